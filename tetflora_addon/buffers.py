@@ -1,0 +1,52 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the engine hands to Blender: one mesh as plain arrays, in Blender's own memory layout."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class MeshBuffers:
+    """One mesh, ready to be copied into a Blender mesh without any further computation.
+
+    Attributes
+    ----------
+    positions : (v, 3) float32
+        Vertices, metres, world space.
+    edge_verts : (e, 2) int32
+        The two vertices of each edge.
+    corner_verts, corner_edges : (c,) int32
+        Vertex of each face corner, and the edge that leads from it to the next corner.
+    face_offsets : (f + 1,) int32
+        Where each face's corners start; the last entry is ``c``.
+    attributes : mapping of str to (str, ndarray)
+        Name to domain (``'POINT'``, ``'FACE'`` or ``'CORNER'``) and values: ``(n,)``, ``(n, 2)`` or ``(n, 3)`` float32,
+        or ``(n,)`` int32.
+    smooth : bool
+        Whether faces are shaded smooth.
+    """
+
+    positions: NDArray[np.float32]
+    edge_verts: NDArray[np.int32]
+    corner_verts: NDArray[np.int32]
+    corner_edges: NDArray[np.int32]
+    face_offsets: NDArray[np.int32]
+    attributes: Mapping[str, tuple[str, NDArray]] = field(default_factory=dict)
+    smooth: bool = False
+
+    @property
+    def polygons(self) -> int:
+        """Number of faces."""
+        return len(self.face_offsets) - 1
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays together."""
+        arrays = [self.positions, self.edge_verts, self.corner_verts, self.corner_edges, self.face_offsets]
+        return sum(a.nbytes for a in arrays) + sum(a.nbytes for _, a in self.attributes.values())
