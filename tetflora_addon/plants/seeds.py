@@ -1,0 +1,41 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Seeds: all that is stored of a plant before it is needed (paper, section 5)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Seeds:
+    """Plants of a scene as a structure of arrays.
+
+    Attributes
+    ----------
+    identifiers : tuple of str
+        Identifiers of the species that occur, as in the catalogue.
+    species : (n,) int32
+        Index into ``identifiers``.
+    seed : (n,) int64
+        Random seed of each plant; any value.
+    position : (n, 3) float64
+        Where the trunk leaves the ground, metres.
+    frame : (n, 3, 3) float64
+        Rotation of each plant; its columns are the plant's axes in world space, +z along the upright trunk.
+    scale : (n,) float64
+        Uniform scale, greater than zero.
+    """
+
+    identifiers: tuple[str, ...]
+    species: NDArray[np.int32]
+    seed: NDArray[np.int64]
+    position: NDArray[np.float64]
+    frame: NDArray[np.float64]
+    scale: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.seed)

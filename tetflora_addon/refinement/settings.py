@@ -1,0 +1,42 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the user decides about refinement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class RefinementSettings:
+    """Limits of the loop of visibility, refinement and update.
+
+    Attributes
+    ----------
+    cutoff : float
+        Side, in pixels of the final picture, under which a tetrahedron gains nothing from being split (section 6.4).
+    leaf_limit : float
+        Width in pixels from which on leaves are kept as real leaves.
+    block : float
+        Side, in pixels, from which on a visible tetrahedron is split further although all in it will become polygons,
+        so that hidden parts can be told from visible ones.
+    few_polygons : int
+        A tetrahedron that holds fewer polygons than this gains nothing from being split.
+    hidden : float
+        Mean visibility, 0 to 1, under which a tetrahedron counts as hidden.
+    visibility_resolution : int
+        Longer side of the alpha buffer, pixels.
+    max_tetrahedra : int
+        Refinement stops before it makes more.
+    max_levels : int
+        Generations of bisection at most.
+    """
+
+    cutoff: float = 2.0
+    leaf_limit: float = 0.5
+    block: float = 32.0
+    few_polygons: int = 200
+    hidden: float = 0.02
+    visibility_resolution: int = 256
+    max_tetrahedra: int = 400_000
+    max_levels: int = 60

@@ -1,0 +1,47 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a refinement did: one object that the panel, the command line and the benchmarks all read."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+
+
+@dataclass
+class Statistics:
+    """Counts and seconds of one refinement; ``as_dict`` is what JSON output holds.
+
+    Attributes
+    ----------
+    plants : int
+        Plants that took part.
+    polygons_full : int
+        Polygons if every plant were expanded (compiled estimate).
+    polygons_meshed : int
+        Polygons of the plants' meshes that were made.
+    polygons_proxy : int
+        Faces that proxies are drawn with.
+    tetrahedra_made, tetrahedra_terminal, tetrahedra_proxy : int
+        All tetrahedra ever made; those that are not divided further; those of them that are drawn as approximations.
+    levels : int
+        Passes through the loop.
+    seconds : dict of str to float
+        Wall clock by stage: ``read``, ``compile``, ``refine``, ``emit``.
+    memory_mb : float
+        Estimated megabytes of the meshes that were handed to Blender.
+    """
+
+    plants: int = 0
+    polygons_full: int = 0
+    polygons_meshed: int = 0
+    polygons_proxy: int = 0
+    tetrahedra_made: int = 0
+    tetrahedra_terminal: int = 0
+    tetrahedra_proxy: int = 0
+    levels: int = 0
+    seconds: dict[str, float] = field(default_factory=dict)
+    memory_mb: float = 0.0
+
+    def as_dict(self) -> dict:
+        """Plain dictionary, ready for JSON."""
+        return asdict(self)
