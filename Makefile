@@ -1,0 +1,65 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+#
+# Everything a developer runs. Needs make and a Python 3.13 or 3.11; the rest goes into .venv by itself.
+
+VENV ?= .venv
+VERSIONS ?= 3.13 3.11
+PY = $(VENV)/bin/python
+
+# The second Blender, 4.5 LTS, has an environment of its own.
+LTS_VENV = .venv-4.5
+LTS_VERSIONS = 3.11
+
+export PYTHON
+export PYTHONDONTWRITEBYTECODE = 1
+
+.PHONY: help environment demo test test-lts lint build bench docs-images clean
+.DEFAULT_GOAL := help
+
+help:
+	@echo 'make demo         a forest of eighty trees: out/demo/{cycles,eevee,top}.png, demo.blend, stats.json'
+	@echo 'make test         all tests that need no full Blender, on bpy'
+	@echo 'make test-lts     the same on Blender 4.5 LTS (Python 3.11)'
+	@echo 'make lint         style, and the rules of the house'
+	@echo 'make build        the extension for Blender: dist/tetflora-VERSION.zip'
+	@echo 'make bench        benchmarks against their targets'
+	@echo 'make docs-images  the pictures of the documentation, made anew'
+	@echo 'make clean        removes environments and everything that was made'
+	@echo
+	@echo 'PYTHON=/path/to/python3.13 chooses the Python; otherwise 3.13 or 3.11 is looked for in PATH and pyenv.'
+	@echo 'Set BLENDER=/path/to/blender and run .ci/run for the tests in a full Blender.'
+
+environment: $(VENV)/.ready
+
+$(VENV)/.ready: pyproject.toml devtools/environment.py
+	@python=$$(sh devtools/find_python.sh $(VERSIONS)) && "$$python" -m devtools.environment $(VENV)
+
+demo: environment
+	$(PY) -m examples.demo --out out/demo
+
+# Two runs: the first never has Blender in its process, as the engine should not need it.
+test: environment
+	$(PY) -m pytest -q -n 2 tests/engine
+	$(PY) -m pytest -q -n 2 --dist loadfile tests/blender tests/packaging
+
+test-lts:
+	@$(MAKE) --no-print-directory test VENV='$(LTS_VENV)' VERSIONS='$(LTS_VERSIONS)'
+
+lint: environment
+	$(PY) -m ruff check .
+	$(PY) -m ruff format --check .
+	$(PY) -m devtools.house
+
+build: environment
+	$(PY) -m devtools.build
+
+bench: environment
+	$(PY) -m benchmarks all
+
+docs-images: environment
+	$(PY) -m examples.docs_images
+
+clean:
+	rm -rf $(VENV) $(LTS_VENV) out dist .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
