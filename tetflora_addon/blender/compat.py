@@ -1,0 +1,61 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The only place that knows which Blender this is; every branch asks for a feature, none for a version number."""
+
+from __future__ import annotations
+
+import bpy
+
+EEVEE_ENGINES = ("BLENDER_EEVEE", "BLENDER_EEVEE_NEXT")
+PHYSICAL_SKIES = ("MULTIPLE_SCATTERING", "NISHITA")
+
+
+def _first_of(owner: type, attribute: str, wanted: tuple[str, ...]) -> str:
+    known = {item.identifier for item in owner.bl_rna.properties[attribute].enum_items}
+    for identifier in wanted:
+        if identifier in known:
+            return identifier
+    raise LookupError(f"{owner.__name__}.{attribute} has none of {', '.join(wanted)}; this Blender is not supported")
+
+
+def eevee_engine() -> str:
+    """Identifier of EEVEE for ``scene.render.engine``: 4.x called its rewrite "next"."""
+    return _first_of(bpy.types.RenderSettings, "engine", EEVEE_ENGINES)
+
+
+def is_eevee(engine: str) -> bool:
+    """Whether a render engine's identifier means EEVEE, under either name."""
+    return engine in EEVEE_ENGINES
+
+
+def physical_sky_type() -> str:
+    """Value of ``ShaderNodeTexSky.sky_type`` for a physical atmosphere with a sun: 5.x replaced Nishita's."""
+    return _first_of(bpy.types.ShaderNodeTexSky, "sky_type", PHYSICAL_SKIES)
+
+
+def shader_tree(owner: bpy.types.Material | bpy.types.World | bpy.types.Light) -> bpy.types.NodeTree:
+    """Node tree of a material, world or light, made if there is none.
+
+    From 5.0 on new datablocks have one from the start, and touching ``use_nodes`` warns of its removal; 4.5 makes the
+    tree when ``use_nodes`` is set.
+    """
+    if owner.node_tree is None:
+        owner.use_nodes = True
+    return owner.node_tree
+
+
+def set_still_format(settings: bpy.types.ImageFormatSettings, file_format: str) -> None:
+    """Choose a still picture's file format: from 5.0 on the media type has to allow it first."""
+    if hasattr(settings, "media_type"):
+        settings.media_type = "IMAGE"
+    settings.file_format = file_format
+
+
+def disable_bump_correction(material: bpy.types.Material) -> None:
+    """Let a material's custom normals be; Cycles otherwise darkens them as if they were bump maps.
+
+    The setting belongs to the Cycles add-on, which may be switched off; then there is nothing to correct.
+    """
+    cycles = getattr(material, "cycles", None)
+    if cycles is not None and hasattr(cycles, "use_bump_map_correction"):
+        cycles.use_bump_map_correction = False
