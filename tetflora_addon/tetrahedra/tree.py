@@ -1,0 +1,270 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The binary tree of planes: tetrahedra at its terminals, cutting planes at its inner nodes (paper, section 4).
+
+A structure of arrays, one row a node. Rows are only ever appended: a node keeps its number, and children have higher
+numbers than their parents. All walks go level by level over all nodes at once.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .bisection import bisect
+from .geometry import plane_distance
+
+#: Points that `TetrahedralTree.locate` takes down the tree at a time; bounds its memory to some tens of megabytes.
+POINTS_AT_ONCE = 1 << 18
+
+
+class TetrahedralTree:
+    """Binary tree of planes over a convex region of space.
+
+    Node 0 is the root. Inner nodes near it may be convex regions without a tetrahedron; terminal nodes are tetrahedra
+    once `split` is used (`tetflora_addon.tetrahedra.roots` sees to that).
+
+    Parameters
+    ----------
+    vertices : (4, 3) float64, optional
+        Tetrahedron of the root, positively oriented, metres. Without it the root is a region to be divided by
+        `divide`.
+    """
+
+    def __init__(self, vertices: ArrayLike | None = None) -> None:
+        self._size = 0
+        self._made = 0
+        self._rows = {
+            "plane": np.zeros((0, 4)),
+            "children": np.zeros((0, 2), np.int32),
+            "parent": np.zeros(0, np.int32),
+            "level": np.zeros(0, np.int16),
+            "inside": np.zeros(0, np.bool_),
+            "vertices": np.zeros((0, 4, 3)),
+        }
+        self._inner_by_level: tuple[int, list[NDArray[np.intp]]] = (-1, [])
+        self._append(np.full(1, -1, np.int32), np.zeros(1, np.int16), np.zeros(1, np.bool_))
+        if vertices is not None:
+            self.place(np.zeros(1, np.intp), np.asarray(vertices, np.float64)[None])
+
+    def __len__(self) -> int:
+        return self._size
+
+    @property
+    def children(self) -> NDArray[np.int32]:
+        """Node numbers ``(len, 2)`` of the children on sides 0 and 1; −1 where the node is terminal."""
+        return self._rows["children"][: self._size]
+
+    @property
+    def parent(self) -> NDArray[np.int32]:
+        """Parent ``(len,)`` of each node; −1 for the root."""
+        return self._rows["parent"][: self._size]
+
+    @property
+    def level(self) -> NDArray[np.int16]:
+        """Steps ``(len,)`` from the root to each node."""
+        return self._rows["level"][: self._size]
+
+    @property
+    def inside(self) -> NDArray[np.bool_]:
+        """Whether each node ``(len,)`` lies within the view for which the root was made."""
+        return self._rows["inside"][: self._size]
+
+    @property
+    def tetrahedra_made(self) -> int:
+        """Number of nodes that are tetrahedra, terminal or divided."""
+        return self._made
+
+    @property
+    def levels(self) -> int:
+        """Number of levels; 1 for a root alone."""
+        return int(self.level.max()) + 1
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes that the arrays take, spare rows included."""
+        return sum(rows.nbytes for rows in self._rows.values())
+
+    def vertices(self, nodes: ArrayLike) -> NDArray[np.float64]:
+        """Tetrahedra ``(n, 4, 3)`` float64 of nodes ``(n,)``, metres; NaN for regions without one."""
+        return self._rows["vertices"][: self._size][nodes]
+
+    def planes(self, nodes: ArrayLike) -> NDArray[np.float64]:
+        """Cutting planes ``(n, 4)`` float64 of nodes ``(n,)``; zeros where the node is terminal."""
+        return self._rows["plane"][: self._size][nodes]
+
+    def terminals(self) -> NDArray[np.intp]:
+        """Numbers ``(t,)`` of the nodes that are not divided, ascending."""
+        return np.flatnonzero(self.children[:, 0] < 0)
+
+    def split(self, nodes: ArrayLike) -> NDArray[np.int32]:
+        """Divide terminal tetrahedra by longest-edge bisection.
+
+        Parameters
+        ----------
+        nodes : (n,) int
+            Terminal nodes with a tetrahedron, each once.
+
+        Returns
+        -------
+        (n, 2) int32
+            The children on sides 0 and 1 of the planes; they inherit `inside`.
+
+        Raises
+        ------
+        ValueError
+            If a node is not terminal, has no tetrahedron, or occurs twice.
+        """
+        nodes = np.asarray(nodes, np.intp)
+        vertices = self.vertices(nodes)
+        if np.isnan(vertices[:, 0, 0]).any():
+            raise ValueError("only nodes with a tetrahedron can be bisected; divide regions by a plane instead")
+        planes, halves = bisect(vertices)
+        children = self.divide(nodes, planes)
+        self.place(children.ravel(), halves.reshape(-1, 4, 3))
+        return children
+
+    def divide(self, nodes: ArrayLike, planes: ArrayLike) -> NDArray[np.int32]:
+        """Divide terminal nodes by given planes; the children have no tetrahedra until `place` gives them some.
+
+        Parameters
+        ----------
+        nodes : (n,) int
+            Terminal nodes, each once.
+        planes : (n, 4) float64
+            Cutting planes ``(nx, ny, nz, d)``, unit normals.
+
+        Returns
+        -------
+        (n, 2) int32
+            The children on sides 0 and 1; they inherit `inside`.
+
+        Raises
+        ------
+        ValueError
+            If a node is not terminal or occurs twice.
+        """
+        nodes = np.asarray(nodes, np.intp)
+        if (self.children[nodes, 0] >= 0).any() or (len(nodes) and np.bincount(nodes).max() > 1):
+            raise ValueError("only terminal nodes can be divided, and each only once")
+        first = self._size
+        self._append(
+            np.repeat(nodes.astype(np.int32), 2),
+            np.repeat(self.level[nodes] + np.int16(1), 2),
+            np.repeat(self.inside[nodes], 2),
+        )
+        made = np.arange(first, self._size, dtype=np.int32).reshape(-1, 2)
+        self.children[nodes] = made
+        self._rows["plane"][nodes] = planes
+        return made
+
+    def place(self, nodes: ArrayLike, vertices: ArrayLike) -> None:
+        """Give nodes ``(n,)`` that have none their tetrahedra ``(n, 4, 3)``, positively oriented, metres."""
+        self._rows["vertices"][nodes] = vertices
+        self._made += len(np.atleast_1d(nodes))
+
+    def mark_inside(self, nodes: ArrayLike) -> None:
+        """Say of nodes ``(n,)``, before they are divided, that they lie within the view."""
+        self._rows["inside"][nodes] = True
+
+    def order(self, eye: ArrayLike | None = None, direction: ArrayLike | None = None) -> NDArray[np.int32]:
+        """Front-to-back rank of each terminal; exact for any eye, as in a BSP tree (paper, section 4).
+
+        At every plane the eye's side comes first. Ranks are offsets in that traversal, found without walking it:
+        terminals are counted from the deepest level upwards, and places handed out from the root downwards.
+
+        Parameters
+        ----------
+        eye : (3,) float64, optional
+            Where rays start, metres, world space.
+        direction : (3,) float64, optional
+            Common direction of parallel rays; used if ``eye`` is None.
+
+        Returns
+        -------
+        (len,) int32
+            0 for the nearest terminal and so on; −1 for inner nodes. Back to front is the reverse.
+
+        Raises
+        ------
+        ValueError
+            If neither an eye nor a direction is given.
+        """
+        if eye is None and direction is None:
+            raise ValueError("a visibility order needs an eye or a direction")
+        children, inner = self.children, self._levels_of_inner()
+        count = np.ones(self._size, np.int32)
+        for nodes in reversed(inner):
+            count[nodes] = count[children[nodes, 0]] + count[children[nodes, 1]]
+        place = np.zeros(self._size, np.int32)
+        for nodes in inner:
+            planes = self.planes(nodes)
+            if eye is not None:
+                near = plane_distance(planes, np.asarray(eye, np.float64)) >= 0.0
+            else:
+                # The eye is infinitely far back along the direction.
+                near = planes[:, :3] @ np.asarray(direction, np.float64) < 0.0
+            first = np.where(near, children[nodes, 1], children[nodes, 0])
+            second = np.where(near, children[nodes, 0], children[nodes, 1])
+            place[first] = place[nodes]
+            place[second] = place[nodes] + count[first]
+        place[children[:, 0] >= 0] = -1
+        return place
+
+    def locate(self, points: ArrayLike) -> NDArray[np.int32]:
+        """Terminal that holds each point; points outside the root go to the one on their side of all planes.
+
+        Parameters
+        ----------
+        points : (n, 3) float64
+            Metres, world space.
+
+        Returns
+        -------
+        (n,) int32
+            Node numbers. A point on a plane belongs to side 1.
+        """
+        points = np.asarray(points, np.float64).reshape(-1, 3)
+        found = np.zeros(len(points), np.int32)
+        for start in range(0, len(points), POINTS_AT_ONCE):
+            part = slice(start, start + POINTS_AT_ONCE)
+            found[part] = self._descend(points[part])
+        return found
+
+    def _descend(self, points: NDArray[np.float64]) -> NDArray[np.int32]:
+        node = np.zeros(len(points), np.int32)
+        moving = np.arange(len(points) if self.children[0, 0] >= 0 else 0)
+        while len(moving):
+            at = node[moving]
+            side = plane_distance(self.planes(at), points[moving]) >= 0.0
+            node[moving] = at = self.children[at, side.astype(np.intp)]
+            moving = moving[self.children[at, 0] >= 0]
+        return node
+
+    def _levels_of_inner(self) -> list[NDArray[np.intp]]:
+        """Inner nodes of each level that has some, from the root down; kept until the tree grows."""
+        if self._inner_by_level[0] != self._size:
+            inner = np.flatnonzero(self.children[:, 0] >= 0)
+            levels = self.level[inner]
+            # Stable sorting of 16-bit integers is a radix sort: linear in the number of nodes.
+            by_level = inner[np.argsort(levels, kind="stable")]
+            groups = np.split(by_level, np.cumsum(np.bincount(levels))[:-1]) if len(inner) else []
+            self._inner_by_level = (self._size, groups)
+        return self._inner_by_level[1]
+
+    def _append(self, parent: NDArray[np.int32], level: NDArray[np.int16], inside: NDArray[np.bool_]) -> None:
+        """Add terminal nodes without tetrahedra; capacity doubles, so that each row is copied twice on average."""
+        start, end = self._size, self._size + len(parent)
+        if end > len(self._rows["parent"]):
+            capacity = max(64, end, 2 * len(self._rows["parent"]))
+            for name, rows in self._rows.items():
+                grown = np.zeros((capacity, *rows.shape[1:]), rows.dtype)
+                grown[:start] = rows[:start]
+                self._rows[name] = grown
+        new = slice(start, end)
+        self._rows["parent"][new] = parent
+        self._rows["level"][new] = level
+        self._rows["inside"][new] = inside
+        self._rows["children"][new] = -1
+        self._rows["vertices"][new] = np.nan
+        self._size = end
