@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fixtures for tests that need Blender; those in tests/engine use none of them and never import bpy."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from devtools import build, session
+
+
+@pytest.fixture(scope="session")
+def blender() -> Iterator[ModuleType]:
+    """The extension's package, enabled from the source tree; one Blender serves all tests of a process."""
+    yield session.start()
+    session.stop()
+
+
+@pytest.fixture
+def clean_file(blender: ModuleType) -> ModuleType:
+    """The same, with an empty file: one scene, nothing in it."""
+    session.clean_file()
+    return blender
+
+
+@pytest.fixture(scope="session")
+def extension_zip(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The zip that users install. ``TETFLORA_ZIP`` names one that stands already."""
+    ready = os.environ.get("TETFLORA_ZIP")
+    return Path(ready).resolve() if ready else build.build(tmp_path_factory.mktemp("dist"))
+
+
+@pytest.fixture(scope="session")
+def full_blender() -> str:
+    """The full Blender that ``BLENDER`` names; tests that use it are only run where there is one."""
+    path = os.environ.get("BLENDER")
+    if not path:
+        pytest.fail("tests in a full Blender need BLENDER=/path/to/blender", pytrace=False)
+    return str(Path(path).absolute())
