@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The catalogue: species files shipped with the extension, and folders of the user's own."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from ..errors import SpeciesError
+from .schema import read_species
+from .species import Species
+
+
+@dataclass(frozen=True)
+class SpeciesInfo:
+    """What a menu shows of a species, without reading it in full."""
+
+    identifier: str
+    name: str
+    description: str
+    path: Path
+
+
+def builtin_folder() -> Path:
+    """Folder of the species files that are shipped."""
+    return Path(__file__).resolve().parent.parent / "catalogue"
+
+
+@lru_cache(maxsize=512)
+def _info(path: Path, _stamp: tuple[int, int]) -> SpeciesInfo:
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+        name, description = str(data.get("name", path.stem)), str(data.get("description", ""))
+    except (OSError, ValueError, AttributeError):
+        name, description = path.stem, "This file cannot be read; choosing the species tells why"
+    return SpeciesInfo(path.stem, name, description, path)
+
+
+@lru_cache(maxsize=256)
+def _species(path: Path, _stamp: tuple[int, int]) -> Species:
+    return read_species(path)
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    status = path.stat()
+    return status.st_mtime_ns, status.st_size
+
+
+def list_species(folders: Sequence[Path] = ()) -> dict[str, SpeciesInfo]:
+    """All species by identifier, sorted by name.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        Folders of the user's own; a file there replaces a shipped one of the same name. Missing folders are passed over.
+    """
+    found: dict[str, SpeciesInfo] = {}
+    for folder in (builtin_folder(), *folders):
+        if folder.is_dir():
+            for path in sorted(folder.glob("*.json")):
+                found[path.stem] = _info(path, _stamp(path))
+    return dict(sorted(found.items(), key=lambda item: item[1].name.lower()))
+
+
+def load_species(identifier: str, folders: Sequence[Path] = ()) -> Species:
+    """Read a species; unchanged files are read once.
+
+    Raises
+    ------
+    SpeciesError
+        Unknown identifier (the message lists the known ones), or a broken file.
+    """
+    known = list_species(folders)
+    if identifier not in known:
+        raise SpeciesError(f"Unknown species \"{identifier}\"; the catalogue has {', '.join(known) or 'none'}")
+    path = known[identifier].path
+    return _species(path, _stamp(path))

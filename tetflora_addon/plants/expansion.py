@@ -1,0 +1,51 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Opening sub-plants into their branches, one order at a time or all the way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .compiled import Flora
+from .growth import Branches, axes, children
+from .pieces import Pieces, whole_pieces
+
+
+def open_subplants(flora: Flora, subplants: Branches) -> tuple[Branches, NDArray[np.int64], Pieces, NDArray[np.int64]]:
+    """Open sub-plants into the sub-plants of the next order and the pieces of their own branch.
+
+    Returns
+    -------
+    Branches, (m,) int64, Pieces, (k,) int64
+        Children with the index of the sub-plant that each comes from, and pieces with theirs.
+    """
+    lines = axes(flora.rows, subplants)
+    pieces, piece_owner = whole_pieces(subplants, lines)
+    grown, owner = children(flora.rows, subplants, lines)
+    return grown, owner, pieces, piece_owner
+
+
+def expand(flora: Flora, subplants: Branches) -> Pieces:
+    """All branches of sub-plants, to the last twig, as pieces.
+
+    Notes
+    -----
+    Memory grows with the number of branches; split the sub-plants with `chunks` where there are many.
+    """
+    parts = [Pieces.empty()]
+    while len(subplants):
+        subplants, _, pieces, _ = open_subplants(flora, subplants)
+        parts.append(pieces)
+    return Pieces.concatenate(parts)
+
+
+def chunks(polygons: NDArray[np.float64], limit: float) -> Iterator[slice]:
+    """Runs of things whose expected polygons (n,) sum up to about a limit each."""
+    block = (np.cumsum(polygons) / limit).astype(np.int64)
+    edges = np.flatnonzero(np.diff(block)) + 1
+    for start, stop in zip([0, *edges], [*edges, len(polygons)], strict=True):
+        if stop > start:
+            yield slice(int(start), int(stop))

@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pieces of branches: straight parts of an axis with the leaves on them, what is left when a branch is clipped (paper, 6.5)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .compiled import Flora, tube_perimeter
+from .growth import Axes, Branches, spread
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Parts of branches, each within one straight segment.
+
+    Attributes
+    ----------
+    branches : Branches of n
+        The whole branch that each piece is part of; enough to make its wood and leaves.
+    t0, t1 : (n,) float64
+        The part's ends as fractions of the branch's axis.
+    start, end : (n, 3) float64
+        The same ends in space, metres.
+    """
+
+    branches: Branches
+    t0: NDArray[np.float64]
+    t1: NDArray[np.float64]
+    start: NDArray[np.float64]
+    end: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.t0)
+
+    def take(self, index: NDArray | slice) -> Pieces:
+        """Selection by indices, mask or slice."""
+        return Pieces(self.branches.take(index), self.t0[index], self.t1[index], self.start[index], self.end[index])
+
+    @classmethod
+    def concatenate(cls, parts: Sequence[Pieces]) -> Pieces:
+        """All pieces of several in one."""
+        rest = (np.concatenate([getattr(p, name) for p in parts]) for name in ("t0", "t1", "start", "end"))
+        return cls(Branches.concatenate([p.branches for p in parts]), *rest)
+
+    @classmethod
+    def empty(cls) -> Pieces:
+        """No pieces."""
+        return cls(Branches.empty(), np.zeros(0), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
+
+
+def whole_pieces(branches: Branches, lines: Axes) -> tuple[Pieces, NDArray[np.int64]]:
+    """All segments of branches as pieces, and the index of the branch of each."""
+    owner, segment = spread(lines.segments)
+    number = lines.segments[owner]
+    pieces = Pieces(
+        branches.take(owner),
+        segment / number,
+        (segment + 1) / number,
+        lines.knots[owner, segment],
+        lines.knots[owner, segment + 1],
+    )
+    return pieces, owner
+
+
+def clipped(pieces: Pieces, distance_start: NDArray[np.float64], distance_end: NDArray[np.float64]) -> tuple[Pieces, Pieces]:
+    """Cut pieces that cross a plane.
+
+    Parameters
+    ----------
+    pieces : Pieces of n
+    distance_start, distance_end : (n,) float64
+        Signed distances of the ends from the plane, of opposite sign.
+
+    Returns
+    -------
+    tuple of Pieces
+        The halves at the start and at the end, n each.
+    """
+    share = distance_start / (distance_start - distance_end)
+    t = pieces.t0 + share * (pieces.t1 - pieces.t0)
+    middle = pieces.start + share[:, None] * (pieces.end - pieces.start)
+    return (
+        Pieces(pieces.branches, pieces.t0, t, pieces.start, middle),
+        Pieces(pieces.branches, t, pieces.t1, middle, pieces.end),
+    )
+
+
+def leaf_fraction(flora: Flora, pieces: Pieces) -> NDArray[np.float64]:
+    """Expected share (n,) of a branch's own leaves that sit on each piece."""
+    start = flora.rows["leaf_start"][pieces.branches.row]
+    return np.clip(np.maximum(pieces.t1, start) - np.maximum(pieces.t0, start), 0, None) / (1 - start)
+
+
+def wood_areas(flora: Flora, pieces: Pieces) -> NDArray[np.float64]:
+    """Surface (n,) of the wood of each piece, m²: perimeter × length at the mean radius."""
+    row = pieces.branches.row
+    middle = 1 - (1 - flora.rows["taper"][row]) * (pieces.t0 + pieces.t1) / 2
+    perimeter = tube_perimeter(flora.rows["sides"][row]) * pieces.branches.radius * middle
+    return perimeter * pieces.branches.length * (pieces.t1 - pieces.t0)

@@ -1,0 +1,266 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reading a species file: every key with its type and allowed range, every mistake named.
+
+The tables below are the reference of the file format; `docs/species.md` is written from them.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import SpeciesError
+from .crown_shapes import CROWN_SHAPES
+from .leaf_models import LEAF_MODELS, LeafModel, leaf_model
+from .species import MAX_ORDERS, Colour, Order, Range, Species
+
+FORMAT = 1
+MAX_FILE_BYTES = 4_000_000
+MAX_POLYGONS = 20_000_000
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key of an order: what it holds, within which range, and what it means.
+
+    Attributes
+    ----------
+    kind : {'range', 'number', 'integer', 'shape', 'colour'}
+        A range is written ``[mean, variation]``; mean − variation and mean + variation both have to lie in the limits.
+    low, high : float
+        Limits, inclusive.
+    default : object
+        Used where the key is absent; None means that the key must be there.
+    unit, meaning : str
+        For the documentation and for tooltips.
+    """
+
+    kind: str
+    low: float
+    high: float
+    default: Any
+    unit: str
+    meaning: str
+
+
+ORDER_KEYS: dict[str, Key] = {
+    "length": Key("range", 0.001, 200, None, "m for the trunk, else of the parent's length", "length of a branch"),
+    "thickness": Key(
+        "range", 0.001, 1, None, "of the length for the trunk, else of the parent's radius", "radius at the base"
+    ),
+    "taper": Key("number", 0, 1, 0.3, "of the radius at the base", "radius at the tip"),
+    "segments": Key("integer", 1, 32, 1, "", "straight pieces along a branch"),
+    "sides": Key("integer", 3, 64, 4, "", "faces around a branch"),
+    "curvature": Key("range", -360, 360, [0, 0], "degrees", "bend over the length, positive towards the parent"),
+    "angle": Key("range", 0, 180, [0, 0], "degrees", "from the parent's direction, at the parent's base"),
+    "angle_tip": Key("number", 0, 180, math.nan, "degrees", "the same at the parent's tip (default: as at the base)"),
+    "azimuth": Key("range", -360, 360, [137.5, 10], "degrees", "around the parent from one branch to the next"),
+    "branches": Key("range", 0, 10_000, [0, 0], "", "branches of the next order on one branch"),
+    "branch_start": Key("number", 0, 0.99, 0.1, "of the length", "part of the branch that is bare of branches"),
+    "crown": Key("shape", 0, 0, "cylindrical", "", "how the children's length varies along the branch"),
+    "leaves": Key("range", 0, 10_000, [0, 0], "", "leaves on one branch of this order itself"),
+    "leaf_start": Key("number", 0, 0.99, 0.1, "of the length", "part of the branch that is bare of leaves"),
+    "leaf_size": Key("range", 0.0005, 20, [0.08, 0.02], "m", "length of a leaf"),
+    "leaf_angle": Key("range", 0, 180, [50, 15], "degrees", "between branch and leaf"),
+    "leaf_azimuth": Key("range", -360, 360, [137.5, 20], "degrees", "around the branch from one leaf to the next"),
+    "leaf_light": Key("number", 0, 1, 0.5, "", "how far leaves turn to the sky"),
+    "branch_colour": Key("colour", 0, 1, [[0.16, 0.11, 0.07], [0.04, 0.03, 0.02]], "linear RGB", "colour of bark"),
+    "leaf_colour": Key("colour", 0, 1, [[0.08, 0.19, 0.03], [0.03, 0.06, 0.01]], "linear RGB", "colour of leaves"),
+}
+
+SPECIES_KEYS = ("format", "name", "description", "orders", "leaf", "leaf_transmission")
+LEAF_KEYS = ("model", "object", "vertices", "faces", "uv")
+
+
+class _Reader:
+    """Names the file and the key in every complaint."""
+
+    def __init__(self, source: str) -> None:
+        self.source = source
+
+    def fail(self, key: str, problem: str) -> SpeciesError:
+        return SpeciesError(f"{self.source}: {key}: {problem}")
+
+    def number(self, value: Any, key: str, low: float, high: float) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.fail(key, f"must be a number from {low:g} to {high:g}, is {_shown(value)}")
+        if not low <= value <= high:  # false for NaN as well
+            raise self.fail(key, f"must be from {low:g} to {high:g}, is {_shown(value)}")
+        return float(value)
+
+    def range(self, value: Any, key: str, low: float, high: float) -> Range:
+        if not isinstance(value, list) or len(value) != 2:
+            raise self.fail(key, f"must be [mean, variation] within {low:g} to {high:g}, is {_shown(value)}")
+        mean = self.number(value[0], f"{key}[0] (mean)", low, high)
+        variation = self.number(value[1], f"{key}[1] (variation)", 0, high - low)
+        if mean - variation < low - 1e-12 or mean + variation > high + 1e-12:
+            raise self.fail(
+                key, f"mean ± variation is {mean - variation:g} to {mean + variation:g}, must be from {low:g} to {high:g}"
+            )
+        return Range(mean, variation)
+
+    def colour(self, value: Any, key: str) -> Colour:
+        form = "[[r, g, b], [variation of each]]"
+        if not (isinstance(value, list) and len(value) == 2 and all(isinstance(v, list) and len(v) == 3 for v in value)):
+            raise self.fail(key, f"must be {form} with numbers from 0 to 1, is {_shown(value)}")
+        channels = [self.range([m, v], f"{key}.{c}", 0, 1) for m, v, c in zip(*value, "rgb", strict=True)]
+        return Colour(tuple(c.mean for c in channels), tuple(c.variation for c in channels))
+
+    def keys(self, value: Any, key: str, allowed: Mapping[str, Any] | tuple[str, ...]) -> None:
+        if not isinstance(value, dict):
+            raise self.fail(key, f"must be an object {{…}}, is {_shown(value)}")
+        for name in value:
+            if name not in allowed:
+                raise self.fail(f"{key}.{name}" if key else name, f"unknown key; allowed are {', '.join(allowed)}")
+
+    def text(self, value: Any, key: str) -> str:
+        if not isinstance(value, str) or not value.strip() or len(value) > 1000:
+            raise self.fail(key, f"must be a text of 1 to 1000 characters, is {_shown(value)}")
+        return value
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _read_order(reader: _Reader, data: Any, index: int, last: bool) -> Order:
+    where = f"orders[{index}]"
+    reader.keys(data, where, ORDER_KEYS)
+    values: dict[str, Any] = {}
+    for name, key in ORDER_KEYS.items():
+        path = f"{where}.{name}"
+        value = data.get(name, key.default)
+        if value is None:
+            raise reader.fail(path, f"missing; must be {_expected(key)}")
+        if name not in data and name == "angle_tip":
+            value = values["angle"].mean
+        high = 20.0 if name == "length" and index > 0 else key.high
+        readers: dict[str, Callable[[], Any]] = {
+            "range": lambda value=value, path=path, key=key, high=high: reader.range(value, path, key.low, high),
+            "number": lambda value=value, path=path, key=key: reader.number(value, path, key.low, key.high),
+            "colour": lambda value=value, path=path: reader.colour(value, path),
+        }
+        if key.kind in readers:
+            values[name] = readers[key.kind]()
+        elif key.kind == "integer":
+            number = reader.number(value, path, key.low, key.high)
+            if number != int(number):
+                raise reader.fail(path, f"must be a whole number, is {_shown(value)}")
+            values[name] = int(number)
+        elif value not in CROWN_SHAPES:
+            raise reader.fail(path, f"must be one of {', '.join(CROWN_SHAPES)}; is {_shown(value)}")
+        else:
+            values[name] = value
+    if last and values["branches"].high > 0:
+        raise reader.fail(f"{where}.branches", "must be [0, 0]: no order follows that could describe these branches")
+    return Order(**values)
+
+
+def _expected(key: Key) -> str:
+    if key.kind == "range":
+        return f"[mean, variation] within {key.low:g} to {key.high:g}"
+    return f"a number from {key.low:g} to {key.high:g}"
+
+
+def _read_leaf(reader: _Reader, data: Any) -> LeafModel | str:
+    reader.keys(data, "leaf", LEAF_KEYS)
+    forms = [k for k in ("model", "object", "vertices") if k in data]
+    if len(forms) != 1:
+        raise reader.fail("leaf", "needs exactly one of model (built-in), object (Blender mesh) or vertices with faces")
+    if "model" in data:
+        if data["model"] not in LEAF_MODELS:
+            raise reader.fail("leaf.model", f"must be one of {', '.join(LEAF_MODELS)}; is {_shown(data['model'])}")
+        return LEAF_MODELS[data["model"]]
+    if "object" in data:
+        return reader.text(data["object"], "leaf.object")
+    faces = data.get("faces")
+    if not isinstance(faces, list) or not all(
+        isinstance(f, list) and all(isinstance(v, int) and not isinstance(v, bool) for v in f) for f in faces
+    ):
+        raise reader.fail("leaf.faces", "must be a list of faces, each a list of vertex indices")
+    try:
+        return leaf_model(data["vertices"], faces, data.get("uv"))
+    except SpeciesError as error:
+        raise reader.fail("leaf", str(error)) from None
+    except (TypeError, ValueError):
+        raise reader.fail("leaf.vertices", "must be a list of [x, y, z]; uv a list of [u, v]") from None
+
+
+def expected_counts(orders: tuple[Order, ...]) -> tuple[list[float], list[float]]:
+    """Mean number of branches and of leaves of each order on one plant."""
+    branches, leaves, number = [], [], 1.0
+    for order in orders:
+        branches.append(number)
+        leaves.append(number * order.leaves.mean)
+        number *= order.branches.mean
+    return branches, leaves
+
+
+def species_from_dict(data: Any, identifier: str, source: str) -> Species:
+    """Check a decoded species file and turn it into a `Species`.
+
+    Parameters
+    ----------
+    data : object
+        What `json.load` gave.
+    identifier : str
+        Name by which plants refer to the species.
+    source : str
+        Named in errors, usually the file's path.
+
+    Raises
+    ------
+    SpeciesError
+        Names the source, the key and what is allowed.
+    """
+    reader = _Reader(source)
+    reader.keys(data, "", SPECIES_KEYS)
+    for key in ("format", "name", "orders", "leaf"):
+        if key not in data:
+            raise reader.fail(key, "missing")
+    if data["format"] != FORMAT or isinstance(data["format"], bool):
+        raise reader.fail("format", f"must be {FORMAT} for this version of TetFlora, is {_shown(data['format'])}")
+    orders = data["orders"]
+    if not isinstance(orders, list) or not 1 <= len(orders) <= MAX_ORDERS:
+        found = len(orders) if isinstance(orders, list) else _shown(orders)
+        raise reader.fail("orders", f"must be a list of 1 to {MAX_ORDERS} orders, has {found}")
+    read = tuple(_read_order(reader, o, i, i == len(orders) - 1) for i, o in enumerate(orders))
+    leaf = _read_leaf(reader, data["leaf"])
+    branches, leaves = expected_counts(read)
+    polygons = sum(n * o.sides * o.segments for n, o in zip(branches, read, strict=True))
+    polygons += sum(leaves) * (leaf.polygons if isinstance(leaf, LeafModel) else 1)
+    if polygons > MAX_POLYGONS:
+        raise reader.fail("orders", f"one plant would have {polygons:.3g} polygons, at most {MAX_POLYGONS:.0g} are allowed")
+    return Species(
+        identifier=identifier,
+        name=reader.text(data["name"], "name"),
+        description=str(data.get("description", "")),
+        orders=read,
+        leaf=leaf,
+        leaf_transmission=reader.number(data.get("leaf_transmission", 0.4), "leaf_transmission", 0, 1),
+    )
+
+
+def read_species(path: Path) -> Species:
+    """Read and check one species file.
+
+    Raises
+    ------
+    SpeciesError
+        The file cannot be read, is not JSON, or breaks a rule of the format.
+    """
+    try:
+        if path.stat().st_size > MAX_FILE_BYTES:
+            raise SpeciesError(f"{path.name}: larger than {MAX_FILE_BYTES:,} bytes")
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SpeciesError(f"{path.name}: cannot be read: {error.strerror}") from None
+    except (UnicodeDecodeError, RecursionError, ValueError) as error:
+        raise SpeciesError(f"{path.name}: is not valid JSON: {error}") from None
+    return species_from_dict(data, path.stem, path.name)
