@@ -1,0 +1,398 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tetrahedra and triangles to a small image of the camera's window (paper, section 6.3), many at once.
+
+Pixels are counted row by row from the lower left corner, ``pixel = row · width + column``. A ray starts at the eye
+(``'PERSP'``) or on the plane of depth 0 (``'ORTHO'``) and goes through a pixel's centre; positions on it are metres
+along it. Nothing nearer than the near plane or beyond the far plane is seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..tetrahedra.geometry import EDGES, face_area_vectors, projected_area, volume
+from .camera import Camera
+
+#: Pairs of a primitive and a pixel of its bounding box that are looked at together; some 100 bytes each.
+PAIRS_AT_ONCE = 1 << 19
+
+#: Primitives whose bounding boxes are computed together.
+PRIMITIVES_AT_ONCE = 1 << 17
+
+#: Shift of the sample from the pixel's centre, in pixels. The view pyramid's own planes run exactly through centres of
+#: pixels; shifted by next to nothing, each ray is on one side of every such plane.
+SHIFT = (1.7e-6, 2.9e-6)
+
+#: Up to this many pixels of silhouette, a tetrahedron counts by its area and mean thickness instead of by samples:
+#: then the optical depth that it brings into the image is exact, however the pixels' centres fall.
+SMALL = 6.0
+
+
+@dataclass(frozen=True)
+class Fragments:
+    """Tetrahedra as seen from pixels, in no particular order.
+
+    Attributes
+    ----------
+    cell : (f,) int32
+        Which tetrahedron.
+    pixel : (f,) int32
+        Which pixel.
+    entry : (f,) float64
+        Where the ray enters, metres along the ray.
+    thickness : (f,) float64
+        Metres of the ray inside.
+    coverage : (f,) float64
+        Pixels that the fragment stands for: 1, or for small tetrahedra their area divided among their fragments.
+    """
+
+    cell: NDArray[np.int32]
+    pixel: NDArray[np.int32]
+    entry: NDArray[np.float64]
+    thickness: NDArray[np.float64]
+    coverage: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.cell)
+
+
+def buffer_size(camera: Camera, resolution: int) -> tuple[int, int]:
+    """Width and height in pixels of a small image whose longer side is ``resolution``, shaped as the picture."""
+    scale = resolution / max(camera.width, camera.height)
+    return max(1, round(camera.width * scale)), max(1, round(camera.height * scale))
+
+
+def pixel_rays(camera: Camera, width: int, height: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Rays through the pixels' centres.
+
+    Parameters
+    ----------
+    camera : Camera
+        Whose window the image shows.
+    width, height : int
+        Size of the image, pixels.
+
+    Returns
+    -------
+    origins, directions : (height · width, 3) float64
+        World space; directions are unit vectors.
+    """
+    x, y = _centres(camera, width, height)
+    grid = np.stack([np.tile(x, height), np.repeat(y, width), np.zeros(width * height)], axis=1)
+    frame = camera.frame * np.array([1.0, 1.0, -1.0])
+    if camera.kind == "ORTHO":
+        return camera.position + grid @ frame.T, np.tile(-camera.frame[:, 2], (width * height, 1))
+    towards = (grid + np.array([0.0, 0.0, 1.0])) @ frame.T
+    return np.tile(camera.position, (width * height, 1)), towards / np.linalg.norm(towards, axis=1, keepdims=True)
+
+
+def silhouette_pixels(vertices: NDArray[np.float64], camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Exact silhouette areas of tetrahedra on the final image.
+
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float64
+        World space, metres.
+    camera : Camera
+        Its ``width`` and ``height`` are the image's.
+
+    Returns
+    -------
+    pixels : (n,) float64
+        Area in pixels; 0 where it is not known.
+    whole : (n,) bool
+        Where it is known: tetrahedra between near and far plane and within the window.
+    """
+    corners, whole = _project(camera.to_camera_space(vertices), camera)
+    left, right, bottom, top = camera.window
+    # A share of the window, so that rounding does not exclude what touches its border, as half of all cells may.
+    slack = 1e-9 * np.array([right - left, top - bottom])
+    whole &= ((corners >= np.array([left, bottom]) - slack) & (corners <= np.array([right, top]) + slack)).all((1, 2))
+    a, b, c, d = (corners[:, i] for i in range(4))
+    # The four faces cover each point of the silhouette twice, whether it is a triangle or a quadrilateral.
+    area = sum(np.abs(_cross(q - p, r - p)) for p, q, r in ((a, b, c), (a, b, d), (a, c, d), (b, c, d))) / 4.0
+    return np.where(whole, area * camera.width * camera.height / ((right - left) * (top - bottom)), 0.0), whole
+
+
+def tetrahedron_fragments(vertices: NDArray[np.float64], camera: Camera, width: int, height: int) -> Fragments:
+    """What the rays through the pixels' centres meet of each tetrahedron.
+
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float64
+        Positively oriented tetrahedra, metres, world space. They may hold the eye or cross its plane.
+    camera : Camera
+        The view.
+    width, height : int
+        Size of the image, pixels.
+
+    Returns
+    -------
+    Fragments
+        One for each pixel whose ray goes through a tetrahedron. One that lies in view between the pixels' centres has
+        a single fragment, in the pixel of its projected centroid. One out of view has none.
+
+    Notes
+    -----
+    A tetrahedron of few pixels (`SMALL`) has as coverage its silhouette's area, shared by its fragments, and as
+    thickness its mean chord V / A: so Σ coverage · thickness over all pixels is its volume, per area of a pixel.
+    """
+    parts = []
+    for start in range(0, len(vertices), PRIMITIVES_AT_ONCE):
+        part = _fragments(vertices[start : start + PRIMITIVES_AT_ONCE], camera, width, height)
+        parts.append((part[0] + start, *part[1:]))
+    if not parts:
+        parts = [(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0))]
+    cell, pixel, entry, thickness, coverage = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    return Fragments(cell.astype(np.int32), pixel.astype(np.int32), entry, thickness, coverage)
+
+
+def occluder_depth(triangles: NDArray[np.float64], camera: Camera, width: int, height: int) -> NDArray[np.float64]:
+    """Where each pixel's ray first meets an opaque triangle.
+
+    Parameters
+    ----------
+    triangles : (t, 3, 3) float64
+        Two-sided triangles, metres, world space. They may cross the eye's plane; those without area or with
+        coordinates that are not finite are ignored.
+    camera : Camera
+        The view.
+    width, height : int
+        Size of the image, pixels.
+
+    Returns
+    -------
+    (height · width,) float64
+        Metres along the ray; infinite where there is nothing.
+    """
+    nearest = np.full(width * height, np.inf)
+    for start in range(0, len(triangles), PRIMITIVES_AT_ONCE):
+        part = np.asarray(triangles[start : start + PRIMITIVES_AT_ONCE], np.float64)
+        _draw_triangles(part[np.isfinite(part).all(axis=(1, 2))], camera, width, height, nearest)
+    return nearest
+
+
+def _fragments(
+    vertices: NDArray[np.float64], camera: Camera, width: int, height: int
+) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
+    """Fragments of as many tetrahedra as fit into memory: cell, pixel, entry, thickness, coverage."""
+    local = camera.to_camera_space(vertices)
+    low, high, middle = _bounds(local, camera)
+    box = _pixel_box(low, high, camera, width, height)
+    # Camera space is mirrored (depth is −z), so outward normals of positive tetrahedra point inwards there.
+    inward = face_area_vectors(local)
+    on_face = local[:, [1, 0, 0, 0]]
+    offset = -np.sum(inward * on_face, axis=2)
+    x, y = _centres(camera, width, height)
+    cells, pixels, entries, thicknesses = [], [], [], []
+    for cell, column, row in _pairs(box):
+        px, py = x[column], y[row]
+        enter, leave = _clip_depths(camera)
+        enter, leave = np.full(len(cell), enter), np.full(len(cell), leave)
+        for face in range(4):
+            nx, ny, nz = (inward[:, face, i][cell] for i in range(3))
+            # Inside where constant + depth · slope >= 0.
+            across = nx * px + ny * py
+            constant, slope = offset[:, face][cell], nz
+            if camera.kind == "ORTHO":
+                constant = constant + across
+            else:
+                slope = slope + across
+            with np.errstate(divide="ignore", invalid="ignore"):
+                crossing = -constant / slope
+            enter = np.maximum(enter, np.where(slope > 0.0, crossing, -np.inf))
+            leave = np.minimum(leave, np.where(slope < 0.0, crossing, np.inf))
+            leave = np.where((slope == 0.0) & (constant < 0.0), -np.inf, leave)
+        hit = np.flatnonzero(leave > enter)
+        metres = _ray_metres(camera, px[hit], py[hit])
+        cells.append(cell[hit])
+        pixels.append(row[hit] * width + column[hit])
+        entries.append(enter[hit] * metres)
+        thicknesses.append((leave[hit] - enter[hit]) * metres)
+    cell, pixel = (np.concatenate([np.zeros(0, np.int64), *arrays]) for arrays in (cells, pixels))
+    entry, thickness = (np.concatenate([np.zeros(0), *arrays]) for arrays in (entries, thicknesses))
+    return _with_small_ones(vertices, camera, (width, height), (low, high, middle), (cell, pixel, entry, thickness))
+
+
+def _with_small_ones(
+    vertices: NDArray[np.float64],
+    camera: Camera,
+    size: tuple[int, int],
+    bounds: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    fragments: tuple[NDArray, NDArray, NDArray, NDArray],
+) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
+    """Add fragments for tetrahedra between the pixels' centres, and set the coverage of all."""
+    cell, pixel, entry, thickness = fragments
+    (width, height), (low, high, middle) = size, bounds
+    left, right, bottom, top = camera.window
+    corner, step = np.array([left, bottom]), np.array([(right - left) / width, (top - bottom) / height])
+    count = np.bincount(cell, minlength=len(vertices))
+    area, whole = silhouette_pixels(vertices, camera)
+    area *= width * height / (camera.width * camera.height)
+    # Of what is partly out of view only the box is known; a tetrahedron fills half of it or less.
+    seen = np.clip((np.minimum(high, [right, top]) - np.maximum(low, corner)) / step, 0.0, None)
+    area = np.where(whole, area, np.minimum(1.0, np.prod(seen, axis=1) / 2.0))
+    with np.errstate(invalid="ignore"):
+        place = (middle - corner) / step
+        visible = ((place >= 0.0) & (place <= [width, height])).all(axis=1) & (area > 0.0)
+    missed = np.flatnonzero((count == 0) & visible)
+    column, row = np.minimum(place[missed].astype(np.int64), [width - 1, height - 1]).T
+    centroid = camera.to_camera_space(vertices[missed].mean(axis=1))
+    depth = np.clip(centroid[:, 2], *_clip_depths(camera))
+    along = depth * _ray_metres(camera, *middle[missed].T)
+    by_area = whole & (area < SMALL) & (count > 0)
+    by_area[missed] = True
+    small = np.flatnonzero(by_area)
+    chord = np.zeros(len(vertices))
+    if camera.kind == "ORTHO":
+        direction = -camera.frame[:, 2]
+    else:
+        direction = vertices[small].mean(axis=1) - camera.position
+        direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-300)
+    across = projected_area(vertices[small], direction)
+    chord[small] = volume(vertices[small]) / np.where(across > 0.0, across, 1.0)
+
+    cell = np.concatenate([cell, missed])
+    pixel = np.concatenate([pixel, row * width + column])
+    entry = np.concatenate([entry, np.maximum(along - chord[missed] / 2.0, 0.0)])
+    thickness = np.concatenate([thickness, chord[missed]])
+    by_area = by_area[cell]
+    thickness = np.where(by_area, chord[cell], thickness)
+    coverage = np.where(by_area, area[cell] / np.maximum(count[cell], 1), 1.0)
+    return cell, pixel, entry, thickness, coverage
+
+
+def _draw_triangles(
+    triangles: NDArray[np.float64], camera: Camera, width: int, height: int, nearest: NDArray[np.float64]
+) -> None:
+    """Lower ``nearest``, metres along each pixel's ray, to where finite triangles are."""
+    local = camera.to_camera_space(triangles)
+    low, high, _ = _bounds(local, camera)
+    box = _pixel_box(low, high, camera, width, height)
+    drawn = np.flatnonzero((box[:, 1] >= box[:, 0]) & (box[:, 3] >= box[:, 2]))
+    local, box = local[drawn], box[drawn]
+    normal = np.cross(local[:, 1] - local[:, 0], local[:, 2] - local[:, 0])
+    constant = np.sum(normal * local[:, 0], axis=1)
+    # A side's plane through the eye is linear in the point (x, y, 1) of the window; so is a side seen in parallel.
+    flat = local if camera.kind != "ORTHO" else np.concatenate([local[..., :2], np.ones((*local.shape[:2], 1))], axis=2)
+    sides = np.cross(flat, np.roll(flat, -1, axis=1))
+    near, far = _clip_depths(camera)
+    x, y = _centres(camera, width, height)
+    for cell, column, row in _pairs(box):
+        px, py = x[column], y[row]
+        lowest, highest = np.full(len(cell), np.inf), np.full(len(cell), -np.inf)
+        for side in range(3):
+            a, b, c = (sides[:, side, i][cell] for i in range(3))
+            value = a * px + b * py + c
+            lowest, highest = np.minimum(lowest, value), np.maximum(highest, value)
+        hit = np.flatnonzero((lowest >= 0.0) | (highest <= 0.0))
+        px, py, n = px[hit], py[hit], normal[cell[hit]]
+        across = n[:, 0] * px + n[:, 1] * py
+        with np.errstate(divide="ignore", invalid="ignore"):
+            if camera.kind == "ORTHO":
+                depth = (constant[cell[hit]] - across) / n[:, 2]
+            else:
+                depth = constant[cell[hit]] / (across + n[:, 2])
+        # Comparisons with what is not a number are false: triangles seen edge-on drop out here.
+        seen = np.flatnonzero((depth >= near) & (depth <= far))
+        hit = hit[seen]
+        np.minimum.at(nearest, row[hit] * width + column[hit], depth[seen] * _ray_metres(camera, px[seen], py[seen]))
+
+
+def _centres(camera: Camera, width: int, height: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Window coordinates of the pixels' centres: x by column, y by row."""
+    left, right, bottom, top = camera.window
+    x = left + (np.arange(width) + 0.5 + SHIFT[0]) * ((right - left) / width)
+    y = bottom + (np.arange(height) + 0.5 + SHIFT[1]) * ((top - bottom) / height)
+    return x, y
+
+
+def _ray_metres(camera: Camera, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64] | float:
+    """Metres along the ray through (x, y) of the window for each metre of depth."""
+    return 1.0 if camera.kind == "ORTHO" else np.sqrt(1.0 + x * x + y * y)
+
+
+def _clip_depths(camera: Camera) -> tuple[float, float]:
+    return camera.near, camera.far
+
+
+def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def _project(local: NDArray[np.float64], camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Camera space ``(n, k, 3)`` to the window ``(n, k, 2)``, and whether all of a row's points can be seen so."""
+    near, far = _clip_depths(camera)
+    depth = local[..., 2]
+    slack = 1e-9 * far
+    seen = ((depth >= near * (1.0 - 1e-9)) & (depth <= far + slack)).all(axis=1)
+    if camera.kind == "ORTHO":
+        return local[..., :2], seen
+    return local[..., :2] / np.maximum(depth, near)[..., None], seen
+
+
+def _bounds(
+    local: NDArray[np.float64], camera: Camera
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Boxes ``low``, ``high`` (n, 2) on the window, and a point (n, 2) on it that lies within the silhouette.
+
+    The part before the near plane is cut off; boxes of what lies wholly before it or wholly beyond the far plane are
+    empty: ``low > high``.
+    """
+    count = local.shape[1]
+    near, far = _clip_depths(camera)
+    counted = (local[..., 2] >= near) & (local[..., 2].min(axis=1) < far)[:, None]
+    mixed = np.flatnonzero(counted.any(axis=1) & ~counted.all(axis=1))
+    flat, _ = _project(local, camera)
+    low = np.where(counted[..., None], flat, np.inf).min(axis=1)
+    high = np.where(counted[..., None], flat, -np.inf).max(axis=1)
+    total = np.where(counted[..., None], flat, 0.0).sum(axis=1)
+    number = counted.sum(axis=1).astype(np.float64)
+    for first, second in EDGES[(EDGES < count).all(axis=1)]:
+        a, b = local[mixed, first], local[mixed, second]
+        crosses = np.flatnonzero(counted[mixed, first] != counted[mixed, second])
+        at, a, b = mixed[crosses], a[crosses], b[crosses]
+        share = (near - a[:, 2:]) / (b[:, 2:] - a[:, 2:])
+        cut = a + share * (b - a)
+        point = cut[:, :2] if camera.kind == "ORTHO" else cut[:, :2] / near
+        low[at], high[at] = np.minimum(low[at], point), np.maximum(high[at], point)
+        total[at] += point
+        number[at] += 1.0
+    return low, high, total / np.maximum(number, 1.0)[:, None]
+
+
+def _pixel_box(
+    low: NDArray[np.float64], high: NDArray[np.float64], camera: Camera, width: int, height: int
+) -> NDArray[np.int64]:
+    """First and last column, first and last row ``(n, 4)`` of the pixels whose centres lie in boxes on the window."""
+    left, right, bottom, top = camera.window
+    corner, step = np.array([left, bottom]), np.array([(right - left) / width, (top - bottom) / height])
+    size = np.array([width, height])
+    # A hair wider than the box: a centre on a side must not be lost to rounding. Clipped before the conversion,
+    # because the box of what starts at the near plane may be wider than integers go, and that of nothing infinite.
+    first = np.ceil(np.clip((low - corner) / step - 0.5 - 1e-5, 0, size))
+    last = np.floor(np.clip((high - corner) / step - 0.5 + 1e-5, -1, size - 1))
+    return np.stack([first[:, 0], last[:, 0], first[:, 1], last[:, 1]], axis=1).astype(np.int64)
+
+
+def _pairs(box: NDArray[np.int64]) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]]:
+    """All pixels of all boxes, some at a time: index of the box, column, row."""
+    wide = np.maximum(box[:, 1] - box[:, 0] + 1, 0)
+    count = wide * np.maximum(box[:, 3] - box[:, 2] + 1, 0)
+    some = np.flatnonzero(count)
+    ends = np.cumsum(count[some])
+    start = 0
+    while start < len(some):
+        before = ends[start - 1] if start else 0
+        stop = max(start + 1, int(np.searchsorted(ends, before + PAIRS_AT_ONCE, side="right")))
+        which = some[start:stop]
+        cell = np.repeat(which, count[which])
+        inside = np.arange(len(cell)) - np.repeat(ends[start:stop] - count[which] - before, count[which])
+        row, column = np.divmod(inside, wide[cell])
+        yield cell, box[cell, 0] + column, box[cell, 2] + row
+        start = stop
