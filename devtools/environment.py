@@ -1,13 +1,17 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Make the virtual environment that development needs: ``python -m devtools.environment .venv``.
+"""Make the environments that development needs.
 
-Runs in a plain Python, with the version that the environment shall have. What goes in is the group ``dev`` of
-pyproject.toml. A stamp remembers what was installed, so that a second call does nothing.
+    python -m devtools.environment .venv                       with the version of the Python that runs this
+    python -m devtools.environment --inside BLENDER FOLDER     a folder of packages for tests/run.py in a full Blender
+
+Runs in a plain Python. What goes in is the group ``dev`` of pyproject.toml, or for a full Blender, which brings its
+own numpy, only what runs tests. A stamp remembers what was installed, so that a second call does nothing.
 """
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -15,6 +19,7 @@ import venv
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+INSIDE = ("pytest", "hypothesis")
 
 
 def requirements() -> list[str]:
@@ -46,12 +51,37 @@ def make(folder: Path) -> None:
     stamp.write_text(wanted, encoding="utf-8")
 
 
+def make_inside(blender: str, folder: Path) -> None:
+    """Put what runs tests into ``folder``, built for the Python of a full Blender, whichever that is.
+
+    Raises
+    ------
+    subprocess.CalledProcessError
+        Blender did not start, or pip has nothing for its Python; the message is on stderr.
+    """
+    ask = "import sys; print('python is', '%d.%d' % sys.version_info[:2])"
+    command = [blender, "-b", "--factory-startup", "--python-expr", ask]
+    said = subprocess.run(command, check=True, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True).stdout
+    version = next(line.split()[-1] for line in said.splitlines() if line.startswith("python is"))
+    stamp = folder / ".ready"
+    wanted = " ".join([version, *INSIDE])
+    if stamp.exists() and stamp.read_text(encoding="utf-8") == wanted:
+        return
+    shutil.rmtree(folder, ignore_errors=True)
+    options = ["--quiet", "--target", folder, "--python-version", version, "--only-binary=:all:"]
+    subprocess.run([sys.executable, "-m", "pip", "install", *options, *INSIDE], check=True)
+    stamp.write_text(wanted, encoding="utf-8")
+
+
 def main(arguments: list[str]) -> int:
-    """Make the environment in the folder that the first argument names; the exit code."""
+    """Make what the arguments name; the exit code."""
     try:
-        make(Path(arguments[0] if arguments else ".venv"))
+        if arguments[:1] == ["--inside"]:
+            make_inside(arguments[1], Path(arguments[2]))
+        else:
+            make(Path(arguments[0] if arguments else ".venv"))
     except subprocess.CalledProcessError as error:
-        print(f"The environment is incomplete: pip ended with exit code {error.returncode}.", file=sys.stderr)
+        print(f"The environment is incomplete: {error.cmd[0]} ended with code {error.returncode}.", file=sys.stderr)
         return 1
     return 0
 

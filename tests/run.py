@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run pytest inside a full Blender: ``blender -b --factory-startup -P tests/run.py -- ARGUMENTS OF PYTEST``.
 
-pytest comes from the folder that ``TETFLORA_SITE`` names (the ``site-packages`` of an environment that `make` made).
-It is searched last, so that numpy and all else that Blender brings is Blender's own.
+pytest comes from the folder that ``TETFLORA_SITE`` names, made by ``python -m devtools.environment --inside BLENDER
+FOLDER``. It is searched last, so that numpy and all else that Blender brings is Blender's own.
 """
 
 from __future__ import annotations
@@ -26,8 +26,7 @@ def main() -> int:
     import pytest
 
     arguments = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
-    # xdist would start workers by Blender's executable, hypothesis writes into a folder that may not be ours.
-    return int(pytest.main(["-p", "no:xdist", "-p", "no:cacheprovider", *arguments]))
+    return int(pytest.main(["-p", "no:cacheprovider", *arguments]))
 
 
 if __name__ == "__main__":
