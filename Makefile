@@ -39,17 +39,22 @@ demo: environment
 	$(PY) -m examples.demo --out out/demo
 
 # Two runs: the first never has Blender in its process, as the engine should not need it.
+# The second also runs when the first has failed.
 test: environment
-	$(PY) -m pytest -q -n 2 tests/engine
-	$(PY) -m pytest -q -n 2 --dist loadfile tests/blender tests/packaging
+	@code=0; \
+	$(PY) -m pytest -q -n 2 tests/engine || code=1; \
+	$(PY) -m pytest -q -n 2 --dist loadfile tests/blender tests/packaging || code=1; \
+	exit $$code
 
 test-lts:
 	@$(MAKE) --no-print-directory test VENV='$(LTS_VENV)' VERSIONS='$(LTS_VERSIONS)'
 
 lint: environment
-	$(PY) -m ruff check .
-	$(PY) -m ruff format --check .
-	$(PY) -m devtools.house
+	@code=0; \
+	$(PY) -m ruff check . || code=1; \
+	$(PY) -m ruff format --check . || code=1; \
+	$(PY) -m devtools.house || code=1; \
+	exit $$code
 
 build: environment
 	$(PY) -m devtools.build
