@@ -9,6 +9,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from ..tetrahedra.geometry import squared_edges
 from .camera import Camera
 from .contents import Amounts
 from .settings import RefinementSettings
@@ -74,5 +75,8 @@ def decide(
     out[small] = Decision.PROXY
     out[large_leaves & no_gain] = Decision.EXPLICIT
     out[hidden] = Decision.HIDDEN
+    if np.isfinite(settings.hidden_block):
+        extent = np.sqrt(squared_edges(vertices).max(axis=1)) / camera.pixel_extent(vertices.mean(axis=1))
+        out[hidden & (extent > settings.hidden_block)] = Decision.SPLIT
     out[~holds] = Decision.EMPTY
     return out

@@ -153,7 +153,7 @@ def _split(
         nodes = tree.split(nodes).reshape(-1)
         share = np.repeat(share, 2)
         pixels, whole = silhouette_pixels(tree.vertices(nodes), camera)
-        large = ~whole | (pixels * share > settings.cutoff**2)
+        large = ~whole | (pixels * share > settings.cutoff**2)  # out of view: nothing is known, one step at a time
         nodes, share = nodes[large], share[large]
 
 

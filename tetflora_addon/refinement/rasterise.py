@@ -353,7 +353,7 @@ def _bounds(
     high = np.where(counted[..., None], flat, -np.inf).max(axis=1)
     total = np.where(counted[..., None], flat, 0.0).sum(axis=1)
     number = counted.sum(axis=1).astype(np.float64)
-    for first, second in EDGES[(EDGES < count).all(axis=1)]:
+    for first, second in EDGES[(count > EDGES).all(axis=1)]:
         a, b = local[mixed, first], local[mixed, second]
         crosses = np.flatnonzero(counted[mixed, first] != counted[mixed, second])
         at, a, b = mixed[crosses], a[crosses], b[crosses]

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 
@@ -24,6 +25,9 @@ class RefinementSettings:
         A tetrahedron that holds fewer polygons than this gains nothing from being split.
     hidden : float
         Mean visibility, 0 to 1, under which a tetrahedron counts as hidden.
+    hidden_block : float
+        Longest edge, in pixels at its depth, down to which hidden tetrahedra are divided. Facets take their places from
+        the plants, so that they need no such limit; a shell fills its whole tetrahedron and does.
     visibility_resolution : int
         Longer side of the alpha buffer, pixels.
     max_tetrahedra : int
@@ -37,6 +41,7 @@ class RefinementSettings:
     block: float = 32.0
     few_polygons: int = 200
     hidden: float = 0.02
+    hidden_block: float = math.inf
     visibility_resolution: int = 256
     max_tetrahedra: int = 400_000
     max_levels: int = 60

@@ -1,0 +1,146 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From decisions to buffers: polygons of what is explicit, block by block, and proxies of the rest.
+
+Blocks are runs of tetrahedra in front-to-back order, so that each is one region of space and one block's buffers at a time are
+held in memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .buffers import MeshBuffers
+from .plants.compiled import Flora
+from .plants.expansion import chunks, expand
+from .plants.growth import trunks
+from .plants.meshing import concatenate_buffers, leaf_buffers, tube_buffers
+from .plants.pieces import Pieces
+from .plants.seeds import Seeds
+from .plants.species import MAX_ORDERS
+from .refinement.camera import Camera
+from .refinement.contents import bounding_cylinders, subplant_amounts
+from .refinement.decisions import Decision
+from .refinement.loop import Refinement
+from .shading.microsurfaces import piece_facets, subplant_facets
+from .shading.shells import shell_buffers
+from .shading.summaries import extinction_matrices, summarise
+from .tetrahedra.geometry import volume
+
+#: Polygons in a block, about; some 60 MB of buffers.
+BLOCK_POLYGONS = 250_000
+#: Sub-plants or pieces whose facets are made at a time.
+FACETS_AT_ONCE = 200_000
+
+
+@dataclass(frozen=True)
+class Block:
+    """One mesh of a block of space.
+
+    Attributes
+    ----------
+    kind : {'leaf', 'bark'}
+    species : int
+        Index into the flora's species.
+    number : int
+        Of the block, front to back.
+    buffers : MeshBuffers
+    fraction : float
+        Share of all polygons that is done with this block.
+    """
+
+    kind: str
+    species: int
+    number: int
+    buffers: MeshBuffers
+    fraction: float
+
+
+def explicit_blocks(flora: Flora, result: Refinement) -> Iterator[Block]:
+    """Polygons of all tetrahedra that are flagged for them."""
+    explicit = result.decision == Decision.EXPLICIT
+    nodes, rank, polygons = (a[explicit] for a in (result.nodes, result.rank, result.amounts.polygons))
+    order = np.argsort(rank)
+    block_of_node = np.full(len(result.tree), -1, dtype=np.int64)
+    runs = list(chunks(polygons[order], BLOCK_POLYGONS))
+    for number, run in enumerate(runs):
+        block_of_node[nodes[order[run]]] = number
+    contents = result.contents.within(block_of_node >= 0)
+    of_subplant, of_piece = block_of_node[contents.subplant_cell], block_of_node[contents.piece_cell]
+    for number in range(len(runs)):
+        pieces = Pieces.concatenate(
+            [contents.pieces.take(of_piece == number), expand(flora, contents.subplants.take(of_subplant == number))]
+        )
+        yield from _block(flora, pieces, number, (number + 1) / len(runs))
+
+
+def expanded_blocks(flora: Flora, seeds: Seeds) -> Iterator[Block]:
+    """Polygons of all plants, whatever the camera sees; for comparison."""
+    plants = trunks(flora.rows, seeds)
+    runs = list(chunks(flora.polygons[plants.row], BLOCK_POLYGONS))
+    for number, run in enumerate(runs):
+        yield from _block(flora, expand(flora, plants.take(run)), number, (number + 1) / len(runs))
+
+
+def _block(flora: Flora, pieces: Pieces, number: int, fraction: float) -> Iterator[Block]:
+    species = pieces.branches.row // MAX_ORDERS
+    for s in np.unique(species):
+        own = pieces.take(species == s)
+        for kind, buffers in (("leaf", leaf_buffers(flora, own, int(s))), ("bark", tube_buffers(flora, own))):
+            if buffers is not None:
+                yield Block(kind, int(s), number, buffers, fraction)
+
+
+def facet_buffers(
+    flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.8, coarse: float = 2.5
+) -> MeshBuffers | None:
+    """Proxies as microsurfaces: facets of all that is not explicit.
+
+    Parameters
+    ----------
+    flora : Flora
+    result : Refinement
+    camera : Camera
+    facet_pixels : float
+        Side of a facet in pixels.
+    coarse : float
+        How much larger facets of hidden tetrahedra are.
+    """
+    hidden = result.chosen(Decision.HIDDEN)
+    contents = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN))
+    subplants, pieces = contents.subplants, contents.pieces
+
+    def sides(centre: NDArray, cell: NDArray) -> NDArray[np.float64]:
+        extent = camera.pixel_extent(centre)
+        if camera.kind == "PERSP":  # beside and behind the camera depth says nothing, but distance does
+            extent = np.maximum(extent, camera.pixel_size * np.linalg.norm(centre - camera.position, axis=1))
+        return facet_pixels * extent * np.where(hidden[cell], coarse, 1.0)
+
+    parts = []
+    side = sides(bounding_cylinders(flora, subplants)[0], contents.subplant_cell)
+    amounts = subplant_amounts(flora, subplants)
+    for run in chunks((amounts.leaf_area + amounts.wood_area) / side**2 + 1, FACETS_AT_ONCE):
+        parts.append(subplant_facets(flora, subplants.take(run), side[run]))
+    side = sides((pieces.start + pieces.end) / 2, contents.piece_cell)
+    for start in range(0, len(pieces), FACETS_AT_ONCE):
+        run = slice(start, start + FACETS_AT_ONCE)
+        parts.append(piece_facets(flora, pieces.take(run), side[run]))
+    return concatenate_buffers([p for p in parts if p is not None])
+
+
+def proxy_shells(flora: Flora, result: Refinement) -> MeshBuffers | None:
+    """Proxies as shells: the tetrahedra themselves, filled with a cloud that has their extinction, colour and orientation."""
+    proxies = np.isin(result.decision, (Decision.PROXY, Decision.HIDDEN))
+    nodes = result.nodes[proxies]
+    if len(nodes) == 0:
+        return None
+    index = np.full(len(result.tree), -1, dtype=np.int64)
+    index[nodes] = np.arange(len(nodes))
+    summaries = summarise(flora, result.contents, index, len(nodes))
+    vertices = result.tree.vertices(nodes)
+    matrices, normal, plane = extinction_matrices(summaries, volume(vertices))
+    return shell_buffers(vertices, summaries.colour, summaries.transmission, matrices, normal, plane)

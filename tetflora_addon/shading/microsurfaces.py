@@ -1,0 +1,196 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Microsurfaces: few facets that stand for the many surfaces of what is not made explicit (paper, sections 1 and 7).
+
+Each facet takes place, orientation and colour from a leaf or branch that the compiled species expects in the sub-plant; there
+are as many as the area asks for, and they are about as large as a pixel. Area and orientation are kept on average.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..buffers import MeshBuffers
+from ..plants.compiled import Flora
+from ..plants.foliage import face_light, place_leaves
+from ..plants.growth import Branches, axes, spread
+from ..plants.hashing import Draw, child_key, mix, signed, uniform
+from ..plants.meshing import concatenate_buffers
+from ..plants.pieces import Pieces
+from ..plants.samples import SAMPLES
+from ..refinement.contents import Amounts, piece_amounts, subplant_amounts
+
+_FACET_PATH = 1 << 40  # child indices of facets start here
+_WOOD_PATH = 1 << 41
+_COUNT, _TURN, _START, _PLACE = 201, 202, 203, 204
+_SKY = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Facets:
+    """Squares as a structure of arrays.
+
+    Attributes
+    ----------
+    centre : (n, 3) float64
+    across, along : (n, 3) float64
+        Unit vectors in the facet's plane.
+    side : (n,) float64
+        Metres.
+    colour : (n, 3) float64
+    transmission : (n,) float64
+    """
+
+    centre: NDArray[np.float64]
+    across: NDArray[np.float64]
+    along: NDArray[np.float64]
+    side: NDArray[np.float64]
+    colour: NDArray[np.float64]
+    transmission: NDArray[np.float64]
+
+
+def subplant_facets(flora: Flora, subplants: Branches, side: NDArray[np.float64]) -> MeshBuffers | None:
+    """Facets of sub-plants.
+
+    Parameters
+    ----------
+    flora : Flora
+    subplants : Branches of n
+    side : (n,) float64
+        Wanted side of a facet, metres; facets are never smaller than the leaves that they stand for.
+    """
+    amounts = subplant_amounts(flora, subplants)
+    return concatenate_buffers(
+        [
+            _buffers(_leaves_of_subplants(flora, subplants, amounts, side)),
+            _buffers(_wood_of_subplants(flora, subplants, amounts, side)),
+        ]
+    )
+
+
+def piece_facets(flora: Flora, pieces: Pieces, side: NDArray[np.float64]) -> MeshBuffers | None:
+    """Facets of pieces of branches; parameters as for `subplant_facets`."""
+    amounts = piece_amounts(flora, pieces)
+    return concatenate_buffers(
+        [_buffers(_leaves_of_pieces(flora, pieces, amounts, side)), _buffers(_wood_of_pieces(flora, pieces, amounts, side))]
+    )
+
+
+def _numbers(key: NDArray, area: NDArray, facet: NDArray, path: int) -> tuple[NDArray, NDArray, NDArray]:
+    """Owner, index and key of the facets that areas (n,) are cut into; their expected number is area / facet."""
+    counts = np.floor(area / facet + uniform(key, _COUNT + path % 7)).astype(np.int64)
+    owner, index = spread(counts)
+    return owner, index, child_key(key[owner], index + path)
+
+
+def _leaf_area(flora: Flora, row: NDArray, scale: NDArray) -> NDArray[np.float64]:
+    """Mean area of one leaf of sub-plants, m²."""
+    return flora.leaf_area[row] / np.maximum(flora.leaf_count[row], 1e-300) * scale**2
+
+
+def _facet_colours(flora: Flora, row: NDArray, key: NDArray, leaves: NDArray) -> NDArray[np.float64]:
+    """Colours of facets that stand for a number of leaves (n,) each: their mean varies less than one leaf's colour."""
+    colour = flora.rows["leaf_colour"][row]
+    deviation = signed(key, Draw.LEAF_COLOUR) / np.sqrt(np.maximum(leaves, 1))
+    return np.clip(colour[:, 0] + colour[:, 1] * deviation[:, None], 0, 1)
+
+
+def _leaves_of_subplants(flora: Flora, subplants: Branches, amounts: Amounts, side: NDArray) -> Facets:
+    row = subplants.row
+    one = _leaf_area(flora, row, subplants.scale)
+    facet = np.maximum(side**2, one)
+    owner, index, key = _numbers(subplants.key, amounts.leaf_area, facet, _FACET_PATH)
+    # Runs of the samples are spread over the sub-plant; each sub-plant starts its run elsewhere.
+    start = (uniform(subplants.key, _START) * SAMPLES).astype(np.int64)
+    pick = (start[owner] + index) % SAMPLES
+    of_row, base = row[owner], subplants.frame[owner]
+    samples = flora.samples
+    leaf_row = samples.leaf_row[of_row, pick]
+    place = np.einsum("nij,nj->ni", base, samples.leaf_position[of_row, pick].astype(np.float64))
+    frame = base @ samples.leaf_frame[of_row, pick].astype(np.float64)
+    frame = face_light(frame, flora.rows["leaf_light"][leaf_row], _SKY)
+    half_leaf = 0.5 * flora.rows["leaf_size"][leaf_row, 0] * subplants.scale[owner]
+    centre = subplants.position[owner] + subplants.length[owner, None] * place + half_leaf[:, None] * frame[:, :, 1]
+    return Facets(
+        centre,
+        frame[:, :, 0],
+        frame[:, :, 1],
+        np.sqrt(facet)[owner],
+        _facet_colours(flora, leaf_row, key, (facet / one.clip(1e-300))[owner]),
+        flora.transmission[of_row],
+    )
+
+
+def _leaves_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDArray) -> Facets:
+    branches = pieces.branches
+    row = branches.row
+    size, variation = flora.rows["leaf_size"][row].T
+    species = row // (len(flora.rows) // len(flora.species))
+    model_area = np.array([m.area for m in flora.leaf_models])[species]
+    one = (size**2 + variation**2 / 3) * model_area * branches.scale**2
+    facet = np.maximum(side**2, one)
+    # Pieces of one branch have its key; the end's position tells them apart.
+    own = mix(branches.key ^ pieces.t1.view(np.uint64))
+    owner, index, key = _numbers(own, amounts.leaf_area, facet, _FACET_PATH)
+    first = np.maximum(pieces.t0, flora.rows["leaf_start"][row])[owner]
+    t = first + (pieces.t1[owner] - first) * uniform(key, _PLACE)
+    leaves = place_leaves(flora.rows, branches, axes(flora.rows, branches), owner, index, key, t)
+    frame = face_light(leaves.frame, flora.rows["leaf_light"][row[owner]], _SKY)
+    centre = leaves.position + 0.5 * leaves.size[:, None] * frame[:, :, 1]
+    colour = _facet_colours(flora, row[owner], key, (facet / one.clip(1e-300))[owner])
+    return Facets(centre, frame[:, :, 0], frame[:, :, 1], np.sqrt(facet)[owner], colour, flora.transmission[row[owner]])
+
+
+def _wood_of_subplants(flora: Flora, subplants: Branches, amounts: Amounts, side: NDArray) -> Facets:
+    row = subplants.row
+    owner, index, key = _numbers(subplants.key, amounts.wood_area / 2, side**2, _WOOD_PATH)
+    start = (uniform(subplants.key, _START) * SAMPLES).astype(np.int64)
+    pick = (start[owner] + index) % SAMPLES
+    of_row, base, samples = row[owner], subplants.frame[owner], flora.samples
+    place = np.einsum("nij,nj->ni", base, samples.wood_position[of_row, pick].astype(np.float64))
+    axis = np.einsum("nij,nj->ni", base, samples.wood_axis[of_row, pick].astype(np.float64))
+    centre = subplants.position[owner] + subplants.length[owner, None] * place
+    colour = flora.rows["branch_colour"][samples.wood_row[of_row, pick], 0]
+    return Facets(centre, _across(axis, key), axis, side[owner], colour, np.zeros(len(owner)))
+
+
+def _wood_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDArray) -> Facets:
+    own = mix(pieces.branches.key ^ pieces.t1.view(np.uint64))
+    owner, _, key = _numbers(own, amounts.wood_area / 2, side**2, _WOOD_PATH)
+    vector = (pieces.end - pieces.start)[owner]
+    centre = pieces.start[owner] + uniform(key, _PLACE)[:, None] * vector
+    axis = vector / np.maximum(np.linalg.norm(vector, axis=1, keepdims=True), 1e-300)
+    colour = flora.rows["branch_colour"][pieces.branches.row[owner], 0]
+    return Facets(centre, _across(axis, key), axis, side[owner], colour, np.zeros(len(owner)))
+
+
+def _across(axis: NDArray[np.float64], key: NDArray[np.uint64]) -> NDArray[np.float64]:
+    """Unit vectors perpendicular to axes, turned about them at random: closed tubes face all ways around."""
+    helper = np.where(np.abs(axis[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
+    a = np.cross(axis, helper)
+    a /= np.linalg.norm(a, axis=1, keepdims=True)
+    turn = 2 * np.pi * uniform(key, _TURN)[:, None]
+    return np.cos(turn) * a + np.sin(turn) * np.cross(axis, a)
+
+
+def _buffers(facets: Facets) -> MeshBuffers:
+    n = len(facets.side)
+    half = 0.5 * facets.side[:, None]
+    a, b = half * facets.across, half * facets.along
+    corners = np.stack([facets.centre - a - b, facets.centre + a - b, facets.centre + a + b, facets.centre - a + b], axis=1)
+    every = np.arange(4 * n, dtype=np.int32)
+    following = (every & ~3) | ((every + 1) & 3)
+    return MeshBuffers(
+        positions=corners.reshape(-1, 3).astype(np.float32),
+        edge_verts=np.stack([every, following], axis=1),
+        corner_verts=every,
+        corner_edges=every.copy(),
+        face_offsets=np.arange(n + 1, dtype=np.int32) * np.int32(4),
+        attributes={
+            "tf_colour": ("FACE", facets.colour.astype(np.float32)),
+            "tf_transmission": ("FACE", facets.transmission.astype(np.float32)),
+        },
+    )
