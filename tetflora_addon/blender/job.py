@@ -1,0 +1,278 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The whole way from a scene with plants to meshes and proxies, as steps that can be shown, stopped and undone."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+
+from .. import emission
+from ..errors import SpeciesError
+from ..plants.catalogue import load_species
+from ..plants.compiled import Flora, compile_species
+from ..plants.growth import trunks
+from ..plants.leaf_models import LeafModel, leaf_model
+from ..plants.seeds import Seeds
+from ..plants.species import Species
+from ..refinement.camera import Camera
+from ..refinement.decisions import Decision
+from ..refinement.loop import Refinement
+from ..refinement.loop import refine as refine_loop
+from ..refinement.settings import RefinementSettings
+from ..refinement.statistics import Statistics
+from .emit import Results, has_results, remove_results
+from .materials import bark_material, leaf_material, proxy_material
+from .meshes import read_mesh_arrays
+from .preferences import species_folders
+from .properties import leaf_objects, settings_from
+from .scene_reader import read_camera, read_occluders, read_plants
+from .shell_material import shell_material
+
+__all__ = ["Progress", "clear", "compile_for", "estimate", "has_results", "refine", "refine_steps"]
+
+#: Shells fill their tetrahedra, so that even hidden ones must not be larger than this many pixels.
+SHELL_BLOCK = 16.0
+#: Share of the progress bar that the loop takes; the rest is for writing meshes.
+_LOOP_SHARE = 0.6
+
+
+@dataclass(frozen=True)
+class Progress:
+    """One step of a job.
+
+    Attributes
+    ----------
+    fraction : float
+        0 to 1, an estimate.
+    message : str
+        What is being done, for the status bar.
+    """
+
+    fraction: float
+    message: str
+
+
+def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Flora:
+    """Load and compile species, leaf objects of the scene included.
+
+    Raises
+    ------
+    SpeciesError
+        Unknown or broken species, or a leaf object that is missing or not a mesh with faces.
+    """
+    chosen = leaf_objects(scene)
+    folders = species_folders()
+    resolved = []
+    for identifier in identifiers:
+        species = load_species(identifier, folders)
+        if identifier in chosen:
+            species = replace(species, leaf=_leaf_of(species, chosen[identifier], depsgraph))
+        elif not isinstance(species.leaf, LeafModel):
+            found = bpy.data.objects.get(species.leaf)
+            if found is None:
+                raise SpeciesError(
+                    f'Species "{species.name}" takes its leaf from an object "{species.leaf}", which this file does not have. '
+                    "Add a mesh object of that name, or choose one under Leaf Objects"
+                )
+            species = replace(species, leaf=_leaf_of(species, found, depsgraph))
+        resolved.append(species)
+    return compile_species(resolved)
+
+
+def _leaf_of(species: Species, source: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> LeafModel:
+    if source.type != 'MESH':
+        raise SpeciesError(f'"{source.name}" is to be the leaf of "{species.name}" but is not a mesh object')
+    evaluated = source.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        arrays = read_mesh_arrays(mesh)
+    finally:
+        evaluated.to_mesh_clear()
+    if arrays.polygons == 0:
+        raise SpeciesError(f'"{source.name}" is to be the leaf of "{species.name}" but its mesh has no faces')
+    offsets, corners = arrays.face_offsets, arrays.corner_verts
+    faces = [corners[a:b].tolist() for a, b in zip(offsets[:-1], offsets[1:], strict=True)]
+    model = leaf_model(arrays.positions, faces)
+    if "UVMap" in arrays.attributes:
+        model = LeafModel(model.positions, model.corner_verts, model.face_offsets, arrays.attributes["UVMap"][1])
+    return model
+
+
+def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statistics:
+    """What the scene would be if it were expanded, without growing anything.
+
+    Raises
+    ------
+    TetFloraError
+        As `refine`.
+    """
+    seeds = read_plants(scene, depsgraph, depsgraph.view_layer)
+    flora = compile_for(seeds.identifiers, scene, depsgraph)
+    return Statistics(plants=len(seeds), polygons_full=_polygons_full(flora, seeds))
+
+
+def _polygons_full(flora: Flora, seeds: Seeds) -> int:
+    return int(round(flora.polygons[trunks(flora.rows, seeds).row].sum()))
+
+
+def refine_steps(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    *,
+    view_layer: bpy.types.ViewLayer | None = None,
+    for_render: bool = False,
+) -> Generator[Progress, None, Statistics]:
+    """Refine a scene step by step.
+
+    Closing the generator, or an error, leaves the scene as it was. Earlier results are replaced when all is done.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    depsgraph : bpy.types.Depsgraph
+        Evaluated for the frame that is wanted.
+    view_layer : bpy.types.ViewLayer, optional
+        Whose plants count; by default the dependency graph's.
+    for_render : bool
+        Results live beside those of the artist, in a collection of their own.
+
+    Raises
+    ------
+    TetFloraError
+        No camera, no plants, unknown species, unusable plants or occluders; the message says which.
+    """
+    clock = _Stopwatch()
+    yield Progress(0.0, "Reading the scene")
+    camera = read_camera(scene, depsgraph)
+    seeds = read_plants(scene, depsgraph, view_layer or depsgraph.view_layer)
+    occluders = read_occluders(scene, depsgraph)
+    settings = _settings(scene)
+    clock.lap("read")
+    yield Progress(0.02, "Compiling species")
+    flora = compile_for(seeds.identifiers, scene, depsgraph)
+    clock.lap("compile")
+    statistics = Statistics(plants=len(seeds), polygons_full=_polygons_full(flora, seeds), seconds=clock.seconds)
+    results = Results(scene, 'RENDER' if for_render else 'VIEW')
+    try:
+        if scene.tetflora.expand_everything:
+            results.open()
+            yield from _write_blocks(results, flora, emission.expanded_blocks(flora, seeds), statistics, 0.05)
+        else:
+            refinement = yield from _run_loop(flora, seeds, camera, settings, occluders)
+            clock.lap("refine")
+            _count(statistics, refinement)
+            results.open()
+            blocks = emission.explicit_blocks(flora, refinement)
+            yield from _write_blocks(results, flora, blocks, statistics, _LOOP_SHARE)
+            yield Progress(0.95, "Making proxies")
+            _write_proxies(results, flora, refinement, camera, statistics, scene.tetflora.proxy_form)
+        clock.lap("emit")
+    except BaseException:  # an error, Esc (GeneratorExit) or Ctrl+C: nothing of ours may stay behind
+        results.discard()
+        raise
+    remove_results(scene, results.purpose, keep=results.collection)
+    statistics.seconds = dict(clock.seconds)
+    scene.tetflora.statistics = json.dumps(statistics.as_dict())
+    return statistics
+
+
+def refine(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, **options: object) -> Statistics:
+    """Refine a scene at once; options and errors as for `refine_steps`."""
+    steps = refine_steps(scene, depsgraph, **options)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as stop:
+            return stop.value
+
+
+def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:
+    """Remove what refinement made for a scene, and nothing else.
+
+    Parameters
+    ----------
+    for_render : bool, optional
+        Only what was made for a render (True), only what the artist made (False), or both (None).
+
+    Returns
+    -------
+    int
+        Number of datablocks removed.
+    """
+    removed = remove_results(scene, {None: None, True: 'RENDER', False: 'VIEW'}[for_render])
+    if not for_render:
+        scene.tetflora.statistics = ""
+    return removed
+
+
+def _settings(scene: bpy.types.Scene) -> RefinementSettings:
+    settings = settings_from(scene)
+    return replace(settings, hidden_block=SHELL_BLOCK) if scene.tetflora.proxy_form == 'SHELLS' else settings
+
+
+def _run_loop(
+    flora: Flora, seeds: Seeds, camera: Camera, settings: RefinementSettings, occluders: np.ndarray
+) -> Generator[Progress, None, Refinement]:
+    loop = refine_loop(flora, seeds, camera, settings, occluders)
+    fraction = 0.05
+    while True:
+        try:
+            state = next(loop)
+        except StopIteration as stop:
+            return stop.value
+        waiting = int((state.decision == Decision.SPLIT).sum())
+        fraction += 0.15 * (_LOOP_SHARE - fraction)  # nobody knows how many passes will follow
+        yield Progress(
+            fraction, f"Refining, pass {state.passes}: {state.tree.tetrahedra_made:,} tetrahedra, {waiting:,} to divide"
+        )
+
+
+def _count(statistics: Statistics, refinement: Refinement) -> None:
+    statistics.tetrahedra_made = int(refinement.tree.tetrahedra_made)
+    statistics.tetrahedra_terminal = len(refinement.tree.terminals())
+    statistics.tetrahedra_proxy = int(np.isin(refinement.decision, (Decision.PROXY, Decision.HIDDEN)).sum())
+    statistics.levels = refinement.passes
+
+
+def _write_blocks(
+    results: Results, flora: Flora, blocks: object, statistics: Statistics, start: float
+) -> Generator[Progress, None, None]:
+    for block in blocks:
+        species = flora.species[block.species]
+        material = (leaf_material if block.kind == "leaf" else bark_material)(species.name)
+        results.add(f"{species.name} {block.kind} {block.number:03d}", block.kind, block.buffers, material)
+        statistics.polygons_meshed += block.buffers.polygons
+        statistics.memory_mb += block.buffers.nbytes / 1e6
+        yield Progress(start + (0.95 - start) * block.fraction, f"Making polygons: {statistics.polygons_meshed:,}")
+
+
+def _write_proxies(
+    results: Results, flora: Flora, refinement: Refinement, camera: Camera, statistics: Statistics, form: str
+) -> None:
+    if form == 'SHELLS':
+        buffers, material = emission.proxy_shells(flora, refinement), shell_material
+    else:
+        buffers, material = emission.facet_buffers(flora, refinement, camera), proxy_material
+    if buffers is not None:
+        results.add("TetFlora proxies", "proxy", buffers, material())
+        statistics.polygons_proxy += buffers.polygons
+        statistics.memory_mb += buffers.nbytes / 1e6
+
+
+class _Stopwatch:
+    """Wall clock by stage."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._last = time.perf_counter()
+
+    def lap(self, stage: str) -> None:
+        now = time.perf_counter()
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + now - self._last
+        self._last = now
