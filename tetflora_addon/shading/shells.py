@@ -34,7 +34,7 @@ def mean_extinction(S: ArrayLike) -> NDArray[np.float64]:
     Returns
     -------
     (n,) float64
-        Mean extinction, 1/m; within 0.5 % of the integral.
+        Mean extinction, 1/m; within 1.3 % of the integral, which single orientations reach.
 
     Notes
     -----

@@ -1,0 +1,190 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shorthand for node trees built by code, and the mark that tells our datablocks from the artist's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import bpy
+
+# Not plain "tetflora": on 4.5 a registered property group lives among the custom properties under its own name, so
+# every empty with plant settings would look as if we had made it.
+MADE = "tetflora_made"
+VERSION = "tetflora_version"
+
+Datablock = TypeVar("Datablock", bound=bpy.types.ID)
+
+
+def tag(datablock: bpy.types.ID) -> None:
+    """Mark a datablock as made by TetFlora, under the name that it has now; call it last, after naming."""
+    datablock[MADE] = datablock.name
+
+
+def is_ours(datablock: bpy.types.ID) -> bool:
+    """Whether TetFlora made a datablock and nobody took it over.
+
+    A copy inherits custom properties but not the name, so copies and renamed datablocks count as the artist's.
+    """
+    return datablock.get(MADE) == datablock.name
+
+
+def get_or_create(
+    collection: Any, name: str, version: int, new: Callable[[str], Datablock], build: Callable[[Datablock], None]
+) -> Datablock:
+    """The datablock of that name, built anew only if there is none or ours is of another version.
+
+    Parameters
+    ----------
+    collection : bpy_prop_collection
+        Such as ``bpy.data.materials``.
+    name : str
+        Name to look for and to give.
+    version : int
+        Version of what `build` makes; stamped on the datablock.
+    new : callable
+        Makes an empty datablock of a name.
+    build : callable
+        Fills the new datablock.
+
+    Returns
+    -------
+    bpy.types.ID
+        What an artist edited or put there under this name comes back untouched. An outdated datablock of ours is kept
+        under another name, because somebody may have edited it, and is the artist's from then on.
+    """
+    found = collection.get(name)
+    if found is not None:
+        if not is_ours(found) or found.get(VERSION) == version:
+            return found
+        found.name = f"{name} (version {found.get(VERSION, 0)})"
+    made = new(name)
+    build(made)
+    made[VERSION] = version
+    tag(made)
+    return made
+
+
+def new_group(name: str) -> bpy.types.NodeTree:
+    """An empty group of shader nodes."""
+    return bpy.data.node_groups.new(name, "ShaderNodeTree")
+
+
+class Graph:
+    """A node tree under construction.
+
+    Sockets are found by identifier or, for the sockets of groups, by name: identifiers stayed the same where 5.x
+    renamed "Fac" to "Factor".
+
+    Parameters
+    ----------
+    tree : bpy.types.NodeTree
+        Emptied first.
+    """
+
+    def __init__(self, tree: bpy.types.NodeTree) -> None:
+        self.tree = tree
+        tree.nodes.clear()
+
+    def node(self, kind: str, inputs: dict[str, Any] | None = None, **settings: Any) -> bpy.types.Node:
+        """Add a node, set its properties, and link or set its inputs: a value, a socket, or a node's first output."""
+        node = self.tree.nodes.new(kind)
+        for key, value in settings.items():
+            setattr(node, key, value)
+        for key, value in (inputs or {}).items():
+            self.feed(find_socket(node.inputs, key), value)
+        return node
+
+    def feed(self, socket: bpy.types.NodeSocket, value: Any) -> None:
+        """Link a socket to another socket or to a node's first output, or set its value."""
+        if isinstance(value, bpy.types.Node):
+            value = value.outputs[0]
+        if isinstance(value, bpy.types.NodeSocket):
+            self.tree.links.new(value, socket)
+        else:
+            socket.default_value = value
+
+    def attribute(self, name: str, output: str) -> bpy.types.NodeSocket:
+        """Output ``'Color'``, ``'Vector'`` or ``'Fac'`` of a mesh attribute."""
+        return find_socket(self.node("ShaderNodeAttribute", attribute_name=name).outputs, output)
+
+    def math(self, operation: str, *values: Any) -> bpy.types.NodeSocket:
+        """Scalar operation on sockets or numbers."""
+        node = self.node("ShaderNodeMath", operation=operation)
+        for socket, value in zip(node.inputs, values, strict=False):
+            self.feed(socket, value)
+        return node.outputs[0]
+
+    def vector(self, operation: str, *values: Any) -> bpy.types.NodeSocket:
+        """Vector operation; the result is a number for ``'DOT_PRODUCT'`` and ``'LENGTH'``.
+
+        The second operand of ``'SCALE'`` is the factor.
+        """
+        node = self.node("ShaderNodeVectorMath", operation=operation)
+        names = ("Vector", "Scale") if operation == 'SCALE' else ("Vector", "Vector_001")
+        for key, value in zip(names, values, strict=False):
+            self.feed(find_socket(node.inputs, key), value)
+        return find_socket(node.outputs, "Value" if operation in {'DOT_PRODUCT', 'LENGTH'} else "Vector")
+
+    def mix(self, factor: Any, first: Any, second: Any) -> bpy.types.NodeSocket:
+        """Mix two shaders; factor 0 gives the first."""
+        node = self.node("ShaderNodeMixShader", {"Fac": factor, "Shader": first, "Shader_001": second})
+        return node.outputs[0]
+
+    def tinted(self, colour: Any, tint: Any) -> bpy.types.NodeSocket:
+        """Product of two colours, kept under 1 so that no surface returns more light than it gets."""
+        node = self.node(
+            "ShaderNodeMix",
+            {"Factor_Float": 1.0, "A_Color": colour, "B_Color": tint},
+            data_type='RGBA',
+            blend_type='MULTIPLY',
+            clamp_result=True,
+        )
+        return find_socket(node.outputs, "Result_Color")
+
+    def scaled(self, colour: Any, factor: Any) -> bpy.types.NodeSocket:
+        """Colour times a number, kept under 1."""
+        grey = self.node("ShaderNodeCombineColor", {"Red": factor, "Green": factor, "Blue": factor})
+        return self.tinted(colour, grey)
+
+    def arrange(self) -> None:
+        """Lay the nodes out in columns by their distance from the outputs, for whoever opens the editor."""
+        column = {node: 0 for node in self.tree.nodes}
+        for _ in range(len(column)):
+            moved = False
+            for link in self.tree.links:
+                wanted = column[link.to_node] + 1
+                if column[link.from_node] < wanted:
+                    column[link.from_node], moved = wanted, True
+            if not moved:
+                break
+        rows: dict[int, int] = {}
+        for node, place in column.items():
+            node.location = (-220.0 * place, -200.0 * rows.get(place, 0))
+            rows[place] = rows.get(place, 0) + 1
+
+
+def find_socket(sockets: Any, key: str) -> bpy.types.NodeSocket:
+    """Socket by identifier, else by name."""
+    for attribute in ("identifier", "name"):
+        for socket in sockets:
+            if getattr(socket, attribute) == key:
+                return socket
+    raise KeyError(f"No socket {key} among {', '.join(socket.name for socket in sockets)}")
+
+
+def add_socket(
+    tree: bpy.types.NodeTree,
+    name: str,
+    kind: str,
+    default: Any = None,
+    limits: tuple[float, float] | None = None,
+    description: str = "",
+) -> None:
+    """Add an input to a group's interface; `limits` are the least and greatest number."""
+    socket = tree.interface.new_socket(name=name, description=description, in_out='INPUT', socket_type=kind)
+    if limits is not None:
+        socket.min_value, socket.max_value = limits
+    if default is not None:
+        socket.default_value = default
