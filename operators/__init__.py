@@ -1,0 +1,43 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the artist can do: one operator a file, each calls tetflora_addon.blender and reports."""
+
+import bpy
+
+from . import (
+    add_plant,
+    assign_species,
+    clear,
+    edit_list,
+    mark_occluder,
+    populate,
+    refine,
+    remove_plants,
+    reseed,
+    select_species,
+)
+
+CLASSES = (
+    add_plant.TETFLORA_OT_add_plant,
+    populate.TETFLORA_OT_populate,
+    assign_species.TETFLORA_OT_assign_species,
+    reseed.TETFLORA_OT_reseed,
+    select_species.TETFLORA_OT_select_species,
+    remove_plants.TETFLORA_OT_remove_plants,
+    mark_occluder.TETFLORA_OT_mark_occluder,
+    edit_list.TETFLORA_OT_edit_list,
+    refine.TETFLORA_OT_refine,
+    clear.TETFLORA_OT_clear,
+)
+
+
+def register() -> None:
+    """Register all operators."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    """Unregister all operators."""
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,74 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Add one plant."""
+
+import bpy
+import numpy as np
+from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty
+
+from ..tetflora_addon.blender.placement import Placement, new_seeds
+from ..tetflora_addon.blender.plant_objects import add_plants, plants_of
+from ..tetflora_addon.blender.species_items import NO_SPECIES, default_species, operator_items
+from . import ids
+from .base import in_object_mode, reports_errors, select_only
+
+
+class TETFLORA_OT_add_plant(bpy.types.Operator):
+    """Add an empty that stands for a plant at the 3D cursor."""
+
+    bl_idname = ids.ADD_PLANT
+    bl_label = "Add Plant"
+    bl_description = (
+        "Add a plant at the 3D cursor. It is stored as an empty with species and seed; "
+        "its branches and leaves are made when the scene is refined or rendered"
+    )
+    bl_options = {'REGISTER', 'UNDO'}
+
+    species: EnumProperty(name="Species", description="Species of the catalogue", items=operator_items)
+    seed: IntProperty(
+        name="Seed",
+        description="Which individual of the species; chosen anew for each plant if not given",
+        options={'SKIP_SAVE'},
+    )
+    location: FloatVectorProperty(
+        name="Location",
+        description="Where the trunk leaves the ground, world space; the 3D cursor if not given",
+        subtype='TRANSLATION',
+        unit='LENGTH',
+        options={'SKIP_SAVE'},
+    )
+    azimuth: FloatProperty(
+        name="Azimuth", description="Rotation about the vertical", subtype='ANGLE', options={'SKIP_SAVE'}
+    )
+    scale: FloatProperty(
+        name="Scale",
+        description="Size; 1 is the size that the species file gives",
+        default=1.0,
+        min=0.01,
+        soft_max=4.0,
+        options={'SKIP_SAVE'},
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return in_object_mode(cls, context)
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        properties = self.properties
+        if not properties.is_property_set("location"):
+            self.location = context.scene.cursor.location
+        if not properties.is_property_set("seed"):
+            # The n-th plant of a scene: another one each time, but the same when the script runs again.
+            self.seed = int(new_seeds(np.array([len(plants_of(context.scene.objects))]))[0])
+        species = default_species() if self.species in {"", NO_SPECIES} else self.species
+        placement = Placement(
+            position=np.array([self.location]),
+            azimuth=np.array([self.azimuth]),
+            scale=np.array([self.scale]),
+            species=np.zeros(1, np.int32),
+            seed=np.array([self.seed]),
+            wanted=1,
+        )
+        select_only(context, add_plants(context.scene, placement, [species]))
+        return {'FINISHED'}

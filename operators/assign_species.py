@@ -1,0 +1,35 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Change the species of plants."""
+
+import bpy
+from bpy.props import EnumProperty
+
+from ..tetflora_addon.blender.plant_objects import assign_species
+from ..tetflora_addon.blender.species_items import NO_SPECIES, operator_items
+from . import ids
+from .base import counted, plants_selected, reports_errors, selected_plants
+
+
+class TETFLORA_OT_assign_species(bpy.types.Operator):
+    """Give the selected plants another species."""
+
+    bl_idname = ids.ASSIGN_SPECIES
+    bl_label = "Change Species"
+    bl_description = "Make all selected plants belong to this species. Their seeds and places stay"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    species: EnumProperty(name="Species", description="Species of the catalogue", items=operator_items)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return plants_selected(cls, context)
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        if self.species in {"", NO_SPECIES}:
+            self.report({'ERROR'}, "Choose a species")
+            return {'CANCELLED'}
+        changed = assign_species(selected_plants(context), self.species)
+        self.report({'INFO'}, f"{counted(changed, 'plant')} changed")
+        return {'FINISHED'}

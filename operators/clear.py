@@ -1,0 +1,32 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Clear what refinement made."""
+
+import bpy
+
+from ..tetflora_addon.blender import job
+from . import ids
+from .base import counted, in_object_mode, reports_errors
+
+
+class TETFLORA_OT_clear(bpy.types.Operator):
+    """Remove what Refine made."""
+
+    bl_idname = ids.CLEAR
+    bl_label = "Clear"
+    bl_description = "Remove all meshes, materials and proxies that Refine made, and nothing else. The plants stay"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not in_object_mode(cls, context):
+            return False
+        if not job.has_results(context.scene):
+            cls.poll_message_set("Refine has made nothing yet")
+            return False
+        return True
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        self.report({'INFO'}, f"{counted(job.clear(context.scene), 'datablock')} removed")
+        return {'FINISHED'}

@@ -1,0 +1,61 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Add entries to the lists of the panels and remove them."""
+
+import bpy
+from bpy.props import EnumProperty
+
+from ..tetflora_addon.blender.species_items import catalogue, default_species
+from . import ids
+from .base import reports_errors
+
+
+class TETFLORA_OT_edit_list(bpy.types.Operator):
+    """Add an entry to a list of species, or remove the active one."""
+
+    bl_idname = ids.EDIT_LIST
+    bl_label = "Edit List"
+    bl_options = {'REGISTER', 'UNDO', 'INTERNAL'}
+
+    which: EnumProperty(
+        name="List",
+        description="Which list",
+        items=(
+            ('MIX', "Species", "The species to populate with"),
+            ('LEAVES', "Leaf Objects", "The meshes that replace leaves"),
+        ),
+    )
+    action: EnumProperty(
+        name="Action",
+        description="What to do",
+        items=(
+            ('ADD', "Add", "Add an entry, with a species that the list does not have yet if there is one"),
+            ('REMOVE', "Remove", "Remove the active entry"),
+        ),
+    )
+
+    @classmethod
+    def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+        return properties.bl_rna.properties["action"].enum_items[properties.action].description
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        settings = context.scene.tetflora
+        owner, entries, index = (
+            (settings.populate, settings.populate.mix, "mix_index")
+            if self.which == 'MIX'
+            else (settings, settings.leaf_objects, "leaf_objects_index")
+        )
+        if self.action == 'ADD':
+            present = {entry.species for entry in entries}
+            species = next((s for s in catalogue() if s not in present), None) or default_species()
+            entries.add().species = species
+            setattr(owner, index, len(entries) - 1)
+            return {'FINISHED'}
+        active = getattr(owner, index)
+        if not 0 <= active < len(entries):
+            self.report({'WARNING'}, "The list has no active entry; nothing removed")
+            return {'CANCELLED'}
+        entries.remove(active)
+        setattr(owner, index, max(min(active, len(entries) - 1), 0))
+        return {'FINISHED'}

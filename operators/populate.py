@@ -1,0 +1,137 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Populate a terrain with plants."""
+
+from math import pi
+
+import bpy
+import numpy as np
+from bpy.props import FloatProperty, IntProperty, StringProperty
+
+from ..tetflora_addon.blender.placement import place
+from ..tetflora_addon.blender.plant_objects import add_plants, plants_of
+from ..tetflora_addon.blender.species_items import catalogue, default_species
+from ..tetflora_addon.blender.surfaces import mesh_triangles
+from ..tetflora_addon.errors import SceneError
+from . import ids
+from .base import counted, in_object_mode, reports_errors, select_only
+
+# Names that the operator shares with the scene's settings for populating.
+_SHARED = ("count", "seed", "slope_limit", "min_distance", "scale_min", "scale_max")
+
+
+class TETFLORA_OT_populate(bpy.types.Operator):
+    """Scatter plants over the selected meshes."""
+
+    bl_idname = ids.POPULATE
+    bl_label = "Populate"
+    bl_description = (
+        "Scatter plants over the selected meshes. What is not given is taken from the panel. "
+        "Each plant is an empty; thousands are fine, beyond some ten thousand Blender becomes slow"
+    )
+    bl_options = {'REGISTER', 'UNDO'}
+
+    count: IntProperty(
+        name="Plants", description="Plants to place", default=100, min=1, max=100_000, options={'SKIP_SAVE'}
+    )
+    seed: IntProperty(
+        name="Seed", description="Another seed is another arrangement and other plants", options={'SKIP_SAVE'}
+    )
+    slope_limit: FloatProperty(
+        name="Slope Limit",
+        description="Ground steeper than this stays bare",
+        subtype='ANGLE',
+        default=pi / 4,
+        min=0.0,
+        max=pi / 2,
+        options={'SKIP_SAVE'},
+    )
+    min_distance: FloatProperty(
+        name="Distance",
+        description="Least distance between two trunks, measured on the map",
+        subtype='DISTANCE',
+        unit='LENGTH',
+        min=0.0,
+        options={'SKIP_SAVE'},
+    )
+    scale_min: FloatProperty(
+        name="Scale From",
+        description="Size of the smallest plants; 1 is the size that the species file gives",
+        default=1.0,
+        min=0.01,
+        options={'SKIP_SAVE'},
+    )
+    scale_max: FloatProperty(
+        name="To",
+        description="Size of the largest plants; 1 is the size that the species file gives",
+        default=1.0,
+        min=0.01,
+        options={'SKIP_SAVE'},
+    )
+    species: StringProperty(
+        name="Species",
+        description="Identifiers of species separated by commas, each with a share if wanted: broadleaf_tree:3, bush:1",
+        options={'SKIP_SAVE'},
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not in_object_mode(cls, context):
+            return False
+        if not any(obj.type == 'MESH' for obj in context.selected_objects):
+            cls.poll_message_set("Select the mesh on which plants shall grow")
+            return False
+        return True
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = context.scene
+        self._complete_from(scene)
+        shares = _parse_shares(self.species)
+        depsgraph = context.evaluated_depsgraph_get()
+        grounds = [obj for obj in context.selected_objects if obj.type == 'MESH']
+        standing = [obj.matrix_world.translation[:2] for obj in plants_of(scene.objects)]
+        placement = place(
+            np.concatenate([mesh_triangles(obj, depsgraph) for obj in grounds]),
+            count=self.count,
+            seed=self.seed,
+            slope_limit=self.slope_limit,
+            min_distance=self.min_distance,
+            scale_range=(self.scale_min, self.scale_max),
+            shares=tuple(shares.values()),
+            occupied=np.array(standing).reshape(-1, 2),
+        )
+        made = add_plants(scene, placement, tuple(shares))
+        select_only(context, [*made, *grounds])
+        # The terrain stays selected and active, so that Populate can follow Populate.
+        context.view_layer.objects.active = grounds[0]
+        if placement.reason:
+            self.report({'WARNING'}, f"{counted(len(made), 'plant')} of {self.count:,} placed: {placement.reason}")
+        else:
+            self.report({'INFO'}, f"{counted(len(made), 'plant')} placed")
+        return {'FINISHED'}
+
+    def _complete_from(self, scene: bpy.types.Scene) -> None:
+        """Take what was not given from the panel; the redo panel then shows what was really used."""
+        settings = scene.tetflora.populate
+        for name in _SHARED:
+            if not self.properties.is_property_set(name):
+                setattr(self, name, getattr(settings, name))
+        if not self.species:
+            mix = [(entry.species, entry.weight) for entry in settings.mix if entry.species]
+            self.species = ", ".join(f"{name}:{share:g}" for name, share in mix) or default_species()
+
+
+def _parse_shares(text: str) -> dict[str, float]:
+    """``oak:3, spruce`` to shares by identifier; a species named twice gets both shares."""
+    known = catalogue()
+    shares: dict[str, float] = {}
+    for part in filter(None, (p.strip() for p in text.split(","))):
+        identifier, _, share = (p.strip() for p in part.partition(":"))
+        if identifier not in known:
+            raise SceneError(f'Unknown species "{identifier}" to populate with; the catalogue has {", ".join(known)}')
+        try:
+            shares[identifier] = shares.get(identifier, 0.0) + (float(share) if share else 1.0)
+        except ValueError:
+            raise SceneError(f'"{part}" is no species with a share; write for example {identifier}:2') from None
+    return shares

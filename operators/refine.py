@@ -1,0 +1,125 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Refine the scene: at once in scripts, step by step with progress and Esc in the window."""
+
+import time
+from collections.abc import Generator
+
+import bpy
+
+from ..tetflora_addon.blender import job
+from ..tetflora_addon.blender.plant_objects import prepare_scene
+from ..tetflora_addon.errors import TetFloraError
+from ..tetflora_addon.refinement.statistics import Statistics
+from . import ids
+from .base import counted, reports_errors
+
+# Seconds of work between two looks at the keyboard.
+_SLICE = 0.05
+
+
+class TETFLORA_OT_refine(bpy.types.Operator):
+    """Make meshes and proxies of all plants, as fine as the scene's camera sees them."""
+
+    bl_idname = ids.REFINE
+    bl_label = "Refine"
+    bl_description = (
+        "Make meshes of the plants near the scene's camera and proxies of the others, in place of earlier ones. "
+        "Esc cancels and leaves the scene as it was"
+    )
+    bl_options = {'REGISTER', 'UNDO'}
+
+    _steps: Generator[job.Progress, None, Statistics] | None = None
+    _timer: bpy.types.Timer | None = None
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.mode != 'OBJECT':
+            cls.poll_message_set("Works in Object Mode")
+            return False
+        if context.scene.camera is None:
+            cls.poll_message_set("The scene has no active camera; add one (Add > Camera)")
+            return False
+        return True
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        statistics = job.refine(
+            context.scene, context.evaluated_depsgraph_get(), view_layer=context.view_layer, for_render=False
+        )
+        return self._finish(context, statistics)
+
+    @reports_errors
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        if bpy.app.background or context.window is None:
+            return self.execute(context)
+        self._steps = job.refine_steps(
+            context.scene, context.evaluated_depsgraph_get(), view_layer=context.view_layer, for_render=False
+        )
+        try:
+            # The scene is read in the second step: what is wrong with it is said while the artist still looks here.
+            for _ in range(2):
+                progress = next(self._steps)
+        except BaseException:
+            self._steps.close()
+            raise
+        manager = context.window_manager
+        manager.progress_begin(0.0, 1.0)
+        self._show(context, progress)
+        self._timer = manager.event_timer_add(_SLICE / 5.0, window=context.window)
+        manager.modal_handler_add(self)
+        return {'RUNNING_MODAL'}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if event.type == 'ESC' and event.value == 'PRESS':
+            self.cancel(context)
+            self.report({'INFO'}, "Cancelled; the scene is as it was")
+            return {'CANCELLED'}
+        if event.type != 'TIMER':
+            # Everything else waits: the scene must not change under the job.
+            return {'RUNNING_MODAL'}
+        end = time.monotonic() + _SLICE
+        try:
+            while time.monotonic() < end:
+                progress = next(self._steps)
+        except StopIteration as stop:
+            self._leave(context)
+            return self._finish(context, stop.value)
+        except TetFloraError as error:
+            self.cancel(context)
+            self.report({'ERROR'}, str(error))
+            return {'CANCELLED'}
+        except BaseException:
+            self.cancel(context)
+            raise
+        self._show(context, progress)
+        return {'RUNNING_MODAL'}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Esc, or Blender ends the operator: what was half made goes."""
+        if self._steps is not None:
+            self._steps.close()
+        self._leave(context)
+
+    def _show(self, context: bpy.types.Context, progress: job.Progress) -> None:
+        context.window_manager.progress_update(progress.fraction)
+        context.workspace.status_text_set(f"TetFlora {progress.fraction:4.0%}   {progress.message}   |   Esc: cancel")
+
+    def _leave(self, context: bpy.types.Context) -> None:
+        self._steps = None
+        if self._timer is not None:
+            context.window_manager.event_timer_remove(self._timer)
+            self._timer = None
+            context.window_manager.progress_end()
+            context.workspace.status_text_set(None)
+
+    def _finish(self, context: bpy.types.Context, statistics: Statistics) -> set[str]:
+        prepare_scene(context.scene)
+        for area in context.screen.areas if context.screen else ():
+            area.tag_redraw()
+        self.report(
+            {'INFO'},
+            f"{counted(statistics.plants, 'plant')}: {statistics.polygons_meshed:,} of {statistics.polygons_full:,} "
+            f"polygons, {statistics.tetrahedra_proxy:,} proxies in {sum(statistics.seconds.values()):.1f} s",
+        )
+        return {'FINISHED'}

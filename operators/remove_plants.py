@@ -1,0 +1,55 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Remove plants."""
+
+import bpy
+from bpy.props import EnumProperty, StringProperty
+
+from ..tetflora_addon.blender.plant_objects import plants_of, remove_plants
+from . import ids
+from .base import counted, in_object_mode, reports_errors
+
+
+class TETFLORA_OT_remove_plants(bpy.types.Operator):
+    """Delete plants from the scene."""
+
+    bl_idname = ids.REMOVE_PLANTS
+    bl_label = "Remove Plants"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    which: EnumProperty(
+        name="Which",
+        description="Which plants go",
+        items=(
+            ('SELECTED', "Selected", "Delete the selected plants; other selected objects stay"),
+            ('SPECIES', "Species", "Delete all plants of the scene that belong to one species"),
+            ('ALL', "All", "Delete all plants of the scene"),
+        ),
+        default='SELECTED',
+    )
+    species: StringProperty(
+        name="Species", description="Identifier of the species whose plants go", options={'SKIP_SAVE'}
+    )
+
+    @classmethod
+    def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+        return properties.bl_rna.properties["which"].enum_items[properties.which].description
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return in_object_mode(cls, context)
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        objects = context.selected_objects if self.which == 'SELECTED' else context.scene.objects
+        plants = [o for o in plants_of(objects) if self.which != 'SPECIES' or o.tetflora.species == self.species]
+        if not plants:
+            none = {
+                'SELECTED': "No plants are selected",
+                'SPECIES': f'The scene has no plants of species "{self.species}"',
+                'ALL': "The scene has no plants",
+            }
+            self.report({'WARNING'}, f"{none[self.which]}; nothing removed")
+            return {'CANCELLED'}
+        self.report({'INFO'}, f"{counted(remove_plants(plants), 'plant')} removed")
+        return {'FINISHED'}

@@ -1,0 +1,50 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Select plants by species."""
+
+import bpy
+from bpy.props import BoolProperty, StringProperty
+
+from ..tetflora_addon.blender.plant_objects import plants_of
+from . import ids
+from .base import counted, reports_errors
+
+
+class TETFLORA_OT_select_species(bpy.types.Operator):
+    """Select all plants of a species."""
+
+    bl_idname = ids.SELECT_SPECIES
+    bl_label = "Select Species"
+    bl_description = "Select all plants of the active plant's species"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    species: StringProperty(
+        name="Species",
+        description="Identifier of the species, also one that the catalogue lacks; the active plant's if not given",
+        options={'SKIP_SAVE'},
+    )
+    extend: BoolProperty(name="Extend", description="Keep what is selected already", options={'SKIP_SAVE'})
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.mode != 'OBJECT':
+            cls.poll_message_set("Works in Object Mode")
+            return False
+        return True
+
+    @reports_errors
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        if not self.species:
+            active = context.active_object
+            if active is None or not active.tetflora.is_plant:
+                self.report({'ERROR'}, "Make a plant active first, so that its species is known")
+                return {'CANCELLED'}
+            self.species = active.tetflora.species
+        found = [o for o in plants_of(context.view_layer.objects) if o.tetflora.species == self.species]
+        if not self.extend:
+            for obj in context.selected_objects:
+                obj.select_set(False)
+        for obj in found:
+            obj.select_set(True)
+        self.report({'INFO'}, f'{counted(len(found), "plant")} of species "{self.species}" selected')
+        return {'FINISHED'}

@@ -1,0 +1,34 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the artist sees: a tab in the 3D view's sidebar and an entry in the Add menu. Nothing here computes."""
+
+import bpy
+
+from . import add_menu, lists, plants_panel, populate_panel, refinement_panel, statistics_panel
+
+CLASSES = (
+    lists.TETFLORA_UL_mix,
+    lists.TETFLORA_UL_leaf_objects,
+    plants_panel.TETFLORA_PT_plants,
+    populate_panel.TETFLORA_PT_populate,
+    refinement_panel.TETFLORA_PT_refinement,
+    refinement_panel.TETFLORA_PT_limits,
+    refinement_panel.TETFLORA_PT_leaf_objects,
+    statistics_panel.TETFLORA_PT_statistics,
+    add_menu.TETFLORA_MT_add_plant,
+    plants_panel.TETFLORA_MT_species,
+)
+
+
+def register() -> None:
+    """Register panels and menus."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    bpy.types.VIEW3D_MT_add.append(add_menu.draw_in_add_menu)
+
+
+def unregister() -> None:
+    """Unregister panels and menus."""
+    bpy.types.VIEW3D_MT_add.remove(add_menu.draw_in_add_menu)
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

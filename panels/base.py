@@ -1,0 +1,20 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What all of TetFlora's panels share: their place in the sidebar and their layout."""
+
+import bpy
+
+
+class SidebarPanel:
+    """Mix-in for panels in the 3D view's sidebar."""
+
+    bl_space_type = 'VIEW_3D'
+    bl_region_type = 'UI'
+    bl_category = "TetFlora"
+
+
+def split_layout(panel: bpy.types.Panel) -> bpy.types.UILayout:
+    """The panel's layout with labels to the left of values, as elsewhere in Blender."""
+    panel.layout.use_property_split = True
+    panel.layout.use_property_decorate = False
+    return panel.layout

@@ -1,0 +1,52 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lists of species in panels: the mixture to populate with, and leaf objects."""
+
+from collections.abc import Iterable
+
+import bpy
+
+from ..operators import ids
+
+
+class TETFLORA_UL_mix(bpy.types.UIList):
+    """A species and its share."""
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, _index, _flag) -> None:
+        row = layout.row(align=True)
+        row.prop(item, "species_choice", text="", emboss=False)
+        row.prop(item, "weight", text="")
+
+
+class TETFLORA_UL_leaf_objects(bpy.types.UIList):
+    """A species and the mesh that replaces its leaf."""
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, _index, _flag) -> None:
+        row = layout.row(align=True)
+        row.prop(item, "species_choice", text="", emboss=False)
+        row.prop(item, "leaf", text="")
+
+
+def draw_list(
+    layout: bpy.types.UILayout,
+    cls: type[bpy.types.UIList],
+    owner: bpy.types.PropertyGroup,
+    names: Iterable[str],
+    which: str,
+) -> None:
+    """A list with buttons to add and remove.
+
+    Parameters
+    ----------
+    names : iterable of str
+        The owner's collection and its active index.
+    which : {'MIX', 'LEAVES'}
+        As in the operator.
+    """
+    entries, index = names
+    row = layout.row()
+    row.template_list(cls.__name__, "", owner, entries, owner, index, rows=2)
+    column = row.column(align=True)
+    for icon, action in (('ADD', 'ADD'), ('REMOVE', 'REMOVE')):
+        button = column.operator(ids.EDIT_LIST, text="", icon=icon)
+        button.which, button.action = which, action

@@ -1,0 +1,48 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The tab's first panel: species and seed of the active plant, and what can be done to selected ones."""
+
+import bpy
+
+from ..operators import ids
+from ..tetflora_addon.blender.species_items import catalogue
+from .base import SidebarPanel, split_layout
+
+
+class TETFLORA_MT_species(bpy.types.Menu):
+    """Species to give to the selected plants."""
+
+    bl_label = "Change Species"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        for info in catalogue().values():
+            self.layout.operator(ids.ASSIGN_SPECIES, text=info.name).species = info.identifier
+
+
+class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
+    """Plants."""
+
+    bl_label = "Plants"
+    bl_order = 0
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = split_layout(self)
+        active = context.active_object
+        column = layout.column()
+        if active is not None and active.tetflora.is_plant:
+            plant = active.tetflora
+            column.prop(plant, "species_choice")
+            if plant.species not in catalogue():
+                column.label(text=f'The catalogue has no "{plant.species}"', icon='ERROR')
+            column.prop(plant, "seed")
+            column.prop(plant, "enabled")
+        else:
+            column.label(text="The active object is not a plant", icon='INFO')
+        layout.menu("TETFLORA_MT_add_plant", text="Add Plant", icon='ADD')
+        column = layout.column(align=True)
+        column.menu(TETFLORA_MT_species.__name__, text="Change Species of Selected")
+        column.operator(ids.RESEED, text="Re-roll Seeds of Selected", icon='FILE_REFRESH')
+        column.operator(ids.SELECT_SPECIES, text="Select All of This Species", icon='RESTRICT_SELECT_OFF')
+        row = layout.row(align=True)
+        row.operator(ids.REMOVE_PLANTS, text="Remove Selected", icon='X').which = 'SELECTED'
+        row.operator(ids.REMOVE_PLANTS, text="All", icon='TRASH').which = 'ALL'

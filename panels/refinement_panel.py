@@ -1,0 +1,66 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Refinement: how fine, in which form, and the buttons that make it and clear it."""
+
+import bpy
+
+from ..operators import ids
+from .base import SidebarPanel, split_layout
+from .lists import TETFLORA_UL_leaf_objects, draw_list
+
+
+class TETFLORA_PT_refinement(SidebarPanel, bpy.types.Panel):
+    """Refinement."""
+
+    bl_label = "Refinement"
+    bl_order = 2
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = split_layout(self)
+        settings = context.scene.tetflora
+        column = layout.column()
+        column.active = not settings.expand_everything
+        column.prop(settings, "cutoff")
+        column.prop(settings, "visibility_resolution")
+        column.prop(settings, "proxy_form")
+        layout.prop(settings, "refine_at_render")
+        row = layout.row(align=True)
+        row.scale_y = 1.4
+        row.operator(ids.REFINE, icon='MOD_DECIM')
+        row.operator(ids.CLEAR, icon='TRASH')
+        if context.scene.camera is None:
+            layout.label(text="The scene has no camera", icon='ERROR')
+
+
+class TETFLORA_PT_limits(SidebarPanel, bpy.types.Panel):
+    """Limits."""
+
+    bl_label = "Limits"
+    bl_parent_id = "TETFLORA_PT_refinement"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = split_layout(self)
+        settings = context.scene.tetflora
+        column = layout.column()
+        column.active = not settings.expand_everything
+        for name in ("leaf_limit", "few_polygons", "block", "hidden", "max_tetrahedra", "max_levels"):
+            column.prop(settings, name)
+        layout.prop(settings, "expand_everything")
+
+
+class TETFLORA_PT_leaf_objects(SidebarPanel, bpy.types.Panel):
+    """Leaf objects."""
+
+    bl_label = "Leaf Objects"
+    bl_parent_id = "TETFLORA_PT_refinement"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        draw_list(
+            self.layout,
+            TETFLORA_UL_leaf_objects,
+            context.scene.tetflora,
+            ("leaf_objects", "leaf_objects_index"),
+            'LEAVES',
+        )

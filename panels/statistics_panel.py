@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Statistics of the last refinement, from the figures that it left in the scene."""
+
+import json
+from functools import lru_cache
+
+import bpy
+
+from ..tetflora_addon.blender.handlers import render_errors
+from .base import SidebarPanel
+
+
+@lru_cache(maxsize=8)
+def rows_of(text: str) -> tuple[tuple[str, str], ...]:
+    """Rows of the table, (name, value), from the stored JSON; none if there is none or it is not ours.
+
+    Cached, because a panel is drawn at every movement of the mouse.
+    """
+    try:
+        figures = json.loads(text)
+        seconds = figures["seconds"]
+        full = figures["polygons_full"]
+        share = f" ({figures['polygons_meshed'] / full:.1%})" if full else ""
+        return (
+            ("Plants", f"{figures['plants']:,}"),
+            ("Polygons if expanded", f"{full:,}"),
+            ("Polygons made", f"{figures['polygons_meshed']:,}{share}"),
+            ("Faces of proxies", f"{figures['polygons_proxy']:,}"),
+            ("Tetrahedra made", f"{figures['tetrahedra_made']:,}"),
+            ("    not divided", f"{figures['tetrahedra_terminal']:,}"),
+            ("    proxies", f"{figures['tetrahedra_proxy']:,}"),
+            ("Seconds", f"{sum(seconds.values()):.2f}"),
+            ("Memory, estimated", f"{figures['memory_mb']:,.0f} MB"),
+        )
+    except (ValueError, KeyError, TypeError, AttributeError):
+        return ()
+
+
+class TETFLORA_PT_statistics(SidebarPanel, bpy.types.Panel):
+    """Statistics."""
+
+    bl_label = "Statistics"
+    bl_order = 3
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        for error in render_errors()[-1:]:
+            layout.label(text=error, icon='ERROR')
+        rows = rows_of(context.scene.tetflora.statistics)
+        if not rows:
+            layout.label(text="Nothing refined yet", icon='INFO')
+            return
+        split = layout.split(factor=0.58)
+        names, values = split.column(align=True), split.column(align=True)
+        values.alignment = 'RIGHT'
+        for name, value in rows:
+            names.label(text=name)
+            values.label(text=value)

@@ -1,0 +1,20 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Everything below the operators that touches bpy: what the scene stores, reading it, writing results, rendering."""
+
+from . import command_line, handlers, preferences, properties
+
+# Handlers and commands read properties, so those come first.
+_PARTS = (preferences, properties, handlers, command_line)
+
+
+def register() -> None:
+    """Register all parts in order."""
+    for part in _PARTS:
+        part.register()
+
+
+def unregister() -> None:
+    """Unregister all parts in reverse order."""
+    for part in reversed(_PARTS):
+        part.unregister()

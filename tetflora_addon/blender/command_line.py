@@ -1,0 +1,207 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``blender scene.blend --command tetflora refine|render|stats``: TetFlora for scripts and render farms.
+
+Exit codes: 0 done, 1 the scene or a file cannot be used, 2 wrong arguments. An error is one line on stderr. With
+``--json`` the last line on stdout is one JSON object; Blender's own chatter comes before it.
+"""
+
+import argparse
+import json
+import re
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ..errors import SceneError, TetFloraError
+from . import handlers, job
+from .compat import EEVEE_ENGINES, eevee_engine
+from .properties import TetFloraScene
+from .scene_reader import read_camera
+
+NAME = "tetflora"
+
+_command: Any = None
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line, as all other errors are said."""
+
+    def error(self, message: str) -> None:
+        raise SystemExit(_fail(f"{message}; see --help", 2))
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run one command on the open file.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        What follows ``--command tetflora``.
+
+    Returns
+    -------
+    int
+        Exit code, see above.
+    """
+    try:
+        options = _parser().parse_args(list(arguments))
+    except SystemExit as stop:
+        return stop.code if isinstance(stop.code, int) else 0
+    try:
+        figures = options.run(options)
+    except (TetFloraError, OSError) as error:
+        return _fail(str(error), 1)
+    except RuntimeError as error:
+        # Blender's operators say "Error: ..." and more, on several lines.
+        return _fail(" ".join(str(error).split()), 1)
+    if figures is None:
+        return 1
+    if options.json:
+        print(json.dumps(figures), flush=True)
+    else:
+        for key, value in figures.items():
+            print(f"{key.replace('_', ' '):>22}: {_readable(value)}", flush=True)
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog=f"blender FILE --command {NAME}",
+        description="Refine and render the plants of a scene. Works on the file that Blender has opened.",
+    )
+    commands = parser.add_subparsers(title="commands", required=True, metavar="refine|render|stats")
+
+    refine = commands.add_parser("refine", help="turn plants into meshes for the scene's camera")
+    refine.add_argument("--cutoff", type=_positive, metavar="PIXELS", help="overrides the scene's cutoff")
+    refine.add_argument("--form", choices=_forms(), help="overrides the form of proxies")
+    refine.add_argument("--save", type=Path, metavar="PATH", help="write a copy of the file with the result")
+    refine.set_defaults(run=_refine)
+
+    render = commands.add_parser("render", help="refine and render frames")
+    which = render.add_mutually_exclusive_group()
+    which.add_argument("--frame", type=int, metavar="N", help="frame to render; the scene's current one if not given")
+    which.add_argument("--frames", type=_frames, metavar="A-B", help="frames to render, first and last")
+    render.add_argument("--engine", choices=("cycles", "eevee"), help="overrides the scene's render engine")
+    render.add_argument("--samples", type=_whole, metavar="N", help="overrides the samples of a pixel")
+    render.add_argument("--output", type=Path, metavar="PATH", help="where pictures go; #### stands for the frame")
+    render.set_defaults(run=_render)
+
+    stats = commands.add_parser("stats", help="count plants and the polygons that they stand for; changes nothing")
+    stats.set_defaults(run=_stats)
+
+    for command in (refine, render, stats):
+        command.add_argument("--json", action="store_true", help="print figures as one JSON object, in the last line")
+    return parser
+
+
+def _refine(options: argparse.Namespace) -> dict:
+    scene = bpy.context.scene
+    if options.cutoff is not None:
+        scene.tetflora.cutoff = options.cutoff
+    if options.form is not None:
+        scene.tetflora.proxy_form = options.form.upper()
+    if options.save is not None and not options.save.absolute().parent.is_dir():
+        raise SceneError(f"The folder {options.save.absolute().parent} does not exist; make it or choose another")
+    statistics = job.refine(scene, bpy.context.evaluated_depsgraph_get(), view_layer=bpy.context.view_layer)
+    if options.save is not None:
+        bpy.ops.wm.save_as_mainfile(filepath=str(options.save.absolute()), copy=True)
+    return asdict(statistics)
+
+
+def _render(options: argparse.Namespace) -> dict | None:
+    scene = bpy.context.scene
+    # Blender's own message about a missing camera comes late and is hard to read.
+    read_camera(scene, bpy.context.evaluated_depsgraph_get())
+    scene.tetflora.refine_at_render = True
+    if options.engine is not None:
+        scene.render.engine = 'CYCLES' if options.engine == "cycles" else eevee_engine()
+    if options.samples is not None:
+        if scene.render.engine in EEVEE_ENGINES:
+            scene.eevee.taa_render_samples = options.samples
+        elif scene.render.engine == 'CYCLES':
+            scene.cycles.samples = options.samples
+        else:
+            raise SceneError(f"The engine {scene.render.engine} has no samples; choose one with --engine")
+    if options.output is not None:
+        scene.render.filepath = str(options.output.absolute())
+    if options.frames is not None:
+        scene.frame_start, scene.frame_end = options.frames
+        scene.frame_step = 1
+        bpy.ops.render.render(animation=True)
+        files = [scene.render.frame_path(frame=n) for n in range(options.frames[0], options.frames[1] + 1)]
+    else:
+        if options.frame is not None:
+            scene.frame_set(options.frame)
+        # Blender leaves #### as it is in stills.
+        scene.render.filepath = _still_path(scene)
+        bpy.ops.render.render(write_still=True)
+        files = [bpy.path.ensure_ext(scene.render.filepath, scene.render.file_extension)]
+    if handlers.render_errors():
+        return None  # said on stderr when it happened
+    return {"files": [str(Path(bpy.path.abspath(f))) for f in files], **json.loads(scene.tetflora.statistics or "{}")}
+
+
+def _stats(_options: argparse.Namespace) -> dict:
+    statistics = job.estimate(bpy.context.scene, bpy.context.evaluated_depsgraph_get())
+    return {"plants": statistics.plants, "polygons_full": statistics.polygons_full}
+
+
+def _still_path(scene: bpy.types.Scene) -> str:
+    frame = scene.frame_current
+    return re.sub(r"#+", lambda match: f"{frame:0{len(match.group())}d}", bpy.path.abspath(scene.render.filepath))
+
+
+def _forms() -> list[str]:
+    return [item.identifier.lower() for item in TetFloraScene.bl_rna.properties["proxy_form"].enum_items]
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not a number above 0")
+    return value
+
+
+def _whole(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text} is not a number above 0")
+    return value
+
+
+def _frames(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r"(-?\d+)-(-?\d+)", text)
+    if not match or int(match[1]) > int(match[2]):
+        raise argparse.ArgumentTypeError(f"{text} is not a range of frames such as 1-24")
+    return int(match[1]), int(match[2])
+
+
+def _readable(value: object) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {_readable(item)}" for key, item in value.items())
+    if isinstance(value, list):
+        return " ".join(map(str, value))
+    return f"{value:,.2f}" if isinstance(value, float) else f"{value:,}" if isinstance(value, int) else str(value)
+
+
+def _fail(message: str, code: int) -> int:
+    print(f"tetflora: error: {message}", file=sys.stderr, flush=True)
+    return code
+
+
+def register() -> None:
+    """Make ``--command tetflora`` known."""
+    global _command
+    _command = bpy.utils.register_cli_command(NAME, main)
+
+
+def unregister() -> None:
+    """Take the command back; 4.5 hangs at exit if it stays."""
+    global _command
+    bpy.utils.unregister_cli_command(_command)
+    _command = None

@@ -1,0 +1,186 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Refine at render: what Blender calls before and after each frame that it renders, on load and on save.
+
+Tried on 4.5 and 5.2, and the reason for the order of things here:
+
+- ``render_pre`` comes before Blender goes to the frame: in animations the camera still stands where it stood a frame
+  ago, so the handler goes to the frame itself. Objects made there reach the picture of that frame.
+- 5.2 crashes if objects that were rendered are deleted in ``render_post`` or ``render_write``, while the renderer still
+  holds them. They go in the next ``render_pre``, and in ``render_complete`` or ``render_cancel`` after the last frame.
+- What is made for a render is marked as runtime data, which Blender never writes into a file, whenever somebody saves.
+"""
+
+import sys
+import traceback
+from dataclasses import dataclass, field
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ..errors import TetFloraError
+from . import job
+from .emit import result_collections
+from .migration import migrate
+from .scene_reader import NoPlantsError, has_plants, renderable_objects
+
+
+@dataclass
+class _Rendering:
+    """What has to be undone when a render ends; names, because references do not outlive a load."""
+
+    busy: bool = False
+    hidden: list[str] = field(default_factory=list)
+    errors: list[str] = field(default_factory=list)
+
+
+_rendering = _Rendering()
+
+
+def render_errors() -> list[str]:
+    """Messages of all frames of the last render that went without their plants."""
+    return list(_rendering.errors)
+
+
+@persistent
+def on_render_init(_scene: bpy.types.Scene, _depsgraph: object = None) -> None:
+    """A render starts: earlier errors are past."""
+    _rendering.errors.clear()
+
+
+@persistent
+def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
+    """Before a frame: refine for its camera, in place of what the frame before left."""
+    if _rendering.busy:
+        return
+    _rendering.busy = True
+    try:
+        _take_back(scene)
+        if scene.tetflora.refine_at_render and has_plants(scene):
+            _make(scene)
+    except NoPlantsError:
+        pass  # all of them are disabled or hidden: the artist wants no forest
+    except TetFloraError as error:
+        _complain(scene, str(error))
+    except Exception as error:
+        # Blender would print it and render on; the count of errors and the message in the window must not miss it.
+        traceback.print_exc()
+        _complain(scene, f"unexpected error, please report it: {error!r}")
+    finally:
+        _rendering.busy = False
+
+
+@persistent
+def on_render_end(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
+    """After the last frame, or when the render was cancelled: leave the scene as it was."""
+    if _rendering.busy:
+        return
+    _rendering.busy = True
+    try:
+        _take_back(scene)
+    finally:
+        _rendering.busy = False
+
+
+@persistent
+def on_save_pre(_path: object, _other: object = None) -> None:
+    """Before a file is written: meshes that are only hidden for a render are stored as shown."""
+    _show_hidden()
+
+
+@persistent
+def on_save_post(_path: object, _other: object = None) -> None:
+    """After a file was written, in the middle of a render: hide them again."""
+    for collection in _named(_rendering.hidden):
+        collection.hide_render = True
+
+
+@persistent
+def on_load_post(_path: object, _other: object = None) -> None:
+    """After a file was read: nothing of an earlier render counts any more; bring old properties up to date."""
+    _rendering.busy = False
+    _rendering.hidden.clear()
+    _rendering.errors.clear()
+    migrate()
+
+
+def _make(scene: bpy.types.Scene) -> None:
+    """Refine for the frame that is about to be rendered, and hide results that the artist made for another view."""
+    # Also where nothing is animated: it is what the renderer does next, and the only way to a depsgraph of this frame.
+    scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
+    layer = _view_layer(scene)
+    job.refine(scene, layer.depsgraph, view_layer=layer, for_render=True)
+    for made in result_collections(scene, 'RENDER'):
+        for datablock in (made, *made.objects, *(obj.data for obj in made.objects)):
+            datablock.is_runtime_data = True
+    # Hidden only now: if refinement failed, yesterday's trees are better than none.
+    _rendering.hidden = [c.name for c in result_collections(scene, 'VIEW') if not c.hide_render]
+    for collection in _named(_rendering.hidden):
+        collection.hide_render = True
+
+
+def _take_back(scene: bpy.types.Scene) -> None:
+    _show_hidden()
+    _rendering.hidden.clear()
+    job.clear(scene, for_render=True)
+
+
+def _show_hidden() -> None:
+    for collection in _named(_rendering.hidden):
+        collection.hide_render = False
+
+
+def _named(names: list[str]) -> list[bpy.types.Collection]:
+    return [found for name in names if (found := bpy.data.collections.get((name, None))) is not None]
+
+
+def _view_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
+    """The first rendered view layer with plants; one refinement has to serve all layers."""
+    layers = [layer for layer in scene.view_layers if layer.use] or list(scene.view_layers)
+    for layer in layers:
+        if any(obj.tetflora.is_plant for obj in renderable_objects(layer)):
+            return layer
+    return layers[0]
+
+
+def _complain(scene: bpy.types.Scene, message: str) -> None:
+    text = f"frame {scene.frame_current} rendered without its plants: {message}"
+    _rendering.errors.append(text)
+    print(f"TetFlora: error: {text}", file=sys.stderr, flush=True)
+    if not bpy.app.background:
+        # Renders run in a thread of their own, the window belongs to the main one; timers fire there.
+        bpy.app.timers.register(lambda: _show_message(text))
+
+
+def _show_message(text: str) -> None:
+    windows = bpy.context.window_manager.windows
+    if not windows:
+        return
+    with bpy.context.temp_override(window=windows[0]):
+        bpy.context.window_manager.popup_menu(
+            lambda menu, _context: menu.layout.label(text=text), title="TetFlora", icon='ERROR'
+        )
+
+
+_HANDLERS = {
+    "render_init": on_render_init,
+    "render_pre": on_render_pre,
+    "render_complete": on_render_end,
+    "render_cancel": on_render_end,
+    "save_pre": on_save_pre,
+    "save_post": on_save_post,
+    "save_post_fail": on_save_post,
+    "load_post": on_load_post,
+}
+
+
+def register() -> None:
+    """Add the handlers."""
+    for name, handler in _HANDLERS.items():
+        getattr(bpy.app.handlers, name).append(handler)
+
+
+def unregister() -> None:
+    """Take the handlers out."""
+    for name, handler in _HANDLERS.items():
+        getattr(bpy.app.handlers, name).remove(handler)

@@ -1,0 +1,55 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The add-on's preferences: where the user's own species are."""
+
+from pathlib import Path
+
+import bpy
+from bpy.props import StringProperty
+
+# Blender files preferences under the name of the extension's root package, two levels above this one. Only the name
+# is needed; nothing in tetflora_addon imports what lies above it.
+ROOT_PACKAGE = __package__.rsplit(".", 2)[0]
+
+
+class TetFloraPreferences(bpy.types.AddonPreferences):
+    """What belongs to the user and not to a scene."""
+
+    bl_idname = ROOT_PACKAGE
+
+    species_folder: StringProperty(
+        name="Species Folder",
+        description=(
+            "Folder of your own species files (*.json). A file there replaces a shipped species of the same file name. "
+            "Scenes store only the name of a species: whoever renders a scene needs the same files"
+        ),
+        subtype='DIR_PATH',
+        default="",
+    )
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        """The page in Preferences > Add-ons."""
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop(self, "species_folder")
+        if self.species_folder and not species_folders():
+            layout.label(text="This folder does not exist", icon='ERROR')
+
+
+def species_folders() -> tuple[Path, ...]:
+    """Folders of the user's own species that exist, for the catalogue's functions; empty outside of an extension."""
+    addon = bpy.context.preferences.addons.get(ROOT_PACKAGE)
+    if addon is None or addon.preferences is None or not addon.preferences.species_folder:
+        return ()
+    folder = Path(bpy.path.abspath(addon.preferences.species_folder))
+    return (folder,) if folder.is_dir() else ()
+
+
+def register() -> None:
+    """Register the preferences."""
+    bpy.utils.register_class(TetFloraPreferences)
+
+
+def unregister() -> None:
+    """Unregister the preferences."""
+    bpy.utils.unregister_class(TetFloraPreferences)

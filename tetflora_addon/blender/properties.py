@@ -1,0 +1,330 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What TetFlora stores in a file: ``Object.tetflora`` on plants and occluders, ``Scene.tetflora`` for the rest."""
+
+from dataclasses import fields
+from math import pi, radians
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+from ..refinement.settings import RefinementSettings
+from .species_items import items_for, number_of
+
+_SETTINGS = RefinementSettings()
+
+
+class SpeciesChoice:
+    """A stored identifier, and an enumeration over it for panels.
+
+    The identifier is a string, so that a species whose file is missing survives; the enumeration only reads and
+    writes it.
+    """
+
+    species: StringProperty(
+        name="Species",
+        description="File name of the species in the catalogue, without its ending",
+    )
+    species_choice: EnumProperty(
+        name="Species",
+        description="Species of the catalogue",
+        items=lambda self, _context: items_for(self.species),
+        get=lambda self: number_of(self.species) if self.species else items_for()[0][4],
+        set=lambda self, number: _choose(self, number),
+        options={'SKIP_SAVE'},
+    )
+
+
+def _choose(group: SpeciesChoice, number: int) -> None:
+    for identifier, *_, item_number in items_for(group.species):
+        if item_number == number and number:
+            group.species = identifier
+
+
+class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
+    """A plant is a species, a transform and a seed; nothing else is stored (paper, section 5)."""
+
+    version: IntProperty(name="Version", description="Layout of these properties", options={'HIDDEN'})
+    is_plant: BoolProperty(
+        name="Plant",
+        description="This object stands for a plant: its species and seed say how it grows, its transform where",
+        options=set(),
+    )
+    seed: IntProperty(
+        name="Seed",
+        description="Every seed is another individual of the species; the same seed is the same plant to the last leaf",
+    )
+    enabled: BoolProperty(
+        name="Enabled",
+        description="The plant takes part in refinement and rendering",
+        default=True,
+    )
+    is_occluder: BoolProperty(
+        name="Hides Plants",
+        description=(
+            "Plants behind this mesh count as hidden, and cost next to nothing. Meant for terrain and buildings; "
+            "transparent or very thin things should not hide plants"
+        ),
+        options=set(),
+    )
+
+
+class TetFloraMixEntry(bpy.types.PropertyGroup, SpeciesChoice):
+    """One species of a mixture to populate with."""
+
+    weight: FloatProperty(
+        name="Share",
+        description="Share of this species among the plants, relative to the other shares",
+        default=1.0,
+        min=0.0,
+        soft_max=10.0,
+        options=set(),
+    )
+
+
+class TetFloraLeafObject(bpy.types.PropertyGroup, SpeciesChoice):
+    """A mesh of the user's that takes the place of a species' own leaf."""
+
+    leaf: PointerProperty(
+        name="Leaf",
+        description=(
+            "Mesh object used as the leaf of the species: one unit long, its stalk at the origin, along +Y, upper side "
+            "towards +Z. Its polygons count for every leaf, so keep it simple"
+        ),
+        type=bpy.types.Object,
+        poll=lambda _group, candidate: candidate.type == 'MESH',
+    )
+
+
+class TetFloraPopulate(bpy.types.PropertyGroup):
+    """How Populate places plants; the operator starts from these."""
+
+    count: IntProperty(
+        name="Plants",
+        description="Plants to place. Fewer are placed where no more fit, and the report says so",
+        default=100,
+        min=1,
+        soft_max=10_000,
+        max=100_000,
+        options=set(),
+    )
+    seed: IntProperty(name="Seed", description="Another seed is another arrangement and other plants", options=set())
+    slope_limit: FloatProperty(
+        name="Slope Limit",
+        description="Ground steeper than this stays bare",
+        subtype='ANGLE',
+        default=radians(40.0),
+        min=0.0,
+        max=pi / 2,
+        options=set(),
+    )
+    min_distance: FloatProperty(
+        name="Distance",
+        description="Least distance between two trunks, measured on the map; plants that are there already count",
+        subtype='DISTANCE',
+        unit='LENGTH',
+        default=2.0,
+        min=0.0,
+        soft_max=50.0,
+        options=set(),
+    )
+    scale_min: FloatProperty(
+        name="Scale From",
+        description="Size of the smallest plants; 1 is the size that the species file gives",
+        default=0.8,
+        min=0.01,
+        soft_max=4.0,
+        options=set(),
+    )
+    scale_max: FloatProperty(
+        name="To",
+        description="Size of the largest plants; 1 is the size that the species file gives",
+        default=1.2,
+        min=0.01,
+        soft_max=4.0,
+        options=set(),
+    )
+    mix: CollectionProperty(
+        name="Species",
+        description="Species to choose from; without any, the first of the catalogue is taken",
+        type=TetFloraMixEntry,
+    )
+    mix_index: IntProperty(name="Active Species", options={'HIDDEN', 'SKIP_SAVE'})
+
+
+class TetFloraScene(bpy.types.PropertyGroup):
+    """Settings of a scene; the first block mirrors `RefinementSettings` field by field."""
+
+    version: IntProperty(name="Version", description="Layout of these properties", options={'HIDDEN'})
+
+    cutoff: FloatProperty(
+        name="Cutoff",
+        description=(
+            "Side in pixels of the final picture under which space is divided no further. "
+            "Smaller is finer and slower; 1 to 4 pixels are hard to tell apart"
+        ),
+        subtype='PIXEL',
+        default=_SETTINGS.cutoff,
+        min=0.25,
+        soft_min=0.5,
+        soft_max=16.0,
+        max=1000.0,
+    )
+    leaf_limit: FloatProperty(
+        name="Leaf Limit",
+        description=(
+            "Width in pixels from which on leaves stay real leaves. Larger saves polygons; "
+            "above about half a pixel the loss shows"
+        ),
+        subtype='PIXEL',
+        default=_SETTINGS.leaf_limit,
+        min=0.05,
+        soft_max=4.0,
+        max=1000.0,
+    )
+    block: FloatProperty(
+        name="Block",
+        description=(
+            "Side in pixels from which on visible space is divided even where all of it becomes polygons, "
+            "so that hidden parts are found. Smaller finds more of them and takes longer"
+        ),
+        subtype='PIXEL',
+        default=_SETTINGS.block,
+        min=1.0,
+        soft_max=256.0,
+        max=10_000.0,
+    )
+    few_polygons: IntProperty(
+        name="Few Polygons",
+        description="Space that holds fewer polygons than this is divided no further",
+        default=_SETTINGS.few_polygons,
+        min=0,
+        soft_max=5_000,
+    )
+    hidden: FloatProperty(
+        name="Hidden Below",
+        description="Space counts as hidden if less than this share of it is seen. Larger saves polygons in thickets",
+        subtype='FACTOR',
+        default=_SETTINGS.hidden,
+        min=0.0,
+        max=1.0,
+    )
+    visibility_resolution: IntProperty(
+        name="Visibility",
+        description=(
+            "Longer side, in pixels, of the small picture that tells what hides what. "
+            "Larger tells it more exactly; time grows with its square"
+        ),
+        subtype='PIXEL',
+        default=_SETTINGS.visibility_resolution,
+        min=16,
+        soft_min=64,
+        soft_max=1024,
+        max=4096,
+    )
+    max_tetrahedra: IntProperty(
+        name="Most Tetrahedra",
+        description="Refinement stops before it makes more pieces of space than this. It bounds time and memory",
+        default=_SETTINGS.max_tetrahedra,
+        min=100,
+        soft_min=10_000,
+        soft_max=2_000_000,
+    )
+    max_levels: IntProperty(
+        name="Most Levels",
+        description="How often a piece of space may be halved at most",
+        default=_SETTINGS.max_levels,
+        min=1,
+        max=200,
+    )
+
+    proxy_form: EnumProperty(
+        name="Proxies",
+        description="What stands for plants that are too small or too hidden for polygons of their own",
+        items=(
+            (
+                'MICROSURFACES',
+                "Microsurfaces",
+                "Few small facets with the area, directions and colours of the leaves they stand for",
+                'MESH_GRID',
+                0,
+            ),
+            (
+                'SHELLS',
+                "Shells",
+                "Each piece of space drawn as a translucent volume, as in the paper. Slower to render; good for haze",
+                'MESH_CONE',
+                1,
+            ),
+        ),
+        default='MICROSURFACES',
+    )
+    refine_at_render: BoolProperty(
+        name="Refine at Render",
+        description=(
+            "Refine for the camera of every frame that is rendered, in the background too, and remove the result "
+            "afterwards. Meshes made by Refine are left out of such renders. In the window, Blender's interface is "
+            "locked while it renders (Render > Lock Interface), which TetFlora switches on when plants are added"
+        ),
+        default=True,
+    )
+    expand_everything: BoolProperty(
+        name="Expand Everything",
+        description=(
+            "For comparison: make every polygon of every plant. "
+            "Eighty trees are some 4 million polygons; a forest does not fit into memory"
+        ),
+    )
+
+    populate: PointerProperty(type=TetFloraPopulate)
+    leaf_objects: CollectionProperty(
+        name="Leaf Objects",
+        description="Meshes of your own in place of a species' leaf",
+        type=TetFloraLeafObject,
+    )
+    leaf_objects_index: IntProperty(name="Active Leaf Object", options={'HIDDEN', 'SKIP_SAVE'})
+    statistics: StringProperty(
+        name="Statistics",
+        description="Figures of the last refinement, as JSON",
+        options={'HIDDEN'},
+    )
+
+
+CLASSES = (TetFloraObject, TetFloraMixEntry, TetFloraLeafObject, TetFloraPopulate, TetFloraScene)
+
+
+def settings_from(scene: bpy.types.Scene) -> RefinementSettings:
+    """The scene's settings as the engine takes them."""
+    group = scene.tetflora
+    # A field that has no property of its own keeps the engine's value.
+    names = [f.name for f in fields(RefinementSettings) if f.name in group.bl_rna.properties]
+    return RefinementSettings(**{name: getattr(group, name) for name in names})
+
+
+def leaf_objects(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
+    """Mesh objects that replace the leaves of species, by the species' identifier."""
+    return {entry.species: entry.leaf for entry in scene.tetflora.leaf_objects if entry.species and entry.leaf}
+
+
+def register() -> None:
+    """Register the property groups and hang them on Blender's types."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    bpy.types.Object.tetflora = PointerProperty(type=TetFloraObject)
+    bpy.types.Scene.tetflora = PointerProperty(type=TetFloraScene)
+
+
+def unregister() -> None:
+    """Take everything back; what is stored in the file stays there."""
+    del bpy.types.Scene.tetflora
+    del bpy.types.Object.tetflora
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)
