@@ -15,8 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tetrahedra.geometry import EDGES, face_area_vectors, projected_area, volume
+from ..tetrahedra.geometry import face_area_vectors, projected_area, volume
 from .camera import Camera
+from .silhouette import silhouette_area, window_bounds
 
 #: Pairs of a primitive and a pixel of its bounding box that are looked at together; some 100 bytes each.
 PAIRS_AT_ONCE = 1 << 19
@@ -30,7 +31,7 @@ SHIFT = (1.7e-6, 2.9e-6)
 
 #: Up to this many pixels of silhouette, a tetrahedron counts by its area and mean thickness instead of by samples:
 #: then the optical depth that it brings into the image is exact, however the pixels' centres fall.
-SMALL = 6.0
+SMALL = 4.0
 
 
 @dataclass(frozen=True)
@@ -89,34 +90,6 @@ def pixel_rays(camera: Camera, width: int, height: int) -> tuple[NDArray[np.floa
         return camera.position + grid @ frame.T, np.tile(-camera.frame[:, 2], (width * height, 1))
     towards = (grid + np.array([0.0, 0.0, 1.0])) @ frame.T
     return np.tile(camera.position, (width * height, 1)), towards / np.linalg.norm(towards, axis=1, keepdims=True)
-
-
-def silhouette_pixels(vertices: NDArray[np.float64], camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Exact silhouette areas of tetrahedra on the final image.
-
-    Parameters
-    ----------
-    vertices : (n, 4, 3) float64
-        World space, metres.
-    camera : Camera
-        Its ``width`` and ``height`` are the image's.
-
-    Returns
-    -------
-    pixels : (n,) float64
-        Area in pixels; 0 where it is not known.
-    whole : (n,) bool
-        Where it is known: tetrahedra between near and far plane and within the window.
-    """
-    corners, whole = _project(camera.to_camera_space(vertices), camera)
-    left, right, bottom, top = camera.window
-    # A share of the window, so that rounding does not exclude what touches its border, as half of all cells may.
-    slack = 1e-9 * np.array([right - left, top - bottom])
-    whole &= ((corners >= np.array([left, bottom]) - slack) & (corners <= np.array([right, top]) + slack)).all((1, 2))
-    a, b, c, d = (corners[:, i] for i in range(4))
-    # The four faces cover each point of the silhouette twice, whether it is a triangle or a quadrilateral.
-    area = sum(np.abs(_cross(q - p, r - p)) for p, q, r in ((a, b, c), (a, b, d), (a, c, d), (b, c, d))) / 4.0
-    return np.where(whole, area * camera.width * camera.height / ((right - left) * (top - bottom)), 0.0), whole
 
 
 def tetrahedron_fragments(vertices: NDArray[np.float64], camera: Camera, width: int, height: int) -> Fragments:
@@ -182,7 +155,7 @@ def _fragments(
 ) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
     """Fragments of as many tetrahedra as fit into memory: cell, pixel, entry, thickness, coverage."""
     local = camera.to_camera_space(vertices)
-    low, high, middle = _bounds(local, camera)
+    low, high, middle = window_bounds(local, camera)
     box = _pixel_box(low, high, camera, width, height)
     # Camera space is mirrored (depth is −z), so outward normals of positive tetrahedra point inwards there.
     inward = face_area_vectors(local)
@@ -192,8 +165,7 @@ def _fragments(
     cells, pixels, entries, thicknesses = [], [], [], []
     for cell, column, row in _pairs(box):
         px, py = x[column], y[row]
-        enter, leave = _clip_depths(camera)
-        enter, leave = np.full(len(cell), enter), np.full(len(cell), leave)
+        enter, leave = np.full(len(cell), camera.near), np.full(len(cell), camera.far)
         for face in range(4):
             nx, ny, nz = (inward[:, face, i][cell] for i in range(3))
             # Inside where constant + depth · slope >= 0.
@@ -216,11 +188,14 @@ def _fragments(
         thicknesses.append((leave[hit] - enter[hit]) * metres)
     cell, pixel = (np.concatenate([np.zeros(0, np.int64), *arrays]) for arrays in (cells, pixels))
     entry, thickness = (np.concatenate([np.zeros(0), *arrays]) for arrays in (entries, thicknesses))
-    return _with_small_ones(vertices, camera, (width, height), (low, high, middle), (cell, pixel, entry, thickness))
+    return _with_small_ones(
+        vertices, local, camera, (width, height), (low, high, middle), (cell, pixel, entry, thickness)
+    )
 
 
 def _with_small_ones(
     vertices: NDArray[np.float64],
+    local: NDArray[np.float64],
     camera: Camera,
     size: tuple[int, int],
     bounds: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
@@ -232,8 +207,8 @@ def _with_small_ones(
     left, right, bottom, top = camera.window
     corner, step = np.array([left, bottom]), np.array([(right - left) / width, (top - bottom) / height])
     count = np.bincount(cell, minlength=len(vertices))
-    area, whole = silhouette_pixels(vertices, camera)
-    area *= width * height / (camera.width * camera.height)
+    area, whole = silhouette_area(local, low, high, camera)
+    area = area / np.prod(step)
     # Of what is partly out of view only the box is known; a tetrahedron fills half of it or less.
     seen = np.clip((np.minimum(high, [right, top]) - np.maximum(low, corner)) / step, 0.0, None)
     area = np.where(whole, area, np.minimum(1.0, np.prod(seen, axis=1) / 2.0))
@@ -242,8 +217,7 @@ def _with_small_ones(
         visible = ((place >= 0.0) & (place <= [width, height])).all(axis=1) & (area > 0.0)
     missed = np.flatnonzero((count == 0) & visible)
     column, row = np.minimum(place[missed].astype(np.int64), [width - 1, height - 1]).T
-    centroid = camera.to_camera_space(vertices[missed].mean(axis=1))
-    depth = np.clip(centroid[:, 2], *_clip_depths(camera))
+    depth = np.clip(local[missed, :, 2].mean(axis=1), camera.near, camera.far)
     along = depth * _ray_metres(camera, *middle[missed].T)
     by_area = whole & (area < SMALL) & (count > 0)
     by_area[missed] = True
@@ -272,7 +246,7 @@ def _draw_triangles(
 ) -> None:
     """Lower ``nearest``, metres along each pixel's ray, to where finite triangles are."""
     local = camera.to_camera_space(triangles)
-    low, high, _ = _bounds(local, camera)
+    low, high, _ = window_bounds(local, camera)
     box = _pixel_box(low, high, camera, width, height)
     drawn = np.flatnonzero((box[:, 1] >= box[:, 0]) & (box[:, 3] >= box[:, 2]))
     local, box = local[drawn], box[drawn]
@@ -281,7 +255,7 @@ def _draw_triangles(
     # A side's plane through the eye is linear in the point (x, y, 1) of the window; so is a side seen in parallel.
     flat = local if camera.kind != "ORTHO" else np.concatenate([local[..., :2], np.ones((*local.shape[:2], 1))], axis=2)
     sides = np.cross(flat, np.roll(flat, -1, axis=1))
-    near, far = _clip_depths(camera)
+    near, far = camera.near, camera.far
     x, y = _centres(camera, width, height)
     for cell, column, row in _pairs(box):
         px, py = x[column], y[row]
@@ -315,55 +289,6 @@ def _centres(camera: Camera, width: int, height: int) -> tuple[NDArray[np.float6
 def _ray_metres(camera: Camera, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64] | float:
     """Metres along the ray through (x, y) of the window for each metre of depth."""
     return 1.0 if camera.kind == "ORTHO" else np.sqrt(1.0 + x * x + y * y)
-
-
-def _clip_depths(camera: Camera) -> tuple[float, float]:
-    return camera.near, camera.far
-
-
-def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-
-
-def _project(local: NDArray[np.float64], camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Camera space ``(n, k, 3)`` to the window ``(n, k, 2)``, and whether all of a row's points can be seen so."""
-    near, far = _clip_depths(camera)
-    depth = local[..., 2]
-    slack = 1e-9 * far
-    seen = ((depth >= near * (1.0 - 1e-9)) & (depth <= far + slack)).all(axis=1)
-    if camera.kind == "ORTHO":
-        return local[..., :2], seen
-    return local[..., :2] / np.maximum(depth, near)[..., None], seen
-
-
-def _bounds(
-    local: NDArray[np.float64], camera: Camera
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Boxes ``low``, ``high`` (n, 2) on the window, and a point (n, 2) on it that lies within the silhouette.
-
-    The part before the near plane is cut off; boxes of what lies wholly before it or wholly beyond the far plane are
-    empty: ``low > high``.
-    """
-    count = local.shape[1]
-    near, far = _clip_depths(camera)
-    counted = (local[..., 2] >= near) & (local[..., 2].min(axis=1) < far)[:, None]
-    mixed = np.flatnonzero(counted.any(axis=1) & ~counted.all(axis=1))
-    flat, _ = _project(local, camera)
-    low = np.where(counted[..., None], flat, np.inf).min(axis=1)
-    high = np.where(counted[..., None], flat, -np.inf).max(axis=1)
-    total = np.where(counted[..., None], flat, 0.0).sum(axis=1)
-    number = counted.sum(axis=1).astype(np.float64)
-    for first, second in EDGES[(count > EDGES).all(axis=1)]:
-        a, b = local[mixed, first], local[mixed, second]
-        crosses = np.flatnonzero(counted[mixed, first] != counted[mixed, second])
-        at, a, b = mixed[crosses], a[crosses], b[crosses]
-        share = (near - a[:, 2:]) / (b[:, 2:] - a[:, 2:])
-        cut = a + share * (b - a)
-        point = cut[:, :2] if camera.kind == "ORTHO" else cut[:, :2] / near
-        low[at], high[at] = np.minimum(low[at], point), np.maximum(high[at], point)
-        total[at] += point
-        number[at] += 1.0
-    return low, high, total / np.maximum(number, 1.0)[:, None]
 
 
 def _pixel_box(

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .camera import Camera
-from .rasterise import buffer_size, silhouette_pixels, tetrahedron_fragments
+from .rasterise import buffer_size, tetrahedron_fragments
+from .silhouette import silhouette_pixels
 
 #: Optical depth of one fragment at most. e^−60 is no light at all, and larger numbers, or infinite ones, would take
 #: the precision from the cumulative sum over the whole image.
