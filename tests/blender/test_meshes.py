@@ -4,20 +4,27 @@
 
 from dataclasses import replace
 
-import bpy
 import numpy as np
 import pytest
 
-from tetflora_addon.blender.meshes import read_mesh_arrays, write_mesh
-from tetflora_addon.buffers import MeshBuffers
+from devtools import session
+
+pytestmark = pytest.mark.usefixtures("clean_file")
 
 
-@pytest.fixture(autouse=True)
-def empty_file():
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+def write_mesh(*args):
+    return session.part("tetflora_addon.blender.meshes").write_mesh(*args)
 
 
-def prism() -> MeshBuffers:
+def read_mesh_arrays(*args):
+    return session.part("tetflora_addon.blender.meshes").read_mesh_arrays(*args)
+
+
+def MeshBuffers(*args, **fields):  # noqa: N802 - stands for the class of the enabled extension
+    return session.part("tetflora_addon.buffers").MeshBuffers(*args, **fields)
+
+
+def prism():
     """A triangular prism: faces of three and four corners, closed."""
     edges = [(0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)]
     corners = [0, 2, 1, 3, 4, 5, 0, 1, 4, 3, 1, 2, 5, 4, 2, 0, 3, 5]
@@ -87,6 +94,8 @@ def test_shading(smooth):
 
 
 def test_materials_fill_the_slots():
+    import bpy
+
     materials = [bpy.data.materials.new("a"), None, bpy.data.materials.new("b")]
     assert list(write_mesh("prism", prism(), materials).materials) == materials
 
@@ -112,6 +121,8 @@ def test_an_empty_mesh():
 
 
 def test_a_mesh_of_an_artist():
+    import bpy
+
     bpy.ops.mesh.primitive_cube_add()
     mesh = bpy.context.object.data
     back = read_mesh_arrays(mesh)
@@ -142,6 +153,8 @@ def test_a_mesh_of_an_artist():
     ],
 )
 def test_broken_buffers_are_refused_and_leave_nothing(change, message):
+    import bpy
+
     with pytest.raises(ValueError, match=message):
         write_mesh("broken", replace(prism(), **change))
     assert len(bpy.data.meshes) == 0

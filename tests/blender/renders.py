@@ -1,0 +1,71 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures of a few pixels, as arrays of linear radiance, for tests of materials."""
+
+from __future__ import annotations
+
+import tempfile
+from math import pi, radians
+from pathlib import Path
+
+import numpy as np
+
+from devtools import session
+
+
+def compat():
+    return session.part("tetflora_addon.blender.compat")
+
+
+def small_scene(
+    sky: float, samples: int, sun: float | None = None, size: int = 16, engine: str = "CYCLES", width: float = 2.0
+) -> None:
+    """Look down from z = 50 on `width` metres, under a grey sky and a sun of π W/m² so many degrees off the zenith."""
+    import bpy
+
+    scene = bpy.context.scene
+    render = scene.render
+    render.engine = engine
+    render.resolution_x = render.resolution_y = size
+    render.resolution_percentage = 100
+    render.film_transparent = False
+    scene.cycles.samples = scene.eevee.taa_render_samples = samples
+    scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
+    scene.cycles.transparent_max_bounces = 64
+    scene.cycles.seed = 1
+    world = bpy.data.worlds.new("sky")
+    scene.world = world
+    tree = compat().shader_tree(world)
+    tree.nodes["Background"].inputs["Color"].default_value = (sky, sky, sky, 1.0)
+    camera = bpy.data.cameras.new("camera")
+    camera.type = 'ORTHO'
+    camera.ortho_scale = width
+    scene.camera = bpy.data.objects.new("camera", camera)
+    scene.camera.location = (0.0, 0.0, 50.0)
+    scene.collection.objects.link(scene.camera)
+    if sun is not None:
+        light = bpy.data.lights.new("sun", 'SUN')
+        light.energy, light.angle = pi, 0.0
+        made = bpy.data.objects.new("sun", light)
+        made.rotation_euler = (0.0, radians(sun), 0.0)
+        scene.collection.objects.link(made)
+
+
+def picture() -> np.ndarray:
+    """Render; linear radiance ``(height, width, 3)``, bottom row first."""
+    import bpy
+
+    settings = bpy.context.scene.render
+    with tempfile.TemporaryDirectory() as folder:
+        path = str(Path(folder) / "picture.exr")
+        compat().set_still_format(settings.image_settings, 'OPEN_EXR')
+        settings.image_settings.color_depth = '32'
+        settings.filepath = path
+        bpy.ops.render.render(write_still=True)
+        image = bpy.data.images.load(path)
+        image.colorspace_settings.name = "Non-Color"
+        pixels = np.zeros(len(image.pixels), dtype=np.float32)
+        image.pixels.foreach_get(pixels)
+        values = pixels.reshape(image.size[1], image.size[0], 4)[..., :3].astype(np.float64)
+        bpy.data.images.remove(image)
+    return values
