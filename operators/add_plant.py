@@ -10,10 +10,10 @@ from ..tetflora_addon.blender.placement import Placement, new_seeds
 from ..tetflora_addon.blender.plant_objects import add_plants, plants_of
 from ..tetflora_addon.blender.species_items import NO_SPECIES, default_species, operator_items
 from . import ids
-from .base import in_object_mode, reports_errors, select_only
+from .base import Reporting, in_object_mode, select_only
 
 
-class TETFLORA_OT_add_plant(bpy.types.Operator):
+class TETFLORA_OT_add_plant(Reporting, bpy.types.Operator):
     """Add an empty that stands for a plant at the 3D cursor."""
 
     bl_idname = ids.ADD_PLANT
@@ -53,8 +53,7 @@ class TETFLORA_OT_add_plant(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         return in_object_mode(cls, context)
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         properties = self.properties
         if not properties.is_property_set("location"):
             self.location = context.scene.cursor.location

@@ -8,10 +8,10 @@ from bpy.props import EnumProperty
 from ..tetflora_addon.blender.plant_objects import assign_species
 from ..tetflora_addon.blender.species_items import NO_SPECIES, operator_items
 from . import ids
-from .base import counted, plants_selected, reports_errors, selected_plants
+from .base import Reporting, counted, plants_selected, selected_plants
 
 
-class TETFLORA_OT_assign_species(bpy.types.Operator):
+class TETFLORA_OT_assign_species(Reporting, bpy.types.Operator):
     """Give the selected plants another species."""
 
     bl_idname = ids.ASSIGN_SPECIES
@@ -25,8 +25,7 @@ class TETFLORA_OT_assign_species(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         return plants_selected(cls, context)
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         if self.species in {"", NO_SPECIES}:
             self.report({'ERROR'}, "Choose a species")
             return {'CANCELLED'}

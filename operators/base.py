@@ -2,30 +2,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What operators have in common: errors of the artist become reports, and the selection is read in one way."""
 
-from collections.abc import Callable
-from functools import wraps
-from typing import TypeVar
-
 import bpy
 
 from ..tetflora_addon.blender.plant_objects import plants_of
 from ..tetflora_addon.errors import TetFloraError
 
-Run = TypeVar("Run", bound=Callable[..., set[str]])
 
+class Reporting:
+    """Mix-in for operators: ``run`` does the work, and an error of the artist's becomes a report.
 
-def reports_errors(run: Run) -> Run:
-    """Turn a `TetFloraError` of ``execute`` or ``invoke`` into a report; the operator then counts as cancelled."""
+    Blender counts the operator as cancelled then, and pushes no undo step.
+    """
 
-    @wraps(run)
-    def wrapped(self: bpy.types.Operator, *arguments: object) -> set[str]:
+    def execute(self, context: bpy.types.Context) -> set[str]:
         try:
-            return run(self, *arguments)
+            return self.run(context)
         except TetFloraError as error:
             self.report({'ERROR'}, str(error))
             return {'CANCELLED'}
 
-    return wrapped
+    def run(self, context: bpy.types.Context) -> set[str]:
+        """Do it; the result of ``execute``."""
+        raise NotImplementedError
 
 
 def in_object_mode(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:

@@ -6,10 +6,10 @@ import bpy
 
 from ..tetflora_addon.blender import job
 from . import ids
-from .base import counted, in_object_mode, reports_errors
+from .base import Reporting, counted, in_object_mode
 
 
-class TETFLORA_OT_clear(bpy.types.Operator):
+class TETFLORA_OT_clear(Reporting, bpy.types.Operator):
     """Remove what Refine made."""
 
     bl_idname = ids.CLEAR
@@ -26,7 +26,6 @@ class TETFLORA_OT_clear(bpy.types.Operator):
             return False
         return True
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         self.report({'INFO'}, f"{counted(job.clear(context.scene), 'datablock')} removed")
         return {'FINISHED'}

@@ -7,10 +7,10 @@ from bpy.props import EnumProperty
 
 from ..tetflora_addon.blender.species_items import catalogue, default_species
 from . import ids
-from .base import reports_errors
+from .base import Reporting
 
 
-class TETFLORA_OT_edit_list(bpy.types.Operator):
+class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
     """Add an entry to a list of species, or remove the active one."""
 
     bl_idname = ids.EDIT_LIST
@@ -38,8 +38,7 @@ class TETFLORA_OT_edit_list(bpy.types.Operator):
     def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
         return properties.bl_rna.properties["action"].enum_items[properties.action].description
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.tetflora
         owner, entries, index = (
             (settings.populate, settings.populate.mix, "mix_index")

@@ -6,10 +6,10 @@ import bpy
 from bpy.props import EnumProperty
 
 from . import ids
-from .base import counted, reports_errors
+from .base import Reporting, counted
 
 
-class TETFLORA_OT_mark_occluder(bpy.types.Operator):
+class TETFLORA_OT_mark_occluder(Reporting, bpy.types.Operator):
     """Mark the selected meshes as hiding the plants behind them, or take the mark away."""
 
     bl_idname = ids.MARK_OCCLUDER
@@ -39,8 +39,7 @@ class TETFLORA_OT_mark_occluder(bpy.types.Operator):
         cls.poll_message_set("Select meshes first")
         return False
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         # Something marked that has since been converted can still be unmarked.
         meshes = [o for o in context.selected_objects if o.type == 'MESH' or o.tetflora.is_occluder]
         mark = self.action == 'MARK' or (self.action == 'TOGGLE' and not all(o.tetflora.is_occluder for o in meshes))

@@ -14,13 +14,13 @@ from ..tetflora_addon.blender.species_items import catalogue, default_species
 from ..tetflora_addon.blender.surfaces import mesh_triangles
 from ..tetflora_addon.errors import SceneError
 from . import ids
-from .base import counted, in_object_mode, reports_errors, select_only
+from .base import Reporting, counted, in_object_mode, select_only
 
 # Names that the operator shares with the scene's settings for populating.
 _SHARED = ("count", "seed", "slope_limit", "min_distance", "scale_min", "scale_max")
 
 
-class TETFLORA_OT_populate(bpy.types.Operator):
+class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
     """Scatter plants over the selected meshes."""
 
     bl_idname = ids.POPULATE
@@ -83,8 +83,7 @@ class TETFLORA_OT_populate(bpy.types.Operator):
             return False
         return True
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
         self._complete_from(scene)
         shares = _parse_shares(self.species)

@@ -12,13 +12,13 @@ from ..tetflora_addon.blender.plant_objects import prepare_scene
 from ..tetflora_addon.errors import TetFloraError
 from ..tetflora_addon.refinement.statistics import Statistics
 from . import ids
-from .base import counted, reports_errors
+from .base import Reporting, counted
 
 # Seconds of work between two looks at the keyboard.
 _SLICE = 0.05
 
 
-class TETFLORA_OT_refine(bpy.types.Operator):
+class TETFLORA_OT_refine(Reporting, bpy.types.Operator):
     """Make meshes and proxies of all plants, as fine as the scene's camera sees them."""
 
     bl_idname = ids.REFINE
@@ -42,14 +42,12 @@ class TETFLORA_OT_refine(bpy.types.Operator):
             return False
         return True
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         statistics = job.refine(
             context.scene, context.evaluated_depsgraph_get(), view_layer=context.view_layer, for_render=False
         )
         return self._finish(context, statistics)
 
-    @reports_errors
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if bpy.app.background or context.window is None:
             return self.execute(context)
@@ -60,9 +58,9 @@ class TETFLORA_OT_refine(bpy.types.Operator):
             # The scene is read in the second step: what is wrong with it is said while the artist still looks here.
             for _ in range(2):
                 progress = next(self._steps)
-        except BaseException:
-            self._steps.close()
-            raise
+        except TetFloraError as error:
+            self.report({'ERROR'}, str(error))
+            return {'CANCELLED'}
         manager = context.window_manager
         manager.progress_begin(0.0, 1.0)
         self._show(context, progress)

@@ -7,10 +7,10 @@ from bpy.props import EnumProperty, StringProperty
 
 from ..tetflora_addon.blender.plant_objects import plants_of, remove_plants
 from . import ids
-from .base import counted, in_object_mode, reports_errors
+from .base import Reporting, counted, in_object_mode
 
 
-class TETFLORA_OT_remove_plants(bpy.types.Operator):
+class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
     """Delete plants from the scene."""
 
     bl_idname = ids.REMOVE_PLANTS
@@ -39,8 +39,7 @@ class TETFLORA_OT_remove_plants(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         return in_object_mode(cls, context)
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         objects = context.selected_objects if self.which == 'SELECTED' else context.scene.objects
         plants = [o for o in plants_of(objects) if self.which != 'SPECIES' or o.tetflora.species == self.species]
         if not plants:

@@ -7,10 +7,10 @@ from bpy.props import IntProperty
 
 from ..tetflora_addon.blender.plant_objects import reseed
 from . import ids
-from .base import counted, plants_selected, reports_errors, selected_plants
+from .base import Reporting, counted, plants_selected, selected_plants
 
 
-class TETFLORA_OT_reseed(bpy.types.Operator):
+class TETFLORA_OT_reseed(Reporting, bpy.types.Operator):
     """Make other individuals of the selected plants."""
 
     bl_idname = ids.RESEED
@@ -28,8 +28,7 @@ class TETFLORA_OT_reseed(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         return plants_selected(cls, context)
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         number = reseed(selected_plants(context), self.roll)
         self.report({'INFO'}, f"{counted(number, 'plant')} re-rolled")
         return {'FINISHED'}

@@ -7,10 +7,10 @@ from bpy.props import BoolProperty, StringProperty
 
 from ..tetflora_addon.blender.plant_objects import plants_of
 from . import ids
-from .base import counted, reports_errors
+from .base import Reporting, counted
 
 
-class TETFLORA_OT_select_species(bpy.types.Operator):
+class TETFLORA_OT_select_species(Reporting, bpy.types.Operator):
     """Select all plants of a species."""
 
     bl_idname = ids.SELECT_SPECIES
@@ -32,8 +32,7 @@ class TETFLORA_OT_select_species(bpy.types.Operator):
             return False
         return True
 
-    @reports_errors
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         if not self.species:
             active = context.active_object
             if active is None or not active.tetflora.is_plant:
