@@ -118,11 +118,11 @@ def tetrahedron_fragments(vertices: NDArray[np.float64], camera: Camera, width: 
     parts = []
     for start in range(0, len(vertices), PRIMITIVES_AT_ONCE):
         part = _fragments(vertices[start : start + PRIMITIVES_AT_ONCE], camera, width, height)
-        parts.append((part[0] + start, *part[1:]))
+        parts.append((part[0] + np.int32(start), *part[1:]))
     if not parts:
-        parts = [(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0))]
+        parts = [(np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros(0), np.zeros(0), np.zeros(0))]
     cell, pixel, entry, thickness, coverage = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    return Fragments(cell.astype(np.int32), pixel.astype(np.int32), entry, thickness, coverage)
+    return Fragments(cell, pixel, entry, thickness, coverage)
 
 
 def occluder_depth(triangles: NDArray[np.float64], camera: Camera, width: int, height: int) -> NDArray[np.float64]:
@@ -182,11 +182,12 @@ def _fragments(
             leave = np.where((slope == 0.0) & (constant < 0.0), -np.inf, leave)
         hit = np.flatnonzero(leave > enter)
         metres = _ray_metres(camera, px[hit], py[hit])
-        cells.append(cell[hit])
-        pixels.append(row[hit] * width + column[hit])
+        # Half the memory of intp; a heavy scene has millions of fragments.
+        cells.append(cell[hit].astype(np.int32))
+        pixels.append((row[hit] * width + column[hit]).astype(np.int32))
         entries.append(enter[hit] * metres)
         thicknesses.append((leave[hit] - enter[hit]) * metres)
-    cell, pixel = (np.concatenate([np.zeros(0, np.int64), *arrays]) for arrays in (cells, pixels))
+    cell, pixel = (np.concatenate([np.zeros(0, np.int32), *arrays]) for arrays in (cells, pixels))
     entry, thickness = (np.concatenate([np.zeros(0), *arrays]) for arrays in (entries, thicknesses))
     return _with_small_ones(
         vertices, local, camera, (width, height), (low, high, middle), (cell, pixel, entry, thickness)
@@ -231,8 +232,8 @@ def _with_small_ones(
     across = projected_area(vertices[small], direction)
     chord[small] = volume(vertices[small]) / np.where(across > 0.0, across, 1.0)
 
-    cell = np.concatenate([cell, missed])
-    pixel = np.concatenate([pixel, row * width + column])
+    cell = np.concatenate([cell, missed.astype(np.int32)])
+    pixel = np.concatenate([pixel, (row * width + column).astype(np.int32)])
     entry = np.concatenate([entry, np.maximum(along - chord[missed] / 2.0, 0.0)])
     thickness = np.concatenate([thickness, chord[missed]])
     by_area = by_area[cell]
