@@ -96,7 +96,7 @@ def _block(flora: Flora, pieces: Pieces, number: int, fraction: float) -> Iterat
 
 
 def facet_buffers(
-    flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.8, coarse: float = 2.5
+    flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.6, coarse: float = 2.0
 ) -> MeshBuffers | None:
     """Proxies as microsurfaces: facets of all that is not explicit.
 

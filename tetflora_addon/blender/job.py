@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Generator
 from dataclasses import dataclass, replace
 
@@ -25,7 +24,7 @@ from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 from ..refinement.loop import refine as refine_loop
 from ..refinement.settings import RefinementSettings
-from ..refinement.statistics import Statistics
+from ..refinement.statistics import Statistics, Stopwatch
 from .emit import Results, has_results, remove_results
 from .materials import bark_material, leaf_material, proxy_material
 from .meshes import read_mesh_arrays
@@ -147,7 +146,7 @@ def refine_steps(
     TetFloraError
         No camera, no plants, unknown species, unusable plants or occluders; the message says which.
     """
-    clock = _Stopwatch()
+    clock = Stopwatch()
     yield Progress(0.0, "Reading the scene")
     camera = read_camera(scene, depsgraph)
     seeds = read_plants(scene, depsgraph, view_layer or depsgraph.view_layer)
@@ -264,15 +263,3 @@ def _write_proxies(
         statistics.polygons_proxy += buffers.polygons
         statistics.memory_mb += buffers.nbytes / 1e6
 
-
-class _Stopwatch:
-    """Wall clock by stage."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-        self._last = time.perf_counter()
-
-    def lap(self, stage: str) -> None:
-        now = time.perf_counter()
-        self.seconds[stage] = self.seconds.get(stage, 0.0) + now - self._last
-        self._last = now

@@ -156,7 +156,14 @@ def _spray(blades: int, half_width: float) -> LeafModel:
     return leaf_model(np.array(positions), faces, np.tile([[0, 0], [1, 0], [1, 1], [0, 1]], (blades, 1)))
 
 
+def _kite(half_width: float, fold: float, droop: float) -> LeafModel:
+    """One quad, bent along the midrib: the least that still looks like a leaf."""
+    corners = [(0.0, 0.0, 0.0), (half_width, 0.4, fold), (0.0, 1.0, -droop), (-half_width, 0.4, fold)]
+    return leaf_model(corners, [[0, 1, 2, 3]])
+
+
 LEAF_MODELS: dict[str, LeafModel] = {
+    "kite": _kite(0.32, 0.05, 0.05),
     "ovate": _folded(0.30, 0.08, 0.10),
     "round": _folded(0.42, 0.05, 0.06),
     "lanceolate": _folded(0.13, 0.03, 0.12),

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Generator
 from dataclasses import dataclass
 
@@ -19,8 +18,10 @@ from ..tetrahedra.tree import TetrahedralTree
 from .camera import Camera
 from .contents import Amounts, Contents, bounding_box, node_amounts, push_down
 from .decisions import Decision, decide, feature_pixels
-from .rasterise import buffer_size, occluder_depth, silhouette_pixels
+from .rasterise import buffer_size, occluder_depth
 from .settings import RefinementSettings
+from .silhouette import silhouette_pixels
+from .statistics import Stopwatch
 from .visibility import Visibility, visibility
 
 #: Bisections between two visibility steps; three together divide a tetrahedron into eight.
@@ -100,7 +101,7 @@ def refine(
     occluders : (t, 3, 3) float64, optional
         Triangles of explicit polygons that hide what is behind them, metres.
     """
-    clock = _Clock()
+    clock = Stopwatch()
     contents = Contents.of_plants(flora, seeds)
     tree = view_root(camera, bounding_box(flora, contents.subplants))
     contents = push_down(flora, tree, contents)
@@ -168,15 +169,3 @@ def _without_splits(
 def _of(amounts: Amounts, nodes: NDArray) -> Amounts:
     return Amounts(amounts.leaf_area[nodes], amounts.wood_area[nodes], amounts.polygons[nodes], amounts.width[nodes])
 
-
-class _Clock:
-    """Adds up wall clock by step."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-        self._last = time.perf_counter()
-
-    def lap(self, step: str) -> None:
-        now = time.perf_counter()
-        self.seconds[step] = self.seconds.get(step, 0.0) + now - self._last
-        self._last = now

@@ -1,0 +1,90 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures compared by numbers: FLIP (Andersson et al., 2020) where plants are, and where plants are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import flip_evaluator
+import numpy as np
+from numpy.typing import NDArray
+
+
+def read_picture(path: Path) -> NDArray[np.float32]:
+    """RGBA (height, width, 4) of an 8-bit picture as it is stored (sRGB), top row first."""
+    image = bpy.data.images.load(str(path), check_existing=False)
+    try:
+        image.colorspace_settings.name = "Non-Color"
+        image.alpha_mode = 'CHANNEL_PACKED'
+        width, height = image.size
+        pixels = np.zeros(width * height * 4, np.float32)
+        image.pixels.foreach_get(pixels)
+    finally:
+        bpy.data.images.remove(image)
+    return pixels.reshape(height, width, 4)[::-1]
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How far a picture is from its reference.
+
+    Attributes
+    ----------
+    flip : float
+        Mean FLIP over the mask.
+    flip_all : float
+        Mean FLIP over the whole picture.
+    colour : float
+        Difference of the masked mean colours (linear light), relative to the reference's mean.
+    """
+
+    flip: float
+    flip_all: float
+    colour: float
+
+
+def difference(reference: Path, test: Path, mask: NDArray[np.bool_] | None = None) -> Difference:
+    """Compare two 8-bit pictures of equal size; ``mask`` is (height, width), by default all."""
+    a, b = (np.ascontiguousarray(read_picture(p)[:, :, :3]) for p in (reference, test))
+    error = np.asarray(flip_evaluator.evaluate(a, b, "LDR", inputsRGB=True, applyMagma=False)[0]).reshape(a.shape[:2])
+    mask = np.ones(a.shape[:2], bool) if mask is None else mask
+    linear = [np.where(p <= 0.04045, p / 12.92, ((p + 0.055) / 1.055) ** 2.4)[mask].mean(axis=0) for p in (a, b)]
+    colour = float(np.abs(linear[1] - linear[0]).mean() / linear[0].mean())
+    return Difference(float(error[mask].mean()), float(error.mean()), colour)
+
+
+def render(scene: bpy.types.Scene, path: Path, samples: int, seed: int = 0) -> None:
+    """Render a frame of a scene in Cycles without denoising, as an 8-bit PNG."""
+    scene.render.engine = 'CYCLES'
+    scene.cycles.samples, scene.cycles.seed = samples, seed
+    scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
+    scene.render.image_settings.file_format = 'PNG'
+    scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+
+
+def plant_mask(scene: bpy.types.Scene, path: Path, samples: int = 8, threshold: float = 0.05) -> NDArray[np.bool_]:
+    """Where plants are seen, with the objects that the scene holds now: everything else is made a hole.
+
+    Returns
+    -------
+    (height, width) bool
+        Pixels that plants cover by more than the threshold.
+    """
+    others = [
+        o for o in scene.objects if o.type in {'MESH', 'POINTCLOUD'} and "tetflora_kind" not in o and not o.is_holdout
+    ]
+    before = scene.render.film_transparent, scene.render.image_settings.color_mode
+    try:
+        for o in others:
+            o.is_holdout = True
+        scene.render.film_transparent, scene.render.image_settings.color_mode = True, 'RGBA'
+        render(scene, path, samples)
+    finally:
+        for o in others:
+            o.is_holdout = False
+        scene.render.film_transparent, scene.render.image_settings.color_mode = before
+    return read_picture(path)[:, :, 3] > threshold

@@ -1,0 +1,86 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The row of eighty (paper, section 8.1): eighty different trees that recede from the viewer, 3.79 million polygons in all."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from .terrain import Terrain
+
+COUNT = 80
+SPACING = 7.0
+CORNER = (20, 40)
+_ROW_X = 70.0
+_FIRST_Y = 36.0
+
+
+def build(scene: bpy.types.Scene, count: int = COUNT, species: str = "broadleaf_tree") -> None:
+    """Fill an empty scene with ground, plants, camera, sun and sky.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    count : int
+        Number of plants.
+    species : str
+        Identifier in the catalogue.
+    """
+    ground = Terrain(corner=CORNER, shape=(72, 18), scale=0.1)
+    ground.add_object(scene, "Ground", spacing=3.0)
+    place = np.arange(count)
+    # A planted row is never quite straight; the golden ratio spreads the deviations evenly.
+    aside = 1.6 * ((place * 0.618034) % 1 - 0.5)
+    x, y = _ROW_X + aside, _FIRST_Y + SPACING * place
+    z = ground.height(x, y)
+    plants = bpy.data.collections.new("Row of eighty")
+    scene.collection.children.link(plants)
+    for i in range(count):
+        empty = bpy.data.objects.new(f"Tree {i + 1:02d}", None)
+        empty.empty_display_type, empty.empty_display_size = 'SINGLE_ARROW', 8.0
+        empty.location = x[i], y[i], z[i] - 0.05
+        empty.rotation_euler.z = 2.399963 * i  # golden angle
+        empty.scale = (0.9 + 0.25 * ((i * 0.754878) % 1),) * 3
+        empty.tetflora.is_plant, empty.tetflora.species, empty.tetflora.seed = True, species, 1000 + i
+        plants.objects.link(empty)
+    eye = Vector((_ROW_X - 17.0, 7.0, 0.0))
+    eye.z = float(ground.height(eye.x, eye.y)) + 3.2
+    target = Vector((_ROW_X - 2.0, _FIRST_Y + 50.0, 0.0))
+    target.z = float(ground.height(target.x, target.y)) + 7.0
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.lens, camera.data.clip_end = 35.0, 3000.0
+    camera.location = eye
+    camera.rotation_euler = (target - eye).to_track_quat('-Z', 'Y').to_euler()
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    add_daylight(scene, elevation=38.0, azimuth=70.0)
+    render = scene.render
+    render.resolution_x, render.resolution_y, render.resolution_percentage = 800, 450, 100
+
+
+def add_daylight(scene: bpy.types.Scene, elevation: float, azimuth: float) -> None:
+    """Sun, and a sky that is blue above and pale at the horizon; angles in degrees, azimuth from north to the east."""
+    sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", 'SUN'))
+    sun.data.energy, sun.data.angle, sun.data.color = 5.0, math.radians(0.6), (1.0, 0.94, 0.85)
+    sun.rotation_euler = (math.radians(90 - elevation), 0, math.radians(-azimuth))
+    scene.collection.objects.link(sun)
+    world = bpy.data.worlds.new("Sky")
+    scene.world = world
+    if not world.node_tree:
+        world.use_nodes = True
+    nodes, links = world.node_tree.nodes, world.node_tree.links
+    place = nodes.new("ShaderNodeTexCoord")
+    split = nodes.new("ShaderNodeSeparateXYZ")
+    ramp = nodes.new("ShaderNodeValToRGB")
+    stops = ramp.color_ramp.elements
+    stops[0].position, stops[0].color = 0.0, (0.72, 0.80, 0.88, 1)
+    stops[1].position, stops[1].color = 0.55, (0.16, 0.34, 0.72, 1)
+    links.new(place.outputs["Generated"], split.inputs[0])
+    links.new(split.outputs["Z"], ramp.inputs[0])
+    background = next(n for n in nodes if n.type == 'BACKGROUND')
+    background.inputs["Strength"].default_value = 0.9
+    links.new(ramp.outputs["Color"], background.inputs["Color"])
