@@ -105,12 +105,12 @@ def bark_material(species_name: str) -> bpy.types.Material:
         geometry = graph.node("ShaderNodeNewGeometry").outputs
         # Stretched five times along the vertical, the way most wood grows: ridges of about 5 cm by 25 cm.
         stretched = graph.vector('MULTIPLY', geometry["Position"], (1.0, 1.0, 0.2))
-        noise = graph.node("ShaderNodeTexNoise", {"Vector": stretched, "Scale": 20.0, "Detail": 2.0, "Roughness": 0.65})
+        noise = graph.node("ShaderNodeTexNoise", {"Vector": stretched, "Scale": 20.0, "Detail": 3.0, "Roughness": 0.7})
         height = find_socket(noise.outputs, "Fac")
         # Noise lies around .5; the factor around 1.
-        factor = graph.math('MULTIPLY_ADD', height, 1.6, 0.2)
+        factor = graph.math('MULTIPLY_ADD', height, 2.4, -0.2)
         colour = graph.scaled(graph.attribute("tf_colour", "Color"), factor)
-        bump = graph.node("ShaderNodeBump", {"Strength": 0.7, "Distance": 0.02, "Height": height})
+        bump = graph.node("ShaderNodeBump", {"Strength": 1.0, "Distance": 0.03, "Height": height})
         _finish(graph, {"Colour": colour, "Transmission": 0.0, "Gloss": 0.0, "Normal": bump})
         material.diffuse_color = (0.18, 0.12, 0.08, 1.0)
 
