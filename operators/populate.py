@@ -91,7 +91,7 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
         grounds = [obj for obj in context.selected_objects if obj.type == 'MESH']
         standing = [obj.matrix_world.translation[:2] for obj in plants_of(scene.objects)]
         placement = place(
-            np.concatenate([mesh_triangles(obj, depsgraph) for obj in grounds]),
+            np.concatenate([mesh_triangles(obj, depsgraph, "select a mesh with faces") for obj in grounds]),
             count=self.count,
             seed=self.seed,
             slope_limit=self.slope_limit,

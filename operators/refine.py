@@ -78,6 +78,7 @@ class TETFLORA_OT_refine(Reporting, bpy.types.Operator):
             return {'RUNNING_MODAL'}
         end = time.monotonic() + _SLICE
         try:
+            progress = next(self._steps)
             while time.monotonic() < end:
                 progress = next(self._steps)
         except StopIteration as stop:

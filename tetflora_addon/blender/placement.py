@@ -17,6 +17,7 @@ from ..errors import SceneError
 from ..plants.hashing import child_key, key_of_seed, uniform
 
 _ROUNDS = 24
+_NO_DISTANCE = 1e-4  # metres; less is none, and its cells could not be counted
 _SMALLEST_ROUND = 512
 _LARGEST_ROUND = 200_000
 
@@ -187,7 +188,7 @@ class _Spacing:
 
     def admit(self, candidates: NDArray[np.float64], most: int) -> NDArray[np.int64]:
         """Indices of candidates, (k,) and at most ``most``, that keep their distance; earlier ones go first."""
-        if self.distance <= 0.0:
+        if self.distance < _NO_DISTANCE:
             return np.arange(min(most, len(candidates)))
         undecided = np.flatnonzero(~self._near(candidates, self.points))
         chosen = np.zeros(0, np.int64)

@@ -17,8 +17,11 @@ from ..plants.seeds import Seeds
 from ..refinement.camera import Camera
 from .species_items import catalogue
 from .surfaces import mesh_triangles
+from .transforms import frames_of, world_matrix
 
-_TINY = 1e-9  # of an axis: no scale that anybody means
+_OCCLUDER_REMEDY = (
+    "it is marked as hiding plants: make it a mesh with faces, or take the mark away in the sidebar's TetFlora tab"
+)
 _NAMED = 3  # objects that a message names before it only counts
 
 
@@ -57,8 +60,8 @@ def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Camer
     corners = np.array(data.view_frame(scene=scene))  # (4, 3), camera space
     picture = corners[:, :2] / -corners[:, 2:] if data.type == 'PERSP' else corners[:, :2]
     (left, bottom), (right, top) = picture.min(axis=0), picture.max(axis=0)
-    matrix = np.array(evaluated.matrix_world)
-    frame, _, sound = _frames(matrix[None, :3, :3])
+    matrix = world_matrix(scene.camera, depsgraph)
+    frame, _, sound = frames_of(matrix[None, :3, :3])
     if not (sound[0] and np.isfinite(matrix).all()):
         raise SceneError(f'The camera "{name}" has scale 0 or no valid position; press Alt S and Alt G on it')
     if np.linalg.det(matrix[:3, :3]) < 0.0:
@@ -105,7 +108,7 @@ def read_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_lay
                 names.append(obj.name)
                 identifiers.append(group.species)
                 seeds.append(group.seed)
-                matrices.append(np.array(obj.evaluated_get(depsgraph).matrix_world))
+                matrices.append(world_matrix(obj, depsgraph))
     if any(o.is_instancer for o in view_layer.objects):
         for obj, seed, matrix in _instances(depsgraph):
             names.append(obj.name)
@@ -121,7 +124,7 @@ def read_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_lay
         )
     _check_species(names, identifiers)
     transforms = np.array(matrices)
-    frame, scale, sound = _frames(transforms[:, :3, :3])
+    frame, scale, sound = frames_of(transforms[:, :3, :3])
     sound &= np.isfinite(transforms).all(axis=(1, 2))
     if not sound.all():
         bad = [names[i] for i in np.flatnonzero(~sound)]
@@ -159,7 +162,7 @@ def read_occluders(
     """
     marked = [o for o in renderable_objects(view_layer or depsgraph.view_layer) if o.tetflora.is_occluder]
     marked.sort(key=lambda o: o.name_full)
-    return np.concatenate([np.zeros((0, 3, 3)), *(mesh_triangles(o, depsgraph) for o in marked)])
+    return np.concatenate([np.zeros((0, 3, 3)), *(mesh_triangles(o, depsgraph, _OCCLUDER_REMEDY) for o in marked)])
 
 
 def renderable_objects(view_layer: bpy.types.ViewLayer) -> Iterator[bpy.types.Object]:
@@ -193,23 +196,6 @@ def _instances(depsgraph: bpy.types.Depsgraph) -> Iterator[tuple[bpy.types.Objec
                 # Copies of a plant shall not be the same individual: the instance's own number joins the seed.
                 key = child_key(key_of_seed(group.seed), instance.random_id & 0xFFFFFFFF)
                 yield obj.original, int(key.view(np.int64)), np.array(instance.matrix_world)
-
-
-def _frames(linear: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Rotations and mean absolute scales of linear maps, and which of them have any.
-
-    The frame keeps the direction of z, then the azimuth of x; a shear or mirroring goes.
-    """
-    lengths = np.linalg.norm(linear, axis=1)  # (n, 3): of the columns
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        z = linear[:, :, 2] / lengths[:, 2:]
-        x = linear[:, :, 0] / lengths[:, :1]
-        x = x - z * np.sum(x * z, axis=1, keepdims=True)
-        rest = np.linalg.norm(x, axis=1, keepdims=True)
-        x = x / rest
-        frame = np.stack([x, np.cross(z, x), z], axis=2)
-        sound = (lengths > _TINY).all(axis=1) & (rest[:, 0] > _TINY) & np.isfinite(frame).all(axis=(1, 2))
-    return frame, lengths.mean(axis=1), sound
 
 
 def _check_species(names: list[str], identifiers: list[str]) -> None:

@@ -7,18 +7,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
+from .transforms import world_matrix
 
 
-def mesh_triangles(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> NDArray[np.float64]:
+def mesh_triangles(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, remedy: str) -> NDArray[np.float64]:
     """Triangles of a mesh object, modifiers applied.
 
     Parameters
     ----------
     obj : bpy.types.Object
-        Original or evaluated object.
+        The original object.
     depsgraph : bpy.types.Depsgraph
-        Decides about animation and modifiers. An object that it does not hold (hidden in the viewport) is taken
+        Decides about animation and modifiers. An object that it does not hold (switched off in viewports) is taken
         without its modifiers.
+    remedy : str
+        What the artist can do if the object cannot be used; ends the message of the error.
 
     Returns
     -------
@@ -31,10 +34,7 @@ def mesh_triangles(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> NDA
         Not a mesh (any more), or a mesh without faces.
     """
     if obj.type != 'MESH':
-        raise SceneError(
-            f'"{obj.name}" is marked as hiding plants but is not a mesh; '
-            "convert it (Object > Convert > Mesh) or take the mark away in the sidebar's TetFlora tab"
-        )
+        raise SceneError(f'"{obj.name}" is not a mesh; {remedy}')
     evaluated = obj.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     try:
@@ -42,11 +42,8 @@ def mesh_triangles(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> NDA
     finally:
         evaluated.to_mesh_clear()
     if not len(triangles):
-        raise SceneError(
-            f'"{obj.name}" has no faces; give it some, or take the mark as hiding plants away '
-            "in the sidebar's TetFlora tab"
-        )
-    matrix = np.array(evaluated.matrix_world)
+        raise SceneError(f'"{obj.name}" has no faces; {remedy}')
+    matrix = world_matrix(obj, depsgraph)
     return triangles @ matrix[:3, :3].T + matrix[:3, 3]
 
 

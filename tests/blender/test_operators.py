@@ -1,0 +1,318 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What each operator does, what it refuses and that a refusal changes nothing."""
+
+from __future__ import annotations
+
+import json
+from types import SimpleNamespace
+
+import pytest
+
+from devtools import session
+from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, errors, part, select, tiny_render
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+
+def _ops():
+    import bpy
+
+    return bpy.ops.tetflora
+
+
+def _plants():
+    import bpy
+
+    return {o.name: o.tetflora for o in bpy.data.objects if o.tetflora.is_plant}
+
+
+def _small_forest():
+    add_camera(location=(0.0, -60.0, 2.0))
+    for i in range(2):
+        add_plant(f"p{i}", seed=i, location=(3.0 * i, 3.0 * i, 0.0))
+    select()
+    return tiny_render()
+
+
+def test_identifiers_are_those_of_the_registry(blender):
+    import bpy
+
+    ids = session.part("operators.ids")
+    wanted = {value for name, value in vars(ids).items() if name.isupper()}
+    assert wanted == {c.bl_idname for c in session.part("operators").CLASSES}
+    for identifier in wanted:
+        namespace, name = identifier.split(".")
+        assert hasattr(bpy.types, f"{namespace.upper()}_OT_{name}")
+
+
+def test_add_plant_stands_at_the_cursor_with_another_seed_each_time():
+    import bpy
+
+    bpy.context.scene.cursor.location = (1.0, 2.0, 3.0)
+    _ops().add_plant(species="conifer")
+    _ops().add_plant(species="conifer")
+    _ops().add_plant(species="bush", seed=9, location=(4.0, 0.0, 0.0), scale=2.0, azimuth=1.0)
+    objects = [o for o in bpy.data.objects if o.tetflora.is_plant]
+    assert sorted(o.tetflora.species for o in objects) == ["bush", "conifer", "conifer"]
+    bush = next(o for o in objects if o.tetflora.species == "bush")
+    assert tuple(bush.location) == (4.0, 0.0, 0.0)
+    assert (bush.tetflora.seed, bush.scale.z, bush.rotation_euler.z) == (9, 2.0, 1.0)
+    assert bpy.context.view_layer.objects.active == bush
+    assert bpy.context.selected_objects == [bush]
+    conifers = [o for o in objects if o != bush]
+    assert all(tuple(o.location) == (1.0, 2.0, 3.0) for o in conifers)
+    assert conifers[0].tetflora.seed != conifers[1].tetflora.seed
+    assert all(o.empty_display_size > 1.0 for o in conifers)
+    assert bpy.context.scene.render.use_lock_interface
+
+
+def test_reseed_parts_copies_and_leaves_others_alone():
+    plants = [add_plant(f"p{i}", seed=5) for i in range(4)]
+    select(*plants[:3])
+    _ops().reseed()
+    first = {name: p.seed for name, p in _plants().items()}
+    assert len(set(first.values())) == 4
+    assert first["p3"] == 5
+    _ops().reseed(roll=1)
+    assert not {p.seed for p in _plants().values()} & set(first.values()) - {5}
+
+
+def test_species_are_selected_assigned_and_removed():
+    import bpy
+
+    add_plant("a", "bush")
+    add_plant("b", "conifer")
+    add_plant("c", "gone")
+    mesh = add_mesh("terrain")
+    select(bpy.data.objects["a"])
+    _ops().select_species()
+    assert [o.name for o in bpy.context.selected_objects] == ["a"]
+    _ops().select_species(species="gone", extend=True)
+    assert {o.name for o in bpy.context.selected_objects} == {"a", "c"}
+    _ops().assign_species(species="conifer")
+    assert {n: p.species for n, p in _plants().items()} == {"a": "conifer", "b": "conifer", "c": "conifer"}
+    select(bpy.data.objects["a"], mesh)
+    _ops().remove_plants()
+    assert sorted(o.name for o in bpy.data.objects) == ["b", "c", "terrain"]
+    assert _ops().remove_plants(which='SPECIES', species="bush") == {'CANCELLED'}
+    _ops().remove_plants(which='ALL')
+    assert [o.name for o in bpy.data.objects] == ["terrain"]
+
+
+def test_removing_the_last_plant_takes_the_empty_collection_along():
+    import bpy
+
+    _ops().add_plant(species="bush")
+    assert [c.name for c in bpy.data.collections] == ["TetFlora plants"]
+    _ops().remove_plants(which='ALL')
+    assert not bpy.data.collections
+
+
+def test_mark_occluder_toggles_meshes_only():
+    import bpy
+
+    first, second = add_mesh("first"), add_mesh("second")
+    plant = add_plant()
+    select(first, second, plant)
+    first.tetflora.is_occluder = True
+    _ops().mark_occluder()
+    assert first.tetflora.is_occluder
+    assert second.tetflora.is_occluder
+    assert not plant.tetflora.is_occluder
+    _ops().mark_occluder()
+    assert not any(o.tetflora.is_occluder for o in bpy.data.objects)
+
+
+def test_lists_grow_and_shrink():
+    import bpy
+
+    settings = bpy.context.scene.tetflora
+    assert _ops().edit_list(which='MIX', action='REMOVE') == {'CANCELLED'}
+    for _ in range(3):
+        _ops().edit_list(which='MIX', action='ADD')
+    species = [entry.species for entry in settings.populate.mix]
+    assert len(set(species)) == 3
+    assert settings.populate.mix_index == 2
+    settings.populate.mix_index = 0
+    _ops().edit_list(which='MIX', action='REMOVE')
+    assert [entry.species for entry in settings.populate.mix] == species[1:]
+    _ops().edit_list(which='LEAVES', action='ADD')
+    assert len(settings.leaf_objects) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("populate", "Select the mesh"),
+        ("reseed", "Select plants first"),
+        ("assign_species", "Select plants first"),
+        ("mark_occluder", "Select meshes first"),
+        ("refine", "no active camera"),
+        ("clear", "made nothing yet"),
+    ],
+)
+def test_disabled_buttons_say_why(name, says):
+    select()
+    with pytest.raises(RuntimeError, match=says):
+        getattr(_ops(), name)()
+
+
+def test_refine_makes_meshes_and_figures_and_clear_takes_them_back():
+    import bpy
+
+    scene = _small_forest()
+    before = datablocks()
+    assert _ops().refine() == {'FINISHED'}
+    assert part("job").has_results(scene)
+    figures = json.loads(scene.tetflora.statistics)
+    assert figures["plants"] == 2
+    assert figures["polygons_meshed"] + figures["polygons_proxy"] > 0
+    rows = dict(session.part("panels.statistics_panel").rows_of(scene.tetflora.statistics))
+    assert rows["Plants"] == "2"
+    assert rows["Polygons if expanded"] == f"{figures['polygons_full']:,}"
+    assert len(bpy.data.meshes) > 0
+    assert _ops().clear() == {'FINISHED'}
+    assert datablocks() == before
+    assert session.part("panels.statistics_panel").rows_of(scene.tetflora.statistics) == ()
+
+
+@pytest.mark.parametrize(
+    ("break_it", "says"),
+    [
+        (lambda: _ops().remove_plants(which='ALL'), "No plants are there"),
+        (lambda: add_plant("Odd", "quercus"), 'unknown species "quercus"'),
+        (lambda: add_plant("Flat", scale=(0.0, 0.0, 0.0)), '"Flat": scale 0'),
+        (lambda: setattr(add_mesh("Bare", faces=()).tetflora, "is_occluder", True), '"Bare" has no faces'),
+    ],
+)
+def test_refine_reports_what_is_wrong_and_changes_nothing(break_it, says):
+    _small_forest()
+    break_it()
+    before = datablocks()
+    with pytest.raises(RuntimeError, match=says):
+        _ops().refine()
+    assert datablocks() == before
+
+
+class _Window:
+    """As much of a window as the modal operator touches, so that its steps can be taken one by one."""
+
+    def __init__(self):
+        import bpy
+
+        self.progress, self.status, self.timers = [], [], 0
+        self.window_manager = SimpleNamespace(
+            progress_begin=lambda _a, _b: None,
+            progress_update=self.progress.append,
+            progress_end=lambda: None,
+            event_timer_add=self._add,
+            event_timer_remove=self._remove,
+            modal_handler_add=lambda _operator: None,
+        )
+        self.workspace = SimpleNamespace(status_text_set=self.status.append)
+        self.window, self.screen, self.scene = object(), None, bpy.context.scene
+        self.view_layer = bpy.context.view_layer
+        self.evaluated_depsgraph_get = bpy.context.evaluated_depsgraph_get
+
+    def _add(self, _step, window):
+        self.timers += 1
+        return object()
+
+    def _remove(self, _timer):
+        self.timers -= 1
+
+
+class _Operator:
+    """The refine operator's methods on a plain object: Blender makes operators only inside its own event loop."""
+
+    def __init__(self):
+        self.reports = []
+        for name in ("_steps", "_timer"):
+            setattr(self, name, None)
+        self.kind = session.part("operators.refine").TETFLORA_OT_refine
+
+    def __getattr__(self, name):
+        return getattr(self.kind, name).__get__(self)
+
+    def report(self, level, message):
+        self.reports.append((level, message))
+
+
+@pytest.fixture
+def window(blender, monkeypatch):
+    refine = session.part("operators.refine")
+    # Not in the background as far as the operator can tell; a slice of no time is one step a tick.
+    monkeypatch.setattr(refine, "bpy", SimpleNamespace(app=SimpleNamespace(background=False)))
+    monkeypatch.setattr(refine, "_SLICE", 1e-9)
+    return _Window()
+
+
+def _tick(operator, window, kind='TIMER', value='NOTHING'):
+    return operator.modal(window, SimpleNamespace(type=kind, value=value))
+
+
+def test_escape_in_the_middle_leaves_the_scene_as_it_was(clean_file, window):
+    scene = _small_forest()
+    scene.tetflora.expand_everything = True  # objects appear early, so there is something to take back
+    window.__init__()
+    before = datablocks()
+    operator = _Operator()
+    assert operator.invoke(window, None) == {'RUNNING_MODAL'}
+    while datablocks() == before:
+        assert _tick(operator, window) == {'RUNNING_MODAL'}
+    assert _tick(operator, window, 'MOUSEMOVE') == {'RUNNING_MODAL'}
+    assert _tick(operator, window, 'ESC', 'PRESS') == {'CANCELLED'}
+    assert datablocks() == before
+    assert scene.tetflora.statistics == ""
+    assert window.timers == 0
+    assert window.status[-1] is None
+    assert window.progress == sorted(window.progress)
+
+
+def test_steps_in_the_window_give_what_the_script_gives(clean_file, window):
+    scene = _small_forest()
+    window.__init__()
+    operator = _Operator()
+    result = operator.invoke(window, None)
+    while result == {'RUNNING_MODAL'}:
+        result = _tick(operator, window)
+    assert result == {'FINISHED'}
+    assert window.timers == 0
+    stepped = json.loads(scene.tetflora.statistics)
+    made = datablocks()
+    _ops().refine()
+    at_once = json.loads(scene.tetflora.statistics)
+    assert {k: v for k, v in stepped.items() if k != "seconds"} == {k: v for k, v in at_once.items() if k != "seconds"}
+    assert {k: len(v) for k, v in datablocks().items()} == {k: len(v) for k, v in made.items()}
+
+
+def test_what_is_wrong_is_said_before_the_window_waits(clean_file, window):
+    _small_forest()
+    add_plant("Odd", "quercus")
+    window.__init__()
+    operator = _Operator()
+    assert operator.invoke(window, None) == {'CANCELLED'}
+    assert operator.reports[0][0] == {'ERROR'}
+    assert "quercus" in operator.reports[0][1]
+    assert window.timers == 0
+
+
+def test_errors_in_the_middle_are_reported(clean_file, window, monkeypatch):
+    _small_forest()
+    window.__init__()
+
+    def broken(*_arguments, **_options):
+        progress = part("job").Progress
+        yield progress(0.0, "one")
+        yield progress(0.1, "two")
+        yield progress(0.2, "three")
+        raise errors().SpeciesError("leaf without faces")
+
+    monkeypatch.setattr(part("job"), "refine_steps", broken)
+    operator = _Operator()
+    assert operator.invoke(window, None) == {'RUNNING_MODAL'}
+    assert _tick(operator, window) == {'RUNNING_MODAL'}
+    assert _tick(operator, window) == {'CANCELLED'}
+    assert operator.reports == [({'ERROR'}, "leaf without faces")]
+    assert window.timers == 0

@@ -1,0 +1,136 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a file stores of plants and settings, and that it survives."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import pytest
+
+from devtools import session
+from tests.blender.scenes import add_mesh, add_plant, part
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+
+def _reopen(path):
+    import bpy
+
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+
+
+def test_settings_mirror_the_engine():
+    import bpy
+
+    settings = session.part("tetflora_addon.refinement.settings").RefinementSettings()
+    scene = bpy.context.scene
+    read = part("properties").settings_from(scene)
+    for field in fields(settings):
+        assert getattr(read, field.name) == pytest.approx(getattr(settings, field.name), rel=1e-6), field.name
+    scene.tetflora.cutoff = 3.5
+    scene.tetflora.max_tetrahedra = 1234
+    read = part("properties").settings_from(scene)
+    assert (read.cutoff, read.max_tetrahedra) == (3.5, 1234)
+
+
+def test_everything_the_artist_sees_is_explained():
+    import bpy
+
+    groups = {
+        name: getattr(part("properties"), name).bl_rna for name in (c.__name__ for c in part("properties").CLASSES)
+    }
+    operators = {name: getattr(bpy.types, name).bl_rna for name in dir(bpy.types) if name.startswith("TETFLORA_OT_")}
+    assert len(operators) >= 9
+    unexplained = [
+        f"{owner}.{p.identifier}"
+        for owner, rna in {**groups, **operators}.items()
+        for p in rna.properties
+        if not p.is_readonly
+        and not p.is_hidden
+        and p.identifier not in {"rna_type", "name"}
+        and not p.identifier.startswith("bl_")
+        and not p.description
+    ]
+    assert unexplained == []
+
+
+def test_an_unknown_species_survives_the_panel_and_the_file(tmp_path):
+    import bpy
+
+    plant = add_plant(species="not_in_the_catalogue", seed=-7)
+    assert plant.tetflora.species_choice == "not_in_the_catalogue"
+    _reopen(tmp_path / "a.blend")
+    plant = bpy.data.objects["plant"].tetflora
+    assert (plant.species, plant.seed, plant.is_plant, plant.enabled) == ("not_in_the_catalogue", -7, True, True)
+    plant.species_choice = "bush"
+    assert plant.species == "bush"
+    assert plant.species_choice == "bush"
+
+
+def test_items_keep_their_numbers_when_the_catalogue_grows(tmp_path):
+    items = part("species_items").items_for("gone")
+    numbers = {item[0]: item[4] for item in items}
+    assert len(set(numbers.values())) == len(numbers)
+    assert numbers["gone"] == part("species_items").number_of("gone")
+    assert {i[0]: i[4] for i in part("species_items").items_for()} == {k: v for k, v in numbers.items() if k != "gone"}
+
+
+def test_species_of_the_users_own_folder(tmp_path):
+    import bpy
+
+    preferences = part("preferences")
+    shipped = part("species_items").catalogue()
+    own = bpy.context.preferences.addons[preferences.ROOT_PACKAGE].preferences
+    (tmp_path / "mine.json").write_text(shipped["bush"].path.read_text(encoding="utf-8"), encoding="utf-8")
+    try:
+        own.species_folder = str(tmp_path)
+        assert preferences.species_folders() == (tmp_path,)
+        assert set(part("species_items").catalogue()) == {*shipped, "mine"}
+        own.species_folder = str(tmp_path / "missing")
+        assert preferences.species_folders() == ()
+    finally:
+        own.species_folder = ""
+
+
+def test_leaf_objects_are_pointers(tmp_path):
+    import bpy
+
+    leaf = add_mesh("my leaf")
+    entry = bpy.context.scene.tetflora.leaf_objects.add()
+    entry.species, entry.leaf = "bush", leaf
+    assert bpy.context.scene.tetflora.leaf_objects.add().species == ""
+    leaf.name = "renamed"
+    _reopen(tmp_path / "a.blend")
+    found = part("properties").leaf_objects(bpy.context.scene)
+    assert {k: v.name for k, v in found.items()} == {"bush": "renamed"}
+
+
+def test_old_files_are_brought_up_to_date_and_newer_ones_left_alone(tmp_path, capsys):
+    import bpy
+
+    migration = part("migration")
+    add_plant("old")
+    newer = add_plant("newer")
+    newer.tetflora.version = migration.VERSION + 1
+    add_mesh("other")
+    bpy.context.scene.tetflora.cutoff = 5.0
+    _reopen(tmp_path / "a.blend")
+    versions = {o.name: o.tetflora.version for o in bpy.data.objects}
+    assert versions == {"old": migration.VERSION, "newer": migration.VERSION + 1, "other": 0}
+    assert bpy.context.scene.tetflora.version == migration.VERSION
+    assert "newer TetFlora" in capsys.readouterr().err
+
+
+def test_steps_of_a_migration_run_once_and_in_order(monkeypatch):
+    migration = part("migration")
+    plant = add_plant()
+    seen = []
+    monkeypatch.setattr(migration, "VERSION", 3)
+    monkeypatch.setattr(migration, "OBJECT_STEPS", [lambda o, n=n: seen.append((o.name, n)) for n in range(3)])
+    monkeypatch.setattr(migration, "SCENE_STEPS", [lambda _s: None] * 3)
+    plant.tetflora.version = 1
+    migration.migrate()
+    migration.migrate()
+    assert seen == [("plant", 1), ("plant", 2)]
