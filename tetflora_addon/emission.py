@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From decisions to buffers: polygons of what is explicit, block by block, and proxies of the rest.
 
-Blocks are runs of tetrahedra in front-to-back order, so that each is one region of space and one block's buffers at a time are
-held in memory.
+Blocks are runs of tetrahedra in front-to-back order, so that each is one region of space and one block's buffers at a
+time are held in memory.
 """
 
 from __future__ import annotations
@@ -133,7 +133,7 @@ def facet_buffers(
 
 
 def proxy_shells(flora: Flora, result: Refinement) -> MeshBuffers | None:
-    """Proxies as shells: the tetrahedra themselves, filled with a cloud that has their extinction, colour and orientation."""
+    """Proxies as shells: the tetrahedra themselves, filled with a cloud of their extinction, colour and orientation."""
     proxies = np.isin(result.decision, (Decision.PROXY, Decision.HIDDEN))
     nodes = result.nodes[proxies]
     if len(nodes) == 0:

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bounding volumes of sub-plants of every order, from the ranges alone (paper, section 5).
 
-Computed from the highest order down to the trunk: the longest possible branch at every angle that it may take. The volume is a
-cylinder about the branch's axis for a branch of unit length; what does not scale with the length (leaves, thickness) is a pad.
+Computed from the highest order down to the trunk: the longest possible branch at every angle that it may take. The
+volume is a cylinder about the branch's axis for a branch of unit length; what does not scale with the length (leaves,
+thickness) is a pad.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ _CROWN_SLOPE = 1 / 0.3  # steepest of the crown shapes
 
 
 def _axis_envelope(row: NDArray[np.void]) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """At each knot of a unit branch: widest radius, lowest and highest z, widest turn of the direction from there on."""
+    """At each knot of a unit branch: widest radius, lowest and highest z; and the widest turn of each segment."""
     segments = int(row["segments"])
     mean, variation = row["curvature"]
     turn = np.minimum(np.arange(segments) * (abs(mean) + 2 * variation) / segments, np.pi)
@@ -59,7 +60,8 @@ def unit_bounds(rows: NDArray[np.void]) -> NDArray[np.float64]:
     Returns
     -------
     (r, 3) float64
-        Radius, lowest and highest z, in the frame of the branch's base; z is at most 0 at the bottom and at least 0 on top.
+        Radius, lowest and highest z, in the frame of the branch's base; z is at most 0 at the bottom and at least 0 on
+        top.
     """
     bounds = np.zeros((len(rows), 3))
     for order in range(MAX_ORDERS - 1, -1, -1):

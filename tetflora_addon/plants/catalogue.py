@@ -56,7 +56,8 @@ def list_species(folders: Sequence[Path] = ()) -> dict[str, SpeciesInfo]:
     Parameters
     ----------
     folders : sequence of Path
-        Folders of the user's own; a file there replaces a shipped one of the same name. Missing folders are passed over.
+        Folders of the user's own; a file there replaces a shipped one of the same name. Missing folders are passed
+        over.
     """
     found: dict[str, SpeciesInfo] = {}
     for folder in (builtin_folder(), *folders):

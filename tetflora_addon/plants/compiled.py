@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is known of sub-plants before any is grown: bounds, mean areas, colours and orientation (paper, section 5).
 
-Areas, counts and colours are expectations in closed form. Orientation and the places of leaves and wood within a sub-plant are
-kept as a few hundred sample points, drawn by following random paths from the branch outwards.
+Areas, counts and colours are expectations in closed form. Orientation and the places of leaves and wood within a
+sub-plant are kept as a few hundred sample points, drawn by following random paths from the branch outwards.
 """
 
 from __future__ import annotations
@@ -109,9 +109,11 @@ def compile_species(species: Sequence[Species]) -> Flora:
     own_wood = tube_perimeter(np.maximum(rows["sides"], 1)) * (1 + rows["taper"]) / 2 * rows["used"]
     own_faces = rows["sides"] * rows["segments"] + own_leaves * model_polygons
 
-    leaf_count, leaf_area, wood_area, polygons = own_leaves.copy(), own_area.copy(), own_wood.copy(), own_faces.astype(float)
+    leaf_count, leaf_area = own_leaves.copy(), own_area.copy()
+    wood_area, polygons = own_wood.copy(), own_faces.astype(float)
     leaf_reach, leaf_width = own_reach.copy(), own_leaves * size * model_width
-    leaf_colour, wood_colour = own_area[:, None] * rows["leaf_colour"][:, 0], own_wood[:, None] * rows["branch_colour"][:, 0]
+    leaf_colour = own_area[:, None] * rows["leaf_colour"][:, 0]
+    wood_colour = own_wood[:, None] * rows["branch_colour"][:, 0]
     wood_share = np.zeros((total, MAX_ORDERS))  # of the sub-plant's wood, by relative order
     wood_share[:, 0] = own_wood
     leaf_share = np.zeros((total, MAX_ORDERS))

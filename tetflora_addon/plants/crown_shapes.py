@@ -7,7 +7,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-CROWN_SHAPES = ("conical", "spherical", "hemispherical", "cylindrical", "tapered", "flame", "inverse conical", "tend flame")
+CROWN_SHAPES = (
+    "conical",
+    "spherical",
+    "hemispherical",
+    "cylindrical",
+    "tapered",
+    "flame",
+    "inverse conical",
+    "tend flame",
+)
 """Names of the shapes, in the order of their numbers (Weber and Penn, SIGGRAPH 1995, section 4.3)."""
 
 
@@ -23,8 +32,8 @@ def crown_ratio(shape: NDArray[np.integer], r: NDArray[np.float64]) -> NDArray[n
 
     Notes
     -----
-    Weber and Penn 1995, table of ShapeRatio. The lower end of the two flames is raised from 0 to 0.05, so that no branch has
-    zero length.
+    Weber and Penn 1995, table of ShapeRatio. The lower end of the two flames is raised from 0 to 0.05, so that no
+    branch has zero length.
     """
     r = np.clip(r, 0.0, 1.0)
     return np.choose(

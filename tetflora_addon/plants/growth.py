@@ -37,7 +37,8 @@ class Branches:
     position : (n, 3) float64
         Base, metres, world space.
     frame : (n, 3, 3) float64
-        Columns are the local axes at the base; the branch sets out along the third, the first points away from the parent.
+        Columns are the local axes at the base; the branch sets out along the third, the first points away from the
+        parent.
     length, radius : (n,) float64
         Length of the axis and radius at its base, metres.
     scale : (n,) float64
@@ -226,7 +227,9 @@ def chosen_children(
     return Branches(row, parent.plant, key, position, turned(frame, azimuth, angle), length, radius, parent.scale)
 
 
-def children(rows: NDArray[np.void], parents: Branches, lines: Axes | None = None) -> tuple[Branches, NDArray[np.int64]]:
+def children(
+    rows: NDArray[np.void], parents: Branches, lines: Axes | None = None
+) -> tuple[Branches, NDArray[np.int64]]:
     """All children of branches, and the index of each one's parent."""
     lines = axes(rows, parents) if lines is None else lines
     counts = branch_counts(rows, parents)

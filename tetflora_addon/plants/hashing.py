@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Random numbers as a pure function of (seed, path of child indices, attribute).
 
-Any part of a plant can therefore be made alone, in any order, and comes out the same. Only unsigned 64-bit integer arithmetic
-is used, which numpy defines exactly, so that no version of numpy or Blender changes a plant.
+Any part of a plant can therefore be made alone, in any order, and comes out the same. Only unsigned 64-bit integer
+arithmetic is used, which numpy defines exactly, so that no version of numpy or Blender changes a plant.
 """
 
 from __future__ import annotations

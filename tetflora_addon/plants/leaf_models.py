@@ -123,7 +123,9 @@ def leaf_model(positions: ArrayLike, faces: list[list[int]], uv: ArrayLike | Non
     sizes = np.array([len(f) for f in faces])
     corners = np.array([v for f in faces for v in f], dtype=np.int32)
     if corners.min() < 0 or corners.max() >= len(positions):
-        raise SpeciesError(f"leaf model: faces name vertex {corners.max()}, but there are only {len(positions)} vertices")
+        raise SpeciesError(
+            f"leaf model: faces name vertex {corners.max()}, but there are only {len(positions)} vertices"
+        )
     offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int32)
     by_vertex = np.asarray(uv, dtype=np.float32) if uv is not None else positions[:, :2].astype(np.float32) + [0.5, 0.0]
     if by_vertex.shape != (len(positions), 2):

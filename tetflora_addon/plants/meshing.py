@@ -169,7 +169,9 @@ def leaf_buffers(flora: Flora, pieces: Pieces, species: int) -> MeshBuffers | No
     row = branches.row[owner]
     frame = face_light(leaves.frame, flora.rows["leaf_light"][row], _SKY)
     colour = leaf_colours(flora.rows, row, key).astype(np.float32)
-    return _copies(flora.leaf_models[species], leaves.position, frame, leaves.size, colour, float(flora.transmission[row[0]]))
+    return _copies(
+        flora.leaf_models[species], leaves.position, frame, leaves.size, colour, float(flora.transmission[row[0]])
+    )
 
 
 def _copies(
@@ -188,7 +190,9 @@ def _copies(
         edge_verts=(edges[None] + copy[:, :, None] * np.int32(v)).reshape(-1, 2),
         corner_verts=(model.corner_verts[None] + copy * np.int32(v)).reshape(-1),
         corner_edges=(edge_of_corner[None] + copy * np.int32(len(edges))).reshape(-1),
-        face_offsets=np.append((model.face_offsets[None, :-1] + copy * np.int32(corners)).reshape(-1), np.int32(n * corners)),
+        face_offsets=np.append(
+            (model.face_offsets[None, :-1] + copy * np.int32(corners)).reshape(-1), np.int32(n * corners)
+        ),
         attributes={
             "UVMap": ("CORNER", np.tile(model.uv, (n, 1))),
             "tf_colour": ("FACE", np.repeat(colour, f, axis=0)),

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pieces of branches: straight parts of an axis with the leaves on them, what is left when a branch is clipped (paper, 6.5)."""
+"""Pieces of branches: straight parts of an axis with the leaves on them; branches are clipped to them (paper, 6.5)."""
 
 from __future__ import annotations
 
@@ -67,7 +67,9 @@ def whole_pieces(branches: Branches, lines: Axes) -> tuple[Pieces, NDArray[np.in
     return pieces, owner
 
 
-def clipped(pieces: Pieces, distance_start: NDArray[np.float64], distance_end: NDArray[np.float64]) -> tuple[Pieces, Pieces]:
+def clipped(
+    pieces: Pieces, distance_start: NDArray[np.float64], distance_end: NDArray[np.float64]
+) -> tuple[Pieces, Pieces]:
     """Cut pieces that cross a plane.
 
     Parameters

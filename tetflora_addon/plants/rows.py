@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Parameters of all species and orders as one table, so that branches of every kind are grown by the same array operations.
+"""Parameters of all species and orders as one table: the same array operations grow branches of every kind.
 
 Row ``species * MAX_ORDERS + order`` holds the ranges of one order of one species, angles in radians.
 """
@@ -17,7 +17,8 @@ from .hashing import signed
 from .species import MAX_ORDERS, Species
 
 _RANGES = (
-    "length", "thickness", "curvature", "angle", "azimuth", "branches", "leaves", "leaf_size", "leaf_angle", "leaf_azimuth",
+    "length", "thickness", "curvature", "angle", "azimuth", "branches",
+    "leaves", "leaf_size", "leaf_angle", "leaf_azimuth",
 )  # fmt: skip
 _DEGREES = {"curvature", "angle", "angle_tip", "azimuth", "leaf_angle", "leaf_azimuth"}
 _NUMBERS = ("taper", "angle_tip", "branch_start", "leaf_start", "leaf_light")

@@ -37,7 +37,8 @@ class Samples:
     leaf_row : (r, SAMPLES) int32
         Row that describes the leaf (its size, colour and turn to the light).
     leaf_moment : (r, T, 4) float64
-        Mean of n nᵀ over the leaves, sky up, for the tilts of `leaf_moments`: xx, yy, zz, xz with z up and the branch in xz.
+        Mean of n nᵀ over the leaves, sky up, for the tilts of `leaf_moments`: xx, yy, zz, xz with z up and the branch
+        in xz.
     wood_position : (r, SAMPLES, 3) float32
         Points on axes of branches, as many as there is surface.
     wood_axis : (r, SAMPLES, 3) float32
@@ -65,7 +66,9 @@ def _paths(row: int) -> Branches:
     key = mix(key_of_seed(np.arange(n)) ^ np.uint64(0x7E7F10A5))
     frame = np.broadcast_to(np.eye(3), (n, 3, 3))
     one = np.ones(n)
-    return Branches(np.full(n, row, np.int32), np.arange(n, dtype=np.int32), key, np.zeros((n, 3)), frame, one, one, one)
+    return Branches(
+        np.full(n, row, np.int32), np.arange(n, dtype=np.int32), key, np.zeros((n, 3)), frame, one, one, one
+    )
 
 
 def _systematic(weights: NDArray[np.float64], number: int) -> NDArray[np.int64]:
@@ -134,7 +137,9 @@ def _sample_row(
             t = leaf_places(rows, branches, picked, index, counts, key)
             leaves = place_leaves(rows, branches, lines, picked, index, key, t)
             area = (weight * counts)[picked] * leaves.size**2
-            leaf_parts.append((leaves.position, leaves.frame, branches.row[picked], area * (leaf_share[depth] / area.sum())))
+            leaf_parts.append(
+                (leaves.position, leaves.frame, branches.row[picked], area * (leaf_share[depth] / area.sum()))
+            )
         counts = branch_counts(rows, branches)
         alive = np.flatnonzero(counts)
         if len(alive) == 0:
@@ -155,13 +160,14 @@ def _sample_row(
 
 
 def _moments_by_tilt(frame: NDArray, light: NDArray, leaf_moment: NDArray) -> NDArray[np.float64]:
-    """Moments (T, 4) of leaves after they turned to the sky, for branches at each tilt, averaged over rolls of the branch."""
+    """Moments (T, 4) of leaves turned to the sky, for branches at each tilt, averaged over rolls of the branch."""
     n = len(frame)
     roll = np.arange(n) * np.pi * (3 - np.sqrt(5))  # golden angle: even for any number of samples
     table = np.zeros((len(_TILTS), 4))
     for k, cos in enumerate(_TILTS):
         sin = np.sqrt(1 - cos * cos)
-        # The world's axes seen from the branch: sky, the level direction in which the branch leans, and their cross product.
+        # The world's axes seen from the branch: sky, the level direction in which the branch leans, and their cross
+        # product.
         radial = np.stack([np.cos(roll), np.sin(roll), np.zeros(n)], axis=1)
         sky = -sin * radial + [0, 0, cos]
         lean = cos * radial + [0, 0, sin]

@@ -100,13 +100,16 @@ class _Reader:
         variation = self.number(value[1], f"{key}[1] (variation)", 0, high - low)
         if mean - variation < low - 1e-12 or mean + variation > high + 1e-12:
             raise self.fail(
-                key, f"mean ± variation is {mean - variation:g} to {mean + variation:g}, must be from {low:g} to {high:g}"
+                key,
+                f"mean ± variation is {mean - variation:g} to {mean + variation:g}, must be from {low:g} to {high:g}",
             )
         return Range(mean, variation)
 
     def colour(self, value: Any, key: str) -> Colour:
         form = "[[r, g, b], [variation of each]]"
-        if not (isinstance(value, list) and len(value) == 2 and all(isinstance(v, list) and len(v) == 3 for v in value)):
+        if not (
+            isinstance(value, list) and len(value) == 2 and all(isinstance(v, list) and len(v) == 3 for v in value)
+        ):
             raise self.fail(key, f"must be {form} with numbers from 0 to 1, is {_shown(value)}")
         channels = [self.range([m, v], f"{key}.{c}", 0, 1) for m, v, c in zip(*value, "rgb", strict=True)]
         return Colour(tuple(c.mean for c in channels), tuple(c.variation for c in channels))
@@ -236,7 +239,9 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
     polygons = sum(n * o.sides * o.segments for n, o in zip(branches, read, strict=True))
     polygons += sum(leaves) * (leaf.polygons if isinstance(leaf, LeafModel) else 1)
     if polygons > MAX_POLYGONS:
-        raise reader.fail("orders", f"one plant would have {polygons:.3g} polygons, at most {MAX_POLYGONS:.0g} are allowed")
+        raise reader.fail(
+            "orders", f"one plant would have {polygons:.3g} polygons, at most {MAX_POLYGONS:.0g} are allowed"
+        )
     return Species(
         identifier=identifier,
         name=reader.text(data["name"], "name"),

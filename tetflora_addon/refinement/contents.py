@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What tetrahedra hold, and the update step: handing it on to the children of divided ones (paper, section 6.5).
 
-A plant is held as a sub-plant while its bound lies on one side of every plane. Where it straddles one it is opened into the
-sub-plants of the next order and the pieces of its own branch; pieces that straddle are clipped.
+A plant is held as a sub-plant while its bound lies on one side of every plane. Where it straddles one it is opened into
+the sub-plants of the next order and the pieces of its own branch; pieces that straddle are clipped.
 """
 
 from __future__ import annotations
@@ -172,8 +172,8 @@ class Amounts:
     polygons : (n,) float64
         Expected faces if made explicit.
     width : (n,) float64
-        Width of the features, metres: that of the leaves, or of the branch where there are none. By node: the mean, weighted
-        by area.
+        Width of the features, metres: that of the leaves, or of the branch where there are none. By node: the mean,
+        weighted by area.
     """
 
     leaf_area: NDArray[np.float64]

@@ -61,9 +61,9 @@ def decide(
 
     Notes
     -----
-    A tetrahedron's *contribution* is the number of pixels that its contents change: its pixels × the share of them that is
-    not hidden × its own opacity. Leaves wider than ``leaf_limit`` pixels can only be drawn as leaves; a tetrahedron full of
-    them is divided down to ``block`` pixels so that its hidden parts are found out, and then made explicit.
+    A tetrahedron's *contribution* is the number of pixels that its contents change: its pixels × the share of them that
+    is not hidden × its own opacity. Leaves wider than ``leaf_limit`` pixels can only be drawn as leaves; a tetrahedron
+    full of them is divided down to ``block`` pixels so that its hidden parts are found out, and then made explicit.
     """
     contribution = seen.pixels * seen.transmittance * seen.opacity
     holds = amounts.leaf_area + amounts.wood_area > 0

@@ -144,9 +144,7 @@ def refine(
         clock.lap("update")
 
 
-def _split(
-    tree: TetrahedralTree, nodes: NDArray, share: NDArray, camera: Camera, settings: RefinementSettings
-) -> None:
+def _split(tree: TetrahedralTree, nodes: NDArray, share: NDArray, camera: Camera, settings: RefinementSettings) -> None:
     """Bisect nodes several times, each as long as its pixels, seen as well as its ancestor, exceed the cutoff."""
     for _ in range(GENERATIONS):
         if len(nodes) == 0 or tree.tetrahedra_made + 2 * len(nodes) > settings.max_tetrahedra:
@@ -163,9 +161,9 @@ def _without_splits(
 ) -> NDArray[np.int8]:
     """What becomes of tetrahedra that would be split when a limit forbids it: leaves of a pixel stay leaves."""
     leafy = feature_pixels(vertices, amounts.width, camera) >= settings.leaf_limit
-    return np.where(decision == Decision.SPLIT, np.where(leafy, Decision.EXPLICIT, Decision.PROXY), decision).astype(np.int8)
+    instead = np.where(leafy, Decision.EXPLICIT, Decision.PROXY)
+    return np.where(decision == Decision.SPLIT, instead, decision).astype(np.int8)
 
 
 def _of(amounts: Amounts, nodes: NDArray) -> Amounts:
     return Amounts(amounts.leaf_area[nodes], amounts.wood_area[nodes], amounts.polygons[nodes], amounts.width[nodes])
-

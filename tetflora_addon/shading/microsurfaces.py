@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Microsurfaces: few facets that stand for the many surfaces of what is not made explicit (paper, sections 1 and 7).
 
-Each facet takes place, orientation and colour from a leaf or branch that the compiled species expects in the sub-plant; there
-are as many as the area asks for, and they are about as large as a pixel. Area and orientation are kept on average.
+Each facet takes place, orientation and colour from a leaf or branch that the compiled species expects in the sub-plant;
+there are as many as the area asks for, and they are about as large as a pixel. Area and orientation are kept on
+average.
 """
 
 from __future__ import annotations
@@ -75,7 +76,10 @@ def piece_facets(flora: Flora, pieces: Pieces, side: NDArray[np.float64]) -> Mes
     """Facets of pieces of branches; parameters as for `subplant_facets`."""
     amounts = piece_amounts(flora, pieces)
     return concatenate_buffers(
-        [_buffers(_leaves_of_pieces(flora, pieces, amounts, side)), _buffers(_wood_of_pieces(flora, pieces, amounts, side))]
+        [
+            _buffers(_leaves_of_pieces(flora, pieces, amounts, side)),
+            _buffers(_wood_of_pieces(flora, pieces, amounts, side)),
+        ]
     )
 
 
@@ -180,7 +184,9 @@ def _buffers(facets: Facets) -> MeshBuffers:
     n = len(facets.side)
     half = 0.5 * facets.side[:, None]
     a, b = half * facets.across, half * facets.along
-    corners = np.stack([facets.centre - a - b, facets.centre + a - b, facets.centre + a + b, facets.centre - a + b], axis=1)
+    corners = np.stack(
+        [facets.centre - a - b, facets.centre + a - b, facets.centre + a + b, facets.centre - a + b], axis=1
+    )
     every = np.arange(4 * n, dtype=np.int32)
     following = (every & ~3) | ((every + 1) & 3)
     return MeshBuffers(

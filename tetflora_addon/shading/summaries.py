@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Summaries of tetrahedra: optical area, colour and orientation of what they hold (paper, section 6.5), and extinction."""
+"""Summaries of tetrahedra: optical area, colour, orientation of what they hold (paper, 6.5), and extinction."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from ..plants.compiled import Flora
 from ..plants.samples import leaf_moments, wood_moments
 from ..refinement.contents import Contents, piece_amounts, subplant_amounts
 
-#: κ along an axis is ⟨|n·e|⟩, the moment gives ⟨(n·e)²⟩. The power of the second that is the first at 0, ⅓ (all ways: ½) and 1;
-#: at ½ (normals around a circle) it gives .646 for 2/π = .637.
+#: κ along an axis is ⟨|n·e|⟩, the moment gives ⟨(n·e)²⟩. The power of the second that is the first at 0, ⅓ (all ways:
+#: ½) and 1; at ½ (normals around a circle) it gives .646 for 2/π = .637.
 _ROOT = np.log(2) / np.log(3)
 
 
@@ -91,13 +91,13 @@ def extinction_matrices(summaries: Summaries, volumes: NDArray[np.float64]) -> t
     Returns
     -------
     S : (n, 6) float64
-        Sxx, Syy, Szz, Sxy, Sxz, Syz with κ(ω) = √(ωᵀSω), 1/m² (the form of Heitz, Dupuy, Crassin and Dachsbacher, "The SGGX
-        Microflake Distribution", 2015).
+        Sxx, Syy, Szz, Sxy, Sxz, Syz with κ(ω) = √(ωᵀSω), 1/m² (the form of Heitz, Dupuy, Crassin and Dachsbacher, "The
+        SGGX Microflake Distribution", 2015).
     normal : (n, 3) float64
         Axis in which most normals lie.
     plane : (n,) float64
-        0 for surfaces that face all ways, 1 for parallel ones: (3 λmax − 1) / 2 of the moment, the weight of the paper's plane
-        term (section 7) for two-sided surfaces.
+        0 for surfaces that face all ways, 1 for parallel ones: (3 λmax − 1) / 2 of the moment, the weight of the
+        paper's plane term (section 7) for two-sided surfaces.
     """
     values, vectors = np.linalg.eigh(summaries.moment)
     density = summaries.optical_area / volumes
