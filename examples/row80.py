@@ -31,7 +31,7 @@ def build(scene: bpy.types.Scene, count: int = COUNT, species: str = "broadleaf_
         Identifier in the catalogue.
     """
     ground = Terrain(corner=CORNER, shape=(72, 18), scale=0.1)
-    ground.add_object(scene, "Ground", spacing=3.0)
+    ground.add_object(scene, "Ground", spacing=5.0)
     place = np.arange(count)
     # A planted row is never quite straight; the golden ratio spreads the deviations evenly.
     aside = 1.6 * ((place * 0.618034) % 1 - 0.5)
@@ -59,6 +59,9 @@ def build(scene: bpy.types.Scene, count: int = COUNT, species: str = "broadleaf_
     scene.camera = camera
     add_daylight(scene, elevation=38.0, azimuth=70.0)
     render = scene.render
+    scene.view_settings.exposure = 0.65
+    scene.view_settings.look = 'AgX - Medium High Contrast'
+    scene.eevee.use_raytracing = True  # for the shade of leaves on leaves
     render.resolution_x, render.resolution_y, render.resolution_percentage = 800, 450, 100
 
 
@@ -77,8 +80,8 @@ def add_daylight(scene: bpy.types.Scene, elevation: float, azimuth: float) -> No
     split = nodes.new("ShaderNodeSeparateXYZ")
     ramp = nodes.new("ShaderNodeValToRGB")
     stops = ramp.color_ramp.elements
-    stops[0].position, stops[0].color = 0.0, (0.72, 0.80, 0.88, 1)
-    stops[1].position, stops[1].color = 0.55, (0.16, 0.34, 0.72, 1)
+    stops[0].position, stops[0].color = 0.0, (0.62, 0.76, 0.92, 1)
+    stops[1].position, stops[1].color = 0.5, (0.08, 0.24, 0.70, 1)
     links.new(place.outputs["Generated"], split.inputs[0])
     links.new(split.outputs["Z"], ramp.inputs[0])
     background = next(n for n in nodes if n.type == 'BACKGROUND')

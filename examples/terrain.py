@@ -98,9 +98,20 @@ def _ground_material() -> bpy.types.Material:
     ramp.color_ramp.elements[0].position, ramp.color_ramp.elements[1].position = 0.38, 0.66
     ramp.color_ramp.elements[0].color = (0.075, 0.12, 0.03, 1)
     ramp.color_ramp.elements[1].color = (0.2, 0.19, 0.085, 1)
-    links.new(noise.outputs["Factor" if "Factor" in noise.outputs else "Fac"], ramp.inputs[0])
+    links.new(noise.outputs[0], ramp.inputs[0])
+    tufts = nodes.new("ShaderNodeTexNoise")
+    tufts.inputs["Scale"].default_value, tufts.inputs["Detail"].default_value = 4.0, 6.0
+    links.new(place.outputs["Object"], tufts.inputs["Vector"])
+    shade = nodes.new("ShaderNodeMapRange")
+    shade.inputs["From Min"].default_value, shade.inputs["From Max"].default_value = 0.3, 0.7
+    shade.inputs["To Min"].default_value, shade.inputs["To Max"].default_value = 0.45, 1.35
+    links.new(tufts.outputs[0], shade.inputs["Value"])
+    scaled = nodes.new("ShaderNodeVectorMath")
+    scaled.operation = 'SCALE'
+    links.new(ramp.outputs["Color"], scaled.inputs[0])
+    links.new(shade.outputs[0], scaled.inputs["Scale"])
     diffuse = nodes.new("ShaderNodeBsdfDiffuse")
-    links.new(ramp.outputs["Color"], diffuse.inputs["Color"])
+    links.new(scaled.outputs[0], diffuse.inputs["Color"])
     out = nodes.new("ShaderNodeOutputMaterial")
     links.new(diffuse.outputs[0], out.inputs["Surface"])
     return material

@@ -33,7 +33,7 @@ from .properties import leaf_objects, settings_from
 from .scene_reader import read_camera, read_occluders, read_plants
 from .shell_material import shell_material
 
-__all__ = ["Progress", "clear", "compile_for", "estimate", "has_results", "refine", "refine_steps"]
+__all__ = ["Progress", "clear", "compile_for", "estimate", "has_results", "partition", "refine", "refine_steps"]
 
 #: Shells fill their tetrahedra, so that even hidden ones must not be larger than this many pixels.
 SHELL_BLOCK = 16.0
@@ -189,6 +189,24 @@ def refine(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, **options: ob
             next(steps)
         except StopIteration as stop:
             return stop.value
+
+
+def partition(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[Camera, Refinement]:
+    """Camera and state of space after refinement, without making anything; for pictures of the partition.
+
+    Raises
+    ------
+    TetFloraError
+        As `refine_steps`.
+    """
+    camera, seeds = read_camera(scene, depsgraph), read_plants(scene, depsgraph, depsgraph.view_layer)
+    flora = compile_for(seeds.identifiers, scene, depsgraph)
+    loop = _run_loop(flora, seeds, camera, _settings(scene), read_occluders(scene, depsgraph))
+    while True:
+        try:
+            next(loop)
+        except StopIteration as stop:
+            return camera, stop.value
 
 
 def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:

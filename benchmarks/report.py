@@ -1,0 +1,78 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What every benchmark prints and writes."""
+
+from __future__ import annotations
+
+import os
+import platform
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+
+ROOT = Path(__file__).resolve().parent.parent
+Targets = dict[str, dict[str, float]]
+
+
+def peak_mb() -> float:
+    """Largest resident memory of this process so far, megabytes."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / (1e6 if sys.platform == "darwin" else 1e3)
+
+
+def machine() -> str:
+    """Processor, cores and system in a line."""
+    model = platform.processor() or platform.machine()
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.exists():
+        names = [line.split(":", 1)[1].strip() for line in cpuinfo.read_text().splitlines() if line.startswith("model name")]
+        model = names[0] if names else model
+    return f"{model}, {os.cpu_count()} cores, {platform.system()}"
+
+
+def commit() -> str:
+    """Commit of the repository, with a plus sign where files are changed; empty outside of a repository."""
+    try:
+        run = ["git", "-C", str(ROOT)]
+        head = subprocess.run([*run, "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=True).stdout.strip()
+        changed = subprocess.run([*run, "status", "--porcelain", "-uno"], capture_output=True, text=True, check=True).stdout
+        return head + ("+" if changed.strip() else "")
+    except (OSError, subprocess.CalledProcessError):
+        return ""
+
+
+def report(name: str, figures: dict[str, float], targets: Targets) -> dict:
+    """The record of one benchmark as it is written to JSON."""
+    return {
+        "name": name,
+        "figures": figures,
+        "targets": targets,
+        "machine": machine(),
+        "blender": bpy.app.version_string,
+        "commit": commit(),
+    }
+
+
+def missed(record: dict) -> list[str]:
+    """Targets that do not hold, in words; a figure that is missing counts."""
+    out = []
+    for key, target in record["targets"].items():
+        value = record["figures"].get(key)
+        for kind, limit in target.items():
+            if value is None or (value > limit if kind == "max" else value < limit):
+                out.append(f"{key} is {value}, should be at {'most' if kind == 'max' else 'least'} {limit}")
+    return out
+
+
+def table(record: dict) -> str:
+    """Figures beside their targets, one a line."""
+    lines = [f"{record['name']}  (Blender {record['blender']}, {record['machine']}, {record['commit']})"]
+    for key, value in record["figures"].items():
+        shown = f"{value:,}" if isinstance(value, int) else f"{value:,.4g}"
+        target = record["targets"].get(key, {})
+        limits = "  ".join(f"{'≤' if kind == 'max' else '≥'} {limit:,g}" for kind, limit in target.items())
+        lines.append(f"  {key:24s} {shown:>14s}   {limits}")
+    return "\n".join(lines)
