@@ -16,6 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
 _MIX_2 = np.uint64(0x94D049BB133111EB)
+# Odd, and not the constant of seeds: else child i of seed s would be child s of seed i, and child s of seed s always 0.
+_CHILD = np.uint64(0xD1342543DE82EF95)
 _TO_UNIT = 2.0**-53
 
 
@@ -67,7 +69,7 @@ def child_key(key: NDArray[np.uint64], index: ArrayLike) -> NDArray[np.uint64]:
     """Key of the child with a given index of the branches with given keys (both broadcast)."""
     index = np.asarray(index).astype(np.uint64)
     with np.errstate(over="ignore"):
-        return mix(np.asarray(key, dtype=np.uint64) ^ mix((index + np.uint64(1)) * _GOLDEN))
+        return mix(np.asarray(key, dtype=np.uint64) ^ mix((index + np.uint64(1)) * _CHILD))
 
 
 def uniform(key: NDArray[np.uint64], draw: int) -> NDArray[np.float64]:

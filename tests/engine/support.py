@@ -1,0 +1,159 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What several engine tests share: the shipped species compiled once, rows of plants, measures of meshes."""
+
+from __future__ import annotations
+
+import copy
+import json
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tetflora_addon.buffers import MeshBuffers
+from tetflora_addon.plants.catalogue import builtin_folder, load_species
+from tetflora_addon.plants.compiled import Flora, compile_species
+from tetflora_addon.plants.expansion import expand
+from tetflora_addon.plants.growth import Branches, trunks
+from tetflora_addon.plants.meshing import leaf_buffers, tube_buffers
+from tetflora_addon.plants.pieces import Pieces
+from tetflora_addon.plants.schema import species_from_dict
+from tetflora_addon.plants.seeds import Seeds
+from tetflora_addon.plants.species import MAX_ORDERS
+from tetflora_addon.refinement.camera import Camera
+
+SPECIES = tuple(sorted(path.stem for path in builtin_folder().glob("*.json")))
+
+#: Three orders, every feature, some 600 polygons: large enough to be a plant, small enough for hundreds of them.
+SMALL: dict[str, Any] = {
+    "format": 1,
+    "name": "Small",
+    "leaf": {"model": "kite"},
+    "orders": [
+        {"length": [3, 0.5], "thickness": [0.02, 0.004], "taper": 0.3, "segments": 3, "sides": 5, "curvature": [0, 30],
+         "angle": [3, 3], "branches": [7, 2], "branch_start": 0.2, "crown": "spherical"},
+        {"length": [0.35, 0.08], "thickness": [0.4, 0.08], "segments": 2, "sides": 4, "curvature": [20, 30],
+         "angle": [70, 15], "angle_tip": 35, "branches": [4, 1], "crown": "tapered",
+         "leaves": [3, 1], "leaf_start": 0.5, "leaf_size": [0.1, 0.03], "leaf_light": 0.4},
+        {"length": [0.5, 0.1], "thickness": [0.5, 0.1], "segments": 1, "sides": 3, "angle": [50, 15],
+         "leaves": [6, 2], "leaf_size": [0.1, 0.03], "leaf_light": 0.6},
+    ],
+}  # fmt: skip
+
+
+def shipped(identifier: str) -> dict[str, Any]:
+    """A shipped species file as decoded JSON, a fresh copy."""
+    return json.loads((builtin_folder() / f"{identifier}.json").read_text(encoding="utf-8"))
+
+
+def small(**changes: Any) -> dict[str, Any]:
+    """A fresh copy of `SMALL`; ``order1={"leaves": [0, 0]}`` changes keys of order 1, other names keys of the file."""
+    data = copy.deepcopy(SMALL)
+    for name, value in changes.items():
+        if name.startswith("order"):
+            data["orders"][int(name[5:])].update(value)
+        else:
+            data[name] = value
+    return data
+
+
+def compiled(*files: dict[str, Any]) -> Flora:
+    """Flora of decoded species files."""
+    return compile_species([species_from_dict(data, f"s{i}", f"s{i}.json") for i, data in enumerate(files)])
+
+
+@cache
+def flora() -> Flora:
+    """The shipped species, in the order of `SPECIES`."""
+    return compile_species([load_species(name) for name in SPECIES])
+
+
+@cache
+def small_flora() -> Flora:
+    """Only `SMALL`."""
+    return compiled(SMALL)
+
+
+def plants(seed: ArrayLike, species: ArrayLike = 0, position: ArrayLike = (0, 0, 0), scale: ArrayLike = 1.0) -> Seeds:
+    """Upright plants; everything broadcasts against the seeds (n,)."""
+    seed = np.atleast_1d(np.asarray(seed, np.int64))
+    n = len(seed)
+    kinds = np.broadcast_to(np.asarray(species, np.int32), n).copy()
+    return Seeds(
+        tuple(f"s{i}" for i in range(int(kinds.max(initial=0)) + 1)),
+        kinds,
+        seed,
+        np.broadcast_to(np.asarray(position, float), (n, 3)).copy(),
+        np.tile(np.eye(3), (n, 1, 1)),
+        np.broadcast_to(np.asarray(scale, float), n).copy(),
+    )
+
+
+def grove(count: int, spacing: float, species: ArrayLike = 0) -> Seeds:
+    """A square of plants about the origin, all different."""
+    side = int(np.ceil(np.sqrt(count)))
+    index = np.arange(count)
+    places = np.stack([index % side, index // side, np.zeros(count)], axis=1) * spacing
+    return plants(100 + index, species, places - [(side - 1) * spacing / 2] * 2 + [0])
+
+
+def camera(
+    eye: ArrayLike, target: ArrayLike, pixels: int = 128, view: float = 0.8, kind: str = "PERSP", near: float = 0.1
+) -> Camera:
+    """A square picture; ``view`` is its side at depth 1 (perspective) or in metres (orthographic)."""
+    eye, target = np.asarray(eye, float), np.asarray(target, float)
+    back = (eye - target) / np.linalg.norm(eye - target)
+    right = np.cross([0.0, 0.02, 1.0], back)
+    right /= np.linalg.norm(right)
+    frame = np.stack([right, np.cross(back, right), back], axis=1)
+    half = view / 2
+    return Camera(kind, eye, frame, (-half, half, -half, half), near, 1000.0, pixels, pixels)
+
+
+def grown(one: Flora, seeds: Seeds) -> tuple[Branches, Pieces]:
+    """Trunks, and all branches of the plants as pieces."""
+    whole = trunks(one.rows, seeds)
+    return whole, expand(one, whole)
+
+
+def meshes(one: Flora, pieces: Pieces) -> tuple[list[MeshBuffers], list[MeshBuffers]]:
+    """Tubes and leaves of pieces, one mesh for each species that has any."""
+    tubes, leaves = [], []
+    kinds = pieces.branches.row // MAX_ORDERS
+    for species in np.unique(kinds):
+        own = pieces.take(kinds == species)
+        tubes += [b for b in [tube_buffers(one, own)] if b is not None]
+        leaves += [b for b in [leaf_buffers(one, own, int(species))] if b is not None]
+    return tubes, leaves
+
+
+def face_vectors(mesh: MeshBuffers) -> NDArray[np.float64]:
+    """Area vectors (f, 3) by Newell's formula, m²."""
+    points = mesh.positions[mesh.corner_verts].astype(np.float64)
+    first, last = mesh.face_offsets[:-1], mesh.face_offsets[1:] - 1
+    origin = np.repeat(points[first], np.diff(mesh.face_offsets), axis=0)
+    points = points - origin  # float32 far from the origin would drown in the product
+    following = np.roll(points, -1, axis=0)
+    following[last] = points[first]
+    return 0.5 * np.add.reduceat(np.cross(points, following), first, axis=0)
+
+
+def face_areas(mesh: MeshBuffers) -> NDArray[np.float64]:
+    """Areas (f,) of faces, m²."""
+    return np.linalg.norm(face_vectors(mesh), axis=1)
+
+
+def face_centres(mesh: MeshBuffers) -> NDArray[np.float64]:
+    """Means (f, 3) of the corners of faces, metres."""
+    points = mesh.positions[mesh.corner_verts].astype(np.float64)
+    return np.add.reduceat(points, mesh.face_offsets[:-1], axis=0) / np.diff(mesh.face_offsets)[:, None]
+
+
+def moment(mesh: MeshBuffers) -> NDArray[np.float64]:
+    """Area-weighted mean (3, 3) of n nᵀ over the faces."""
+    vectors = face_vectors(mesh)
+    areas = np.linalg.norm(vectors, axis=1)
+    scaled = vectors / np.sqrt(np.maximum(areas, 1e-300))[:, None]
+    return scaled.T @ scaled / areas.sum()
