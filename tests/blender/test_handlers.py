@@ -1,0 +1,220 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Refine at render: each frame gets its plants, and nothing of them stays."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, errors, part, tiny_render
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+
+@pytest.fixture
+def stage(tmp_path):
+    """A camera above a plant, white sky, pictures in a temporary folder; gives the scene."""
+    import bpy
+
+    scene = tiny_render()
+    add_camera(location=(0.0, 0.0, 10.0), rotation=(0.0, 0.0, 0.0))
+    add_plant()
+    world = bpy.data.worlds.new("sky")
+    scene.world = world
+    background = part("compat").shader_tree(world).nodes["Background"]
+    background.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    scene.render.filepath = str(tmp_path / "frame_####")
+    return scene
+
+
+class _Stub:
+    """A job that makes a black square below the camera and remembers what it was asked for."""
+
+    def __init__(self):
+        self.cameras, self.plants, self.error = [], [], None
+
+    def __call__(self, scene, depsgraph, *, view_layer=None, for_render=False):
+        import bpy
+
+        assert for_render
+        if self.error is not None:
+            raise self.error
+        camera = part("scene_reader").read_camera(scene, depsgraph)
+        seeds = part("scene_reader").read_plants(scene, depsgraph, view_layer)
+        self.cameras.append(camera.position.round(4).tolist())
+        self.plants.append(seeds.position.round(4).tolist())
+        x, y, _ = camera.position
+        square = np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]]) + [x, y, 0.0]
+        mesh = bpy.data.meshes.new("square")
+        mesh.from_pydata(square.tolist(), [], [(0, 1, 2, 3)])
+        black = bpy.data.materials.new("black")
+        tree = part("compat").shader_tree(black)
+        tree.nodes.clear()
+        holdout = tree.nodes.new("ShaderNodeEmission")
+        holdout.inputs["Strength"].default_value = 0.0
+        output = tree.nodes.new("ShaderNodeOutputMaterial")
+        tree.links.new(holdout.outputs["Emission"], output.inputs["Surface"])
+        mesh.materials.append(black)
+        results = part("emit").Results(scene, 'RENDER')
+        results.open()
+        made = bpy.data.objects.new("square", mesh)
+        for datablock in (mesh, made, black):
+            part("node_tools").tag(datablock)
+        results.collection.objects.link(made)
+
+
+@pytest.fixture
+def stub(monkeypatch):
+    stub = _Stub()
+    monkeypatch.setattr(part("job"), "refine", stub)
+    return stub
+
+
+def _centre(path) -> float:
+    """Mean of the middle of a picture: 0 where the square is, 1 where it is not."""
+    import bpy
+
+    image = bpy.data.images.load(str(path))
+    try:
+        pixels = np.array(image.pixels).reshape(image.size[1], image.size[0], -1)
+        return float(pixels[7:9, 7:9, :3].mean())
+    finally:
+        bpy.data.images.remove(image)
+
+
+def _still(scene, path):
+    import bpy
+
+    scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+    return _centre(path)
+
+
+def test_animations_are_refined_for_the_camera_and_plants_of_each_frame(stage, stub, tmp_path):
+    import bpy
+
+    for obj, way in ((stage.camera, (6.0, 0.0, 10.0)), (bpy.data.objects["plant"], (0.0, 4.0, 0.0))):
+        obj.keyframe_insert("location", frame=1)
+        obj.location = way
+        obj.keyframe_insert("location", frame=3)
+    stage.frame_start, stage.frame_end = 1, 3
+    before = datablocks()
+    bpy.ops.render.render(animation=True)
+    assert [c[0] for c in stub.cameras] == [0.0, 3.0, 6.0]
+    assert [p[0][1] for p in stub.plants] == [0.0, 2.0, 4.0]
+    assert [_centre(tmp_path / f"frame_{n:04d}.png") for n in (1, 2, 3)] == [0.0] * 3
+    assert datablocks() == before
+
+
+@pytest.mark.parametrize("persistent", [False, True])
+def test_stills_leave_nothing_behind_render_after_render(stage, stub, tmp_path, persistent):
+    stage.render.use_persistent_data = persistent
+    before = datablocks()
+    for n in range(3):
+        stage.camera.location.x = 5.0 * n
+        assert _still(stage, tmp_path / f"{n}.png") == 0.0
+        assert datablocks() == before
+    assert [c[0] for c in stub.cameras] == [0.0, 5.0, 10.0]
+
+
+def test_a_scene_without_the_setting_or_without_plants_is_left_alone(stage, stub, tmp_path):
+    import bpy
+
+    stage.tetflora.refine_at_render = False
+    assert _still(stage, tmp_path / "a.png") == pytest.approx(1.0, abs=0.3)
+    stage.tetflora.refine_at_render = True
+    bpy.data.objects.remove(bpy.data.objects["plant"])
+    _still(stage, tmp_path / "b.png")
+    assert stub.cameras == []
+    assert part("handlers").render_errors() == []
+
+
+def test_disabled_plants_are_no_error(stage, tmp_path):
+    import bpy
+
+    bpy.data.objects["plant"].tetflora.enabled = False
+    _still(stage, tmp_path / "a.png")
+    assert part("handlers").render_errors() == []
+
+
+def _refined_by_hand(scene):
+    """A result of Refine that covers the picture, as if made for another view."""
+    results = part("emit").Results(scene, 'VIEW')
+    results.open()
+    cover = add_mesh("cover", size=50.0, z=5.0)
+    part("node_tools").tag(cover)
+    part("node_tools").tag(cover.data)
+    results.collection.objects.link(cover)
+    scene.collection.objects.unlink(cover)
+    return results.collection
+
+
+def test_results_made_by_hand_are_hidden_while_rendering_only(stage, stub, tmp_path):
+    made = _refined_by_hand(stage)
+    # The black square on the ground is seen, not the cover above it.
+    assert _still(stage, tmp_path / "a.png") == 0.0
+    assert not made.hide_render
+    assert [o.name for o in made.objects] == ["cover"]
+    stage.tetflora.refine_at_render = False
+    assert _still(stage, tmp_path / "b.png") > 0.0
+
+
+def test_an_error_is_said_and_earlier_results_are_rendered(stage, stub, tmp_path, capfd):
+    made = _refined_by_hand(stage)
+    stub.error = errors().SpeciesError('Unknown species "quercus"')
+    covered = _still(stage, tmp_path / "a.png")
+    assert covered > 0.0
+    assert not made.hide_render
+    assert len(part("handlers").render_errors()) == 1
+    assert 'TetFlora: error: frame 1 rendered without its plants: Unknown species "quercus"' in capfd.readouterr().err
+    stub.error = None
+    _still(stage, tmp_path / "b.png")
+    assert part("handlers").render_errors() == []
+
+
+def test_an_unexpected_error_does_not_stop_later_frames(stage, stub, tmp_path, capfd):
+    stub.error = ZeroDivisionError("oops")
+    _still(stage, tmp_path / "a.png")
+    assert "ZeroDivisionError" in capfd.readouterr().err
+    assert len(part("handlers").render_errors()) == 1
+    stub.error = None
+    assert _still(stage, tmp_path / "b.png") == 0.0
+
+
+def test_a_file_saved_in_the_middle_of_a_render_holds_nothing_of_it(stage, stub, tmp_path):
+    import bpy
+
+    hand = _refined_by_hand(stage)
+    path = str(tmp_path / "middle.blend")
+    seen = []
+
+    def save(_scene, _depsgraph=None):
+        seen.append((hand.hide_render, len(bpy.data.objects)))
+        bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
+        seen.append((hand.hide_render, len(bpy.data.objects)))
+
+    bpy.app.handlers.render_post.append(save)
+    try:
+        _still(stage, tmp_path / "a.png")
+    finally:
+        bpy.app.handlers.render_post.remove(save)
+    assert seen[0] == seen[1] == (True, 4)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    assert sorted(o.name for o in bpy.data.objects) == ["camera", "cover", "plant"]
+    assert [c.name for c in bpy.data.collections] == ["TetFlora"]
+    assert not bpy.data.collections[0].hide_render
+
+
+def test_the_real_job_puts_plants_into_the_picture_and_leaves_none_behind(stage, tmp_path):
+    before = datablocks()
+    stage.camera.location.z = 6.0
+    with_plant = _still(stage, tmp_path / "a.png")
+    assert datablocks() == before
+    figures = json.loads(stage.tetflora.statistics)
+    assert figures["plants"] == 1
+    stage.tetflora.refine_at_render = False
+    assert with_plant < 0.9 * _still(stage, tmp_path / "b.png")
+    assert part("handlers").render_errors() == []
