@@ -16,6 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import SpeciesError
 
 MAX_LEAF_POLYGONS = 2000
+MAX_LEAF_CORNERS = 4 * MAX_LEAF_POLYGONS  # of all faces; and vertices
+MAX_COORDINATE = 100.0  # in leaf lengths; keeps areas and bounds far from what floats can hold
+MAX_UV = 10_000.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,28 +113,39 @@ def leaf_model(positions: ArrayLike, faces: list[list[int]], uv: ArrayLike | Non
     uv : (v, 2) float, optional
         Texture coordinates by vertex; x and y of the vertices where not given.
 
+    Returns
+    -------
+    LeafModel
+        With the vertices that faces use, in the order given.
+
     Raises
     ------
     SpeciesError
-        No face, an index out of range, too many faces, or positions that are not finite.
+        No face, too many, one that names a vertex twice or one that is not there, coordinates out of range, no area.
     """
     positions = np.asarray(positions, dtype=np.float64)
-    if positions.ndim != 2 or positions.shape[1] != 3 or not np.isfinite(positions).all():
-        raise SpeciesError("leaf model: vertices must be a list of [x, y, z] with finite numbers")
-    if not 1 <= len(faces) <= MAX_LEAF_POLYGONS or any(len(f) < 3 for f in faces):
+    if positions.ndim != 2 or positions.shape[1] != 3:
+        raise SpeciesError("leaf model: vertices must be a list of [x, y, z]")
+    if not (np.abs(positions) <= MAX_COORDINATE).all():  # false for NaN as well
+        raise SpeciesError(f"leaf model: vertices must be finite, each coordinate within ±{MAX_COORDINATE:g}")
+    sizes = [len(f) for f in faces]
+    if not 1 <= len(faces) <= MAX_LEAF_POLYGONS or min(sizes) < 3:
         raise SpeciesError(f"leaf model: needs 1 to {MAX_LEAF_POLYGONS} faces of 3 or more vertices, has {len(faces)}")
-    sizes = np.array([len(f) for f in faces])
-    corners = np.array([v for f in faces for v in f], dtype=np.int32)
-    if corners.min() < 0 or corners.max() >= len(positions):
-        raise SpeciesError(
-            f"leaf model: faces name vertex {corners.max()}, but there are only {len(positions)} vertices"
-        )
+    if max(sum(sizes), len(positions)) > MAX_LEAF_CORNERS:
+        raise SpeciesError(f"leaf model: at most {MAX_LEAF_CORNERS} vertices and corners of faces are allowed")
+    named = [v for f in faces for v in f]
+    if wrong := [v for v in named if not 0 <= v < len(positions)]:
+        raise SpeciesError(f"leaf model: faces name vertex {wrong[0]}, but there are {len(positions)}, counted from 0")
+    if any(len(set(f)) < len(f) for f in faces):
+        raise SpeciesError("leaf model: a face names a vertex twice")
     offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int32)
-    by_vertex = np.asarray(uv, dtype=np.float32) if uv is not None else positions[:, :2].astype(np.float32) + [0.5, 0.0]
-    if by_vertex.shape != (len(positions), 2):
-        raise SpeciesError("leaf model: uv must hold one [u, v] for each vertex")
-    model = LeafModel(positions, corners, offsets, by_vertex[corners].astype(np.float32))
-    if model.area <= 0:
+    by_vertex = np.asarray(uv, dtype=np.float64) if uv is not None else positions[:, :2] + [0.5, 0.0]
+    if by_vertex.shape != (len(positions), 2) or not (np.abs(by_vertex) <= MAX_UV).all():
+        raise SpeciesError(f"leaf model: uv must hold one [u, v] within ±{MAX_UV:g} for each vertex")
+    used, corners = np.unique(np.array(named, dtype=np.int32), return_inverse=True)
+    corners = corners.reshape(-1).astype(np.int32)
+    model = LeafModel(positions[used], corners, offsets, by_vertex[used][corners].astype(np.float32))
+    if not model.area > 0:
         raise SpeciesError("leaf model: all faces have zero area")
     return model
 

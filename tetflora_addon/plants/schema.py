@@ -22,6 +22,8 @@ from .species import MAX_ORDERS, Colour, Order, Range, Species
 FORMAT = 1
 MAX_FILE_BYTES = 4_000_000
 MAX_POLYGONS = 20_000_000
+LENGTH_HIGH = 20.0
+"""Highest length of a branch after order 0, of its parent's length."""
 
 
 @dataclass(frozen=True)
@@ -121,14 +123,17 @@ class _Reader:
             if name not in allowed:
                 raise self.fail(f"{key}.{name}" if key else name, f"unknown key; allowed are {', '.join(allowed)}")
 
-    def text(self, value: Any, key: str) -> str:
-        if not isinstance(value, str) or not value.strip() or len(value) > 1000:
-            raise self.fail(key, f"must be a text of 1 to 1000 characters, is {_shown(value)}")
+    def text(self, value: Any, key: str, least: int = 1) -> str:
+        if not isinstance(value, str) or len(value.strip()) < least or len(value) > 1000:
+            raise self.fail(key, f"must be a text of {least} to 1000 characters, is {_shown(value)}")
         return value
 
 
 def _shown(value: Any) -> str:
-    text = repr(value)
+    try:
+        text = repr(value)
+    except (RecursionError, ValueError):  # nested too deep, or an integer of thousands of digits
+        return f"a {type(value).__name__} too large to show"
     return text if len(text) <= 60 else text[:57] + "..."
 
 
@@ -143,7 +148,7 @@ def _read_order(reader: _Reader, data: Any, index: int, last: bool) -> Order:
             raise reader.fail(path, f"missing; must be {_expected(key)}")
         if name not in data and name == "angle_tip":
             value = values["angle"].mean
-        high = 20.0 if name == "length" and index > 0 else key.high
+        high = LENGTH_HIGH if name == "length" and index > 0 else key.high
         readers: dict[str, Callable[[], Any]] = {
             "range": lambda value=value, path=path, key=key, high=high: reader.range(value, path, key.low, high),
             "number": lambda value=value, path=path, key=key: reader.number(value, path, key.low, key.high),
@@ -177,7 +182,7 @@ def _read_leaf(reader: _Reader, data: Any) -> LeafModel | str:
     if len(forms) != 1:
         raise reader.fail("leaf", "needs exactly one of model (built-in), object (Blender mesh) or vertices with faces")
     if "model" in data:
-        if data["model"] not in LEAF_MODELS:
+        if not isinstance(data["model"], str) or data["model"] not in LEAF_MODELS:
             raise reader.fail("leaf.model", f"must be one of {', '.join(LEAF_MODELS)}; is {_shown(data['model'])}")
         return LEAF_MODELS[data["model"]]
     if "object" in data:
@@ -187,12 +192,23 @@ def _read_leaf(reader: _Reader, data: Any) -> LeafModel | str:
         isinstance(f, list) and all(isinstance(v, int) and not isinstance(v, bool) for v in f) for f in faces
     ):
         raise reader.fail("leaf.faces", "must be a list of faces, each a list of vertex indices")
+    for key, form in (("vertices", "[x, y, z]"), ("uv", "[u, v]")):
+        if key in data and not _is_list_of_points(data[key], form.count(",") + 1):
+            raise reader.fail(f"leaf.{key}", f"must be a list of {form} with numbers")
     try:
         return leaf_model(data["vertices"], faces, data.get("uv"))
     except SpeciesError as error:
         raise reader.fail("leaf", str(error)) from None
-    except (TypeError, ValueError):
-        raise reader.fail("leaf.vertices", "must be a list of [x, y, z]; uv a list of [u, v]") from None
+
+
+def _is_list_of_points(value: Any, size: int) -> bool:
+    # numpy would take texts and truths for numbers, and stumble over integers that no float can hold.
+    return isinstance(value, list) and all(
+        isinstance(point, list)
+        and len(point) == size
+        and all(isinstance(x, int | float) and not isinstance(x, bool) and not abs(x) > 1e300 for x in point)
+        for point in value
+    )
 
 
 def expected_counts(orders: tuple[Order, ...]) -> tuple[list[float], list[float]]:
@@ -223,6 +239,8 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
         Names the source, the key and what is allowed.
     """
     reader = _Reader(source)
+    if not isinstance(data, dict):
+        raise reader.fail("species", f"must be an object {{…}}, is {_shown(data)}")
     reader.keys(data, "", SPECIES_KEYS)
     for key in ("format", "name", "orders", "leaf"):
         if key not in data:
@@ -245,7 +263,7 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
     return Species(
         identifier=identifier,
         name=reader.text(data["name"], "name"),
-        description=str(data.get("description", "")),
+        description=reader.text(data.get("description", ""), "description", least=0),
         orders=read,
         leaf=leaf,
         leaf_transmission=reader.number(data.get("leaf_transmission", 0.4), "leaf_transmission", 0, 1),
