@@ -11,7 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from ..errors import SpeciesError
-from .schema import read_species
+from .schema import MAX_FILE_BYTES, read_species
 from .species import Species
 
 
@@ -31,11 +31,13 @@ def builtin_folder() -> Path:
 
 
 @lru_cache(maxsize=512)
-def _info(path: Path, _stamp: tuple[int, int]) -> SpeciesInfo:
+def _info(path: Path, stamp: tuple[int, int]) -> SpeciesInfo:
     try:
+        if stamp[1] > MAX_FILE_BYTES:
+            raise ValueError("too large to read only for a menu")
         data = json.loads(path.read_text(encoding="utf-8"))
         name, description = str(data.get("name", path.stem)), str(data.get("description", ""))
-    except (OSError, ValueError, AttributeError):
+    except (OSError, ValueError, AttributeError, RecursionError):
         name, description = path.stem, "This file cannot be read; choosing the species tells why"
     return SpeciesInfo(path.stem, name, description, path)
 
@@ -63,7 +65,8 @@ def list_species(folders: Sequence[Path] = ()) -> dict[str, SpeciesInfo]:
     for folder in (builtin_folder(), *folders):
         if folder.is_dir():
             for path in sorted(folder.glob("*.json")):
-                found[path.stem] = _info(path, _stamp(path))
+                if path.is_file():  # neither a folder nor a link that leads nowhere
+                    found[path.stem] = _info(path, _stamp(path))
     return dict(sorted(found.items(), key=lambda item: item[1].name.lower()))
 
 
