@@ -77,6 +77,11 @@ def _systematic(weights: NDArray[np.float64], number: int) -> NDArray[np.int64]:
     return np.minimum(np.searchsorted(edges, (np.arange(number) + 0.5) / number), len(weights) - 1)
 
 
+def _at_least_some(counts: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The same counts; one each where things are so rare that no path has met any, but some are expected."""
+    return counts if counts.any() else np.ones_like(counts)
+
+
 def _interleave(index: NDArray[np.int64]) -> NDArray[np.int64]:
     """The same indices in an order in which any run of them is spread over all (a fixed permutation)."""
     return index[np.argsort(mix(np.arange(len(index)).astype(np.uint64)), kind="stable")]
@@ -130,7 +135,7 @@ def _sample_row(
             area = weight * branches.length * branches.radius * (1 - (1 - taper) * along)
             wood_parts.append((position, frame[:, :, 2], branches.row, area * (wood_share[depth] / area.sum())))
         if leaf_share[depth] > 0:
-            counts = leaf_counts(rows, branches)
+            counts = _at_least_some(leaf_counts(rows, branches))
             picked = np.flatnonzero(counts)
             index = (uniform(branches.key, _PICK) * counts).astype(np.int64)[picked]
             key = leaf_keys(branches, picked, index)
@@ -140,10 +145,10 @@ def _sample_row(
             leaf_parts.append(
                 (leaves.position, leaves.frame, branches.row[picked], area * (leaf_share[depth] / area.sum()))
             )
-        counts = branch_counts(rows, branches)
-        alive = np.flatnonzero(counts)
-        if len(alive) == 0:
+        if rows["branches"][branches.row[0], 0] <= 0:
             break
+        counts = _at_least_some(branch_counts(rows, branches))
+        alive = np.flatnonzero(counts)
         index = (uniform(branches.key, _LEVEL) * counts).astype(np.int64)[alive]
         weight = (weight * counts)[alive]
         branches = chosen_children(rows, branches, lines, alive, index, counts)
