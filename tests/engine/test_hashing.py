@@ -62,7 +62,7 @@ def test_small_integer_types_hold_the_same_seed() -> None:
 
 
 def test_numbers_are_even() -> None:
-    """χ² over 64 bins and the mean of products with neighbours, for seeds in a row, siblings in a row, draws in a row."""
+    """χ² over 64 bins and the mean of products with neighbours: for seeds, siblings and draws in a row."""
     n = 64_000
     siblings = uniform(child_key(key_of_seed(5), np.arange(n)), Draw.LENGTH)
     seeds = uniform(key_of_seed(np.arange(n)), Draw.LENGTH)

@@ -1,0 +1,78 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``python -m devtools.species_docs`` writes the tables of docs/species.md from the tables that the reader checks by.
+
+A test says whether the page is current.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+
+from tetflora_addon.plants.crown_shapes import CROWN_SHAPES
+from tetflora_addon.plants.leaf_models import LEAF_MODELS
+from tetflora_addon.plants.schema import LENGTH_HIGH, ORDER_KEYS, Key
+
+from .house import ROOT
+
+PAGE = ROOT / "docs" / "species.md"
+
+_WRITTEN = {
+    "range": "`[mean, variation]`",
+    "number": "number",
+    "integer": "whole number",
+    "shape": "name",
+    "colour": "`[[r, g, b], [variation of each]]`",
+}
+
+
+def _limits(name: str, key: Key) -> str:
+    if key.kind == "shape":
+        return "see below"
+    limits = f"{key.low:g} to {key.high:g}"
+    return f"{limits}; {key.low:g} to {LENGTH_HIGH:g} after order 0" if name == "length" else limits
+
+
+def _default(key: Key) -> str:
+    if key.default is None:
+        return "required"
+    if isinstance(key.default, float) and math.isnan(key.default):
+        return "mean of `angle`"
+    return f"`{json.dumps(key.default)}`"
+
+
+def key_table() -> str:
+    """Markdown table of the keys of an order."""
+    lines = ["| key | written | limits | unit | default | meaning |", "|---|---|---|---|---|---|"]
+    for name, key in ORDER_KEYS.items():
+        cells = (f"`{name}`", _WRITTEN[key.kind], _limits(name, key), key.unit or "–", _default(key), key.meaning)
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def crown_list() -> str:
+    """Names of the crown shapes in one line."""
+    return ", ".join(f"`{name}`" for name in CROWN_SHAPES)
+
+
+def leaf_table() -> str:
+    """Markdown table of the built-in leaves."""
+    lines = ["| model | faces | width | one-sided area |", "|---|---|---|---|"]
+    lines += [f"| `{n}` | {m.polygons} | {m.width:.2f} | {m.area:.3f} |" for n, m in LEAF_MODELS.items()]
+    return "\n".join(lines)
+
+
+def updated(page: str) -> str:
+    """The page with its tables written anew; they stand between comments that name them."""
+    for name, text in (("keys", key_table()), ("crowns", crown_list()), ("leaves", leaf_table())):
+        pattern = re.compile(rf"(<!-- {name} -->\n).*?(<!-- end of {name} -->)", re.DOTALL)
+        if not pattern.search(page):
+            raise ValueError(f"{PAGE.name} has no place for {name}")
+        page = pattern.sub(lambda match, text=text: f"{match[1]}\n{text}\n\n{match[2]}", page)
+    return page
+
+
+if __name__ == "__main__":
+    PAGE.write_text(updated(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
