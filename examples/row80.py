@@ -59,9 +59,10 @@ def build(scene: bpy.types.Scene, count: int = COUNT, species: str = "broadleaf_
     scene.camera = camera
     add_daylight(scene, elevation=38.0, azimuth=70.0)
     render = scene.render
-    scene.view_settings.exposure = 0.65
+    scene.view_settings.exposure = 0.8
     scene.view_settings.look = 'AgX - Medium High Contrast'
-    scene.eevee.use_raytracing = True  # for the shade of leaves on leaves
+    scene.eevee.use_raytracing = True  # or the sky would shine through crowns
+    scene.eevee.fast_gi_thickness_near = 3.0
     render.resolution_x, render.resolution_y, render.resolution_percentage = 800, 450, 100
 
 
@@ -85,5 +86,5 @@ def add_daylight(scene: bpy.types.Scene, elevation: float, azimuth: float) -> No
     links.new(place.outputs["Generated"], split.inputs[0])
     links.new(split.outputs["Z"], ramp.inputs[0])
     background = next(n for n in nodes if n.type == 'BACKGROUND')
-    background.inputs["Strength"].default_value = 0.9
+    background.inputs["Strength"].default_value = 0.55
     links.new(ramp.outputs["Color"], background.inputs["Color"])

@@ -66,7 +66,7 @@ class Terrain:
         faces = np.stack([first, first + 1, first + nx + 1, first + nx], axis=1)
         mesh = bpy.data.meshes.new(name)
         mesh.from_pydata(points.tolist(), [], faces.tolist(), shade_flat=False)
-        mesh.materials.append(_ground_material())
+        mesh.materials.append(ground_material())
         ground = bpy.data.objects.new(name, mesh)
         ground.tetflora.is_occluder = True
         scene.collection.objects.link(ground)
@@ -82,7 +82,7 @@ def _catmull_rom(t: NDArray) -> tuple[NDArray, ...]:
     )
 
 
-def _ground_material() -> bpy.types.Material:
+def ground_material() -> bpy.types.Material:
     """Meadow: greens and browns by noise."""
     material = bpy.data.materials.new("Meadow")
     if not material.node_tree:  # before Blender 5.0 new materials have no nodes
