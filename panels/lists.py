@@ -13,7 +13,7 @@ class TETFLORA_UL_mix(bpy.types.UIList):
     """A species and its share."""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, _index, _flag) -> None:
-        row = layout.row(align=True)
+        row = layout.split(factor=0.7, align=True)
         row.prop(item, "species_choice", text="", emboss=False)
         row.prop(item, "weight", text="")
 
