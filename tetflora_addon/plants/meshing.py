@@ -48,9 +48,10 @@ def concatenate_buffers(parts: Sequence[MeshBuffers]) -> MeshBuffers | None:
 
 def _distinct(pieces: Pieces) -> tuple[Pieces, Branches, NDArray[np.int64]]:
     """Pieces sorted along their branches, the distinct branches, and the index of the branch of each piece."""
-    pieces = pieces.take(np.lexsort([pieces.t0, pieces.branches.key]))
-    key = pieces.branches.key
-    first = np.concatenate([[True], key[1:] != key[:-1]])
+    # The plant belongs to the order: plants of one seed (copies in the scene) have the same keys at different places.
+    pieces = pieces.take(np.lexsort([pieces.t0, pieces.branches.key, pieces.branches.plant]))
+    key, plant = pieces.branches.key, pieces.branches.plant
+    first = np.concatenate([[True], (key[1:] != key[:-1]) | (plant[1:] != plant[:-1])])
     return pieces, pieces.branches.take(first), np.cumsum(first) - 1
 
 
