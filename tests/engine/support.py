@@ -16,7 +16,8 @@ from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.plants.catalogue import builtin_folder, load_species
 from tetflora_addon.plants.compiled import Flora, compile_species
 from tetflora_addon.plants.expansion import expand
-from tetflora_addon.plants.growth import Branches, trunks
+from tetflora_addon.plants.foliage import leaf_keys, leaf_places, place_leaves
+from tetflora_addon.plants.growth import Branches, axes, leaf_counts, spread, trunks
 from tetflora_addon.plants.meshing import leaf_buffers, tube_buffers
 from tetflora_addon.plants.pieces import Pieces
 from tetflora_addon.plants.schema import species_from_dict
@@ -116,6 +117,16 @@ def grown(one: Flora, seeds: Seeds) -> tuple[Branches, Pieces]:
     """Trunks, and all branches of the plants as pieces."""
     whole = trunks(one.rows, seeds)
     return whole, expand(one, whole)
+
+
+def leaves_of(one: Flora, branches: Branches) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Branch, base (m, 3) and size (m,) of all leaves on branches' own axes."""
+    counts = leaf_counts(one.rows, branches)
+    owner, index = spread(counts)
+    key = leaf_keys(branches, owner, index)
+    t = leaf_places(one.rows, branches, owner, index, counts, key)
+    leaves = place_leaves(one.rows, branches, axes(one.rows, branches), owner, index, key, t)
+    return owner, leaves.position, leaves.size
 
 
 def meshes(one: Flora, pieces: Pieces) -> tuple[list[MeshBuffers], list[MeshBuffers]]:

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Growth from seeds: the same plant whatever is grown beside it, before it, or of it.
 
-``tests/data/plants.json`` holds plants as they were grown once; every version of Python and numpy has to meet them. After
-a change that is meant to change plants, write it anew with ``python -m tests.engine.test_growth``.
+``tests/data/plants.json`` holds plants as they were grown once; every version of Python and numpy has to meet them.
+After a change that is meant to change plants, write it anew with ``python -m tests.engine.test_growth``.
 """
 
 from __future__ import annotations

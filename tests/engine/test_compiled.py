@@ -1,0 +1,216 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is known of plants before they are grown, against plants that are: bounds for every seed, averages over many."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.engine import support
+from tetflora_addon.plants.compiled import Flora
+from tetflora_addon.plants.expansion import chunks, expand, open_subplants
+from tetflora_addon.plants.growth import Branches
+from tetflora_addon.plants.pieces import wood_areas
+from tetflora_addon.plants.samples import leaf_moments, wood_moments
+from tetflora_addon.plants.species import MAX_ORDERS
+from tetflora_addon.refinement.contents import bounding_cylinders, subplant_amounts
+
+_FLOAT32 = 1e-6  # relative rounding of vertices
+
+
+def outside(flora: Flora, subplants: Branches) -> float:
+    """How far the farthest vertex of any sub-plant lies outside its bound, as a fraction of the bound's size."""
+    worst = -1.0
+    centre, radius, half_height = bounding_cylinders(flora, subplants)
+    for i in range(len(subplants)):
+        one = expand(flora, subplants.take(np.array([i])))
+        tubes, leaves = support.meshes(flora, one)
+        axis = subplants.frame[i, :, 2]
+        for mesh in (*tubes, *leaves):
+            points = mesh.positions.astype(np.float64) - centre[i]
+            along = points @ axis
+            across = np.linalg.norm(points - along[:, None] * axis, axis=1)
+            size = radius[i] + half_height[i] + np.abs(centre[i]).max()
+            worst = max(worst, (across.max() - radius[i]) / size, (np.abs(along).max() - half_height[i]) / size)
+    return worst
+
+
+@pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
+def test_every_vertex_of_200_plants_is_inside_the_bound(species: int) -> None:
+    flora = support.flora()
+    for first in range(0, 200, 50):
+        trunk = support.trunks(flora.rows, support.plants(np.arange(first, first + 50), species))
+        assert outside(flora, trunk) < _FLOAT32
+
+
+@pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
+def test_every_vertex_of_subplants_is_inside_their_bounds(species: int) -> None:
+    flora = support.flora()
+    level = support.trunks(flora.rows, support.plants([1, 2], species))
+    while len(level):
+        level, *_ = open_subplants(flora, level.take(np.s_[:: max(1, len(level) // 12)]))
+        assert outside(flora, level.take(np.s_[:: max(1, len(level) // 25)])) < _FLOAT32
+
+
+RANGES = st.fixed_dictionaries(
+    {
+        "curvature": st.tuples(st.floats(-300, 300), st.floats(0, 60)),
+        "angle": st.tuples(st.floats(40, 140), st.floats(0, 40)),
+        "angle_tip": st.floats(0, 180),
+        "branch_start": st.floats(0, 0.99),
+        "segments": st.integers(1, 12),
+        "crown": st.sampled_from(["conical", "flame", "inverse conical", "tend flame", "spherical"]),
+        "taper": st.floats(0, 1),
+    }
+)
+
+
+@given(RANGES, RANGES, st.integers(0, 10**6))
+@settings(deadline=None, max_examples=60)
+def test_bounds_hold_for_any_species(first: dict, second: dict, seed: int) -> None:
+    """Branches that curl, hang and lean back; the extremes come from the ranges, not from the shipped species."""
+    data = support.small(order0={k: v for k, v in first.items() if "angle" not in k}, order1=second)
+    data["orders"][2].update({k: first[k] for k in ("angle", "angle_tip", "curvature", "segments")})
+    for order in data["orders"]:
+        for key in ("curvature", "angle"):
+            order[key] = list(order.get(key, [0, 0]))
+    flora = support.compiled(data)
+    assert outside(flora, support.trunks(flora.rows, support.plants(seed + np.arange(6)))) < _FLOAT32
+
+
+def samples_of_plants(species: int, count: int) -> dict[str, np.ndarray]:
+    """By plant: leaves, leaf area, wood area over that of its compiled mean, polygons."""
+    flora = support.flora()
+    trunk = support.trunks(flora.rows, support.plants(np.arange(count) + 1000, species))
+    out: dict[str, list] = {"leaf_count": [], "leaf_area": [], "polygons": [], "wood": [], "wood_expected": []}
+    model = flora.leaf_models[species]
+    for run in chunks(flora.polygons[trunk.row], 400_000):
+        branches = trunk.take(run)
+        pieces = expand(flora, branches)
+        number = len(branches)
+        plant = pieces.branches.plant - branches.plant[0]
+        wood = np.bincount(plant, wood_areas(flora, pieces), number)
+        faces = np.bincount(plant, flora.rows["sides"][pieces.branches.row], number)
+        tips = pieces.take(pieces.t1 == 1)
+        owner, _, size = support.leaves_of(flora, tips.branches)
+        of_plant = tips.branches.plant[owner] - branches.plant[0]
+        leaves = np.bincount(of_plant, minlength=number)
+        out["leaf_count"].append(leaves)
+        out["leaf_area"].append(np.bincount(of_plant, size**2, number) * model.area)
+        out["polygons"].append(faces + leaves * model.polygons)
+        out["wood"].append(wood)
+        out["wood_expected"].append(subplant_amounts(flora, branches).wood_area)
+    return {name: np.concatenate(values).astype(float) for name, values in out.items()}
+
+
+@pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
+def test_averages_are_those_of_grown_plants(species: int) -> None:
+    """Within four standard errors and 1 % over 240 plants; the wood as a ratio, for it depends on the trunk's size."""
+    flora = support.flora()
+    found = samples_of_plants(species, 240)
+    row = species * MAX_ORDERS
+    for name in ("leaf_count", "leaf_area", "polygons"):
+        expected, values = getattr(flora, name)[row], found[name]
+        error = values.std() / np.sqrt(len(values))
+        assert abs(values.mean() - expected) < min(4 * error, 0.01 * expected) + 1e-9, name
+    assert found["wood"].sum() == pytest.approx(found["wood_expected"].sum(), rel=0.015)
+
+
+def test_a_species_without_variation_is_known_exactly() -> None:
+    """Counts to the last leaf; areas but for where branches sit on their parents."""
+    data = support.small()
+    for order in data["orders"]:
+        for key in ("length", "thickness", "branches", "leaves", "leaf_size"):
+            if key in order:
+                order[key] = [order[key][0], 0]
+    flora = support.compiled(data)
+    trunk, pieces = support.grown(flora, support.plants(np.arange(40)))
+    tubes, leaves = support.meshes(flora, pieces)
+    polygons = sum(m.polygons for m in (*tubes, *leaves))
+    assert polygons == pytest.approx(40 * flora.polygons[0])
+    assert sum(m.polygons for m in leaves) == pytest.approx(40 * flora.leaf_count[0])
+    expected = 40 * flora.leaf_area[0]
+    assert sum(support.face_areas(m).sum() for m in leaves) == pytest.approx(expected, rel=1e-5)
+    assert wood_areas(flora, pieces).sum() == pytest.approx(subplant_amounts(flora, trunk).wood_area.sum(), rel=0.01)
+
+
+def test_colours_are_means_weighted_by_area() -> None:
+    """Large pale leaves on order 1, small dark ones on order 2: the faces' colours, weighted, are the compiled one."""
+    data = support.small(
+        order1={"leaves": [4, 0], "leaf_size": [0.3, 0], "leaf_colour": [[0.8, 0.7, 0.2], [0.1, 0.1, 0.1]]},
+        order2={"leaf_colour": [[0.1, 0.2, 0.1], [0.05, 0.05, 0.05]], "branch_colour": [[0.5, 0.4, 0.3], [0, 0, 0]]},
+    )
+    flora = support.compiled(data)
+    _, pieces = support.grown(flora, support.plants(np.arange(80)))
+    tubes, leaves = support.meshes(flora, pieces)
+    for meshes, expected in ((leaves, flora.leaf_colour[0]), (tubes, flora.wood_colour[0])):
+        areas = np.concatenate([support.face_areas(m) for m in meshes])
+        colours = np.concatenate([m.attributes["tf_colour"][1] for m in meshes])
+        np.testing.assert_allclose(areas @ colours / areas.sum(), expected, rtol=0.03)
+
+
+@pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
+def test_orientation_of_whole_plants(species: int) -> None:
+    flora = support.flora()
+    trunk, pieces = support.grown(flora, support.plants(np.arange(12), species))
+    tubes, leaves = support.meshes(flora, pieces)
+    axis = trunk.frame[:, :, 2]
+    expected = leaf_moments(flora.samples, trunk.row, axis).mean(axis=0)
+    assert np.trace(expected) == pytest.approx(1)
+    np.testing.assert_allclose(support.moment(leaves[0]), expected, atol=0.025)
+    np.testing.assert_allclose(
+        support.moment(tubes[0]), wood_moments(flora.samples, trunk.row, axis).mean(axis=0), atol=0.03
+    )
+
+
+@pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
+def test_orientation_of_subplants_at_any_tilt(species: int) -> None:
+    """Boughs of many plants, sorted by how steeply they stand, each group against what their axes foretell."""
+    flora = support.flora()
+    trunk = support.trunks(flora.rows, support.plants(np.arange(8), species))
+    boughs, *_ = open_subplants(flora, trunk)
+    steepness = np.argsort(boughs.frame[:, 2, 2])
+    for group in np.array_split(steepness, 3):
+        some = boughs.take(group[:40])
+        _, leaves = support.meshes(flora, expand(flora, some))
+        weight = subplant_amounts(flora, some).leaf_area
+        expected = np.einsum("n,nij->ij", weight, leaf_moments(flora.samples, some.row, some.frame[:, :, 2]))
+        np.testing.assert_allclose(support.moment(leaves[0]), expected / weight.sum(), atol=0.05)
+
+
+@pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
+def test_sample_points_lie_where_leaves_and_wood_are(species: int) -> None:
+    """Mean and spread of height and distance from the trunk, in units of its length."""
+    flora = support.flora()
+    row = species * MAX_ORDERS
+    trunk, pieces = support.grown(flora, support.plants(np.arange(24), species))
+    tips = pieces.take(pieces.t1 == 1)
+    owner, position, size = support.leaves_of(flora, tips.branches)
+    middle = (pieces.start + pieces.end) / 2
+    for points, plant, weight, samples in (
+        (position, tips.branches.plant[owner], size**2, flora.samples.leaf_position[row]),
+        (middle, pieces.branches.plant, wood_areas(flora, pieces), flora.samples.wood_position[row]),
+    ):
+        local = np.einsum("ni,nij->nj", points, trunk.frame[plant]) / trunk.length[plant, None]
+        for measure in (lambda p: p[:, 2], lambda p: np.hypot(p[:, 0], p[:, 1])):
+            grown, sampled = measure(local), measure(samples.astype(float))
+            mean = np.average(grown, weights=weight)
+            spread = np.sqrt(np.average((grown - mean) ** 2, weights=weight))
+            tolerance = 0.04 * max(1.0, mean)  # of a thousand points
+
+            assert sampled.mean() == pytest.approx(mean, abs=tolerance)
+            assert sampled.std() == pytest.approx(spread, abs=tolerance)
+
+
+def test_compiling_does_not_depend_on_neighbours() -> None:
+    """A species compiled alone and among others: the same numbers, with rows moved."""
+    alone, among = support.small_flora(), support.compiled(support.shipped("bush"), support.SMALL)
+    for name in ("bound", "leaf_count", "leaf_area", "wood_area", "polygons", "leaf_colour", "wood_colour"):
+        assert (getattr(alone, name) == getattr(among, name)[MAX_ORDERS:]).all(), name
+    for name in ("leaf_position", "leaf_frame", "leaf_moment", "wood_position", "wood_axis", "wood_moment"):
+        assert (getattr(alone.samples, name) == getattr(among.samples, name)[MAX_ORDERS:]).all(), name
+    used = alone.rows["used"]
+    assert (among.samples.leaf_row[MAX_ORDERS:][used] == alone.samples.leaf_row[used] + MAX_ORDERS).all()
