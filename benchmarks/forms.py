@@ -28,6 +28,7 @@ def run(quick: bool) -> dict[str, float]:
     row80.build(scene)
     scene.tetflora.refine_at_render = False
     scene.render.resolution_percentage = 50
+    scene.cycles.transparent_max_bounces = 256  # two hits a shell
     samples = 16 if quick else 128
     figures: dict[str, float] = {}
     with tempfile.TemporaryDirectory() as folder:

@@ -26,8 +26,6 @@ ROOMS = {
     "shading": {"plants", "tetrahedra", "refinement"},
 }
 SHARED = {"buffers", "errors"}
-# The camera is plain data, like the buffers: the root of the tree is made from it.
-DATA = {"refinement.camera"}
 
 ENGINE = sorted(p for p in ADDON.rglob("*.py") if p.relative_to(ADDON).parts[0] != "blender")
 EXTENSION = sorted(p for folder in (ADDON, ROOT / "operators", ROOT / "panels") for p in folder.rglob("*.py"))
@@ -72,7 +70,7 @@ def test_engine_file(path: Path) -> None:
         if level == 0:
             assert first == "numpy" or first in sys.stdlib_module_names, f"imports {module}"
         elif level == len(inside):
-            assert first in allowed or module in DATA, f"{room} imports {module}"
+            assert first in allowed, f"{room} imports {module}"
     assert ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))), "says nothing of what it is for"
 
 
