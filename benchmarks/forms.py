@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which form of proxy comes closer to the plants: the same tetrahedra as microsurfaces and as shells, all leaves deferred.
+"""Which form of proxy comes closer to the plants: the row of eighty as microsurfaces and as shells.
 
-With the leaf limit at 3 pixels nearly all of the row is drawn as proxies, so that the figures are theirs and not the meshes'.
+With the leaf limit at 3 pixels nearly all of it is drawn as proxies, so that the figures are theirs, not the meshes'.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The main job from beginning to end: the row of eighty as a file of seeds, refined and rendered in both engines.
 
-``python -m examples.demo --out FOLDER`` writes ``demo.blend``, ``cycles.png``, ``eevee.png``, ``top.png`` and ``stats.json``.
+``python -m examples.demo --out FOLDER`` writes ``demo.blend``, ``cycles.png``, ``eevee.png``, ``top.png`` and
+``stats.json``.
 """
 
 from __future__ import annotations
@@ -78,8 +79,8 @@ def run(out: Path, width: int) -> dict:
     (out / "stats.json").write_text(json.dumps(stats, indent=1) + "\n")
     share = statistics.polygons_meshed / statistics.polygons_full
     say(
-        f"{statistics.plants} plants, {statistics.polygons_full:,} polygons if expanded; {statistics.polygons_meshed:,} were made "
-        f"({100 * share:.1f} %) and {statistics.tetrahedra_proxy:,} tetrahedra drawn as proxies"
+        f"{statistics.plants} plants, {statistics.polygons_full:,} polygons if expanded; "
+        f"{statistics.polygons_meshed:,} were made ({100 * share:.1f} %) and {statistics.tetrahedra_proxy:,} tetrahedra drawn as proxies"
     )
     return stats
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The row of eighty (paper, section 8.1): eighty different trees that recede from the viewer, 3.79 million polygons in all."""
+"""The row of eighty (paper, section 8.1): different trees that recede from the viewer, 3.79 million polygons in all."""
 
 from __future__ import annotations
 

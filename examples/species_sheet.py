@@ -18,7 +18,7 @@ from .terrain import ground_material
 
 
 def build(scene: bpy.types.Scene, seed: int = 11) -> list[str]:
-    """Place one plant of each species of the catalogue in a row, each in a frame of its own height; returns their names."""
+    """Place one plant of each species of the catalogue in a row, equally high all of them; returns their names."""
     catalogue = session.part("tetflora_addon.plants.catalogue")
     known = catalogue.list_species()
     flora = session.part("tetflora_addon.plants.compiled").compile_species([catalogue.load_species(i) for i in known])

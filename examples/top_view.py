@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Top view of the partition (the paper's figure 5): tetrahedra by decision, the polygons that were made, the view pyramid."""
+"""Top view of the partition (the paper's figure 5): tetrahedra by decision, polygons that were made, view pyramid."""
 
 from __future__ import annotations
 

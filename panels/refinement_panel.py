@@ -23,6 +23,11 @@ class TETFLORA_PT_refinement(SidebarPanel, bpy.types.Panel):
         column.prop(settings, "cutoff")
         column.prop(settings, "visibility_resolution")
         column.prop(settings, "proxy_form")
+        cycles = getattr(context.scene, "cycles", None)
+        if settings.proxy_form == 'SHELLS' and cycles is not None:
+            column.prop(cycles, "transparent_max_bounces", text="Transparent")
+            if cycles.transparent_max_bounces < 128:
+                column.label(text="Too few: Cycles draws shells black", icon='ERROR')
         layout.prop(settings, "refine_at_render")
         row = layout.row(align=True)
         row.scale_y = 1.4

@@ -218,3 +218,21 @@ def test_the_real_job_puts_plants_into_the_picture_and_leaves_none_behind(stage,
     stage.tetflora.refine_at_render = False
     assert with_plant < 0.9 * _still(stage, tmp_path / "b.png")
     assert part("handlers").render_errors() == []
+
+
+def test_shells_are_rendered_with_enough_transparent_bounces_and_the_setting_comes_back(stage, tmp_path):
+    import bpy
+
+    scene = bpy.context.scene
+    scene.cycles.transparent_max_bounces = 8
+    scene.tetflora.proxy_form = 'SHELLS'
+    seen = []
+    read = lambda *_: seen.append(scene.cycles.transparent_max_bounces)  # noqa: E731
+    bpy.app.handlers.render_post.append(read)
+    try:
+        scene.render.filepath = str(tmp_path / "shells.png")
+        bpy.ops.render.render(write_still=True)
+    finally:
+        bpy.app.handlers.render_post.remove(read)
+    assert seen == [256]
+    assert scene.cycles.transparent_max_bounces == 8

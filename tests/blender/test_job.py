@@ -94,7 +94,7 @@ def test_results_carry_uvs_materials_and_smooth_tubes():
 
 @pytest.mark.parametrize("steps", [1, 2, 5, 1000])
 def test_closing_the_job_leaves_the_scene_as_it_was(steps):
-    """As Esc does; 1,000 steps are more than there are, so that the last close comes after the end of the loop's yields."""
+    """As Esc does; 1,000 steps are more than there are, so that the last close comes at the last step."""
     import bpy
 
     scene = _forest()
@@ -158,7 +158,7 @@ def test_a_leaf_that_cannot_be_used_is_named():
     entry = scene.tetflora.leaf_objects.add()
     entry.species, entry.leaf = scene.objects["tree 0"].tetflora.species, empty
     before = datablocks()
-    with pytest.raises(errors().SpeciesError, match="bare leaf.*no faces"):
+    with pytest.raises(errors().SpeciesError, match=r"bare leaf.*no faces"):
         _refine(scene)
     assert datablocks() == before
 
@@ -175,7 +175,7 @@ def test_estimates_agree_with_what_is_made():
 
 @pytest.mark.parametrize(("form", "bound"), [('MICROSURFACES', 0.03), ('SHELLS', 0.06)])
 def test_the_refined_picture_is_that_of_the_plants(form, bound):
-    """Mean radiance over blocks of the picture, refined against expanded, with the leaf limit so high that most is proxies."""
+    """Mean radiance over blocks of the picture, refined against expanded; the leaf limit makes most of it proxies."""
     import bpy
 
     from tests.blender.renders import picture

@@ -33,7 +33,9 @@ def visible_state() -> set[str]:
             state |= {f"handler {name} {c.__module__}.{c.__qualname__}" for c in callbacks}
     for name in dir(bpy.types):
         draw = getattr(getattr(bpy.types, name), "draw", None)
-        state |= {f"entry {name} {f.__module__}.{f.__qualname__}" for f in getattr(draw, "_draw_funcs", ())}
+        # Blender moves the menu's own draw function among them when the first is appended, and leaves it there.
+        functions = [f for f in getattr(draw, "_draw_funcs", ()) if not f.__module__.startswith("bl_ui.")]
+        state |= {f"entry {name} {f.__module__}.{f.__qualname__}" for f in functions}
     for keymap in (
         bpy.context.window_manager.keyconfigs.addon.keymaps if bpy.context.window_manager.keyconfigs.addon else ()
     ):

@@ -10,7 +10,7 @@ from ..buffers import MeshBuffers
 from .meshes import write_mesh
 from .node_tools import is_ours, tag
 
-#: Custom property of a result collection: 'VIEW' for what the artist keeps, 'RENDER' for what lives only while rendering.
+#: Custom property of a result collection: 'VIEW' for what the artist keeps, 'RENDER' for what lives while rendering.
 PURPOSE = "tetflora_purpose"
 NAMES = {'VIEW': "TetFlora", 'RENDER': "TetFlora render"}
 #: Custom property of a result object: 'leaf', 'bark' or 'proxy'.
@@ -20,8 +20,8 @@ KIND = "tetflora_kind"
 class Results:
     """A result collection under construction.
 
-    It is linked to the scene at once, so that an object reaches the render as soon as it is made; `discard` takes everything
-    back.
+    It is linked to the scene at once, so that an object reaches the render as soon as it is made; `discard` takes
+    everything back.
 
     Parameters
     ----------
@@ -61,9 +61,8 @@ class Results:
 
 def result_collections(scene: bpy.types.Scene, purpose: str | None = None) -> list[bpy.types.Collection]:
     """Result collections of a scene, of one purpose or of all."""
-    return [
-        c for c in scene.collection.children if is_ours(c) and PURPOSE in c and (purpose is None or c[PURPOSE] == purpose)
-    ]
+    made = [c for c in scene.collection.children if is_ours(c) and PURPOSE in c]
+    return [c for c in made if purpose is None or c[PURPOSE] == purpose]
 
 
 def has_results(scene: bpy.types.Scene) -> bool:

@@ -31,10 +31,14 @@ class _Rendering:
 
     busy: bool = False
     hidden: list[str] = field(default_factory=list)
+    bounces: int | None = None
     errors: list[str] = field(default_factory=list)
 
 
 _rendering = _Rendering()
+
+#: Transparent bounces for shells: a ray passes each of them twice, and what it cannot follow to its end turns black.
+SHELL_BOUNCES = 256
 
 
 def render_errors() -> list[str]:
@@ -99,6 +103,7 @@ def on_save_post(_path: object, _other: object = None) -> None:
 def on_load_post(_path: object, _other: object = None) -> None:
     """After a file was read: nothing of an earlier render counts any more; bring old properties up to date."""
     _rendering.busy = False
+    _rendering.bounces = None
     _rendering.hidden.clear()
     _rendering.errors.clear()
     migrate()
@@ -113,6 +118,10 @@ def _make(scene: bpy.types.Scene) -> None:
     for made in result_collections(scene, 'RENDER'):
         for datablock in (made, *made.objects, *(obj.data for obj in made.objects)):
             datablock.is_runtime_data = True
+    cycles = getattr(scene, "cycles", None)
+    if scene.tetflora.proxy_form == 'SHELLS' and cycles is not None and cycles.transparent_max_bounces < SHELL_BOUNCES:
+        _rendering.bounces = cycles.transparent_max_bounces
+        cycles.transparent_max_bounces = SHELL_BOUNCES
     # Hidden only now: if refinement failed, yesterday's trees are better than none.
     _rendering.hidden = [c.name for c in result_collections(scene, 'VIEW') if not c.hide_render]
     for collection in _named(_rendering.hidden):
@@ -122,6 +131,8 @@ def _make(scene: bpy.types.Scene) -> None:
 def _take_back(scene: bpy.types.Scene) -> None:
     _show_hidden()
     _rendering.hidden.clear()
+    if _rendering.bounces is not None:
+        scene.cycles.transparent_max_bounces, _rendering.bounces = _rendering.bounces, None
     job.clear(scene, for_render=True)
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 from collections.abc import Generator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import bpy
 import numpy as np
@@ -76,8 +77,8 @@ def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph:
             found = bpy.data.objects.get(species.leaf)
             if found is None:
                 raise SpeciesError(
-                    f'Species "{species.name}" takes its leaf from an object "{species.leaf}", which this file does not have. '
-                    "Add a mesh object of that name, or choose one under Leaf Objects"
+                    f'Species "{species.name}" takes its leaf from an object "{species.leaf}", which this '
+                    "file does not have. Add a mesh object of that name, or choose one under Leaf Objects"
                 )
             species = replace(species, leaf=_leaf_of(species, found, depsgraph))
         resolved.append(species)
@@ -96,7 +97,7 @@ def _leaf_of(species: Species, source: bpy.types.Object, depsgraph: bpy.types.De
     if arrays.polygons == 0:
         raise SpeciesError(f'"{source.name}" is to be the leaf of "{species.name}" but its mesh has no faces')
     offsets, corners = arrays.face_offsets, arrays.corner_verts
-    faces = [corners[a:b].tolist() for a, b in zip(offsets[:-1], offsets[1:], strict=True)]
+    faces = [corners[a:b].tolist() for a, b in pairwise(offsets)]
     model = leaf_model(arrays.positions, faces)
     if "UVMap" in arrays.attributes:
         model = LeafModel(model.positions, model.corner_verts, model.face_offsets, arrays.attributes["UVMap"][1])
@@ -117,7 +118,7 @@ def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statisti
 
 
 def _polygons_full(flora: Flora, seeds: Seeds) -> int:
-    return int(round(flora.polygons[trunks(flora.rows, seeds).row].sum()))
+    return round(flora.polygons[trunks(flora.rows, seeds).row].sum())
 
 
 def refine_steps(
@@ -280,4 +281,3 @@ def _write_proxies(
         results.add("TetFlora proxies", "proxy", buffers, material())
         statistics.polygons_proxy += buffers.polygons
         statistics.memory_mb += buffers.nbytes / 1e6
-
