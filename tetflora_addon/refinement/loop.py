@@ -111,6 +111,8 @@ def refine(
         depth = occluder_depth(occluders, camera, *buffer_size(camera, settings.visibility_resolution))
     clock.lap("visibility")
     direction = {"eye": camera.position} if camera.kind == "PERSP" else {"direction": -camera.frame[:, 2]}
+    # Generations count from the root's own pieces. Passes do not count: a late one may divide what is still coarse.
+    deepest = tree.levels - 1 + settings.max_levels
     passes = 0
     while True:
         passes += 1
@@ -126,17 +128,22 @@ def refine(
         decision = decide(vertices, amounts, seen, camera, settings)
         splitting = decision == Decision.SPLIT
         room = settings.max_tetrahedra - tree.tetrahedra_made
-        stopped = splitting.any() and (room < 2 * splitting.sum() or passes * GENERATIONS > settings.max_levels)
-        if stopped:
-            decision = _without_splits(decision, vertices, amounts, camera, settings)
+        full = bool(room < 2 * splitting.sum())
+        barred = splitting & (full | (tree.level[nodes] >= deepest))
+        limited = bool(barred.any())
+        if limited:
+            decision = np.where(barred, _without_splits(decision, vertices, amounts, camera, settings), decision)
+            splitting &= ~barred
         clock.lap("refinement")
         state = Refinement(
-            tree, contents, nodes, decision, rank, amounts, seen, passes, not stopped, dict(clock.seconds)
+            tree, contents, nodes, decision, rank, amounts, seen, passes, not limited, dict(clock.seconds)
         )
-        if stopped or not splitting.any():
+        if not splitting.any():
             return state
         yield state
-        _split(tree, nodes[splitting], seen.transmittance[splitting] * seen.opacity[splitting], camera, settings)
+        _split(
+            tree, nodes[splitting], seen.transmittance[splitting] * seen.opacity[splitting], camera, settings, deepest
+        )
         clock.lap("refinement")
         divided = tree.children[:, 0] >= 0
         moving = contents.within(divided)
@@ -144,7 +151,9 @@ def refine(
         clock.lap("update")
 
 
-def _split(tree: TetrahedralTree, nodes: NDArray, share: NDArray, camera: Camera, settings: RefinementSettings) -> None:
+def _split(
+    tree: TetrahedralTree, nodes: NDArray, share: NDArray, camera: Camera, settings: RefinementSettings, deepest: int
+) -> None:
     """Bisect nodes several times, each as long as its pixels, seen as well as its ancestor, exceed the cutoff."""
     for _ in range(GENERATIONS):
         if len(nodes) == 0 or tree.tetrahedra_made + 2 * len(nodes) > settings.max_tetrahedra:
@@ -152,7 +161,8 @@ def _split(tree: TetrahedralTree, nodes: NDArray, share: NDArray, camera: Camera
         nodes = tree.split(nodes).reshape(-1)
         share = np.repeat(share, 2)
         pixels, whole = silhouette_pixels(tree.vertices(nodes), camera)
-        large = ~whole | (pixels * share > settings.cutoff**2)  # out of view: nothing is known, one step at a time
+        large = ~whole | (pixels * share > settings.cutoff**2)  # pixels are not known for what leaves the view
+        large &= tree.level[nodes] < deepest
         nodes, share = nodes[large], share[large]
 
 
