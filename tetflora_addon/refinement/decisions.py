@@ -72,7 +72,8 @@ def decide(
     no_gain = (amounts.polygons <= settings.few_polygons) | (seen.pixels <= settings.block**2)
     small = contribution <= settings.cutoff**2
     out = np.full(len(holds), Decision.SPLIT, dtype=np.int8)
-    out[small] = Decision.PROXY
+    # Large leaves never become a proxy: a block of them that is hardly seen is divided until its hidden parts show.
+    out[small & ~large_leaves] = Decision.PROXY
     out[large_leaves & no_gain] = Decision.EXPLICIT
     out[hidden] = Decision.HIDDEN
     if np.isfinite(settings.hidden_block):
