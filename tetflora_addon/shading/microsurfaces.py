@@ -26,7 +26,8 @@ from ..refinement.contents import Amounts, piece_amounts, subplant_amounts
 
 _FACET_PATH = 1 << 40  # child indices of facets start here
 _WOOD_PATH = 1 << 41
-_COUNT, _TURN, _START, _PLACE = 201, 202, 203, 204
+# Draws of this module. Wood and leaves have counts of their own; none may meet another, or facets bunch up.
+_LEAF_COUNT, _WOOD_COUNT, _TURN, _START, _PLACE = 201, 202, 203, 204, 205
 _SKY = np.array([0.0, 0.0, 1.0])
 
 
@@ -83,9 +84,9 @@ def piece_facets(flora: Flora, pieces: Pieces, side: NDArray[np.float64]) -> Mes
     )
 
 
-def _numbers(key: NDArray, area: NDArray, facet: NDArray, path: int) -> tuple[NDArray, NDArray, NDArray]:
+def _numbers(key: NDArray, area: NDArray, facet: NDArray, path: int, draw: int) -> tuple[NDArray, NDArray, NDArray]:
     """Owner, index and key of the facets that areas (n,) are cut into; their expected number is area / facet."""
-    counts = np.floor(area / facet + uniform(key, _COUNT + path % 7)).astype(np.int64)
+    counts = np.floor(area / facet + uniform(key, draw)).astype(np.int64)
     owner, index = spread(counts)
     return owner, index, child_key(key[owner], index + path)
 
@@ -106,7 +107,7 @@ def _leaves_of_subplants(flora: Flora, subplants: Branches, amounts: Amounts, si
     row = subplants.row
     one = _leaf_area(flora, row, subplants.scale)
     facet = np.maximum(side**2, one)
-    owner, index, key = _numbers(subplants.key, amounts.leaf_area, facet, _FACET_PATH)
+    owner, index, key = _numbers(subplants.key, amounts.leaf_area, facet, _FACET_PATH, _LEAF_COUNT)
     # Runs of the samples are spread over the sub-plant; each sub-plant starts its run elsewhere.
     start = (uniform(subplants.key, _START) * SAMPLES).astype(np.int64)
     pick = (start[owner] + index) % SAMPLES
@@ -138,7 +139,7 @@ def _leaves_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDAr
     facet = np.maximum(side**2, one)
     # Pieces of one branch have its key; the end's position tells them apart.
     own = mix(branches.key ^ pieces.t1.view(np.uint64))
-    owner, index, key = _numbers(own, amounts.leaf_area, facet, _FACET_PATH)
+    owner, index, key = _numbers(own, amounts.leaf_area, facet, _FACET_PATH, _LEAF_COUNT)
     first = np.maximum(pieces.t0, flora.rows["leaf_start"][row])[owner]
     t = first + (pieces.t1[owner] - first) * uniform(key, _PLACE)
     leaves = place_leaves(flora.rows, branches, axes(flora.rows, branches), owner, index, key, t)
@@ -150,7 +151,7 @@ def _leaves_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDAr
 
 def _wood_of_subplants(flora: Flora, subplants: Branches, amounts: Amounts, side: NDArray) -> Facets:
     row = subplants.row
-    owner, index, key = _numbers(subplants.key, amounts.wood_area / 2, side**2, _WOOD_PATH)
+    owner, index, key = _numbers(subplants.key, amounts.wood_area / 2, side**2, _WOOD_PATH, _WOOD_COUNT)
     start = (uniform(subplants.key, _START) * SAMPLES).astype(np.int64)
     pick = (start[owner] + index) % SAMPLES
     of_row, base, samples = row[owner], subplants.frame[owner], flora.samples
@@ -163,7 +164,7 @@ def _wood_of_subplants(flora: Flora, subplants: Branches, amounts: Amounts, side
 
 def _wood_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDArray) -> Facets:
     own = mix(pieces.branches.key ^ pieces.t1.view(np.uint64))
-    owner, _, key = _numbers(own, amounts.wood_area / 2, side**2, _WOOD_PATH)
+    owner, _, key = _numbers(own, amounts.wood_area / 2, side**2, _WOOD_PATH, _WOOD_COUNT)
     vector = (pieces.end - pieces.start)[owner]
     centre = pieces.start[owner] + uniform(key, _PLACE)[:, None] * vector
     axis = vector / np.maximum(np.linalg.norm(vector, axis=1, keepdims=True), 1e-300)
