@@ -39,6 +39,8 @@ class Samples:
     leaf_moment : (r, T, 4) float64
         Mean of n nᵀ over the leaves, sky up, for the tilts of `leaf_moments`: xx, yy, zz, xz with z up and the branch
         in xz.
+    own_leaf_moment : (r, T, 4) float64
+        The same over the leaves of the branch itself, without those of its children.
     wood_position : (r, SAMPLES, 3) float32
         Points on axes of branches, as many as there is surface.
     wood_axis : (r, SAMPLES, 3) float32
@@ -53,6 +55,7 @@ class Samples:
     leaf_frame: NDArray[np.float32]
     leaf_row: NDArray[np.int32]
     leaf_moment: NDArray[np.float64]
+    own_leaf_moment: NDArray[np.float64]
     wood_position: NDArray[np.float32]
     wood_axis: NDArray[np.float32]
     wood_row: NDArray[np.int32]
@@ -109,6 +112,7 @@ def draw_samples(
         np.zeros((total, SAMPLES, 3, 3), np.float32),
         np.zeros((total, SAMPLES), np.int32),
         np.zeros((total, len(_TILTS), 4)),
+        np.zeros((total, len(_TILTS), 4)),
         np.zeros((total, SAMPLES, 3), np.float32),
         np.zeros((total, SAMPLES, 3), np.float32),
         np.zeros((total, SAMPLES), np.int32),
@@ -156,6 +160,11 @@ def _sample_row(
         position, frame, kind, area = (np.concatenate(p) for p in zip(*leaf_parts, strict=True))
         pick = _interleave(_systematic(area, SAMPLES))
         out.leaf_position[row], out.leaf_frame[row], out.leaf_row[row] = position[pick], frame[pick], kind[pick]
+        if leaf_share[0] > 0:
+            _, own, _, area = leaf_parts[0]
+            own = own[_systematic(area, SAMPLES)]
+            light = np.full(SAMPLES, rows["leaf_light"][row])
+            out.own_leaf_moment[row] = _moments_by_tilt(own, light, leaf_moment)
         out.leaf_moment[row] = _moments_by_tilt(frame[pick], rows["leaf_light"][kind[pick]], leaf_moment)
     position, axis, kind, area = (np.concatenate(p) for p in zip(*wood_parts, strict=True))
     pick = _interleave(_systematic(area, SAMPLES))
@@ -183,7 +192,9 @@ def _moments_by_tilt(frame: NDArray, light: NDArray, leaf_moment: NDArray) -> ND
     return table
 
 
-def leaf_moments(samples: Samples, row: NDArray[np.integer], axis: NDArray[np.float64]) -> NDArray[np.float64]:
+def leaf_moments(
+    samples: Samples, row: NDArray[np.integer], axis: NDArray[np.float64], own: bool = False
+) -> NDArray[np.float64]:
     """Mean of n nᵀ over the leaves of sub-plants.
 
     Parameters
@@ -191,6 +202,8 @@ def leaf_moments(samples: Samples, row: NDArray[np.integer], axis: NDArray[np.fl
     row : (n,) int
     axis : (n, 3) float64
         Unit direction of each sub-plant's branch; the sky is +z.
+    own : bool
+        Only the leaves of the branches themselves, as pieces of branches bear them.
 
     Returns
     -------
@@ -199,7 +212,8 @@ def leaf_moments(samples: Samples, row: NDArray[np.integer], axis: NDArray[np.fl
     at = (axis[:, 2].clip(-1, 1) + 1) / 2 * (len(_TILTS) - 1)
     low = np.minimum(at.astype(int), len(_TILTS) - 2)
     part = (at - low)[:, None]
-    xx, yy, zz, xz = ((1 - part) * samples.leaf_moment[row, low] + part * samples.leaf_moment[row, low + 1]).T
+    table = samples.own_leaf_moment if own else samples.leaf_moment
+    xx, yy, zz, xz = ((1 - part) * table[row, low] + part * table[row, low + 1]).T
     level = np.hypot(axis[:, 0], axis[:, 1])
     ex = np.where(level > 1e-9, axis[:, 0] / np.maximum(level, 1e-9), 1.0)
     ey = np.where(level > 1e-9, axis[:, 1] / np.maximum(level, 1e-9), 0.0)

@@ -54,21 +54,30 @@ def summarise(flora: Flora, contents: Contents, index: NDArray[np.integer], coun
     """
     sums = np.zeros((count, 14))  # area, colour × area, transmission × area, moment × area
     subplants, pieces = contents.subplants, contents.pieces
-    for cells, branches, amounts, axis in (
-        (contents.subplant_cell, subplants, subplant_amounts(flora, subplants), subplants.frame[:, :, 2]),
-        (contents.piece_cell, pieces.branches, piece_amounts(flora, pieces), _directions(pieces.end - pieces.start)),
+    rows = flora.rows
+    # A sub-plant shows the mean of all that grows on it, a piece only its own bark and leaves.
+    whole = subplant_amounts(flora, subplants), flora.leaf_colour, flora.wood_colour, subplants.frame[:, :, 2]
+    own = (
+        piece_amounts(flora, pieces),
+        rows["leaf_colour"][:, 0],
+        rows["branch_colour"][:, 0],
+        pieces.end - pieces.start,
+    )
+    for cells, branches, is_piece, (amounts, leaf_colour, wood_colour, vectors) in (
+        (contents.subplant_cell, subplants, False, whole),
+        (contents.piece_cell, pieces.branches, True, own),
     ):
-        to = index[cells]
+        to, axis = index[cells], _directions(vectors)
         keep = np.flatnonzero(to >= 0)
         to, row, axis = to[keep], branches.row[keep], axis[keep]
         leaf, wood = amounts.leaf_area[keep], amounts.wood_area[keep] / 2
-        along_axis = axis[:, :, None] * axis[:, None, :]
-        if cells is contents.subplant_cell:
-            wood_moment = wood_moments(flora.samples, row, axis)
+        if is_piece:
+            wood_moment = (np.eye(3) - axis[:, :, None] * axis[:, None, :]) / 2
         else:
-            wood_moment = (np.eye(3) - along_axis) / 2
-        moment = leaf[:, None, None] * leaf_moments(flora.samples, row, axis) + wood[:, None, None] * wood_moment
-        colour = leaf[:, None] * flora.leaf_colour[row] + wood[:, None] * flora.wood_colour[row]
+            wood_moment = wood_moments(flora.samples, row, axis)
+        leaf_moment = leaf_moments(flora.samples, row, axis, own=is_piece)
+        moment = leaf[:, None, None] * leaf_moment + wood[:, None, None] * wood_moment
+        colour = leaf[:, None] * leaf_colour[row] + wood[:, None] * wood_colour[row]
         values = np.concatenate(
             [(leaf + wood)[:, None], colour, (leaf * flora.transmission[row])[:, None], moment.reshape(-1, 9)], axis=1
         )
