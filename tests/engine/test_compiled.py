@@ -186,7 +186,8 @@ def test_sample_points_lie_where_leaves_and_wood_are(species: int) -> None:
     """Mean and spread of height and distance from the trunk, in units of its length."""
     flora = support.flora()
     row = species * MAX_ORDERS
-    trunk, pieces = support.grown(flora, support.plants(np.arange(24), species))
+    number = int(1.2e6 / flora.polygons[row])
+    trunk, pieces = support.grown(flora, support.plants(np.arange(number), species))
     tips = pieces.take(pieces.t1 == 1)
     owner, position, size = support.leaves_of(flora, tips.branches)
     middle = (pieces.start + pieces.end) / 2
@@ -199,7 +200,7 @@ def test_sample_points_lie_where_leaves_and_wood_are(species: int) -> None:
             grown, sampled = measure(local), measure(samples.astype(float))
             mean = np.average(grown, weights=weight)
             spread = np.sqrt(np.average((grown - mean) ** 2, weights=weight))
-            tolerance = 0.04 * max(1.0, mean)  # of a thousand points
+            tolerance = 0.06 * max(1.0, mean)  # of a thousand points
 
             assert sampled.mean() == pytest.approx(mean, abs=tolerance)
             assert sampled.std() == pytest.approx(spread, abs=tolerance)
