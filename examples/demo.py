@@ -80,7 +80,8 @@ def run(out: Path, width: int) -> dict:
     share = statistics.polygons_meshed / statistics.polygons_full
     say(
         f"{statistics.plants} plants, {statistics.polygons_full:,} polygons if expanded; "
-        f"{statistics.polygons_meshed:,} were made ({100 * share:.1f} %) and {statistics.tetrahedra_proxy:,} tetrahedra drawn as proxies"
+        f"{statistics.polygons_meshed:,} were made ({100 * share:.1f} %) "
+        f"and {statistics.tetrahedra_proxy:,} tetrahedra are drawn as proxies"
     )
     return stats
 
