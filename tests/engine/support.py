@@ -97,7 +97,7 @@ def grove(count: int, spacing: float, species: ArrayLike = 0) -> Seeds:
     side = int(np.ceil(np.sqrt(count)))
     index = np.arange(count)
     places = np.stack([index % side, index // side, np.zeros(count)], axis=1) * spacing
-    return plants(100 + index, species, places - [(side - 1) * spacing / 2] * 2 + [0])
+    return plants(100 + index, species, places - np.array([1, 1, 0]) * (side - 1) * spacing / 2)
 
 
 def camera(

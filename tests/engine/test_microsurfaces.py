@@ -1,0 +1,161 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Microsurfaces stand for surfaces that are not made: as much area, turned the same way, in the same place."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.engine import support
+from tests.engine.test_meshing import check_topology
+from tetflora_addon.buffers import MeshBuffers
+from tetflora_addon.plants.compiled import Flora
+from tetflora_addon.plants.expansion import open_subplants
+from tetflora_addon.plants.growth import Branches, trunks
+from tetflora_addon.refinement.contents import bounding_cylinders, piece_amounts, subplant_amounts
+from tetflora_addon.shading.microsurfaces import piece_facets, subplant_facets
+
+
+def facets(flora: Flora, subplants: Branches, side: float) -> MeshBuffers:
+    made = subplant_facets(flora, subplants, np.full(len(subplants), side))
+    assert made is not None
+    return made
+
+
+def part(mesh: MeshBuffers, leaves: bool) -> np.ndarray:
+    """Faces that stand for leaves, or for wood."""
+    return (mesh.attributes["tf_transmission"][1] > 0) == leaves
+
+
+def moment_of(mesh: MeshBuffers, chosen: np.ndarray) -> np.ndarray:
+    vectors = support.face_vectors(mesh)[chosen]
+    areas = np.linalg.norm(vectors, axis=1)
+    return np.einsum("ni,nj->ij", vectors / areas[:, None], vectors) / areas.sum()
+
+
+@pytest.mark.parametrize("side", [0.02, 0.1, 0.4, 1.5])
+@pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
+def test_area_is_kept_at_any_size(species: int, side: float) -> None:
+    """Leaves count in full, closed branches half; plants are small enough for facets larger than all of them."""
+    flora = support.flora()
+    number = 60 if side > 0.1 else 4
+    plants = trunks(flora.rows, support.plants(np.arange(number), species))
+    mesh = facets(flora, plants, side)
+    check_topology(mesh)
+    amounts, areas = subplant_amounts(flora, plants), support.face_areas(mesh)
+    for leaves, expected in ((True, amounts.leaf_area), (False, amounts.wood_area / 2)):
+        found = areas[part(mesh, leaves)]
+        error = np.sqrt(number) / 2 * side**2  # of rounding a number of facets up or down, at most
+        assert found.sum() == pytest.approx(expected.sum(), abs=4 * error + 1e-4 * expected.sum())
+
+
+def test_small_shares_are_met_on_average_and_from_all_samples() -> None:
+    """Sub-plants of a tenth of a facet: one in ten gets one, and they do not crowd at a few places."""
+    flora = support.small_flora()
+    n = 20_000
+    plants = trunks(flora.rows, support.plants(np.arange(n)))
+    side = np.sqrt(subplant_amounts(flora, plants).leaf_area * 10)
+    mesh = subplant_facets(flora, plants, side)
+    leaves = part(mesh, True)
+    assert leaves.sum() == pytest.approx(n / 10, abs=4 * np.sqrt(n * 0.09))
+    heights = support.face_centres(mesh)[leaves][:, 2]
+    assert len(np.unique(np.round(heights / heights.max(), 3))) > 300
+    amounts = subplant_amounts(flora, plants)
+    total = support.face_areas(mesh)[leaves].sum()
+    assert total == pytest.approx(amounts.leaf_area.sum(), rel=0.1)
+
+
+@pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
+def test_orientation_and_place_are_those_of_the_plant(species: int) -> None:
+    """Facets of whole plants against their leaves: moment, mean height and spread; wood against its tubes."""
+    flora = support.flora()
+    seeds = support.plants(np.arange(8), species)
+    trunk, pieces = support.grown(flora, seeds)
+    mesh = facets(flora, trunk, 0.1)
+    tubes, leaves = support.meshes(flora, pieces)
+    height = trunk.length.mean()
+    for is_leaf, real in ((True, leaves[0]), (False, tubes[0])):
+        chosen = part(mesh, is_leaf)
+        # A facet is flat where a leaf may be bent or of several blades.
+        np.testing.assert_allclose(moment_of(mesh, chosen), support.moment(real), atol=0.12 if is_leaf else 0.05)
+        areas = support.face_areas(real)
+        for axis in (0, 1, 2):
+            centre, other = support.face_centres(mesh)[chosen][:, axis], support.face_centres(real)[:, axis]
+            mean = np.average(other, weights=areas)
+            spread = np.sqrt(np.average((other - mean) ** 2, weights=areas))
+            assert centre.mean() == pytest.approx(mean, abs=0.15 * max(spread, 0.1 * height))
+            assert centre.std() == pytest.approx(spread, rel=0.15, abs=0.02 * height)
+
+
+@given(st.integers(-(2**63), 2**63 - 1), st.floats(0.02, 2), st.floats(0.1, 10))
+@settings(deadline=None, max_examples=20)
+def test_facets_stay_by_their_plant(seed: int, side: float, scale: float) -> None:
+    """Centres within the bound, but for half a leaf; corners half a diagonal further."""
+    flora = support.small_flora()
+    plant = trunks(flora.rows, support.plants(seed, scale=scale, position=(3, 4, 5)))
+    mesh = subplant_facets(flora, plant, np.array([side * scale]))
+    if mesh is None:
+        return
+    centre, radius, half_height = bounding_cylinders(flora, plant)
+    offset = support.face_centres(mesh) - centre
+    along = offset @ plant.frame[0, :, 2]
+    across = np.linalg.norm(offset - along[:, None] * plant.frame[0, :, 2], axis=1)
+    assert np.abs(along).max() <= half_height[0] * (1 + 1e-5)
+    assert across.max() <= radius[0] * (1 + 1e-5)
+    colour, share = (mesh.attributes[n][1] for n in ("tf_colour", "tf_transmission"))
+    assert 0 <= colour.min() <= colour.max() <= 1
+    assert set(np.unique(share)) <= {np.float32(0), np.float32(flora.transmission[0])}
+    assert support.face_areas(mesh).min() > 0
+
+
+def test_facets_are_squares_no_smaller_than_leaves() -> None:
+    flora = support.small_flora()
+    plant = trunks(flora.rows, support.plants(np.arange(5)))
+    leaf = flora.leaf_area[0] / flora.leaf_count[0]
+    for side in (1e-2, 0.5):
+        mesh = facets(flora, plant, side)
+        quads = mesh.positions.reshape(-1, 4, 3).astype(float)
+        edges = np.linalg.norm(quads - np.roll(quads, -1, axis=1), axis=2)
+        expected = np.where(part(mesh, True), max(side, np.sqrt(leaf)), side)
+        np.testing.assert_allclose(edges, np.tile(expected[:, None], 4), rtol=1e-3)
+
+
+def test_the_same_facets_alone_as_in_company_and_twice() -> None:
+    flora = support.small_flora()
+    plants = trunks(flora.rows, support.plants(np.arange(6)))
+    together = facets(flora, plants, 0.1)
+    assert (facets(flora, plants, 0.1).positions == together.positions).all()
+    alone = np.concatenate([facets(flora, plants.take(np.array([i])), 0.1).positions for i in range(6)])
+    assert (np.unique(alone.reshape(-1, 12), axis=0) == np.unique(together.positions.reshape(-1, 12), axis=0)).all()
+
+
+def test_pieces_keep_area_place_and_orientation() -> None:
+    """What single branches and clipped pieces bear: facets on them, of their wood and their own leaves."""
+    flora = support.small_flora()
+    _, pieces = support.grown(flora, support.grove(16, 4.0))
+    amounts = piece_amounts(flora, pieces)
+    mesh = piece_facets(flora, pieces, np.full(len(pieces), 0.05))
+    check_topology(mesh)
+    areas = support.face_areas(mesh)
+    for leaves, expected in ((True, amounts.leaf_area), (False, amounts.wood_area / 2)):
+        assert areas[part(mesh, leaves)].sum() == pytest.approx(expected.sum(), rel=0.05)
+    tubes, real = support.meshes(flora, pieces)
+    np.testing.assert_allclose(moment_of(mesh, part(mesh, True)), support.moment(real[0]), atol=0.12)
+    np.testing.assert_allclose(moment_of(mesh, part(mesh, False)), support.moment(tubes[0]), atol=0.05)
+    wood = support.face_centres(mesh)[part(mesh, False)]
+    low, high = np.minimum(pieces.start, pieces.end).min(axis=0), np.maximum(pieces.start, pieces.end).max(axis=0)
+    assert ((wood >= low - 1e-5) & (wood <= high + 1e-5)).all()
+
+
+def test_pieces_without_leaves_have_facets_of_wood_only() -> None:
+    flora = support.small_flora()
+    trunk = trunks(flora.rows, support.plants(np.arange(5)))
+    _, _, pieces, _ = open_subplants(flora, trunk)
+    mesh = piece_facets(flora, pieces, np.full(len(pieces), 0.02))
+    assert part(mesh, False).all()
+    none = pieces.take(np.zeros(len(pieces), bool))
+    assert piece_facets(flora, none, np.zeros(0)) is None
+    assert subplant_facets(flora, trunk.take(np.zeros(5, bool)), np.zeros(0)) is None
