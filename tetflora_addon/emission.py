@@ -23,7 +23,7 @@ from .plants.pieces import Pieces
 from .plants.seeds import Seeds
 from .plants.species import MAX_ORDERS
 from .refinement.camera import Camera
-from .refinement.contents import bounding_cylinders, subplant_amounts
+from .refinement.contents import bounding_cylinders, piece_amounts, subplant_amounts
 from .refinement.decisions import Decision
 from .refinement.loop import Refinement
 from .shading.microsurfaces import piece_facets, subplant_facets
@@ -33,7 +33,7 @@ from .tetrahedra.geometry import volume
 
 #: Polygons in a block, about; some 60 MB of buffers.
 BLOCK_POLYGONS = 250_000
-#: Sub-plants or pieces whose facets are made at a time.
+#: Facets that are made at a time, about; thick wood close to the eye is cut into very many.
 FACETS_AT_ONCE = 200_000
 
 
@@ -126,8 +126,8 @@ def facet_buffers(
     for run in chunks((amounts.leaf_area + amounts.wood_area) / side**2 + 1, FACETS_AT_ONCE):
         parts.append(subplant_facets(flora, subplants.take(run), side[run]))
     side = sides((pieces.start + pieces.end) / 2, contents.piece_cell)
-    for start in range(0, len(pieces), FACETS_AT_ONCE):
-        run = slice(start, start + FACETS_AT_ONCE)
+    amounts = piece_amounts(flora, pieces)
+    for run in chunks((amounts.leaf_area + amounts.wood_area) / side**2 + 1, FACETS_AT_ONCE):
         parts.append(piece_facets(flora, pieces.take(run), side[run]))
     return concatenate_buffers([p for p in parts if p is not None])
 
