@@ -108,7 +108,7 @@ def facet_buffers(
     facet_pixels : float
         Side of a facet in pixels.
     coarse : float
-        How much larger facets of hidden tetrahedra are.
+        How much larger facets of hidden tetrahedra are; there, wood gets no more facets than it has faces.
     """
     hidden = result.chosen(Decision.HIDDEN)
     contents = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN))
@@ -124,11 +124,11 @@ def facet_buffers(
     side = sides(bounding_cylinders(flora, subplants)[0], contents.subplant_cell)
     amounts = subplant_amounts(flora, subplants)
     for run in chunks((amounts.leaf_area + amounts.wood_area) / side**2 + 1, FACETS_AT_ONCE):
-        parts.append(subplant_facets(flora, subplants.take(run), side[run]))
+        parts.append(subplant_facets(flora, subplants.take(run), side[run], hidden[contents.subplant_cell[run]]))
     side = sides((pieces.start + pieces.end) / 2, contents.piece_cell)
     amounts = piece_amounts(flora, pieces)
     for run in chunks((amounts.leaf_area + amounts.wood_area) / side**2 + 1, FACETS_AT_ONCE):
-        parts.append(piece_facets(flora, pieces.take(run), side[run]))
+        parts.append(piece_facets(flora, pieces.take(run), side[run], hidden[contents.piece_cell[run]]))
     return concatenate_buffers([p for p in parts if p is not None])
 
 

@@ -113,7 +113,7 @@ def test_facets_have_the_area_of_what_is_not_explicit() -> None:
 
 
 def test_facets_are_as_large_as_asked_for_and_larger_where_hidden() -> None:
-    """In pixels at their own distance, for wood; facets for leaves are never smaller than the leaf."""
+    """In pixels at their own distance, for wood; hidden wood of few faces gets larger facets still."""
     flora, _, camera, result = scene()
     numbers = {}
     for decision in (Decision.PROXY, Decision.HIDDEN):
@@ -123,8 +123,10 @@ def test_facets_are_as_large_as_asked_for_and_larger_where_hidden() -> None:
         centre = support.face_centres(mesh)[wood]
         pixels = np.sqrt(support.face_areas(mesh)[wood])
         pixels /= np.linalg.norm(centre - camera.position, axis=1) * camera.pixel_size
-        wanted = 0.5 if decision == Decision.PROXY else 2.0
-        assert np.median(pixels) == pytest.approx(wanted, rel=0.25)
+        if decision == Decision.PROXY:
+            assert np.median(pixels) == pytest.approx(0.5, rel=0.25)
+        else:
+            assert np.quantile(pixels, 0.01) > 2.0 * 0.75
     assert numbers[Decision.HIDDEN] < numbers[Decision.PROXY]
 
 
@@ -152,7 +154,7 @@ def test_facets_are_made_in_chunks_that_are_bounded(monkeypatch: pytest.MonkeyPa
 
         monkeypatch.setattr(emission, name, counted)
     monkeypatch.setattr(emission, "FACETS_AT_ONCE", 2_000)
-    total = facet_buffers(flora, with_decision(result, Decision.HIDDEN), camera, facet_pixels=0.05)
+    total = facet_buffers(flora, with_decision(result, Decision.PROXY), camera, facet_pixels=0.05)
     assert sum(map(sum, made.values())) == total.polygons
     for numbers in made.values():
         assert sum(numbers) > 10_000

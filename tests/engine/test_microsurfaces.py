@@ -113,6 +113,29 @@ def test_facets_stay_by_their_plant(seed: int, side: float, scale: float) -> Non
     assert support.face_areas(mesh).min() > 0
 
 
+def test_hidden_wood_gets_no_more_facets_than_it_has_faces() -> None:
+    """Plants beside the eye, where a pixel is a millimetre: the area stays, the number is that of their polygons."""
+    flora = support.small_flora()
+    plants, pieces = support.grown(flora, support.plants(np.arange(20)))
+    for made, faces, amounts in (
+        (
+            subplant_facets(flora, plants, np.full(20, 1e-3), np.ones(20, bool)),
+            20 * (flora.polygons[0] - flora.leaf_count[0] * flora.leaf_models[0].polygons),
+            subplant_amounts(flora, plants),
+        ),
+        (
+            piece_facets(flora, pieces, np.full(len(pieces), 1e-3), np.ones(len(pieces), bool)),
+            flora.rows["sides"][pieces.branches.row].sum(),
+            piece_amounts(flora, pieces),
+        ),
+    ):
+        wood = part(made, False)
+        assert wood.sum() == pytest.approx(faces, rel=0.01)
+        assert support.face_areas(made)[wood].sum() == pytest.approx(amounts.wood_area.sum() / 2, rel=0.01)
+    fine = subplant_facets(flora, plants.take(np.s_[:1]), np.array([3e-3]), np.zeros(1, bool))
+    assert part(fine, False).sum() > faces / 20 * 5
+
+
 def test_facets_are_squares_no_smaller_than_leaves() -> None:
     flora = support.small_flora()
     plant = trunks(flora.rows, support.plants(np.arange(5)))

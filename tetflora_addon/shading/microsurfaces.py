@@ -54,7 +54,9 @@ class Facets:
     transmission: NDArray[np.float64]
 
 
-def subplant_facets(flora: Flora, subplants: Branches, side: NDArray[np.float64]) -> MeshBuffers | None:
+def subplant_facets(
+    flora: Flora, subplants: Branches, side: NDArray[np.float64], coarse: NDArray[np.bool_] | None = None
+) -> MeshBuffers | None:
     """Facets of sub-plants.
 
     Parameters
@@ -63,25 +65,41 @@ def subplant_facets(flora: Flora, subplants: Branches, side: NDArray[np.float64]
     subplants : Branches of n
     side : (n,) float64
         Wanted side of a facet, metres; facets are never smaller than the leaves that they stand for.
+    coarse : (n,) bool, optional
+        Where no one looks: wood is cut into no more facets than it has faces. Elsewhere it is cut as fine as the side
+        asks for, or thin twigs would become blots.
     """
     amounts = subplant_amounts(flora, subplants)
+    row = subplants.row
+    model_polygons = np.array([m.polygons for m in flora.leaf_models])[row // (len(flora.rows) // len(flora.species))]
+    wood = _wood_sides(side, amounts, flora.polygons[row] - flora.leaf_count[row] * model_polygons, coarse)
     return concatenate_buffers(
         [
             _buffers(_leaves_of_subplants(flora, subplants, amounts, side)),
-            _buffers(_wood_of_subplants(flora, subplants, amounts, side)),
+            _buffers(_wood_of_subplants(flora, subplants, amounts, wood)),
         ]
     )
 
 
-def piece_facets(flora: Flora, pieces: Pieces, side: NDArray[np.float64]) -> MeshBuffers | None:
+def piece_facets(
+    flora: Flora, pieces: Pieces, side: NDArray[np.float64], coarse: NDArray[np.bool_] | None = None
+) -> MeshBuffers | None:
     """Facets of pieces of branches; parameters as for `subplant_facets`."""
     amounts = piece_amounts(flora, pieces)
+    wood = _wood_sides(side, amounts, flora.rows["sides"][pieces.branches.row], coarse)
     return concatenate_buffers(
         [
             _buffers(_leaves_of_pieces(flora, pieces, amounts, side)),
-            _buffers(_wood_of_pieces(flora, pieces, amounts, side)),
+            _buffers(_wood_of_pieces(flora, pieces, amounts, wood)),
         ]
     )
+
+
+def _wood_sides(side: NDArray, amounts: Amounts, faces: NDArray, coarse: NDArray[np.bool_] | None) -> NDArray:
+    if coarse is None:
+        return side
+    least = np.sqrt(amounts.wood_area / 2 / np.maximum(faces, 1))
+    return np.where(coarse, np.maximum(side, least), side)
 
 
 def _numbers(key: NDArray, area: NDArray, facet: NDArray, path: int, draw: int) -> tuple[NDArray, NDArray, NDArray]:
