@@ -8,7 +8,7 @@ from collections.abc import Generator
 import bpy
 
 from ..tetflora_addon.blender import job
-from ..tetflora_addon.blender.plant_objects import prepare_scene
+from ..tetflora_addon.blender.plant_objects import plants_of, prepare_scene
 from ..tetflora_addon.errors import TetFloraError
 from ..tetflora_addon.refinement.statistics import Statistics
 from . import ids
@@ -121,4 +121,23 @@ class TETFLORA_OT_refine(Reporting, bpy.types.Operator):
             f"{counted(statistics.plants, 'plant')}: {statistics.polygons_meshed:,} of {statistics.polygons_full:,} "
             f"polygons, {statistics.tetrahedra_proxy:,} proxies in {sum(statistics.seconds.values()):.1f} s",
         )
+        if warning := _cut_off(context.scene):
+            self.report({'WARNING'}, warning)
         return {'FINISHED'}
+
+
+def _cut_off(scene: bpy.types.Scene) -> str:
+    """A warning if the camera's range ends before some plants, else an empty text.
+
+    A new file's camera ends at 100 m: a forest then renders as nothing, and nobody sees why.
+    """
+    camera, plants = scene.camera, [o for o in plants_of(scene.objects) if o.tetflora.enabled and not o.hide_render]
+    to_camera = camera.matrix_world.normalized().inverted_safe()
+    end = camera.data.clip_end
+    beyond = sum(-(to_camera @ obj.matrix_world.translation).z > end for obj in plants)
+    if not beyond:
+        return ""
+    return (
+        f"{beyond:,} of {counted(len(plants), 'plant')} stand beyond the camera's range and will not be seen; "
+        f'raise Clip End of "{camera.name}", now {end:g} m'
+    )

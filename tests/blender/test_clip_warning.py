@@ -1,0 +1,43 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Refine says so when the camera's range ends before plants: a new file's camera sees 100 m, a forest is larger."""
+
+from __future__ import annotations
+
+import pytest
+
+from devtools import session
+from tests.blender.scenes import add_camera, add_plant, depsgraph
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+
+@pytest.fixture
+def far_row():
+    """A camera that looks along +Y from the origin; plants 50, 150 and 250 m away, one of 350 m that is switched off."""
+    import bpy
+
+    camera = add_camera(location=(0.0, 0.0, 2.0))
+    camera.scale = (3.0, 3.0, 3.0)  # a camera's scale does not move its range
+    for distance in (50.0, 150.0, 250.0, 350.0):
+        add_plant(f"p{distance:g}", location=(0.0, distance, 0.0))
+    bpy.data.objects["p350"].tetflora.enabled = False
+    depsgraph()
+    return camera
+
+
+@pytest.mark.parametrize(("clip_end", "beyond"), [(100.0, 2), (200.0, 1)])
+def test_plants_beyond_the_range_are_counted(far_row, clip_end, beyond):
+    import bpy
+
+    far_row.data.clip_end = clip_end
+    text = session.part("operators.refine")._cut_off(bpy.context.scene)
+    assert text.startswith(f"{beyond} of 3 plants")
+    assert f'raise Clip End of "camera", now {clip_end:g} m' in text
+
+
+def test_no_warning_where_all_are_in_range(far_row):
+    import bpy
+
+    far_row.data.clip_end = 251.0
+    assert session.part("operators.refine")._cut_off(bpy.context.scene) == ""
