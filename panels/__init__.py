@@ -10,6 +10,7 @@ CLASSES = (
     lists.TETFLORA_UL_mix,
     lists.TETFLORA_UL_leaf_objects,
     plants_panel.TETFLORA_PT_plants,
+    plants_panel.TETFLORA_PT_selected_plants,
     populate_panel.TETFLORA_PT_populate,
     refinement_panel.TETFLORA_PT_refinement,
     refinement_panel.TETFLORA_PT_limits,

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tab's first panel: species and seed of the active plant, and what can be done to selected ones."""
+"""The tab's first panels: species and seed of the active plant, and what can be done to selected ones."""
 
 import bpy
 
@@ -39,10 +39,20 @@ class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
         else:
             column.label(text="The active object is not a plant", icon='INFO')
         layout.menu("TETFLORA_MT_add_plant", text="Add Plant", icon='ADD')
-        column = layout.column(align=True)
-        column.menu(TETFLORA_MT_species.__name__, text="Change Species of Selected")
-        column.operator(ids.RESEED, text="Re-roll Seeds of Selected", icon='FILE_REFRESH')
+
+
+class TETFLORA_PT_selected_plants(SidebarPanel, bpy.types.Panel):
+    """What can be done to many plants at once; closed at first, so that the panels below stay in sight."""
+
+    bl_label = "Selected Plants"
+    bl_parent_id = "TETFLORA_PT_plants"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        column = self.layout.column(align=True)
+        column.menu(TETFLORA_MT_species.__name__, text="Change Species", icon='OUTLINER_OB_EMPTY')
+        column.operator(ids.RESEED, icon='FILE_REFRESH')
         column.operator(ids.SELECT_SPECIES, text="Select All of This Species", icon='RESTRICT_SELECT_OFF')
-        row = layout.row(align=True)
-        row.operator(ids.REMOVE_PLANTS, text="Remove Selected", icon='X').which = 'SELECTED'
-        row.operator(ids.REMOVE_PLANTS, text="All", icon='TRASH').which = 'ALL'
+        column = self.layout.column(align=True)
+        column.operator(ids.REMOVE_PLANTS, text="Remove Selected", icon='X').which = 'SELECTED'
+        column.operator(ids.REMOVE_PLANTS, text="Remove All Plants", icon='TRASH').which = 'ALL'
