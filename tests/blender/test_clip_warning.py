@@ -14,7 +14,7 @@ pytestmark = pytest.mark.usefixtures("clean_file")
 
 @pytest.fixture
 def far_row():
-    """A camera that looks along +Y from the origin; plants 50, 150 and 250 m away, one of 350 m that is switched off."""
+    """A camera that looks along +Y from the origin; plants 50, 150 and 250 m away, and one that is switched off."""
     import bpy
 
     camera = add_camera(location=(0.0, 0.0, 2.0))
