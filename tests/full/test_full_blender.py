@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
@@ -16,26 +15,6 @@ from devtools import build
 
 PROBE = build.ROOT / "tests" / "packaging" / "probe.py"
 Run = Callable[..., subprocess.CompletedProcess]
-
-
-@pytest.fixture(scope="module")
-def run(full_blender: str, extension_zip: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """Blender with a home of its own, in which TetFlora was installed by Blender's own command."""
-    home = tmp_path_factory.mktemp("home")
-
-    def call(*arguments: str | Path) -> subprocess.CompletedProcess:
-        return subprocess.run(
-            [full_blender, *arguments],
-            env={**os.environ, "BLENDER_USER_RESOURCES": str(home)},
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=180,
-        )
-
-    done = call("-b", "--command", "extension", "install-file", "-r", "user_default", "-e", extension_zip)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return call
 
 
 @pytest.fixture(scope="module")
