@@ -24,7 +24,9 @@ def _axis_envelope(row: NDArray[np.void]) -> tuple[NDArray, NDArray, NDArray, ND
     """At each knot of a unit branch: widest radius, lowest and highest z; and the widest turn of each segment."""
     segments = int(row["segments"])
     mean, variation = row["curvature"]
-    turn = np.minimum(np.arange(segments) * (abs(mean) + 2 * variation) / segments, np.pi)
+    # A joint bends back by a, then aside by b: cos c = cos a cos b, and c² ≤ a² + b². The turns of joints add up at most.
+    joint = np.hypot(abs(mean) + variation, variation) / segments
+    turn = np.minimum(np.arange(segments) * joint, np.pi)
     sideways = np.sin(np.minimum(turn, np.pi / 2)) / segments
     radius = np.concatenate([[0], np.cumsum(sideways)])
     low = np.concatenate([[0], np.cumsum(np.cos(turn)) / segments])
@@ -94,7 +96,7 @@ def _unit_bound(rows: NDArray[np.void], index: int, child_bound: NDArray | None)
     inner = np.linspace(share[:-1], share[1:], 5, axis=1)
     crown = crown_ratio(np.full(inner.shape, row["crown"]), 1 - inner).max(1) + _CROWN_SLOPE / _SLABS / 8
     far, bottom, top = _tilted(child_bound, angle, np.minimum(crown, 1) * child["length"].sum())
-    # Knots inside a slab may stick out between its ends, but only as far as the envelope of the axis itself does.
+    # Between a slab's ends nothing sticks out: radius and height grow along the axis, the lowest height is concave.
     bound[0] = max(bound[0], (np.maximum(r[:-1], r[1:]) + far).max())
     bound[1] = min(bound[1], (np.minimum(lo[:-1], lo[1:]) + bottom).min())
     bound[2] = max(bound[2], (np.maximum(hi[:-1], hi[1:]) + top).max())
