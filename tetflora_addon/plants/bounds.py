@@ -24,7 +24,7 @@ def _axis_envelope(row: NDArray[np.void]) -> tuple[NDArray, NDArray, NDArray, ND
     """At each knot of a unit branch: widest radius, lowest and highest z; and the widest turn of each segment."""
     segments = int(row["segments"])
     mean, variation = row["curvature"]
-    # A joint bends back by a, then aside by b: cos c = cos a cos b, and c² ≤ a² + b². The turns of joints add up at most.
+    # A joint bends back by a, then aside by b: cos c = cos a cos b, and c² ≤ a² + b². Turns of joints add up at most.
     joint = np.hypot(abs(mean) + variation, variation) / segments
     turn = np.minimum(np.arange(segments) * joint, np.pi)
     sideways = np.sin(np.minimum(turn, np.pi / 2)) / segments
