@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the artist sees: a tab in the 3D view's sidebar and an entry in the Add menu. Nothing here computes."""
+"""What the artist sees: a tab in the 3D view's sidebar, entries in the Add and Object menus. Nothing here computes."""
 
 import bpy
 
-from . import add_menu, lists, plants_panel, populate_panel, refinement_panel, statistics_panel
+from . import add_menu, lists, object_menu, plants_panel, populate_panel, refinement_panel, statistics_panel
 
 CLASSES = (
     lists.TETFLORA_UL_mix,
@@ -18,6 +18,7 @@ CLASSES = (
     statistics_panel.TETFLORA_PT_statistics,
     add_menu.TETFLORA_MT_add_plant,
     plants_panel.TETFLORA_MT_species,
+    object_menu.TETFLORA_MT_object,
 )
 
 
@@ -26,10 +27,12 @@ def register() -> None:
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.VIEW3D_MT_add.append(add_menu.draw_in_add_menu)
+    bpy.types.VIEW3D_MT_object.append(object_menu.draw_in_object_menu)
 
 
 def unregister() -> None:
     """Unregister panels and menus."""
+    bpy.types.VIEW3D_MT_object.remove(object_menu.draw_in_object_menu)
     bpy.types.VIEW3D_MT_add.remove(add_menu.draw_in_add_menu)
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

@@ -58,6 +58,19 @@ def steps(ui):
     bpy.context.scene.tetflora.refine_at_render = False
     ui.values["green_without"] = yield from render(ui, "render_without")
 
+    # Without the sidebar: search, type, Return.
+    yield from press_key(ui, 'Z', ctrl=True)
+    bpy.context.view_layer.objects.active = bpy.data.objects["Hill"]
+    bpy.data.objects["Hill"].select_set(True)
+    before = len(plants())
+    yield from press_key(ui, 'F3')
+    ui.type_text("populate with")
+    yield 1.0
+    yield from ui.picture("search")
+    ui.press('RET')
+    yield 1.0
+    ui.values["planted_by_search"] = len(plants()) - before
+
 
 def build_ground(scene):
     """A hill of 30 m, the startup file's camera and lamp moved to where it is seen and lit, and what to plant there."""

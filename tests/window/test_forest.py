@@ -67,6 +67,10 @@ def test_render_shows_the_forest_and_leaves_no_meshes(seen: dict) -> None:
     assert seen["after_render"]["objects"] == seen["populate_redone"]["objects"]
 
 
-@pytest.mark.parametrize("name", ["populated", "progress", "refined", "escaped", "rendered"])
+def test_search_finds_populate(seen: dict) -> None:
+    assert 0 < seen["planted_by_search"] <= 14  # fewer where the first ones stand in the way
+
+
+@pytest.mark.parametrize("name", ["populated", "progress", "refined", "escaped", "rendered", "search"])
 def test_the_window_was_drawn(seen: dict, pictures: Path, colours: Callable[[Path], int], name: str) -> None:
     assert colours(pictures / "forest" / f"{name}.png") > 200
