@@ -22,11 +22,12 @@ def rows_of(text: str) -> tuple[tuple[str, str], ...]:
         figures = json.loads(text)
         seconds = figures["seconds"]
         full = figures["polygons_full"]
-        share = f" ({figures['polygons_meshed'] / full:.1%})" if full else ""
+        share = f"{figures['polygons_meshed'] / full:.1%}" if full else "–"
         return (
             ("Plants", f"{figures['plants']:,}"),
             ("Polygons if expanded", f"{full:,}"),
-            ("Polygons made", f"{figures['polygons_meshed']:,}{share}"),
+            ("Polygons made", f"{figures['polygons_meshed']:,}"),
+            ("    share of all", share),
             ("Faces of proxies", f"{figures['polygons_proxy']:,}"),
             ("Tetrahedra made", f"{figures['tetrahedra_made']:,}"),
             ("    not divided", f"{figures['tetrahedra_terminal']:,}"),
