@@ -64,6 +64,7 @@ bench: environment
 
 docs-images: environment
 	$(PY) -m examples.docs_images
+	$(PY) -m devtools.window_pictures
 
 clean:
 	rm -rf $(VENV) $(LTS_VENV) out dist .pytest_cache .ruff_cache .hypothesis

@@ -1,0 +1,182 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Makes the manual's pictures of the window anew: ``BLENDER=/path/to/blender python -m devtools.window_pictures``.
+
+One file with two lives: run as a module it builds the zip, installs it in a home of its own and opens Blender's window;
+devtools/window_driver.py then loads it again inside Blender for `steps`. Without ``BLENDER`` it says so and does
+nothing, as the other pictures of the documentation need no full Blender.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+LARGEST = 300_000  # bytes
+TABS = 24  # pixels at the sidebar's right edge with the names of its tabs
+
+# Panels by picture: those that are shown, sub-panels opened.
+PANELS = {
+    "plants": ("TETFLORA_PT_plants", "TETFLORA_PT_selected_plants"),
+    "populate": ("TETFLORA_PT_populate",),
+    "refinement": ("TETFLORA_PT_refinement", "TETFLORA_PT_limits", "TETFLORA_PT_leaf_objects"),
+    "statistics": ("TETFLORA_PT_statistics",),
+}
+
+
+def steps(ui: Any) -> Iterator[float | None]:
+    """Inside Blender: populate, refine, and show the panels one after the other."""
+    import bpy
+
+    scene = bpy.context.scene
+    bpy.context.preferences.system.use_region_overlap = False  # an even background, so that panels can be cut out
+    _hill(scene)
+    with ui.override():
+        bpy.ops.view3d.view_camera()
+    yield from ui.show_sidebar("TetFlora")
+    with ui.override():
+        bpy.ops.tetflora.populate('INVOKE_DEFAULT')
+    yield from ui.picture("populated")
+    with ui.override():
+        bpy.ops.wm.call_menu(name="VIEW3D_MT_add")
+    yield 0.5
+    # The last entry is ours; up wraps around, right opens it.
+    for key in ('UP_ARROW', 'RIGHT_ARROW'):
+        ui.press(key)
+        yield 0.5
+    yield from ui.picture("add-menu")
+    for _ in range(2):
+        ui.press('ESC')
+        yield 0.5
+    with ui.override():
+        bpy.ops.tetflora.refine('INVOKE_DEFAULT')
+    yield 1.0
+    (ui.out_dir / "progress.request").touch()  # answered while the job runs
+    yield from ui.until(lambda: scene.tetflora.statistics != "", 120, "refinement")
+    for obj in bpy.context.selected_objects:
+        obj.select_set(False)
+    yield from ui.picture("refined")
+
+    plant = next(obj for obj in scene.objects if obj.tetflora.is_plant)
+    plant.select_set(True)
+    bpy.context.view_layer.objects.active = plant
+    leaf = scene.tetflora.leaf_objects.add()
+    leaf.species = "broadleaf_tree"
+    registered = [getattr(bpy.types, name) for name in dir(bpy.types) if name.startswith("TETFLORA_PT_")]
+    for cls in sorted(registered, key=lambda cls: not hasattr(cls, "bl_parent_id")):
+        bpy.utils.unregister_class(cls)
+    for name, shown in PANELS.items():
+        opened = _register_open([cls for wanted in shown for cls in registered if cls.__name__ == wanted])
+        yield from ui.show_sidebar("TetFlora")
+        yield from ui.picture(f"panel-{name}")
+        for cls in reversed(opened):
+            bpy.utils.unregister_class(cls)
+    region = next(r for r in ui.area().regions if r.type == 'UI')
+    ui.values["sidebar"] = [region.x, region.y, region.width, region.height]
+
+
+def _hill(scene: Any) -> None:
+    """Ground of 80 m with a clearing in front of the camera, and the species to plant there."""
+    import bpy
+    import numpy as np
+    from mathutils import Vector
+
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
+    side = 41
+    x, y = (a.ravel() for a in np.meshgrid(np.linspace(-40.0, 40.0, side), np.linspace(-40.0, 40.0, side)))
+    z = 4.0 * np.cos(x / 13.0) * np.cos(y / 17.0)
+    corner = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).ravel()
+    mesh = bpy.data.meshes.new("Hill")
+    mesh.from_pydata(
+        np.stack([x, y, z], axis=1).tolist(),
+        [],
+        np.stack([corner, corner + 1, corner + side + 1, corner + side], axis=1).tolist(),
+        shade_flat=False,
+    )
+    hill = bpy.data.objects.new("Hill", mesh)
+    hill.tetflora.is_occluder = True
+    scene.collection.objects.link(hill)
+    for obj in bpy.context.selected_objects:
+        obj.select_set(False)
+    hill.select_set(True)
+    bpy.context.view_layer.objects.active = hill
+    camera = scene.camera
+    camera.location = (52.0, -50.0, 14.0)
+    camera.rotation_euler = (Vector((0.0, 0.0, 4.0)) - camera.location).to_track_quat('-Z', 'Y').to_euler()
+    camera.data.clip_end = 1000.0
+    settings = scene.tetflora.populate
+    settings.count, settings.min_distance = 60, 4.0
+    for species, share in (("broadleaf_tree", 2.0), ("conifer", 1.0), ("bush", 2.0)):
+        entry = settings.mix.add()
+        entry.species, entry.weight = species, share
+
+
+def _register_open(panels: list[Any]) -> list[Any]:
+    """Register copies of panels that are open; under other names, because Blender remembers which were closed."""
+    import bpy
+
+    made = []
+    for cls in panels:
+        members = {"bl_options": set(), "bl_idname": f"{cls.__name__}_open"}
+        if hasattr(cls, "bl_parent_id"):
+            members["bl_parent_id"] = f"{cls.bl_parent_id}_open"
+        made.append(type(f"{cls.__name__}_open", (cls,), members))
+        bpy.utils.register_class(made[-1])
+    return made
+
+
+def _convert(*arguments: str | Path) -> None:
+    subprocess.run(["convert", *map(str, arguments)], check=True)
+
+
+def _store(out: Path, sidebar: list[int], images: Path, height: int) -> None:
+    """Cut and compress what the window showed."""
+    x, y, width, tall = sidebar
+    for name in PANELS:
+        cut = f"{width - TABS}x{tall}+{x}+{height - y - tall}"
+        source, target = out / f"panel-{name}.png", images / f"panel-{name}.png"
+        trimmed = ("-crop", cut, "+repage", "-shave", "4x4", "-fuzz", "2%", "-trim", "+repage")
+        _convert(source, *trimmed, "-strip", "+dither", "-colors", "200", target)
+    for name in ("populated", "add-menu", "progress", "refined"):
+        _convert(out / f"{name}.png", "-resize", "1280x", "-strip", "-quality", "84", images / f"panel-{name}.jpg")
+
+
+def main() -> int:
+    """Make the pictures; exit code 1 if Blender failed or a picture is too large."""
+    from . import build, window
+
+    blender = os.environ.get("BLENDER")
+    if not blender:
+        print("Pictures of the window are left as they are: set BLENDER=/path/to/blender to make them anew.")
+        return 0
+    images = build.ROOT / "docs" / "images"
+    images.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix="tetflora-pictures-") as folder:
+        home, out = Path(folder) / "home", Path(folder) / "out"
+        home.mkdir()
+        archive = build.build(Path(folder) / "dist")
+        install = [blender, "-b", "--command", "extension", "install-file", "-r", "user_default", "-e", archive]
+        environment = {**os.environ, "BLENDER_USER_RESOURCES": str(home)}
+        subprocess.run(install, env=environment, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        result = window.run_in_window(blender, Path(__file__), out, 240, home)
+        if not result["ok"]:
+            print(result["error"], json.dumps(result["values"]), file=sys.stderr)
+            return 1
+        _store(out, result["values"]["sidebar"], images, window.SIZE[1])
+    made = sorted(images.glob("panel-*"))
+    for path in made:
+        print(f"{path.stat().st_size:>8,} {path.relative_to(build.ROOT)}")
+    large = [path.name for path in made if path.stat().st_size > LARGEST]
+    if large:
+        print(f"larger than {LARGEST:,} bytes: {', '.join(large)}", file=sys.stderr)
+    return 1 if large else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
