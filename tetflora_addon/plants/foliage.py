@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from .growth import Axes, Branches, turned
 from .hashing import Draw, child_key, signed, uniform
 from .rows import ranged
+from .vectors import columns, cross, dot, gathered, unit
 
 _LEAF_PATH = 1 << 32  # child indices of leaves start here, so that they never meet those of branches
 _PLACE_JITTER = 0.4
@@ -87,7 +88,7 @@ def place_leaves(
     tilted = turned(frame, azimuth, ranged(rows, "leaf_angle", row, key, Draw.ANGLE))
     # The upper side of a leaf faces the tip of its branch: against the tilt, whose first column leads away from it.
     along, up = tilted[:, :, 2], -tilted[:, :, 0]
-    leaf_frame = np.stack([-tilted[:, :, 1], along, up], axis=2)
+    leaf_frame = columns(-tilted[:, :, 1], along, up)
     size = branches.scale[owner] * ranged(rows, "leaf_size", row, key, Draw.LEAF_SIZE)
     return Leaves(owner, key, position, leaf_frame, size)
 
@@ -113,14 +114,16 @@ def face_light(frame: NDArray[np.float64], light: NDArray[np.float64], sky: NDAr
     light = light[:, None]
     normal = (1 - light) * up + light * sky
     normal += 1e-9 * up  # a leaf that hangs upside down half way has no direction left; it keeps its own
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    along = along - np.einsum("ni,ni->n", along, normal)[:, None] * normal
-    length = np.linalg.norm(along, axis=1, keepdims=True)
-    across_before = frame[:, :, 0]
-    fallback = np.cross(normal, across_before - np.einsum("ni,ni->n", across_before, normal)[:, None] * normal)
-    along = np.where(length > 1e-6, along, fallback)
-    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
-    return np.stack([np.cross(along, normal), along, normal], axis=2)
+    normal = unit(normal)
+    level = along - dot(along, normal) * normal
+    lost = np.flatnonzero(
+        dot(level, level)[:, 0] <= 1e-12
+    )  # the midrib points straight up or down: turn about the blade
+    if len(lost):
+        across, facing = gathered(frame[:, :, 0], lost), gathered(normal, lost)
+        level[lost] = cross(facing, across - dot(across, facing) * facing)
+    along = unit(level)
+    return columns(cross(along, normal), along, normal)
 
 
 def leaf_colours(rows: NDArray[np.void], row: NDArray[np.integer], key: NDArray[np.uint64]) -> NDArray[np.float64]:

@@ -18,6 +18,7 @@ from .hashing import Draw, child_key, key_of_seed, signed, uniform
 from .rows import ranged
 from .seeds import Seeds
 from .species import MAX_ORDERS
+from .vectors import by_component, columns, gathered
 
 _PLACE_JITTER = 0.4  # of the distance from one child to the next
 
@@ -59,7 +60,7 @@ class Branches:
 
     def take(self, index: NDArray | slice) -> Branches:
         """Selection by indices, mask or slice."""
-        return Branches(*(getattr(self, f.name)[index] for f in fields(self)))
+        return Branches(*(gathered(getattr(self, f.name), index) for f in fields(self)))
 
     @classmethod
     def concatenate(cls, parts: Sequence[Branches]) -> Branches:
@@ -93,10 +94,27 @@ class Axes:
 
     def at(self, branch: NDArray[np.integer], t: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
         """Positions (m, 3) and frames (m, 3, 3) at the fractions t (m,) of the axes of branches (m,)."""
-        along = t * self.segments[branch]
-        segment = np.minimum(along.astype(np.int64), self.segments[branch] - 1)
-        start, end = self.knots[branch, segment], self.knots[branch, segment + 1]
-        return start + (along - segment)[:, None] * (end - start), self.frames[branch, segment]
+        number = self.segments[branch]
+        along = t * number
+        segment = np.minimum(along.astype(np.int64), number - 1)
+        start = self.knot(branch, segment)
+        step = self.knot(branch, segment + 1) - start
+        return start + (along - segment)[:, None] * step, self.frame(branch, segment)
+
+    def knot(self, branch: NDArray[np.integer], number: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Positions (m, 3) of knots given by branch (m,) and number (m,)."""
+        return _picked(self.knots, branch, number)
+
+    def frame(self, branch: NDArray[np.integer], segment: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Frames (m, 3, 3) of segments given by branch (m,) and number (m,)."""
+        return _picked(self.frames, branch, segment)
+
+
+def _picked(array: NDArray, first: NDArray[np.integer], second: NDArray[np.integer]) -> NDArray:
+    """``array[first, second]`` of an array whose first axis is the last in memory and whose second the one before."""
+    flat = np.moveaxis(array, (1, 0), (-2, -1))
+    flat = flat.reshape(*flat.shape[:-2], -1)
+    return np.moveaxis(np.take(flat, second * len(array) + first, axis=-1), -1, 0)
 
 
 def turned(frame: NDArray[np.float64], azimuth: NDArray[np.float64], angle: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -116,7 +134,7 @@ def turned(frame: NDArray[np.float64], azimuth: NDArray[np.float64], angle: NDAr
     x, y, z = frame[:, :, 0], frame[:, :, 1], frame[:, :, 2]
     ca, sa, cd, sd = (f(v)[:, None] for v in (azimuth, angle) for f in (np.cos, np.sin))
     radial = ca * x + sa * y
-    return np.stack([cd * radial - sd * z, ca * y - sa * x, sd * radial + cd * z], axis=2)
+    return columns(cd * radial - sd * z, ca * y - sa * x, sd * radial + cd * z)
 
 
 def trunks(rows: NDArray[np.void], seeds: Seeds) -> Branches:
@@ -136,11 +154,12 @@ def axes(rows: NDArray[np.void], branches: Branches) -> Axes:
     segments = rows["segments"][branches.row]
     most = int(segments.max(initial=1))
     n = len(branches)
-    knots = np.zeros((n, most + 1, 3))  # zeros, not empty: padding must be finite
-    frames = np.zeros((n, most, 3, 3))
+    # Branches last in memory, see `vectors`. Zeros, not empty: padding must be finite.
+    knots = np.moveaxis(np.zeros((3, most + 1, n)), (1, 2), (1, 0))
+    frames = np.moveaxis(np.zeros((3, 3, most, n)), (2, 3), (1, 0))
     step = (branches.length / segments)[:, None]
     bend = rows["curvature"][branches.row] / segments[:, None]
-    frame, knot = branches.frame, branches.position
+    frame, knot = by_component(branches.frame), by_component(branches.position)
     knots[:, 0] = knot
     for s in range(most):
         if s:
@@ -157,7 +176,7 @@ def _bent(frame: NDArray[np.float64], pitch: NDArray[np.float64], yaw: NDArray[n
     x, y, z = frame[:, :, 0], frame[:, :, 1], frame[:, :, 2]
     cp, sp, cy, sy = (f(v)[:, None] for v in (pitch, yaw) for f in (np.cos, np.sin))
     forward = sp * x + cp * z
-    return np.stack([cp * x - sp * z, cy * y + sy * forward, cy * forward - sy * y], axis=2)
+    return columns(cp * x - sp * z, cy * y + sy * forward, cy * forward - sy * y)
 
 
 def branch_counts(rows: NDArray[np.void], branches: Branches) -> NDArray[np.int64]:

@@ -15,6 +15,7 @@ from .foliage import branch_colours, face_light, leaf_colours, leaf_keys, leaf_p
 from .growth import Axes, Branches, axes, leaf_counts, radius_at, spread
 from .leaf_models import LeafModel
 from .pieces import Pieces
+from .vectors import columns, unit
 
 _SKY = np.array([0.0, 0.0, 1.0])
 _SAME_T = 1e-9  # fractions of a branch closer than this are one place
@@ -90,9 +91,12 @@ def _tubes(flora: Flora, pieces: Pieces, sides: int) -> MeshBuffers:
     radius = radius_at(flora.rows, branches.take(owner), t)
 
     angle = 2 * np.pi * np.arange(sides) / sides
-    across = radius[:, None, None] * np.cos(angle)[:, None] * frame[:, None, :, 0]
-    across += radius[:, None, None] * np.sin(angle)[:, None] * frame[:, None, :, 1]
-    positions = (centre[:, None, :] + across).reshape(-1, 3).astype(np.float32)
+    cos, sin = (f(angle).astype(np.float32) for f in (np.cos, np.sin))
+    reach = (radius[:, None, None] * frame[:, :, :2]).astype(np.float32)
+    positions = np.zeros((len(t), sides, 3), np.float32)
+    for axis in range(3):
+        positions[:, :, axis] = reach[:, axis, :1] * cos + reach[:, axis, 1:] * sin
+        positions[:, :, axis] += centre[:, axis, None].astype(np.float32)
 
     rings = len(t)
     base = np.flatnonzero(~closing).astype(np.int32)  # the ring that each piece starts with
@@ -116,7 +120,7 @@ def _tubes(flora: Flora, pieces: Pieces, sides: int) -> MeshBuffers:
     faces = len(base) * sides
     colour = branch_colours(flora.rows, branches.row, branches.key)[owner[base]].astype(np.float32)
     return MeshBuffers(
-        positions=positions,
+        positions=positions.reshape(-1, 3),
         edge_verts=edge_verts,
         corner_verts=corner_verts.reshape(-1),
         corner_edges=corner_edges.reshape(-1),
@@ -138,9 +142,9 @@ def _ring_frames(lines: Axes, branch: NDArray[np.int64], t: NDArray[np.float64])
     at_joint = (np.abs(along - joint) < _SAME_T * 1e3) & (joint > 0) & (joint < lines.segments[branch])
     if at_joint.any():
         b, j = branch[at_joint], joint[at_joint]
-        centre[at_joint] = lines.knots[b, j]
-        mean = lines.frames[b, j - 1] + lines.frames[b, j]
-        frame[at_joint] = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-12)
+        centre[at_joint] = lines.knot(b, j)
+        mean = lines.frame(b, j - 1) + lines.frame(b, j)
+        frame[at_joint] = columns(*(unit(mean[:, :, k]) for k in range(3)))
     return centre, frame
 
 
@@ -180,9 +184,13 @@ def _copies(
 ) -> MeshBuffers:
     n, v, f = len(size), len(model.positions), model.polygons
     scaled = (frame * size[:, None, None]).astype(np.float32)
-    points = np.repeat(position.astype(np.float32)[:, None, :], v, axis=1)
+    points = np.zeros((n, v, 3), np.float32)
+    shape = model.positions.astype(np.float32)
     for axis in range(3):
-        points += model.positions[:, axis].astype(np.float32)[:, None] * scaled[:, None, :, axis]
+        offset = scaled[:, axis, :1] * shape[:, 0]
+        offset += scaled[:, axis, 1:2] * shape[:, 1]
+        offset += scaled[:, axis, 2:] * shape[:, 2]
+        points[:, :, axis] = offset + position[:, axis, None].astype(np.float32)
     edges, edge_of_corner = model.edges
     copy = np.arange(n, dtype=np.int32)[:, None]
     corners = len(model.corner_verts)

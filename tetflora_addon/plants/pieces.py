@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from .compiled import Flora, tube_perimeter
 from .growth import Axes, Branches, spread
+from .vectors import gathered
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,8 @@ class Pieces:
 
     def take(self, index: NDArray | slice) -> Pieces:
         """Selection by indices, mask or slice."""
-        return Pieces(self.branches.take(index), self.t0[index], self.t1[index], self.start[index], self.end[index])
+        ends = gathered(self.start, index), gathered(self.end, index)
+        return Pieces(self.branches.take(index), self.t0[index], self.t1[index], *ends)
 
     @classmethod
     def concatenate(cls, parts: Sequence[Pieces]) -> Pieces:
@@ -61,8 +63,8 @@ def whole_pieces(branches: Branches, lines: Axes) -> tuple[Pieces, NDArray[np.in
         branches.take(owner),
         segment / number,
         (segment + 1) / number,
-        lines.knots[owner, segment],
-        lines.knots[owner, segment + 1],
+        lines.knot(owner, segment),
+        lines.knot(owner, segment + 1),
     )
     return pieces, owner
 

@@ -1,0 +1,53 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Vectors and frames of many things, laid out so that numpy is fast with them.
+
+Shapes are (n, 3) and (n, 3, 3) everywhere, but memory holds one component of all n after the other. Arithmetic on such
+arrays runs along n without strides, and its results keep the layout; only indexing and stacking have to take care of
+it, which is done here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def by_component(array: NDArray) -> NDArray:
+    """The same values (n, ...), with memory laid out component by component."""
+    return np.moveaxis(np.ascontiguousarray(np.moveaxis(array, 0, -1)), -1, 0)
+
+
+def gathered(array: NDArray, index: NDArray | slice) -> NDArray:
+    """``array[index]`` along the first axis, component by component; ``index`` may be integers, a mask or a slice."""
+    if array.ndim == 1 or isinstance(index, slice):
+        return array[index]
+    if index.dtype == bool:
+        index = np.flatnonzero(index)
+    return np.moveaxis(np.take(np.moveaxis(array, 0, -1), index, axis=-1), -1, 0)
+
+
+def columns(x: NDArray, y: NDArray, z: NDArray) -> NDArray:
+    """Frames (n, 3, 3) with columns x, y, z (n, 3)."""
+    return np.moveaxis(np.stack([x.T, y.T, z.T], axis=1), -1, 0)
+
+
+def dot(a: NDArray, b: NDArray) -> NDArray:
+    """Scalar products (n, 1) of vectors (n, 3)."""
+    return (a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2])[:, None]
+
+
+def cross(a: NDArray, b: NDArray) -> NDArray:
+    """Vector products (n, 3); numpy's own shuffles axes."""
+    return np.stack(
+        [
+            a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1],
+            a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2],
+            a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0],
+        ]
+    ).T
+
+
+def unit(a: NDArray) -> NDArray:
+    """Vectors (n, 3) scaled to length 1; zero vectors stay."""
+    return a / np.maximum(np.sqrt(dot(a, a)), 1e-300)
