@@ -71,6 +71,14 @@ def steps(ui):
     yield 1.0
     ui.values["planted_by_search"] = len(plants()) - before
 
+    # What the Adjust Last Operation box does when its numbers change.
+    last = bpy.context.window_manager.operators[-1]
+    last.count, last.species = 5, "bush"
+    with ui.override():
+        bpy.ops.ed.undo_redo()
+    yield 0.5
+    ui.values["adjusted"] = state()["plants"][before:]
+
 
 def build_ground(scene):
     """A hill of 30 m, the startup file's camera and lamp moved to where it is seen and lit, and what to plant there."""

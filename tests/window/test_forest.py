@@ -71,6 +71,10 @@ def test_search_finds_populate(seen: dict) -> None:
     assert 0 < seen["planted_by_search"] <= 14  # fewer where the first ones stand in the way
 
 
+def test_populate_can_be_adjusted_afterwards(seen: dict) -> None:
+    assert [species for _, species, _ in seen["adjusted"]] == ["bush"] * 5
+
+
 @pytest.mark.parametrize("name", ["populated", "progress", "refined", "escaped", "rendered", "search"])
 def test_the_window_was_drawn(seen: dict, pictures: Path, colours: Callable[[Path], int], name: str) -> None:
     assert colours(pictures / "forest" / f"{name}.png") > 200
