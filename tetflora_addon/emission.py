@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from .buffers import MeshBuffers
 from .plants.compiled import Flora
 from .plants.expansion import chunks, expand
-from .plants.growth import trunks
+from .plants.growth import Branches, trunks
 from .plants.meshing import concatenate_buffers, leaf_buffers, tube_buffers
 from .plants.pieces import Pieces
 from .plants.seeds import Seeds
@@ -26,7 +26,7 @@ from .refinement.camera import Camera
 from .refinement.contents import bounding_cylinders, piece_amounts, subplant_amounts
 from .refinement.decisions import Decision
 from .refinement.loop import Refinement
-from .shading.microsurfaces import piece_facets, subplant_facets
+from .shading.microsurfaces import kept_out_of_view, piece_facets, subplant_facets
 from .shading.shells import shell_buffers
 from .shading.summaries import extinction_matrices, summarise
 from .tetrahedra.geometry import volume
@@ -35,6 +35,8 @@ from .tetrahedra.geometry import volume
 BLOCK_POLYGONS = 250_000
 #: Facets that are made at a time, about; thick wood close to the eye is cut into very many.
 FACETS_AT_ONCE = 200_000
+#: Leaves that one facet of a hidden tetrahedron stands for at least: plants beside the camera only cast shadows.
+HIDDEN_LEAVES = 8
 
 
 @dataclass(frozen=True)
@@ -108,27 +110,51 @@ def facet_buffers(
     facet_pixels : float
         Side of a facet in pixels.
     coarse : float
-        How much larger facets of hidden tetrahedra are; there, wood gets no more facets than it has faces.
+        How much larger facets of hidden tetrahedra are; there, one stands for at least `HIDDEN_LEAVES` leaves, and
+        wood gets no more facets than it has faces.
     """
     hidden = result.chosen(Decision.HIDDEN)
     contents = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN))
     subplants, pieces = contents.subplants, contents.pieces
 
-    def sides(centre: NDArray, cell: NDArray) -> NDArray[np.float64]:
+    def sides(branches: Branches, centre: NDArray, cell: NDArray) -> NDArray[np.float64]:
         extent = camera.pixel_extent(centre)
         if camera.kind == "PERSP":  # beside and behind the camera depth says nothing, but distance does
             extent = np.maximum(extent, camera.pixel_size * np.linalg.norm(centre - camera.position, axis=1))
-        return facet_pixels * extent * np.where(hidden[cell], coarse, 1.0)
+        leaf = (
+            np.sqrt(flora.leaf_area[branches.row] / np.maximum(flora.leaf_count[branches.row], 1e-300)) * branches.scale
+        )
+        least = np.maximum(coarse * facet_pixels * extent, np.sqrt(HIDDEN_LEAVES) * leaf)
+        return np.where(hidden[cell], least, facet_pixels * extent)
 
     parts = []
-    side = sides(bounding_cylinders(flora, subplants)[0], contents.subplant_cell)
-    amounts = subplant_amounts(flora, subplants)
-    for run in chunks((amounts.leaf_area + amounts.wood_area) / side**2 + 1, FACETS_AT_ONCE):
-        parts.append(subplant_facets(flora, subplants.take(run), side[run], hidden[contents.subplant_cell[run]]))
-    side = sides((pieces.start + pieces.end) / 2, contents.piece_cell)
-    amounts = piece_amounts(flora, pieces)
-    for run in chunks((amounts.leaf_area + amounts.wood_area) / side**2 + 1, FACETS_AT_ONCE):
-        parts.append(piece_facets(flora, pieces.take(run), side[run], hidden[contents.piece_cell[run]]))
+    for things, branches, centre, cell, amounts, make in (
+        (
+            subplants,
+            subplants,
+            bounding_cylinders(flora, subplants)[0],
+            contents.subplant_cell,
+            subplant_amounts(flora, subplants),
+            subplant_facets,
+        ),
+        (
+            pieces,
+            pieces.branches,
+            (pieces.start + pieces.end) / 2,
+            contents.piece_cell,
+            piece_amounts(flora, pieces),
+            piece_facets,
+        ),
+    ):
+        side = sides(branches, centre, cell)
+        expected = (amounts.leaf_area + amounts.wood_area) / side**2 + 1
+        # What is beside the view and what is in it are made apart: only the first must not reach into the picture.
+        for beside in (False, True):
+            chosen = np.flatnonzero(result.tree.inside[cell] != beside)
+            for run in chunks(expected[chosen], FACETS_AT_ONCE):
+                part = chosen[run]
+                made = make(flora, things.take(part), side[part], hidden[cell[part]])
+                parts.append(kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5) if beside else made)
     return concatenate_buffers([p for p in parts if p is not None])
 
 

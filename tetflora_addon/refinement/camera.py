@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -52,6 +52,33 @@ class Camera:
     def to_camera_space(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """World points ``(..., 3)`` to (x right, y up, depth) ``(..., 3)``, metres."""
         return ((points - self.position) @ self.frame) * np.array([1.0, 1.0, -1.0])
+
+    def clearance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distance of world points (n, 3) from the space that the picture shows, metres; negative within it."""
+        x, y, depth = self.to_camera_space(points).T
+        left, right, bottom, top = self.window
+        if self.kind == "ORTHO":
+            return np.max([x - right, left - x, y - top, bottom - y], axis=0)
+        walls = [
+            (x - right * depth, right),
+            (left * depth - x, left),
+            (y - top * depth, top),
+            (bottom * depth - y, bottom),
+        ]
+        return np.max([distance / np.hypot(1.0, slope) for distance, slope in walls], axis=0)
+
+    def widened(self, margin: float) -> Camera:
+        """The same camera with more around its picture: ``margin`` of its width and height on each side."""
+        left, right, bottom, top = self.window
+        # Whole pixels, so that the pixels of the picture stay where they are.
+        across, up = round(margin * self.width), round(margin * self.height)
+        dx, dy = across * (right - left) / self.width, up * (top - bottom) / self.height
+        return replace(
+            self,
+            window=(left - dx, right + dx, bottom - dy, top + dy),
+            width=self.width + 2 * across,
+            height=self.height + 2 * up,
+        )
 
     def pixel_extent(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Metres that one pixel spans at each of the world points ``(..., 3)``; result ``(...)``.

@@ -102,6 +102,7 @@ def refine(
         Triangles of explicit polygons that hide what is behind them, metres.
     """
     clock = Stopwatch()
+    camera = camera.widened(settings.margin)
     contents = Contents.of_plants(flora, seeds)
     tree = view_root(camera, bounding_box(flora, contents.subplants))
     contents = push_down(flora, tree, contents)

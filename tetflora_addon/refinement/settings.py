@@ -28,6 +28,9 @@ class RefinementSettings:
     hidden_block : float
         Longest edge, in pixels at its depth, down to which hidden tetrahedra are divided. Facets take their places from
         the plants, so that they need no such limit; a shell fills its whole tetrahedron and does.
+    margin : float
+        Share of the picture's width and height by which the view is widened on each side: leaves that grow outside but
+        reach in are real leaves.
     visibility_resolution : int
         Longer side of the alpha buffer, pixels.
     max_tetrahedra : int
@@ -42,6 +45,7 @@ class RefinementSettings:
     few_polygons: int = 200
     hidden: float = 0.02
     hidden_block: float = math.inf
+    margin: float = 0.04
     visibility_resolution: int = 256
     max_tetrahedra: int = 400_000
     max_levels: int = 60

@@ -9,7 +9,8 @@ average.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,6 +94,29 @@ def piece_facets(
             _buffers(_wood_of_pieces(flora, pieces, amounts, wood)),
         ]
     )
+
+
+def kept_out_of_view(
+    buffers: MeshBuffers | None, clearance: Callable[[NDArray], NDArray], smallest: float
+) -> MeshBuffers | None:
+    """Shrink facets of what is out of view where they would reach into it.
+
+    Parameters
+    ----------
+    buffers : MeshBuffers or None
+        Of `subplant_facets` or `piece_facets`.
+    clearance : callable
+        Distance (n,) of points (n, 3) from the view, metres.
+    smallest : float
+        Least share of its side that a facet keeps, 0 to 1.
+    """
+    if buffers is None:
+        return None
+    corners = buffers.positions.reshape(-1, 4, 3).astype(np.float64)
+    centre = corners.mean(axis=1, keepdims=True)
+    reach = np.linalg.norm(corners - centre, axis=2).max(axis=1)
+    share = np.clip(clearance(centre[:, 0]) / np.maximum(reach, 1e-12), smallest, 1.0)[:, None, None]
+    return replace(buffers, positions=(centre + share * (corners - centre)).reshape(-1, 3).astype(np.float32))
 
 
 def _wood_sides(side: NDArray, amounts: Amounts, faces: NDArray, coarse: NDArray[np.bool_] | None) -> NDArray:
