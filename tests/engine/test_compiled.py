@@ -60,6 +60,9 @@ RANGES = st.fixed_dictionaries(
         "curvature": st.tuples(st.floats(-300, 300), st.floats(0, 60)),
         "angle": st.tuples(st.floats(40, 140), st.floats(0, 40)),
         "angle_tip": st.floats(0, 180),
+        "curvature_tip": st.floats(-300, 300),
+        "whorl": st.integers(1, 5),
+        "count_by_length": st.floats(0, 1),
         "branch_start": st.floats(0, 0.99),
         "segments": st.integers(1, 12),
         "crown": st.sampled_from(["conical", "flame", "inverse conical", "tend flame", "spherical"]),
@@ -117,6 +120,22 @@ def test_averages_are_those_of_grown_plants(species: int) -> None:
         error = values.std() / np.sqrt(len(values))
         assert abs(values.mean() - expected) < min(4 * error, 0.01 * expected) + 1e-9, name
     assert found["wood"].sum() == pytest.approx(found["wood_expected"].sum(), rel=0.015)
+
+
+@pytest.mark.parametrize(("follow", "whorl"), [(0.6, 1), (1.0, 3)])
+def test_averages_hold_where_counts_follow_the_length(follow: float, whorl: int) -> None:
+    change = {"count_by_length": follow, "whorl": whorl}
+    data = support.small(order0={"crown": "conical"}, order1={**change, "crown": "flame"}, order2=change)
+    flora = support.compiled(data)
+    assert flora.leaf_count[0] < 0.8 * support.small_flora().leaf_count[0]
+    trunk, pieces = support.grown(flora, support.plants(np.arange(1500)))
+    tubes, leaves = support.meshes(flora, pieces)
+    assert sum(m.polygons for m in leaves) == pytest.approx(1500 * flora.leaf_count[0], rel=0.02)
+    assert sum(m.polygons for m in (*tubes, *leaves)) == pytest.approx(1500 * flora.polygons[0], rel=0.02)
+    amounts = subplant_amounts(flora, trunk)
+    assert wood_areas(flora, pieces).sum() == pytest.approx(amounts.wood_area.sum(), rel=0.02)
+    children, *_ = open_subplants(flora, trunk)
+    assert subplant_amounts(flora, children).leaf_area.sum() == pytest.approx(amounts.leaf_area.sum(), rel=0.02)
 
 
 def test_a_species_without_variation_is_known_exactly() -> None:

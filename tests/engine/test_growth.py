@@ -277,3 +277,28 @@ def test_no_plants_and_one_plant(seeds: list[int]) -> None:
 if __name__ == "__main__":
     TABLE.parent.mkdir(exist_ok=True)
     TABLE.write_text(json.dumps(table(), separators=(",", ":")) + "\n", encoding="utf-8")
+
+
+def test_whorls_share_their_place_and_stand_evenly_around() -> None:
+    flora = support.compiled(support.small(order1={"whorl": 4, "azimuth": [30, 0]}, order0={"branches": [12, 0]}))
+    trunk = support.trunks(flora.rows, support.plants([3]))
+    grown, _ = children(flora.rows, trunk)
+    assert len(grown) == 12
+    places = grown.position.reshape(3, 4, 3)
+    assert np.ptp(places, axis=1).max() < 1e-12
+    assert (np.diff(places[:, 0, 2]) > 0.1).all()
+    up = trunk.frame[0, :, 2]
+    for whorl in grown.frame.reshape(3, 4, 3, 3)[:1]:  # on the first segment, which sets out along the trunk
+        out = whorl[:, :, 2] - (whorl[:, :, 2] @ up)[:, None] * up
+        out /= np.linalg.norm(out, axis=1, keepdims=True)
+        np.testing.assert_allclose(np.sort(np.round(out @ out[0], 6)), [-1, 0, 0, 1], atol=1e-6)
+
+
+def test_the_outer_half_bends_by_itself() -> None:
+    """Bent back by 40° and forth by 40°, a branch ends as it set out but stands aside."""
+    bend = {"curvature": [40, 0], "curvature_tip": -40, "segments": 5}  # two joints in each half
+    flora = support.compiled(support.small(order0=bend))
+    lines = axes(flora.rows, support.trunks(flora.rows, support.plants([1])))
+    first, middle, last = lines.frames[0, 0], lines.frames[0, 2], lines.frames[0, 4]
+    np.testing.assert_allclose(first, last, atol=1e-9)
+    assert np.degrees(np.arccos(first[:, 2] @ middle[:, 2])) == pytest.approx(16)

@@ -24,9 +24,11 @@ def _axis_envelope(row: NDArray[np.void]) -> tuple[NDArray, NDArray, NDArray, ND
     """At each knot of a unit branch: widest radius, lowest and highest z; and the widest turn of each segment."""
     segments = int(row["segments"])
     mean, variation = row["curvature"]
+    back = np.where(2 * np.arange(segments) < segments, abs(mean), abs(row["curvature_tip"]))
     # A joint bends back by a, then aside by b: cos c = cos a cos b, and c² ≤ a² + b². Turns of joints add up at most.
-    joint = np.hypot(abs(mean) + variation, variation) / segments
-    turn = np.minimum(np.arange(segments) * joint, np.pi)
+    joint = np.hypot(back + variation, variation) / segments
+    joint[0] = 0  # the first segment sets out straight
+    turn = np.minimum(np.cumsum(joint), np.pi)
     sideways = np.sin(np.minimum(turn, np.pi / 2)) / segments
     radius = np.concatenate([[0], np.cumsum(sideways)])
     low = np.concatenate([[0], np.cumsum(np.cos(turn)) / segments])

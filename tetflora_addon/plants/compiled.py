@@ -27,6 +27,9 @@ from .species import MAX_ORDERS, Species
 class Flora:
     """The compiled species of a scene; arrays have one entry for each row (species and order).
 
+    Amounts are those of a sub-plant where the crown's branches are longest (vigour 1); of what follows the length, a
+    shorter one has the share that `growth.fullness` says.
+
     Attributes
     ----------
     species : tuple of Species
@@ -44,8 +47,10 @@ class Flora:
         Expected number and one-sided area (m², at plant scale 1) of the leaves of the sub-plant.
     wood_area : (r,) float64
         Expected surface of the branches of the sub-plant divided by length × radius of its own branch.
-    polygons : (r,) float64
-        Expected number of faces of the sub-plant, leaves and branches.
+    own_wood : (r,) float64
+        The part of it that is the own branch's.
+    polygons, own_faces : (r,) float64
+        Expected number of faces of the sub-plant, leaves and branches; and those of its own branch's tube.
     leaf_colour, wood_colour : (r, 3) float64
         Area-weighted mean colours.
     transmission : (r,) float64
@@ -63,7 +68,9 @@ class Flora:
     leaf_count: NDArray[np.float64]
     leaf_area: NDArray[np.float64]
     wood_area: NDArray[np.float64]
+    own_wood: NDArray[np.float64]
     polygons: NDArray[np.float64]
+    own_faces: NDArray[np.float64]
     leaf_colour: NDArray[np.float64]
     wood_colour: NDArray[np.float64]
     transmission: NDArray[np.float64]
@@ -75,13 +82,23 @@ def tube_perimeter(sides: NDArray[np.integer]) -> NDArray[np.float64]:
     return 2 * sides * np.sin(np.pi / sides)
 
 
-def _forks(rows: NDArray[np.void], index: int) -> float:
-    """Expected sum over the children of (length × radius) relative to the parent's."""
+def _children(rows: NDArray[np.void], index: int) -> tuple[float, float, float, float]:
+    """Expected sums over the children of a branch, at its place in the crown where branches are longest.
+
+    Returns
+    -------
+    number, fullness : float
+        Of the children: how many, and the sum of the factors on their own numbers (see `growth.fullness`).
+    wood, full_wood : float
+        Sums of length × radius relative to the parent's, without and with that factor.
+    """
     row, child = rows[index], rows[index + 1]
     share = (np.arange(256) + 0.5) / 256
     t = row["branch_start"] + (1 - row["branch_start"]) * share
-    shape = crown_ratio(np.full(share.shape, row["crown"]), 1 - share) * (1 - (1 - row["taper"]) * t)
-    return row["branches"][0] * shape.mean() * child["length"][0] * child["thickness"][0]
+    vigour = crown_ratio(np.full(share.shape, row["crown"]), 1 - share)
+    full = 1 - child["count_by_length"] * (1 - vigour)
+    size = vigour * (1 - (1 - row["taper"]) * t) * child["length"][0] * child["thickness"][0]
+    return tuple(float(row["branches"][0] * m.mean()) for m in (np.ones_like(t), full, size, size * full))
 
 
 def compile_species(species: Sequence[Species]) -> Flora:
@@ -107,10 +124,10 @@ def compile_species(species: Sequence[Species]) -> Flora:
     own_area = own_leaves * (size**2 + spread_**2 / 3) * model_area  # E[s²] of a uniform range
     own_reach = np.where(rows["leaves"].sum(1) > 0, (size + spread_) * model_reach, 0.0)
     own_wood = tube_perimeter(np.maximum(rows["sides"], 1)) * (1 + rows["taper"]) / 2 * rows["used"]
-    own_faces = rows["sides"] * rows["segments"] + own_leaves * model_polygons
+    own_faces = (rows["sides"] * rows["segments"]).astype(float)
 
     leaf_count, leaf_area = own_leaves.copy(), own_area.copy()
-    wood_area, polygons = own_wood.copy(), own_faces.astype(float)
+    wood_area, polygons = own_wood.copy(), own_faces + own_leaves * model_polygons
     leaf_reach, leaf_width = own_reach.copy(), own_leaves * size * model_width
     leaf_colour = own_area[:, None] * rows["leaf_colour"][:, 0]
     wood_colour = own_wood[:, None] * rows["branch_colour"][:, 0]
@@ -120,17 +137,18 @@ def compile_species(species: Sequence[Species]) -> Flora:
     leaf_share[:, 0] = own_area
     for order in range(MAX_ORDERS - 2, -1, -1):
         for i in range(order, total, MAX_ORDERS):
-            number = rows["branches"][i, 0]
-            if number <= 0:
+            if rows["branches"][i, 0] <= 0:
                 continue
-            forks = _forks(rows, i)
-            for array in (leaf_count, leaf_area, polygons, leaf_width):
-                array[i] += number * array[i + 1]
-            leaf_colour[i] += number * leaf_colour[i + 1]
-            wood_area[i] += forks * wood_area[i + 1]
-            wood_colour[i] += forks * wood_colour[i + 1]
-            leaf_share[i, 1:] = number * leaf_share[i + 1, :-1]
-            wood_share[i, 1:] = forks * wood_share[i + 1, :-1]
+            number, full, wood, full_wood = _children(rows, i)
+            for array in (leaf_count, leaf_area, leaf_width, leaf_colour):
+                array[i] += full * array[i + 1]
+            leaf_share[i, 1:] = full * leaf_share[i + 1, :-1]
+            polygons[i] += number * own_faces[i + 1] + full * (polygons[i + 1] - own_faces[i + 1])
+            own_colour = own_wood[i + 1] * rows["branch_colour"][i + 1, 0]
+            wood_area[i] += wood * own_wood[i + 1] + full_wood * (wood_area[i + 1] - own_wood[i + 1])
+            wood_colour[i] += wood * own_colour + full_wood * (wood_colour[i + 1] - own_colour)
+            wood_share[i, 1] = wood * own_wood[i + 1]
+            wood_share[i, 2:] = full_wood * wood_share[i + 1, 1:-1]
             leaf_reach[i] = max(leaf_reach[i], leaf_reach[i + 1])
     return Flora(
         species=tuple(species),
@@ -142,7 +160,9 @@ def compile_species(species: Sequence[Species]) -> Flora:
         leaf_count=leaf_count,
         leaf_area=leaf_area,
         wood_area=wood_area,
+        own_wood=own_wood,
         polygons=polygons,
+        own_faces=own_faces,
         leaf_colour=leaf_colour / np.maximum(leaf_area, 1e-300)[:, None],
         wood_colour=wood_colour / np.maximum(wood_area, 1e-300)[:, None],
         transmission=np.array([one.leaf_transmission for one in species])[by_species],

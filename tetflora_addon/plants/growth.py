@@ -20,7 +20,7 @@ from .seeds import Seeds
 from .species import MAX_ORDERS
 from .vectors import by_component, columns, gathered
 
-_PLACE_JITTER = 0.4  # of the distance from one child to the next
+_PLACE_JITTER = 0.5  # of the distance from one child to the next: together children lie evenly along the whole parent
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,8 @@ class Branches:
         Length of the axis and radius at its base, metres.
     scale : (n,) float64
         Scale of the plant, which leaves take as well.
+    vigour : (n,) float64
+        Length as the crown's shape has it here, relative to the longest; numbers of branches and leaves may follow it.
     """
 
     row: NDArray[np.int32]
@@ -54,6 +56,7 @@ class Branches:
     length: NDArray[np.float64]
     radius: NDArray[np.float64]
     scale: NDArray[np.float64]
+    vigour: NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.row)
@@ -70,7 +73,7 @@ class Branches:
     @classmethod
     def empty(cls) -> Branches:
         """No branches."""
-        floats = [np.zeros(s) for s in ((0, 3), (0, 3, 3), 0, 0, 0)]
+        floats = [np.zeros(s) for s in ((0, 3), (0, 3, 3), 0, 0, 0, 0)]
         return cls(np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros(0, np.uint64), *floats)
 
 
@@ -146,7 +149,8 @@ def trunks(rows: NDArray[np.void], seeds: Seeds) -> Branches:
     roll = 2 * np.pi * uniform(key, Draw.ROLL)
     frame = turned(seeds.frame, roll, ranged(rows, "angle", row, key, Draw.ANGLE))
     plant = np.arange(len(seeds), dtype=np.int32)
-    return Branches(row, plant, key, seeds.position, frame, length, radius, np.asarray(seeds.scale, dtype=np.float64))
+    scale = np.asarray(seeds.scale, dtype=np.float64)
+    return Branches(row, plant, key, seeds.position, frame, length, radius, scale, np.ones(len(seeds)))
 
 
 def axes(rows: NDArray[np.void], branches: Branches) -> Axes:
@@ -159,11 +163,15 @@ def axes(rows: NDArray[np.void], branches: Branches) -> Axes:
     frames = np.moveaxis(np.zeros((3, 3, most, n)), (2, 3), (1, 0))
     step = (branches.length / segments)[:, None]
     bend = rows["curvature"][branches.row] / segments[:, None]
+    outer_bend = rows["curvature_tip"][branches.row] / segments
     frame, knot = by_component(branches.frame), by_component(branches.position)
     knots[:, 0] = knot
     for s in range(most):
         if s:
-            back = bend[:, 0] + bend[:, 1] * signed(branches.key, Draw.BEND + 2 * s)
+            # The joint in the middle of an even number of segments belongs to the outer half.
+            back = np.where(2 * s < segments, bend[:, 0], outer_bend) + bend[:, 1] * signed(
+                branches.key, Draw.BEND + 2 * s
+            )
             aside = bend[:, 1] * signed(branches.key, Draw.BEND + 2 * s + 1)
             frame = _bent(frame, -back, aside)
         knot = np.where((s < segments)[:, None], knot + step * frame[:, :, 2], knot)
@@ -179,15 +187,23 @@ def _bent(frame: NDArray[np.float64], pitch: NDArray[np.float64], yaw: NDArray[n
     return columns(cp * x - sp * z, cy * y + sy * forward, cy * forward - sy * y)
 
 
+def fullness(rows: NDArray[np.void], branches: Branches) -> NDArray[np.float64]:
+    """Factor (n,) on the numbers of branches and leaves: 1 for the longest branches of a crown, less for others."""
+    share = rows["count_by_length"][branches.row]
+    return 1 - share + share * branches.vigour
+
+
 def branch_counts(rows: NDArray[np.void], branches: Branches) -> NDArray[np.int64]:
-    """Number of children of each branch; its expectation is exactly the range's mean."""
-    wanted = ranged(rows, "branches", branches.row, branches.key, Draw.BRANCHES)
-    return np.floor(wanted + uniform(branches.key, Draw.BRANCHES_ROUND)).astype(np.int64)
+    """Number of children of each branch, in whole whorls; its expectation is exactly the range's mean."""
+    wanted = ranged(rows, "branches", branches.row, branches.key, Draw.BRANCHES) * fullness(rows, branches)
+    # The last row of the table has no children, and no row after it.
+    whorl = np.maximum(rows["whorl"][np.minimum(branches.row + 1, len(rows) - 1)], 1)
+    return np.floor(wanted / whorl + uniform(branches.key, Draw.BRANCHES_ROUND)).astype(np.int64) * whorl
 
 
 def leaf_counts(rows: NDArray[np.void], branches: Branches) -> NDArray[np.int64]:
     """Number of leaves on each branch's own axis; its expectation is exactly the range's mean."""
-    wanted = ranged(rows, "leaves", branches.row, branches.key, Draw.LEAVES)
+    wanted = ranged(rows, "leaves", branches.row, branches.key, Draw.LEAVES) * fullness(rows, branches)
     return np.floor(wanted + uniform(branches.key, Draw.LEAVES_ROUND)).astype(np.int64)
 
 
@@ -232,18 +248,24 @@ def chosen_children(
     parent = parents.take(owner)
     key = child_key(parent.key, index)
     row = parent.row + np.int32(1)
-    share = (index + 0.5 + _PLACE_JITTER * signed(key, Draw.PLACE)) / counts[owner]
+    # Branches of a whorl share their place: that of the first of them.
+    whorl = rows["whorl"][row]
+    node, within = index // whorl, index % whorl
+    place = signed(np.where(within > 0, child_key(parent.key, node * whorl), key), Draw.PLACE)
+    share = (node + 0.5 + _PLACE_JITTER * place) / (counts[owner] // whorl)
     start = rows["branch_start"][parent.row]
     t = start + (1 - start) * share
     position, frame = lines.at(owner, t)
     angle_base, angle_spread = rows["angle"][row].T
     angle = angle_base + (rows["angle_tip"][row] - angle_base) * share + angle_spread * signed(key, Draw.ANGLE)
     step, jitter = rows["azimuth"][row].T
-    azimuth = 2 * np.pi * uniform(parent.key, Draw.AZIMUTH) + index * step + jitter * signed(key, Draw.AZIMUTH)
-    length = parent.length * ranged(rows, "length", row, key, Draw.LENGTH)
-    length *= crown_ratio(rows["crown"][parent.row], 1 - share)
+    azimuth = 2 * np.pi * (uniform(parent.key, Draw.AZIMUTH) + within / whorl) + node * step
+    azimuth += jitter * signed(key, Draw.AZIMUTH)
+    vigour = crown_ratio(rows["crown"][parent.row], 1 - share)
+    length = parent.length * ranged(rows, "length", row, key, Draw.LENGTH) * vigour
     radius = radius_at(rows, parent, t) * ranged(rows, "thickness", row, key, Draw.THICKNESS)
-    return Branches(row, parent.plant, key, position, turned(frame, azimuth, angle), length, radius, parent.scale)
+    frame = turned(frame, azimuth, angle)
+    return Branches(row, parent.plant, key, position, frame, length, radius, parent.scale, vigour)
 
 
 def children(

@@ -20,14 +20,14 @@ _RANGES = (
     "length", "thickness", "curvature", "angle", "azimuth", "branches",
     "leaves", "leaf_size", "leaf_angle", "leaf_azimuth",
 )  # fmt: skip
-_DEGREES = {"curvature", "angle", "angle_tip", "azimuth", "leaf_angle", "leaf_azimuth"}
-_NUMBERS = ("taper", "angle_tip", "branch_start", "leaf_start", "leaf_light")
+_DEGREES = {"curvature", "curvature_tip", "angle", "angle_tip", "azimuth", "leaf_angle", "leaf_azimuth"}
+_NUMBERS = ("taper", "curvature_tip", "count_by_length", "angle_tip", "branch_start", "leaf_start", "leaf_light")
 
 ROW_DTYPE = np.dtype(
     [(name, np.float64, (2,)) for name in _RANGES]
     + [(name, np.float64) for name in _NUMBERS]
     + [(name, np.float64, (2, 3)) for name in ("branch_colour", "leaf_colour")]
-    + [("segments", np.int64), ("sides", np.int64), ("crown", np.int64), ("used", np.bool_)]
+    + [("segments", np.int64), ("sides", np.int64), ("whorl", np.int64), ("crown", np.int64), ("used", np.bool_)]
 )
 """One order of one species; ranges are (mean, variation), colours ((r, g, b), variation of each)."""
 
@@ -48,7 +48,7 @@ def build_rows(species: Sequence[Species]) -> NDArray[np.void]:
                 value = np.asarray(getattr(order, name), dtype=np.float64)
                 row[name] = np.radians(value) if name in _DEGREES else value
             row["branch_colour"], row["leaf_colour"] = order.branch_colour, order.leaf_colour
-            row["segments"], row["sides"] = order.segments, order.sides
+            row["segments"], row["sides"], row["whorl"] = order.segments, order.sides, order.whorl
             row["crown"] = CROWN_SHAPES.index(order.crown)
             row["used"] = True
     return rows

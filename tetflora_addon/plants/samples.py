@@ -70,7 +70,7 @@ def _paths(row: int) -> Branches:
     frame = np.broadcast_to(np.eye(3), (n, 3, 3))
     one = np.ones(n)
     return Branches(
-        np.full(n, row, np.int32), np.arange(n, dtype=np.int32), key, np.zeros((n, 3)), frame, one, one, one
+        np.full(n, row, np.int32), np.arange(n, dtype=np.int32), key, np.zeros((n, 3)), frame, one, one, one, one
     )
 
 

@@ -59,12 +59,24 @@ ORDER_KEYS: dict[str, Key] = {
     "segments": Key("integer", 1, 32, 1, "", "straight pieces along a branch"),
     "sides": Key("integer", 3, 64, 4, "", "faces around a branch"),
     "curvature": Key("range", -360, 360, [0, 0], "degrees", "bend over the length, positive towards the parent"),
+    "curvature_tip": Key(
+        "number", -360, 360, math.nan, "degrees", "the same as the outer half of a branch has it (default: no change)"
+    ),
     "angle": Key("range", 0, 180, [0, 0], "degrees", "from the parent's direction, at the parent's base"),
     "angle_tip": Key("number", 0, 180, math.nan, "degrees", "the same at the parent's tip (default: as at the base)"),
     "azimuth": Key("range", -360, 360, [137.5, 10], "degrees", "around the parent from one branch to the next"),
+    "whorl": Key("integer", 1, 12, 1, "", "branches at one place: 1 alternate, 2 opposite, more a whorl"),
     "branches": Key("range", 0, 10_000, [0, 0], "", "branches of the next order on one branch"),
     "branch_start": Key("number", 0, 0.99, 0.1, "of the length", "part of the branch that is bare of branches"),
     "crown": Key("shape", 0, 0, "cylindrical", "", "how the children's length varies along the branch"),
+    "count_by_length": Key(
+        "number",
+        0,
+        1,
+        0.0,
+        "",
+        "how far branches and leaves are fewer on shorter branches: 0 not at all, 1 in proportion",
+    ),
     "leaves": Key("range", 0, 10_000, [0, 0], "", "leaves on one branch of this order itself"),
     "leaf_start": Key("number", 0, 0.99, 0.1, "of the length", "part of the branch that is bare of leaves"),
     "leaf_size": Key("range", 0.0005, 20, [0.08, 0.02], "m", "length of a leaf"),
@@ -146,8 +158,8 @@ def _read_order(reader: _Reader, data: Any, index: int, last: bool) -> Order:
         value = data.get(name, key.default)
         if value is None:
             raise reader.fail(path, f"missing; must be {_expected(key)}")
-        if name not in data and name == "angle_tip":
-            value = values["angle"].mean
+        if name not in data and name.endswith("_tip"):
+            value = values[name.removesuffix("_tip")].mean
         high = LENGTH_HIGH if name == "length" and index > 0 else key.high
         readers: dict[str, Callable[[], Any]] = {
             "range": lambda value=value, path=path, key=key, high=high: reader.range(value, path, key.low, high),

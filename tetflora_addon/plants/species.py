@@ -52,6 +52,10 @@ class Order:
         Straight pieces along, and faces around, a branch.
     curvature : Range
         Degrees by which a branch bends over its length; positive bends back towards the parent's direction.
+    curvature_tip : float
+        Degrees by which it would bend over its length if all of it bent like its outer half.
+    whorl : int
+        Branches that leave the parent at one place: 1 alternate, 2 opposite, more a whorl.
     angle : Range
         Degrees between parent and branch, for branches at the parent's base.
     angle_tip : float
@@ -64,6 +68,8 @@ class Order:
         Fraction of the branch that stays bare of branches.
     crown : str
         How the length of the children varies along the branch, see `crown_shapes.CROWN_SHAPES`.
+    count_by_length : float
+        How far the numbers of branches and leaves follow the branch's length: 0 not at all, 1 in proportion.
     leaves : Range
         Number of leaves on one branch of this order itself.
     leaf_start : float
@@ -86,12 +92,15 @@ class Order:
     segments: int
     sides: int
     curvature: Range
+    curvature_tip: float
     angle: Range
     angle_tip: float
     azimuth: Range
+    whorl: int
     branches: Range
     branch_start: float
     crown: str
+    count_by_length: float
     leaves: Range
     leaf_start: float
     leaf_size: Range

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..plants.compiled import Flora
 from ..plants.expansion import open_subplants
-from ..plants.growth import Branches, trunks
+from ..plants.growth import Branches, fullness, trunks
 from ..plants.pieces import Pieces, clipped, leaf_fraction, wood_areas
 from ..plants.seeds import Seeds
 from ..tetrahedra.tree import TetrahedralTree
@@ -186,10 +186,12 @@ def subplant_amounts(flora: Flora, subplants: Branches) -> Amounts:
     """Compiled means for sub-plants."""
     row = subplants.row
     leafy = flora.leaf_area[row] > 0
+    full = fullness(flora.rows, subplants)
+    own_wood, own_faces = flora.own_wood[row], flora.own_faces[row]
     return Amounts(
-        flora.leaf_area[row] * subplants.scale**2,
-        flora.wood_area[row] * subplants.length * subplants.radius,
-        flora.polygons[row],
+        full * flora.leaf_area[row] * subplants.scale**2,
+        (own_wood + full * (flora.wood_area[row] - own_wood)) * subplants.length * subplants.radius,
+        own_faces + full * (flora.polygons[row] - own_faces),
         np.where(leafy, flora.leaf_width[row] * subplants.scale, 2 * subplants.radius),
     )
 
@@ -203,7 +205,7 @@ def piece_amounts(flora: Flora, pieces: Pieces) -> Amounts:
     area, width, polygons = (
         np.array([getattr(m, name) for m in flora.leaf_models])[model] for name in ("area", "width", "polygons")
     )
-    leaves = flora.rows["leaves"][row, 0] * leaf_fraction(flora, pieces)
+    leaves = flora.rows["leaves"][row, 0] * fullness(flora.rows, branches) * leaf_fraction(flora, pieces)
     return Amounts(
         leaves * (size**2 + variation**2 / 3) * area * branches.scale**2,
         wood_areas(flora, pieces),

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..buffers import MeshBuffers
 from ..plants.compiled import Flora
 from ..plants.foliage import face_light, place_leaves
-from ..plants.growth import Branches, axes, spread
+from ..plants.growth import Branches, axes, fullness, spread
 from ..plants.hashing import Draw, child_key, mix, signed, uniform
 from ..plants.meshing import concatenate_buffers
 from ..plants.pieces import Pieces
@@ -73,7 +73,12 @@ def subplant_facets(
     amounts = subplant_amounts(flora, subplants)
     row = subplants.row
     model_polygons = np.array([m.polygons for m in flora.leaf_models])[row // (len(flora.rows) // len(flora.species))]
-    wood = _wood_sides(side, amounts, flora.polygons[row] - flora.leaf_count[row] * model_polygons, coarse)
+    wood = _wood_sides(
+        side,
+        amounts,
+        amounts.polygons - fullness(flora.rows, subplants) * flora.leaf_count[row] * model_polygons,
+        coarse,
+    )
     return concatenate_buffers(
         [
             _buffers(_leaves_of_subplants(flora, subplants, amounts, side)),
