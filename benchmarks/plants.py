@@ -1,0 +1,146 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Throughput of plants: from seeds to finished Blender meshes, for every species of the catalogue.
+
+Seconds are processor time of the whole process, all threads together, so that they are those of one core. Memory is
+what numpy holds at most, by `tracemalloc`, plus the meshes that Blender holds by then, for the plants of about one
+block: where there are more blocks, what is held beside the meshes stays the same and the ratio falls.
+"""
+
+from __future__ import annotations
+
+import time
+import tracemalloc
+from collections.abc import Callable
+from statistics import median
+from types import ModuleType
+from typing import Any
+
+import bpy
+import numpy as np
+
+from devtools import session
+
+from .report import Targets
+
+#: Polygons of each species that are made to measure speed.
+POLYGONS, QUICK_POLYGONS = 600_000, 200_000
+REPEATS, QUICK_REPEATS = 5, 2
+#: Nobody plants more of a species in one go; keeps grass and flowers from being all seeds.
+MOST_PLANTS = 20_000
+
+TARGETS: Targets = {
+    "mtri_per_s_median": {"min": 5.0},
+    "peak_over_mesh": {"max": 2.5},
+    "compile_ms_max": {"max": 50.0},
+}
+QUICK_TARGETS: Targets = TARGETS
+
+
+def plants(flora: Any, polygons: float) -> Any:
+    """Upright plants of a flora's only species that have about a number of polygons together, all different."""
+    count = int(np.clip(round(polygons / flora.polygons[0]), 1, MOST_PLANTS))
+    side = int(np.ceil(np.sqrt(count)))
+    index = np.arange(count)
+    return session.part("tetflora_addon.plants.seeds").Seeds(
+        (flora.species[0].identifier,),
+        np.zeros(count, np.int32),
+        index.astype(np.int64),
+        np.stack([index % side, index // side, np.zeros(count)], axis=1) * 5.0,
+        np.tile(np.eye(3), (count, 1, 1)),
+        np.ones(count),
+    )
+
+
+def made(emission: ModuleType, meshes: ModuleType, flora: Any, seeds: Any) -> list[Any]:
+    """Write all plants as meshes, as the job does; returns the buffers, whose meshes are still there."""
+    written = []
+    for block in emission.expanded_blocks(flora, seeds):
+        meshes.write_mesh("measured", block.buffers)
+        written.append(block.buffers)
+    return written
+
+
+def removed() -> None:
+    """Remove all meshes."""
+    bpy.data.batch_remove(list(bpy.data.meshes))
+
+
+def seconds(task: Callable[[], object], repeats: int, after: Callable[[], object] = lambda: None) -> float:
+    """Median processor time of a task; what comes after each is not counted."""
+    taken = []
+    for _ in range(repeats):
+        start = time.process_time()
+        task()
+        taken.append(time.process_time() - start)
+        after()
+    return median(taken)
+
+
+def copied(buffers: list[Any]) -> list[np.ndarray]:
+    """Plain copies of all arrays."""
+    return [array.copy() for one in buffers for array in arrays(one)]
+
+
+def arrays(buffers: Any) -> list[np.ndarray]:
+    """All arrays of one mesh."""
+    topology = [buffers.edge_verts, buffers.corner_verts, buffers.corner_edges, buffers.face_offsets]
+    return [buffers.positions, *topology, *(values for _, values in buffers.attributes.values())]
+
+
+def peak_over_mesh(emission: ModuleType, meshes: ModuleType, flora: Any) -> float:
+    """Largest memory while about one block is made and written, over the bytes of its meshes."""
+    seeds = plants(flora, emission.BLOCK_POLYGONS)
+    written = peak = 0
+    tracemalloc.start()
+    try:
+        before = tracemalloc.get_traced_memory()[0]
+        tracemalloc.reset_peak()
+        for block in emission.expanded_blocks(flora, seeds):
+            peak = max(peak, written + tracemalloc.get_traced_memory()[1] - before)
+            tracemalloc.reset_peak()
+            meshes.write_mesh("measured", block.buffers)
+            written += block.buffers.nbytes
+            peak = max(peak, written + tracemalloc.get_traced_memory()[1] - before)
+            del block
+            tracemalloc.reset_peak()
+    finally:
+        tracemalloc.stop()
+        removed()
+    return peak / written
+
+
+def run(quick: bool) -> dict[str, float]:
+    """Measure all species; see the table in ``docs/results.md`` for what the figures mean."""
+    part = session.part
+    emission, meshes = part("tetflora_addon.emission"), part("tetflora_addon.blender.meshes")
+    catalogue, compiled = part("tetflora_addon.plants.catalogue"), part("tetflora_addon.plants.compiled")
+    compile_species = getattr(compiled.compile_species, "__wrapped__", compiled.compile_species)  # never from a cache
+    repeats = QUICK_REPEATS if quick else REPEATS
+    speed, memory, compiling, copying = {}, {}, {}, {}
+    triangles_in_all = bytes_in_all = 0
+    for name in catalogue.list_species():
+        species = [catalogue.load_species(name)]
+        flora = compile_species(species)
+        compiling[name] = 1e3 * seconds(lambda s=species: compile_species(s), repeats)
+        seeds = plants(flora, QUICK_POLYGONS if quick else POLYGONS)
+        buffers = made(emission, meshes, flora, seeds)
+        removed()
+        triangles = sum(len(b.corner_verts) - 2 * b.polygons for b in buffers)
+        triangles_in_all += triangles
+        bytes_in_all += sum(b.nbytes for b in buffers)
+        plain = seconds(lambda b=buffers: copied(b), repeats)
+        del buffers
+        taken = seconds(lambda f=flora, s=seeds: made(emission, meshes, f, s), repeats, removed)
+        speed[name], copying[name] = triangles / taken / 1e6, taken / plain
+        memory[name] = peak_over_mesh(emission, meshes, flora)
+    return {
+        "mtri_per_s_median": median(speed.values()),
+        "mtri_per_s_min": min(speed.values()),
+        "peak_over_mesh": max(memory.values()),
+        "bytes_per_triangle": bytes_in_all / triangles_in_all,
+        "memcpy_ratio": median(copying.values()),
+        "compile_ms_max": max(compiling.values()),
+        **{f"mtri_per_s_{name}": value for name, value in speed.items()},
+        **{f"peak_over_mesh_{name}": value for name, value in memory.items()},
+    }
