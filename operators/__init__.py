@@ -15,6 +15,8 @@ from . import (
     remove_plants,
     reseed,
     select_species,
+    species_edit,
+    species_files,
 )
 
 CLASSES = (
@@ -28,6 +30,13 @@ CLASSES = (
     edit_list.TETFLORA_OT_edit_list,
     refine.TETFLORA_OT_refine,
     clear.TETFLORA_OT_clear,
+    species_edit.TETFLORA_OT_duplicate_species,
+    species_edit.TETFLORA_OT_revert_species,
+    species_edit.TETFLORA_OT_edit_orders,
+    species_files.TETFLORA_OT_save_species,
+    species_files.TETFLORA_OT_load_species,
+    species_files.TETFLORA_OT_export_species,
+    species_files.TETFLORA_OT_delete_species,
 )
 
 

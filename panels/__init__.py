@@ -4,13 +4,27 @@
 
 import bpy
 
-from . import add_menu, lists, object_menu, plants_panel, populate_panel, refinement_panel, statistics_panel
+from . import (
+    add_menu,
+    lists,
+    object_menu,
+    plants_panel,
+    populate_panel,
+    refinement_panel,
+    species_panel,
+    statistics_panel,
+)
 
 CLASSES = (
     lists.TETFLORA_UL_mix,
     lists.TETFLORA_UL_leaf_objects,
     plants_panel.TETFLORA_PT_plants,
     plants_panel.TETFLORA_PT_selected_plants,
+    species_panel.TETFLORA_MT_species_files,
+    species_panel.TETFLORA_PT_species,
+    species_panel.TETFLORA_PT_species_orders,
+    species_panel.TETFLORA_PT_species_leaves,
+    species_panel.TETFLORA_PT_species_whole,
     populate_panel.TETFLORA_PT_populate,
     refinement_panel.TETFLORA_PT_refinement,
     refinement_panel.TETFLORA_PT_limits,

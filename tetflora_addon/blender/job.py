@@ -14,7 +14,6 @@ import numpy as np
 
 from .. import emission
 from ..errors import SpeciesError
-from ..plants.catalogue import load_species
 from ..plants.compiled import Flora, compile_species
 from ..plants.growth import trunks
 from ..plants.leaf_models import LeafModel, leaf_model
@@ -29,10 +28,10 @@ from ..refinement.statistics import Statistics, Stopwatch
 from .emit import Results, has_results, remove_results
 from .materials import bark_material, leaf_material, proxy_material
 from .meshes import read_mesh_arrays
-from .preferences import species_folders
 from .properties import leaf_objects, settings_from
 from .scene_reader import read_camera, read_occluders, read_plants
 from .shell_material import shell_material
+from .species_edits import species_for
 
 __all__ = ["Progress", "clear", "compile_for", "estimate", "has_results", "partition", "refine", "refine_steps"]
 
@@ -67,10 +66,9 @@ def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph:
         Unknown or broken species, or a leaf object that is missing or not a mesh with faces.
     """
     chosen = leaf_objects(scene)
-    folders = species_folders()
     resolved = []
     for identifier in identifiers:
-        species = load_species(identifier, folders)
+        species = species_for(scene, identifier)
         if identifier in chosen:
             species = replace(species, leaf=_leaf_of(species, chosen[identifier], depsgraph))
         elif not isinstance(species.leaf, LeafModel):

@@ -7,6 +7,8 @@ from pathlib import Path
 import bpy
 from bpy.props import StringProperty
 
+from ..errors import SpeciesError
+
 # Blender files preferences under the name of the extension's root package, two levels above this one. Only the name
 # is needed; nothing in tetflora_addon imports what lies above it.
 ROOT_PACKAGE = __package__.rsplit(".", 2)[0]
@@ -20,7 +22,8 @@ class TetFloraPreferences(bpy.types.AddonPreferences):
     species_folder: StringProperty(
         name="Species Folder",
         description=(
-            "Folder of your own species files (*.json). A file there replaces a shipped species of the same file name. "
+            "Folder of your own species files (*.json); without one, a folder beside your Blender settings. "
+            "A file there replaces a shipped species of the same file name. "
             "Scenes store only the name of a species: whoever renders a scene needs the same files"
         ),
         subtype='DIR_PATH',
@@ -38,11 +41,39 @@ class TetFloraPreferences(bpy.types.AddonPreferences):
 
 def species_folders() -> tuple[Path, ...]:
     """Folders of the user's own species that exist, for the catalogue's functions; empty outside of an extension."""
+    folder = _species_folder(create=False)
+    return (folder,) if folder is not None and folder.is_dir() else ()
+
+
+def own_species_folder() -> Path:
+    """The folder that the user's own species are saved in, made if there is none.
+
+    Raises
+    ------
+    SpeciesError
+        It cannot be made, or this is no installed extension.
+    """
+    try:
+        folder = _species_folder(create=True)
+        if folder is not None:
+            folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SpeciesError(f"The species folder cannot be made: {error}; name another in the preferences") from None
+    if folder is None:
+        raise SpeciesError("There is no folder for your own species; name one in TetFlora's preferences")
+    return folder
+
+
+def _species_folder(create: bool) -> Path | None:
     addon = bpy.context.preferences.addons.get(ROOT_PACKAGE)
-    if addon is None or addon.preferences is None or not addon.preferences.species_folder:
-        return ()
-    folder = Path(bpy.path.abspath(addon.preferences.species_folder))
-    return (folder,) if folder.is_dir() else ()
+    if addon is None or addon.preferences is None:
+        return None
+    if addon.preferences.species_folder:
+        return Path(bpy.path.abspath(addon.preferences.species_folder))
+    try:
+        return Path(bpy.utils.extension_path_user(ROOT_PACKAGE, path="species", create=create))
+    except ValueError:  # an add-on of the old kind has no such folder
+        return None
 
 
 def register() -> None:

@@ -17,36 +17,11 @@ from bpy.props import (
 )
 
 from ..refinement.settings import RefinementSettings
-from .species_items import items_for, number_of
+from .species_choice import SpeciesChoice
+from .species_editor import TetFloraSpeciesEditor
+from .species_edits import TetFloraSpeciesEdit
 
 _SETTINGS = RefinementSettings()
-
-
-class SpeciesChoice:
-    """A stored identifier, and an enumeration over it for panels.
-
-    The identifier is a string, so that a species whose file is missing survives; the enumeration only reads and
-    writes it.
-    """
-
-    species: StringProperty(
-        name="Species",
-        description="File name of the species in the catalogue, without its ending",
-    )
-    species_choice: EnumProperty(
-        name="Species",
-        description="Species of the catalogue",
-        items=lambda self, _context: items_for(self.species),
-        get=lambda self: number_of(self.species) if self.species else items_for()[0][4],
-        set=lambda self, number: _choose(self, number),
-        options={'SKIP_SAVE'},
-    )
-
-
-def _choose(group: SpeciesChoice, number: int) -> None:
-    for identifier, *_, item_number in items_for(group.species):
-        if item_number == number and number:
-            group.species = identifier
 
 
 class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
@@ -291,6 +266,12 @@ class TetFloraScene(bpy.types.PropertyGroup):
         type=TetFloraLeafObject,
     )
     leaf_objects_index: IntProperty(name="Active Leaf Object", options={'HIDDEN', 'SKIP_SAVE'})
+    species_edits: CollectionProperty(
+        name="Species Edits",
+        description="Species that are edited in this file, as JSON; they take the place of the catalogue's",
+        type=TetFloraSpeciesEdit,
+    )
+    species_editor: PointerProperty(name="Species Editor", type=TetFloraSpeciesEditor)
     statistics: StringProperty(
         name="Statistics",
         description="Figures of the last refinement, as JSON",
@@ -298,7 +279,15 @@ class TetFloraScene(bpy.types.PropertyGroup):
     )
 
 
-CLASSES = (TetFloraObject, TetFloraMixEntry, TetFloraLeafObject, TetFloraPopulate, TetFloraScene)
+CLASSES = (
+    TetFloraObject,
+    TetFloraMixEntry,
+    TetFloraLeafObject,
+    TetFloraPopulate,
+    TetFloraSpeciesEdit,
+    TetFloraSpeciesEditor,
+    TetFloraScene,
+)
 
 
 def settings_from(scene: bpy.types.Scene) -> RefinementSettings:

@@ -8,8 +8,9 @@ from zlib import crc32
 import bpy
 
 from ..errors import SpeciesError
-from ..plants.catalogue import SpeciesInfo, list_species, load_species
+from ..plants.catalogue import SpeciesInfo, list_species
 from .preferences import species_folders
+from .species_edits import edited_infos, species_for
 
 # What an enumeration says when there is nothing to choose.
 NO_SPECIES = "NONE"
@@ -22,8 +23,10 @@ _kept: dict[tuple, list[Item]] = {}
 
 
 def catalogue() -> dict[str, SpeciesInfo]:
-    """All species that this user has, by identifier."""
-    return list_species(species_folders())
+    """All species that this user or this file has, by identifier, sorted by name."""
+    known = list_species(species_folders())
+    edited = edited_infos()
+    return dict(sorted((known | edited).items(), key=lambda item: item[1].name.lower())) if edited else known
 
 
 def number_of(identifier: str) -> int:
@@ -64,7 +67,7 @@ def operator_items(_operator: bpy.types.OperatorProperties, _context: bpy.types.
 def display_height(identifier: str) -> float:
     """Height of a species' trunk in metres, for the arrow that stands for a plant in the viewport."""
     try:
-        return float(load_species(identifier, species_folders()).orders[0].length.mean)
+        return float(species_for(None, identifier).orders[0].length.mean)
     except SpeciesError:
         return FALLBACK_HEIGHT
 

@@ -1,0 +1,142 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The species editor: a species, its orders as a list, and a slider for everything that the species file says."""
+
+from textwrap import wrap
+
+import bpy
+
+from ..operators import ids
+from ..tetflora_addon.blender.species_editor import (
+    OBJECT_LEAF,
+    VARIATION,
+    order_keys,
+    orders_of,
+    present_order,
+    present_species,
+)
+from ..tetflora_addon.blender.species_edits import find_edit, problem_of
+from ..tetflora_addon.blender.species_files import own_file
+from .base import SidebarPanel, split_layout
+
+# Keys of an order that say how its leaves are; the others are about its branches.
+_LEAVES = ("leaf", "leaves")
+
+
+def draw_message(context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str = 'ERROR') -> None:
+    """A text over several lines, as Blender breaks none; a letter is some 7 pixels wide at a scale of 1."""
+    letters = context.region.width / (7.0 * context.preferences.system.ui_scale)
+    column = layout.column(align=True)
+    for n, line in enumerate(wrap(text, max(int(letters) - 4, 16))):
+        column.label(text=line, icon='BLANK1' if n else icon)
+
+
+class TETFLORA_MT_species_files(bpy.types.Menu):
+    """Saving, loading, sharing and deleting species."""
+
+    bl_label = "Species Files"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.operator_context = 'INVOKE_DEFAULT'
+        layout.operator(ids.SAVE_SPECIES, icon='FILE_TICK')
+        layout.operator(ids.LOAD_SPECIES, icon='IMPORT')
+        layout.operator(ids.EXPORT_SPECIES, icon='EXPORT')
+        layout.separator()
+        layout.operator(ids.DELETE_SPECIES, icon='TRASH')
+
+
+class TETFLORA_PT_species(SidebarPanel, bpy.types.Panel):
+    """Species."""
+
+    bl_label = "Species"
+    bl_parent_id = "TETFLORA_PT_plants"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = split_layout(self)
+        scene = context.scene
+        editor = scene.tetflora.species_editor
+        identifier = present_species(editor)
+        row = layout.row(align=True)
+        row.use_property_split = False
+        row.prop(editor, "species_choice", text="")
+        row.operator(ids.DUPLICATE_SPECIES, text="", icon='DUPLICATE')
+        row.operator(ids.REVERT_SPECIES, text="", icon='LOOP_BACK')
+        row.menu(TETFLORA_MT_species_files.__name__, text="", icon='DOWNARROW_HLT')
+        if find_edit(scene, identifier) is not None:
+            layout.label(text="Edited in this file", icon='GREASEPENCIL')
+        else:
+            layout.label(text="Your own species" if own_file(identifier) else "As shipped", icon='LOCKED')
+        if problem := problem_of(scene, identifier):
+            draw_message(context, layout, problem)
+
+
+class _SpeciesPart(SidebarPanel):
+    """Mix-in for the editor's sub-panels."""
+
+    bl_parent_id = "TETFLORA_PT_species"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return bool(orders_of(context.scene.tetflora.species_editor))
+
+
+class TETFLORA_PT_species_whole(_SpeciesPart, bpy.types.Panel):
+    """Name, leaf and what else holds for the whole species."""
+
+    bl_label = "Name and Leaf"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = split_layout(self)
+        editor = context.scene.tetflora.species_editor
+        column = layout.column()
+        column.prop(editor, "species_name")
+        column.prop(editor, "species_description")
+        column.prop(editor, "leaf_form")
+        if editor.leaf_form == OBJECT_LEAF:
+            column.prop_search(editor, "leaf_object", bpy.data, "objects")
+        column.prop(editor, "leaf_transmission")
+
+
+class TETFLORA_PT_species_orders(_SpeciesPart, bpy.types.Panel):
+    """The orders as a list, and the branches of the active one."""
+
+    bl_label = "Branches by Order"
+    bl_options = set()
+
+    def draw(self, context: bpy.types.Context) -> None:
+        editor = context.scene.tetflora.species_editor
+        row = self.layout.row()
+        row.column(align=True).prop(editor, "order", expand=True)
+        buttons = row.column(align=True)
+        for action in ('ADD', 'REMOVE'):
+            buttons.operator(ids.EDIT_ORDERS, text="", icon=action).action = action
+        _draw_keys(split_layout(self), editor, leaves=False)
+
+
+class TETFLORA_PT_species_leaves(_SpeciesPart, bpy.types.Panel):
+    """Leaves of the active order."""
+
+    bl_label = "Leaves of This Order"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        _draw_keys(split_layout(self), context.scene.tetflora.species_editor, leaves=True)
+
+
+def _draw_keys(layout: bpy.types.UILayout, editor: bpy.types.PropertyGroup, leaves: bool) -> None:
+    column = layout.column(align=True)
+    last = present_order(editor) == len(orders_of(editor)) - 1
+    bare = editor.leaves + editor.leaves_variation <= 0.0
+    for name, key in order_keys().items():
+        if name.startswith(_LEAVES) != leaves:
+            continue
+        row = column.row(align=True)
+        # Still there to be changed, but it does nothing as things are.
+        row.active = not (bare and leaves and name != "leaves") and not (name == "branches" and last)
+        row.prop(editor, name)
+        if name + VARIATION in editor.bl_rna.properties:
+            row.prop(editor, name + VARIATION, text="")
+        if key.kind == "colour":
+            column.separator()
