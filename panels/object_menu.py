@@ -21,6 +21,7 @@ class TETFLORA_MT_object(bpy.types.Menu):
         layout.menu(TETFLORA_MT_species.__name__, text="Change Species", icon='OUTLINER_OB_EMPTY')
         layout.operator(ids.RESEED, icon='FILE_REFRESH')
         layout.operator(ids.SELECT_SPECIES, text="Select All of This Species", icon='RESTRICT_SELECT_OFF')
+        layout.operator(ids.MAKE_PLANT_MESH, icon='OUTLINER_OB_MESH')
         layout.operator(ids.REMOVE_PLANTS, text="Remove Selected Plants", icon='X').which = 'SELECTED'
         layout.operator(ids.REMOVE_PLANTS, text="Remove All Plants", icon='TRASH').which = 'ALL'
         layout.separator()

@@ -53,6 +53,7 @@ class TETFLORA_PT_selected_plants(SidebarPanel, bpy.types.Panel):
         column.menu(TETFLORA_MT_species.__name__, text="Change Species", icon='OUTLINER_OB_EMPTY')
         column.operator(ids.RESEED, icon='FILE_REFRESH')
         column.operator(ids.SELECT_SPECIES, text="Select All of This Species", icon='RESTRICT_SELECT_OFF')
+        column.operator(ids.MAKE_PLANT_MESH, text="Make Real Meshes", icon='OUTLINER_OB_MESH')
         column = self.layout.column(align=True)
         column.operator(ids.REMOVE_PLANTS, text="Remove Selected", icon='X').which = 'SELECTED'
         column.operator(ids.REMOVE_PLANTS, text="Remove All Plants", icon='TRASH').which = 'ALL'

@@ -128,6 +128,11 @@ class TETFLORA_PT_species_leaves(_SpeciesPart, bpy.types.Panel):
 def _draw_keys(layout: bpy.types.UILayout, editor: bpy.types.PropertyGroup, leaves: bool) -> None:
     column = layout.column(align=True)
     last = present_order(editor) == len(orders_of(editor)) - 1
+    split = column.split(factor=0.4)
+    split.label(text="")
+    head = split.row(align=True)
+    head.label(text="Mean")
+    head.label(text="±")
     bare = editor.leaves + editor.leaves_variation <= 0.0
     for name, key in order_keys().items():
         if name.startswith(_LEAVES) != leaves:

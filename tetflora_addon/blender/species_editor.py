@@ -66,7 +66,7 @@ def _count(value: Any) -> str:
         mean, variation = map(float, value)
     except (TypeError, ValueError):
         return ""
-    return "" if mean + variation <= 0 else f"{mean:g} ± {variation:g}" if variation else f"{mean:g}"
+    return f"{mean:g}" if mean + variation > 0 else ""
 
 
 def value_of(editor: bpy.types.PropertyGroup, name: str) -> Any:
@@ -133,7 +133,14 @@ def _soft_high(key: Key) -> float:
 
 def _float_options(key: Key, low: float, high: float) -> dict[str, Any]:
     if key.unit == "degrees":
-        return {"min": radians(low), "max": radians(high), "subtype": 'ANGLE', "unit": 'ROTATION', "step": 100}
+        return {
+            "min": radians(low),
+            "max": radians(high),
+            "subtype": 'ANGLE',
+            "unit": 'ROTATION',
+            "step": 100,
+            "precision": 4,
+        }
     options: dict[str, Any] = {"min": low, "max": high, "soft_max": min(_soft_high(key), high), "precision": 3}
     if key.unit == "m":
         options |= {"subtype": 'DISTANCE', "unit": 'LENGTH', "step": 1}
