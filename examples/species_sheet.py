@@ -17,36 +17,53 @@ from .row80 import add_daylight
 from .terrain import ground_material
 
 
+PER_ROW = 7
+STEP, TERRACE = 8.0, 11.5
+
+
 def build(scene: bpy.types.Scene, seed: int = 11) -> list[str]:
-    """Place one plant of each species of the catalogue in a row, equally high all of them; returns their names."""
+    """Place one plant of each species of the catalogue on terraces, as large as the sheet allows; returns their names."""
     catalogue = session.part("tetflora_addon.plants.catalogue")
     known = catalogue.list_species()
     flora = session.part("tetflora_addon.plants.compiled").compile_species([catalogue.load_species(i) for i in known])
     trunk_rows = np.arange(len(known)) * (len(flora.rows) // len(known))
-    height = flora.rows["length"][trunk_rows, 0] * flora.samples.leaf_position[trunk_rows, :, 2].max(axis=1)
-    x = 0.0
+    samples, length = flora.samples, flora.rows["length"][trunk_rows, 0]
+    leaf_rise = flora.rows["leaf_size"][samples.leaf_row[trunk_rows], 0] * samples.leaf_frame[trunk_rows, :, 2, 1]
+    leaves = length[:, None] * samples.leaf_position[trunk_rows, :, 2] + leaf_rise
+    wood = length[:, None] * samples.wood_position[trunk_rows, :, 2]
+    height = np.where(flora.leaf_count[trunk_rows] > 0, leaves.max(axis=1), wood.max(axis=1))
+    reach = length * np.linalg.norm(samples.wood_position[trunk_rows, :, :2], axis=2).max(axis=1)
+    reach += np.where(flora.leaf_count[trunk_rows] > 0, 0.5 * flora.leaf_reach[trunk_rows], 0.0)
+    terraces = math.ceil(len(known) / PER_ROW)
     for i, identifier in enumerate(known):
+        line, place = divmod(i, PER_ROW)
         empty = bpy.data.objects.new(identifier, None)
         empty.tetflora.is_plant, empty.tetflora.species, empty.tetflora.seed = True, identifier, seed + i
-        empty.scale = (9.0 / float(height[i]),) * 3  # all equally high on the sheet
-        empty.location.x = x
-        x += 8.5
+        empty.scale = (min(10.6 / float(height[i]), 4.2 / float(reach[i])),) * 3
+        empty.location = place * STEP, 20.0 * (terraces - 1 - line), TERRACE * (terraces - 1 - line)
         scene.collection.objects.link(empty)
-    middle = (x - 8.5) / 2
-    mesh = bpy.data.meshes.new("Floor")
-    mesh.from_pydata([(-200, -60, 0), (200, -60, 0), (200, 200, 0), (-200, 200, 0)], [], [(0, 1, 2, 3)])
-    floor = bpy.data.objects.new("Floor", mesh)
-    scene.collection.objects.link(floor)
-    mesh.materials.append(ground_material())
+    width = (min(PER_ROW, len(known)) - 1) * STEP
+    material = ground_material()
+    for line in range(terraces):
+        y, z = 20.0 * line, TERRACE * line
+        mesh = bpy.data.meshes.new("Terrace")
+        corners = [(-200, y - 10, z), (200, y - 10, z), (200, y + 10, z), (-200, y + 10, z)]
+        wall = [(-200, y + 10, z), (200, y + 10, z), (200, y + 10, z + TERRACE), (-200, y + 10, z + TERRACE)]
+        faces = [(0, 1, 2, 3), (4, 5, 6, 7)] if line < terraces - 1 else [(0, 1, 2, 3)]
+        mesh.from_pydata(corners + wall, [], faces)
+        mesh.materials.append(material)
+        scene.collection.objects.link(bpy.data.objects.new("Terrace", mesh))
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    eye, target = Vector((middle, -60.0, 6.5)), Vector((middle, 0.0, 4.4))
-    camera.location, camera.data.lens = eye, 36.0 * 60.0 / (x + 3.0)
-    camera.rotation_euler = (target - eye).to_track_quat('-Z', 'Y').to_euler()
+    rise = TERRACE * terraces
+    camera.data.type, camera.data.ortho_scale, camera.data.clip_end = 'ORTHO', width + 10.0, 500.0
+    camera.location = Vector((width / 2, -100.0, rise / 2 - 0.4))
+    camera.rotation_euler = (math.pi / 2, 0, 0)
     scene.collection.objects.link(camera)
     scene.camera = camera
-    add_daylight(scene, elevation=42.0, azimuth=140.0)
-    scene.view_settings.exposure = 0.4
-    scene.render.resolution_x, scene.render.resolution_y = 1200, math.floor(1200 * 11.5 / (x + 3.0))
+    add_daylight(scene, elevation=48.0, azimuth=25.0)
+    scene.view_settings.exposure = 0.6
+    scene.render.resolution_x = 1400
+    scene.render.resolution_y = math.floor(1400 * (rise + 0.8) / (width + 10.0))
     return [info.name for info in known.values()]
 
 

@@ -70,7 +70,7 @@ def test_small_shares_are_met_on_average_and_from_all_samples() -> None:
     assert total == pytest.approx(amounts.leaf_area.sum(), rel=0.1)
 
 
-@pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
+@pytest.mark.parametrize("species", [support.SPECIES.index(name) for name in support.DENSE], ids=support.DENSE)
 def test_orientation_and_place_are_those_of_the_plant(species: int) -> None:
     """Facets of whole plants against their leaves: moment, mean height and spread; wood against its tubes."""
     flora = support.flora()
