@@ -11,14 +11,17 @@ from numpy.typing import NDArray
 
 from ..buffers import MeshBuffers
 from .compiled import Flora
-from .foliage import branch_colours, face_light, leaf_colours, leaf_keys, leaf_places, place_leaves
+from .copies import Copies
+from .foliage import branch_colours, face_light, leaf_colours, leaf_keys, leaf_places, leaf_range, place_leaves
 from .growth import Axes, Branches, axes, leaf_counts, radius_at, spread
-from .leaf_models import LeafModel
-from .pieces import Pieces
-from .vectors import columns, unit
+from .pieces import Pieces, along_branches
+from .vectors import gathered, unit
 
 _SKY = np.array([0.0, 0.0, 1.0])
-_SAME_T = 1e-9  # fractions of a branch closer than this are one place
+_AT_JOINT = 1e-6  # fractions of a segment closer to a joint than this are at it
+#: Vertices of leaves, and rings of tubes, that are worked on at a time: what passes through numpy stays in the cache.
+_VERTICES_AT_ONCE = 40_000
+_RINGS_AT_ONCE = 16_000
 
 
 def concatenate_buffers(parts: Sequence[MeshBuffers]) -> MeshBuffers | None:
@@ -47,15 +50,6 @@ def concatenate_buffers(parts: Sequence[MeshBuffers]) -> MeshBuffers | None:
     )
 
 
-def _distinct(pieces: Pieces) -> tuple[Pieces, Branches, NDArray[np.int64]]:
-    """Pieces sorted along their branches, the distinct branches, and the index of the branch of each piece."""
-    # The plant belongs to the order: plants of one seed (copies in the scene) have the same keys at different places.
-    pieces = pieces.take(np.lexsort([pieces.t0, pieces.branches.key, pieces.branches.plant]))
-    key, plant = pieces.branches.key, pieces.branches.plant
-    first = np.concatenate([[True], (key[1:] != key[:-1]) | (plant[1:] != plant[:-1])])
-    return pieces, pieces.branches.take(first), np.cumsum(first) - 1
-
-
 def tube_buffers(flora: Flora, pieces: Pieces) -> MeshBuffers | None:
     """Tubes of pieces of branches; pieces that touch share a ring.
 
@@ -63,148 +57,208 @@ def tube_buffers(flora: Flora, pieces: Pieces) -> MeshBuffers | None:
     ----------
     flora : Flora
     pieces : Pieces of n
-        Any rows; no two may overlap.
+        Any rows; no two may overlap. Those without length are passed over.
 
     Returns
     -------
     MeshBuffers or None
         Quads with ``UVMap``, ``tf_colour`` and ``tf_transmission``; None without pieces.
     """
+    pieces = along_branches(pieces.take(pieces.t1 > pieces.t0))
     if len(pieces) == 0:
         return None
-    sides = flora.rows["sides"][pieces.branches.row]
-    return concatenate_buffers([_tubes(flora, pieces.take(sides == k), int(k)) for k in np.unique(sides)])
-
-
-def _tubes(flora: Flora, pieces: Pieces, sides: int) -> MeshBuffers:
-    pieces, branches, branch = _distinct(pieces)
-    lines = axes(flora.rows, branches)
-    apart = np.abs(pieces.t0[1:] - pieces.t1[:-1]) > _SAME_T
-    last = np.concatenate([(branch[1:] != branch[:-1]) | apart, [True]])
+    first, last = pieces.runs()
+    sides = flora.rows["sides"][pieces.branches.row[first]]
     # One ring at the start of each piece, and one more at the end of each run of pieces.
-    ring_piece = np.repeat(np.arange(len(pieces)), 1 + last)
-    closing = np.zeros(len(ring_piece), dtype=bool)
-    closing[np.cumsum(1 + last) - 1] = last
-    t = np.where(closing, pieces.t1[ring_piece], pieces.t0[ring_piece])
-    owner = branch[ring_piece]
-    centre, frame = _ring_frames(lines, owner, t)
-    radius = radius_at(flora.rows, branches.take(owner), t)
-
-    angle = 2 * np.pi * np.arange(sides) / sides
-    cos, sin = (f(angle).astype(np.float32) for f in (np.cos, np.sin))
-    reach = (radius[:, None, None] * frame[:, :, :2]).astype(np.float32)
-    positions = np.zeros((len(t), sides, 3), np.float32)
-    for axis in range(3):
-        positions[:, :, axis] = reach[:, axis, :1] * cos + reach[:, axis, 1:] * sin
-        positions[:, :, axis] += centre[:, axis, None].astype(np.float32)
-
-    rings = len(t)
-    base = np.flatnonzero(~closing).astype(np.int32)  # the ring that each piece starts with
-    here, there = np.arange(sides, dtype=np.int32), (np.arange(1, sides + 1, dtype=np.int32)) % sides
-    lower, upper = base[:, None] * sides, (base[:, None] + 1) * sides
-    corner_verts = np.stack([lower + here, lower + there, upper + there, upper + here], axis=2)
-    ring_edges = np.arange(rings, dtype=np.int32)[:, None] * sides
-    long_edges = rings * sides + np.arange(len(base), dtype=np.int32)[:, None] * sides
-    corner_edges = np.stack([lower + here, long_edges + there, upper + here, long_edges + here], axis=2)
-    edge_verts = np.concatenate(
-        [
-            np.stack([ring_edges + here, ring_edges + there], axis=2).reshape(-1, 2),
-            np.stack([lower + here, upper + here], axis=2).reshape(-1, 2),
-        ]
-    )
-    # v counts lengths of the perimeter at the branch's base, so that a texture is as wide as it is high.
-    v = t * branches.length[owner] / np.maximum(2 * np.pi * branches.radius[owner], 1e-9)
-    low_v, high_v = (np.broadcast_to(v[base + k][:, None], (len(base), sides)) for k in (0, 1))
-    u0, u1 = (np.broadcast_to((np.arange(sides) + k) / sides, (len(base), sides)) for k in (0, 1))
-    uv = np.stack([np.stack(c, axis=2) for c in ((u0, low_v), (u1, low_v), (u1, high_v), (u0, high_v))], axis=2)
-    faces = len(base) * sides
-    colour = branch_colours(flora.rows, branches.row, branches.key)[owner[base]].astype(np.float32)
-    return MeshBuffers(
-        positions=positions.reshape(-1, 3),
-        edge_verts=edge_verts,
-        corner_verts=corner_verts.reshape(-1),
-        corner_edges=corner_edges.reshape(-1),
-        face_offsets=np.arange(faces + 1, dtype=np.int32) * np.int32(4),
-        attributes={
-            "UVMap": ("CORNER", uv.reshape(-1, 2).astype(np.float32)),
-            "tf_colour": ("FACE", np.repeat(colour, sides, axis=0)),
-            "tf_transmission": ("FACE", np.zeros(faces, np.float32)),
-        },
-        smooth=True,
-    )
+    rings = last - first + 2
+    tubes = _Tubes(int((sides * rings).sum()), int((sides * (rings - 1)).sum()))
+    for k in np.unique(sides):
+        runs = np.flatnonzero(sides == k)
+        ends = np.cumsum(rings[runs])
+        for chunk in np.split(runs, np.searchsorted(ends, np.arange(_RINGS_AT_ONCE, ends[-1], _RINGS_AT_ONCE))):
+            if len(chunk):
+                tubes.add(flora, pieces, first[chunk], last[chunk], int(k))
+    return tubes.buffers()
 
 
-def _ring_frames(lines: Axes, branch: NDArray[np.int64], t: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
-    """Centres and frames of rings; at a joint the ring lies half way between the two segments."""
-    centre, frame = lines.at(branch, t)
-    along = t * lines.segments[branch]
+class _Tubes:
+    """Tubes under construction: the arrays of the whole mesh, and how far they are filled.
+
+    Parameters
+    ----------
+    vertices, faces : int
+        How many there will be; there are as many edges as both together.
+    """
+
+    def __init__(self, vertices: int, faces: int) -> None:
+        self.vertices = self.edges = self.faces = 0
+        self.positions = np.zeros((vertices, 3), np.float32)
+        self.edge_verts = np.zeros((vertices + faces, 2), np.int32)
+        self.corner_verts, self.corner_edges = np.zeros((2, faces, 4), np.int32)
+        self.uv = np.zeros((faces, 8), np.float32)
+        self.colour = np.zeros((faces, 3), np.float32)
+
+    def buffers(self) -> MeshBuffers:
+        """The mesh."""
+        faces = len(self.corner_verts)
+        return MeshBuffers(
+            positions=self.positions,
+            edge_verts=self.edge_verts,
+            corner_verts=self.corner_verts.reshape(-1),
+            corner_edges=self.corner_edges.reshape(-1),
+            face_offsets=np.arange(0, 4 * faces + 1, 4, dtype=np.int32),
+            attributes={
+                "UVMap": ("CORNER", self.uv.reshape(-1, 2)),
+                "tf_colour": ("FACE", self.colour),
+                "tf_transmission": ("FACE", np.zeros(faces, np.float32)),
+            },
+            smooth=True,
+        )
+
+    def add(
+        self, flora: Flora, pieces: Pieces, first: NDArray[np.int64], last: NDArray[np.int64], sides: int
+    ) -> None:
+        """Tubes of one number of sides along runs of pieces, from their first to their last."""
+        number = last - first + 1
+        owner, step = spread(number)
+        piece = np.take(first, owner) + step
+        branches = pieces.branches.take(first)
+        # Rings: those of the pieces' starts, and between them those that close each run.
+        base = np.arange(len(piece)) + owner
+        closing = np.cumsum(number + 1) - 1
+        t, of_branch, of_piece = (np.zeros(len(piece) + len(first), kind) for kind in (float, int, int))
+        t[base], t[closing] = np.take(pieces.t0, piece), np.take(pieces.t1, last)
+        of_branch[base], of_branch[closing] = owner, np.arange(len(first))
+        of_piece[base], of_piece[closing] = piece, last
+        centre = np.moveaxis(gathered(pieces.start, of_piece), 0, -1)
+        centre[:, closing] = gathered(pieces.end, last).T
+        across = _ring_axes(axes(flora.rows, branches), of_branch, t)
+        radius = radius_at(flora.rows, _without_places(branches, of_branch), t)
+        self._add_shape(centre.astype(np.float32), (radius * across).astype(np.float32), sides)
+        self._add_topology(base.astype(np.int32), len(t), sides)
+        # v counts lengths of the perimeter at the branch's base, so that a texture is as wide as it is high.
+        v = t * np.take(branches.length / np.maximum(2 * np.pi * branches.radius, 1e-9), of_branch)
+        colour = branch_colours(flora.rows, branches.row, branches.key).astype(np.float32)
+        self._add_looks(v[base], v[base + 1], np.ascontiguousarray(colour)[owner], sides)
+        self.vertices += len(t) * sides
+        self.edges += (len(t) + len(piece)) * sides
+        self.faces += len(piece) * sides
+
+    def _add_shape(self, centre: NDArray[np.float32], reach: NDArray[np.float32], sides: int) -> None:
+        """Vertices around centres (3, rings), along both axes (2, 3, rings) of each ring."""
+        rings = centre.shape[1]
+        angle = 2 * np.pi * np.arange(sides) / sides
+        points = np.zeros((sides, 3, rings), np.float32)
+        for point, x, y in zip(points, np.cos(angle), np.sin(angle), strict=True):  # over a tube's few sides
+            np.multiply(reach[0], np.float32(x), out=point)
+            point += reach[1] * np.float32(y)
+            point += centre
+        new = self.positions[self.vertices : self.vertices + rings * sides]
+        new.reshape(rings, -1)[...] = points.reshape(-1, rings).T
+
+    def _add_topology(self, base: NDArray[np.int32], rings: int, sides: int) -> None:
+        """Edges around all rings, then edges from those where pieces start (p,) to the next; faces between."""
+        here = np.arange(sides, dtype=np.int32)
+        there = np.roll(here, -1)
+        lower = np.int32(self.vertices) + base * np.int32(sides)
+        ring_edge = np.int32(self.edges) + base * np.int32(sides)
+        long_edge = np.int32(self.edges + rings * sides) + np.arange(0, len(base) * sides, sides, dtype=np.int32)
+
+        new = self.edge_verts[self.edges : self.edges + (rings + len(base)) * sides].reshape(-1, 2 * sides)
+        first = np.arange(self.vertices, self.vertices + rings * sides, sides, dtype=np.int32)
+        np.add(first[:, None], _interleaved(here, there), out=new[:rings])
+        np.add(lower[:, None], _interleaved(here, here + sides), out=new[rings:])
+        faces = slice(self.faces, self.faces + len(base) * sides)
+        new = self.corner_verts[faces].reshape(len(base), -1)
+        np.add(lower[:, None], _interleaved(here, there, there + sides, here + sides), out=new)
+        new = self.corner_edges[faces].reshape(len(base), -1)
+        np.add(ring_edge[:, None], _interleaved(here, here + sides), out=new[:, ::2])
+        np.add(long_edge[:, None], _interleaved(there, here), out=new[:, 1::2])
+
+    def _add_looks(self, low: NDArray, high: NDArray, colour: NDArray[np.float32], sides: int) -> None:
+        """Texture coordinates between the v (p,) at both ends of pieces, their colours (p, 3)."""
+        number = len(low) * sides
+        new = self.uv[self.faces : self.faces + number].reshape(len(low), -1)
+        u0, u1, zero = np.arange(sides) / sides, np.arange(1, sides + 1) / sides, np.zeros(sides)
+        u = _interleaved(u0, zero, u1, zero, u1, zero, u0, zero).astype(np.float32)
+        weights = np.array([[0, 1, 0, 1, 0, 0, 0, 0], [0, 0, 0, 0, 0, 1, 0, 1]], np.float32)
+        at_low, at_high = np.tile(weights, sides)
+        np.multiply(low.astype(np.float32)[:, None], at_low, out=new)
+        new += high.astype(np.float32)[:, None] * at_high
+        new += u
+        self.colour[self.faces : self.faces + number] = np.repeat(colour, sides, axis=0)
+
+
+def _interleaved(*columns: NDArray) -> NDArray:
+    """First of each, then second of each, and so on."""
+    return np.stack(columns, axis=1).reshape(-1)
+
+
+def _without_places(branches: Branches, index: NDArray[np.int64]) -> Branches:
+    """Selection of all that numbers and radii depend on; places and frames, which are most of the memory, are zero."""
+    n = len(index)
+    names = ("row", "plant", "key", "length", "radius", "scale", "vigour")
+    rest = {name: np.take(getattr(branches, name), index) for name in names}
+    return Branches(position=np.broadcast_to(0.0, (n, 3)), frame=np.broadcast_to(0.0, (n, 3, 3)), **rest)
+
+
+def _ring_axes(lines: Axes, branch: NDArray[np.int64], t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Both axes (2, 3, n) across a branch at rings; at a joint, half way between those of the two segments."""
+    frames = lines.frames[:, :, :, :2].astype(np.float32)
+    number = np.take(lines.segments, branch)
+    along = t * number
     joint = np.rint(along).astype(np.int64)
-    at_joint = (np.abs(along - joint) < _SAME_T * 1e3) & (joint > 0) & (joint < lines.segments[branch])
-    if at_joint.any():
-        b, j = branch[at_joint], joint[at_joint]
-        centre[at_joint] = lines.knot(b, j)
-        mean = lines.frame(b, j - 1) + lines.frame(b, j)
-        frame[at_joint] = columns(*(unit(mean[:, :, k]) for k in range(3)))
-    return centre, frame
+    at_joint = np.flatnonzero((np.abs(along - joint) < _AT_JOINT) & (joint > 0) & (joint < number))
+    segment = np.minimum(along.astype(np.int64), number - 1)
+    segment[at_joint] = joint[at_joint]
+    light = Axes(lines.knots, frames, lines.segments)
+    out = np.moveaxis(light.frame(branch, segment), 0, -1).swapaxes(0, 1)
+    if len(at_joint):
+        before = light.frame(branch[at_joint], joint[at_joint] - 1)
+        for axis in range(2):
+            out[axis][:, at_joint] = unit(before[:, :, axis] + out[axis][:, at_joint].T).T
+    return out
 
 
 def leaf_buffers(flora: Flora, pieces: Pieces, species: int) -> MeshBuffers | None:
     """Copies of the leaf model for the leaves on pieces of branches of one species.
+
+    A leaf belongs to the piece that holds its base; the tip of the branch belongs to the last piece.
 
     Returns
     -------
     MeshBuffers or None
         Faces with ``UVMap``, ``tf_colour`` and ``tf_transmission``; None where there are no leaves.
     """
-    bearing = flora.rows["leaves"][pieces.branches.row].sum(axis=1) > 0
-    if not bearing.any():
-        return None
-    pieces, branches, branch = _distinct(pieces.take(bearing))
+    first, last = pieces.runs()
+    row = np.take(pieces.branches.row, first)
+    # Row after row, so that parameters are the same for all leaves that are worked on at a time.
+    order = np.argsort(row, kind="stable")
+    order = order[flora.rows["leaves"][row[order]].sum(axis=1) > 0]
+    first, last = first[order], last[order]
+    branches = pieces.branches.take(first)
     counts = leaf_counts(flora.rows, branches)
-    of_piece, index = spread(counts[branch])
-    owner = branch[of_piece]
-    key = leaf_keys(branches, owner, index)
-    t = leaf_places(flora.rows, branches, owner, index, counts, key)
-    # A leaf belongs to the piece that holds its base; the tip of the branch belongs to the last piece.
-    inside = (t >= pieces.t0[of_piece]) & ((t < pieces.t1[of_piece]) | (pieces.t1[of_piece] >= 1))
-    owner, index, key, t = (a[inside] for a in (owner, index, key, t))
-    if len(t) == 0:
+    low, high = leaf_range(flora.rows, branches, counts, pieces.t0[first], pieces.t1[last])
+    number = high - low
+    ends = np.cumsum(number)
+    if len(ends) == 0 or ends[-1] == 0:
         return None
-    leaves = place_leaves(flora.rows, branches, axes(flora.rows, branches), owner, index, key, t)
-    row = branches.row[owner]
-    frame = face_light(leaves.frame, flora.rows["leaf_light"][row], _SKY)
-    colour = leaf_colours(flora.rows, row, key).astype(np.float32)
-    return _copies(
-        flora.leaf_models[species], leaves.position, frame, leaves.size, colour, float(flora.transmission[row[0]])
-    )
-
-
-def _copies(
-    model: LeafModel, position: NDArray, frame: NDArray, size: NDArray, colour: NDArray, transmission: float
-) -> MeshBuffers:
-    n, v, f = len(size), len(model.positions), model.polygons
-    scaled = (frame * size[:, None, None]).astype(np.float32)
-    points = np.zeros((n, v, 3), np.float32)
-    shape = model.positions.astype(np.float32)
-    for axis in range(3):
-        offset = scaled[:, axis, :1] * shape[:, 0]
-        offset += scaled[:, axis, 1:2] * shape[:, 1]
-        offset += scaled[:, axis, 2:] * shape[:, 2]
-        points[:, :, axis] = offset + position[:, axis, None].astype(np.float32)
-    edges, edge_of_corner = model.edges
-    copy = np.arange(n, dtype=np.int32)[:, None]
-    corners = len(model.corner_verts)
-    return MeshBuffers(
-        positions=points.reshape(-1, 3),
-        edge_verts=(edges[None] + copy[:, :, None] * np.int32(v)).reshape(-1, 2),
-        corner_verts=(model.corner_verts[None] + copy * np.int32(v)).reshape(-1),
-        corner_edges=(edge_of_corner[None] + copy * np.int32(len(edges))).reshape(-1),
-        face_offsets=np.append(
-            (model.face_offsets[None, :-1] + copy * np.int32(corners)).reshape(-1), np.int32(n * corners)
-        ),
-        attributes={
-            "UVMap": ("CORNER", np.tile(model.uv, (n, 1))),
-            "tf_colour": ("FACE", np.repeat(colour, f, axis=0)),
-            "tf_transmission": ("FACE", np.full(n * f, transmission, np.float32)),
-        },
-    )
+    model = flora.leaf_models[species]
+    copies = Copies(model, int(ends[-1]), float(flora.transmission[branches.row[0]]))
+    limit = max(_VERTICES_AT_ONCE // len(model.positions), 1)
+    cuts = np.searchsorted(ends, np.arange(limit, ends[-1], limit))
+    new_row = np.flatnonzero(np.diff(branches.row)) + 1
+    for chunk in np.split(np.arange(len(ends)), np.union1d(cuts, new_row)):
+        if number[chunk].sum() == 0:
+            continue
+        part = slice(chunk[0], chunk[-1] + 1)
+        bearers = branches.take(part)
+        owner, index = spread(number[part])
+        index += np.take(low[part], owner)
+        key = leaf_keys(bearers, owner, index)
+        t = leaf_places(flora.rows, bearers, owner, index, counts[part], key)
+        leaves = place_leaves(flora.rows, bearers, axes(flora.rows, bearers), owner, index, key, t)
+        kind = bearers.row[:1]
+        frame = face_light(leaves.frame, flora.rows["leaf_light"][kind], _SKY)
+        copies.add(leaves.position, frame, leaves.size, leaf_colours(flora.rows, kind, key))
+    return copies.buffers()

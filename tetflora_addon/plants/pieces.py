@@ -39,7 +39,11 @@ class Pieces:
         return len(self.t0)
 
     def take(self, index: NDArray | slice) -> Pieces:
-        """Selection by indices, mask or slice."""
+        """Selection by indices, mask or slice; by a mask that leaves nothing out, the pieces themselves."""
+        if not isinstance(index, slice) and index.dtype == bool:
+            if index.all():
+                return self
+            index = np.flatnonzero(index)  # once, not for each field
         ends = gathered(self.start, index), gathered(self.end, index)
         return Pieces(self.branches.take(index), self.t0[index], self.t1[index], *ends)
 
@@ -53,6 +57,32 @@ class Pieces:
     def empty(cls) -> Pieces:
         """No pieces."""
         return cls(Branches.empty(), np.zeros(0), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
+
+    def runs(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """First and last piece (k,), (k,) of each longest row of pieces that follow one another on a branch."""
+        key, plant = self.branches.key, self.branches.plant
+        apart = (key[1:] != key[:-1]) | (plant[1:] != plant[:-1]) | (self.t0[1:] != self.t1[:-1])
+        inner = np.flatnonzero(apart)
+        edge = np.zeros(min(len(self), 1), np.int64)
+        return np.concatenate([edge, inner + 1]), np.concatenate([inner, edge + len(self) - 1])
+
+
+def along_branches(pieces: Pieces) -> Pieces:
+    """The same pieces, those of each branch together and from base to tip; whole branches keep their place.
+
+    No two may overlap. What comes from `whole_pieces` is in order already and costs nothing.
+    """
+    first, last = pieces.runs()
+    # A branch that is whole in one run has no pieces elsewhere.
+    parts = (pieces.t0[first] > 0) | (pieces.t1[last] < 1)
+    if not parts.any():
+        return pieces
+    of_part = np.repeat(parts, last - first + 1)
+    rest = np.flatnonzero(of_part)
+    # The plant belongs to the order: plants of one seed (copies in the scene) have the same keys at different places.
+    key, plant = (np.take(a, rest) for a in (pieces.branches.key, pieces.branches.plant))
+    rest = rest[np.lexsort([np.take(pieces.t0, rest), key, plant])]
+    return pieces.take(np.concatenate([np.flatnonzero(~of_part), rest]))
 
 
 def whole_pieces(branches: Branches, lines: Axes) -> tuple[Pieces, NDArray[np.int64]]:

@@ -20,10 +20,12 @@ def by_component(array: NDArray) -> NDArray:
 
 def gathered(array: NDArray, index: NDArray | slice) -> NDArray:
     """``array[index]`` along the first axis, component by component; ``index`` may be integers, a mask or a slice."""
-    if array.ndim == 1 or isinstance(index, slice):
+    if isinstance(index, slice):
         return array[index]
     if index.dtype == bool:
         index = np.flatnonzero(index)
+    if array.ndim == 1:
+        return np.take(array, index)
     return np.moveaxis(np.take(np.moveaxis(array, 0, -1), index, axis=-1), -1, 0)
 
 
@@ -49,5 +51,5 @@ def cross(a: NDArray, b: NDArray) -> NDArray:
 
 
 def unit(a: NDArray) -> NDArray:
-    """Vectors (n, 3) scaled to length 1; zero vectors stay."""
-    return a / np.maximum(np.sqrt(dot(a, a)), 1e-300)
+    """Vectors (n, 3) scaled to length 1, in the precision that they have; zero vectors stay."""
+    return a / np.maximum(np.sqrt(dot(a, a)), np.finfo(a.dtype).tiny)
