@@ -55,7 +55,7 @@ class Copies:
         new = slice(self.done, self.done + len(size))
         self.done = new.stop
         shape = self.model.positions.astype(np.float32)
-        scaled = np.moveaxis(frame, 0, -1) * size.astype(np.float32)  # (3, 3, n)
+        scaled = frame.transpose(1, 2, 0) * size.astype(np.float32)  # (3, 3, n)
         points = np.zeros((len(shape), 3, len(size)), np.float32)
         for axis in range(3):
             point = points[:, axis]

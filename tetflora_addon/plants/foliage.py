@@ -151,7 +151,7 @@ def _leaf_frames(
 
     The upper side of a leaf faces the tip of its branch: against the tilt, whose first column leads away from it.
     """
-    x, y, z = np.moveaxis(frame, 0, -1).swapaxes(0, 1)
+    x, y, z = frame.transpose(2, 1, 0)
     ca, sa, cd, sd = (f(v) for v in (azimuth, angle) for f in (np.cos, np.sin))
     out = np.zeros((3, 3, len(azimuth)), np.float32)
     across, along, up = out.swapaxes(0, 1)
@@ -163,7 +163,7 @@ def _leaf_frames(
     along += cd * z
     np.multiply(sd, z, out=up)
     up -= cd * radial
-    return np.moveaxis(out, -1, 0)
+    return out.transpose(2, 0, 1)
 
 
 def face_light(frame: NDArray[np.floating], light: NDArray[np.float64], sky: NDArray[np.float64]) -> NDArray:
@@ -204,7 +204,7 @@ def face_light(frame: NDArray[np.floating], light: NDArray[np.float64], sky: NDA
     along_out /= length
     np.multiply(along_out[[1, 2, 0]], normal[[2, 0, 1]], out=across_out)
     across_out -= along_out[[2, 0, 1]] * normal[[1, 2, 0]]
-    return np.moveaxis(out, -1, 0)
+    return out.transpose(2, 0, 1)
 
 
 def _inner(a: NDArray, b: NDArray) -> NDArray:
@@ -231,7 +231,7 @@ def branch_colours(rows: NDArray[np.void], row: NDArray[np.integer], key: NDArra
 
 
 def _colours(colour: NDArray[np.float64], draw: NDArray[np.float64]) -> NDArray[np.float64]:
-    mean, variation = np.moveaxis(colour, 0, -1)
+    mean, variation = colour.transpose(1, 2, 0)
     out = variation * draw
     out += mean
     return np.clip(out, 0, 1, out=out).T

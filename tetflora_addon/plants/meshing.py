@@ -19,9 +19,9 @@ from .vectors import gathered, unit
 
 _SKY = np.array([0.0, 0.0, 1.0])
 _AT_JOINT = 1e-6  # fractions of a segment closer to a joint than this are at it
-#: Vertices of leaves, and rings of tubes, that are worked on at a time: what passes through numpy stays in the cache.
-_VERTICES_AT_ONCE = 40_000
-_RINGS_AT_ONCE = 16_000
+#: Vertices of leaves, and rings of tubes, that are worked on at a time: some ten megabytes.
+_VERTICES_AT_ONCE = 120_000
+_RINGS_AT_ONCE = 48_000
 
 
 def concatenate_buffers(parts: Sequence[MeshBuffers]) -> MeshBuffers | None:
@@ -115,9 +115,7 @@ class _Tubes:
             smooth=True,
         )
 
-    def add(
-        self, flora: Flora, pieces: Pieces, first: NDArray[np.int64], last: NDArray[np.int64], sides: int
-    ) -> None:
+    def add(self, flora: Flora, pieces: Pieces, first: NDArray[np.int64], last: NDArray[np.int64], sides: int) -> None:
         """Tubes of one number of sides along runs of pieces, from their first to their last."""
         number = last - first + 1
         owner, step = spread(number)
@@ -130,7 +128,7 @@ class _Tubes:
         t[base], t[closing] = np.take(pieces.t0, piece), np.take(pieces.t1, last)
         of_branch[base], of_branch[closing] = owner, np.arange(len(first))
         of_piece[base], of_piece[closing] = piece, last
-        centre = np.moveaxis(gathered(pieces.start, of_piece), 0, -1)
+        centre = gathered(pieces.start, of_piece).T
         centre[:, closing] = gathered(pieces.end, last).T
         across = _ring_axes(axes(flora.rows, branches), of_branch, t)
         radius = radius_at(flora.rows, _without_places(branches, of_branch), t)
@@ -212,7 +210,7 @@ def _ring_axes(lines: Axes, branch: NDArray[np.int64], t: NDArray[np.float64]) -
     segment = np.minimum(along.astype(np.int64), number - 1)
     segment[at_joint] = joint[at_joint]
     light = Axes(lines.knots, frames, lines.segments)
-    out = np.moveaxis(light.frame(branch, segment), 0, -1).swapaxes(0, 1)
+    out = light.frame(branch, segment).transpose(2, 1, 0)
     if len(at_joint):
         before = light.frame(branch[at_joint], joint[at_joint] - 1)
         for axis in range(2):

@@ -15,7 +15,16 @@ from numpy.typing import NDArray
 
 def by_component(array: NDArray) -> NDArray:
     """The same values (n, ...), with memory laid out component by component."""
-    return np.moveaxis(np.ascontiguousarray(np.moveaxis(array, 0, -1)), -1, 0)
+    return _first_to_front(np.ascontiguousarray(_first_to_back(array)))
+
+
+def _first_to_back(array: NDArray) -> NDArray:
+    """As np.moveaxis, which takes as long as arithmetic on a thousand numbers."""
+    return array.transpose(*range(1, array.ndim), 0)
+
+
+def _first_to_front(array: NDArray) -> NDArray:
+    return array.transpose(-1, *range(array.ndim - 1))
 
 
 def gathered(array: NDArray, index: NDArray | slice) -> NDArray:
@@ -26,12 +35,12 @@ def gathered(array: NDArray, index: NDArray | slice) -> NDArray:
         index = np.flatnonzero(index)
     if array.ndim == 1:
         return np.take(array, index)
-    return np.moveaxis(np.take(np.moveaxis(array, 0, -1), index, axis=-1), -1, 0)
+    return _first_to_front(np.take(_first_to_back(array), index, axis=-1))
 
 
 def columns(x: NDArray, y: NDArray, z: NDArray) -> NDArray:
     """Frames (n, 3, 3) with columns x, y, z (n, 3)."""
-    return np.moveaxis(np.stack([x.T, y.T, z.T], axis=1), -1, 0)
+    return np.stack([x.T, y.T, z.T], axis=1).transpose(2, 0, 1)
 
 
 def dot(a: NDArray, b: NDArray) -> NDArray:
