@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The catalogue as a picture (the paper's figure 4): one plant of each species side by side, fully expanded."""
+"""The catalogue as a picture (the paper's figure 4): one plant of each species, fully expanded."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from devtools import session
 
 from .row80 import add_daylight
 from .terrain import ground_material
-
 
 PER_ROW = 7
 STEP, TERRACE = 8.0, 11.5

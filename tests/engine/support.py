@@ -26,8 +26,19 @@ from tetflora_addon.plants.species import MAX_ORDERS
 from tetflora_addon.refinement.camera import Camera
 
 SPECIES = tuple(sorted(path.stem for path in builtin_folder().glob("*.json")))
-#: Species of so many alike branches that a few plants settle means of place and direction; a palm has thirty fronds.
-DENSE = ("bamboo", "birch", "broadleaf_tree", "bush", "cherry_blossom", "conifer", "cypress", "fern", "oak", "scots_pine")
+#: Species of so many alike branches that a few plants settle means of place and direction (a palm has 30 fronds).
+DENSE = (
+    "bamboo",
+    "birch",
+    "broadleaf_tree",
+    "bush",
+    "cherry_blossom",
+    "conifer",
+    "cypress",
+    "fern",
+    "oak",
+    "scots_pine",
+)
 
 #: Three orders, every feature, some 600 polygons: large enough to be a plant, small enough for hundreds of them.
 SMALL: dict[str, Any] = {
