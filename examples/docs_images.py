@@ -22,6 +22,8 @@ def as_jpeg(source: Path, target: Path, quality: int = 88) -> None:
     import bpy
 
     image = bpy.data.images.load(str(source))
+    image.colorspace_settings.name = "Non-Color"
+    image.update()  # read it now: what was only named has nothing to save
     image.file_format, image.filepath_raw = 'JPEG', str(target)
     image.save(quality=quality)
     bpy.data.images.remove(image)

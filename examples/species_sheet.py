@@ -21,7 +21,7 @@ STEP, TERRACE = 8.0, 11.5
 
 
 def build(scene: bpy.types.Scene, seed: int = 11) -> list[str]:
-    """Place one plant of each species of the catalogue on terraces, as large as the sheet allows; returns their names."""
+    """Place one plant of each species of the catalogue on terraces, as large as there is room; returns their names."""
     catalogue = session.part("tetflora_addon.plants.catalogue")
     known = catalogue.list_species()
     flora = session.part("tetflora_addon.plants.compiled").compile_species([catalogue.load_species(i) for i in known])
