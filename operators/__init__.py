@@ -18,6 +18,7 @@ from . import (
     select_species,
     species_edit,
     species_files,
+    species_preview,
 )
 
 CLASSES = (
@@ -35,6 +36,7 @@ CLASSES = (
     species_edit.TETFLORA_OT_duplicate_species,
     species_edit.TETFLORA_OT_revert_species,
     species_edit.TETFLORA_OT_edit_orders,
+    species_preview.TETFLORA_OT_preview_species,
     species_files.TETFLORA_OT_save_species,
     species_files.TETFLORA_OT_load_species,
     species_files.TETFLORA_OT_export_species,

@@ -7,6 +7,7 @@ from textwrap import wrap
 import bpy
 
 from ..operators import ids
+from ..tetflora_addon.blender import species_preview
 from ..tetflora_addon.blender.species_editor import (
     OBJECT_LEAF,
     VARIATION,
@@ -70,6 +71,14 @@ class TETFLORA_PT_species(SidebarPanel, bpy.types.Panel):
             layout.label(text="Your own species" if own_file(identifier) else "As shipped", icon='LOCKED')
         if problem := problem_of(scene, identifier):
             draw_message(context, layout, problem)
+        shown = species_preview.shown_in(scene)
+        row = layout.row(align=True)
+        row.use_property_split = False
+        row.operator(ids.PREVIEW_SPECIES, text="Preview", icon='HIDE_OFF' if shown else 'HIDE_ON', depress=shown)
+        row.prop(editor, "preview_seed")
+        text, failed = species_preview.message()
+        if shown and text and text != problem:
+            draw_message(context, layout, text, 'ERROR' if failed else 'BLANK1')
 
 
 class _SpeciesPart(SidebarPanel):

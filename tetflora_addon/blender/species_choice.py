@@ -4,6 +4,7 @@
 
 from bpy.props import EnumProperty, StringProperty
 
+from .species_edits import tell_listeners
 from .species_items import items_for, number_of
 
 
@@ -32,3 +33,4 @@ def _choose(group: SpeciesChoice, number: int) -> None:
     for identifier, *_, item_number in items_for(group.species):
         if item_number == number and number:
             group.species = identifier
+            tell_listeners()

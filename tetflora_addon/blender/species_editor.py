@@ -19,7 +19,7 @@ from ..plants.leaf_models import LEAF_MODELS
 from ..plants.schema import LENGTH_HIGH, ORDER_KEYS, Key
 from ..plants.species import MAX_ORDERS
 from .species_choice import SpeciesChoice
-from .species_edits import change_species, species_data, species_for
+from .species_edits import change_species, species_data, species_for, tell_listeners
 from .species_items import catalogue
 
 #: Added to a key's name for the property of a range's second number.
@@ -315,6 +315,14 @@ class _Fixed(SpeciesChoice):
         get=present_order,
         set=lambda self, number: setattr(self, "order_index", number),
         options={'SKIP_SAVE'},
+    )
+    preview_seed: IntProperty(
+        name="Seed",
+        description="Which individual of the species the preview shows",
+        default=1,
+        min=0,
+        update=lambda _self, _context: tell_listeners(),
+        options=set(),
     )
     species_name: StringProperty(
         name="Name",

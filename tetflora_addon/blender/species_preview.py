@@ -1,0 +1,196 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One plant of the species in the editor, live in the viewport: rebuilt after each change, never rendered or saved.
+
+The preview belongs to the session, not to the file: what is shown is remembered here by names, its datablocks are
+runtime data, and undo may take them away at any time; the next change, or the undo itself, brings them back.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ..errors import TetFloraError
+from ..plants.compiled import Flora, compile_species
+from ..plants.seeds import Seeds
+from ..plants.species import Range
+from . import job, species_editor, species_edits
+from .node_tools import is_ours, tag
+from .plant_mesh import expected_polygons, plant_buffers, plant_mesh, single_seed
+
+NAME = "TetFlora preview"
+#: Polygons that a preview has at most, about: what is rebuilt while a slider moves.
+MOST_POLYGONS = 150_000
+_SOON = 0.05  # seconds from a change to the rebuilding
+
+
+@dataclass
+class _State:
+    """The scene whose editor shows a preview, and how the last rebuilding went."""
+
+    scene: str | None = None
+    message: str = ""
+    failed: bool = False
+    seconds: float = 0.0
+
+
+_state = _State()
+
+
+def shown_in(scene: bpy.types.Scene) -> bool:
+    """Whether the preview is switched on in a scene."""
+    return _state.scene == scene.name
+
+
+def message() -> tuple[str, bool]:
+    """What a panel says of the preview, and whether it is a complaint."""
+    return _state.message, _state.failed
+
+
+def show(scene: bpy.types.Scene, on: bool) -> None:
+    """Switch the preview of a scene on or off; in the window it appears a moment later."""
+    _remove()
+    _state.scene, _state.message, _state.failed = (scene.name, "", False) if on else (None, "", False)
+    if on:
+        schedule()
+
+
+def schedule() -> None:
+    """Rebuild the preview soon; many changes in a row are one rebuilding."""
+    if _state.scene is not None:
+        _call_soon()
+
+
+def _call_soon() -> None:
+    if bpy.app.timers.is_registered(_on_timer):
+        return
+    # A large plant must not keep the window busy while a slider is dragged.
+    bpy.app.timers.register(_on_timer, first_interval=max(_SOON, _state.seconds))
+
+
+def _call_off() -> None:
+    # Also before a file is loaded: 4.5's wheel hangs at exit if Blender itself has dropped a waiting timer.
+    if bpy.app.timers.is_registered(_on_timer):
+        bpy.app.timers.unregister(_on_timer)
+
+
+def _on_timer() -> None:
+    refresh()
+
+
+def refresh() -> None:
+    """Build the preview anew, now; take it away if it is switched off."""
+    scene = bpy.data.scenes.get((_state.scene, None)) if _state.scene is not None else None
+    if scene is None:
+        _state.scene = None
+        _remove()
+        return
+    begin = time.perf_counter()
+    editor = scene.tetflora.species_editor
+    identifier = species_editor.present_species(editor)
+    try:
+        depsgraph = scene.view_layers[0].depsgraph or bpy.context.evaluated_depsgraph_get()
+        seeds = single_seed(identifier, editor.preview_seed)
+        flora, orders = _limited(job.compile_for((identifier,), scene, depsgraph), seeds)
+        mesh = plant_mesh(NAME, flora.species[0].name, plant_buffers(flora, seeds))
+    except TetFloraError as error:
+        _state.message, _state.failed = str(error), True
+        return  # the last plant that could be grown stays
+    _place(scene, mesh)
+    _state.seconds = time.perf_counter() - begin
+    cut = f" of the first {orders} orders; all would be too many to follow a slider" if orders else ""
+    _state.message, _state.failed = f"{len(mesh.polygons):,} polygons{cut}", False
+    _redraw()
+
+
+def _limited(flora: Flora, seeds: Seeds) -> tuple[Flora, int]:
+    """The species, cut off after as many orders as the preview can show; and how many, 0 for all."""
+    species = flora.species[0]
+    number = len(species.orders)
+    while number > 1 and expected_polygons(flora, seeds) > MOST_POLYGONS:
+        number -= 1
+        kept = species.orders[: number - 1] + (replace(species.orders[number - 1], branches=Range(0.0)),)
+        flora = compile_species([replace(species, leaf=flora.leaf_models[0], orders=kept)])
+    return flora, 0 if number == len(species.orders) else number
+
+
+def _place(scene: bpy.types.Scene, mesh: bpy.types.Mesh) -> None:
+    """Show a mesh at the scene's 3D cursor, in place of the one before."""
+    tag(mesh)
+    found = _objects()
+    if not found or found[0].name not in scene.objects:
+        _remove()
+        collection = bpy.data.collections.new(NAME)
+        scene.collection.children.link(collection)
+        obj = bpy.data.objects.new(NAME, mesh)
+        collection.objects.link(obj)
+        obj.hide_render = obj.hide_select = True
+        collection.hide_render = True
+        tag(collection)
+        tag(obj)
+    else:
+        obj = found[0]
+        old, obj.data = obj.data, mesh
+        bpy.data.meshes.remove(old)
+    for datablock in (obj, mesh, *_collections()):
+        datablock.is_runtime_data = True  # each time: undo brings datablocks back without it
+    obj.location = scene.cursor.location
+
+
+def _objects() -> list[bpy.types.Object]:
+    # By mark and not by name: an artist's object may be called like ours.
+    return [o for o in bpy.data.objects if o.name.startswith(NAME) and is_ours(o) and o.type == 'MESH']
+
+
+def _collections() -> list[bpy.types.Collection]:
+    return [c for c in bpy.data.collections if c.name.startswith(NAME) and is_ours(c)]
+
+
+def _remove() -> None:
+    objects = _objects()
+    # Materials stay for Refine to use; Blender does not save them while nobody does.
+    bpy.data.batch_remove([*objects, *{o.data for o in objects if is_ours(o.data)}, *_collections()])
+
+
+def _redraw() -> None:
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == 'VIEW_3D':
+                area.tag_redraw()
+
+
+@persistent
+def _on_undo(_scene: bpy.types.Scene, _other: object = None) -> None:
+    # Undo may also bring back a preview that was switched off since.
+    if _state.scene is not None or _objects():
+        _call_soon()
+
+
+@persistent
+def _on_load_pre(_path: object, _other: object = None) -> None:
+    _state.scene = None
+    _call_off()
+
+
+_HANDLERS = {"undo_post": _on_undo, "redo_post": _on_undo, "load_pre": _on_load_pre}
+
+
+def register() -> None:
+    """Listen to changes of species, undo and loading."""
+    species_edits.listeners.append(schedule)
+    for name, handler in _HANDLERS.items():
+        getattr(bpy.app.handlers, name).append(handler)
+
+
+def unregister() -> None:
+    """Take the preview and all that listens away."""
+    _remove()
+    _state.scene = None
+    _call_off()
+    for name, handler in _HANDLERS.items():
+        getattr(bpy.app.handlers, name).remove(handler)
+    species_edits.listeners.remove(schedule)
