@@ -74,10 +74,8 @@ def explicit_blocks(flora: Flora, result: Refinement) -> Iterator[Block]:
     contents = result.contents.within(block_of_node >= 0)
     of_subplant, of_piece = block_of_node[contents.subplant_cell], block_of_node[contents.piece_cell]
     for number in range(len(runs)):
-        pieces = Pieces.concatenate(
-            [contents.pieces.take(of_piece == number), expand(flora, contents.subplants.take(of_subplant == number))]
-        )
-        yield from _block(flora, pieces, number, (number + 1) / len(runs))
+        cut, whole = contents.pieces.take(of_piece == number), contents.subplants.take(of_subplant == number)
+        yield from _block(flora, Pieces.concatenate([cut, expand(flora, whole)]), number, (number + 1) / len(runs))
 
 
 def expanded_blocks(flora: Flora, seeds: Seeds) -> Iterator[Block]:
@@ -90,11 +88,18 @@ def expanded_blocks(flora: Flora, seeds: Seeds) -> Iterator[Block]:
 
 def _block(flora: Flora, pieces: Pieces, number: int, fraction: float) -> Iterator[Block]:
     species = pieces.branches.row // MAX_ORDERS
+    made: list[tuple[str, int, MeshBuffers | None]] = []
+    own = None
     for s in np.unique(species):
         own = pieces.take(species == s)
-        for kind, buffers in (("leaf", leaf_buffers(flora, own, int(s))), ("bark", tube_buffers(flora, own))):
-            if buffers is not None:
-                yield Block(kind, int(s), number, buffers, fraction)
+        made += [("leaf", int(s), leaf_buffers(flora, own, int(s))), ("bark", int(s), tube_buffers(flora, own))]
+    # Whoever takes a block copies it into Blender: what it was made from, and what was taken, is not kept meanwhile.
+    del pieces, species, own
+    while made:
+        kind, s, buffers = made.pop(0)
+        if buffers is not None:
+            yield Block(kind, s, number, buffers, fraction)
+        del buffers
 
 
 def facet_buffers(

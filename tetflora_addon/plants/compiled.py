@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,13 +103,18 @@ def _children(rows: NDArray[np.void], index: int) -> tuple[float, float, float, 
 
 
 def compile_species(species: Sequence[Species]) -> Flora:
-    """Compile the species of a scene.
+    """Compile the species of a scene; the last few results are kept, by content.
 
     Raises
     ------
     SpeciesError
         A species whose leaf is still the name of a Blender object (the bridge to Blender has to replace it first).
     """
+    return _compiled(tuple(species))
+
+
+@lru_cache(maxsize=8)
+def _compiled(species: tuple[Species, ...]) -> Flora:
     for one in species:
         if not isinstance(one.leaf, LeafModel):
             raise SpeciesError(f"{one.identifier}: the leaf object \"{one.leaf}\" has not been resolved to a mesh")
