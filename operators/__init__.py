@@ -16,6 +16,7 @@ from . import (
     remove_plants,
     reseed,
     select_species,
+    species_assets,
     species_edit,
     species_files,
     species_preview,
@@ -41,6 +42,7 @@ CLASSES = (
     species_files.TETFLORA_OT_load_species,
     species_files.TETFLORA_OT_export_species,
     species_files.TETFLORA_OT_delete_species,
+    species_assets.TETFLORA_OT_create_asset_library,
 )
 
 

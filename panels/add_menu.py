@@ -6,6 +6,7 @@ import bpy
 
 from ..operators import ids
 from ..tetflora_addon.blender.species_items import catalogue
+from .base import picture
 
 
 class TETFLORA_MT_add_plant(bpy.types.Menu):
@@ -16,7 +17,8 @@ class TETFLORA_MT_add_plant(bpy.types.Menu):
     def draw(self, _context: bpy.types.Context) -> None:
         known = catalogue()
         for info in known.values():
-            self.layout.operator(ids.ADD_PLANT, text=info.name).species = info.identifier
+            icon = picture(info.identifier)
+            self.layout.operator(ids.ADD_PLANT, text=info.name, **icon).species = info.identifier
         if not known:
             self.layout.label(text="The catalogue has no species", icon='ERROR')
 

@@ -4,6 +4,8 @@
 
 import bpy
 
+from ..tetflora_addon.blender.thumbnails import FALLBACK_ICON, icon_of
+
 
 class SidebarPanel:
     """Mix-in for panels in the 3D view's sidebar."""
@@ -18,3 +20,9 @@ def split_layout(panel: bpy.types.Panel) -> bpy.types.UILayout:
     panel.layout.use_property_split = True
     panel.layout.use_property_decorate = False
     return panel.layout
+
+
+def picture(identifier: str) -> dict[str, str | int]:
+    """Arguments for a layout's element that shows a species' picture, or an icon where it has none."""
+    number = icon_of(identifier)
+    return {"icon_value": number} if number else {"icon": FALLBACK_ICON}

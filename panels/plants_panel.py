@@ -6,7 +6,7 @@ import bpy
 
 from ..operators import ids
 from ..tetflora_addon.blender.species_items import catalogue
-from .base import SidebarPanel, split_layout
+from .base import SidebarPanel, picture, split_layout
 
 
 class TETFLORA_MT_species(bpy.types.Menu):
@@ -16,7 +16,8 @@ class TETFLORA_MT_species(bpy.types.Menu):
 
     def draw(self, _context: bpy.types.Context) -> None:
         for info in catalogue().values():
-            self.layout.operator(ids.ASSIGN_SPECIES, text=info.name).species = info.identifier
+            icon = picture(info.identifier)
+            self.layout.operator(ids.ASSIGN_SPECIES, text=info.name, **icon).species = info.identifier
 
 
 class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):

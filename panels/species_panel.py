@@ -45,6 +45,8 @@ class TETFLORA_MT_species_files(bpy.types.Menu):
         layout.operator(ids.EXPORT_SPECIES, icon='EXPORT')
         layout.separator()
         layout.operator(ids.DELETE_SPECIES, icon='TRASH')
+        layout.separator()
+        layout.operator(ids.CREATE_ASSET_LIBRARY, icon='ASSET_MANAGER')
 
 
 class TETFLORA_PT_species(SidebarPanel, bpy.types.Panel):
@@ -59,6 +61,7 @@ class TETFLORA_PT_species(SidebarPanel, bpy.types.Panel):
         scene = context.scene
         editor = scene.tetflora.species_editor
         identifier = present_species(editor)
+        layout.template_icon_view(editor, "species_choice", show_labels=True, scale=5.0, scale_popup=5.0)
         row = layout.row(align=True)
         row.use_property_split = False
         row.prop(editor, "species_choice", text="")

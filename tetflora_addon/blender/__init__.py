@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Everything below the operators that touches bpy: what the scene stores, reading it, writing results, rendering."""
 
-from . import command_line, handlers, preferences, properties, species_preview
+from . import asset_library, command_line, handlers, preferences, properties, species_preview, thumbnails
 
 # Handlers and commands read properties, so those come first.
-_PARTS = (preferences, properties, handlers, species_preview, command_line)
+_PARTS = (preferences, thumbnails, properties, handlers, species_preview, asset_library, command_line)
 
 
 def register() -> None:

@@ -11,12 +11,13 @@ from ..errors import SpeciesError
 from ..plants.catalogue import SpeciesInfo, list_species
 from .preferences import species_folders
 from .species_edits import edited_infos, species_for
+from .thumbnails import FALLBACK_ICON, icon_of
 
 # What an enumeration says when there is nothing to choose.
 NO_SPECIES = "NONE"
 FALLBACK_HEIGHT = 5.0  # metres, of the arrow of a plant whose species cannot be read
 
-Item = tuple[str, str, str, str, int]
+Item = tuple[str, str, str, str | int, int]
 
 # Blender keeps no copy of the strings of dynamic items, so somebody has to.
 _kept: dict[tuple, list[Item]] = {}
@@ -43,15 +44,18 @@ def items_for(present: str = "") -> list[Item]:
         Identifier that is chosen now; it survives although its file is missing.
     """
     known = catalogue()
-    stamp = (present if present not in known else "", *((i.identifier, i.name, i.description) for i in known.values()))
+    icons = {identifier: icon_of(identifier) for identifier in known}
+    missing = present if present not in known else ""
+    stamp = (missing, *((i.identifier, i.name, i.description, icons[i.identifier]) for i in known.values()))
     if stamp not in _kept:
-        _kept[stamp] = _items(known, present)
+        _kept[stamp] = _items(known, icons, present)
     return _kept[stamp]
 
 
-def _items(known: Mapping[str, SpeciesInfo], present: str) -> list[Item]:
+def _items(known: Mapping[str, SpeciesInfo], icons: Mapping[str, int], present: str) -> list[Item]:
     items = [
-        (i.identifier, i.name, i.description, 'OUTLINER_OB_EMPTY', number_of(i.identifier)) for i in known.values()
+        (i.identifier, i.name, i.description, icons[i.identifier] or FALLBACK_ICON, number_of(i.identifier))
+        for i in known.values()
     ]
     if present and present not in known:
         text = "The catalogue does not have this species; refining the scene will fail until it does"

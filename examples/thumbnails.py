@@ -1,0 +1,112 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures of the catalogue's species for menus: ``python -m examples.thumbnails [IDENTIFIER ...]``.
+
+One plant of each species in daylight, rendered by Cycles in front of nothing, 128 × 128 pixels, into
+``tetflora_addon/catalogue/thumbnails``. A picture is stored with as many colours as fit into 30 kB.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from devtools import session
+
+FOLDER = session.ROOT / "tetflora_addon" / "catalogue" / "thumbnails"
+SIDE, SAMPLES, SEED = 128, 96, 11
+LARGEST = 30_000  # bytes
+
+
+def render_thumbnail(identifier: str, path: Path) -> None:
+    """Render one plant of a species as a PNG with a transparent background."""
+    import bpy
+    import numpy as np
+    from mathutils import Vector
+
+    from .row80 import add_daylight
+
+    session.clean_file()
+    scene = bpy.context.scene
+    empty = bpy.data.objects.new(identifier, None)
+    empty.tetflora.is_plant, empty.tetflora.species, empty.tetflora.seed = True, identifier, SEED
+    scene.collection.objects.link(empty)
+    bpy.context.view_layer.update()
+    make = session.part("tetflora_addon.blender.plant_mesh").make_plant_meshes
+    (plant,) = make(scene, bpy.context.evaluated_depsgraph_get(), [empty])
+    points = np.zeros((len(plant.data.vertices), 3), np.float32)
+    plant.data.vertices.foreach_get("co", points.reshape(-1))
+    # A few twigs that reach far out must not make the rest small.
+    low, high = np.quantile(points, 0.002, axis=0), np.quantile(points, 0.998, axis=0)
+    low[2] = min(low[2], 0.0)
+    middle, side = (low + high) / 2, max(float((high - low).max()), math.hypot(*(high - low)[:2])) * 1.06
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.type, camera.data.ortho_scale = 'ORTHO', side
+    eye = Vector(middle.tolist()) + side * Vector((1.2, -2.4, 0.55))
+    camera.location = eye
+    camera.rotation_euler = (Vector(middle.tolist()) - eye).to_track_quat('-Z', 'Y').to_euler()
+    camera.data.clip_end = 10.0 * side
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    add_daylight(scene, elevation=45.0, azimuth=120.0)
+    scene.tetflora.refine_at_render = False
+    scene.render.engine, scene.render.film_transparent = 'CYCLES', True
+    scene.cycles.samples, scene.cycles.use_denoising = SAMPLES, False
+    scene.view_settings.exposure = 1.1
+    scene.render.resolution_x = scene.render.resolution_y = SIDE
+    image = scene.render.image_settings
+    session.part("tetflora_addon.blender.compat").set_still_format(image, 'PNG')
+    image.color_mode, image.color_depth, image.compression = 'RGBA', '8', 100
+    scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+
+
+def _shrink(source: Path, target: Path) -> None:
+    """Store a picture with fewer steps of colour until it is small enough."""
+    import bpy
+    import numpy as np
+
+    image = bpy.data.images.load(str(source))
+    image.colorspace_settings.name = "Non-Color"
+    image.alpha_mode = 'CHANNEL_PACKED'
+    pixels = np.zeros(len(image.pixels), np.float32)
+    image.pixels.foreach_get(pixels)
+    for steps in (255, 63, 47, 31, 23, 15):
+        coarse = np.round(pixels * steps) / steps
+        coarse.reshape(-1, 4)[coarse[3::4] == 0] = 0.0  # colours that nobody sees
+        stored: Any = bpy.data.images.new("thumbnail", SIDE, SIDE, alpha=True)
+        stored.colorspace_settings.name = "Non-Color"
+        stored.alpha_mode = 'CHANNEL_PACKED'
+        stored.pixels.foreach_set(coarse)
+        stored.file_format, stored.filepath_raw = 'PNG', str(target)
+        stored.save()
+        bpy.data.images.remove(stored)
+        if target.stat().st_size <= LARGEST:
+            break
+    bpy.data.images.remove(image)
+
+
+def main(wanted: list[str]) -> int:
+    """Make the pictures that are asked for, or all; exit code 1 if one is too large."""
+    session.start()
+    known = session.part("tetflora_addon.plants.catalogue").list_species()
+    FOLDER.mkdir(exist_ok=True)
+    large = []
+    with tempfile.TemporaryDirectory() as folder:
+        for identifier in wanted or known:
+            render_thumbnail(identifier, Path(folder) / "plant.png")
+            target = FOLDER / f"{identifier}.png"
+            _shrink(Path(folder) / "plant.png", target)
+            print(f"{target.stat().st_size:>8,} {target.relative_to(session.ROOT)}", flush=True)
+            large += [identifier] if target.stat().st_size > LARGEST else []
+    session.stop()
+    if large:
+        print(f"larger than {LARGEST:,} bytes: {', '.join(large)}", file=sys.stderr)
+    return 1 if large else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

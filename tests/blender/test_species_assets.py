@@ -1,0 +1,140 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures of species in menus, and the catalogue as an asset library."""
+
+from __future__ import annotations
+
+import shutil
+
+import numpy as np
+import pytest
+
+from devtools import session
+from tests.blender.scenes import add_camera, add_plant, datablocks, depsgraph, part, select
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+
+@pytest.fixture
+def own_folder(tmp_path):
+    import bpy
+
+    preferences = bpy.context.preferences.addons[part("preferences").ROOT_PACKAGE].preferences
+    folder = tmp_path / "species"
+    (folder / "thumbnails").mkdir(parents=True)
+    preferences.species_folder = str(folder)
+    yield folder
+    preferences.species_folder = ""
+
+
+def _shipped():
+    return session.part("tetflora_addon.plants.catalogue").list_species()
+
+
+def test_pictures_are_small_squares_of_known_species():
+    import bpy
+
+    folder = session.part("tetflora_addon.plants.catalogue").builtin_folder() / "thumbnails"
+    pictures = sorted(folder.glob("*"))
+    assert {p.stem for p in pictures} <= set(_shipped())
+    assert len(pictures) >= 3
+    for path in pictures:
+        assert path.suffix == ".png"
+        assert path.stat().st_size <= 30_000
+        image = bpy.data.images.load(str(path))
+        assert tuple(image.size) == (128, 128)
+        pixels = np.zeros(len(image.pixels), np.float32)
+        image.pixels.foreach_get(pixels)
+        alpha = pixels[3::4]
+        assert 0.01 < alpha.mean() < 0.9, path.name  # a plant in front of nothing
+        bpy.data.images.remove(image)
+
+
+def test_a_species_without_a_picture_gets_an_icon(own_folder):
+    shipped = _shipped()
+    thumbnails, items = part("thumbnails"), part("species_items")
+    shutil.copy(shipped["bush"].path, own_folder / "mine.json")
+    assert thumbnails.icon_of("mine") == thumbnails.icon_of("") == thumbnails.icon_of("gone") == 0
+    mine = next(i for i in items.items_for() if i[0] == "mine")
+    assert mine[3] == thumbnails.FALLBACK_ICON
+    shutil.copy(thumbnails.thumbnail_file("bush"), own_folder / "thumbnails" / "mine.png")
+    assert thumbnails.thumbnail_file("mine") == own_folder / "thumbnails" / "mine.png"
+    # In the background Blender hands out numbers too; the same picture keeps its own.
+    assert thumbnails.icon_of("mine") == thumbnails.icon_of("mine")
+
+
+def test_the_library_holds_a_plant_of_each_species(tmp_path):
+    import bpy
+
+    add_plant("Bush", "conifer", seed=5)  # has the name of an asset
+    before = datablocks()
+    assert bpy.ops.tetflora.create_asset_library(directory=str(tmp_path / "lib")) == {'FINISHED'}
+    assert datablocks() == before
+    path = tmp_path / "lib" / part("asset_library").FILE
+    with bpy.data.libraries.load(str(path), assets_only=True) as (there, _here):
+        names = list(there.objects)
+    assert sorted(names) == sorted(info.name for info in _shipped().values())
+    assert "TetFlora" in (tmp_path / "lib" / "blender_assets.cats.txt").read_text(encoding="utf-8")
+    bpy.ops.tetflora.create_asset_library(directory=str(tmp_path / "lib"))  # over the first one
+    catalogs = (tmp_path / "lib" / "blender_assets.cats.txt").read_text(encoding="utf-8")
+    assert catalogs.count(":TetFlora:") == 1
+
+
+def test_an_asset_becomes_a_working_plant(tmp_path):
+    import bpy
+
+    path, _ = part("asset_library").write_asset_library(tmp_path)
+    session.clean_file()
+    scene = bpy.context.scene
+    add_camera()
+    assert not scene.render.use_lock_interface
+    bpy.ops.wm.append(directory=f"{path}/Object/", filename="Bush")
+    (plant,) = (o for o in scene.objects if o.tetflora.is_plant)
+    assert (plant.tetflora.species, plant.tetflora.seed, plant.tetflora.enabled) == ("bush", 1, True)
+    assert plant.tetflora.version == part("migration").VERSION
+    assert scene.render.use_lock_interface
+    assert "tetflora_temporary" not in plant
+    assert part("job").estimate(scene, depsgraph()).polygons_full > 1000
+    select(plant)
+    bpy.ops.tetflora.reseed()
+    assert plant.tetflora.seed != 1
+
+
+def test_assets_have_picture_and_tags(tmp_path):
+    import bpy
+
+    path, _ = part("asset_library").write_asset_library(tmp_path)
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    bush = next(o for o in bpy.data.objects if o.tetflora.species == "bush")
+    assert {"plant", "TetFlora", "bush"} == {t.name for t in bush.asset_data.tags}
+    assert bush.asset_data.description == _shipped()["bush"].description
+    assert tuple(bush.preview.image_size) == (128, 128)
+    pixels = np.zeros(4 * 128 * 128, np.float32)
+    bush.preview.image_pixels_float.foreach_get(pixels)
+    assert pixels[1::4].max() > 0.1
+
+
+def test_preferences_change_only_when_asked(tmp_path):
+    import bpy
+
+    libraries = bpy.context.preferences.filepaths.asset_libraries
+    before = len(libraries)
+    bpy.ops.tetflora.create_asset_library(directory=str(tmp_path))
+    assert len(libraries) == before
+    try:
+        for _ in range(2):
+            bpy.ops.tetflora.create_asset_library(directory=str(tmp_path), add_library=True)
+        assert len(libraries) == before + 1
+    finally:
+        while len(libraries) > before:
+            libraries.remove(libraries[len(libraries) - 1])
+
+
+def test_a_folder_that_cannot_be_written_is_said(tmp_path):
+    import bpy
+
+    (tmp_path / "file").write_text("in the way", encoding="utf-8")
+    before = datablocks()
+    with pytest.raises(RuntimeError, match="asset library cannot be written"):
+        bpy.ops.tetflora.create_asset_library(directory=str(tmp_path / "file"))
+    assert datablocks() == before

@@ -1,0 +1,149 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The catalogue as an asset library: a .blend with one plant of each species, to be dragged into any scene.
+
+An asset is an empty like any other plant, so that what is dragged in takes part in refinement at once. Species that
+only the open file has are left out: the file into which an asset is dragged would not know them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+import numpy as np
+from bpy.app.handlers import persistent
+
+from ..errors import SceneError
+from ..plants.catalogue import SpeciesInfo, list_species, load_species
+from .migration import VERSION
+from .plant_objects import prepare_scene
+from .preferences import species_folders
+from .thumbnails import thumbnail_file
+
+FILE = "tetflora_plants.blend"
+LIBRARY = "TetFlora"
+_CATALOG = "6f1d3a52-8f0b-4d7e-9a43-0c5c7a2be901"
+_CATALOGS_FILE = "blender_assets.cats.txt"
+
+
+def write_asset_library(folder: Path) -> tuple[Path, int]:
+    """Write a .blend with a plant of each species of the catalogue, marked as assets, over an earlier one.
+
+    Parameters
+    ----------
+    folder : Path
+        Made if there is none. Blender's file of asset catalogues there gets a line for TetFlora.
+
+    Returns
+    -------
+    path : Path
+        The .blend.
+    plants : int
+        Number of assets.
+
+    Raises
+    ------
+    SceneError
+        The folder cannot be written.
+    SpeciesError
+        A species of the catalogue is broken.
+    """
+    known = list_species(species_folders())
+    path = folder / FILE
+    with _names_free({info.name for info in known.values()}):
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            plants = {_asset(info) for info in known.values()}
+            bpy.data.libraries.write(str(path), plants, fake_user=True, compress=True)
+            _write_catalog(folder / _CATALOGS_FILE)
+        except (OSError, RuntimeError) as error:
+            raise SceneError(f"The asset library cannot be written: {error}") from None
+        finally:
+            bpy.data.batch_remove([o for o in bpy.data.objects if o.get(_TEMPORARY)])
+    return path, len(known)
+
+
+def add_to_preferences(folder: Path) -> bool:
+    """Let Blender's asset browsers show a folder; false if they do already. The user saves preferences as usual."""
+    libraries = bpy.context.preferences.filepaths.asset_libraries
+    if any(library.path and Path(bpy.path.abspath(library.path)) == folder for library in libraries):
+        return False
+    libraries.new(name=LIBRARY, directory=str(folder))
+    return True
+
+
+_TEMPORARY = "tetflora_temporary"  # on objects that are only made to be written
+
+
+@contextmanager
+def _names_free(names: set[str]) -> Iterator[None]:
+    """Keep names free for a while: what is written bears the name that it has in the open file."""
+    taken = [(obj, name) for name in names if (obj := bpy.data.objects.get((name, None))) is not None]
+    for obj, name in taken:
+        obj.name = f"{name} (elsewhere)"
+    try:
+        yield
+    finally:
+        for obj, name in taken:
+            obj.name = name
+
+
+def _asset(info: SpeciesInfo) -> bpy.types.Object:
+    species = load_species(info.identifier, species_folders())
+    obj = bpy.data.objects.new(info.name, None)
+    obj[_TEMPORARY] = True
+    obj.empty_display_type, obj.empty_display_size = 'SINGLE_ARROW', species.orders[0].length.mean
+    group = obj.tetflora
+    group.version, group.is_plant, group.species, group.seed = VERSION, True, info.identifier, 1
+    obj.asset_mark()
+    about = obj.asset_data
+    about.description, about.author, about.catalog_id = info.description, "TetFlora", _CATALOG
+    for tag in ("plant", "TetFlora", info.identifier):
+        about.tags.new(tag, skip_if_exists=True)
+    picture = thumbnail_file(info.identifier)
+    if picture is not None:
+        _set_preview(obj, picture)
+    return obj
+
+
+def _set_preview(obj: bpy.types.Object, picture: Path) -> None:
+    image = bpy.data.images.load(str(picture))
+    try:
+        pixels = np.zeros(len(image.pixels), np.float32)
+        image.pixels.foreach_get(pixels)
+        preview = obj.preview_ensure()
+        preview.image_size = image.size[:]
+        preview.image_pixels_float.foreach_set(pixels)
+    finally:
+        bpy.data.images.remove(image)
+
+
+def _write_catalog(path: Path) -> None:
+    text = path.read_text(encoding="utf-8") if path.exists() else "VERSION 1\n"
+    if _CATALOG not in text:
+        path.write_text(f"{text.rstrip()}\n{_CATALOG}:TetFlora:TetFlora\n", encoding="utf-8")
+
+
+@persistent
+def _on_import(context: bpy.types.BlendImportContext, _other: object = None) -> None:
+    """Plants came from another file: this scene needs what a scene with plants needs."""
+    objects = [item.id for item in context.import_items if isinstance(item.id, bpy.types.Object)]
+    plants = [obj for obj in objects if obj.tetflora.is_plant and obj.library is None]
+    for plant in plants:
+        if _TEMPORARY in plant:
+            del plant[_TEMPORARY]
+    if plants:
+        prepare_scene(bpy.context.scene)
+
+
+def register() -> None:
+    """Watch what is appended."""
+    bpy.app.handlers.blend_import_post.append(_on_import)
+
+
+def unregister() -> None:
+    """Watch no longer."""
+    bpy.app.handlers.blend_import_post.remove(_on_import)
