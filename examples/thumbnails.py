@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Pictures of the catalogue's species for menus: ``python -m examples.thumbnails [IDENTIFIER ...]``.
 
-One plant of each species in daylight, rendered by Cycles in front of nothing, 128 × 128 pixels, into
+One plant of each species in daylight, rendered by Cycles in front of a light grey, 128 × 128 pixels, into
 ``tetflora_addon/catalogue/thumbnails``. A picture is stored with as many colours as fit into 30 kB.
 """
 
@@ -19,6 +19,7 @@ from devtools import session
 FOLDER = session.ROOT / "tetflora_addon" / "catalogue" / "thumbnails"
 SIDE, SAMPLES, SEED = 128, 96, 11
 LARGEST = 30_000  # bytes
+BACKDROP = (0.78, 0.82, 0.84)  # display values; conifers would not be seen on the dark grey of menus
 
 
 def render_thumbnail(identifier: str, path: Path) -> None:
@@ -65,7 +66,7 @@ def render_thumbnail(identifier: str, path: Path) -> None:
 
 
 def _shrink(source: Path, target: Path) -> None:
-    """Store a picture with fewer steps of colour until it is small enough."""
+    """Store a picture in front of the backdrop, with fewer steps of colour until it is small enough."""
     import bpy
     import numpy as np
 
@@ -74,9 +75,11 @@ def _shrink(source: Path, target: Path) -> None:
     image.alpha_mode = 'CHANNEL_PACKED'
     pixels = np.zeros(len(image.pixels), np.float32)
     image.pixels.foreach_get(pixels)
+    rgba = pixels.reshape(-1, 4)
+    rgba[:, :3] = rgba[:, :3] * rgba[:, 3:] + np.array(BACKDROP) * (1 - rgba[:, 3:])
+    rgba[:, 3] = 1.0
     for steps in (255, 63, 47, 31, 23, 15):
         coarse = np.round(pixels * steps) / steps
-        coarse.reshape(-1, 4)[coarse[3::4] == 0] = 0.0  # colours that nobody sees
         stored: Any = bpy.data.images.new("thumbnail", SIDE, SIDE, alpha=True)
         stored.colorspace_settings.name = "Non-Color"
         stored.alpha_mode = 'CHANNEL_PACKED'
