@@ -270,8 +270,9 @@ class TetFloraScene(bpy.types.PropertyGroup):
         name="Species Edits",
         description="Species that are edited in this file, as JSON; they take the place of the catalogue's",
         type=TetFloraSpeciesEdit,
+        options={'HIDDEN'},
     )
-    species_editor: PointerProperty(name="Species Editor", type=TetFloraSpeciesEditor)
+    species_editor: PointerProperty(name="Species Editor", type=TetFloraSpeciesEditor, options={'HIDDEN'})
     statistics: StringProperty(
         name="Statistics",
         description="Figures of the last refinement, as JSON",
