@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 from .buffers import MeshBuffers
 from .plants.compiled import Flora
 from .plants.expansion import chunks, expand
-from .plants.growth import Branches, trunks
+from .plants.growth import trunks
 from .plants.meshing import concatenate_buffers, leaf_buffers, tube_buffers
 from .plants.pieces import Pieces
 from .plants.seeds import Seeds
-from .plants.species import MAX_ORDERS
 from .refinement.camera import Camera
 from .refinement.contents import bounding_cylinders, piece_amounts, subplant_amounts
 from .refinement.decisions import Decision
@@ -87,7 +86,7 @@ def expanded_blocks(flora: Flora, seeds: Seeds) -> Iterator[Block]:
 
 
 def _block(flora: Flora, pieces: Pieces, number: int, fraction: float) -> Iterator[Block]:
-    species = pieces.branches.row // MAX_ORDERS
+    species = flora.species_of(pieces.branches.row)
     made: list[tuple[str, int, MeshBuffers | None]] = []
     own = None
     for s in np.unique(species):
@@ -118,49 +117,42 @@ def facet_buffers(
         How much larger facets of hidden tetrahedra are; there, one stands for at least `HIDDEN_LEAVES` leaves, and
         wood gets no more facets than it has faces.
     """
-    hidden = result.chosen(Decision.HIDDEN)
     contents = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN))
+    hidden = result.chosen(Decision.HIDDEN)
     subplants, pieces = contents.subplants, contents.pieces
-
-    def sides(branches: Branches, centre: NDArray, cell: NDArray) -> NDArray[np.float64]:
-        extent = camera.pixel_extent(centre)
-        if camera.kind == "PERSP":  # beside and behind the camera depth says nothing, but distance does
-            extent = np.maximum(extent, camera.pixel_size * np.linalg.norm(centre - camera.position, axis=1))
-        leaf = (
-            np.sqrt(flora.leaf_area[branches.row] / np.maximum(flora.leaf_count[branches.row], 1e-300)) * branches.scale
-        )
-        least = np.maximum(coarse * facet_pixels * extent, np.sqrt(HIDDEN_LEAVES) * leaf)
-        return np.where(hidden[cell], least, facet_pixels * extent)
-
-    parts = []
+    parts: list[MeshBuffers | None] = []
     for things, branches, centre, cell, amounts, make in (
-        (
-            subplants,
-            subplants,
-            bounding_cylinders(flora, subplants)[0],
-            contents.subplant_cell,
-            subplant_amounts(flora, subplants),
-            subplant_facets,
-        ),
-        (
-            pieces,
-            pieces.branches,
-            (pieces.start + pieces.end) / 2,
-            contents.piece_cell,
-            piece_amounts(flora, pieces),
-            piece_facets,
-        ),
-    ):
-        side = sides(branches, centre, cell)
+        (subplants, subplants, bounding_cylinders(flora, subplants)[0], contents.subplant_cell,
+         subplant_amounts(flora, subplants), subplant_facets),
+        (pieces, pieces.branches, (pieces.start + pieces.end) / 2, contents.piece_cell,
+         piece_amounts(flora, pieces), piece_facets),
+    ):  # fmt: skip
+        fine = facet_pixels * _extent(camera, centre)
+        least = np.sqrt(HIDDEN_LEAVES * flora.one_leaf_area(branches))
+        side = np.where(hidden[cell], np.maximum(coarse * fine, least), fine)
         expected = (amounts.leaf_area + amounts.wood_area) / side**2 + 1
-        # What is beside the view and what is in it are made apart: only the first must not reach into the picture.
-        for beside in (False, True):
-            chosen = np.flatnonzero(result.tree.inside[cell] != beside)
-            for run in chunks(expected[chosen], FACETS_AT_ONCE):
-                part = chosen[run]
-                made = make(flora, things.take(part), side[part], hidden[cell[part]])
-                parts.append(kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5) if beside else made)
+        inside = result.tree.inside[cell]
+        seen, beside = np.flatnonzero(inside), np.flatnonzero(~inside)
+        parts += [make(flora, things.take(i), side[i], hidden[cell[i]]) for i in _runs(expected, seen)]
+        # What is beside the view must not reach into the picture.
+        for i in _runs(expected, beside):
+            made = make(flora, things.take(i), side[i], hidden[cell[i]])
+            parts.append(kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5))
     return concatenate_buffers([p for p in parts if p is not None])
+
+
+def _extent(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Metres (n,) that a pixel spans at points (n, 3), in view or not."""
+    extent = camera.pixel_extent(points)
+    if camera.kind == "PERSP":  # beside and behind the camera depth says nothing, but distance does
+        extent = np.maximum(extent, camera.pixel_size * np.linalg.norm(points - camera.position, axis=1))
+    return extent
+
+
+def _runs(expected: NDArray[np.float64], chosen: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
+    """Chosen things (m,) in runs of about `FACETS_AT_ONCE` expected facets."""
+    for run in chunks(expected[chosen], FACETS_AT_ONCE):
+        yield chosen[run]
 
 
 def proxy_shells(flora: Flora, result: Refinement) -> MeshBuffers | None:

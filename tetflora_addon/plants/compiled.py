@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..errors import SpeciesError
 from .bounds import unit_bounds
 from .crown_shapes import crown_ratio
+from .growth import Branches
 from .leaf_models import LeafModel
 from .rows import build_rows
 from .samples import Samples, draw_samples
@@ -76,6 +77,16 @@ class Flora:
     wood_colour: NDArray[np.float64]
     transmission: NDArray[np.float64]
     samples: Samples
+
+    @staticmethod
+    def species_of(row: NDArray[np.integer]) -> NDArray[np.integer]:
+        """Index (n,) of the species that rows (n,) belong to."""
+        return row // MAX_ORDERS
+
+    def one_leaf_area(self, branches: Branches) -> NDArray[np.float64]:
+        """Mean one-sided area (n,) of a single leaf of sub-plants, m²; 0 where they have none."""
+        row = branches.row
+        return self.leaf_area[row] / np.maximum(self.leaf_count[row], 1e-300) * branches.scale**2
 
 
 def tube_perimeter(sides: NDArray[np.integer]) -> NDArray[np.float64]:

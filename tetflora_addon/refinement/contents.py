@@ -200,7 +200,7 @@ def piece_amounts(flora: Flora, pieces: Pieces) -> Amounts:
     """Compiled means for pieces: the wood, and the leaves that the branch itself bears there."""
     branches = pieces.branches
     row = branches.row
-    model = row // (len(flora.rows) // len(flora.species))
+    model = flora.species_of(row)
     size, variation = flora.rows["leaf_size"][row].T
     area, width, polygons = (
         np.array([getattr(m, name) for m in flora.leaf_models])[model] for name in ("area", "width", "polygons")

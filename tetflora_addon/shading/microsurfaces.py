@@ -72,7 +72,7 @@ def subplant_facets(
     """
     amounts = subplant_amounts(flora, subplants)
     row = subplants.row
-    model_polygons = np.array([m.polygons for m in flora.leaf_models])[row // (len(flora.rows) // len(flora.species))]
+    model_polygons = np.array([m.polygons for m in flora.leaf_models])[flora.species_of(row)]
     wood = _wood_sides(
         side,
         amounts,
@@ -138,11 +138,6 @@ def _numbers(key: NDArray, area: NDArray, facet: NDArray, path: int, draw: int) 
     return owner, index, child_key(key[owner], index + path)
 
 
-def _leaf_area(flora: Flora, row: NDArray, scale: NDArray) -> NDArray[np.float64]:
-    """Mean area of one leaf of sub-plants, m²."""
-    return flora.leaf_area[row] / np.maximum(flora.leaf_count[row], 1e-300) * scale**2
-
-
 def _facet_colours(flora: Flora, row: NDArray, key: NDArray, leaves: NDArray) -> NDArray[np.float64]:
     """Colours of facets that stand for a number of leaves (n,) each: their mean varies less than one leaf's colour."""
     colour = flora.rows["leaf_colour"][row]
@@ -152,7 +147,7 @@ def _facet_colours(flora: Flora, row: NDArray, key: NDArray, leaves: NDArray) ->
 
 def _leaves_of_subplants(flora: Flora, subplants: Branches, amounts: Amounts, side: NDArray) -> Facets:
     row = subplants.row
-    one = _leaf_area(flora, row, subplants.scale)
+    one = flora.one_leaf_area(subplants)
     facet = np.maximum(side**2, one)
     owner, index, key = _numbers(subplants.key, amounts.leaf_area, facet, _FACET_PATH, _LEAF_COUNT)
     # Runs of the samples are spread over the sub-plant; each sub-plant starts its run elsewhere.
@@ -180,7 +175,7 @@ def _leaves_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDAr
     branches = pieces.branches
     row = branches.row
     size, variation = flora.rows["leaf_size"][row].T
-    species = row // (len(flora.rows) // len(flora.species))
+    species = flora.species_of(row)
     model_area = np.array([m.area for m in flora.leaf_models])[species]
     one = (size**2 + variation**2 / 3) * model_area * branches.scale**2
     facet = np.maximum(side**2, one)
