@@ -79,11 +79,6 @@ class Ui:
         for value in ('PRESS', 'RELEASE'):
             self.window.event_simulate(type=key, value=value, x=x, y=y, **modifiers)
 
-    def click(self, x: int, y: int, button: str = 'LEFTMOUSE') -> None:
-        """Move the mouse to a place and click there."""
-        self.move(x, y)
-        self.press(button)
-
     def type_text(self, text: str) -> None:
         """Type letters, digits and simple punctuation."""
         x, y = self._mouse

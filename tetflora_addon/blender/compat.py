@@ -7,30 +7,15 @@ from __future__ import annotations
 import bpy
 
 EEVEE_ENGINES = ("BLENDER_EEVEE", "BLENDER_EEVEE_NEXT")
-PHYSICAL_SKIES = ("MULTIPLE_SCATTERING", "NISHITA")
-
-
-def _first_of(owner: type, attribute: str, wanted: tuple[str, ...]) -> str:
-    known = {item.identifier for item in owner.bl_rna.properties[attribute].enum_items}
-    for identifier in wanted:
-        if identifier in known:
-            return identifier
-    raise LookupError(f"{owner.__name__}.{attribute} has none of {', '.join(wanted)}; this Blender is not supported")
 
 
 def eevee_engine() -> str:
     """Identifier of EEVEE for ``scene.render.engine``: 4.x called its rewrite "next"."""
-    return _first_of(bpy.types.RenderSettings, "engine", EEVEE_ENGINES)
-
-
-def is_eevee(engine: str) -> bool:
-    """Whether a render engine's identifier means EEVEE, under either name."""
-    return engine in EEVEE_ENGINES
-
-
-def physical_sky_type() -> str:
-    """Value of ``ShaderNodeTexSky.sky_type`` for a physical atmosphere with a sun: 5.x replaced Nishita's."""
-    return _first_of(bpy.types.ShaderNodeTexSky, "sky_type", PHYSICAL_SKIES)
+    known = {item.identifier for item in bpy.types.RenderSettings.bl_rna.properties["engine"].enum_items}
+    for identifier in EEVEE_ENGINES:
+        if identifier in known:
+            return identifier
+    raise LookupError(f"this Blender has none of {', '.join(EEVEE_ENGINES)}; it is not supported")
 
 
 def shader_tree(owner: bpy.types.Material | bpy.types.World | bpy.types.Light) -> bpy.types.NodeTree:
