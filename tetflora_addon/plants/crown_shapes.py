@@ -16,8 +16,9 @@ CROWN_SHAPES = (
     "flame",
     "inverse conical",
     "tend flame",
+    "receding",
 )
-"""Names of the shapes, in the order of their numbers (Weber and Penn, SIGGRAPH 1995, section 4.3)."""
+"""Names of the shapes, in the order of their numbers (Weber and Penn, SIGGRAPH 1995, section 4.3), and one more."""
 
 
 def crown_ratio(shape: NDArray[np.integer], r: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -32,7 +33,9 @@ def crown_ratio(shape: NDArray[np.integer], r: NDArray[np.float64]) -> NDArray[n
 
     Notes
     -----
-    Weber and Penn 1995, table of ShapeRatio. The lower end of the two flames is raised from 0 to 0.05, so that no
+    Weber and Penn 1995, table of ShapeRatio. "Receding" is their rule for the branches of branches (section 4.3):
+    parent's length less 0.6 of the way to the child. Their number of leaves and of further branches, less by half
+    towards the tip, is what ``count_by_length`` 5/6 makes of it. The lower end of the two flames is raised from 0 to 0.05, so that no
     branch has zero length.
     """
     r = np.clip(r, 0.0, 1.0)
@@ -47,5 +50,6 @@ def crown_ratio(shape: NDArray[np.integer], r: NDArray[np.float64]) -> NDArray[n
             np.maximum(np.where(r <= 0.7, r / 0.7, (1 - r) / 0.3), 0.05),
             1 - 0.8 * r,
             np.where(r <= 0.7, 0.5 + 0.5 * r / 0.7, 0.5 + 0.5 * (1 - r) / 0.3),
+            0.4 + 0.6 * r,
         ],
     )
