@@ -1,0 +1,347 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Levels of detail of a species by one factor: the same plant described with fewer or more polygons.
+
+One number, the *detail*, leads from a caricature to a portrait: 1 is the description. What there are many of goes first
+and comes first: of a kind with n members (leaves, or branches of one order), m (n / m)^detail are left, m being `_FEW`,
+so that boughs stay while leaves and twigs thin out. What is left stands for what went: leaves grow so that their area is
+kept, branches thicken so that the surface of their order is. Tubes lose sides and segments somewhat earlier than plants
+lose members; bends are adjusted so that the tips of branches stay where they were.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from ..errors import SpeciesError
+from .crown_shapes import CROWN_SHAPES, crown_ratio
+from .leaf_models import LeafModel
+from .schema import MAX_POLYGONS, ORDER_KEYS
+from .species import Order, Range, Species
+
+QUALITY_LOW, QUALITY_HIGH = 0.001, 1000.0
+"""Least and highest quality, inclusive."""
+TOLERANCE = 0.1
+"""How far the expected polygons may be from those asked for, as a fraction of them."""
+
+_FEW = 12.0  # a kind with no more members than this keeps them all
+_SHAPE_PACE = 1.0  # how much sooner than members a trunk's sides and segments go; of twigs, `_TWIG_PACE` more
+_TWIG_PACE = 0.5
+_MANY = 1000.0  # branches of an order from which on they are twigs in this sense
+_ROUNDER = 10.0  # factor on sides and on segments for one unit of detail above the description
+_TURN = 40.0  # degrees that one segment may stand for before a bent branch is a different one
+_SLOWER = 0.25  # how much slower they grow from `_ROUND` on: nobody sees more sides
+_ROUND = 0.6
+_LEAF_SHARE = 0.02, 0.06  # of the plant's reach: leaves that are too short, or long enough, to make its outline
+_SHORTEST = 0.5  # of the length of boughs
+_SWAY_HIGH = 1.25  # highest factor on the random bend of joints: the bound of a plant grows with it
+_DETAIL_HIGH = 16.0
+_STEPS = 60  # of bisection: more than the digits of a float need
+
+
+@lru_cache(maxsize=len(CROWN_SHAPES))
+def _mean_vigour(crown: str) -> float:
+    """Mean length of the children of a branch, relative to the longest; the same sum as in `compiled`."""
+    share = (np.arange(256) + 0.5) / 256
+    return float(crown_ratio(np.full(share.shape, CROWN_SHAPES.index(crown)), 1 - share).mean())
+
+
+def _members(species: Species) -> tuple[list[float], list[float]]:
+    """Expected branches and leaves of each order on one plant; what follows the length of branches included."""
+    branches, leaves, full = [1.0], [], 1.0
+    for i, order in enumerate(species.orders):
+        if i > 0:
+            parent = species.orders[i - 1]
+            branches.append(full * parent.branches.mean)
+            full = branches[i] * (1 - order.count_by_length * (1 - _mean_vigour(parent.crown)))
+        leaves.append(full * order.leaves.mean)
+    return branches, leaves
+
+
+def expected_polygons(species: Species) -> float:
+    """Mean number of polygons of one plant of a species, leaves and branches.
+
+    Notes
+    -----
+    The same number as ``compile_species([species]).polygons[0]``, in closed form and without compiling. A leaf that is
+    still the name of a Blender object counts as one polygon.
+    """
+    branches, leaves = _members(species)
+    tubes = sum(n * o.sides * o.segments for n, o in zip(branches, species.orders, strict=True))
+    return tubes + sum(leaves) * (species.leaf.polygons if isinstance(species.leaf, LeafModel) else 1)
+
+
+def quality_for(species: Species, polygons: float) -> float:
+    """Quality at which a plant of the species has about a given number of polygons.
+
+    Parameters
+    ----------
+    species : Species
+        As described, quality 1.
+    polygons : float
+        Expected polygons of one plant.
+
+    Raises
+    ------
+    SpeciesError
+        The number is not finite and positive, or even the least or highest quality misses it by more than `TOLERANCE`.
+    """
+    described = expected_polygons(species)
+    if not (math.isfinite(polygons) and polygons > 0):
+        raise SpeciesError(f"{species.identifier}: polygons must be a number greater than 0, is {polygons}")
+    quality = min(max(polygons / described, QUALITY_LOW), QUALITY_HIGH)
+    if abs(quality * described / polygons - 1) > TOLERANCE:
+        raise SpeciesError(
+            f"{species.identifier}: one plant cannot have {polygons:.3g} polygons; ask for"
+            f" {QUALITY_LOW * described:.3g} to {QUALITY_HIGH * described:.3g}"
+        )
+    return quality
+
+
+@lru_cache(maxsize=256)
+def with_quality(species: Species, quality: float) -> Species:
+    """The same species with ``quality`` times the polygons.
+
+    Parameters
+    ----------
+    species : Species
+        As described.
+    quality : float
+        `QUALITY_LOW` to `QUALITY_HIGH`; 1 returns the species itself.
+
+    Returns
+    -------
+    Species
+        Sides, segments, bends, thicknesses, and numbers and sizes of branches and leaves differ, within the limits of
+        the schema. Leaf area is kept, and the surface of wood as far as twigs stay thinner than what bears them, and
+        with both the mean colours. Where the limits do not let it reach the number, it comes as near as they do:
+        below, some 12 branches of each order with 12 leaves in all; above, 10,000 leaves or branches on a branch.
+
+    Raises
+    ------
+    SpeciesError
+        The quality is out of range or not finite, or a plant would have more than `schema.MAX_POLYGONS` polygons.
+
+    Notes
+    -----
+    A pure function of its arguments without random numbers; the last few results are kept. A species whose leaf is the
+    name of a Blender object is first to be given its mesh, because a leaf counts by its polygons.
+    """
+    if not (QUALITY_LOW <= quality <= QUALITY_HIGH):  # false for NaN as well
+        raise SpeciesError(
+            f"{species.identifier}: quality must be from {QUALITY_LOW:g} to {QUALITY_HIGH:g}, is {quality:g}"
+        )
+    if quality == 1:
+        return species
+    target = quality * expected_polygons(species)
+    if target > MAX_POLYGONS:
+        raise SpeciesError(
+            f"{species.identifier}: at quality {quality:g} one plant would have {target:.3g} polygons,"
+            f" at most {MAX_POLYGONS:.0g} are allowed; lower the quality"
+        )
+
+    # Sides and segments as real numbers make the count continuous; once they are whole, members make up for it.
+    detail = _bisected(lambda d: expected_polygons(_thinned(_shaped(species, _shapes(species, d)), d)), target)
+    shapes = [(round(k), round(s)) for k, s in _shapes(species, detail)]
+    shaped = _shaped(species, shapes)
+    detail = _bisected(lambda d: expected_polygons(_thinned(shaped, d)), target)
+    return _kept(species, _thinned(shaped, detail))
+
+
+def _bisected(polygons: Callable[[float], float], target: float) -> float:
+    """Detail at which a count that grows with it reaches the target, or the end of the interval."""
+    low, high = 0.0, _DETAIL_HIGH
+    for _ in range(_STEPS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if polygons(middle) < target else (low, middle)
+    return (low + high) / 2
+
+
+def _shapes(species: Species, detail: float) -> list[tuple[float, float]]:
+    """Sides and segments of each order, not yet whole numbers."""
+    shapes = []
+    for order, number in zip(species.orders, _members(species)[0], strict=True):
+        if detail >= 1:
+            more = detail - 1
+            rounder = _ROUNDER ** (min(more, _ROUND) + _SLOWER * max(more - _ROUND, 0.0))
+            shape = order.sides * rounder, order.segments * rounder
+        else:
+            pace = _SHAPE_PACE + _TWIG_PACE * _crowd(number)
+            left = max(1 - pace * (1 - detail), 0.0)
+            bent = min(max(math.ceil(_bend(order) / _TURN), 1), order.segments)
+            shape = 3 * (order.sides / 3) ** left, bent * (order.segments / bent) ** left
+        shapes.append((min(shape[0], ORDER_KEYS["sides"].high), min(shape[1], ORDER_KEYS["segments"].high)))
+    return shapes
+
+
+def _crowd(number: float) -> float:
+    """0 for the trunk, 1 for the twigs of a large tree."""
+    return min(math.log(max(number, 1.0)) / math.log(_MANY), 1.0)
+
+
+def _bend(order: Order) -> float:
+    """Degrees by which a branch of the order is meant to turn from base to tip, to either side."""
+    return (abs(order.curvature.mean) + abs(order.curvature_tip)) / 2
+
+
+def _shaped(species: Species, shapes: list[tuple[float, float]]) -> Species:
+    """The species with other sides and segments."""
+    pairs = zip(species.orders, shapes, strict=True)
+    return replace(species, orders=tuple(replace(o, sides=k, segments=s) for o, (k, s) in pairs))
+
+
+def _left(number: float, detail: float, pace: float = 1.0) -> float:
+    """Factor on the number of a kind that has ``number`` members."""
+    base = max(number / _FEW, 1.0)
+    return base ** (detail - 1 if detail < 1 else pace * (detail - 1))
+
+
+def _thinned(species: Species, detail: float) -> Species:
+    """The species with other numbers of branches and leaves, and leaves of such a size that their area is kept."""
+    branches, leaves = _members(species)
+    orders = list(species.orders)
+    foliage = _left(max(sum(leaves), 2 * _FEW), detail)
+    there = 1.0  # factor on the number of branches of this order
+    for i, order in enumerate(orders):
+        count = 1.0
+        if i + 1 < len(orders):
+            count = _within(order.branches, _left(branches[i + 1], detail, _crowd(branches[i + 1])) / there, "branches")
+        share = _within(order.leaves, foliage / there, "leaves")
+        orders[i] = replace(order, branches=_times(order.branches, count), leaves=_times(order.leaves, share))
+        there *= count
+    return replace(species, orders=tuple(orders))
+
+
+def _within(value: Range, factor: float, key: str) -> float:
+    """The factor, or the nearest to it that keeps a range with a mean above 0 within the limits of its key."""
+    limits = ORDER_KEYS[key]
+    if value.high > 0:
+        factor = min(factor, limits.high / value.high)
+    if value.low > 0:
+        factor = max(factor, limits.low / value.low)
+    return factor
+
+
+def _times(value: Range, factor: float) -> Range:
+    return Range(value.mean * factor, value.variation * factor)
+
+
+def _kept(described: Species, changed: Species) -> Species:
+    """The changed species with leaves, lengths, thicknesses and bends such that it looks like the one described."""
+    (branches, leaves), (branches_left, leaves_left) = _members(described), _members(changed)
+    leaf, area = described.leaf, 1.0
+    if isinstance(leaf, LeafModel) and sum(leaves) > 0:
+        wider = _widening(described, math.sqrt(sum(leaves) / sum(leaves_left)))
+        leaf = _widened(leaf, wider) if wider != 1 else leaf
+        area = described.leaf.area / leaf.area
+    sizes = [
+        _within(o.leaf_size, math.sqrt(_ratio(n, m) * area), "leaf_size") if o.leaves.mean > 0 else 1.0
+        for o, n, m in zip(described.orders, leaves, leaves_left, strict=True)
+    ]
+    shorter = _shortening(described, sizes)
+    orders, thicker = [], 1.0  # factor on the radius of this order
+    for i, (old, new) in enumerate(zip(described.orders, changed.orders, strict=True)):
+        # Fewer branches show less bark, and a tube of fewer sides is narrower (Cauchy: the mean width of a convex
+        # figure is its perimeter by pi). The radius makes up for both, as far as branches stay thinner than parents.
+        wanted = _ratio(branches[i], branches_left[i]) * _perimeter(old.sides) / _perimeter(new.sides)
+        thick = _within(old.thickness, wanted / (shorter if i else 1.0) / thicker, "thickness")
+        thicker *= thick
+        new = replace(
+            new,
+            length=_times(old.length, shorter) if i == 1 else old.length,
+            thickness=_times(old.thickness, thick),
+            leaf_size=_times(old.leaf_size, sizes[i]),
+        )
+        orders.append(_bent_alike(old, new))
+    return replace(changed, orders=tuple(orders), leaf=leaf)
+
+
+def _lengths(species: Species) -> list[float]:
+    """Mean length of the longest branches of each order, metres."""
+    lengths = [o.length.mean for o in species.orders]
+    return [math.prod(lengths[: i + 1]) for i in range(len(lengths))]
+
+
+def _widening(species: Species, larger: float) -> float:
+    """Factor on the width of the leaf model where leaves become larger by a factor on their mean extent.
+
+    Where the length of the leaves makes the outline of the plant, as in a tuft of grass or the frond of a palm, they
+    keep it, and take or give their area in width. Few large leaves become at most half as wide as they are long.
+    """
+    longest = max(o.leaf_size.mean for o in species.orders if o.leaves.mean > 0)
+    share = longest / (longest + sum(_lengths(species)))
+    outline = min(max((share - _LEAF_SHARE[0]) / (_LEAF_SHARE[1] - _LEAF_SHARE[0]), 0.0), 1.0)
+    if larger < 1:
+        return larger ** (2 * outline)
+    return min(max(larger ** (2 * outline), math.sqrt(larger)), max(0.5 / species.leaf.width, 1.0))
+
+
+def _widened(leaf: LeafModel, width: float) -> LeafModel:
+    """The leaf model with its width changed; it droops as before, and folds along its midrib in proportion."""
+    x, y, z = leaf.positions.T
+    midrib = np.flatnonzero(np.abs(x) < 1e-6)
+    midrib = midrib[np.argsort(y[midrib])]
+    droop = np.interp(y, y[midrib], z[midrib]) if len(midrib) else np.zeros_like(z)
+    fold = min(width, 1.0)  # wider leaves are not folded deeper
+    return replace(leaf, positions=np.stack([x * width, y, droop + (z - droop) * fold], axis=1))
+
+
+def _shortening(species: Species, sizes: list[float]) -> float:
+    """Factor on the length of boughs where large leaves stick out of the crown: of their growth, half goes outwards."""
+    beyond = max(o.leaf_size.mean * (f - 1) for o, f in zip(species.orders, sizes, strict=True)) / 2
+    crown = sum(_lengths(species)[1:])
+    return min(max(1 - beyond / crown, _SHORTEST), 1.0) if crown > 0 else 1.0
+
+
+def _ratio(before: float, after: float) -> float:
+    return before / after if after > 0 else 1.0
+
+
+def _perimeter(sides: int) -> float:
+    return sides * math.sin(math.pi / sides)
+
+
+def _bent_alike(old: Order, new: Order) -> Order:
+    """An order whose tips are where they were with another number of segments.
+
+    Notes
+    -----
+    Joint j of S turns by curvature / S, and by curvature_tip / S from the middle on, and moves the tip by its turn
+    times 1 - j / S of the length (see `growth.axes`). That sums up to less where segments are few, and to nothing for a
+    single one, which takes the direction of the chord instead. The random parts of joints are independent, so that
+    their squares sum up: without a larger range, more segments would be straighter.
+    """
+    s, t = old.segments, new.segments
+    if s == t:
+        return new
+    (inner, outer), sway = _sways(s), _random_sway(s)
+    moved = inner * old.curvature.mean + outer * old.curvature_tip
+    if t == 1:
+        high = ORDER_KEYS["angle"].high
+        mean, tip = (min(max(a - moved, 0.0), high) for a in (old.angle.mean, old.angle_tip))
+        variation = math.hypot(old.angle.variation, sway * old.curvature.variation)
+        return replace(new, angle=Range(mean, min(variation, mean, high - mean)), angle_tip=tip)
+    high = ORDER_KEYS["curvature"].high
+    inner_left, outer_left = _sways(t)
+    share = inner / inner_left if inner > 0 and inner_left > 0 else (inner + outer) / (inner_left + outer_left)
+    mean = min(max(old.curvature.mean * share, -high), high)
+    tip = min(max((moved - inner_left * mean) / outer_left, -high), high)
+    variation = old.curvature.variation * min(sway / _random_sway(t), _SWAY_HIGH)
+    return replace(new, curvature=Range(mean, min(variation, high - abs(mean))), curvature_tip=tip)
+
+
+def _sways(segments: int) -> tuple[float, float]:
+    """How far the joints of the inner and of the outer half move the tip aside, of the turn over the whole length."""
+    moves = [(1 - j / segments) / segments for j in range(1, segments)]
+    middle = math.ceil(segments / 2) - 1
+    return sum(moves[:middle]), sum(moves[middle:])
+
+
+def _random_sway(segments: int) -> float:
+    """The same for turns that are independent from joint to joint."""
+    return math.sqrt(sum((1 - j / segments) ** 2 for j in range(1, segments))) / segments
