@@ -8,22 +8,24 @@ A test says whether the page is current.
 from __future__ import annotations
 
 import json
-import math
 import re
 
 from tetflora_addon.plants.crown_shapes import CROWN_SHAPES
 from tetflora_addon.plants.leaf_models import LEAF_MODELS
-from tetflora_addon.plants.schema import LENGTH_HIGH, ORDER_KEYS, Key
+from tetflora_addon.plants.schema import FOLLOWS, LENGTH_HIGH, ORDER_KEYS, Key
+from tetflora_addon.plants.species import LEAF_KINDS
 
 from .house import ROOT
 
 PAGE = ROOT / "docs" / "species.md"
 
 _WRITTEN = {
-    "range": "`[mean, variation]`",
+    "range": "`[mean, variation]`, or the mean",
     "number": "number",
     "integer": "whole number",
     "shape": "name",
+    "kind": "name",
+    "rgb": "`[r, g, b]`",
     "colour": "`[[r, g, b], [variation of each]]`",
 }
 
@@ -31,15 +33,17 @@ _WRITTEN = {
 def _limits(name: str, key: Key) -> str:
     if key.kind == "shape":
         return "see below"
+    if key.kind == "kind":
+        return ", ".join(f"`{name}`" for name in LEAF_KINDS)
     limits = f"{key.low:g} to {key.high:g}"
     return f"{limits}; {key.low:g} to {LENGTH_HIGH:g} after order 0" if name == "length" else limits
 
 
-def _default(key: Key) -> str:
+def _default(name: str, key: Key) -> str:
+    if name in FOLLOWS:
+        return f"mean of `{FOLLOWS[name]}`"
     if key.default is None:
         return "required"
-    if isinstance(key.default, float) and math.isnan(key.default):
-        return "mean of `angle`"
     return f"`{json.dumps(key.default)}`"
 
 
@@ -47,7 +51,7 @@ def key_table() -> str:
     """Markdown table of the keys of an order."""
     lines = ["| key | written | limits | unit | default | meaning |", "|---|---|---|---|---|---|"]
     for name, key in ORDER_KEYS.items():
-        cells = (f"`{name}`", _WRITTEN[key.kind], _limits(name, key), key.unit or "–", _default(key), key.meaning)
+        cells = (f"`{name}`", _WRITTEN[key.kind], _limits(name, key), key.unit or "–", _default(name, key), key.meaning)
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 

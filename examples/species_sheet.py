@@ -25,13 +25,10 @@ def build(scene: bpy.types.Scene, seed: int = 11) -> list[str]:
     catalogue = session.part("tetflora_addon.plants.catalogue")
     known = catalogue.list_species()
     flora = session.part("tetflora_addon.plants.compiled").compile_species([catalogue.load_species(i) for i in known])
-    trunk_rows = np.arange(len(known)) * (len(flora.rows) // len(known))
+    trunk_rows = flora.first_row
     samples, length = flora.samples, flora.rows["length"][trunk_rows, 0]
-    leaf_rise = flora.rows["leaf_size"][samples.leaf_row[trunk_rows], 0] * samples.leaf_frame[trunk_rows, :, 2, 1]
-    leaves = length[:, None] * samples.leaf_position[trunk_rows, :, 2] + leaf_rise
-    wood = length[:, None] * samples.wood_position[trunk_rows, :, 2]
-    height = np.where(flora.leaf_count[trunk_rows] > 0, leaves.max(axis=1), wood.max(axis=1))
-    reach = length * np.linalg.norm(samples.wood_position[trunk_rows, :, :2], axis=2).max(axis=1)
+    wood = np.array([samples.wood.position[f : f + 64].max(axis=0) for f in samples.wood.first[trunk_rows, -1]])
+    height, reach = length * wood[:, 2], length * np.abs(wood[:, :2]).max(axis=1)
     reach += np.where(flora.leaf_count[trunk_rows] > 0, 0.5 * flora.leaf_reach[trunk_rows], 0.0)
     terraces = math.ceil(len(known) / PER_ROW)
     for i, identifier in enumerate(known):

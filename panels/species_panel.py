@@ -98,7 +98,7 @@ class _SpeciesPart(SidebarPanel):
 class TETFLORA_PT_species_whole(_SpeciesPart, bpy.types.Panel):
     """Name, leaf and what else holds for the whole species."""
 
-    bl_label = "Name and Leaf"
+    bl_label = "Name, Leaf and Bark"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = split_layout(self)
@@ -110,6 +110,8 @@ class TETFLORA_PT_species_whole(_SpeciesPart, bpy.types.Panel):
         if editor.leaf_form == OBJECT_LEAF:
             column.prop_search(editor, "leaf_object", bpy.data, "objects")
         column.prop(editor, "leaf_transmission")
+        column.prop(editor, "bark")
+        column.prop(editor, "quality")
 
 
 class TETFLORA_PT_species_orders(_SpeciesPart, bpy.types.Panel):

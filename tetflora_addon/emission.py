@@ -18,9 +18,10 @@ from .buffers import MeshBuffers
 from .plants.compiled import Flora
 from .plants.expansion import chunks, expand
 from .plants.growth import trunks
-from .plants.meshing import concatenate_buffers, leaf_buffers, tube_buffers
+from .plants.meshing import concatenate_buffers, leaf_meshes, tube_buffers
 from .plants.pieces import Pieces
 from .plants.seeds import Seeds
+from .plants.species import LEAF_KINDS
 from .refinement.camera import Camera
 from .refinement.contents import bounding_cylinders, piece_amounts, subplant_amounts
 from .refinement.decisions import Decision
@@ -44,7 +45,9 @@ class Block:
 
     Attributes
     ----------
-    kind : {'leaf', 'bark'}
+    kind : {'leaf', 'blossom', 'bark'}
+    form : int
+        Which of the species' forms of leaves or blossoms.
     species : int
         Index into the flora's species.
     number : int
@@ -55,6 +58,7 @@ class Block:
     """
 
     kind: str
+    form: int
     species: int
     number: int
     buffers: MeshBuffers
@@ -87,17 +91,18 @@ def expanded_blocks(flora: Flora, seeds: Seeds) -> Iterator[Block]:
 
 def _block(flora: Flora, pieces: Pieces, number: int, fraction: float) -> Iterator[Block]:
     species = flora.species_of(pieces.branches.row)
-    made: list[tuple[str, int, MeshBuffers | None]] = []
+    made: list[tuple[str, int, int, MeshBuffers | None]] = []
     own = None
     for s in np.unique(species):
         own = pieces.take(species == s)
-        made += [("leaf", int(s), leaf_buffers(flora, own, int(s))), ("bark", int(s), tube_buffers(flora, own))]
+        made += [(LEAF_KINDS[m.kind], m.form, int(s), m.buffers) for m in leaf_meshes(flora, own, int(s))]
+        made.append(("bark", 0, int(s), tube_buffers(flora, own)))
     # Whoever takes a block copies it into Blender: what it was made from, and what was taken, is not kept meanwhile.
     del pieces, species, own
     while made:
-        kind, s, buffers = made.pop(0)
+        kind, form, s, buffers = made.pop(0)
         if buffers is not None:
-            yield Block(kind, s, number, buffers, fraction)
+            yield Block(kind, form, s, number, buffers, fraction)
         del buffers
 
 

@@ -18,11 +18,10 @@ from tetflora_addon.plants.compiled import Flora, compile_species
 from tetflora_addon.plants.expansion import expand
 from tetflora_addon.plants.foliage import leaf_keys, leaf_places, place_leaves
 from tetflora_addon.plants.growth import Branches, axes, leaf_counts, spread, trunks
-from tetflora_addon.plants.meshing import leaf_buffers, tube_buffers
+from tetflora_addon.plants.meshing import leaf_meshes, tube_buffers
 from tetflora_addon.plants.pieces import Pieces
 from tetflora_addon.plants.schema import species_from_dict
 from tetflora_addon.plants.seeds import Seeds
-from tetflora_addon.plants.species import MAX_ORDERS
 from tetflora_addon.refinement.camera import Camera
 
 SPECIES = tuple(sorted(path.stem for path in builtin_folder().glob("*.json")))
@@ -143,14 +142,21 @@ def leaves_of(one: Flora, branches: Branches) -> tuple[NDArray[np.int64], NDArra
 
 
 def meshes(one: Flora, pieces: Pieces) -> tuple[list[MeshBuffers], list[MeshBuffers]]:
-    """Tubes and leaves of pieces, one mesh for each species that has any."""
+    """Tubes and leaves of pieces, a mesh for each species that has any, and for each form of its leaves."""
     tubes, leaves = [], []
-    kinds = pieces.branches.row // MAX_ORDERS
+    kinds = one.species_of(pieces.branches.row)
     for species in np.unique(kinds):
         own = pieces.take(kinds == species)
         tubes += [b for b in [tube_buffers(one, own)] if b is not None]
-        leaves += [b for b in [leaf_buffers(one, own, int(species))] if b is not None]
+        leaves += [leaf.buffers for leaf in leaf_meshes(one, own, int(species))]
     return tubes, leaves
+
+
+def leaf_mesh(one: Flora, pieces: Pieces, species: int = 0) -> MeshBuffers | None:
+    """Leaves of a species that has only one form of them; None where pieces bear none."""
+    found = [leaf.buffers for leaf in leaf_meshes(one, pieces, species)]
+    assert len(found) < 2
+    return found[0] if found else None
 
 
 def face_vectors(mesh: MeshBuffers) -> NDArray[np.float64]:

@@ -170,11 +170,11 @@ def test_amounts_of_a_piece_add_up_to_its_branch() -> None:
     branches = pieces.t0 == 0
     size, spread = flora.rows["leaf_size"][pieces.branches.row].T
     leaves = flora.rows["leaves"][pieces.branches.row, 0]
-    expected = leaves * (size**2 + spread**2 / 3) * flora.leaf_models[0].area * pieces.branches.scale**2
+    expected = leaves * (size**2 + spread**2 / 3) * flora.leaf.area[0] * pieces.branches.scale**2
     assert own.leaf_area.sum() == pytest.approx(expected[branches].sum())
     assert own.wood_area.sum() == pytest.approx(wood_areas(flora, pieces).sum())
     assert (own.wood_area > 0).all()
-    assert subplant_amounts(flora, trunk).leaf_area[0] == pytest.approx(flora.leaf_area[0])
+    assert subplant_amounts(flora, trunk).leaf_area[0] == pytest.approx(flora.area_nodes[0, 0])
 
 
 def test_selection_and_joining() -> None:

@@ -196,8 +196,8 @@ def test_children_sit_on_their_parents() -> None:
     grown, owner = children(flora.rows, trunk, lines)
     counts = branch_counts(flora.rows, trunk)
     assert (np.bincount(owner, minlength=len(trunk)) == counts).all()
-    most = flora.rows["branches"][trunk.row].sum(axis=1) + 1
-    least = flora.rows["branches"][trunk.row] @ [1, -1]
+    most = flora.rows["count"][trunk.row, 0].sum(axis=1) + 1
+    least = flora.rows["count"][trunk.row, 0] @ [1, -1]
     assert ((counts < most) & (counts >= np.floor(least))).all()
     a, b = lines.knots[owner, :-1], lines.knots[owner, 1:]
     along = np.clip(((grown.position[:, None] - a) * (b - a)).sum(2) / np.maximum(((b - a) ** 2).sum(2), 1e-30), 0, 1)

@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from tests.engine import support
 from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.plants.growth import radius_at
-from tetflora_addon.plants.meshing import concatenate_buffers, leaf_buffers, tube_buffers
+from tetflora_addon.plants.meshing import concatenate_buffers, tube_buffers
 from tetflora_addon.plants.pieces import Pieces, clipped, leaf_fraction, wood_areas
-from tetflora_addon.plants.species import MAX_ORDERS
 
 
 def check_topology(mesh: MeshBuffers) -> None:
@@ -58,8 +57,8 @@ def check_attributes(mesh: MeshBuffers) -> None:
 def test_meshes_of_shipped_species(species: int) -> None:
     flora = support.flora()
     _, pieces = support.grown(flora, support.plants([3, 4], species))
-    leaves = leaf_buffers(flora, pieces, species)
-    assert (leaves is None) == (flora.leaf_count[species * MAX_ORDERS] == 0)
+    leaves = support.leaf_mesh(flora, pieces, species)
+    assert (leaves is None) == (flora.leaf_count[flora.first_row[species]] == 0)
     for mesh in (tube_buffers(flora, pieces), *([] if leaves is None else [leaves])):
         check_topology(mesh)
         check_attributes(mesh)
@@ -94,7 +93,7 @@ def test_a_straight_tube_is_a_frustum() -> None:
     flora = support.compiled({**support.small(order0={"curvature": [0, 0], "angle": [0, 0], "branches": [0, 0]})})
     trunk, pieces = support.grown(flora, support.plants(5))
     mesh = tube_buffers(flora, pieces)
-    sides, taper = int(flora.rows["sides"][0]), float(flora.rows["taper"][0])
+    sides, taper = int(flora.rows["sides"][0]), float(flora.rows["taper"][0, 0])
     rings = mesh.positions.reshape(-1, sides, 3)
     radii = np.linalg.norm(rings[..., :2], axis=2)
     heights = rings[..., 2].mean(axis=1)
@@ -119,11 +118,12 @@ def test_area_of_tubes_is_the_area_of_the_wood() -> None:
 
 def test_area_of_leaves_is_that_of_the_model_times_size_squared() -> None:
     flora = support.flora()
-    for species, model in enumerate(flora.leaf_models):
+    for species, (forms, _) in enumerate(flora.forms):
+        model = forms[0]
         _, pieces = support.grown(flora, support.plants([1], species))
         tips = pieces.take(pieces.t1 == 1)
         _, _, size = support.leaves_of(flora, tips.branches)
-        mesh = leaf_buffers(flora, pieces, species)
+        mesh = support.leaf_mesh(flora, pieces, species)
         if len(size) == 0:
             assert mesh is None
             continue
@@ -135,9 +135,9 @@ def test_area_of_leaves_is_that_of_the_model_times_size_squared() -> None:
 def test_uv_of_leaves_and_bark() -> None:
     flora = support.small_flora()
     _, pieces = support.grown(flora, support.plants(1))
-    leaves, tubes = leaf_buffers(flora, pieces, 0), tube_buffers(flora, pieces)
-    number = leaves.polygons // flora.leaf_models[0].polygons
-    assert (leaves.attributes["UVMap"][1] == np.tile(flora.leaf_models[0].uv, (number, 1))).all()
+    leaves, tubes = support.leaf_mesh(flora, pieces, 0), tube_buffers(flora, pieces)
+    number = leaves.polygons // flora.forms[0][0][0].polygons
+    assert (leaves.attributes["UVMap"][1] == np.tile(flora.forms[0][0][0].uv, (number, 1))).all()
     quads = tubes.attributes["UVMap"][1].reshape(-1, 4, 2)
     assert (quads[:, [0, 3], 0] < quads[:, [1, 2], 0]).all()  # no face spans the seam backwards
     assert (quads[:, 0, 1] < quads[:, 3, 1]).all()
@@ -150,8 +150,8 @@ def test_one_colour_a_branch_and_a_leaf() -> None:
     own = pieces.take(pieces.branches.row == 0)
     colours = tube_buffers(flora, own).attributes["tf_colour"][1]
     assert len(np.unique(colours, axis=0)) == 1
-    leaves = leaf_buffers(flora, pieces, 0).attributes["tf_colour"][1]
-    assert len(np.unique(leaves, axis=0)) > 0.9 * len(leaves) / flora.leaf_models[0].polygons
+    leaves = support.leaf_mesh(flora, pieces, 0).attributes["tf_colour"][1]
+    assert len(np.unique(leaves, axis=0)) > 0.9 * len(leaves) / flora.forms[0][0][0].polygons
     low, high = (flora.rows["leaf_colour"][1, 0] + s * flora.rows["leaf_colour"][1, 1] for s in (-1, 1))
     assert ((leaves >= low - 1e-6) & (leaves <= high + 1e-6)).all()
 
@@ -179,7 +179,7 @@ def test_cutting_changes_nothing_but_the_number_of_rings(seed: int, cuts: int) -
     assert wood_areas(flora, parts).sum() == pytest.approx(wood_areas(flora, pieces).sum(), rel=1e-12)
     assert (leaf_fraction(flora, parts)).sum() == pytest.approx(leaf_fraction(flora, pieces).sum(), rel=1e-12)
     for row in range(3):
-        of = [leaf_buffers(flora, p.take(p.branches.row == row), 0) for p in (pieces, parts)]
+        of = [support.leaf_mesh(flora, p.take(p.branches.row == row), 0) for p in (pieces, parts)]
         if of[0] is None:
             assert of[1] is None
             continue
@@ -213,7 +213,7 @@ def test_species_of_one_seed_are_plants_of_their_own() -> None:
     flora = support.compiled(support.SMALL, support.shipped("bush"))
     pieces = support.grown(flora, support.plants([9, 9], [0, 1]))[1]
     together = tube_buffers(flora, pieces).polygons
-    apart = [tube_buffers(flora, pieces.take(pieces.branches.row // MAX_ORDERS == s)).polygons for s in (0, 1)]
+    apart = [tube_buffers(flora, pieces.take(flora.species_of(pieces.branches.row) == s)).polygons for s in (0, 1)]
     assert together == sum(apart)
 
 
@@ -236,8 +236,8 @@ def test_no_mesh_without_contents() -> None:
     flora = support.small_flora()
     _, pieces = support.grown(flora, support.plants(2))
     assert tube_buffers(flora, Pieces.empty()) is None
-    assert leaf_buffers(flora, Pieces.empty(), 0) is None
-    assert leaf_buffers(flora, pieces.take(pieces.branches.row == 0), 0) is None
+    assert support.leaf_mesh(flora, Pieces.empty(), 0) is None
+    assert support.leaf_mesh(flora, pieces.take(pieces.branches.row == 0), 0) is None
     bare = pieces.take((pieces.branches.row == 1) & (pieces.t1 <= 0.5))
     assert len(bare)
-    assert leaf_buffers(flora, bare, 0) is None
+    assert support.leaf_mesh(flora, bare, 0) is None

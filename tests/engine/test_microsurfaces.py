@@ -120,7 +120,7 @@ def test_hidden_wood_gets_no_more_facets_than_it_has_faces() -> None:
     for made, faces, amounts in (
         (
             subplant_facets(flora, plants, np.full(20, 1e-3), np.ones(20, bool)),
-            20 * (flora.polygons[0] - flora.leaf_count[0] * flora.leaf_models[0].polygons),
+            20 * (flora.polygons[0] - flora.leaf_count[0] * flora.leaf.polygons[0]),
             subplant_amounts(flora, plants),
         ),
         (
@@ -139,7 +139,7 @@ def test_hidden_wood_gets_no_more_facets_than_it_has_faces() -> None:
 def test_facets_are_squares_no_smaller_than_leaves() -> None:
     flora = support.small_flora()
     plant = trunks(flora.rows, support.plants(np.arange(5)))
-    leaf = flora.leaf_area[0] / flora.leaf_count[0]
+    leaf = flora.area_nodes[0, 0] / flora.leaf_count[0]
     for side in (1e-2, 0.5):
         mesh = facets(flora, plant, side)
         quads = mesh.positions.reshape(-1, 4, 3).astype(float)

@@ -13,7 +13,7 @@ from .node_tools import is_ours, tag
 #: Custom property of a result collection: 'VIEW' for what the artist keeps, 'RENDER' for what lives while rendering.
 PURPOSE = "tetflora_purpose"
 NAMES = {'VIEW': "TetFlora", 'RENDER': "TetFlora render"}
-#: Custom property of a result object: 'leaf', 'bark' or 'proxy'.
+#: Custom property of a result object: 'leaf', 'blossom', 'bark' or 'proxy'.
 KIND = "tetflora_kind"
 
 
@@ -41,9 +41,9 @@ class Results:
         tag(self.collection)
         self.scene.collection.children.link(self.collection)
 
-    def add(self, name: str, kind: str, buffers: MeshBuffers, material: bpy.types.Material) -> bpy.types.Object:
+    def add(self, name: str, kind: str, buffers: MeshBuffers, materials: list[bpy.types.Material]) -> bpy.types.Object:
         """Write one mesh as an object of the collection."""
-        mesh = write_mesh(name, buffers, [material])
+        mesh = write_mesh(name, buffers, materials)
         tag(mesh)
         made = bpy.data.objects.new(name, mesh)
         made[KIND] = kind

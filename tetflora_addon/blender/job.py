@@ -7,18 +7,14 @@ from __future__ import annotations
 import json
 from collections.abc import Generator
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import bpy
 import numpy as np
 
 from .. import emission
-from ..errors import SpeciesError
 from ..plants.compiled import Flora, compile_species
 from ..plants.growth import trunks
-from ..plants.leaf_models import LeafModel, leaf_model
 from ..plants.seeds import Seeds
-from ..plants.species import Species
 from ..refinement.camera import Camera
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
@@ -26,12 +22,11 @@ from ..refinement.loop import refine as refine_loop
 from ..refinement.settings import RefinementSettings
 from ..refinement.statistics import Statistics, Stopwatch
 from .emit import Results, has_results, remove_results
-from .materials import bark_material, leaf_material, proxy_material
-from .meshes import read_mesh_arrays
-from .properties import leaf_objects, settings_from
+from .leaf_forms import materials_of, resolved_species
+from .materials import proxy_material
+from .properties import settings_from
 from .scene_reader import read_camera, read_occluders, read_plants
 from .shell_material import shell_material
-from .species_edits import species_for
 
 __all__ = ["Progress", "clear", "compile_for", "estimate", "has_results", "partition", "refine", "refine_steps"]
 
@@ -65,41 +60,7 @@ def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph:
     SpeciesError
         Unknown or broken species, or a leaf object that is missing or not a mesh with faces.
     """
-    chosen = leaf_objects(scene)
-    resolved = []
-    for identifier in identifiers:
-        species = species_for(scene, identifier)
-        if identifier in chosen:
-            species = replace(species, leaf=_leaf_of(species, chosen[identifier], depsgraph))
-        elif not isinstance(species.leaf, LeafModel):
-            found = bpy.data.objects.get(species.leaf)
-            if found is None:
-                raise SpeciesError(
-                    f'Species "{species.name}" takes its leaf from an object "{species.leaf}", which this '
-                    "file does not have. Add a mesh object of that name, or choose one under Leaf Objects"
-                )
-            species = replace(species, leaf=_leaf_of(species, found, depsgraph))
-        resolved.append(species)
-    return compile_species(resolved)
-
-
-def _leaf_of(species: Species, source: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> LeafModel:
-    if source.type != 'MESH':
-        raise SpeciesError(f'"{source.name}" is to be the leaf of "{species.name}" but is not a mesh object')
-    evaluated = source.evaluated_get(depsgraph)
-    mesh = evaluated.to_mesh()
-    try:
-        arrays = read_mesh_arrays(mesh)
-    finally:
-        evaluated.to_mesh_clear()
-    if arrays.polygons == 0:
-        raise SpeciesError(f'"{source.name}" is to be the leaf of "{species.name}" but its mesh has no faces')
-    offsets, corners = arrays.face_offsets, arrays.corner_verts
-    faces = [corners[a:b].tolist() for a, b in pairwise(offsets)]
-    model = leaf_model(arrays.positions, faces)
-    if "UVMap" in arrays.attributes:
-        model = LeafModel(model.positions, model.corner_verts, model.face_offsets, arrays.attributes["UVMap"][1])
-    return model
+    return compile_species([resolved_species(scene, identifier, depsgraph) for identifier in identifiers])
 
 
 def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statistics:
@@ -261,8 +222,8 @@ def _write_blocks(
 ) -> Generator[Progress, None, None]:
     for block in blocks:
         species = flora.species[block.species]
-        material = (leaf_material if block.kind == "leaf" else bark_material)(species.name)
-        results.add(f"{species.name} {block.kind} {block.number:03d}", block.kind, block.buffers, material)
+        materials = materials_of(results.scene, species, block.kind, block.form)
+        results.add(f"{species.name} {block.kind} {block.number:03d}", block.kind, block.buffers, materials)
         statistics.polygons_meshed += block.buffers.polygons
         statistics.memory_mb += block.buffers.nbytes / 1e6
         yield Progress(start + (0.95 - start) * block.fraction, f"Making polygons: {statistics.polygons_meshed:,}")
@@ -276,6 +237,6 @@ def _write_proxies(
     else:
         buffers, material = emission.facet_buffers(flora, refinement, camera), proxy_material
     if buffers is not None:
-        results.add("TetFlora proxies", "proxy", buffers, material())
+        results.add("TetFlora proxies", "proxy", buffers, [material()])
         statistics.polygons_proxy += buffers.polygons
         statistics.memory_mb += buffers.nbytes / 1e6

@@ -144,7 +144,7 @@ def _check_range(key: str, indices: NDArray, count: int) -> None:
 
 
 def read_mesh_arrays(mesh: bpy.types.Mesh) -> MeshBuffers:
-    """Copy a mesh into buffers: the geometry, and the active UV map if there is one.
+    """Copy a mesh into buffers: the geometry, the active UV map and the indices of materials if there are any.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def read_mesh_arrays(mesh: bpy.types.Mesh) -> MeshBuffers:
     Returns
     -------
     MeshBuffers
-        Arrays of the caller's own; ``attributes`` has ``UVMap`` or nothing; ``smooth`` if any face is smooth.
+        Arrays of the caller's own; ``attributes`` may have ``UVMap`` and ``material_index``; ``smooth`` if any face is smooth.
     """
     positions = np.zeros((len(mesh.vertices), 3), dtype=np.float32)
     edges = np.zeros((len(mesh.edges), 2), dtype=np.int32)
@@ -175,4 +175,8 @@ def read_mesh_arrays(mesh: bpy.types.Mesh) -> MeshBuffers:
         uv = np.zeros((len(mesh.loops), 2), dtype=np.float32)
         layer.uv.foreach_get("vector", uv.reshape(-1))
         attributes[UV_MAP] = ("CORNER", uv)
+    if "material_index" in mesh.attributes:
+        index = np.zeros(len(mesh.polygons), dtype=np.int32)
+        mesh.polygons.foreach_get("material_index", index)
+        attributes["material_index"] = ("FACE", index)
     return MeshBuffers(positions, edges, corner_verts, corner_edges, offsets, attributes, bool(smooth.any()))

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -19,8 +19,9 @@ from ..plants.compiled import Flora
 from ..plants.growth import trunks
 from ..plants.meshing import concatenate_buffers
 from ..plants.seeds import Seeds
+from ..plants.species import Species
 from . import job
-from .materials import bark_material, leaf_material
+from .leaf_forms import materials_of
 from .meshes import write_mesh
 from .transforms import frames_of, world_matrix
 
@@ -47,45 +48,66 @@ def expected_polygons(flora: Flora, seeds: Seeds) -> float:
     return float(flora.polygons[trunks(flora.rows, seeds).row].sum())
 
 
-def plant_buffers(flora: Flora, seeds: Seeds) -> list[tuple[str, MeshBuffers]]:
-    """All polygons of one plant at the origin, in its own space, by kind: ``'bark'``, ``'leaf'``."""
+@dataclass(frozen=True)
+class Part:
+    """Polygons of a plant that have materials of their own.
+
+    Attributes
+    ----------
+    kind : str
+        ``'bark'``, ``'leaf'`` or ``'blossom'``.
+    form : int
+        Which of the species' forms of leaf.
+    buffers : MeshBuffers
+    """
+
+    kind: str
+    form: int
+    buffers: MeshBuffers
+
+
+def plant_parts(flora: Flora, seeds: Seeds) -> list[Part]:
+    """All polygons of one plant at the origin, in its own space."""
     frame = seeds.frame[0].astype(np.float32)
-    parts: dict[str, list[MeshBuffers]] = {}
+    found: dict[tuple[str, int], list[MeshBuffers]] = {}
     for block in emission.expanded_blocks(flora, seeds):
-        parts.setdefault(block.kind, []).append(block.buffers)
-    joined = [(kind, concatenate_buffers(buffers)) for kind, buffers in sorted(parts.items())]
+        found.setdefault((block.kind, block.form), []).append(block.buffers)
+    joined = [(*what, concatenate_buffers(buffers)) for what, buffers in sorted(found.items())]
     # Row vectors times the frame are turned back by it.
-    return [(kind, replace(b, positions=b.positions @ frame)) for kind, b in joined if b is not None]
+    return [Part(kind, form, replace(b, positions=b.positions @ frame)) for kind, form, b in joined if b is not None]
 
 
-def plant_mesh(name: str, species_name: str, parts: list[tuple[str, MeshBuffers]]) -> bpy.types.Mesh:
-    """One mesh of the parts of a plant, with a material for each kind.
+def plant_mesh(scene: bpy.types.Scene, name: str, species: Species, parts: list[Part]) -> bpy.types.Mesh:
+    """One mesh of the parts of a plant, with materials for each.
 
     Parameters
     ----------
+    scene : bpy.types.Scene
+        Whose leaf objects count.
     name : str
         Of the datablock.
-    species_name : str
+    species : Species
         Materials are the species' own, as Refine makes them.
-    parts : list of (kind, MeshBuffers)
-        What `plant_buffers` gives.
+    parts : list of Part
+        What `plant_parts` gives.
 
     Returns
     -------
     bpy.types.Mesh
         In the space of the plant. Wood is shaded smooth, leaves flat.
     """
-    numbered = []
-    for slot, (_, buffers) in enumerate(parts):
-        index = np.full(buffers.polygons, slot, dtype=np.int32)
-        attributes = {**buffers.attributes, "material_index": ("FACE", index)}
+    numbered, materials = [], []
+    for part in parts:
+        buffers = part.buffers
+        _, index = buffers.attributes.get("material_index", ("", np.zeros(buffers.polygons, dtype=np.int32)))
+        attributes = {**buffers.attributes, "material_index": ("FACE", index + np.int32(len(materials)))}
         numbered.append(replace(buffers, attributes=attributes, smooth=True))
+        materials += materials_of(scene, species, part.kind, part.form)
     whole = concatenate_buffers(numbered)
     if whole is None:
-        raise SceneError(f'A plant of "{species_name}" has neither branches nor leaves')
-    materials = [(leaf_material if kind == "leaf" else bark_material)(species_name) for kind, _ in parts]
+        raise SceneError(f'A plant of "{species.name}" has neither branches nor leaves')
     mesh = write_mesh(name, whole, materials)
-    sharp = np.repeat([not buffers.smooth for _, buffers in parts], [buffers.polygons for _, buffers in parts])
+    sharp = np.repeat([not p.buffers.smooth for p in parts], [p.buffers.polygons for p in parts])
     if sharp.any():
         mesh.attributes.new("sharp_face", 'BOOLEAN', 'FACE').data.foreach_set("value", sharp)
     return mesh
@@ -125,7 +147,7 @@ def make_plant_meshes(
     made = []
     for number, (plant, seed) in enumerate(zip(plants, seeds, strict=True)):
         flora = floras[plant.tetflora.species]
-        mesh = plant_mesh(f"{plant.name} mesh", flora.species[0].name, plant_buffers(flora, seed))
+        mesh = plant_mesh(scene, f"{plant.name} mesh", flora.species[0], plant_parts(flora, seed))
         obj = bpy.data.objects.new(mesh.name, mesh)
         for collection in plant.users_collection:
             collection.objects.link(obj)

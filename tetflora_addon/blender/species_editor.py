@@ -14,10 +14,9 @@ import bpy
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 
 from ..errors import SpeciesError
-from ..plants.crown_shapes import CROWN_SHAPES
 from ..plants.leaf_models import LEAF_MODELS
-from ..plants.schema import LENGTH_HIGH, ORDER_KEYS, Key
-from ..plants.species import MAX_ORDERS
+from ..plants.schema import CHOICES, LENGTH_HIGH, ORDER_KEYS, QUALITY_LIMITS, Key
+from ..plants.species import BARKS, MAX_ORDERS
 from .species_choice import SpeciesChoice
 from .species_edits import change_species, species_data, species_for, tell_listeners
 from .species_items import catalogue
@@ -82,7 +81,9 @@ def value_of(editor: bpy.types.PropertyGroup, name: str) -> Any:
 
 
 def _number(value: Any, *path: int) -> float:
-    """A number inside nested lists; 0 where there is none."""
+    """A number inside nested lists; 0 where there is none. A range may be written as its mean alone."""
+    if path and isinstance(value, int | float):
+        return 0.0 if path[0] else float(value)
     try:
         for step in path:
             value = value[step]
@@ -206,6 +207,21 @@ def _colour(name: str, key: Key) -> dict[str, Any]:
     return {name + suffix: _colour_part(name, key, part) for part, suffix in enumerate(("", VARIATION))}
 
 
+def _rgb(name: str, key: Key) -> dict[str, Any]:
+    made = FloatVectorProperty(
+        name=_label(name),
+        description=_description(name, key),
+        subtype='COLOR',
+        size=3,
+        min=0.0,
+        max=1.0,
+        get=lambda self: tuple(_number(value_of(self, name), c) for c in range(3)),
+        set=lambda self, value: _write(self, name, [_rounded(c) for c in value]),
+        options=set(),
+    )
+    return {name: made}
+
+
 def _colour_part(name: str, key: Key, part: int) -> Any:
     def write(self: bpy.types.PropertyGroup, value: Any) -> None:
         old = value_of(self, name)
@@ -227,7 +243,7 @@ def _colour_part(name: str, key: Key, part: int) -> Any:
 
 
 def _choices(key: Key) -> tuple[str, ...]:
-    return CROWN_SHAPES if key.kind == "shape" else tuple(getattr(key, "choices", ()))
+    return CHOICES.get(key.kind, ())
 
 
 def _choice(name: str, key: Key) -> dict[str, Any]:
@@ -248,7 +264,9 @@ _MAKERS: dict[str, Callable[[str, Key], dict[str, Any]]] = {
     "number": _single,
     "integer": _integer,
     "colour": _colour,
+    "rgb": _rgb,
     "shape": _choice,
+    "kind": _choice,
 }
 
 # Blender keeps no copy of the strings of dynamic items, so somebody has to.
@@ -351,6 +369,27 @@ class _Fixed(SpeciesChoice):
         description="Mesh object that is the leaf: its stalk at the origin, along +Y, its upper side towards +Z",
         get=lambda self: str(_leaf(self).get("object", "")),
         set=lambda self, value: _set_species_value(self, "leaf", {"object": value}),
+        options={'SKIP_SAVE'},
+    )
+    bark: EnumProperty(
+        name="Bark",
+        description="Character of the bark's pattern",
+        items=[(name, name.capitalize(), "", number) for number, name in enumerate(BARKS)],
+        get=lambda self: BARKS.index(value) if (value := _species_value(self, "bark", BARKS[0])) in BARKS else 0,
+        set=lambda self, number: _set_species_value(self, "bark", BARKS[number]),
+        options={'SKIP_SAVE'},
+    )
+    quality: FloatProperty(
+        name="Quality",
+        description="Polygons of a plant, of those that are described: fewer and larger leaves, or more and finer ones",
+        min=QUALITY_LIMITS[0],
+        max=QUALITY_LIMITS[1],
+        soft_min=0.02,
+        soft_max=10.0,
+        default=1.0,
+        precision=3,
+        get=lambda self: _number(_species_value(self, "quality", 1.0)),
+        set=lambda self, value: _set_species_value(self, "quality", _rounded(value)),
         options={'SKIP_SAVE'},
     )
     leaf_transmission: FloatProperty(

@@ -20,7 +20,7 @@ from ..plants.seeds import Seeds
 from ..plants.species import Range
 from . import job, species_editor, species_edits
 from .node_tools import is_ours, tag
-from .plant_mesh import expected_polygons, plant_buffers, plant_mesh, single_seed
+from .plant_mesh import expected_polygons, plant_parts, plant_mesh, single_seed
 
 NAME = "TetFlora preview"
 #: Polygons that a preview has at most, about: what is rebuilt while a slider moves.
@@ -96,7 +96,7 @@ def refresh() -> None:
         depsgraph = scene.view_layers[0].depsgraph or bpy.context.evaluated_depsgraph_get()
         seeds = single_seed(identifier, editor.preview_seed)
         flora, orders = _limited(job.compile_for((identifier,), scene, depsgraph), seeds)
-        mesh = plant_mesh(NAME, flora.species[0].name, plant_buffers(flora, seeds))
+        mesh = plant_mesh(scene, NAME, flora.species[0], plant_parts(flora, seeds))
     except TetFloraError as error:
         _state.message, _state.failed = str(error), True
         return  # the last plant that could be grown stays
@@ -114,7 +114,7 @@ def _limited(flora: Flora, seeds: Seeds) -> tuple[Flora, int]:
     while number > 1 and expected_polygons(flora, seeds) > MOST_POLYGONS:
         number -= 1
         kept = species.orders[: number - 1] + (replace(species.orders[number - 1], branches=Range(0.0)),)
-        flora = compile_species([replace(species, leaf=flora.leaf_models[0], orders=kept)])
+        flora = compile_species([replace(species, orders=kept)])
     return flora, 0 if number == len(species.orders) else number
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .crown_shapes import crown_ratio
-from .species import MAX_ORDERS
+from .rows import FORK, LATERAL, SPUR
 
 _SLABS = 48
 _ANGLES = 33
@@ -26,7 +26,7 @@ def _axis_envelope(row: NDArray[np.void]) -> tuple[NDArray, NDArray, NDArray, ND
     mean, variation = row["curvature"]
     back = np.where(2 * np.arange(segments) < segments, abs(mean), abs(row["curvature_tip"]))
     # A joint bends back by a, then aside by b: cos c = cos a cos b, and c² ≤ a² + b². Turns of joints add up at most.
-    joint = np.hypot(back + variation, variation) / segments
+    joint = (np.hypot(back + variation, variation) + np.abs(row["attraction"]).sum()) / segments
     joint[0] = 0  # the first segment sets out straight
     turn = np.minimum(np.cumsum(joint), np.pi)
     sideways = np.sin(np.minimum(turn, np.pi / 2)) / segments
@@ -68,38 +68,78 @@ def unit_bounds(rows: NDArray[np.void]) -> NDArray[np.float64]:
         top.
     """
     bounds = np.zeros((len(rows), 3))
-    for order in range(MAX_ORDERS - 1, -1, -1):
-        for index in range(order, len(rows), MAX_ORDERS):
-            if rows["used"][index]:
-                child = index + 1 if rows["branches"][index].sum() > 0 else None
-                bounds[index] = _unit_bound(rows, index, None if child is None else bounds[child])
+    for index in range(len(rows) - 1, -1, -1):
+        bounds[index] = _unit_bound(rows, index, bounds)
     return bounds
 
 
-def _unit_bound(rows: NDArray[np.void], index: int, child_bound: NDArray | None) -> NDArray[np.float64]:
+def leaf_reaches(
+    rows: NDArray[np.void], bounds: NDArray[np.float64], model_reach: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """How far leaves and short shoots stick out beyond the axes of sub-plants at plant scale 1, metres.
+
+    Parameters
+    ----------
+    rows : (r,) table
+    bounds : (r, 3) float64
+        Of `unit_bounds`.
+    model_reach : (r,) float64
+        Distance of the farthest vertex from the base of the leaf that each row bears, for a leaf of size 1.
+    """
+    largest = rows["leaf_size"].sum(axis=1) * np.maximum(rows["leaf_size_tip"], 1)
+    reach = np.where(rows["leaves"].sum(axis=1) > 0, largest * model_reach, 0.0)
+    for index in range(len(rows) - 1, -1, -1):
+        for sort in np.flatnonzero(rows["next"][index] >= 0):
+            child = rows["next"][index, sort]
+            farther = reach[child]
+            if sort == SPUR:
+                radius, low, high = bounds[child]
+                length, thickness = rows["length"][child].sum(), rows["thickness"][child].sum()
+                farther += length * (np.hypot(radius, max(high, -low)) + thickness * (1 + rows["flare"][child]))
+            reach[index] = max(reach[index], farther)
+    return reach
+
+
+def _unit_bound(rows: NDArray[np.void], index: int, bounds: NDArray[np.float64]) -> NDArray[np.float64]:
     row = rows[index]
     radius, low, high, turn = _axis_envelope(row)
     bound = np.array([radius.max(), min(low.min(), 0.0), max(high.max(), 0.0)])
-    if child_bound is None:
-        return bound
-    child = rows[index + 1]
-    share = np.linspace(0, 1, _SLABS + 1)
-    t = row["branch_start"] + (1 - row["branch_start"]) * share
     knot_t = np.linspace(0, 1, len(radius))
-    r, lo, hi = (np.interp(t, knot_t, v) for v in (radius, low, high))
-    first = np.minimum((t[:-1] * row["segments"]).astype(int), len(turn) - 1)
-    last = np.minimum((t[1:] * row["segments"]).astype(int), len(turn) - 1)
-    dev = np.maximum(turn[first], turn[last])
-    base, variation = child["angle"]
-    lean = base + (child["angle_tip"] - base) * share
-    least = np.clip(np.minimum(lean[:-1], lean[1:]) - variation - dev, 0, np.pi)
-    most = np.clip(np.maximum(lean[:-1], lean[1:]) + variation + dev, 0, np.pi)
-    angle = np.linspace(least, most, _ANGLES, axis=1)
-    inner = np.linspace(share[:-1], share[1:], 5, axis=1)
-    crown = crown_ratio(np.full(inner.shape, row["crown"]), 1 - inner).max(1) + _CROWN_SLOPE / _SLABS / 8
-    far, bottom, top = _tilted(child_bound, angle, np.minimum(crown, 1) * child["length"].sum())
-    # Between a slab's ends nothing sticks out: radius and height grow along the axis, the lowest height is concave.
-    bound[0] = max(bound[0], (np.maximum(r[:-1], r[1:]) + far).max())
-    bound[1] = min(bound[1], (np.minimum(lo[:-1], lo[1:]) + bottom).min())
-    bound[2] = max(bound[2], (np.maximum(hi[:-1], hi[1:]) + top).max())
+    for sort in (LATERAL, FORK):
+        if row["next"][sort] < 0:
+            continue
+        child = rows[row["next"][sort]]
+        share = np.linspace(0, 1, _SLABS + 1)
+        start = max(row["start"][sort, 0] - row["start"][sort, 1], 0.0)
+        t = start + (1 - start) * share
+        share = row["share"][sort, 0] + np.ptp(row["share"][sort]) * share
+        r, lo, hi = (np.interp(t, knot_t, v) for v in (radius, low, high))
+        first = np.minimum((t[:-1] * row["segments"]).astype(int), len(turn) - 1)
+        last = np.minimum((t[1:] * row["segments"]).astype(int), len(turn) - 1)
+        dev = np.maximum(turn[first], turn[last])
+        base, variation = child["angle"]
+        lean = base + (child["angle_tip"] - base) * share
+        most = np.clip(np.maximum(lean[:-1], lean[1:]) + variation + dev, 0, np.pi)
+        least = np.clip(np.minimum(lean[:-1], lean[1:]) - variation - dev, 0, np.pi)
+        longest = np.full(_SLABS, child["length"].sum() * row["nominal"])
+        if sort == FORK:
+            longest[:] = child["length"].sum()
+            least[:] = 0.0  # a single stem goes straight on
+        elif row["start"][sort, 1] > 0:
+            longest *= _crown_most(row, np.zeros(1), np.ones(1))[0]  # the places of shares are not known
+        else:
+            longest *= _crown_most(row, share[:-1], share[1:])
+        angle = np.linspace(least, most, _ANGLES, axis=1)
+        far, bottom, top = _tilted(bounds[row["next"][sort]], angle, longest)
+        # Between a slab's ends nothing sticks out: radius and height grow along the axis, the lowest height is concave.
+        bound[0] = max(bound[0], (np.maximum(r[:-1], r[1:]) + far).max())
+        bound[1] = min(bound[1], (np.minimum(lo[:-1], lo[1:]) + bottom).min())
+        bound[2] = max(bound[2], (np.maximum(hi[:-1], hi[1:]) + top).max())
     return bound
+
+
+def _crown_most(row: NDArray[np.void], low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Greatest length ratio of children between two shares (n,)."""
+    inner = np.linspace(low, high, 5, axis=1)
+    ratio = crown_ratio(np.full(inner.shape, row["crown"]), 1 - inner).max(axis=1)
+    return np.minimum(ratio + _CROWN_SLOPE * (high - low) / 8, 1)

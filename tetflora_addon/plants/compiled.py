@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SpeciesError
-from .bounds import unit_bounds
-from .crown_shapes import crown_ratio
-from .growth import Branches
+from .averages import Averages, RowLeaves, average, quadratic, row_leaves
+from .bounds import leaf_reaches, unit_bounds
+from .growth import Branches, fullness
 from .leaf_models import LeafModel
 from .rows import build_rows
 from .samples import Samples, draw_samples
-from .species import MAX_ORDERS, Species
+from .species import LEAF_KINDS, Species
 
 
 @dataclass(frozen=True)
@@ -35,82 +35,104 @@ class Flora:
     Attributes
     ----------
     species : tuple of Species
-    leaf_models : tuple of LeafModel
-        By species.
+    forms : tuple of tuple of tuple of LeafModel
+        By species and kind of leaf.
     rows : (r,) structured array
         Parameters, see `rows.ROW_DTYPE`.
+    first_row : (species,) int64
+        Row of each species' trunk.
+    leaf : RowLeaves
+        Means over the forms of the leaf that each row's own branch bears.
     bound : (r, 3) float64
         Radius, lowest and highest z of the sub-plant's axes for a branch of length 1, see `bounds.unit_bounds`.
+    widest : (r,) float64
+        Greatest radius of the branch in radii of its base, which may flare.
     leaf_reach : (r,) float64
-        How far leaves of the sub-plant stick out beyond its axes at plant scale 1, metres.
+        How far leaves and short shoots of the sub-plant stick out beyond its axes at plant scale 1, metres.
     leaf_width : (r,) float64
         Mean width of its leaves at plant scale 1, metres; 0 without leaves.
-    leaf_count, leaf_area : (r,) float64
-        Expected number and one-sided area (m², at plant scale 1) of the leaves of the sub-plant.
-    wood_area : (r,) float64
-        Expected surface of the branches of the sub-plant divided by length × radius of its own branch.
-    own_wood : (r,) float64
-        The part of it that is the own branch's.
-    polygons, own_faces : (r,) float64
-        Expected number of faces of the sub-plant, leaves and branches; and those of its own branch's tube.
-    leaf_colour, wood_colour : (r, 3) float64
-        Area-weighted mean colours.
+    leaf_count : (r,) float64
+        Expected number of the leaves of the sub-plant.
+    fixed_wood, full_wood : (r,) float64
+        Expected surface of the branches of the sub-plant divided by length × radius of its own branch: what every one
+        has, and what follows its fullness.
+    spur_wood : (r,) float64
+        Surface of its short shoots, m² at plant scale 1; follows the fullness.
+    polygons, leaf_faces, fixed_faces : (r,) float64
+        Expected number of faces of the sub-plant, leaves and branches; those of the leaves; and those of the tubes that
+        every one has.
+    wood_colour : (r, 3) float64
+        Area-weighted mean.
     transmission : (r,) float64
-        Share of scattered light that goes through leaves.
+        Share of scattered light that goes through the leaves of the sub-plant.
     samples : Samples
         Points on the leaves and wood of sub-plants.
+    area_nodes : (r, 3) float64
+        Expected one-sided area of leaves at `averages.NODES`, m² at plant scale 1.
+    colour_nodes : (r, 3, 3) float64
+        Area times mean colour at the same places.
     """
 
     species: tuple[Species, ...]
-    leaf_models: tuple[LeafModel, ...]
+    forms: tuple[tuple[tuple[LeafModel, ...], ...], ...]
     rows: NDArray[np.void]
+    first_row: NDArray[np.int64]
+    leaf: RowLeaves
     bound: NDArray[np.float64]
+    widest: NDArray[np.float64]
     leaf_reach: NDArray[np.float64]
     leaf_width: NDArray[np.float64]
     leaf_count: NDArray[np.float64]
-    leaf_area: NDArray[np.float64]
-    wood_area: NDArray[np.float64]
-    own_wood: NDArray[np.float64]
+    fixed_wood: NDArray[np.float64]
+    full_wood: NDArray[np.float64]
+    spur_wood: NDArray[np.float64]
     polygons: NDArray[np.float64]
-    own_faces: NDArray[np.float64]
-    leaf_colour: NDArray[np.float64]
+    leaf_faces: NDArray[np.float64]
+    fixed_faces: NDArray[np.float64]
     wood_colour: NDArray[np.float64]
     transmission: NDArray[np.float64]
     samples: Samples
+    area_nodes: NDArray[np.float64]
+    colour_nodes: NDArray[np.float64]
 
-    @staticmethod
-    def species_of(row: NDArray[np.integer]) -> NDArray[np.integer]:
+    def species_of(self, row: NDArray[np.integer]) -> NDArray[np.integer]:
         """Index (n,) of the species that rows (n,) belong to."""
-        return row // MAX_ORDERS
+        return self.rows["species"][row]
+
+    def leaf_areas(self, subplants: Branches) -> NDArray[np.float64]:
+        """Expected one-sided area (n,) of the leaves of sub-plants, m²."""
+        area = self._at_place(self.area_nodes, subplants)
+        return fullness(self.rows, subplants) * area * subplants.scale**2
+
+    def leaf_colours(self, subplants: Branches) -> NDArray[np.float64]:
+        """Mean linear RGB (n, 3) of the leaves of sub-plants, weighted by area; black where they have none."""
+        area = self._at_place(self.area_nodes, subplants)
+        return self._at_place(self.colour_nodes, subplants) / np.maximum(area, 1e-300)[:, None]
+
+    def wood_areas(self, subplants: Branches) -> NDArray[np.float64]:
+        """Expected surface (n,) of the branches of sub-plants, m²."""
+        row, full = subplants.row, fullness(self.rows, subplants)
+        relative = self.fixed_wood[row] + full * self.full_wood[row]
+        return relative * subplants.length * subplants.radius + full * self.spur_wood[row] * subplants.scale**2
+
+    def face_counts(self, subplants: Branches) -> NDArray[np.float64]:
+        """Expected number (n,) of the faces of sub-plants, leaves and branches."""
+        row, fixed = subplants.row, self.fixed_faces[subplants.row]
+        return fixed + fullness(self.rows, subplants) * (self.polygons[row] - fixed)
+
+    def branch_faces(self, subplants: Branches) -> NDArray[np.float64]:
+        """Expected number (n,) of the faces of the branches of sub-plants."""
+        leaves = fullness(self.rows, subplants) * self.leaf_faces[subplants.row]
+        return self.face_counts(subplants) - leaves
 
     def one_leaf_area(self, branches: Branches) -> NDArray[np.float64]:
         """Mean one-sided area (n,) of a single leaf of sub-plants, m²; 0 where they have none."""
-        row = branches.row
-        return self.leaf_area[row] / np.maximum(self.leaf_count[row], 1e-300) * branches.scale**2
+        area = self._at_place(self.area_nodes, branches)
+        return area / np.maximum(self.leaf_count[branches.row], 1e-300) * branches.scale**2
 
-
-def tube_perimeter(sides: NDArray[np.integer]) -> NDArray[np.float64]:
-    """Perimeter of a branch's cross-section, a regular polygon, divided by its radius."""
-    return 2 * sides * np.sin(np.pi / sides)
-
-
-def _children(rows: NDArray[np.void], index: int) -> tuple[float, float, float, float]:
-    """Expected sums over the children of a branch, at its place in the crown where branches are longest.
-
-    Returns
-    -------
-    number, fullness : float
-        Of the children: how many, and the sum of the factors on their own numbers (see `growth.fullness`).
-    wood, full_wood : float
-        Sums of length × radius relative to the parent's, without and with that factor.
-    """
-    row, child = rows[index], rows[index + 1]
-    share = (np.arange(256) + 0.5) / 256
-    t = row["branch_start"] + (1 - row["branch_start"]) * share
-    vigour = crown_ratio(np.full(share.shape, row["crown"]), 1 - share)
-    full = 1 - child["count_by_length"] * (1 - vigour)
-    size = vigour * (1 - (1 - row["taper"]) * t) * child["length"][0] * child["thickness"][0]
-    return tuple(float(row["branches"][0] * m.mean()) for m in (np.ones_like(t), full, size, size * full))
+    def _at_place(self, nodes: NDArray[np.float64], subplants: Branches) -> NDArray[np.float64]:
+        """Values at the places of sub-plants between the inside and the outside of the crown."""
+        return np.einsum("nk,nk...->n...", quadratic(subplants.outward), nodes[subplants.row])
 
 
 def compile_species(species: Sequence[Species]) -> Flora:
@@ -127,61 +149,47 @@ def compile_species(species: Sequence[Species]) -> Flora:
 @lru_cache(maxsize=8)
 def _compiled(species: tuple[Species, ...]) -> Flora:
     for one in species:
-        if not isinstance(one.leaf, LeafModel):
-            raise SpeciesError(f"{one.identifier}: the leaf object \"{one.leaf}\" has not been resolved to a mesh")
+        for kind, name in enumerate(LEAF_KINDS):
+            for form in one.forms(kind):
+                if not isinstance(form, LeafModel):
+                    raise SpeciesError(f'{one.identifier}: the {name} object "{form}" has not been resolved to a mesh')
     rows = build_rows(species)
-    models = tuple(one.leaf for one in species)
-    total = len(rows)
-    by_species = np.repeat(np.arange(len(species)), MAX_ORDERS)
-    model_area, model_polygons, model_reach, model_width = (
-        np.array([getattr(m, name) for m in models])[by_species] for name in ("area", "polygons", "reach", "width")
-    )
-    size, spread_ = rows["leaf_size"].T
-    own_leaves = rows["leaves"][:, 0]
-    own_area = own_leaves * (size**2 + spread_**2 / 3) * model_area  # E[s²] of a uniform range
-    own_reach = np.where(rows["leaves"].sum(1) > 0, (size + spread_) * model_reach, 0.0)
-    own_wood = tube_perimeter(np.maximum(rows["sides"], 1)) * (1 + rows["taper"]) / 2 * rows["used"]
-    own_faces = (rows["sides"] * rows["segments"]).astype(float)
-
-    leaf_count, leaf_area = own_leaves.copy(), own_area.copy()
-    wood_area, polygons = own_wood.copy(), own_faces + own_leaves * model_polygons
-    leaf_reach, leaf_width = own_reach.copy(), own_leaves * size * model_width
-    leaf_colour = own_area[:, None] * rows["leaf_colour"][:, 0]
-    wood_colour = own_wood[:, None] * rows["branch_colour"][:, 0]
-    wood_share = np.zeros((total, MAX_ORDERS))  # of the sub-plant's wood, by relative order
-    wood_share[:, 0] = own_wood
-    leaf_share = np.zeros((total, MAX_ORDERS))
-    leaf_share[:, 0] = own_area
-    for order in range(MAX_ORDERS - 2, -1, -1):
-        for i in range(order, total, MAX_ORDERS):
-            if rows["branches"][i, 0] <= 0:
-                continue
-            number, full, wood, full_wood = _children(rows, i)
-            for array in (leaf_count, leaf_area, leaf_width, leaf_colour):
-                array[i] += full * array[i + 1]
-            leaf_share[i, 1:] = full * leaf_share[i + 1, :-1]
-            polygons[i] += number * own_faces[i + 1] + full * (polygons[i + 1] - own_faces[i + 1])
-            own_colour = own_wood[i + 1] * rows["branch_colour"][i + 1, 0]
-            wood_area[i] += wood * own_wood[i + 1] + full_wood * (wood_area[i + 1] - own_wood[i + 1])
-            wood_colour[i] += wood * own_colour + full_wood * (wood_colour[i + 1] - own_colour)
-            wood_share[i, 1] = wood * own_wood[i + 1]
-            wood_share[i, 2:] = full_wood * wood_share[i + 1, 1:-1]
-            leaf_reach[i] = max(leaf_reach[i], leaf_reach[i + 1])
+    forms = tuple(tuple(one.forms(kind) for kind in range(len(LEAF_KINDS))) for one in species)
+    leaf = row_leaves(rows, forms, np.array([[one.leaf_transmission, one.blossom_transmission] for one in species]))
+    amounts = average(rows, leaf)
+    bound = unit_bounds(rows)
+    leaves, area = amounts.leaves, amounts.leaf_area[:, 1]
+    wood = _wood_shares(amounts)
+    leaf_count, leaf_area = leaves.sum(axis=1), area.sum(axis=1)
+    size = rows["leaf_size"][:, 0] * (1 + rows["leaf_size_tip"]) / 2
+    fixed, full = amounts.fixed_faces.sum(axis=1), amounts.full_faces.sum(axis=1)
+    polygons = fixed + full + leaves @ leaf.polygons
     return Flora(
         species=tuple(species),
-        leaf_models=models,
+        forms=forms,
         rows=rows,
-        bound=unit_bounds(rows),
-        leaf_reach=leaf_reach,
-        leaf_width=leaf_width / np.maximum(leaf_count, 1e-300),
+        first_row=np.flatnonzero(np.diff(rows["species"], prepend=-1)),
+        leaf=leaf,
+        bound=bound,
+        widest=1 + rows["flare"],
+        leaf_reach=leaf_reaches(rows, bound, leaf.reach),
+        leaf_width=leaves @ (size * leaf.width) / np.maximum(leaf_count, 1e-300),
         leaf_count=leaf_count,
-        leaf_area=leaf_area,
-        wood_area=wood_area,
-        own_wood=own_wood,
+        fixed_wood=amounts.fixed_wood.sum(axis=1),
+        full_wood=amounts.full_wood.sum(axis=1),
+        spur_wood=amounts.spur_wood.sum(axis=1),
         polygons=polygons,
-        own_faces=own_faces,
-        leaf_colour=leaf_colour / np.maximum(leaf_area, 1e-300)[:, None],
-        wood_colour=wood_colour / np.maximum(wood_area, 1e-300)[:, None],
-        transmission=np.array([one.leaf_transmission for one in species])[by_species],
-        samples=draw_samples(rows, [m.moment for m in models], leaf_share, wood_share),
+        leaf_faces=leaves @ leaf.polygons,
+        fixed_faces=fixed,
+        wood_colour=wood @ rows["branch_colour"][:, 0] / wood.sum(axis=1, keepdims=True),
+        transmission=area @ leaf.transmission / np.maximum(leaf_area, 1e-300),
+        samples=draw_samples(rows, leaf, forms, area, wood, polygons, amounts.length),
+        area_nodes=amounts.leaf_area.sum(axis=2),
+        colour_nodes=amounts.leaf_colour,
     )
+
+
+def _wood_shares(amounts: Averages) -> NDArray[np.float64]:
+    """Expected surface (r, r) of branches of typical size by contributing row, over length × radius of the own one."""
+    size = np.maximum(amounts.length * amounts.radius, 1e-300)
+    return amounts.fixed_wood + amounts.full_wood + amounts.spur_wood / size[:, None]

@@ -72,6 +72,9 @@ class Copies:
         edges, edge_of_corner = model.edges
         vertices, corners = len(model.positions), len(model.corner_verts)
         starts = _stepped(model.face_offsets[:-1], corners, n)
+        materials = (
+            {} if model.material_index is None else {"material_index": ("FACE", _stepped(model.material_index, 0, n))}
+        )
         return MeshBuffers(
             positions=self.positions.reshape(-1, 3),
             edge_verts=_stepped(edges.reshape(-1), vertices, n).reshape(-1, 2),
@@ -82,6 +85,7 @@ class Copies:
                 "UVMap": ("CORNER", _stepped(model.uv.reshape(-1), 0, n).reshape(-1, 2)),
                 "tf_colour": ("FACE", self.colour.reshape(-1, 3)),
                 "tf_transmission": ("FACE", np.full(n * model.polygons, self.transmission, np.float32)),
+                **materials,
             },
         )
 

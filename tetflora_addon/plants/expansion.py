@@ -23,7 +23,7 @@ def open_subplants(flora: Flora, subplants: Branches) -> tuple[Branches, NDArray
         Children with the index of the sub-plant that each comes from, and pieces with theirs.
     """
     lines = axes(flora.rows, subplants)
-    pieces, piece_owner = whole_pieces(subplants, lines)
+    pieces, piece_owner = whole_pieces(flora.rows, subplants, lines)
     grown, owner = children(flora.rows, subplants, lines)
     return grown, owner, pieces, piece_owner
 

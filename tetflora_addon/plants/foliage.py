@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .growth import Axes, Branches
+from .growth import Axes, Branches, level_azimuth
 from .hashing import Draw, child_key, signed, uniform
 from .rows import ranged
 from .vectors import cross, dot, gathered
@@ -34,6 +34,8 @@ class Leaves:
         nanometres at the tip of a leaf, and its cosines are ten times as fast.
     size : (n,) float64
         Metres by which the leaf model is scaled.
+    light : (n,) float64
+        How far it turns to the sky.
     """
 
     branch: NDArray[np.int64]
@@ -41,6 +43,7 @@ class Leaves:
     position: NDArray[np.float64]
     frame: NDArray[np.float32]
     size: NDArray[np.float64]
+    light: NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.key)
@@ -54,10 +57,33 @@ def leaf_keys(branches: Branches, owner: NDArray[np.int64], index: NDArray[np.in
 def leaf_places(
     rows: NDArray[np.void], branches: Branches, owner: NDArray, index: NDArray, counts: NDArray, key: NDArray[np.uint64]
 ) -> NDArray[np.float64]:
-    """Fractions (m,) of the branches' axes at which leaves sit."""
-    share = (index + 0.5 + _PLACE_JITTER * signed(key, Draw.PLACE)) / np.take(counts, owner)
-    start = rows["leaf_start"][_rows_of(branches, owner)]
+    """Fractions (m,) of the branches' axes at which leaves sit; those of a whorl share that of the first of them."""
+    row = _rows_of(branches, owner)
+    whorl = rows["leaf_whorl"][row]
+    number = np.take(counts, owner)
+    node = index
+    if (whorl > 1).any():
+        node = index // whorl
+        key = np.where(index % whorl > 0, leaf_keys(branches, owner, node * whorl), key)
+        number = number // whorl
+    share = (node + 0.5 + _PLACE_JITTER * signed(key, Draw.PLACE)) / number
+    start = leaf_start(rows, branches)
+    start = start[:1] if len(row) == 1 and (start == start[:1]).all() else np.take(start, owner)
     return start + (1 - start) * share
+
+
+def leaf_start(rows: NDArray[np.void], branches: Branches) -> NDArray[np.float64]:
+    """Fraction (n,) of each branch's axis that is bare of leaves."""
+    return ranged(rows, "leaf_start", branches.row, branches.key, Draw.LEAF_START)
+
+
+def outwardness(
+    rows: NDArray[np.void], branches: Branches, owner: NDArray[np.int64], t: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Where leaves at fractions t (m,) of branches lie between the inside of the crown, 0, and the outside, 1."""
+    row = _rows_of(branches, owner)
+    first, last = rows["part"][row].T
+    return np.where(rows["outward"][row], first + (last - first) * t, np.take(branches.outward, owner))
 
 
 def leaf_range(
@@ -90,12 +116,14 @@ def leaf_range(
     def below(t: NDArray[np.float64]) -> NDArray[np.int64]:
         out = np.where(t >= 1, counts, 0)
         near = np.flatnonzero((t > 0) & (t < 1) & (counts > 0))
-        number, start = counts[near], rows["leaf_start"][branches.row[near]]
+        some = branches.take(near)
+        start, whorl = leaf_start(rows, some), rows["leaf_whorl"][some.row]
+        number = counts[near] // whorl
         share = (t[near] - start) / (1 - start)
-        # Each leaf keeps to its own part of the branch, one of `number`.
-        index = np.clip(np.floor(share * number), 0, number - 1).astype(np.int64)
-        place = leaf_places(rows, branches, near, index, counts, leaf_keys(branches, near, index))
-        out[near] = index + (place < t[near])
+        # Each whorl keeps to its own part of the branch, one of `number`.
+        node = np.clip(np.floor(share * number), 0, number - 1).astype(np.int64)
+        place = leaf_places(rows, branches, near, node * whorl, counts, leaf_keys(branches, near, node * whorl))
+        out[near] = (node + (place < t[near])) * whorl
         return out
 
     return below(t0), below(t1)
@@ -133,15 +161,48 @@ def place_leaves(
     row = _rows_of(branches, owner)
     light = Axes(lines.knots, lines.frames.astype(np.float32), lines.segments)
     position, frame = light.at(owner, t)
+    frame = leaf_frames(rows, row, frame, np.take(uniform(branches.key, Draw.ROLL), owner), index, key)
+    size = np.take(branches.scale, owner) * ranged(rows, "leaf_size", row, key, Draw.LEAF_SIZE)
+    tip = rows["leaf_size_tip"][row]
+    if (tip != 1).any():
+        size *= 1 + (tip - 1) * outwardness(rows, branches, owner, t)
+    return Leaves(owner, key, position, frame, size, ranged(rows, "leaf_light", row, key, Draw.LEAF_LIGHT))
+
+
+def leaf_frames(
+    rows: NDArray[np.void],
+    row: NDArray[np.integer],
+    frame: NDArray[np.float32],
+    roll: NDArray[np.float64],
+    index: NDArray[np.int64],
+    key: NDArray[np.uint64],
+) -> NDArray[np.float32]:
+    """Frames (m, 3, 3) of leaves before they turn to the light.
+
+    Parameters
+    ----------
+    rows : parameter table
+    row : (m,) or (1,) int
+    frame : (m, 3, 3) float32
+        Of the branch where each leaf sits.
+    roll : (m,) float64
+        Random number of the branch, 0 to 1: where around it its first leaf stands.
+    index : (m,) int
+        Number of the leaf on its branch.
+    key : (m,) uint64
+    """
     step, jitter = rows["leaf_azimuth"][row].T
-    turns = np.take(uniform(branches.key, Draw.ROLL), owner) + (index * step + jitter * signed(key, Draw.AZIMUTH)) / (
-        2 * np.pi
-    )
+    whorl = rows["leaf_whorl"][row]
+    node, within = (index // whorl, (index % whorl) / whorl) if (whorl > 1).any() else (index, 0.0)
+    turns = roll + within + (node * step + jitter * signed(key, Draw.AZIMUTH)) / (2 * np.pi)
+    spray = rows["leaf_spray"][row]
+    if spray.any():
+        level = level_azimuth(frame) / (2 * np.pi) + (1 - spray) * (roll - 0.5) - roll
+        turns += np.where(spray > 0, level, 0.0)
     turns -= np.rint(turns)  # whole turns would cost single precision its last digits
     azimuth = (turns * (2 * np.pi)).astype(np.float32)
     angle = ranged(rows, "leaf_angle", row, key, Draw.ANGLE).astype(np.float32)
-    size = np.take(branches.scale, owner) * ranged(rows, "leaf_size", row, key, Draw.LEAF_SIZE)
-    return Leaves(owner, key, position, _leaf_frames(frame, azimuth, angle), size)
+    return _leaf_frames(frame, azimuth, angle)
 
 
 def _leaf_frames(
@@ -207,6 +268,49 @@ def face_light(frame: NDArray[np.floating], light: NDArray[np.float64], sky: NDA
     return out.transpose(2, 0, 1)
 
 
+def settled(
+    rows: NDArray[np.void],
+    row: NDArray[np.integer],
+    frame: NDArray[np.floating],
+    light: NDArray[np.float64],
+    sky: NDArray[np.float64],
+) -> NDArray:
+    """Leaf frames as they are in the end: turned to the light, then hanging, as far as their orders ask for.
+
+    Parameters
+    ----------
+    rows : parameter table
+    row : (n,) or (1,) int
+    frame, light, sky
+        As for `face_light`.
+    """
+    frame = face_light(frame, light, sky)
+    droop = rows["leaf_droop"][row]
+    return hanging(frame, droop, sky) if droop.any() else frame
+
+
+def hanging(frame: NDArray[np.floating], droop: NDArray[np.float64], sky: NDArray[np.float64]) -> NDArray:
+    """Let leaves hang: the midrib turns down by the share ``droop`` (n,) or (1,), the blade follows it."""
+    kind = frame.dtype
+    droop, sky = droop.astype(kind), sky.astype(kind).T
+    along, up = frame[:, :, 1].T, frame[:, :, 2].T
+    out = np.zeros((3, 3, len(frame)), kind)
+    across_out, along_out, normal = out.swapaxes(0, 1)
+    np.multiply(1 - droop, along, out=along_out)
+    along_out -= droop * sky if sky.ndim == 2 else droop * sky[:, None]
+    along_out += kind.type(1e-6) * along  # a leaf that stands upright half way has no direction left; it keeps its own
+    along_out /= _length(along_out)
+    # The upper side leads away from the old midrib, so that it never lies along the new one: a leaf may hang over.
+    np.subtract(up, _inner(up, along_out) * along_out, out=normal)
+    lost = np.flatnonzero(_length(normal) < 1e-3)
+    if len(lost):
+        normal[:, lost] = -along[:, lost]
+    normal /= _length(normal)
+    np.multiply(along_out[[1, 2, 0]], normal[[2, 0, 1]], out=across_out)
+    across_out -= along_out[[2, 0, 1]] * normal[[1, 2, 0]]
+    return out.transpose(2, 0, 1)
+
+
 def _inner(a: NDArray, b: NDArray) -> NDArray:
     """Scalar products (n,) of vectors given by component (3, n)."""
     out = a[0] * b[0]
@@ -220,9 +324,30 @@ def _length(a: NDArray) -> NDArray:
     return np.maximum(np.sqrt(_inner(a, a)), np.finfo(a.dtype).tiny)
 
 
-def leaf_colours(rows: NDArray[np.void], row: NDArray[np.integer], key: NDArray[np.uint64]) -> NDArray[np.float64]:
-    """Linear RGB (n, 3) of leaves of the rows (n,), or all of one row (1,)."""
-    return _colours(rows["leaf_colour"][row], signed(key, Draw.LEAF_COLOUR))
+def leaf_colours(
+    rows: NDArray[np.void],
+    row: NDArray[np.integer],
+    key: NDArray[np.uint64],
+    outward: NDArray[np.float64] | None = None,
+) -> NDArray[np.float64]:
+    """Linear RGB (n, 3) of leaves of the rows (n,), or all of one row (1,); ``outward`` (n,) is 0 inside the crown."""
+    deviation = signed(key, Draw.LEAF_COLOUR)
+    if outward is None:
+        return _colours(rows["leaf_colour"][row], deviation)
+    return np.clip(mean_leaf_colours(rows, row, outward) + rows["leaf_colour"][row, 1] * deviation[:, None], 0, 1)
+
+
+def mean_leaf_colours(
+    rows: NDArray[np.void], row: NDArray[np.integer], outward: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Mean linear RGB (n, 3) of leaves of rows (n,) at places between inside (0) and outside (1) of the crown."""
+    inside, tip = rows["leaf_colour"][row, 0], rows["leaf_colour_tip"][row]
+    return inside + (tip - inside) * outward[:, None]
+
+
+def leaf_forms(number: int, key: NDArray[np.uint64]) -> NDArray[np.int64]:
+    """Which of a number of forms each leaf (n,) has."""
+    return (uniform(key, Draw.LEAF_FORM) * number).astype(np.int64)
 
 
 def branch_colours(rows: NDArray[np.void], row: NDArray[np.integer], key: NDArray[np.uint64]) -> NDArray[np.float64]:

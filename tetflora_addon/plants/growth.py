@@ -15,12 +15,17 @@ from numpy.typing import NDArray
 
 from .crown_shapes import crown_ratio
 from .hashing import Draw, child_key, key_of_seed, signed, uniform
-from .rows import ranged
+from .profiles import profile
+from .rows import FORK, LATERAL, SPUR, drawn, ranged
 from .seeds import Seeds
-from .species import MAX_ORDERS
 from .vectors import by_component, columns, gathered
 
 _PLACE_JITTER = 0.5  # of the distance from one child to the next: together children lie evenly along the whole parent
+# Each sort of children has child indices of its own, below those of leaves.
+_PATHS = np.array([0, 1 << 30, 1 << 31])
+_COUNT = (Draw.BRANCHES, Draw.FORKS, Draw.SPURS)
+_ROUND = (Draw.BRANCHES_ROUND, Draw.FORKS_ROUND, Draw.SPURS_ROUND)
+_START = (Draw.BRANCH_START, Draw.BRANCH_START, Draw.SPUR_START)
 
 
 @dataclass(frozen=True)
@@ -30,7 +35,7 @@ class Branches:
     Attributes
     ----------
     row : (n,) int32
-        Row of the parameter table: species and order.
+        Row of the parameter table: which kind of branch of which species.
     plant : (n,) int32
         Index of the plant that it belongs to.
     key : (n,) uint64
@@ -46,6 +51,9 @@ class Branches:
         Scale of the plant, which leaves take as well.
     vigour : (n,) float64
         Length as the crown's shape has it here, relative to the longest; numbers of branches and leaves may follow it.
+    outward : (n,) float64
+        Where it leaves its limb (the branch of order 1), 0 inside the crown to 1 outside; 0 for limbs and trunks
+        themselves, along which it grows.
     """
 
     row: NDArray[np.int32]
@@ -57,6 +65,7 @@ class Branches:
     radius: NDArray[np.float64]
     scale: NDArray[np.float64]
     vigour: NDArray[np.float64]
+    outward: NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.row)
@@ -73,7 +82,7 @@ class Branches:
     @classmethod
     def empty(cls) -> Branches:
         """No branches."""
-        floats = [np.zeros(s) for s in ((0, 3), (0, 3, 3), 0, 0, 0, 0)]
+        floats = [np.zeros(s) for s in ((0, 3), (0, 3, 3), 0, 0, 0, 0, 0)]
         return cls(np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros(0, np.uint64), *floats)
 
 
@@ -140,9 +149,15 @@ def turned(frame: NDArray[np.float64], azimuth: NDArray[np.float64], angle: NDAr
     return columns(cd * radial - sd * z, ca * y - sa * x, sd * radial + cd * z)
 
 
+def level_azimuth(frame: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Azimuth (n,) about the z of frames (n, 3, 3) at which one looks level to the side; any for upright ones."""
+    return np.arctan2(-frame[:, 2, 0], frame[:, 2, 1])
+
+
 def trunks(rows: NDArray[np.void], seeds: Seeds) -> Branches:
     """Trunks of plants (order 0)."""
-    row = (seeds.species * MAX_ORDERS).astype(np.int32)
+    first = np.flatnonzero(np.diff(rows["species"], prepend=-1))  # of each species
+    row = first[seeds.species].astype(np.int32)
     key = key_of_seed(seeds.seed)
     length = seeds.scale * ranged(rows, "length", row, key, Draw.LENGTH)
     radius = length * ranged(rows, "thickness", row, key, Draw.THICKNESS)
@@ -150,11 +165,12 @@ def trunks(rows: NDArray[np.void], seeds: Seeds) -> Branches:
     frame = turned(seeds.frame, roll, ranged(rows, "angle", row, key, Draw.ANGLE))
     plant = np.arange(len(seeds), dtype=np.int32)
     scale = np.asarray(seeds.scale, dtype=np.float64)
-    return Branches(row, plant, key, seeds.position, frame, length, radius, scale, np.ones(len(seeds)))
+    one, none = np.ones(len(seeds)), np.zeros(len(seeds))
+    return Branches(row, plant, key, seeds.position, frame, length, radius, scale, one, none)
 
 
 def axes(rows: NDArray[np.void], branches: Branches) -> Axes:
-    """Centre lines; each joint bends by its share of the order's curvature."""
+    """Centre lines; each joint bends by its share of the order's curvature, and turns to the sky or the ground."""
     segments = rows["segments"][branches.row]
     most = int(segments.max(initial=1))
     n = len(branches)
@@ -164,6 +180,9 @@ def axes(rows: NDArray[np.void], branches: Branches) -> Axes:
     step = (branches.length / segments)[:, None]
     bend = rows["curvature"][branches.row] / segments[:, None]
     outer_bend = rows["curvature_tip"][branches.row] / segments
+    attraction = rows["attraction"][branches.row]
+    attracted = np.flatnonzero(attraction.any(axis=1))
+    pull = drawn(attraction[attracted], branches.key[attracted], Draw.ATTRACTION) / segments[attracted]
     frame, knot = by_component(branches.frame), by_component(branches.position)
     knots[:, 0] = knot
     for s in range(most):
@@ -174,6 +193,8 @@ def axes(rows: NDArray[np.void], branches: Branches) -> Axes:
             )
             aside = bend[:, 1] * signed(branches.key, Draw.BEND + 2 * s + 1)
             frame = _bent(frame, -back, aside)
+            if len(attracted):
+                frame[attracted] = _pulled(gathered(frame, attracted), pull)
         knot = np.where((s < segments)[:, None], knot + step * frame[:, :, 2], knot)
         frames[:, s], knots[:, s + 1] = frame, knot
     return Axes(knots, frames, segments)
@@ -187,29 +208,50 @@ def _bent(frame: NDArray[np.float64], pitch: NDArray[np.float64], yaw: NDArray[n
     return columns(cp * x - sp * z, cy * y + sy * forward, cy * forward - sy * y)
 
 
+def _pulled(frame: NDArray[np.float64], pull: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Turn frames to the sky by an angle (n,) times the sine of their tilt, about the level axis (Rodrigues)."""
+    level = np.hypot(frame[:, 0, 2], frame[:, 1, 2])
+    safe = np.maximum(level, 1e-12)
+    kx, ky = frame[:, 1, 2] / safe, -frame[:, 0, 2] / safe  # z × sky
+    cos, sin = np.cos(pull * level)[:, None], np.sin(pull * level)[:, None]
+    out = np.empty_like(frame)
+    for column in range(3):
+        v = frame[:, :, column]
+        along = kx * v[:, 0] + ky * v[:, 1]
+        across = np.stack([ky * v[:, 2], -kx * v[:, 2], kx * v[:, 1] - ky * v[:, 0]], axis=1)
+        axis = np.stack([kx * along, ky * along, np.zeros(len(along))], axis=1)
+        out[:, :, column] = cos * v + sin * across + (1 - cos) * axis
+    return out
+
+
 def fullness(rows: NDArray[np.void], branches: Branches) -> NDArray[np.float64]:
     """Factor (n,) on the numbers of branches and leaves: 1 for the longest branches of a crown, less for others."""
     share = rows["count_by_length"][branches.row]
     return 1 - share + share * branches.vigour
 
 
-def branch_counts(rows: NDArray[np.void], branches: Branches) -> NDArray[np.int64]:
-    """Number of children of each branch, in whole whorls; its expectation is exactly the range's mean."""
-    wanted = ranged(rows, "branches", branches.row, branches.key, Draw.BRANCHES) * fullness(rows, branches)
-    # The last row of the table has no children, and no row after it.
-    whorl = np.maximum(rows["whorl"][np.minimum(branches.row + 1, len(rows) - 1)], 1)
-    return np.floor(wanted / whorl + uniform(branches.key, Draw.BRANCHES_ROUND)).astype(np.int64) * whorl
+def branch_counts(rows: NDArray[np.void], branches: Branches, sort: int = LATERAL) -> NDArray[np.int64]:
+    """Number of children of one sort of each branch, in whole whorls; its expectation is exactly the range's mean."""
+    row, key = branches.row, branches.key
+    wanted = drawn(rows["count"][row, sort], key, _COUNT[sort])
+    child = rows["next"][row, sort]
+    if sort == FORK:
+        return np.where(child >= 0, np.floor(wanted + uniform(key, _ROUND[sort])), 0).astype(np.int64)
+    whorl = np.maximum(rows["whorl"][child], 1)
+    number = np.floor(wanted * fullness(rows, branches) / whorl + uniform(key, _ROUND[sort])).astype(np.int64) * whorl
+    return np.where(child >= 0, number, 0)
 
 
 def leaf_counts(rows: NDArray[np.void], branches: Branches) -> NDArray[np.int64]:
-    """Number of leaves on each branch's own axis; its expectation is exactly the range's mean."""
+    """Number of leaves on each branch's own axis, in whole whorls; its expectation is exactly the range's mean."""
     wanted = ranged(rows, "leaves", branches.row, branches.key, Draw.LEAVES) * fullness(rows, branches)
-    return np.floor(wanted + uniform(branches.key, Draw.LEAVES_ROUND)).astype(np.int64)
+    whorl = rows["leaf_whorl"][branches.row]
+    return np.floor(wanted / whorl + uniform(branches.key, Draw.LEAVES_ROUND)).astype(np.int64) * whorl
 
 
 def radius_at(rows: NDArray[np.void], branches: Branches, t: NDArray[np.float64]) -> NDArray[np.float64]:
     """Radius at fractions t (n,) of the branches (n,), metres."""
-    return branches.radius * (1 - (1 - rows["taper"][branches.row]) * t)
+    return branches.radius * profile(rows, branches.row, branches.key, t)
 
 
 def spread(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -226,6 +268,7 @@ def chosen_children(
     owner: NDArray[np.int64],
     index: NDArray[np.int64],
     counts: NDArray[np.int64],
+    sort: int = LATERAL,
 ) -> Branches:
     """Some children of branches.
 
@@ -237,35 +280,70 @@ def chosen_children(
     owner : (m,) int
         Which parent.
     index : (m,) int
-        Which of its children.
+        Which of its children of this sort.
     counts : (n,) int
-        Number of children of each parent.
+        Number of children of this sort of each parent.
+    sort : int
+        ``rows.LATERAL``, ``rows.FORK`` or ``rows.SPUR``.
 
     Returns
     -------
     Branches of m
     """
     parent = parents.take(owner)
-    key = child_key(parent.key, index)
-    row = parent.row + np.int32(1)
-    # Branches of a whorl share their place: that of the first of them.
-    whorl = rows["whorl"][row]
-    node, within = index // whorl, index % whorl
-    place = signed(np.where(within > 0, child_key(parent.key, node * whorl), key), Draw.PLACE)
-    share = (node + 0.5 + _PLACE_JITTER * place) / (counts[owner] // whorl)
-    start = rows["branch_start"][parent.row]
-    t = start + (1 - start) * share
+    path = _PATHS[sort]
+    key = child_key(parent.key, index + path)
+    row = rows["next"][parent.row, sort]
+    if sort == FORK:
+        whorl, node, within, share = counts[owner], np.zeros_like(index), index, np.ones(len(index))
+        t = np.ones(len(index))
+    else:
+        # Branches of a whorl share their place: that of the first of them.
+        whorl = rows["whorl"][row]
+        node, within = index // whorl, index % whorl
+        place = signed(np.where(within > 0, child_key(parent.key, node * whorl + path), key), Draw.PLACE)
+        share = (node + 0.5 + _PLACE_JITTER * place) / (counts[owner] // whorl)
+        start = drawn(rows["start"][parent.row, sort], parent.key, _START[sort])
+        t = start + (1 - start) * share
+        low, high = rows["share"][parent.row, sort].T
+        share = low + (high - low) * share
     position, frame = lines.at(owner, t)
     angle_base, angle_spread = rows["angle"][row].T
     angle = angle_base + (rows["angle_tip"][row] - angle_base) * share + angle_spread * signed(key, Draw.ANGLE)
     step, jitter = rows["azimuth"][row].T
-    azimuth = 2 * np.pi * (uniform(parent.key, Draw.AZIMUTH) + within / whorl) + node * step
-    azimuth += jitter * signed(key, Draw.AZIMUTH)
-    vigour = crown_ratio(rows["crown"][parent.row], 1 - share)
-    length = parent.length * ranged(rows, "length", row, key, Draw.LENGTH) * vigour
-    radius = radius_at(rows, parent, t) * ranged(rows, "thickness", row, key, Draw.THICKNESS)
+    turn = uniform(parent.key, Draw.AZIMUTH)
+    azimuth = 2 * np.pi * (turn + within / whorl) + node * step + jitter * signed(key, Draw.AZIMUTH)
+    spray = rows["spray"][row]
+    if spray.any():
+        # Level to the sides, as far as the order asks for; 0 turns whole parents at random, as ``turn`` does.
+        level = level_azimuth(frame) + 2 * np.pi * ((1 - spray) * (turn - 0.5) - turn)
+        azimuth += np.where(spray > 0, level, 0.0)
+    around = parent.outward
+    limb = (rows["order"][parent.row] == 1) & (sort != FORK)
+    if limb.any():
+        first, last = rows["part"][parent.row].T
+        around = np.where(limb, first + (last - first) * t, around)
+    radius = radius_at(rows, parent, t)
+    if sort == LATERAL:
+        vigour = crown_ratio(rows["crown"][parent.row], 1 - share)
+        longest = parent.length * rows["nominal"][parent.row]
+        radius = np.where(rows["pipe"][parent.row] > 0, parent.radius * rows["pipe_share"][parent.row] * vigour, radius)
+    elif sort == FORK:
+        vigour, longest = parent.vigour, parent.length
+        radius = radius * np.maximum(whorl, 1) ** (-1 / rows["fork_power"][parent.row])
+        angle = np.where(whorl > 1, angle, 0.0)
+    else:
+        vigour, longest = np.ones(len(index)), parent.scale
+    length = longest * ranged(rows, "length", row, key, Draw.LENGTH) * vigour
+    thickness = ranged(rows, "thickness", row, key, Draw.THICKNESS)
+    radius = (length if sort == SPUR else radius) * thickness
     frame = turned(frame, azimuth, angle)
-    return Branches(row, parent.plant, key, position, frame, length, radius, parent.scale, vigour)
+    return Branches(row, parent.plant, key, position, frame, length, radius, parent.scale, vigour, around)
+
+
+def sorts_of(rows: NDArray[np.void], parents: Branches) -> list[int]:
+    """Sorts of children that any of the branches has."""
+    return [sort for sort in (LATERAL, FORK, SPUR) if (rows["next"][parents.row, sort] >= 0).any()]
 
 
 def children(
@@ -273,6 +351,10 @@ def children(
 ) -> tuple[Branches, NDArray[np.int64]]:
     """All children of branches, and the index of each one's parent."""
     lines = axes(rows, parents) if lines is None else lines
-    counts = branch_counts(rows, parents)
-    owner, index = spread(counts)
-    return chosen_children(rows, parents, lines, owner, index, counts), owner
+    grown, owners = [Branches.empty()], [np.zeros(0, np.int64)]
+    for sort in sorts_of(rows, parents):
+        counts = branch_counts(rows, parents, sort)
+        owner, index = spread(counts)
+        grown.append(chosen_children(rows, parents, lines, owner, index, counts, sort))
+        owners.append(owner)
+    return (grown[1], owners[1]) if len(grown) == 2 else (Branches.concatenate(grown), np.concatenate(owners))

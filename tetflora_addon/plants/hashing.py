@@ -37,6 +37,17 @@ class Draw(IntEnum):
     BRANCH_COLOUR = 11
     LEAF_COLOUR = 12
     LEAF_SIZE = 13
+    TAPER = 14
+    BRANCH_START = 15
+    LEAF_START = 16
+    LEAF_LIGHT = 17
+    ATTRACTION = 18
+    FORKS = 19
+    FORKS_ROUND = 20
+    SPURS = 21
+    SPURS_ROUND = 22
+    SPUR_START = 23
+    LEAF_FORM = 24
     BEND = 32  # one for each segment and axis from here on
 
 

@@ -35,12 +35,15 @@ class LeafModel:
         First corner of each face.
     uv : (c, 2) float32
         Texture coordinates by corner.
+    material_index : (f,) int32, optional
+        Material of each face, of models that have several.
     """
 
     positions: NDArray[np.float64]
     corner_verts: NDArray[np.int32]
     face_offsets: NDArray[np.int32]
     uv: NDArray[np.float32]
+    material_index: NDArray[np.int32] | None = None
 
     @property
     def polygons(self) -> int:
@@ -50,7 +53,8 @@ class LeafModel:
     @cached_property
     def content(self) -> bytes:
         """Bytes that are equal for equal models; what caches are keyed by."""
-        return b"".join(a.tobytes() for a in (self.positions, self.corner_verts, self.face_offsets, self.uv))
+        arrays = (self.positions, self.corner_verts, self.face_offsets, self.uv, self.material_index)
+        return b"".join(a.tobytes() for a in arrays if a is not None)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, LeafModel) and self.content == other.content

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +13,20 @@ from numpy.typing import NDArray
 from ..buffers import MeshBuffers
 from .compiled import Flora
 from .copies import Copies
-from .foliage import branch_colours, face_light, leaf_colours, leaf_keys, leaf_places, leaf_range, place_leaves
+from .foliage import (
+    Leaves,
+    branch_colours,
+    leaf_colours,
+    leaf_forms,
+    leaf_keys,
+    leaf_places,
+    leaf_range,
+    outwardness,
+    place_leaves,
+    settled,
+)
 from .growth import Axes, Branches, axes, leaf_counts, radius_at, spread
+from .leaf_models import LeafModel
 from .pieces import Pieces, along_branches
 from .vectors import gathered, unit
 
@@ -195,7 +208,7 @@ def _interleaved(*columns: NDArray) -> NDArray:
 def _without_places(branches: Branches, index: NDArray[np.int64]) -> Branches:
     """Selection of all that numbers and radii depend on; places and frames, which are most of the memory, are zero."""
     n = len(index)
-    names = ("row", "plant", "key", "length", "radius", "scale", "vigour")
+    names = ("row", "plant", "key", "length", "radius", "scale", "vigour", "outward")
     rest = {name: np.take(getattr(branches, name), index) for name in names}
     return Branches(position=np.broadcast_to(0.0, (n, 3)), frame=np.broadcast_to(0.0, (n, 3, 3)), **rest)
 
@@ -218,15 +231,29 @@ def _ring_axes(lines: Axes, branch: NDArray[np.int64], t: NDArray[np.float64]) -
     return out
 
 
-def leaf_buffers(flora: Flora, pieces: Pieces, species: int) -> MeshBuffers | None:
-    """Copies of the leaf model for the leaves on pieces of branches of one species.
+@dataclass(frozen=True)
+class LeafMesh:
+    """Copies of one form of leaf.
+
+    Attributes
+    ----------
+    kind : int
+        Index into `species.LEAF_KINDS`.
+    form : int
+        Which of the species' forms of that kind.
+    buffers : MeshBuffers
+        Faces with ``UVMap``, ``tf_colour`` and ``tf_transmission``.
+    """
+
+    kind: int
+    form: int
+    buffers: MeshBuffers
+
+
+def leaf_meshes(flora: Flora, pieces: Pieces, species: int) -> Iterator[LeafMesh]:
+    """Copies of the leaf models for the leaves on pieces of branches of one species, form by form.
 
     A leaf belongs to the piece that holds its base; the tip of the branch belongs to the last piece.
-
-    Returns
-    -------
-    MeshBuffers or None
-        Faces with ``UVMap``, ``tf_colour`` and ``tf_transmission``; None where there are no leaves.
     """
     first, last = pieces.runs()
     row = np.take(pieces.branches.row, first)
@@ -237,26 +264,65 @@ def leaf_buffers(flora: Flora, pieces: Pieces, species: int) -> MeshBuffers | No
     branches = pieces.branches.take(first)
     counts = leaf_counts(flora.rows, branches)
     low, high = leaf_range(flora.rows, branches, counts, pieces.t0[first], pieces.t1[last])
-    number = high - low
-    ends = np.cumsum(number)
-    if len(ends) == 0 or ends[-1] == 0:
-        return None
-    model = flora.leaf_models[species]
-    copies = Copies(model, int(ends[-1]), float(flora.transmission[branches.row[0]]))
-    limit = max(_VERTICES_AT_ONCE // len(model.positions), 1)
-    cuts = np.searchsorted(ends, np.arange(limit, ends[-1], limit))
-    new_row = np.flatnonzero(np.diff(branches.row)) + 1
-    for chunk in np.split(np.arange(len(ends)), np.union1d(cuts, new_row)):
-        if number[chunk].sum() == 0:
+    kinds = flora.rows["leaf_kind"][branches.row]
+    for kind in np.unique(kinds[high > low]):
+        own = np.flatnonzero(kinds == kind)
+        bearers = _Bearers(flora, branches.take(own), counts[own], low[own], high[own])
+        forms = flora.forms[species][kind]
+        if len(forms) == 1:
+            yield LeafMesh(int(kind), 0, bearers.copies(forms[0], int(bearers.number.sum())))
             continue
-        part = slice(chunk[0], chunk[-1] + 1)
-        bearers = branches.take(part)
-        owner, index = spread(number[part])
-        index += np.take(low[part], owner)
-        key = leaf_keys(bearers, owner, index)
-        t = leaf_places(flora.rows, bearers, owner, index, counts[part], key)
-        leaves = place_leaves(flora.rows, bearers, axes(flora.rows, bearers), owner, index, key, t)
-        kind = bearers.row[:1]
-        frame = face_light(leaves.frame, flora.rows["leaf_light"][kind], _SKY)
-        copies.add(leaves.position, frame, leaves.size, leaf_colours(flora.rows, kind, key))
-    return copies.buffers()
+        numbers = np.zeros(len(forms), np.int64)
+        for part in bearers.chunks(1):
+            owner, index = bearers.leaves(part)
+            key = leaf_keys(bearers.branches.take(part), owner, index)
+            numbers += np.bincount(leaf_forms(len(forms), key), minlength=len(forms))
+        for form in np.flatnonzero(numbers):
+            yield LeafMesh(int(kind), int(form), bearers.copies(forms[form], int(numbers[form]), int(form)))
+
+
+class _Bearers:
+    """Branches of one species whose leaves are of one kind, row after row, and which of their leaves are wanted."""
+
+    def __init__(self, flora: Flora, branches: Branches, counts: NDArray, low: NDArray, high: NDArray) -> None:
+        self.flora, self.branches, self.counts, self.low = flora, branches, counts, low
+        self.number = high - low
+
+    def chunks(self, vertices: int) -> Iterator[slice]:
+        """Runs of branches of one row each, for leaves of a number of vertices."""
+        ends = np.cumsum(self.number)
+        limit = max(_VERTICES_AT_ONCE // vertices, 1)
+        cuts = np.searchsorted(ends, np.arange(limit, ends[-1], limit))
+        new_row = np.flatnonzero(np.diff(self.branches.row)) + 1
+        for chunk in np.split(np.arange(len(ends)), np.union1d(cuts, new_row)):
+            if self.number[chunk].sum():
+                yield slice(int(chunk[0]), int(chunk[-1]) + 1)
+
+    def leaves(self, part: slice) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Branch within the run, and number on it, of each wanted leaf."""
+        owner, index = spread(self.number[part])
+        index += np.take(self.low[part], owner)
+        return owner, index
+
+    def copies(self, model: LeafModel, number: int, form: int | None = None) -> MeshBuffers:
+        """Mesh of all leaves, or of those of one form."""
+        rows = self.flora.rows
+        copies = Copies(model, number, float(self.flora.leaf.transmission[self.branches.row[0]]))
+        forms = len(self.flora.forms[rows["species"][self.branches.row[0]]][rows["leaf_kind"][self.branches.row[0]]])
+        for part in self.chunks(len(model.positions)):
+            bearers = self.branches.take(part)
+            owner, index = self.leaves(part)
+            key = leaf_keys(bearers, owner, index)
+            if form is not None:
+                chosen = np.flatnonzero(leaf_forms(forms, key) == form)
+                owner, index, key = owner[chosen], index[chosen], key[chosen]
+            t = leaf_places(rows, bearers, owner, index, self.counts[part], key)
+            leaves = place_leaves(rows, bearers, axes(rows, bearers), owner, index, key, t)
+            self._add(copies, bearers, leaves, t)
+        return copies.buffers()
+
+    def _add(self, copies: Copies, bearers: Branches, leaves: Leaves, t: NDArray[np.float64]) -> None:
+        rows, row = self.flora.rows, bearers.row[:1]
+        frame = settled(rows, row, leaves.frame, leaves.light, _SKY)
+        outward = outwardness(rows, bearers, leaves.branch, t) if rows["gradient"][row[0]] else None
+        copies.add(leaves.position, frame, leaves.size, leaf_colours(rows, row, leaves.key, outward))

@@ -10,8 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .compiled import Flora, tube_perimeter
+from .averages import own_leaf_integrals, tube_perimeter
+from .compiled import Flora
+from .foliage import leaf_start, outwardness
 from .growth import Axes, Branches, spread
+from .profiles import profile_integral
+from .rows import flare_rings
 from .vectors import gathered
 
 
@@ -85,18 +89,24 @@ def along_branches(pieces: Pieces) -> Pieces:
     return pieces.take(np.concatenate([np.flatnonzero(~of_part), rest]))
 
 
-def whole_pieces(branches: Branches, lines: Axes) -> tuple[Pieces, NDArray[np.int64]]:
-    """All segments of branches as pieces, and the index of the branch of each."""
-    owner, segment = spread(lines.segments)
+def whole_pieces(rows: NDArray[np.void], branches: Branches, lines: Axes) -> tuple[Pieces, NDArray[np.int64]]:
+    """All segments of branches as pieces, and the index of the branch of each; a flared base has some more."""
+    rings = rows["rings"][branches.row]
+    owner, index = spread(lines.segments + rings)
+    segment = np.maximum(index - rings[owner], 0)
     number = lines.segments[owner]
-    pieces = Pieces(
-        branches.take(owner),
-        segment / number,
-        (segment + 1) / number,
-        lines.knot(owner, segment),
-        lines.knot(owner, segment + 1),
-    )
-    return pieces, owner
+    t0, t1 = segment / number, (segment + 1) / number
+    start, end = lines.knot(owner, segment), lines.knot(owner, segment + 1)
+    flared = np.flatnonzero((index <= rings[owner]) & (rings[owner] > 0))
+    if len(flared):  # the first segment, cut where the flare bends most
+        at = np.concatenate([[0.0], flare_rings(int(rings.max()))])
+        i, r = index[flared], rings[owner[flared]]
+        low = at[i]
+        high = np.where(i < r, at[np.minimum(i + 1, len(at) - 1)], t1[flared])
+        whole, base, step = t1[flared, None], start[flared], end[flared] - start[flared]
+        t0[flared], t1[flared] = low, high
+        start[flared], end[flared] = base + step * (low[:, None] / whole), base + step * (high[:, None] / whole)
+    return Pieces(branches.take(owner), t0, t1, start, end), owner
 
 
 def clipped(
@@ -126,13 +136,31 @@ def clipped(
 
 def leaf_fraction(flora: Flora, pieces: Pieces) -> NDArray[np.float64]:
     """Expected share (n,) of a branch's own leaves that sit on each piece."""
-    start = flora.rows["leaf_start"][pieces.branches.row]
+    start = leaf_start(flora.rows, pieces.branches)
     return np.clip(np.maximum(pieces.t1, start) - np.maximum(pieces.t0, start), 0, None) / (1 - start)
+
+
+def outward_ends(flora: Flora, pieces: Pieces) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Places between inside and outside of the crown of the first and the last leaf that each piece (n,) may bear."""
+    rows, branches = flora.rows, pieces.branches
+    start = leaf_start(rows, branches)
+    every = np.arange(len(pieces))
+    return tuple(outwardness(rows, branches, every, np.maximum(t, start)) for t in (pieces.t0, pieces.t1))
+
+
+def piece_leaf_colours(flora: Flora, pieces: Pieces) -> NDArray[np.float64]:
+    """Mean linear RGB (n, 3) of the leaves that branches themselves bear on pieces, weighted by area."""
+    row = pieces.branches.row
+    rows = flora.rows[row]
+    inside = rows["leaf_colour"][:, 0]
+    if not rows["gradient"].any():
+        return inside
+    area, area_outward = own_leaf_integrals(rows, *outward_ends(flora, pieces))
+    return inside + (rows["leaf_colour_tip"] - inside) * (area_outward / area)[:, None]
 
 
 def wood_areas(flora: Flora, pieces: Pieces) -> NDArray[np.float64]:
     """Surface (n,) of the wood of each piece, m²: perimeter × length at the mean radius."""
-    row = pieces.branches.row
-    middle = 1 - (1 - flora.rows["taper"][row]) * (pieces.t0 + pieces.t1) / 2
-    perimeter = tube_perimeter(flora.rows["sides"][row]) * pieces.branches.radius * middle
-    return perimeter * pieces.branches.length * (pieces.t1 - pieces.t0)
+    branches = pieces.branches
+    low, high = (profile_integral(flora.rows, branches.row, branches.key, t) for t in (pieces.t0, pieces.t1))
+    return tube_perimeter(flora.rows["sides"][branches.row]) * branches.radius * branches.length * (high - low)

@@ -1,35 +1,65 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Parameters of all species and orders as one table: the same array operations grow branches of every kind.
+"""Parameters of all species as one table: the same array operations grow branches of every kind.
 
-Row ``species * MAX_ORDERS + order`` holds the ranges of one order of one species, angles in radians.
+A row describes one kind of branch: an order of a species, a part of it between forks, or the short shoot. It names the
+rows of its children, of three sorts: laterals of the next order, the stems that continue beyond a fork, short shoots.
+Children follow their parents in the table. Angles are in radians.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .crown_shapes import CROWN_SHAPES
+from .crown_shapes import CROWN_SHAPES, crown_ratio
 from .hashing import signed
-from .species import MAX_ORDERS, Species
+from .species import LEAF_KINDS, Order, Range, Species, fork_cuts
 
+LATERAL, FORK, SPUR = range(3)
+"""Sorts of children, the axis of ``next``, ``count``, ``start`` and ``share``."""
+
+SPUR_ORDER = 100
 _RANGES = (
-    "length", "thickness", "curvature", "angle", "azimuth", "branches",
-    "leaves", "leaf_size", "leaf_angle", "leaf_azimuth",
+    "length", "thickness", "taper", "curvature", "attraction", "angle", "azimuth",
+    "leaves", "leaf_start", "leaf_size", "leaf_angle", "leaf_azimuth", "leaf_light",
 )  # fmt: skip
-_DEGREES = {"curvature", "curvature_tip", "angle", "angle_tip", "azimuth", "leaf_angle", "leaf_azimuth"}
-_NUMBERS = ("taper", "curvature_tip", "count_by_length", "angle_tip", "branch_start", "leaf_start", "leaf_light")
+_DEGREES = {"curvature", "curvature_tip", "attraction", "angle", "angle_tip", "azimuth", "leaf_angle", "leaf_azimuth"}
+_NUMBERS = (
+    "curvature_tip", "count_by_length", "angle_tip", "spray", "flare", "pipe",
+    "leaf_spray", "leaf_droop", "leaf_size_tip",
+)  # fmt: skip
+_INTEGERS = ("segments", "sides", "whorl", "leaf_whorl")
+#: Where a flared base gets rings of its own, fractions of the length; as far as they lie on the first segment.
+_FLARE_RINGS = (0.012, 0.035, 0.08)
+# A fork that no pipe model describes keeps the cross-section.
+_FORK_POWER = 2.0
 
 ROW_DTYPE = np.dtype(
     [(name, np.float64, (2,)) for name in _RANGES]
     + [(name, np.float64) for name in _NUMBERS]
     + [(name, np.float64, (2, 3)) for name in ("branch_colour", "leaf_colour")]
-    + [("segments", np.int64), ("sides", np.int64), ("whorl", np.int64), ("crown", np.int64), ("used", np.bool_)]
+    + [("leaf_colour_tip", np.float64, (3,))]
+    + [(name, np.int64) for name in _INTEGERS]
+    + [(name, np.int64) for name in ("crown", "leaf_kind", "species", "order", "rings")]
+    + [("next", np.int32, (3,)), ("count", np.float64, (3, 2)), ("start", np.float64, (3, 2))]
+    + [("share", np.float64, (3, 2)), ("part", np.float64, (2,))]
+    + [("nominal", np.float64), ("pipe_share", np.float64), ("fork_power", np.float64)]
+    + [("continues", np.bool_), ("outward", np.bool_), ("worldly", np.bool_), ("gradient", np.bool_)]
 )
-"""One order of one species; ranges are (mean, variation), colours ((r, g, b), variation of each)."""
+"""One kind of branch.
+
+Ranges are (mean, variation), colours ((r, g, b), variation of each). Beyond the keys of an order: ``rings`` are those
+that a flared base gets besides its joints; ``next`` the rows of children, -1 for none, ``count`` how many, ``start``
+the part that stays bare, ``share`` which part of all children of the order's branch these are; ``part`` the ends of
+this row on the order's branch and ``nominal`` the length of that in lengths of this; ``pipe_share`` the radius of a
+lateral by the pipe model in radii of this; ``continues`` marks stems beyond a fork; ``outward`` branches whose own axis
+leads from the inside of the crown to the outside; ``worldly`` sub-plants whose shape depends on how they stand to the
+sky; ``gradient`` leaves that differ between inside and outside.
+"""
 
 
 def build_rows(species: Sequence[Species]) -> NDArray[np.void]:
@@ -37,21 +67,150 @@ def build_rows(species: Sequence[Species]) -> NDArray[np.void]:
 
     Returns
     -------
-    (len(species) * MAX_ORDERS,) array of `ROW_DTYPE`
-        Rows of orders that a species does not have are zero with ``used`` false.
+    (r,) array of `ROW_DTYPE`
+        The rows of each species follow one another, its trunk first.
     """
-    rows = np.zeros(len(species) * MAX_ORDERS, dtype=ROW_DTYPE)
+    kinds: list[np.void] = []
     for s, one in enumerate(species):
-        for o, order in enumerate(one.orders):
-            row = rows[s * MAX_ORDERS + o]
-            for name in (*_RANGES, *_NUMBERS):
-                value = np.asarray(getattr(order, name), dtype=np.float64)
-                row[name] = np.radians(value) if name in _DEGREES else value
-            row["branch_colour"], row["leaf_colour"] = order.branch_colour, order.leaf_colour
-            row["segments"], row["sides"], row["whorl"] = order.segments, order.sides, order.whorl
-            row["crown"] = CROWN_SHAPES.index(order.crown)
-            row["used"] = True
+        kinds += _rows_of_species(one, s, len(kinds))
+    rows = np.array(kinds, dtype=ROW_DTYPE)
+    for i in range(len(rows) - 1, -1, -1):
+        row = rows[i]
+        here = row["attraction"].any() or row["spray"] > 0 or row["leaf_spray"] > 0
+        row["worldly"] = here or rows["worldly"][row["next"][row["next"] >= 0]].any()
     return rows
+
+
+def _rows_of_species(one: Species, number: int, first: int) -> list[np.void]:
+    """Rows of one species; ``first`` is the index of its trunk in the table."""
+    cuts = [fork_cuts(order) for order in one.orders]
+    begin = first + np.concatenate([[0], np.cumsum([len(c) - 1 for c in cuts])])
+    spur = int(begin[-1])
+    out = []
+    for o, order in enumerate(one.orders):
+        whole = _row(order, number, o)
+        for p, (low, high) in enumerate(zip(cuts[o][:-1], cuts[o][1:], strict=True)):
+            row = whole.copy()
+            row["next"] = -1
+            if order.branches.high > 0:
+                row["next"][LATERAL] = begin[o + 1]
+            if p < len(cuts[o]) - 2:
+                row["next"][FORK] = begin[o] + p + 1
+                row["count"][FORK] = order.forks
+                row["start"][FORK] = 1.0, 0.0
+            if order.spurs.high > 0 and one.spur is not None:
+                row["next"][SPUR] = spur
+            out.append(_part(row, order, low, high, cuts[o][p - 1] if p else 0.0))
+            if row["next"][LATERAL] >= 0 and row["pipe"] > 0:
+                row["pipe_share"] = _pipe_share(row, one.orders[o + 1].thickness.high)
+    if any(order.spurs.high > 0 for order in one.orders) and one.spur is not None:
+        row = _row(one.spur, number, SPUR_ORDER)
+        row["next"] = -1
+        out.append(row)
+    return out
+
+
+def _row(order: Order, species: int, number: int) -> np.void:
+    """Row of an order whose branches do not fork."""
+    row = np.zeros((), dtype=ROW_DTYPE)
+    for name in (*_RANGES, *_NUMBERS, *_INTEGERS):
+        value = np.asarray(getattr(order, name), dtype=np.float64)
+        row[name] = np.radians(value) if name in _DEGREES else value
+    row["branch_colour"], row["leaf_colour"] = order.branch_colour, order.leaf_colour
+    row["leaf_colour_tip"] = order.leaf_colour_tip
+    row["gradient"] = order.leaf_size_tip != 1 or order.leaf_colour_tip != order.leaf_colour.mean
+    row["crown"], row["leaf_kind"] = CROWN_SHAPES.index(order.crown), LEAF_KINDS.index(order.leaf_kind)
+    row["species"], row["order"], row["outward"] = species, number, number <= 1
+    row["count"] = order.branches, (0, 0), order.spurs
+    row["start"] = order.branch_start, (0, 0), order.spur_start
+    row["share"], row["part"], row["nominal"] = (0, 1), (0, 1), 1
+    row["fork_power"] = order.pipe or _FORK_POWER
+    row["rings"] = _flare_rings(row)
+    return row
+
+
+def _part(row: np.void, order: Order, low: float, high: float, before: float) -> np.void:
+    """Turn the row of an order into that of its part from ``low`` to ``high``; the part below begins at ``before``."""
+    if (low, high) == (0.0, 1.0):
+        return row
+    length, tip = high - low, order.taper.mean
+    row["part"], row["nominal"] = (low, high), 1 / length
+    row["segments"] = max(round(order.segments * length), 1)
+    radius = [_radius(order, u) for u in (low, high)]
+    row["taper"] = radius[1] / radius[0], row["taper"][1] * (1.0 if tip == 0 else min(1.0, radius[1] / radius[0]))
+    row["taper"][1] = min(row["taper"][1], row["taper"][0], 1 - row["taper"][0])
+    middle = np.clip((0.5 - low) / length, 0, 1)  # of the order's branch, where its outer half begins
+    inner, outer = row["curvature"][0], row["curvature_tip"]
+    row["curvature"][0] = (inner if middle >= 0.5 else outer) * length
+    row["curvature_tip"] = (inner if middle > 0.5 else outer) * length
+    row["curvature"][1] *= length
+    row["attraction"] *= length
+    for sort, start in ((LATERAL, order.branch_start), (SPUR, order.spur_start)):
+        share = np.clip((np.array([low, high]) - start.mean) / (1 - start.mean), 0, 1)
+        row["share"][sort] = share
+        row["count"][sort] *= share[1] - share[0]
+        row["start"][sort] = _local_start(start, low, high)
+    leaf_share = np.clip((np.array([low, high]) - order.leaf_start.mean) / (1 - order.leaf_start.mean), 0, 1)
+    row["leaves"] *= leaf_share[1] - leaf_share[0]
+    row["leaf_start"] = _local_start(order.leaf_start, low, high)
+    if low > 0:
+        relative = order.length.variation / order.length.mean
+        factor = length / (low - before)
+        row["length"], row["thickness"] = (factor, factor * relative), (1, 0)
+        row["angle"] = np.radians(order.fork_angle)
+        row["angle_tip"], row["azimuth"] = row["angle"][0], (0, 0.35)
+        row["whorl"], row["flare"], row["continues"] = 1, 0, True
+    else:
+        row["length"] *= length
+        if row["order"] == 0:  # whose thickness is a fraction of its length
+            row["thickness"] /= length
+    row["rings"] = _flare_rings(row)
+    return row
+
+
+def _local_start(start: Range, low: float, high: float) -> tuple[float, float]:
+    mean = float(np.clip((start.mean - low) / (high - low), 0, 0.999))
+    inside = low < start.mean < high
+    return mean, (min(start.variation / (high - low), mean, 0.999 - mean) if inside else 0.0)
+
+
+def _radius(order: Order, u: float) -> float:
+    """Radius at a fraction of the branch, in radii of its base (`profiles.profile` without flare)."""
+    if order.pipe <= 0:
+        return 1 - (1 - order.taper.mean) * u
+    share = float(np.clip((u - order.branch_start.mean) / (1 - order.branch_start.mean), 0, 1))
+    tip = order.taper.mean**order.pipe
+    return (tip + (1 - tip) * (1 - share)) ** (1 / order.pipe)
+
+
+def _flare_rings(row: np.void) -> int:
+    return sum(ring < 0.98 / row["segments"] for ring in _FLARE_RINGS) if row["flare"] > 0 else 0
+
+
+def flare_rings(number: int) -> NDArray[np.float64]:
+    """Fractions of the length at which a flared base has rings of its own."""
+    return np.array(_FLARE_RINGS[:number])
+
+
+def _pipe_share(row: np.void, thickest: float) -> float:
+    """Radius of a lateral of vigour 1 such that all together have what the taper takes away, in r^p."""
+    low, high = row["share"][LATERAL]
+    at = low + (high - low) * (np.arange(256) + 0.5) / 256
+    vigour = crown_ratio(np.full(at.shape, row["crown"]), 1 - at)
+    lost = 1 - row["taper"][0] ** row["pipe"]
+    number = max(row["count"][LATERAL, 0], 1.0) * (vigour ** row["pipe"]).mean()
+    return min((lost / number) ** (1 / row["pipe"]), 1 / max(thickest, 1e-9))
+
+
+def without_variation(species: Species) -> Species:
+    """The exact plant of a species: every range has its mean."""
+    orders = tuple(_exact(order) for order in species.orders)
+    return replace(species, orders=orders, spur=None if species.spur is None else _exact(species.spur))
+
+
+def _exact(order: Order) -> Order:
+    still = {name: Range(value.mean) for name, value in vars(order).items() if isinstance(value, Range)}
+    return replace(order, **still)
 
 
 def ranged(rows: NDArray[np.void], name: str, row: NDArray[np.integer], key: NDArray[np.uint64], draw: int) -> NDArray:
@@ -63,6 +222,7 @@ def ranged(rows: NDArray[np.void], name: str, row: NDArray[np.integer], key: NDA
     name : str
         A range of `ROW_DTYPE`.
     row : (n,) int
+        Or (1,), which stands for all.
     key : (n,) uint64
     draw : int
         See `hashing.Draw`.
@@ -71,5 +231,12 @@ def ranged(rows: NDArray[np.void], name: str, row: NDArray[np.integer], key: NDA
     -------
     (n,) float64
     """
-    values = rows[name][row]
-    return values[..., 0] + values[..., 1] * signed(key, draw)
+    return drawn(rows[name][row], key, draw)
+
+
+def drawn(values: NDArray[np.float64], key: NDArray[np.uint64], draw: int) -> NDArray[np.float64]:
+    """Mean + variation × a signed random number, of ranges (n, 2) or (1, 2) and keys (n,)."""
+    mean, variation = values[..., 0], values[..., 1]
+    if not variation.any():  # most are exact, and hashing is most of the time that this takes
+        return mean + np.zeros(len(key))
+    return mean + variation * signed(key, draw)

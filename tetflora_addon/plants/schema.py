@@ -17,7 +17,8 @@ from typing import Any
 from ..errors import SpeciesError
 from .crown_shapes import CROWN_SHAPES
 from .leaf_models import LEAF_MODELS, LeafModel, leaf_model
-from .species import MAX_ORDERS, Colour, Order, Range, Species
+from .members import expected_polygons
+from .species import BARKS, LEAF_KINDS, MAX_ORDERS, Colour, Order, Range, Species
 
 FORMAT = 1
 MAX_FILE_BYTES = 4_000_000
@@ -32,8 +33,9 @@ class Key:
 
     Attributes
     ----------
-    kind : {'range', 'number', 'integer', 'shape', 'colour'}
-        A range is written ``[mean, variation]``; mean − variation and mean + variation both have to lie in the limits.
+    kind : {'range', 'number', 'integer', 'shape', 'kind', 'colour', 'rgb'}
+        A range is written ``[mean, variation]``, or as a number where it has no variation; mean − variation and mean +
+        variation both have to lie in the limits.
     low, high : float
         Limits, inclusive.
     default : object
@@ -55,19 +57,33 @@ ORDER_KEYS: dict[str, Key] = {
     "thickness": Key(
         "range", 0.001, 1, None, "of the length for the trunk, else of the parent's radius", "radius at the base"
     ),
-    "taper": Key("number", 0, 1, 0.3, "of the radius at the base", "radius at the tip"),
+    "taper": Key("range", 0, 1, [0.3, 0], "of the radius at the base", "radius at the tip"),
+    "flare": Key("number", 0, 4, 0.0, "of the radius", "how much thicker the very base is"),
+    "pipe": Key(
+        "number",
+        0,
+        4,
+        0.0,
+        "",
+        "exponent of the pipe model by which radii are shared out among the children, 1.5 to 4 (2: Leonardo's rule); "
+        "0: each child's thickness is a share of its parent's at that place",
+    ),
     "segments": Key("integer", 1, 32, 1, "", "straight pieces along a branch"),
     "sides": Key("integer", 3, 64, 4, "", "faces around a branch"),
     "curvature": Key("range", -360, 360, [0, 0], "degrees", "bend over the length, positive towards the parent"),
     "curvature_tip": Key(
         "number", -360, 360, math.nan, "degrees", "the same as the outer half of a branch has it (default: no change)"
     ),
+    "attraction": Key(
+        "range", -360, 360, [0, 0], "degrees", "turn towards the sky over the length, where level; negative: down"
+    ),
     "angle": Key("range", 0, 180, [0, 0], "degrees", "from the parent's direction, at the parent's base"),
     "angle_tip": Key("number", 0, 180, math.nan, "degrees", "the same at the parent's tip (default: as at the base)"),
     "azimuth": Key("range", -360, 360, [137.5, 10], "degrees", "around the parent from one branch to the next"),
+    "spray": Key("number", 0, 1, 0.0, "", "how far branches leave their parent level, left and right of it"),
     "whorl": Key("integer", 1, 12, 1, "", "branches at one place: 1 alternate, 2 opposite, more a whorl"),
     "branches": Key("range", 0, 10_000, [0, 0], "", "branches of the next order on one branch"),
-    "branch_start": Key("number", 0, 0.99, 0.1, "of the length", "part of the branch that is bare of branches"),
+    "branch_start": Key("range", 0, 0.99, [0.1, 0], "of the length", "part of the branch that is bare of branches"),
     "crown": Key("shape", 0, 0, "cylindrical", "", "how the children's length varies along the branch"),
     "count_by_length": Key(
         "number",
@@ -77,17 +93,40 @@ ORDER_KEYS: dict[str, Key] = {
         "",
         "how far branches and leaves are fewer on shorter branches: 0 not at all, 1 in proportion",
     ),
+    "forks": Key("range", 0, 8, [0, 0], "", "stems into which the branch divides, 1 or more; 0: it does not"),
+    "fork_at": Key("number", 0.05, 0.95, 0.5, "of the length", "where it divides first"),
+    "fork_angle": Key("range", 0, 120, [25, 8], "degrees", "by which each of the stems turns away"),
+    "fork_levels": Key("integer", 1, 4, 1, "", "times that it divides, evenly from there to the tip"),
+    "spurs": Key("range", 0, 10_000, [0, 0], "", "short shoots on one branch, as the species' spur describes them"),
+    "spur_start": Key("range", 0, 0.99, [0.1, 0], "of the length", "part of the branch that is bare of short shoots"),
+    "leaf_kind": Key("kind", 0, 0, "leaf", "", "what the branch bears: the species' leaf or its blossom"),
     "leaves": Key("range", 0, 10_000, [0, 0], "", "leaves on one branch of this order itself"),
-    "leaf_start": Key("number", 0, 0.99, 0.1, "of the length", "part of the branch that is bare of leaves"),
+    "leaf_whorl": Key("integer", 1, 64, 1, "", "leaves at one place: 1 alternate, 2 opposite, more a whorl or bundle"),
+    "leaf_start": Key("range", 0, 0.99, [0.1, 0], "of the length", "part of the branch that is bare of leaves"),
     "leaf_size": Key("range", 0.0005, 20, [0.08, 0.02], "m", "length of a leaf"),
+    "leaf_size_tip": Key("number", 0.05, 5, 1.0, "of leaf_size", "size of leaves at the outside of the crown"),
     "leaf_angle": Key("range", 0, 180, [50, 15], "degrees", "between branch and leaf"),
     "leaf_azimuth": Key("range", -360, 360, [137.5, 20], "degrees", "around the branch from one leaf to the next"),
-    "leaf_light": Key("number", 0, 1, 0.5, "", "how far leaves turn to the sky"),
+    "leaf_light": Key("range", 0, 1, [0.5, 0], "", "how far leaves turn to the sky"),
+    "leaf_spray": Key("number", 0, 1, 0.0, "", "how far leaves stand level to the left and right of their branch"),
+    "leaf_droop": Key("number", 0, 1, 0.0, "", "how far leaves hang"),
     "branch_colour": Key("colour", 0, 1, [[0.16, 0.11, 0.07], [0.04, 0.03, 0.02]], "linear RGB", "colour of bark"),
     "leaf_colour": Key("colour", 0, 1, [[0.08, 0.19, 0.03], [0.03, 0.06, 0.01]], "linear RGB", "colour of leaves"),
+    "leaf_colour_tip": Key(
+        "rgb", 0, 1, None, "linear RGB", "mean colour of leaves at the outside of the crown (default: no change)"
+    ),
 }
 
-SPECIES_KEYS = ("format", "name", "description", "orders", "leaf", "leaf_transmission")
+SPECIES_KEYS = (
+    "format", "name", "description", "orders", "bark", "quality", "leaf", "leaf_transmission",
+    "blossom", "blossom_transmission", "spur",
+)  # fmt: skip
+MAX_FORMS = 8
+QUALITY_LIMITS = (0.001, 1000.0)
+#: Defaults that another key of the same order gives.
+FOLLOWS = {"curvature_tip": "curvature", "angle_tip": "angle", "leaf_colour_tip": "leaf_colour"}
+#: What a key of a kind may be, where that is one of a few names.
+CHOICES = {"shape": CROWN_SHAPES, "kind": LEAF_KINDS}
 LEAF_KEYS = ("model", "object", "vertices", "faces", "uv")
 
 
@@ -108,6 +147,8 @@ class _Reader:
         return float(value)
 
     def range(self, value: Any, key: str, low: float, high: float) -> Range:
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            return Range(self.number(value, key, low, high))
         if not isinstance(value, list) or len(value) != 2:
             raise self.fail(key, f"must be [mean, variation] within {low:g} to {high:g}, is {_shown(value)}")
         mean = self.number(value[0], f"{key}[0] (mean)", low, high)
@@ -127,6 +168,16 @@ class _Reader:
             raise self.fail(key, f"must be {form} with numbers from 0 to 1, is {_shown(value)}")
         channels = [self.range([m, v], f"{key}.{c}", 0, 1) for m, v, c in zip(*value, "rgb", strict=True)]
         return Colour(tuple(c.mean for c in channels), tuple(c.variation for c in channels))
+
+    def rgb(self, value: Any, key: str) -> tuple[float, float, float]:
+        if not isinstance(value, list | tuple) or len(value) != 3:
+            raise self.fail(key, f"must be [r, g, b] with numbers from 0 to 1, is {_shown(value)}")
+        return tuple(self.number(v, f"{key}.{c}", 0, 1) for v, c in zip(value, "rgb", strict=True))
+
+    def choice(self, value: Any, key: str, choices: tuple[str, ...]) -> str:
+        if value not in choices:
+            raise self.fail(key, f"must be one of {', '.join(choices)}; is {_shown(value)}")
+        return value
 
     def keys(self, value: Any, key: str, allowed: Mapping[str, Any] | tuple[str, ...]) -> None:
         if not isinstance(value, dict):
@@ -149,22 +200,23 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _read_order(reader: _Reader, data: Any, index: int, last: bool) -> Order:
-    where = f"orders[{index}]"
+def _read_order(reader: _Reader, data: Any, where: str, first: bool, last: bool) -> Order:
     reader.keys(data, where, ORDER_KEYS)
     values: dict[str, Any] = {}
     for name, key in ORDER_KEYS.items():
         path = f"{where}.{name}"
+        if name not in data and name in FOLLOWS:
+            values[name] = values[FOLLOWS[name]].mean
+            continue
         value = data.get(name, key.default)
         if value is None:
             raise reader.fail(path, f"missing; must be {_expected(key)}")
-        if name not in data and name.endswith("_tip"):
-            value = values[name.removesuffix("_tip")].mean
-        high = LENGTH_HIGH if name == "length" and index > 0 else key.high
+        high = LENGTH_HIGH if name == "length" and not first else key.high
         readers: dict[str, Callable[[], Any]] = {
             "range": lambda value=value, path=path, key=key, high=high: reader.range(value, path, key.low, high),
             "number": lambda value=value, path=path, key=key: reader.number(value, path, key.low, key.high),
             "colour": lambda value=value, path=path: reader.colour(value, path),
+            "rgb": lambda value=value, path=path: reader.rgb(value, path),
         }
         if key.kind in readers:
             values[name] = readers[key.kind]()
@@ -173,12 +225,14 @@ def _read_order(reader: _Reader, data: Any, index: int, last: bool) -> Order:
             if number != int(number):
                 raise reader.fail(path, f"must be a whole number, is {_shown(value)}")
             values[name] = int(number)
-        elif value not in CROWN_SHAPES:
-            raise reader.fail(path, f"must be one of {', '.join(CROWN_SHAPES)}; is {_shown(value)}")
         else:
-            values[name] = value
+            values[name] = reader.choice(value, path, CHOICES[key.kind])
     if last and values["branches"].high > 0:
         raise reader.fail(f"{where}.branches", "must be [0, 0]: no order follows that could describe these branches")
+    if values["forks"].high > 0 and values["forks"].low < 1:
+        raise reader.fail(f"{where}.forks", "must be 1 or more, with its variation: a branch that divides goes on")
+    if 0 < values["pipe"] < 1.5:
+        raise reader.fail(f"{where}.pipe", f"must be 0 or from 1.5 to 4, is {values['pipe']:g}")
     return Order(**values)
 
 
@@ -188,29 +242,38 @@ def _expected(key: Key) -> str:
     return f"a number from {key.low:g} to {key.high:g}"
 
 
-def _read_leaf(reader: _Reader, data: Any) -> LeafModel | str:
-    reader.keys(data, "leaf", LEAF_KEYS)
+def _read_forms(reader: _Reader, data: Any, key: str) -> tuple[LeafModel | str, ...]:
+    """A leaf, or a list of forms among which each leaf has one by chance."""
+    if not isinstance(data, list):
+        return (_read_leaf(reader, data, key),)
+    if not 1 <= len(data) <= MAX_FORMS:
+        raise reader.fail(key, f"must have 1 to {MAX_FORMS} forms, has {len(data)}")
+    return tuple(_read_leaf(reader, one, f"{key}[{i}]") for i, one in enumerate(data))
+
+
+def _read_leaf(reader: _Reader, data: Any, where: str) -> LeafModel | str:
+    reader.keys(data, where, LEAF_KEYS)
     forms = [k for k in ("model", "object", "vertices") if k in data]
     if len(forms) != 1:
-        raise reader.fail("leaf", "needs exactly one of model (built-in), object (Blender mesh) or vertices with faces")
+        raise reader.fail(where, "needs exactly one of model (built-in), object (Blender mesh) or vertices with faces")
     if "model" in data:
         if not isinstance(data["model"], str) or data["model"] not in LEAF_MODELS:
-            raise reader.fail("leaf.model", f"must be one of {', '.join(LEAF_MODELS)}; is {_shown(data['model'])}")
+            raise reader.fail(f"{where}.model", f"must be one of {', '.join(LEAF_MODELS)}; is {_shown(data['model'])}")
         return LEAF_MODELS[data["model"]]
     if "object" in data:
-        return reader.text(data["object"], "leaf.object")
+        return reader.text(data["object"], f"{where}.object")
     faces = data.get("faces")
     if not isinstance(faces, list) or not all(
         isinstance(f, list) and all(isinstance(v, int) and not isinstance(v, bool) for v in f) for f in faces
     ):
-        raise reader.fail("leaf.faces", "must be a list of faces, each a list of vertex indices")
+        raise reader.fail(f"{where}.faces", "must be a list of faces, each a list of vertex indices")
     for key, form in (("vertices", "[x, y, z]"), ("uv", "[u, v]")):
         if key in data and not _is_list_of_points(data[key], form.count(",") + 1):
-            raise reader.fail(f"leaf.{key}", f"must be a list of {form} with numbers")
+            raise reader.fail(f"{where}.{key}", f"must be a list of {form} with numbers")
     try:
         return leaf_model(data["vertices"], faces, data.get("uv"))
     except SpeciesError as error:
-        raise reader.fail("leaf", str(error)) from None
+        raise reader.fail(where, str(error)) from None
 
 
 def _is_list_of_points(value: Any, size: int) -> bool:
@@ -221,16 +284,6 @@ def _is_list_of_points(value: Any, size: int) -> bool:
         and all(isinstance(x, int | float) and not isinstance(x, bool) and not abs(x) > 1e300 for x in point)
         for point in value
     )
-
-
-def expected_counts(orders: tuple[Order, ...]) -> tuple[list[float], list[float]]:
-    """Mean number of branches and of leaves of each order on one plant."""
-    branches, leaves, number = [], [], 1.0
-    for order in orders:
-        branches.append(number)
-        leaves.append(number * order.leaves.mean)
-        number *= order.branches.mean
-    return branches, leaves
 
 
 def species_from_dict(data: Any, identifier: str, source: str) -> Species:
@@ -263,23 +316,44 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
     if not isinstance(orders, list) or not 1 <= len(orders) <= MAX_ORDERS:
         found = len(orders) if isinstance(orders, list) else _shown(orders)
         raise reader.fail("orders", f"must be a list of 1 to {MAX_ORDERS} orders, has {found}")
-    read = tuple(_read_order(reader, o, i, i == len(orders) - 1) for i, o in enumerate(orders))
-    leaf = _read_leaf(reader, data["leaf"])
-    branches, leaves = expected_counts(read)
-    polygons = sum(n * o.sides * o.segments for n, o in zip(branches, read, strict=True))
-    polygons += sum(leaves) * (leaf.polygons if isinstance(leaf, LeafModel) else 1)
-    if polygons > MAX_POLYGONS:
-        raise reader.fail(
-            "orders", f"one plant would have {polygons:.3g} polygons, at most {MAX_POLYGONS:.0g} are allowed"
-        )
-    return Species(
+    read = tuple(_read_order(reader, o, f"orders[{i}]", i == 0, i == len(orders) - 1) for i, o in enumerate(orders))
+    spur = _read_order(reader, data["spur"], "spur", True, True) if "spur" in data else None
+    species = Species(
         identifier=identifier,
         name=reader.text(data["name"], "name"),
         description=reader.text(data.get("description", ""), "description", least=0),
         orders=read,
-        leaf=leaf,
+        leaf=_read_forms(reader, data["leaf"], "leaf"),
         leaf_transmission=reader.number(data.get("leaf_transmission", 0.4), "leaf_transmission", 0, 1),
+        blossom=_read_forms(reader, data["blossom"], "blossom") if "blossom" in data else (),
+        blossom_transmission=reader.number(data.get("blossom_transmission", 0.4), "blossom_transmission", 0, 1),
+        spur=spur,
+        bark=reader.choice(data.get("bark", BARKS[0]), "bark", BARKS),
+        quality=reader.number(data.get("quality", 1.0), "quality", *QUALITY_LIMITS),
     )
+    _check_references(reader, species)
+    polygons = expected_polygons(species) * species.quality
+    if polygons > MAX_POLYGONS:
+        raise reader.fail(
+            "orders" if species.quality <= 1 else "quality",
+            f"one plant would have {polygons:.3g} polygons, at most {MAX_POLYGONS:.0g} are allowed",
+        )
+    return species
+
+
+def _check_references(reader: _Reader, species: Species) -> None:
+    """What orders name has to be described."""
+    named = [(f"orders[{i}]", order) for i, order in enumerate(species.orders)]
+    if species.spur is not None:
+        named.append(("spur", species.spur))
+        for key in ("spurs", "forks"):
+            if getattr(species.spur, key).high > 0:
+                raise reader.fail(f"spur.{key}", "must be [0, 0]: a short shoot bears nothing but leaves")
+    for where, order in named:
+        if order.spurs.high > 0 and species.spur is None:
+            raise reader.fail(f"{where}.spurs", 'asks for short shoots, but the species describes no "spur"')
+        if order.leaf_kind == "blossom" and order.leaves.high > 0 and not species.blossom:
+            raise reader.fail(f"{where}.leaf_kind", 'asks for blossoms, but the species describes no "blossom"')
 
 
 def read_species(path: Path) -> Species:

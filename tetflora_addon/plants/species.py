@@ -10,6 +10,9 @@ from typing import NamedTuple
 from .leaf_models import LeafModel
 
 MAX_ORDERS = 6
+LEAF_KINDS = ("leaf", "blossom")
+BARKS = ("ridged", "plated", "smooth", "banded", "ringed", "fibrous")
+"""Characters of bark that materials know."""
 
 
 class Range(NamedTuple):
@@ -46,14 +49,22 @@ class Order:
         Order 0: metres. Others: fraction of the parent's length, times the parent's ``crown`` shape.
     thickness : Range
         Order 0: radius at the base as a fraction of the length. Others: fraction of the parent's radius at the fork.
-    taper : float
+    taper : Range
         Radius at the tip as a fraction of the radius at the base.
+    flare : float
+        How much thicker the very base is, as a fraction of the radius.
+    pipe : float
+        Exponent of the pipe model, which then shapes the branch and its children's radii; 0 for plain ratios.
     segments, sides : int
         Straight pieces along, and faces around, a branch.
     curvature : Range
         Degrees by which a branch bends over its length; positive bends back towards the parent's direction.
     curvature_tip : float
         Degrees by which it would bend over its length if all of it bent like its outer half.
+    attraction : Range
+        Degrees by which it turns to the sky over its length where it lies level; negative to the ground.
+    spray : float
+        How far branches leave their parent level, to its left and right, instead of all around.
     whorl : int
         Branches that leave the parent at one place: 1 alternate, 2 opposite, more a whorl.
     angle : Range
@@ -64,15 +75,31 @@ class Order:
         Degrees around the parent from one branch to the next.
     branches : Range
         Number of branches of the next order on one branch of this one.
-    branch_start : float
+    branch_start : Range
         Fraction of the branch that stays bare of branches.
+    forks : Range
+        Stems into which the branch divides; 0 where it does not.
+    fork_at : float
+        Fraction of the length at which it does so first.
+    fork_angle : Range
+        Degrees by which each stem turns away.
+    fork_levels : int
+        How many times it divides, at even distances from there to the tip.
+    spurs : Range
+        Number of the species' short shoots on one branch.
+    spur_start : Range
+        Fraction of the branch that stays bare of them.
     crown : str
         How the length of the children varies along the branch, see `crown_shapes.CROWN_SHAPES`.
     count_by_length : float
         How far the numbers of branches and leaves follow the branch's length: 0 not at all, 1 in proportion.
     leaves : Range
         Number of leaves on one branch of this order itself.
-    leaf_start : float
+    leaf_kind : str
+        Which of `LEAF_KINDS` the branch bears.
+    leaf_whorl : int
+        Leaves at one place: 2 opposite, more a whorl or a fascicle.
+    leaf_start : Range
         Fraction of the branch that stays bare of leaves.
     leaf_size : Range
         Metres by which the leaf model, one unit long, is scaled.
@@ -80,35 +107,59 @@ class Order:
         Degrees between branch and leaf.
     leaf_azimuth : Range
         Degrees around the branch from one leaf to the next.
-    leaf_light : float
+    leaf_light : Range
         0: a leaf's upper side faces the tip of its branch; 1: it faces the sky.
+    leaf_spray : float
+        How far leaves stand level to the left and right of their branch, instead of all around.
+    leaf_droop : float
+        0: a leaf keeps its direction; 1: it hangs down.
+    leaf_size_tip : float
+        Size of leaves at the outside of the crown, as a factor on that of those inside.
     branch_colour, leaf_colour : Colour
-        Linear RGB.
+        Linear RGB; of leaves, inside the crown.
+    leaf_colour_tip : tuple of float
+        Mean colour of leaves at the outside of the crown.
     """
 
     length: Range
     thickness: Range
-    taper: float
+    taper: Range
+    flare: float
+    pipe: float
     segments: int
     sides: int
     curvature: Range
     curvature_tip: float
+    attraction: Range
     angle: Range
     angle_tip: float
     azimuth: Range
+    spray: float
     whorl: int
     branches: Range
-    branch_start: float
+    branch_start: Range
     crown: str
     count_by_length: float
+    forks: Range
+    fork_at: float
+    fork_angle: Range
+    fork_levels: int
+    spurs: Range
+    spur_start: Range
+    leaf_kind: str
     leaves: Range
-    leaf_start: float
+    leaf_whorl: int
+    leaf_start: Range
     leaf_size: Range
+    leaf_size_tip: float
     leaf_angle: Range
     leaf_azimuth: Range
-    leaf_light: float
+    leaf_light: Range
+    leaf_spray: float
+    leaf_droop: float
     branch_colour: Colour
     leaf_colour: Colour
+    leaf_colour_tip: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -121,15 +172,39 @@ class Species:
         Identifier is the file's name without its ending.
     orders : tuple of Order
         From the trunk up; at most `MAX_ORDERS`.
-    leaf : LeafModel or str
-        The sample leaf; a string is the name of a Blender mesh object, which the bridge to Blender replaces by a model.
-    leaf_transmission : float
-        Share of the light scattered by a leaf that goes through it, 0 to 1.
+    leaf, blossom : tuple of LeafModel or str
+        Forms of the sample leaf, and of blossoms or fruit; each leaf has one of them by chance. A string is the name of
+        a Blender mesh object, which the bridge to Blender replaces by a model.
+    leaf_transmission, blossom_transmission : float
+        Share of the light scattered by a leaf or blossom that goes through it, 0 to 1.
+    spur : Order or None
+        A short shoot; its length is in metres and its thickness a fraction of that, as for a trunk.
+    bark : str
+        One of `BARKS`.
+    quality : float
+        Polygons of a plant, of those that the description gives; compiling applies it.
     """
 
     identifier: str
     name: str
     description: str
     orders: tuple[Order, ...]
-    leaf: LeafModel | str
-    leaf_transmission: float
+    leaf: tuple[LeafModel | str, ...]
+    leaf_transmission: float = 0.4
+    blossom: tuple[LeafModel | str, ...] = ()
+    blossom_transmission: float = 0.4
+    spur: Order | None = None
+    bark: str = "ridged"
+    quality: float = 1.0
+
+    def forms(self, kind: int) -> tuple[LeafModel | str, ...]:
+        """Forms of leaves of a kind, by its index in `LEAF_KINDS`."""
+        return (self.leaf, self.blossom)[kind]
+
+
+def fork_cuts(order: Order) -> list[float]:
+    """Ends of the parts into which forks divide the branches of an order, fractions of the length from 0 to 1."""
+    if order.forks.high <= 0:
+        return [0.0, 1.0]
+    levels = order.fork_levels
+    return [0.0, *(order.fork_at + (1 - order.fork_at) * k / levels for k in range(levels)), 1.0]

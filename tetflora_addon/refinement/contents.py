@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..plants.averages import own_leaf_integrals
 from ..plants.compiled import Flora
 from ..plants.expansion import open_subplants
 from ..plants.growth import Branches, fullness, trunks
-from ..plants.pieces import Pieces, clipped, leaf_fraction, wood_areas
+from ..plants.pieces import Pieces, clipped, leaf_fraction, outward_ends, wood_areas
 from ..plants.seeds import Seeds
 from ..tetrahedra.tree import TetrahedralTree
 
@@ -75,7 +76,7 @@ def bounding_cylinders(flora: Flora, subplants: Branches) -> tuple[NDArray, NDAr
         Across and along the branch's axis, metres.
     """
     bound = flora.bound[subplants.row] * subplants.length[:, None]
-    pad = subplants.radius + flora.leaf_reach[subplants.row] * subplants.scale
+    pad = subplants.radius * flora.widest[subplants.row] + flora.leaf_reach[subplants.row] * subplants.scale
     middle = (bound[:, 1] + bound[:, 2]) / 2
     centre = subplants.position + middle[:, None] * subplants.frame[:, :, 2]
     return centre, bound[:, 0] + pad, (bound[:, 2] - bound[:, 1]) / 2 + pad
@@ -185,13 +186,11 @@ class Amounts:
 def subplant_amounts(flora: Flora, subplants: Branches) -> Amounts:
     """Compiled means for sub-plants."""
     row = subplants.row
-    leafy = flora.leaf_area[row] > 0
-    full = fullness(flora.rows, subplants)
-    own_wood, own_faces = flora.own_wood[row], flora.own_faces[row]
+    leafy = flora.leaf_count[row] > 0
     return Amounts(
-        full * flora.leaf_area[row] * subplants.scale**2,
-        (own_wood + full * (flora.wood_area[row] - own_wood)) * subplants.length * subplants.radius,
-        own_faces + full * (flora.polygons[row] - own_faces),
+        flora.leaf_areas(subplants),
+        flora.wood_areas(subplants),
+        flora.face_counts(subplants),
         np.where(leafy, flora.leaf_width[row] * subplants.scale, 2 * subplants.radius),
     )
 
@@ -199,19 +198,23 @@ def subplant_amounts(flora: Flora, subplants: Branches) -> Amounts:
 def piece_amounts(flora: Flora, pieces: Pieces) -> Amounts:
     """Compiled means for pieces: the wood, and the leaves that the branch itself bears there."""
     branches = pieces.branches
-    row = branches.row
-    model = flora.species_of(row)
+    row, leaf = branches.row, flora.leaf
     size, variation = flora.rows["leaf_size"][row].T
-    area, width, polygons = (
-        np.array([getattr(m, name) for m in flora.leaf_models])[model] for name in ("area", "width", "polygons")
-    )
     leaves = flora.rows["leaves"][row, 0] * fullness(flora.rows, branches) * leaf_fraction(flora, pieces)
     return Amounts(
-        leaves * (size**2 + variation**2 / 3) * area * branches.scale**2,
+        leaves * (size**2 + variation**2 / 3) * leaf.area[row] * branches.scale**2 * _size_factors(flora, pieces),
         wood_areas(flora, pieces),
-        leaves * polygons + flora.rows["sides"][row],
-        np.where(leaves > 0, width * size * branches.scale, 2 * branches.radius),
+        leaves * leaf.polygons[row] + flora.rows["sides"][row],
+        np.where(leaves > 0, leaf.width[row] * size * branches.scale, 2 * branches.radius),
     )
+
+
+def _size_factors(flora: Flora, pieces: Pieces) -> NDArray[np.float64] | float:
+    """Mean factor (n,) on the area of leaves of pieces, by how far outside in the crown they sit."""
+    if not flora.rows["gradient"].any():
+        return 1.0
+    low, high = outward_ends(flora, pieces)
+    return own_leaf_integrals(flora.rows[pieces.branches.row], low, high)[0]
 
 
 def node_amounts(flora: Flora, contents: Contents, nodes: int) -> Amounts:

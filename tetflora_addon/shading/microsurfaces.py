@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 from ..buffers import MeshBuffers
 from ..plants.compiled import Flora
-from ..plants.foliage import face_light, place_leaves
-from ..plants.growth import Branches, axes, fullness, spread
+from ..plants.foliage import leaf_start, mean_leaf_colours, outwardness, place_leaves, settled
+from ..plants.growth import Branches, axes, spread
 from ..plants.hashing import Draw, child_key, mix, signed, uniform
 from ..plants.meshing import concatenate_buffers
 from ..plants.pieces import Pieces
-from ..plants.samples import SAMPLES
+from ..plants.samples import Points
 from ..refinement.contents import Amounts, piece_amounts, subplant_amounts
 
 _FACET_PATH = 1 << 40  # child indices of facets start here
@@ -71,14 +71,7 @@ def subplant_facets(
         asks for, or thin twigs would become blots.
     """
     amounts = subplant_amounts(flora, subplants)
-    row = subplants.row
-    model_polygons = np.array([m.polygons for m in flora.leaf_models])[flora.species_of(row)]
-    wood = _wood_sides(
-        side,
-        amounts,
-        amounts.polygons - fullness(flora.rows, subplants) * flora.leaf_count[row] * model_polygons,
-        coarse,
-    )
+    wood = _wood_sides(side, amounts, flora.branch_faces(subplants), coarse)
     return concatenate_buffers(
         [
             _buffers(_leaves_of_subplants(flora, subplants, amounts, side)),
@@ -138,69 +131,73 @@ def _numbers(key: NDArray, area: NDArray, facet: NDArray, path: int, draw: int) 
     return owner, index, child_key(key[owner], index + path)
 
 
-def _facet_colours(flora: Flora, row: NDArray, key: NDArray, leaves: NDArray) -> NDArray[np.float64]:
+def _facet_colours(flora: Flora, row: NDArray, key: NDArray, leaves: NDArray, outward: NDArray) -> NDArray[np.float64]:
     """Colours of facets that stand for a number of leaves (n,) each: their mean varies less than one leaf's colour."""
-    colour = flora.rows["leaf_colour"][row]
     deviation = signed(key, Draw.LEAF_COLOUR) / np.sqrt(np.maximum(leaves, 1))
-    return np.clip(colour[:, 0] + colour[:, 1] * deviation[:, None], 0, 1)
+    mean = mean_leaf_colours(flora.rows, row, outward)
+    return np.clip(mean + flora.rows["leaf_colour"][row, 1] * deviation[:, None], 0, 1)
+
+
+def _picked(points: Points, subplants: Branches, owner: NDArray, index: NDArray) -> NDArray[np.int64]:
+    """Sample (m,) for each facet: runs of them are spread over a sub-plant, and each starts its run elsewhere."""
+    first, number = points.runs(subplants)
+    start = (uniform(subplants.key, _START) * number).astype(np.int64)
+    return first[owner] + (start[owner] + index) % number[owner]
 
 
 def _leaves_of_subplants(flora: Flora, subplants: Branches, amounts: Amounts, side: NDArray) -> Facets:
-    row = subplants.row
+    rows, points = flora.rows, flora.samples.leaves
     one = flora.one_leaf_area(subplants)
     facet = np.maximum(side**2, one)
     owner, index, key = _numbers(subplants.key, amounts.leaf_area, facet, _FACET_PATH, _LEAF_COUNT)
-    # Runs of the samples are spread over the sub-plant; each sub-plant starts its run elsewhere.
-    start = (uniform(subplants.key, _START) * SAMPLES).astype(np.int64)
-    pick = (start[owner] + index) % SAMPLES
-    of_row, base = row[owner], subplants.frame[owner]
-    samples = flora.samples
-    leaf_row = samples.leaf_row[of_row, pick]
-    place = np.einsum("nij,nj->ni", base, samples.leaf_position[of_row, pick].astype(np.float64))
-    frame = base @ samples.leaf_frame[of_row, pick].astype(np.float64)
-    frame = face_light(frame, flora.rows["leaf_light"][leaf_row], _SKY)
-    half_leaf = 0.5 * flora.rows["leaf_size"][leaf_row, 0] * subplants.scale[owner]
+    pick = _picked(points, subplants, owner, index)
+    base, leaf_row = subplants.frame[owner], points.row[pick]
+    place = np.einsum("nij,nj->ni", base, points.position[pick].astype(np.float64))
+    frame = base @ points.frame[pick].astype(np.float64)
+    frame = settled(rows, leaf_row, frame, points.light[pick].astype(np.float64), _SKY)
+    half_leaf = 0.5 * rows["leaf_size"][leaf_row, 0] * subplants.scale[owner]
     centre = subplants.position[owner] + subplants.length[owner, None] * place + half_leaf[:, None] * frame[:, :, 1]
+    # Sub-plants beyond the limbs know how far outside they are, and all that grows on them is there.
+    outward = np.where(rows["outward"][subplants.row[owner]], points.outward[pick], subplants.outward[owner])
     return Facets(
         centre,
         frame[:, :, 0],
         frame[:, :, 1],
         np.sqrt(facet)[owner],
-        _facet_colours(flora, leaf_row, key, (facet / one.clip(1e-300))[owner]),
-        flora.transmission[of_row],
+        _facet_colours(flora, leaf_row, key, (facet / one.clip(1e-300))[owner], outward),
+        flora.leaf.transmission[leaf_row],
     )
 
 
 def _leaves_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDArray) -> Facets:
-    branches = pieces.branches
+    branches, rows = pieces.branches, flora.rows
     row = branches.row
-    size, variation = flora.rows["leaf_size"][row].T
-    species = flora.species_of(row)
-    model_area = np.array([m.area for m in flora.leaf_models])[species]
-    one = (size**2 + variation**2 / 3) * model_area * branches.scale**2
+    size, variation = rows["leaf_size"][row].T
+    one = (size**2 + variation**2 / 3) * flora.leaf.area[row] * branches.scale**2
     facet = np.maximum(side**2, one)
     # Pieces of one branch have its key; the end's position tells them apart.
     own = mix(branches.key ^ pieces.t1.view(np.uint64))
     owner, index, key = _numbers(own, amounts.leaf_area, facet, _FACET_PATH, _LEAF_COUNT)
-    first = np.maximum(pieces.t0, flora.rows["leaf_start"][row])[owner]
+    first = np.maximum(pieces.t0, leaf_start(rows, branches))[owner]
     t = first + (pieces.t1[owner] - first) * uniform(key, _PLACE)
-    leaves = place_leaves(flora.rows, branches, axes(flora.rows, branches), owner, index, key, t)
-    frame = face_light(leaves.frame, flora.rows["leaf_light"][row[owner]], _SKY)
+    leaves = place_leaves(rows, branches, axes(rows, branches), owner, index, key, t)
+    frame = settled(rows, row[owner], leaves.frame, leaves.light, _SKY)
     centre = leaves.position + 0.5 * leaves.size[:, None] * frame[:, :, 1]
-    colour = _facet_colours(flora, row[owner], key, (facet / one.clip(1e-300))[owner])
-    return Facets(centre, frame[:, :, 0], frame[:, :, 1], np.sqrt(facet)[owner], colour, flora.transmission[row[owner]])
+    outward = outwardness(rows, branches, owner, t)
+    colour = _facet_colours(flora, row[owner], key, (facet / one.clip(1e-300))[owner], outward)
+    transmission = flora.leaf.transmission[row[owner]]
+    return Facets(centre, frame[:, :, 0], frame[:, :, 1], np.sqrt(facet)[owner], colour, transmission)
 
 
 def _wood_of_subplants(flora: Flora, subplants: Branches, amounts: Amounts, side: NDArray) -> Facets:
-    row = subplants.row
+    points = flora.samples.wood
     owner, index, key = _numbers(subplants.key, amounts.wood_area / 2, side**2, _WOOD_PATH, _WOOD_COUNT)
-    start = (uniform(subplants.key, _START) * SAMPLES).astype(np.int64)
-    pick = (start[owner] + index) % SAMPLES
-    of_row, base, samples = row[owner], subplants.frame[owner], flora.samples
-    place = np.einsum("nij,nj->ni", base, samples.wood_position[of_row, pick].astype(np.float64))
-    axis = np.einsum("nij,nj->ni", base, samples.wood_axis[of_row, pick].astype(np.float64))
+    pick = _picked(points, subplants, owner, index)
+    base = subplants.frame[owner]
+    place = np.einsum("nij,nj->ni", base, points.position[pick].astype(np.float64))
+    axis = np.einsum("nij,nj->ni", base, points.frame[pick, :, 2].astype(np.float64))
     centre = subplants.position[owner] + subplants.length[owner, None] * place
-    colour = flora.rows["branch_colour"][samples.wood_row[of_row, pick], 0]
+    colour = flora.rows["branch_colour"][points.row[pick], 0]
     return Facets(centre, _across(axis, key), axis, side[owner], colour, np.zeros(len(owner)))
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..plants.compiled import Flora
+from ..plants.pieces import piece_leaf_colours
 from ..plants.samples import leaf_moments, wood_moments
 from ..refinement.contents import Contents, piece_amounts, subplant_amounts
 
@@ -55,31 +56,31 @@ def summarise(flora: Flora, contents: Contents, index: NDArray[np.integer], coun
     sums = np.zeros((count, 14))  # area, colour × area, transmission × area, moment × area
     subplants, pieces = contents.subplants, contents.pieces
     rows = flora.rows
-    # A sub-plant shows the mean of all that grows on it, a piece only its own bark and leaves.
-    whole = subplant_amounts(flora, subplants), flora.leaf_colour, flora.wood_colour, subplants.frame[:, :, 2]
-    own = (
-        piece_amounts(flora, pieces),
-        rows["leaf_colour"][:, 0],
-        rows["branch_colour"][:, 0],
-        pieces.end - pieces.start,
-    )
-    for cells, branches, is_piece, (amounts, leaf_colour, wood_colour, vectors) in (
-        (contents.subplant_cell, subplants, False, whole),
-        (contents.piece_cell, pieces.branches, True, own),
+    for cells, branches, own in (
+        (contents.subplant_cell, subplants, None),
+        (contents.piece_cell, pieces.branches, pieces),
     ):
-        to, axis = index[cells], _directions(vectors)
+        to = index[cells]
         keep = np.flatnonzero(to >= 0)
-        to, row, axis = to[keep], branches.row[keep], axis[keep]
-        leaf, wood = amounts.leaf_area[keep], amounts.wood_area[keep] / 2
-        if is_piece:
-            wood_moment = (np.eye(3) - axis[:, :, None] * axis[:, None, :]) / 2
+        to, branches = to[keep], branches.take(keep)
+        row = branches.row
+        # A sub-plant shows the mean of all that grows on it, a piece only its own bark and leaves.
+        if own is None:
+            amounts, axis = subplant_amounts(flora, branches), branches.frame[:, :, 2]
+            leaf_colour, wood_colour = flora.leaf_colours(branches), flora.wood_colour[row]
+            wood_moment, transmission = wood_moments(flora.samples, row, axis), flora.transmission[row]
         else:
-            wood_moment = wood_moments(flora.samples, row, axis)
-        leaf_moment = leaf_moments(flora.samples, row, axis, own=is_piece)
+            own = own.take(keep)
+            amounts, axis = piece_amounts(flora, own), _directions(own.end - own.start)
+            leaf_colour, wood_colour = piece_leaf_colours(flora, own), rows["branch_colour"][row, 0]
+            wood_moment = (np.eye(3) - axis[:, :, None] * axis[:, None, :]) / 2
+            transmission = flora.leaf.transmission[row]
+        leaf, wood = amounts.leaf_area, amounts.wood_area / 2
+        leaf_moment = leaf_moments(flora.samples, row, axis, own=own is not None)
         moment = leaf[:, None, None] * leaf_moment + wood[:, None, None] * wood_moment
-        colour = leaf[:, None] * leaf_colour[row] + wood[:, None] * wood_colour[row]
+        colour = leaf[:, None] * leaf_colour + wood[:, None] * wood_colour
         values = np.concatenate(
-            [(leaf + wood)[:, None], colour, (leaf * flora.transmission[row])[:, None], moment.reshape(-1, 9)], axis=1
+            [(leaf + wood)[:, None], colour, (leaf * transmission)[:, None], moment.reshape(-1, 9)], axis=1
         )
         for k in range(values.shape[1]):
             sums[:, k] += np.bincount(to, values[:, k], count)

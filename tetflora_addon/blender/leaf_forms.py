@@ -1,0 +1,96 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Leaves and blossoms that are mesh objects of the artist's: their polygons, and the materials that they bring."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import bpy
+
+from ..errors import SpeciesError
+from ..plants.leaf_models import LeafModel, leaf_model
+from ..plants.species import LEAF_KINDS, Species
+from .materials import bark_material, leaf_material
+from .meshes import UV_MAP, read_mesh_arrays
+from .properties import leaf_objects
+from .species_edits import species_for
+
+_INDEX = "material_index"
+
+
+def resolved_species(scene: bpy.types.Scene, identifier: str, depsgraph: bpy.types.Depsgraph) -> Species:
+    """A species with polygons in place of the names of objects.
+
+    Raises
+    ------
+    SpeciesError
+        Unknown or broken species, or an object that is missing or not a mesh with faces.
+    """
+    species = species_for(scene, identifier)
+    chosen = leaf_objects(scene).get(identifier)
+    if chosen is not None:
+        species = replace(species, leaf=(_model_of(species, chosen, depsgraph, "leaf"),))
+    for kind in LEAF_KINDS:
+        forms = getattr(species, kind)
+        if not all(isinstance(form, LeafModel) for form in forms):
+            models = (_resolved(species, form, depsgraph, kind) for form in forms)
+            species = replace(species, **{kind: tuple(models)})
+    return species
+
+
+def _resolved(species: Species, form: LeafModel | str, depsgraph: bpy.types.Depsgraph, kind: str) -> LeafModel:
+    if isinstance(form, LeafModel):
+        return form
+    found = bpy.data.objects.get(form)
+    if found is None:
+        raise SpeciesError(
+            f'Species "{species.name}" takes its {kind} from an object "{form}", which this file does not have. '
+            "Add a mesh object of that name, or choose one under Leaf Objects"
+        )
+    return _model_of(species, found, depsgraph, kind)
+
+
+def _model_of(species: Species, source: bpy.types.Object, depsgraph: bpy.types.Depsgraph, kind: str) -> LeafModel:
+    if source.type != 'MESH':
+        raise SpeciesError(f'"{source.name}" is to be the {kind} of "{species.name}" but is not a mesh object')
+    evaluated = source.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        arrays = read_mesh_arrays(mesh)
+    finally:
+        evaluated.to_mesh_clear()
+    if arrays.polygons == 0:
+        raise SpeciesError(f'"{source.name}" is to be the {kind} of "{species.name}" but its mesh has no faces')
+    offsets, corners = arrays.face_offsets, arrays.corner_verts
+    faces = [corners[a:b].tolist() for a, b in pairwise(offsets)]
+    model = leaf_model(arrays.positions, faces)
+    if UV_MAP in arrays.attributes:
+        model = replace(model, uv=arrays.attributes[UV_MAP][1])
+    if len(source.material_slots) > 1 and _INDEX in arrays.attributes:
+        model = replace(model, material_index=arrays.attributes[_INDEX][1])
+    return model
+
+
+def materials_of(scene: bpy.types.Scene, species: Species, kind: str, form: int) -> list[bpy.types.Material]:
+    """Materials for polygons of a kind: an object's own where leaves are copies of one that has any, else the species'.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    species : Species
+        Resolved or not; its identifier says where its leaves come from.
+    kind : str
+        ``'bark'`` or one of `LEAF_KINDS`.
+    form : int
+        Which form of leaf.
+    """
+    if kind == "bark":
+        return [bark_material(species.name, species.bark)]
+    source = leaf_objects(scene).get(species.identifier) if kind == "leaf" else None
+    if source is None:
+        named = getattr(species_for(scene, species.identifier), kind)[form]
+        source = bpy.data.objects.get(named) if isinstance(named, str) else None
+    own = [slot.material for slot in source.material_slots] if source is not None else []
+    return own if any(own) else [leaf_material(species.name if kind == "leaf" else f"{species.name} {kind}")]
