@@ -3,10 +3,10 @@
 """Levels of detail of a species by one factor: the same plant described with fewer or more polygons.
 
 One number, the *detail*, leads from a caricature to a portrait: 1 is the description. What there are many of goes first
-and comes first: of a kind with n members (leaves, or branches of one order), m (n / m)^detail are left, m being `_FEW`,
-so that boughs stay while leaves and twigs thin out. What is left stands for what went: leaves grow so that their area is
-kept, branches thicken so that the surface of their order is. Tubes lose sides and segments somewhat earlier than plants
-lose members; bends are adjusted so that the tips of branches stay where they were.
+and comes first: of a kind with n members (leaves, short shoots, or branches of one order), m (n / m)^detail are left, m
+being `_FEW`, so that boughs stay while leaves and twigs thin out. What is left stands for what went: leaves grow so
+that their area is kept, branches thicken so that the surface of their order is. Tubes lose sides and segments somewhat
+earlier than plants lose members; bends are adjusted so that the tips of branches stay where they were.
 """
 
 from __future__ import annotations
@@ -19,13 +19,11 @@ from functools import lru_cache
 import numpy as np
 
 from ..errors import SpeciesError
-from .crown_shapes import CROWN_SHAPES, crown_ratio
 from .leaf_models import LeafModel
-from .schema import MAX_POLYGONS, ORDER_KEYS
-from .species import Order, Range, Species
+from .members import Members, expected_members, expected_polygons
+from .schema import MAX_POLYGONS, ORDER_KEYS, QUALITY_LIMITS
+from .species import LEAF_KINDS, Order, Range, Species
 
-QUALITY_LOW, QUALITY_HIGH = 0.001, 1000.0
-"""Least and highest quality, inclusive."""
 TOLERANCE = 0.1
 """How far the expected polygons may be from those asked for, as a fraction of them."""
 
@@ -41,39 +39,7 @@ _LEAF_SHARE = 0.02, 0.06  # of the plant's reach: leaves that are too short, or 
 _SHORTEST = 0.5  # of the length of boughs
 _SWAY_HIGH = 1.25  # highest factor on the random bend of joints: the bound of a plant grows with it
 _DETAIL_HIGH = 16.0
-_STEPS = 60  # of bisection: more than the digits of a float need
-
-
-@lru_cache(maxsize=len(CROWN_SHAPES))
-def _mean_vigour(crown: str) -> float:
-    """Mean length of the children of a branch, relative to the longest; the same sum as in `compiled`."""
-    share = (np.arange(256) + 0.5) / 256
-    return float(crown_ratio(np.full(share.shape, CROWN_SHAPES.index(crown)), 1 - share).mean())
-
-
-def _members(species: Species) -> tuple[list[float], list[float]]:
-    """Expected branches and leaves of each order on one plant; what follows the length of branches included."""
-    branches, leaves, full = [1.0], [], 1.0
-    for i, order in enumerate(species.orders):
-        if i > 0:
-            parent = species.orders[i - 1]
-            branches.append(full * parent.branches.mean)
-            full = branches[i] * (1 - order.count_by_length * (1 - _mean_vigour(parent.crown)))
-        leaves.append(full * order.leaves.mean)
-    return branches, leaves
-
-
-def expected_polygons(species: Species) -> float:
-    """Mean number of polygons of one plant of a species, leaves and branches.
-
-    Notes
-    -----
-    The same number as ``compile_species([species]).polygons[0]``, in closed form and without compiling. A leaf that is
-    still the name of a Blender object counts as one polygon.
-    """
-    branches, leaves = _members(species)
-    tubes = sum(n * o.sides * o.segments for n, o in zip(branches, species.orders, strict=True))
-    return tubes + sum(leaves) * (species.leaf.polygons if isinstance(species.leaf, LeafModel) else 1)
+_STEPS = 36  # of bisection: to a hundred millionth of a unit
 
 
 def quality_for(species: Species, polygons: float) -> float:
@@ -94,11 +60,11 @@ def quality_for(species: Species, polygons: float) -> float:
     described = expected_polygons(species)
     if not (math.isfinite(polygons) and polygons > 0):
         raise SpeciesError(f"{species.identifier}: polygons must be a number greater than 0, is {polygons}")
-    quality = min(max(polygons / described, QUALITY_LOW), QUALITY_HIGH)
+    quality = min(max(polygons / described, QUALITY_LIMITS[0]), QUALITY_LIMITS[1])
     if abs(quality * described / polygons - 1) > TOLERANCE:
         raise SpeciesError(
             f"{species.identifier}: one plant cannot have {polygons:.3g} polygons; ask for"
-            f" {QUALITY_LOW * described:.3g} to {QUALITY_HIGH * described:.3g}"
+            f" {QUALITY_LIMITS[0] * described:.3g} to {QUALITY_LIMITS[1] * described:.3g}"
         )
     return quality
 
@@ -112,7 +78,7 @@ def with_quality(species: Species, quality: float) -> Species:
     species : Species
         As described.
     quality : float
-        `QUALITY_LOW` to `QUALITY_HIGH`; 1 returns the species itself.
+        Within `schema.QUALITY_LIMITS`; 1 returns the species itself.
 
     Returns
     -------
@@ -132,10 +98,9 @@ def with_quality(species: Species, quality: float) -> Species:
     A pure function of its arguments without random numbers; the last few results are kept. A species whose leaf is the
     name of a Blender object is first to be given its mesh, because a leaf counts by its polygons.
     """
-    if not (QUALITY_LOW <= quality <= QUALITY_HIGH):  # false for NaN as well
-        raise SpeciesError(
-            f"{species.identifier}: quality must be from {QUALITY_LOW:g} to {QUALITY_HIGH:g}, is {quality:g}"
-        )
+    low, high = QUALITY_LIMITS
+    if not low <= quality <= high:  # false for NaN as well
+        raise SpeciesError(f"{species.identifier}: quality must be from {low:g} to {high:g}, is {quality:g}")
     if quality == 1:
         return species
     target = quality * expected_polygons(species)
@@ -147,10 +112,30 @@ def with_quality(species: Species, quality: float) -> Species:
 
     # Sides and segments as real numbers make the count continuous; once they are whole, members make up for it.
     detail = _bisected(lambda d: expected_polygons(_thinned(_shaped(species, _shapes(species, d)), d)), target)
-    shapes = [(round(k), round(s)) for k, s in _shapes(species, detail)]
-    shaped = _shaped(species, shapes)
+    shaped = _shaped(species, [(round(k), round(s)) for k, s in _shapes(species, detail)])
     detail = _bisected(lambda d: expected_polygons(_thinned(shaped, d)), target)
     return _kept(species, _thinned(shaped, detail))
+
+
+def _tiers(species: Species) -> list[Order]:
+    """The orders, and the short shoot at the end of them."""
+    return [*species.orders, *([species.spur] if species.spur is not None else [])]
+
+
+def _with_tiers(species: Species, tiers: list[Order]) -> Species:
+    """The species with other orders and short shoot, given as `_tiers` gives them."""
+    number = len(species.orders)
+    return replace(species, orders=tuple(tiers[:number]), spur=tiers[number] if len(tiers) > number else None)
+
+
+def _branches(members: Members, species: Species) -> list[float]:
+    """Expected number on one plant of the branches of each of `_tiers`."""
+    return [*members.branches, members.spurs][: len(_tiers(species))]
+
+
+def _leaves(members: Members, species: Species) -> list[float]:
+    """Likewise of leaves."""
+    return [*members.leaves, members.spur_leaves][: len(_tiers(species))]
 
 
 def _bisected(polygons: Callable[[float], float], target: float) -> float:
@@ -165,7 +150,7 @@ def _bisected(polygons: Callable[[float], float], target: float) -> float:
 def _shapes(species: Species, detail: float) -> list[tuple[float, float]]:
     """Sides and segments of each order, not yet whole numbers."""
     shapes = []
-    for order, number in zip(species.orders, _members(species)[0], strict=True):
+    for order, number in zip(_tiers(species), _branches(expected_members(species), species), strict=True):
         if detail >= 1:
             more = detail - 1
             rounder = _ROUNDER ** (min(more, _ROUND) + _SLOWER * max(more - _ROUND, 0.0))
@@ -186,13 +171,13 @@ def _crowd(number: float) -> float:
 
 def _bend(order: Order) -> float:
     """Degrees by which a branch of the order is meant to turn from base to tip, to either side."""
-    return (abs(order.curvature.mean) + abs(order.curvature_tip)) / 2
+    return (abs(order.curvature.mean) + abs(order.curvature_tip)) / 2 + abs(order.attraction.mean)
 
 
 def _shaped(species: Species, shapes: list[tuple[float, float]]) -> Species:
     """The species with other sides and segments."""
-    pairs = zip(species.orders, shapes, strict=True)
-    return replace(species, orders=tuple(replace(o, sides=k, segments=s) for o, (k, s) in pairs))
+    pairs = zip(_tiers(species), shapes, strict=True)
+    return _with_tiers(species, [replace(o, sides=k, segments=s) for o, (k, s) in pairs])
 
 
 def _left(number: float, detail: float, pace: float = 1.0) -> float:
@@ -203,18 +188,26 @@ def _left(number: float, detail: float, pace: float = 1.0) -> float:
 
 def _thinned(species: Species, detail: float) -> Species:
     """The species with other numbers of branches and leaves, and leaves of such a size that their area is kept."""
-    branches, leaves = _members(species)
-    orders = list(species.orders)
-    foliage = _left(max(sum(leaves), 2 * _FEW), detail)
+    members = expected_members(species)
+    branches, tiers = members.branches, _tiers(species)
+    foliage = _left(max(sum(_leaves(members, species)), 2 * _FEW), detail)
+    spurs = _left(members.spurs, detail, _crowd(members.spurs))
     there = 1.0  # factor on the number of branches of this order
-    for i, order in enumerate(orders):
+    for i, order in enumerate(species.orders):
         count = 1.0
-        if i + 1 < len(orders):
+        if i + 1 < len(branches):
             count = _within(order.branches, _left(branches[i + 1], detail, _crowd(branches[i + 1])) / there, "branches")
-        share = _within(order.leaves, foliage / there, "leaves")
-        orders[i] = replace(order, branches=_times(order.branches, count), leaves=_times(order.leaves, share))
+        tiers[i] = replace(
+            order,
+            branches=_times(order.branches, count),
+            spurs=_times(order.spurs, _within(order.spurs, spurs / there, "spurs")),
+            leaves=_times(order.leaves, _within(order.leaves, foliage / there, "leaves")),
+        )
         there *= count
-    return replace(species, orders=tuple(orders))
+    if species.spur is not None:
+        leaves = species.spur.leaves
+        tiers[-1] = replace(species.spur, leaves=_times(leaves, _within(leaves, foliage / spurs, "leaves")))
+    return _with_tiers(species, tiers)
 
 
 def _within(value: Range, factor: float, key: str) -> float:
@@ -222,7 +215,9 @@ def _within(value: Range, factor: float, key: str) -> float:
     limits = ORDER_KEYS[key]
     if value.high > 0:
         factor = min(factor, limits.high / value.high)
-    if value.low > 0:
+    if value.low < 0:
+        factor = min(factor, limits.low / value.low)
+    elif value.low > 0:
         factor = max(factor, limits.low / value.low)
     return factor
 
@@ -233,32 +228,59 @@ def _times(value: Range, factor: float) -> Range:
 
 def _kept(described: Species, changed: Species) -> Species:
     """The changed species with leaves, lengths, thicknesses and bends such that it looks like the one described."""
-    (branches, leaves), (branches_left, leaves_left) = _members(described), _members(changed)
-    leaf, area = described.leaf, 1.0
-    if isinstance(leaf, LeafModel) and sum(leaves) > 0:
-        wider = _widening(described, math.sqrt(sum(leaves) / sum(leaves_left)))
-        leaf = _widened(leaf, wider) if wider != 1 else leaf
-        area = described.leaf.area / leaf.area
-    sizes = [
-        _within(o.leaf_size, math.sqrt(_ratio(n, m) * area), "leaf_size") if o.leaves.mean > 0 else 1.0
-        for o, n, m in zip(described.orders, leaves, leaves_left, strict=True)
-    ]
+    before, after = expected_members(described), expected_members(changed)
+    leaves, leaves_left = _leaves(before, described), _leaves(after, changed)
+    widened = described
+    if sum(leaves) > 0:
+        widened = _widened_forms(described, math.sqrt(sum(leaves) / sum(leaves_left)))
+    tiers = _tiers(described)
+    sizes = [1.0] * len(tiers)
+    for i, order in enumerate(tiers):
+        if order.leaves.mean > 0:
+            area = _ratio(leaves[i], leaves_left[i]) * _form_area(described, order) / _form_area(widened, order)
+            sizes[i] = _within(order.leaf_size, math.sqrt(area), "leaf_size")
     shorter = _shortening(described, sizes)
-    orders, thicker = [], 1.0  # factor on the radius of this order
-    for i, (old, new) in enumerate(zip(described.orders, changed.orders, strict=True)):
+    fewer = [_ratio(n, m) for n, m in zip(_branches(before, described), _branches(after, changed), strict=True)]
+    thicker, out = 1.0, []  # factor on the radius of this order
+    for i, (old, new) in enumerate(zip(tiers, _tiers(changed), strict=True)):
+        spur = i == len(described.orders)
         # Fewer branches show less bark, and a tube of fewer sides is narrower (Cauchy: the mean width of a convex
         # figure is its perimeter by pi). The radius makes up for both, as far as branches stay thinner than parents.
-        wanted = _ratio(branches[i], branches_left[i]) * _perimeter(old.sides) / _perimeter(new.sides)
-        thick = _within(old.thickness, wanted / (shorter if i else 1.0) / thicker, "thickness")
-        thicker *= thick
+        wanted = fewer[i] * _perimeter(old.sides) / _perimeter(new.sides)
+        if i > 0 and not spur and tiers[i - 1].pipe > 0:
+            thick = 1.0  # the pipe model shares out the parent's radius among fewer by itself
+            thicker *= (fewer[i] / fewer[i - 1]) ** (1 / tiers[i - 1].pipe)
+        else:
+            length = shorter if i > 0 and not spur else 1.0
+            thick = _within(old.thickness, wanted / length / (1.0 if spur else thicker), "thickness")
+            thicker *= thick
         new = replace(
             new,
-            length=_times(old.length, shorter) if i == 1 else old.length,
+            length=_times(old.length, shorter) if i == 1 and not spur else old.length,
             thickness=_times(old.thickness, thick),
             leaf_size=_times(old.leaf_size, sizes[i]),
         )
-        orders.append(_bent_alike(old, new))
-    return replace(changed, orders=tuple(orders), leaf=leaf)
+        out.append(_bent_alike(old, new))
+    return replace(_with_tiers(changed, out), leaf=widened.leaf, blossom=widened.blossom, quality=1.0)
+
+
+def _ratio(before: float, after: float) -> float:
+    return before / after if after > 0 else 1.0
+
+
+def _form_area(species: Species, order: Order) -> float:
+    """Mean area of the forms of leaf that an order bears, at size 1; a form without its mesh counts as 1."""
+    forms = species.forms(LEAF_KINDS.index(order.leaf_kind)) or species.leaf
+    return sum(form.area if isinstance(form, LeafModel) else 1.0 for form in forms) / len(forms)
+
+
+def _widened_forms(species: Species, larger: float) -> Species:
+    """The species with leaf models for leaves that become larger by a factor on their mean extent."""
+
+    def forms(given: tuple[LeafModel | str, ...]) -> tuple[LeafModel | str, ...]:
+        return tuple(_widened(f, _widening(species, f, larger)) if isinstance(f, LeafModel) else f for f in given)
+
+    return replace(species, leaf=forms(species.leaf), blossom=forms(species.blossom))
 
 
 def _lengths(species: Species) -> list[float]:
@@ -267,22 +289,24 @@ def _lengths(species: Species) -> list[float]:
     return [math.prod(lengths[: i + 1]) for i in range(len(lengths))]
 
 
-def _widening(species: Species, larger: float) -> float:
-    """Factor on the width of the leaf model where leaves become larger by a factor on their mean extent.
+def _widening(species: Species, form: LeafModel, larger: float) -> float:
+    """Factor on the width of a leaf model where leaves become larger by a factor on their mean extent.
 
     Where the length of the leaves makes the outline of the plant, as in a tuft of grass or the frond of a palm, they
     keep it, and take or give their area in width. Few large leaves become at most half as wide as they are long.
     """
-    longest = max(o.leaf_size.mean for o in species.orders if o.leaves.mean > 0)
+    longest = max(o.leaf_size.mean for o in _tiers(species) if o.leaves.mean > 0)
     share = longest / (longest + sum(_lengths(species)))
     outline = min(max((share - _LEAF_SHARE[0]) / (_LEAF_SHARE[1] - _LEAF_SHARE[0]), 0.0), 1.0)
     if larger < 1:
         return larger ** (2 * outline)
-    return min(max(larger ** (2 * outline), math.sqrt(larger)), max(0.5 / species.leaf.width, 1.0))
+    return min(max(larger ** (2 * outline), math.sqrt(larger)), max(0.5 / form.width, 1.0))
 
 
 def _widened(leaf: LeafModel, width: float) -> LeafModel:
     """The leaf model with its width changed; it droops as before, and folds along its midrib in proportion."""
+    if width == 1:
+        return leaf
     x, y, z = leaf.positions.T
     midrib = np.flatnonzero(np.abs(x) < 1e-6)
     midrib = midrib[np.argsort(y[midrib])]
@@ -293,13 +317,10 @@ def _widened(leaf: LeafModel, width: float) -> LeafModel:
 
 def _shortening(species: Species, sizes: list[float]) -> float:
     """Factor on the length of boughs where large leaves stick out of the crown: of their growth, half goes outwards."""
-    beyond = max(o.leaf_size.mean * (f - 1) for o, f in zip(species.orders, sizes, strict=True)) / 2
-    crown = sum(_lengths(species)[1:])
-    return min(max(1 - beyond / crown, _SHORTEST), 1.0) if crown > 0 else 1.0
-
-
-def _ratio(before: float, after: float) -> float:
-    return before / after if after > 0 else 1.0
+    tiers = _tiers(species)
+    beyond = max(o.leaf_size.mean * (f - 1) for o, f in zip(tiers, sizes, strict=True)) / 2
+    crown = sum(_lengths(species)[1:]) + max(o.leaf_size.mean for o in tiers if o.leaves.mean > 0 or beyond <= 0)
+    return min(max(1 - beyond / crown, _SHORTEST), 1.0)
 
 
 def _perimeter(sides: int) -> float:
@@ -332,7 +353,13 @@ def _bent_alike(old: Order, new: Order) -> Order:
     mean = min(max(old.curvature.mean * share, -high), high)
     tip = min(max((moved - inner_left * mean) / outer_left, -high), high)
     variation = old.curvature.variation * min(sway / _random_sway(t), _SWAY_HIGH)
-    return replace(new, curvature=Range(mean, min(variation, high - abs(mean))), curvature_tip=tip)
+    pull = _within(old.attraction, (inner + outer) / (inner_left + outer_left), "attraction")
+    return replace(
+        new,
+        curvature=Range(mean, min(variation, high - abs(mean))),
+        curvature_tip=tip,
+        attraction=_times(old.attraction, pull),
+    )
 
 
 def _sways(segments: int) -> tuple[float, float]:
