@@ -6,27 +6,39 @@ from __future__ import annotations
 
 import bpy
 
-from .compat import shader_tree
+from .bark_material import BARKS, bark_group, bark_version, smooth_step
+from .compat import disable_bump_correction, shader_tree
 from .node_tools import Graph, add_socket, find_socket, get_or_create, new_group
 from .shell_material import shell_material
 
-__all__ = ["bark_material", "leaf_material", "proxy_material", "scatter_group", "shell_material"]
+__all__ = ["BARKS", "bark_material", "leaf_material", "proxy_material", "scatter_group", "shell_material"]
 
 SCATTER = "TetFlora Scatter"
+BLADE = "TetFlora Leaf Blade"
 PROXY = "TetFlora proxy"
 
 # Raise these when what they count changes: existing files then get the new nodes beside the old ones.
-_SCATTER_VERSION = 1
-_LEAF_VERSION = 1
-_BARK_VERSION = 1
-_PROXY_VERSION = 1
+_SCATTER_VERSION = 2
+_LEAF_VERSION = 2
+_BLADE_VERSION = 1
+_PROXY_VERSION = 2
 
 # Light that has passed through a leaf lost more of its blue than light that was reflected: chlorophyll and carotenoids
 # absorb on the whole way. Products over 1 are cut off.
 THROUGH_TINT = (1.15, 1.1, 0.55, 1.0)
 # Share of the waxy surface's own, colourless reflection (4 % at a refractive index of 1.5), and its roughness.
-GLOSS, GLOSS_ROUGHNESS = 0.04, 0.5
+GLOSS, GLOSS_ROUGHNESS = 0.04, 0.6
 WHITE = (1.0, 1.0, 1.0, 1.0)
+
+# How much more than the mean of both sides a leaf's underside reflects, and the upper side less: fewer pigments lie
+# under its surface, hence most in blue, of which a leaf has least.
+PALER = (0.07, 0.05, 0.22)
+# Lightness of the midrib and of the veins that branch off it, over that of the blade.
+MIDRIB, VEINS = 0.45, 0.2
+# Veins to a leaf's length on either side, and how far along the leaf they run per unit that they run outwards.
+_VEIN_COUNT, _VEIN_SLOPE = 9.0, 0.65
+# Transmission under which leaves show no veins (needles, scales), and over which they show all.
+_OPAQUE, _THIN = 0.15, 0.35
 
 
 def scatter_group() -> bpy.types.NodeTree:
@@ -35,15 +47,16 @@ def scatter_group() -> bpy.types.NodeTree:
     Returns
     -------
     bpy.types.NodeTree
-        Inputs Colour, Transmission, Through Tint, Gloss, Gloss Roughness, Normal; output Shader. Of the light that
-        arrives, (1 − Gloss) · Colour is scattered, evenly over the side of the light or, for the share Transmission and
-        times the tint, over the other side; Gloss is mirrored. No more comes out than went in.
+        Inputs Colour, Transmission, Reflected Tint, Through Tint, Gloss, Gloss Roughness, Normal; output Shader. Of the
+        light that arrives, (1 − Gloss) · Colour is scattered, evenly over the side of the light or, for the share
+        Transmission, over the other side, each times its tint; Gloss is mirrored. No more comes out than went in.
     """
 
     def build(tree: bpy.types.NodeTree) -> None:
         unit = (0.0, 1.0)
         add_socket(tree, "Colour", "NodeSocketColor", (0.1, 0.25, 0.05, 1.0))
         add_socket(tree, "Transmission", "NodeSocketFloat", 0.0, unit, "Share of the scattered light passing through")
+        add_socket(tree, "Reflected Tint", "NodeSocketColor", WHITE, None, "Multiplies the colour of the other light")
         add_socket(tree, "Through Tint", "NodeSocketColor", THROUGH_TINT, None, "Multiplies the colour of that light")
         add_socket(tree, "Gloss", "NodeSocketFloat", GLOSS, unit, "Share of the light that the surface mirrors")
         add_socket(tree, "Gloss Roughness", "NodeSocketFloat", GLOSS_ROUGHNESS, unit)
@@ -52,7 +65,8 @@ def scatter_group() -> bpy.types.NodeTree:
         graph = Graph(tree)
         given = graph.node("NodeGroupInput").outputs
         colour, normal = given["Colour"], given["Normal"]
-        reflected = graph.node("ShaderNodeBsdfDiffuse", {"Color": colour, "Normal": normal})
+        back = graph.tinted(colour, given["Reflected Tint"])
+        reflected = graph.node("ShaderNodeBsdfDiffuse", {"Color": back, "Normal": normal})
         through = graph.tinted(colour, given["Through Tint"])
         transmitted = graph.node("ShaderNodeBsdfTranslucent", {"Color": through, "Normal": normal})
         sheet = graph.mix(given["Transmission"], reflected, transmitted)
@@ -65,8 +79,52 @@ def scatter_group() -> bpy.types.NodeTree:
     return get_or_create(bpy.data.node_groups, SCATTER, _SCATTER_VERSION, new_group, build)
 
 
+def blade_group() -> bpy.types.NodeTree:
+    """The group "TetFlora Leaf Blade": midrib and veins, and a paler underside.
+
+    Returns
+    -------
+    bpy.types.NodeTree
+        Inputs Colour, Transmission, Midrib, Veins, Paler Underside; outputs Colour, and Reflected Tint for the scatter
+        group. In the UV map the midrib is expected at u = .5 from v = 0 to 1, in units of the leaf's length, as leaf
+        models have it. Over the leaf the mean of Colour is that of the input, and over both sides the mean of the tint
+        is 1: light lines lie in darker surroundings.
+    """
+
+    def build(tree: bpy.types.NodeTree) -> None:
+        add_socket(tree, "Colour", "NodeSocketColor", (0.1, 0.25, 0.05, 1.0), None, "Mean colour")
+        add_socket(tree, "Transmission", "NodeSocketFloat", 0.4, (0.0, 1.0), "Thick leaves show no veins")
+        add_socket(tree, "Midrib", "NodeSocketFloat", MIDRIB, (0.0, 2.0), "How much lighter it is")
+        add_socket(tree, "Veins", "NodeSocketFloat", VEINS, (0.0, 1.0), "How much lighter they are")
+        add_socket(tree, "Paler Underside", "NodeSocketFloat", 1.0, (0.0, 4.0))
+        for name in ("Colour", "Reflected Tint"):
+            tree.interface.new_socket(name=name, in_out='OUTPUT', socket_type="NodeSocketColor")
+        graph = Graph(tree)
+        given = graph.node("NodeGroupInput").outputs
+        uv = graph.node("ShaderNodeSeparateXYZ", {"Vector": graph.attribute("UVMap", "Vector")}).outputs
+        aside = graph.math('ABSOLUTE', graph.math('SUBTRACT', uv["X"], 0.5))
+        # The halo is three times as wide as the rib and a third as dark as that is light, so that the mean stays.
+        rib, halo = smooth_step(graph, aside, 0.008, 0.002), smooth_step(graph, aside, 0.022, 0.008)
+        rib = graph.math('MULTIPLY_ADD', halo, -1.0 / 3.0, rib)
+        start = graph.math('MULTIPLY_ADD', aside, -_VEIN_SLOPE, uv["Y"])
+        wave = graph.math('PINGPONG', graph.math('MULTIPLY', start, _VEIN_COUNT), 0.5)
+        # A step from .02 to .1 covers .06 of each .5.
+        vein = graph.math('SUBTRACT', smooth_step(graph, wave, 0.1, 0.02), 0.06 / 0.5)
+        vein = graph.math('MULTIPLY', vein, smooth_step(graph, aside, 0.015, 0.05))
+        lines = graph.math('MULTIPLY', vein, given["Veins"])
+        lines = graph.math('ADD', lines, graph.math('MULTIPLY', rib, given["Midrib"]))
+        factor = graph.math('MULTIPLY_ADD', lines, smooth_step(graph, given["Transmission"], _OPAQUE, _THIN), 1.0)
+        back = graph.node("ShaderNodeNewGeometry").outputs["Backfacing"]
+        side = graph.math('MULTIPLY', graph.math('MULTIPLY_ADD', back, 2.0, -1.0), given["Paler Underside"])
+        tint = graph.vector('ADD', graph.vector('SCALE', PALER, side), (1.0, 1.0, 1.0))
+        graph.node("NodeGroupOutput", {"Colour": graph.scaled(given["Colour"], factor), "Reflected Tint": tint})
+        graph.arrange()
+
+    return get_or_create(bpy.data.node_groups, BLADE, _BLADE_VERSION, new_group, build)
+
+
 def leaf_material(species_name: str) -> bpy.types.Material:
-    """Material "TetFlora <species> leaf": reads ``tf_colour`` and ``tf_transmission`` of each face.
+    """Material "TetFlora <species> leaf": reads ``tf_colour`` and ``tf_transmission`` of each face, veins by ``UVMap``.
 
     Parameters
     ----------
@@ -78,7 +136,11 @@ def leaf_material(species_name: str) -> bpy.types.Material:
         graph = Graph(shader_tree(material))
         geometry = graph.node("ShaderNodeNewGeometry").outputs
         colour, transmission = graph.attribute("tf_colour", "Color"), graph.attribute("tf_transmission", "Fac")
-        _finish(graph, {"Colour": colour, "Transmission": transmission, "Normal": geometry["Normal"]})
+        blade = graph.node("ShaderNodeGroup", node_tree=blade_group())
+        graph.feed(find_socket(blade.inputs, "Colour"), colour)
+        graph.feed(find_socket(blade.inputs, "Transmission"), transmission)
+        looks = {name: blade.outputs[name] for name in ("Colour", "Reflected Tint")}
+        _finish(graph, {**looks, "Transmission": transmission, "Normal": geometry["Normal"]})
         material.diffuse_color = (0.1, 0.25, 0.05, 1.0)
 
     return get_or_create(
@@ -86,36 +148,38 @@ def leaf_material(species_name: str) -> bpy.types.Material:
     )
 
 
-def bark_material(species_name: str) -> bpy.types.Material:
-    """Material "TetFlora <species> bark": ``tf_colour`` with upright ridges that show when the camera is close.
+def bark_material(species_name: str, character: str = "ridged") -> bpy.types.Material:
+    """Material "TetFlora <species> bark": ``tf_colour`` with a pattern that shows when the camera is close.
 
     Parameters
     ----------
     species_name : str
         Name as the artist reads it.
+    character : str
+        One of `BARKS`. A species whose character changed gets a new material; the old one is kept beside it.
+
+    Raises
+    ------
+    SpeciesError
+        There is no such bark.
 
     Notes
     -----
-    The noise varies the colour around its mean, so that bark and its microsurfaces agree from afar. One noise serves
-    colour and bump.
+    The pattern varies the colour around its mean, so that bark and its microsurfaces agree from afar.
     """
 
     def build(material: bpy.types.Material) -> None:
         graph = Graph(shader_tree(material))
-        geometry = graph.node("ShaderNodeNewGeometry").outputs
-        # Stretched five times along the vertical, the way most wood grows: ridges of about 5 cm by 25 cm.
-        stretched = graph.vector('MULTIPLY', geometry["Position"], (1.0, 1.0, 0.2))
-        noise = graph.node("ShaderNodeTexNoise", {"Vector": stretched, "Scale": 20.0, "Detail": 3.0, "Roughness": 0.7})
-        height = find_socket(noise.outputs, "Fac")
-        # Noise lies around .5; the factor around 1.
-        factor = graph.math('MULTIPLY_ADD', height, 2.4, -0.2)
-        colour = graph.scaled(graph.attribute("tf_colour", "Color"), factor)
-        bump = graph.node("ShaderNodeBump", {"Strength": 1.0, "Distance": 0.03, "Height": height})
-        _finish(graph, {"Colour": colour, "Transmission": 0.0, "Gloss": 0.0, "Normal": bump})
+        bark = graph.node("ShaderNodeGroup", node_tree=bark_group(character))
+        graph.feed(find_socket(bark.inputs, "Colour"), graph.attribute("tf_colour", "Color"))
+        looks = {name: bark.outputs[name] for name in ("Colour", "Normal")}
+        _finish(graph, {**looks, "Transmission": 0.0, "Gloss": 0.0})
+        # The correction takes up to a tenth of the light away from what is rough, which proxies know nothing of.
+        disable_bump_correction(material)
         material.diffuse_color = (0.18, 0.12, 0.08, 1.0)
 
     return get_or_create(
-        bpy.data.materials, f"TetFlora {species_name} bark", _BARK_VERSION, bpy.data.materials.new, build
+        bpy.data.materials, f"TetFlora {species_name} bark", bark_version(character), bpy.data.materials.new, build
     )
 
 
