@@ -72,6 +72,30 @@ def small(**changes: Any) -> dict[str, Any]:
     return data
 
 
+#: Everything that a species may ask for at once, some 4,000 polygons.
+RICH: dict[str, Any] = small(
+    order0={
+        "forks": [2.3, 0.4], "fork_at": 0.4, "fork_angle": [25, 5], "fork_levels": 2, "flare": 0.8, "segments": 6,
+        "branches": [8, 1], "branch_start": [0.2, 0.1], "taper": [0.4, 0.1], "spurs": [3, 1],
+    },
+    order1={
+        "pipe": 2.4, "attraction": [60, 20], "spray": 0.8, "azimuth": [180, 10], "leaf_start": [0.3, 0.2],
+        "leaf_whorl": 3, "leaf_spray": 0.7, "leaf_size_tip": 0.6, "leaf_colour_tip": [0.3, 0.4, 0.1],
+        "thickness": [0.6, 0.1], "segments": 4,
+    },
+    order2={
+        "spurs": [2, 1], "leaf_droop": 0.6, "leaf_light": [0.4, 0.3], "leaf_size_tip": 1.7, "attraction": [-40, 10],
+        "leaf_colour_tip": [0.3, 0.4, 0.1], "count_by_length": 0.7,
+    },
+    leaf=[{"model": "kite"}, {"model": "ovate"}, {"model": "round"}],
+    blossom={"model": "lanceolate"},
+    spur={
+        "length": [0.12, 0.04], "thickness": [0.05, 0.01], "sides": 3, "angle": [40, 20], "leaf_kind": "blossom",
+        "leaves": [4, 0], "leaf_whorl": 4, "leaf_size": [0.06, 0.01], "leaf_colour": [[0.8, 0.5, 0.5], [0.1, 0.1, 0.1]],
+    },
+)  # fmt: skip
+
+
 def compiled(*files: dict[str, Any]) -> Flora:
     """Flora of decoded species files."""
     return compile_species([species_from_dict(data, f"s{i}", f"s{i}.json") for i, data in enumerate(files)])

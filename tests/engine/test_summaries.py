@@ -86,7 +86,7 @@ def test_summaries_of_any_division(seed: int, kind: str) -> None:
     np.testing.assert_allclose(np.trace(each.moment[held], axis1=1, axis2=2), 1)
     assert np.linalg.eigvalsh(each.moment[held]).min() > -1e-9
     np.testing.assert_allclose(each.moment, each.moment.transpose(0, 2, 1), atol=1e-12)
-    colours = np.concatenate([flora.rows[n][flora.rows["used"], 0] for n in ("leaf_colour", "branch_colour")])
+    colours = np.concatenate([flora.rows[n][:, 0] for n in ("leaf_colour", "branch_colour")])
     assert (each.colour[held] >= colours.min(axis=0) - 1e-9).all()
     assert (each.colour[held] <= colours.max(axis=0) + 1e-9).all()
     assert ((each.transmission >= 0) & (each.transmission <= flora.transmission[0])).all()

@@ -103,10 +103,10 @@ def row_leaves(
 
 
 def own_leaf_integrals(
-    rows: NDArray[np.void], low: NDArray[np.float64], high: NDArray[np.float64]
+    size_tip: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Means of (size at a place)² / (size inside)², and of that times the place, over places low to high (n,)."""
-    k = rows["leaf_size_tip"] - 1
+    k = size_tip - 1
 
     def moment(power: int) -> NDArray[np.float64]:  # mean of o^power over the interval, exact where it is a point
         terms = [low ** (power - i) * high**i for i in range(power + 1)]
@@ -136,13 +136,14 @@ def average(rows: NDArray[np.void], leaf: RowLeaves) -> Averages:
     for n, place in enumerate(NODES):
         low = np.where(rows["outward"], first + (last - first) * start, place)
         high = np.where(rows["outward"], last, place)
-        area, area_outward = own_leaf_integrals(rows, low, high)
+        area, area_outward = own_leaf_integrals(rows["leaf_size_tip"], low, high)
         leaf_area[every, n, every] = one_area * area
         inside, tip = rows["leaf_colour"][:, 0], rows["leaf_colour_tip"]
         leaf_colour[:, n] = one_area[:, None] * (area[:, None] * inside + area_outward[:, None] * (tip - inside))
     whole = profile_integral(exact, every, no_key, np.ones(r))
-    fixed_wood = eye * (tube_perimeter(np.maximum(rows["sides"], 3)) * whole)
-    fixed_faces = eye * (rows["sides"] * (rows["segments"] + rows["rings"]))
+    real = ~rows["phantom"]
+    fixed_wood = eye * (tube_perimeter(np.maximum(rows["sides"], 3)) * whole * real)
+    fixed_faces = eye * (rows["sides"] * (rows["segments"] + rows["rings"]) * real)
     full_wood, spur_wood, full_faces = np.zeros((3, r, r))
     length, radius = np.zeros((2, r))
     sums = {}
@@ -150,6 +151,8 @@ def average(rows: NDArray[np.void], leaf: RowLeaves) -> Averages:
         if rows["order"][i] == 0 and not rows["continues"][i]:
             length[i] = rows["length"][i, 0]
             radius[i] = length[i] * rows["thickness"][i, 0]
+        if rows["drawn"][i]:
+            length[i], radius[i] = rows["size"][i, :2]
         for sort in np.flatnonzero(rows["next"][i] >= 0):
             sums[i, sort] = one = _sums(exact, i, int(sort))
             j = rows["next"][i, sort]
@@ -176,6 +179,18 @@ def average(rows: NDArray[np.void], leaf: RowLeaves) -> Averages:
                     full_wood[i] += wood
                 full_faces[i] += one.number * fixed_faces[j] + one.full * full_faces[j]
             spur_wood[i] += one.full * spur_wood[j]
+        for j in range(*rows["drawn_rows"][i]):
+            # Each drawn branch is there once, of a known size and fullness.
+            vigour, outward = rows["size"][j, 2:]
+            full = 1 - rows["count_by_length"][j] * (1 - vigour)
+            node = quadratic(np.array(outward))
+            relative = length[j] * radius[j] / (length[i] * radius[i])
+            leaves[i] += full * leaves[j]
+            leaf_area[i] += full * (node @ leaf_area[j].reshape(3, -1))
+            leaf_colour[i] += full * (node @ leaf_colour[j])
+            fixed_wood[i] += relative * (fixed_wood[j] + full * full_wood[j])
+            fixed_faces[i] += fixed_faces[j] + full * full_faces[j]
+            spur_wood[i] += full * spur_wood[j]
     return Averages(
         leaves, leaf_area, leaf_colour, fixed_wood, full_wood, spur_wood, fixed_faces, full_faces, length, radius
     )

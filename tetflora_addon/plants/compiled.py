@@ -20,6 +20,7 @@ from .averages import Averages, RowLeaves, average, quadratic, row_leaves
 from .bounds import leaf_reaches, unit_bounds
 from .growth import Branches, fullness
 from .leaf_models import LeafModel
+from .quality import with_quality
 from .rows import build_rows
 from .samples import Samples, draw_samples
 from .species import LEAF_KINDS, Species
@@ -143,7 +144,7 @@ def compile_species(species: Sequence[Species]) -> Flora:
     SpeciesError
         A species whose leaf is still the name of a Blender object (the bridge to Blender has to replace it first).
     """
-    return _compiled(tuple(species))
+    return _compiled(tuple(with_quality(one, one.quality) for one in species))
 
 
 @lru_cache(maxsize=8)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compiled import Flora
-from .growth import Branches, axes, children
+from .growth import Branches, axes, children, drawn_children
 from .pieces import Pieces, whole_pieces
 
 
@@ -22,10 +22,18 @@ def open_subplants(flora: Flora, subplants: Branches) -> tuple[Branches, NDArray
     Branches, (m,) int64, Pieces, (k,) int64
         Children with the index of the sub-plant that each comes from, and pieces with theirs.
     """
-    lines = axes(flora.rows, subplants)
-    pieces, piece_owner = whole_pieces(flora.rows, subplants, lines)
-    grown, owner = children(flora.rows, subplants, lines)
-    return grown, owner, pieces, piece_owner
+    rows = flora.rows
+    phantom = rows["phantom"][subplants.row]
+    if phantom.any():  # a form drawn by hand: its branches are known, and opened with the plant
+        plants, rest = np.flatnonzero(phantom), np.flatnonzero(~phantom)
+        drawn, plant = drawn_children(rows, subplants.take(plants))
+        bodies, body = Branches.concatenate([subplants.take(rest), drawn]), np.concatenate([rest, plants[plant]])
+    else:
+        bodies, body = subplants, np.arange(len(subplants))
+    lines = axes(rows, bodies)
+    pieces, piece_owner = whole_pieces(rows, bodies, lines)
+    grown, owner = children(rows, bodies, lines)
+    return grown, body[owner], pieces, body[piece_owner]
 
 
 def expand(flora: Flora, subplants: Branches) -> Pieces:

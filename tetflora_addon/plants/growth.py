@@ -23,6 +23,7 @@ from .vectors import by_component, columns, gathered
 _PLACE_JITTER = 0.5  # of the distance from one child to the next: together children lie evenly along the whole parent
 # Each sort of children has child indices of its own, below those of leaves.
 _PATHS = np.array([0, 1 << 30, 1 << 31])
+_DRAWN_PATH = 1 << 29
 _COUNT = (Draw.BRANCHES, Draw.FORKS, Draw.SPURS)
 _ROUND = (Draw.BRANCHES_ROUND, Draw.FORKS_ROUND, Draw.SPURS_ROUND)
 _START = (Draw.BRANCH_START, Draw.BRANCH_START, Draw.SPUR_START)
@@ -158,10 +159,10 @@ def trunks(rows: NDArray[np.void], seeds: Seeds) -> Branches:
     """Trunks of plants (order 0)."""
     first = np.flatnonzero(np.diff(rows["species"], prepend=-1))  # of each species
     row = first[seeds.species].astype(np.int32)
-    key = key_of_seed(seeds.seed)
+    key = key_of_seed(np.where(rows["exact"][row], 0, seeds.seed))
     length = seeds.scale * ranged(rows, "length", row, key, Draw.LENGTH)
     radius = length * ranged(rows, "thickness", row, key, Draw.THICKNESS)
-    roll = 2 * np.pi * uniform(key, Draw.ROLL)
+    roll = np.where(rows["phantom"][row], 0.0, 2 * np.pi * uniform(key, Draw.ROLL))
     frame = turned(seeds.frame, roll, ranged(rows, "angle", row, key, Draw.ANGLE))
     plant = np.arange(len(seeds), dtype=np.int32)
     scale = np.asarray(seeds.scale, dtype=np.float64)
@@ -197,7 +198,48 @@ def axes(rows: NDArray[np.void], branches: Branches) -> Axes:
                 frame[attracted] = _pulled(gathered(frame, attracted), pull)
         knot = np.where((s < segments)[:, None], knot + step * frame[:, :, 2], knot)
         frames[:, s], knots[:, s + 1] = frame, knot
+    by_hand = np.flatnonzero(rows["drawn"][branches.row])
+    if len(by_hand):
+        knots[by_hand], frames[by_hand] = _drawn_axes(rows, branches.take(by_hand), most)
     return Axes(knots, frames, segments)
+
+
+def _drawn_axes(rows: NDArray[np.void], branches: Branches, most: int) -> tuple[NDArray, NDArray]:
+    """Knots (n, most + 1, 3) and frames (n, most, 3, 3) of branches drawn by hand, where their plants stand."""
+    local, line = rows["frames"][branches.row], rows["knots"][branches.row]
+    turn = branches.frame @ local[:, 0].transpose(0, 2, 1)
+    scale = branches.length / rows["size"][branches.row, 0]
+    knots = np.einsum("nij,nsj->nsi", turn * scale[:, None, None], line - line[:, :1]) + branches.position[:, None]
+    return knots[:, : most + 1], (turn[:, None] @ local)[:, :most]
+
+
+def drawn_children(rows: NDArray[np.void], plants: Branches) -> tuple[Branches, NDArray[np.int64]]:
+    """Branches that are drawn by hand, of plants whose form is, and the index of each one's plant."""
+    first, last = rows["drawn_rows"][plants.row].T
+    owner, index = spread((last - first).astype(np.int64))
+    return chosen_drawn(rows, plants, owner, index), owner
+
+
+def chosen_drawn(
+    rows: NDArray[np.void], plants: Branches, owner: NDArray[np.int64], index: NDArray[np.int64]
+) -> Branches:
+    """Some of the branches drawn by hand, given by plant (m,) and number (m,)."""
+    plant = plants.take(owner)
+    row = (rows["drawn_rows"][plant.row, 0] + index).astype(np.int32)
+    length, radius, vigour, outward = rows["size"][row].T
+    start = np.einsum("nij,nj->ni", plant.frame, rows["knots"][row, 0]) * plant.scale[:, None]
+    return Branches(
+        row,
+        plant.plant,
+        child_key(plant.key, index + _DRAWN_PATH),
+        plant.position + start,
+        plant.frame @ rows["frames"][row, 0],
+        length * plant.scale,
+        radius * plant.scale,
+        plant.scale,
+        vigour,
+        outward,
+    )
 
 
 def _bent(frame: NDArray[np.float64], pitch: NDArray[np.float64], yaw: NDArray[np.float64]) -> NDArray[np.float64]:

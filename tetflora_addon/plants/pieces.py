@@ -151,12 +151,12 @@ def outward_ends(flora: Flora, pieces: Pieces) -> tuple[NDArray[np.float64], NDA
 def piece_leaf_colours(flora: Flora, pieces: Pieces) -> NDArray[np.float64]:
     """Mean linear RGB (n, 3) of the leaves that branches themselves bear on pieces, weighted by area."""
     row = pieces.branches.row
-    rows = flora.rows[row]
-    inside = rows["leaf_colour"][:, 0]
+    rows = flora.rows
+    inside = rows["leaf_colour"][row, 0]
     if not rows["gradient"].any():
         return inside
-    area, area_outward = own_leaf_integrals(rows, *outward_ends(flora, pieces))
-    return inside + (rows["leaf_colour_tip"] - inside) * (area_outward / area)[:, None]
+    area, area_outward = own_leaf_integrals(rows["leaf_size_tip"][row], *outward_ends(flora, pieces))
+    return inside + (rows["leaf_colour_tip"][row] - inside) * (area_outward / area)[:, None]
 
 
 def wood_areas(flora: Flora, pieces: Pieces) -> NDArray[np.float64]:

@@ -23,6 +23,9 @@ def profile(rows: NDArray[np.void], row: NDArray, key: NDArray[np.uint64], t: ND
     """Radius (n,) at fractions t (n,) of branches of rows (n,) and keys (n,), divided by that of the base unflared."""
     taper = ranged(rows, "taper", row, key, Draw.TAPER)
     out = 1 - (1 - taper) * t
+    hand = np.flatnonzero(rows["drawn"][row])
+    if len(hand):
+        out[hand] = _drawn(rows, row[hand], t[hand])[0]
     piped = np.flatnonzero(rows["pipe"][row] > 0)
     if len(piped):
         power, start, tip = _pipe(rows, row[piped], taper[piped])
@@ -38,6 +41,9 @@ def profile_integral(rows: NDArray[np.void], row: NDArray, key: NDArray[np.uint6
     """Integral (n,) of `profile` from 0 to t; differences of it are exact under any sequence of cuts."""
     taper = ranged(rows, "taper", row, key, Draw.TAPER)
     out = t - (1 - taper) * t * t / 2
+    hand = np.flatnonzero(rows["drawn"][row])
+    if len(hand):
+        out[hand] = _drawn(rows, row[hand], t[hand])[1]
     piped = np.flatnonzero(rows["pipe"][row] > 0)
     if len(piped):
         power, start, tip = _pipe(rows, row[piped], taper[piped])
@@ -56,3 +62,14 @@ def _pipe(rows: NDArray[np.void], row: NDArray, taper: NDArray) -> tuple[NDArray
     power = rows["pipe"][row]
     # A tip as thick as the base has nothing to share out; the limit keeps divisions finite.
     return power, rows["start"][row, 0, 0], np.minimum(taper, 1 - 1e-6) ** power
+
+
+def _drawn(rows: NDArray[np.void], row: NDArray, t: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
+    """Profile of branches that are drawn by hand, linear between their knots, and its integral."""
+    radii, number = rows["radii"][row], rows["segments"][row]
+    along = t * number
+    segment = np.minimum(along.astype(np.int64), number - 1)
+    part, every = along - segment, np.arange(len(row))
+    low, high = radii[every, segment], radii[every, segment + 1]
+    whole = np.concatenate([np.zeros((len(row), 1)), np.cumsum((radii[:, 1:] + radii[:, :-1]) / 2, axis=1)], axis=1)
+    return low + (high - low) * part, (whole[every, segment] + part * (low + (high - low) * part / 2)) / number

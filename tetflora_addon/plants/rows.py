@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .crown_shapes import CROWN_SHAPES, crown_ratio
+from .drawn import MAX_SEGMENTS, DrawnLines, drawn_lines
 from .hashing import signed
 from .species import LEAF_KINDS, Order, Range, Species, fork_cuts
 
@@ -49,6 +50,9 @@ ROW_DTYPE = np.dtype(
     + [("share", np.float64, (3, 2)), ("part", np.float64, (2,))]
     + [("nominal", np.float64), ("pipe_share", np.float64), ("fork_power", np.float64)]
     + [("continues", np.bool_), ("outward", np.bool_), ("worldly", np.bool_), ("gradient", np.bool_)]
+    + [("exact", np.bool_), ("phantom", np.bool_), ("drawn", np.bool_), ("drawn_rows", np.int32, (2,))]
+    + [("knots", np.float64, (MAX_SEGMENTS + 1, 3)), ("radii", np.float64, (MAX_SEGMENTS + 1,))]
+    + [("frames", np.float64, (MAX_SEGMENTS, 3, 3)), ("size", np.float64, (4,))]
 )
 """One kind of branch.
 
@@ -58,7 +62,12 @@ the part that stays bare, ``share`` which part of all children of the order's br
 this row on the order's branch and ``nominal`` the length of that in lengths of this; ``pipe_share`` the radius of a
 lateral by the pipe model in radii of this; ``continues`` marks stems beyond a fork; ``outward`` branches whose own axis
 leads from the inside of the crown to the outside; ``worldly`` sub-plants whose shape depends on how they stand to the
-sky; ``gradient`` leaves that differ between inside and outside.
+sky; ``gradient`` leaves that differ between inside and outside; ``exact`` plants that are all the same.
+
+A plant whose form is drawn by hand begins with a ``phantom`` row: a branch without wood, whose children are the
+``drawn`` rows from the first to before the last of ``drawn_rows``. Each of these is one branch with ``knots`` (metres in the
+plant's space, evenly spaced), ``radii`` over that of the base, ``frames`` along it, and its ``size``: length, radius,
+vigour and place between inside and outside.
 """
 
 
@@ -77,16 +86,25 @@ def build_rows(species: Sequence[Species]) -> NDArray[np.void]:
     for i in range(len(rows) - 1, -1, -1):
         row = rows[i]
         here = row["attraction"].any() or row["spray"] > 0 or row["leaf_spray"] > 0
-        row["worldly"] = here or rows["worldly"][row["next"][row["next"] >= 0]].any()
+        children = np.concatenate([row["next"][row["next"] >= 0], np.arange(*row["drawn_rows"])])
+        row["worldly"] = here or rows["worldly"][children].any()
     return rows
 
 
 def _rows_of_species(one: Species, number: int, first: int) -> list[np.void]:
     """Rows of one species; ``first`` is the index of its trunk in the table."""
+    if one.exact:
+        one = without_variation(one)
+    drawn = None
+    if one.form is not None:
+        from .skeletons import drawn_branches
+
+        drawn = drawn_lines(drawn_branches(one.form))
     cuts = [fork_cuts(order) for order in one.orders]
-    begin = first + np.concatenate([[0], np.cumsum([len(c) - 1 for c in cuts])])
+    ahead = 0 if drawn is None else 1 + len(drawn.order)
+    begin = first + ahead + np.concatenate([[0], np.cumsum([len(c) - 1 for c in cuts])])
     spur = int(begin[-1])
-    out = []
+    out = [] if drawn is None else _drawn_rows(one, drawn, number, first, begin, spur)
     for o, order in enumerate(one.orders):
         whole = _row(order, number, o)
         for p, (low, high) in enumerate(zip(cuts[o][:-1], cuts[o][1:], strict=True)):
@@ -106,6 +124,40 @@ def _rows_of_species(one: Species, number: int, first: int) -> list[np.void]:
     if any(order.spurs.high > 0 for order in one.orders) and one.spur is not None:
         row = _row(one.spur, number, SPUR_ORDER)
         row["next"] = -1
+        out.append(row)
+    for row in out:
+        row["exact"] = one.exact
+    return out
+
+
+def _drawn_rows(
+    one: Species, drawn: DrawnLines, number: int, first: int, begin: NDArray[np.int64], spur: int
+) -> list[np.void]:
+    """The phantom row of a plant that is drawn by hand, and a row for each of its branches."""
+    height = max(float(np.ptp(drawn.knots[:, :, 2])), 1e-6)
+    whole = np.zeros((), dtype=ROW_DTYPE)
+    whole["next"], whole["species"], whole["segments"], whole["sides"], whole["whorl"] = -1, number, 1, 3, 1
+    whole["phantom"], whole["length"], whole["part"], whole["nominal"] = True, (height, 0), (0, 1), 1
+    whole["thickness"], whole["taper"], whole["leaf_whorl"] = (drawn.radius.max() / height, 0), (1, 0), 1
+    whole["leaf_size_tip"] = 1
+    whole["drawn_rows"] = first + 1, first + 1 + len(drawn.order)
+    out = [whole]
+    highest = int(drawn.order.max())
+    longest = np.maximum.reduceat(drawn.length, np.searchsorted(drawn.order, np.arange(highest + 1)))
+    for b, o in enumerate(np.minimum(drawn.order, len(one.orders) - 1)):
+        order = one.orders[o]
+        row = _row(order, number, int(o))
+        row["next"], row["count"][FORK], row["rings"], row["flare"], row["pipe"] = -1, 0, 0, 0, 0
+        if drawn.order[b] == highest and order.branches.high > 0:
+            row["next"][LATERAL] = begin[o + 1]
+        if order.spurs.high > 0 and one.spur is not None:
+            row["next"][SPUR] = spur
+        row["drawn"], row["segments"] = True, drawn.segments[b]
+        row["knots"], row["frames"] = drawn.knots[b], drawn.frames[b]
+        row["radii"] = drawn.radii[b] / drawn.radius[b]
+        row["taper"] = min(row["radii"][-1], 1.0), 0
+        vigour = drawn.length[b] / longest[drawn.order[b]]
+        row["size"] = drawn.length[b], drawn.radius[b], vigour, drawn.outward[b]
         out.append(row)
     return out
 

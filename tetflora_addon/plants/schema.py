@@ -118,7 +118,7 @@ ORDER_KEYS: dict[str, Key] = {
 }
 
 SPECIES_KEYS = (
-    "format", "name", "description", "orders", "bark", "quality", "leaf", "leaf_transmission",
+    "format", "name", "description", "orders", "bark", "quality", "exact", "leaf", "leaf_transmission",
     "blossom", "blossom_transmission", "spur",
 )  # fmt: skip
 MAX_FORMS = 8
@@ -173,6 +173,11 @@ class _Reader:
         if not isinstance(value, list | tuple) or len(value) != 3:
             raise self.fail(key, f"must be [r, g, b] with numbers from 0 to 1, is {_shown(value)}")
         return tuple(self.number(v, f"{key}.{c}", 0, 1) for v, c in zip(value, "rgb", strict=True))
+
+    def truth(self, value: Any, key: str) -> bool:
+        if not isinstance(value, bool):
+            raise self.fail(key, f"must be true or false, is {_shown(value)}")
+        return value
 
     def choice(self, value: Any, key: str, choices: tuple[str, ...]) -> str:
         if value not in choices:
@@ -330,6 +335,7 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
         spur=spur,
         bark=reader.choice(data.get("bark", BARKS[0]), "bark", BARKS),
         quality=reader.number(data.get("quality", 1.0), "quality", *QUALITY_LIMITS),
+        exact=reader.truth(data.get("exact", False), "exact"),
     )
     _check_references(reader, species)
     polygons = expected_polygons(species) * species.quality

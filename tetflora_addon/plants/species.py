@@ -5,9 +5,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from .leaf_models import LeafModel
+
+if TYPE_CHECKING:
+    from .skeletons import Skeleton
 
 MAX_ORDERS = 6
 LEAF_KINDS = ("leaf", "blossom")
@@ -183,6 +186,10 @@ class Species:
         One of `BARKS`.
     quality : float
         Polygons of a plant, of those that the description gives; compiling applies it.
+    exact : bool
+        Every plant is the same: ranges have their means, and seeds do not matter.
+    form : Skeleton or None
+        Trunk and lower orders modelled by hand; only the orders above are grown.
     """
 
     identifier: str
@@ -196,6 +203,8 @@ class Species:
     spur: Order | None = None
     bark: str = "ridged"
     quality: float = 1.0
+    exact: bool = False
+    form: Skeleton | None = None
 
     def forms(self, kind: int) -> tuple[LeafModel | str, ...]:
         """Forms of leaves of a kind, by its index in `LEAF_KINDS`."""

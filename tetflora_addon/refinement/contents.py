@@ -214,7 +214,7 @@ def _size_factors(flora: Flora, pieces: Pieces) -> NDArray[np.float64] | float:
     if not flora.rows["gradient"].any():
         return 1.0
     low, high = outward_ends(flora, pieces)
-    return own_leaf_integrals(flora.rows[pieces.branches.row], low, high)[0]
+    return own_leaf_integrals(flora.rows["leaf_size_tip"][pieces.branches.row], low, high)[0]
 
 
 def node_amounts(flora: Flora, contents: Contents, nodes: int) -> Amounts:
