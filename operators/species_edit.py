@@ -8,7 +8,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..tetflora_addon.blender.plant_objects import assign_species
-from ..tetflora_addon.blender.species_editor import orders_of, present_species
+from ..tetflora_addon.blender.species_values import orders_of, present_species
 from ..tetflora_addon.blender.species_edits import (
     change_species,
     find_edit,
@@ -18,6 +18,7 @@ from ..tetflora_addon.blender.species_edits import (
     store_species,
 )
 from ..tetflora_addon.blender.species_items import catalogue
+from ..tetflora_addon.plants.schema import DEFAULT_SPUR
 from ..tetflora_addon.plants.species import MAX_ORDERS
 from . import ids
 from .base import Reporting, counted, selected_plants
@@ -124,6 +125,7 @@ class TETFLORA_OT_edit_orders(Reporting, bpy.types.Operator):
         items=(
             ('ADD', "Add", "Add an order: branches like those of the last order, half as long, three on each"),
             ('REMOVE', "Remove", "Remove the last order; the branches before it then bear no branches"),
+            ('SPUR', "Short Shoots", "Add short shoots that bear blossoms, fruit or leaves, or remove them"),
         ),
     )
 
@@ -139,6 +141,9 @@ class TETFLORA_OT_edit_orders(Reporting, bpy.types.Operator):
         scene = context.scene
         editor = scene.tetflora.species_editor
         number = len(orders_of(editor))
+        if self.action == 'SPUR':
+            change_species(scene, present_species(editor), _toggle_spur)
+            return {'FINISHED'}
         if self.action == 'ADD' and not 0 < number < MAX_ORDERS:
             self.report({'WARNING'}, f"A species has at most {MAX_ORDERS} orders")
             return {'CANCELLED'}
@@ -157,6 +162,17 @@ def _add(data: dict) -> None:
     made |= {"length": [0.5, 0.1], "thickness": [0.5, 0.1], "angle": [45, 15], "branches": [0, 0]}
     made.pop("angle_tip", None)
     orders.append(made)
+
+
+def _toggle_spur(data: dict) -> None:
+    if "spur" in data:
+        del data["spur"]
+        for order in data["orders"]:
+            order.pop("spurs", None)
+        return
+    kind = {"leaf_kind": "blossom"} if "blossom" in data else {}
+    data["spur"] = {**DEFAULT_SPUR, **kind}
+    data["orders"][-1]["spurs"] = [3, 1]
 
 
 def _remove(data: dict) -> None:

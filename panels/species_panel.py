@@ -8,16 +8,12 @@ import bpy
 
 from ..operators import ids
 from ..tetflora_addon.blender import species_preview
-from ..tetflora_addon.blender.species_editor import (
-    OBJECT_LEAF,
-    VARIATION,
-    order_keys,
-    orders_of,
-    present_order,
-    present_species,
-)
 from ..tetflora_addon.blender.species_edits import find_edit, problem_of
+from ..tetflora_addon.blender.species_editor import VARIATION, order_keys
 from ..tetflora_addon.blender.species_files import own_file
+from ..tetflora_addon.blender.species_values import orders_of, present_order, present_species
+from ..tetflora_addon.blender.species_whole import NO_LEAF, OBJECT_LEAF
+from ..tetflora_addon.plants.species import LEAF_KINDS
 from .base import SidebarPanel, split_layout
 
 # Keys of an order that say how its leaves are; the others are about its branches.
@@ -106,12 +102,16 @@ class TETFLORA_PT_species_whole(_SpeciesPart, bpy.types.Panel):
         column = layout.column()
         column.prop(editor, "species_name")
         column.prop(editor, "species_description")
-        column.prop(editor, "leaf_form")
-        if editor.leaf_form == OBJECT_LEAF:
-            column.prop_search(editor, "leaf_object", bpy.data, "objects")
-        column.prop(editor, "leaf_transmission")
+        for kind in LEAF_KINDS:
+            form = getattr(editor, f"{kind}_form")
+            column.prop(editor, f"{kind}_form")
+            if form == OBJECT_LEAF:
+                column.prop_search(editor, f"{kind}_object", bpy.data, "objects")
+            if form != NO_LEAF:
+                column.prop(editor, f"{kind}_transmission")
         column.prop(editor, "bark")
         column.prop(editor, "quality")
+        column.prop(editor, "exact")
 
 
 class TETFLORA_PT_species_orders(_SpeciesPart, bpy.types.Panel):
@@ -125,8 +125,8 @@ class TETFLORA_PT_species_orders(_SpeciesPart, bpy.types.Panel):
         row = self.layout.row()
         row.column(align=True).prop(editor, "order", expand=True)
         buttons = row.column(align=True)
-        for action in ('ADD', 'REMOVE'):
-            buttons.operator(ids.EDIT_ORDERS, text="", icon=action).action = action
+        for action, icon in (('ADD', 'ADD'), ('REMOVE', 'REMOVE'), ('SPUR', 'OUTLINER_OB_FORCE_FIELD')):
+            buttons.operator(ids.EDIT_ORDERS, text="", icon=icon).action = action
         _draw_keys(split_layout(self), editor, leaves=False)
 
 
@@ -141,7 +141,7 @@ class TETFLORA_PT_species_leaves(_SpeciesPart, bpy.types.Panel):
 
 def _draw_keys(layout: bpy.types.UILayout, editor: bpy.types.PropertyGroup, leaves: bool) -> None:
     column = layout.column(align=True)
-    last = present_order(editor) == len(orders_of(editor)) - 1
+    last = present_order(editor) >= len(orders_of(editor)) - 1
     split = column.split(factor=0.4)
     split.label(text="")
     head = split.row(align=True)

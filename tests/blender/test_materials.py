@@ -245,3 +245,8 @@ def test_every_link_is_valid_and_every_species_shares_the_group():
         assert bpy.data.node_groups["TetFlora Scatter"] in groups
         assert all(link.is_valid for link in made.node_tree.links)
     assert len([g for g in bpy.data.node_groups if g.name.startswith("TetFlora Scatter")]) == 1
+
+
+def test_every_bark_that_species_may_name_is_there():
+    """In the same order: the number of a character is part of its materials' version."""
+    assert materials().BARKS == session.part("tetflora_addon.plants.species").BARKS

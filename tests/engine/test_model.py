@@ -20,9 +20,9 @@ from tetflora_addon.plants.foliage import leaf_keys, leaf_places, outwardness, p
 from tetflora_addon.plants.growth import Branches, axes, branch_counts, children, leaf_counts, radius_at, spread
 from tetflora_addon.plants.members import expected_members, expected_polygons
 from tetflora_addon.plants.meshing import leaf_meshes
+from tetflora_addon.plants.moments import leaf_moments, wood_moments
 from tetflora_addon.plants.pieces import Pieces, clipped, wood_areas
 from tetflora_addon.plants.rows import FORK, LATERAL, SPUR, without_variation
-from tetflora_addon.plants.samples import leaf_moments, wood_moments
 from tetflora_addon.refinement.contents import piece_amounts, subplant_amounts
 
 _UP = np.array([0.0, 0.0, 1.0])

@@ -65,9 +65,8 @@ ORDER_MISTAKES = [
     ("taper", math.inf, "0 to 1"),
     ("taper", -math.inf, "0 to 1"),
     ("flare", [0.5, 0], "number from 0 to 4"),
-    ("pipe", 1.2, "1.5 to 4"),
-    ("forks", [1, 0.5], "1 or more"),
-    ("spurs", [2, 0], "describes no \"spur\""),
+    ("pipe", 4.5, "0 to 4"),
+    ("forks", [1, 1.5], "0 to 8"),
     ("leaf_kind", "fruit", "leaf, blossom"),
     ("leaf_colour_tip", [0.1, 0.2], "[r, g, b]"),
     ("leaf_colour_tip", [0.1, 0.2, 3], "0 to 1"),
@@ -306,7 +305,10 @@ def _mutated(rng: random.Random) -> Any:
         for step in parents:
             place = place[step]
         change: Callable[[], Any] = rng.choice(
-            [lambda p=place, k=last: p.pop(k), lambda p=place, k=last: p.__setitem__(k, copy.deepcopy(rng.choice(JUNK)))]
+            [
+                lambda p=place, k=last: p.pop(k),
+                lambda p=place, k=last: p.__setitem__(k, copy.deepcopy(rng.choice(JUNK))),
+            ]
         )
         change()
         if not data:

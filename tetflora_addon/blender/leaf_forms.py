@@ -14,21 +14,32 @@ from ..plants.leaf_models import LeafModel, leaf_model
 from ..plants.species import LEAF_KINDS, Species
 from .materials import bark_material, leaf_material
 from .meshes import UV_MAP, read_mesh_arrays
+from .plant_kinds import form_of, species_of
 from .properties import leaf_objects
 from .species_edits import species_for
 
 _INDEX = "material_index"
 
 
-def resolved_species(scene: bpy.types.Scene, identifier: str, depsgraph: bpy.types.Depsgraph) -> Species:
-    """A species with polygons in place of the names of objects.
+def resolved_species(scene: bpy.types.Scene, kind_of_plant: str, depsgraph: bpy.types.Depsgraph) -> Species:
+    """A species with polygons and a skeleton in place of the names of objects.
+
+    Parameters
+    ----------
+    kind_of_plant : str
+        See `plant_kinds.kind_of`.
 
     Raises
     ------
     SpeciesError
-        Unknown or broken species, or an object that is missing or not a mesh with faces.
+        Unknown or broken species, an object that is missing or not a mesh with faces, or a form without edges.
     """
+    identifier, form = species_of(kind_of_plant), form_of(kind_of_plant)
     species = species_for(scene, identifier)
+    if form is not None:
+        from .plant_form import read_skeleton
+
+        species = replace(species, form=read_skeleton(form, depsgraph))
     chosen = leaf_objects(scene).get(identifier)
     if chosen is not None:
         species = replace(species, leaf=(_model_of(species, chosen, depsgraph, "leaf"),))
@@ -90,7 +101,7 @@ def materials_of(scene: bpy.types.Scene, species: Species, kind: str, form: int)
         return [bark_material(species.name, species.bark)]
     source = leaf_objects(scene).get(species.identifier) if kind == "leaf" else None
     if source is None:
-        named = getattr(species_for(scene, species.identifier), kind)[form]
+        named = species_for(scene, species.identifier).forms(LEAF_KINDS.index(kind))[form]
         source = bpy.data.objects.get(named) if isinstance(named, str) else None
     own = [slot.material for slot in source.material_slots] if source is not None else []
     return own if any(own) else [leaf_material(species.name if kind == "leaf" else f"{species.name} {kind}")]

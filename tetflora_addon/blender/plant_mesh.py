@@ -23,6 +23,7 @@ from ..plants.species import Species
 from . import job
 from .leaf_forms import materials_of
 from .meshes import write_mesh
+from .plant_kinds import kind_of
 from .transforms import frames_of, world_matrix
 
 #: Polygons that are made at once at most; more would fill the memory of most computers.
@@ -137,8 +138,8 @@ def make_plant_meshes(
     for plant, good in zip(plants, sound, strict=True):
         if not good:
             raise SceneError(f'"{plant.name}": scale 0 or no valid position; give a scale above 0 (Alt S resets it)')
-    floras = {p.tetflora.species: job.compile_for((p.tetflora.species,), scene, depsgraph) for p in plants}
-    seeds = [single_seed(p.tetflora.species, p.tetflora.seed, f) for p, f in zip(plants, frame, strict=True)]
+    floras = {kind_of(p): job.compile_for((kind_of(p),), scene, depsgraph) for p in plants}
+    seeds = [single_seed(kind_of(p), p.tetflora.seed, f) for p, f in zip(plants, frame, strict=True)]
     polygons = sum(expected_polygons(floras[s.identifiers[0]], s) for s in seeds)
     if polygons > MOST_POLYGONS:
         raise SceneError(
@@ -146,7 +147,7 @@ def make_plant_meshes(
         )
     made = []
     for number, (plant, seed) in enumerate(zip(plants, seeds, strict=True)):
-        flora = floras[plant.tetflora.species]
+        flora = floras[kind_of(plant)]
         mesh = plant_mesh(scene, f"{plant.name} mesh", flora.species[0], plant_parts(flora, seed))
         obj = bpy.data.objects.new(mesh.name, mesh)
         for collection in plant.users_collection:

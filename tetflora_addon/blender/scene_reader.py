@@ -15,6 +15,7 @@ from ..errors import SceneError
 from ..plants.hashing import child_key, key_of_seed
 from ..plants.seeds import Seeds
 from ..refinement.camera import Camera
+from .plant_kinds import kind_of, species_of
 from .species_items import catalogue
 from .surfaces import mesh_triangles
 from .transforms import frames_of, world_matrix
@@ -106,13 +107,13 @@ def read_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_lay
             found_any = True
             if group.enabled:
                 names.append(obj.name)
-                identifiers.append(group.species)
+                identifiers.append(kind_of(obj))
                 seeds.append(group.seed)
                 matrices.append(world_matrix(obj, depsgraph))
     if any(o.is_instancer for o in view_layer.objects):
         for obj, seed, matrix in _instances(depsgraph):
             names.append(obj.name)
-            identifiers.append(obj.tetflora.species)
+            identifiers.append(kind_of(obj))
             seeds.append(seed)
             matrices.append(matrix)
     if not names:
@@ -200,10 +201,10 @@ def _instances(depsgraph: bpy.types.Depsgraph) -> Iterator[tuple[bpy.types.Objec
 
 def _check_species(names: list[str], identifiers: list[str]) -> None:
     known = catalogue()
-    bad = [i for i, identifier in enumerate(identifiers) if identifier not in known]
+    bad = [i for i, identifier in enumerate(identifiers) if species_of(identifier) not in known]
     if bad:
-        species = identifiers[bad[0]]
-        same = [names[i] for i in bad if identifiers[i] == species]
+        species = species_of(identifiers[bad[0]])
+        same = [names[i] for i in bad if species_of(identifiers[i]) == species]
         raise SceneError(
             f'{_listed(same)}: unknown species "{species}"; choose another in the sidebar\'s TetFlora tab, or put '
             f"{species or 'its file'}{'.json' if species else ''} into the species folder named in the preferences"

@@ -18,7 +18,7 @@ from ..errors import TetFloraError
 from ..plants.compiled import Flora, compile_species
 from ..plants.seeds import Seeds
 from ..plants.species import Range
-from . import job, species_editor, species_edits
+from . import job, species_edits, species_values
 from .node_tools import is_ours, tag
 from .plant_mesh import expected_polygons, plant_parts, plant_mesh, single_seed
 
@@ -91,7 +91,7 @@ def refresh() -> None:
         return
     begin = time.perf_counter()
     editor = scene.tetflora.species_editor
-    identifier = species_editor.present_species(editor)
+    identifier = species_values.present_species(editor)
     try:
         depsgraph = scene.view_layers[0].depsgraph or bpy.context.evaluated_depsgraph_get()
         seeds = single_seed(identifier, editor.preview_seed)

@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 
 from .crown_shapes import crown_ratio
 from .leaf_models import LeafModel
+from .members import expected_forks
 from .profiles import profile, profile_integral
 from .rows import FORK, LATERAL, SPUR
+from .species import Range
 
 NODES = np.array([0.0, 0.5, 1.0])
 _SHARES = (np.arange(256) + 0.5) / 256
@@ -244,16 +246,11 @@ def _sums(rows: NDArray[np.void], i: int, sort: int) -> _Sums:
 
 def _fork_sums(rows: NDArray[np.void], i: int) -> _Sums:
     row, child = rows[i], rows[rows["next"][i, FORK]]
-    mean, variation = row["count"][FORK]
-    wanted = mean + variation * (2 * _SHARES - 1)
-    below = np.floor(wanted)
-    more = wanted - below  # how likely one more is, see `growth.branch_counts`
-    power = 1 - 1 / row["fork_power"]
-    summed = (1 - more) * np.maximum(below, 1) ** power + more * (below + 1) ** power
+    forks, power = Range(*row["count"][FORK]), 1 - 1 / row["fork_power"]
+    summed, number = expected_forks(forks, power), expected_forks(forks)
     tip = profile(rows, np.array([i]), np.zeros(1, np.uint64), np.ones(1))[0]
     length = float(child["length"][0])
-    wood = float(summed.mean() * tip * length)
-    number = float(mean)
+    wood = float(summed * tip * length)
     return _Sums(
         number, number, wood, wood, number * np.eye(3), length, float(tip * number ** (-1 / row["fork_power"]))
     )

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 MAX_SEGMENTS = 24
 """Straight pieces of a drawn branch at most; more are made even."""
+_FINER = 3  # segments for one that is drawn: even ones must not cut the corners of uneven ones
 MAX_DRAWN = 1000
 """Drawn branches of a plant at most: higher orders are for the computer."""
 
@@ -63,7 +64,7 @@ def drawn_lines(branches: DrawnBranches) -> DrawnLines:
             "leave the thinnest away, the computer grows them"
         )
     points = np.diff(branches.first)
-    segments = np.clip(points - 1, 1, MAX_SEGMENTS)
+    segments = np.clip(_FINER * (points - 1), 1, MAX_SEGMENTS)
     # Fractions of the length at which knots lie, one row a branch; the last one is repeated.
     wanted = np.minimum(np.arange(MAX_SEGMENTS + 1) / segments[:, None], 1.0)
     owner = np.repeat(np.arange(number), points)

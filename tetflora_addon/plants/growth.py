@@ -278,7 +278,8 @@ def branch_counts(rows: NDArray[np.void], branches: Branches, sort: int = LATERA
     wanted = drawn(rows["count"][row, sort], key, _COUNT[sort])
     child = rows["next"][row, sort]
     if sort == FORK:
-        return np.where(child >= 0, np.floor(wanted + uniform(key, _ROUND[sort])), 0).astype(np.int64)
+        number = np.maximum(np.floor(wanted + uniform(key, _ROUND[sort])), 1)  # what divides goes on
+        return np.where(child >= 0, number, 0).astype(np.int64)
     whorl = np.maximum(rows["whorl"][child], 1)
     number = np.floor(wanted * fullness(rows, branches) / whorl + uniform(key, _ROUND[sort])).astype(np.int64) * whorl
     return np.where(child >= 0, number, 0)

@@ -50,7 +50,7 @@ def expected_members(species: Species) -> Members:
     number = full = 1.0  # branches of the order, and the sum of the factors on what they bear
     for i, order in enumerate(species.orders):
         cuts = fork_cuts(order)
-        fold = max(order.forks.mean, 1.0) ** np.arange(len(cuts) - 1)  # stems side by side in each part
+        fold = expected_forks(order.forks) ** np.arange(len(cuts) - 1)  # stems side by side in each part
         branches.append(number)
         stems.append(number * float(fold.sum()))
         segments.append(number * float(fold @ part_segments(order)))
@@ -65,6 +65,14 @@ def expected_members(species: Species) -> Members:
             full = full * order.branches.mean * float((stems_there * follow).mean())
     on_spur = species.spur.leaves.mean if species.spur is not None else 0.0
     return Members(branches, stems, segments, leaves, spurs, spurs * on_spur)
+
+
+def expected_forks(forks: Range, power: float = 1.0) -> float:
+    """Mean of n^power, for the n stems into which a branch divides (`growth.branch_counts`)."""
+    wanted = forks.mean + forks.variation * (2 * _SHARES - 1)
+    below = np.floor(wanted)
+    more = wanted - below  # how likely one more is
+    return float(((1 - more) * np.maximum(below, 1) ** power + more * np.maximum(below + 1, 1) ** power).mean())
 
 
 def part_segments(order: Order) -> np.ndarray:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from .crown_shapes import CROWN_SHAPES, crown_ratio
 from .drawn import MAX_SEGMENTS, DrawnLines, drawn_lines
 from .hashing import signed
+from .skeletons import drawn_branches
 from .species import LEAF_KINDS, Order, Range, Species, fork_cuts
 
 LATERAL, FORK, SPUR = range(3)
@@ -97,8 +98,6 @@ def _rows_of_species(one: Species, number: int, first: int) -> list[np.void]:
         one = without_variation(one)
     drawn = None
     if one.form is not None:
-        from .skeletons import drawn_branches
-
         drawn = drawn_lines(drawn_branches(one.form))
     cuts = [fork_cuts(order) for order in one.orders]
     ahead = 0 if drawn is None else 1 + len(drawn.order)
@@ -176,7 +175,9 @@ def _row(order: Order, species: int, number: int) -> np.void:
     row["count"] = order.branches, (0, 0), order.spurs
     row["start"] = order.branch_start, (0, 0), order.spur_start
     row["share"], row["part"], row["nominal"] = (0, 1), (0, 1), 1
-    row["fork_power"] = order.pipe or _FORK_POWER
+    if order.pipe > 0:
+        row["pipe"] = max(order.pipe, 1.0)
+    row["fork_power"] = row["pipe"] or _FORK_POWER
     row["rings"] = _flare_rings(row)
     return row
 
@@ -231,8 +232,9 @@ def _radius(order: Order, u: float) -> float:
     if order.pipe <= 0:
         return 1 - (1 - order.taper.mean) * u
     share = float(np.clip((u - order.branch_start.mean) / (1 - order.branch_start.mean), 0, 1))
-    tip = order.taper.mean**order.pipe
-    return (tip + (1 - tip) * (1 - share)) ** (1 / order.pipe)
+    power = max(order.pipe, 1.0)
+    tip = order.taper.mean**power
+    return (tip + (1 - tip) * (1 - share)) ** (1 / power)
 
 
 def _flare_rings(row: np.void) -> int:

@@ -65,8 +65,8 @@ ORDER_KEYS: dict[str, Key] = {
         4,
         0.0,
         "",
-        "exponent of the pipe model by which radii are shared out among the children, 1.5 to 4 (2: Leonardo's rule); "
-        "0: each child's thickness is a share of its parent's at that place",
+        "exponent of the pipe model by which radii are shared out among the children (2: Leonardo's rule; less than 1 "
+        "counts as 1); 0: each child's thickness is a share of its parent's at that place",
     ),
     "segments": Key("integer", 1, 32, 1, "", "straight pieces along a branch"),
     "sides": Key("integer", 3, 64, 4, "", "faces around a branch"),
@@ -93,7 +93,7 @@ ORDER_KEYS: dict[str, Key] = {
         "",
         "how far branches and leaves are fewer on shorter branches: 0 not at all, 1 in proportion",
     ),
-    "forks": Key("range", 0, 8, [0, 0], "", "stems into which the branch divides, 1 or more; 0: it does not"),
+    "forks": Key("range", 0, 8, [0, 0], "", "stems into which the branch divides, at least one; 0: it does not"),
     "fork_at": Key("number", 0.05, 0.95, 0.5, "of the length", "where it divides first"),
     "fork_angle": Key("range", 0, 120, [25, 8], "degrees", "by which each of the stems turns away"),
     "fork_levels": Key("integer", 1, 4, 1, "", "times that it divides, evenly from there to the tip"),
@@ -123,6 +123,8 @@ SPECIES_KEYS = (
 )  # fmt: skip
 MAX_FORMS = 8
 QUALITY_LIMITS = (0.001, 1000.0)
+#: The short shoot of a species that asks for some and describes none.
+DEFAULT_SPUR = {"length": [0.05, 0.02], "thickness": [0.03, 0.005], "angle": [50, 15], "leaves": [4, 1]}
 #: Defaults that another key of the same order gives.
 FOLLOWS = {"curvature_tip": "curvature", "angle_tip": "angle", "leaf_colour_tip": "leaf_colour"}
 #: What a key of a kind may be, where that is one of a few names.
@@ -234,10 +236,6 @@ def _read_order(reader: _Reader, data: Any, where: str, first: bool, last: bool)
             values[name] = reader.choice(value, path, CHOICES[key.kind])
     if last and values["branches"].high > 0:
         raise reader.fail(f"{where}.branches", "must be [0, 0]: no order follows that could describe these branches")
-    if values["forks"].high > 0 and values["forks"].low < 1:
-        raise reader.fail(f"{where}.forks", "must be 1 or more, with its variation: a branch that divides goes on")
-    if 0 < values["pipe"] < 1.5:
-        raise reader.fail(f"{where}.pipe", f"must be 0 or from 1.5 to 4, is {values['pipe']:g}")
     return Order(**values)
 
 
@@ -322,7 +320,12 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
         found = len(orders) if isinstance(orders, list) else _shown(orders)
         raise reader.fail("orders", f"must be a list of 1 to {MAX_ORDERS} orders, has {found}")
     read = tuple(_read_order(reader, o, f"orders[{i}]", i == 0, i == len(orders) - 1) for i, o in enumerate(orders))
-    spur = _read_order(reader, data["spur"], "spur", True, True) if "spur" in data else None
+    spur = None
+    if "spur" in data or any(order.spurs.high > 0 for order in read):
+        spur = _read_order(reader, data.get("spur", DEFAULT_SPUR), "spur", True, True)
+        for key in ("spurs", "forks"):
+            if getattr(spur, key).high > 0:
+                raise reader.fail(f"spur.{key}", "must be [0, 0]: a short shoot bears nothing but leaves")
     species = Species(
         identifier=identifier,
         name=reader.text(data["name"], "name"),
@@ -337,7 +340,6 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
         quality=reader.number(data.get("quality", 1.0), "quality", *QUALITY_LIMITS),
         exact=reader.truth(data.get("exact", False), "exact"),
     )
-    _check_references(reader, species)
     polygons = expected_polygons(species) * species.quality
     if polygons > MAX_POLYGONS:
         raise reader.fail(
@@ -345,21 +347,6 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
             f"one plant would have {polygons:.3g} polygons, at most {MAX_POLYGONS:.0g} are allowed",
         )
     return species
-
-
-def _check_references(reader: _Reader, species: Species) -> None:
-    """What orders name has to be described."""
-    named = [(f"orders[{i}]", order) for i, order in enumerate(species.orders)]
-    if species.spur is not None:
-        named.append(("spur", species.spur))
-        for key in ("spurs", "forks"):
-            if getattr(species.spur, key).high > 0:
-                raise reader.fail(f"spur.{key}", "must be [0, 0]: a short shoot bears nothing but leaves")
-    for where, order in named:
-        if order.spurs.high > 0 and species.spur is None:
-            raise reader.fail(f"{where}.spurs", 'asks for short shoots, but the species describes no "spur"')
-        if order.leaf_kind == "blossom" and order.leaves.high > 0 and not species.blossom:
-            raise reader.fail(f"{where}.leaf_kind", 'asks for blossoms, but the species describes no "blossom"')
 
 
 def read_species(path: Path) -> Species:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 MAX_ORDERS = 6
 LEAF_KINDS = ("leaf", "blossom")
-BARKS = ("ridged", "plated", "smooth", "banded", "ringed", "fibrous")
+BARKS = ("ridged", "plated", "smooth", "banded", "ringed", "fibrous", "jointed")
 """Characters of bark that materials know."""
 
 
@@ -176,8 +176,8 @@ class Species:
     orders : tuple of Order
         From the trunk up; at most `MAX_ORDERS`.
     leaf, blossom : tuple of LeafModel or str
-        Forms of the sample leaf, and of blossoms or fruit; each leaf has one of them by chance. A string is the name of
-        a Blender mesh object, which the bridge to Blender replaces by a model.
+        Forms of the sample leaf, and of blossoms or fruit, where there are any; each leaf has one of them by chance. A
+        string is the name of a Blender mesh object, which the bridge to Blender replaces by a model.
     leaf_transmission, blossom_transmission : float
         Share of the light scattered by a leaf or blossom that goes through it, 0 to 1.
     spur : Order or None
@@ -207,8 +207,8 @@ class Species:
     form: Skeleton | None = None
 
     def forms(self, kind: int) -> tuple[LeafModel | str, ...]:
-        """Forms of leaves of a kind, by its index in `LEAF_KINDS`."""
-        return (self.leaf, self.blossom)[kind]
+        """Forms of leaves of a kind, by its index in `LEAF_KINDS`; leaves where there are no blossoms."""
+        return self.blossom or self.leaf if kind else self.leaf
 
 
 def fork_cuts(order: Order) -> list[float]:
