@@ -182,11 +182,45 @@ def _kite(half_width: float, fold: float, droop: float) -> LeafModel:
     return leaf_model(corners, [[0, 1, 2, 3]])
 
 
+def _outlined(half: list[tuple[float, float]], fold: float, droop: float) -> LeafModel:
+    """Two polygons that meet at the midrib and rise from it, of a leaf whose right half has the outline given.
+
+    The outline leads from behind the base to before the tip; ``fold`` is the rise and ``droop`` the fall over one unit.
+    """
+    right = [(x, y, fold * x - droop * y * y) for x, y in half]
+    left = [(-x, y, z) for x, y, z in reversed(right)]
+    ends = [(0.0, 0.0, 0.0), (0.0, 1.0, -droop)]
+    n = len(half)
+    faces = [[0, *range(2, n + 2), 1], [0, 1, *range(n + 2, 2 * n + 2)]]
+    return leaf_model([*ends, *right, *left], faces)
+
+
+def _flower(petals: int, half_width: float, cup: float) -> LeafModel:
+    """Quads around a point half a unit along: an open flower that looks up, its petals raised at their tips."""
+    centre = np.array([0.0, 0.5, 0.0])
+    turn = 2 * np.pi * (np.arange(petals) + 0.5) / petals - np.pi / 2
+    along = np.stack([np.cos(turn), np.sin(turn), np.zeros(petals)], axis=1)
+    across = np.stack([-along[:, 1], along[:, 0], along[:, 2]], axis=1)
+    rise = np.array([0.0, 0.0, cup])
+    right, left = (centre + 0.36 * along + side * across + 0.9 * rise for side in (-half_width, half_width))
+    corners = np.stack([right, centre + 0.52 * along + 0.7 * rise, left], axis=1)
+    faces = [[0, 3 * i + 1, 3 * i + 2, 3 * i + 3] for i in range(petals)]
+    return leaf_model(np.concatenate([centre[None], corners.reshape(-1, 3)]), faces)
+
+
+_LOBED = [(0.17, 0.2), (0.1, 0.34), (0.28, 0.5), (0.16, 0.62), (0.28, 0.8), (0.14, 0.96)]
+_MAPLE = [(0.2, -0.05), (0.4, 0.12), (0.29, 0.22), (0.56, 0.56), (0.24, 0.5), (0.2, 0.74)]
+_DELTOID = [(0.3, 0.1), (0.37, 0.3), (0.19, 0.66)]
+
 LEAF_MODELS: dict[str, LeafModel] = {
     "kite": _kite(0.32, 0.05, 0.05),
     "ovate": _folded(0.30, 0.08, 0.10),
     "round": _folded(0.42, 0.05, 0.06),
     "lanceolate": _folded(0.13, 0.03, 0.12),
     "needles": _spray(4, 0.035),
+    "lobed": _outlined(_LOBED, 0.16, 0.08),
+    "maple": _outlined(_MAPLE, 0.14, 0.1),
+    "deltoid": _outlined(_DELTOID, 0.14, 0.08),
+    "blossom": _flower(5, 0.24, 0.12),
 }
 """The built-in polygon lists by name."""
