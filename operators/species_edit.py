@@ -8,7 +8,6 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..tetflora_addon.blender.plant_objects import assign_species
-from ..tetflora_addon.blender.species_values import orders_of, present_species
 from ..tetflora_addon.blender.species_edits import (
     change_species,
     find_edit,
@@ -18,6 +17,7 @@ from ..tetflora_addon.blender.species_edits import (
     store_species,
 )
 from ..tetflora_addon.blender.species_items import catalogue
+from ..tetflora_addon.blender.species_values import orders_of, present_species
 from ..tetflora_addon.plants.schema import DEFAULT_SPUR
 from ..tetflora_addon.plants.species import MAX_ORDERS
 from . import ids

@@ -8,8 +8,8 @@ import bpy
 
 from ..operators import ids
 from ..tetflora_addon.blender import species_preview
-from ..tetflora_addon.blender.species_edits import find_edit, problem_of
 from ..tetflora_addon.blender.species_editor import VARIATION, order_keys
+from ..tetflora_addon.blender.species_edits import find_edit, problem_of
 from ..tetflora_addon.blender.species_files import own_file
 from ..tetflora_addon.blender.species_values import orders_of, present_order, present_species
 from ..tetflora_addon.blender.species_whole import NO_LEAF, OBJECT_LEAF

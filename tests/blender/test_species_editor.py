@@ -105,7 +105,7 @@ def test_every_slider_changes_its_own_value_and_no_other():
         elif key.kind == "integer":
             meant = int(key.low) + 1
             setattr(editor, name, meant)
-        elif key.kind == "colour":
+        elif key.kind in {"colour", "rgb"}:
             meant = (0.5, 0.25, 0.125)
             setattr(editor, name, meant)
         else:

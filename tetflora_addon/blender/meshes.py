@@ -155,7 +155,7 @@ def read_mesh_arrays(mesh: bpy.types.Mesh) -> MeshBuffers:
     Returns
     -------
     MeshBuffers
-        Arrays of the caller's own; ``attributes`` may have ``UVMap`` and ``material_index``; ``smooth`` if any face is smooth.
+        Arrays of the caller's own; ``attributes`` may have ``UVMap`` and ``material_index``; ``smooth`` if any face is.
     """
     positions = np.zeros((len(mesh.vertices), 3), dtype=np.float32)
     edges = np.zeros((len(mesh.edges), 2), dtype=np.int32)

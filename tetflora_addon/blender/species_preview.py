@@ -20,7 +20,7 @@ from ..plants.seeds import Seeds
 from ..plants.species import Range
 from . import job, species_edits, species_values
 from .node_tools import is_ours, tag
-from .plant_mesh import expected_polygons, plant_parts, plant_mesh, single_seed
+from .plant_mesh import expected_polygons, plant_mesh, plant_parts, single_seed
 
 NAME = "TetFlora preview"
 #: Polygons that a preview has at most, about: what is rebuilt while a slider moves.

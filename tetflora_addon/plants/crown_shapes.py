@@ -35,8 +35,8 @@ def crown_ratio(shape: NDArray[np.integer], r: NDArray[np.float64]) -> NDArray[n
     -----
     Weber and Penn 1995, table of ShapeRatio. "Receding" is their rule for the branches of branches (section 4.3):
     parent's length less 0.6 of the way to the child. Their number of leaves and of further branches, less by half
-    towards the tip, is what ``count_by_length`` 5/6 makes of it. The lower end of the two flames is raised from 0 to 0.05, so that no
-    branch has zero length.
+    towards the tip, is what ``count_by_length`` 5/6 makes of it. The lower end of the two flames is raised from 0 to
+    0.05, so that no branch has zero length.
     """
     r = np.clip(r, 0.0, 1.0)
     return np.choose(
