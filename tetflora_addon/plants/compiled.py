@@ -21,7 +21,7 @@ from .bounds import leaf_reaches, unit_bounds
 from .growth import Branches, fullness
 from .leaf_models import LeafModel
 from .quality import with_quality
-from .rows import build_rows
+from .rows import LATERAL, build_rows
 from .samples import Samples, draw_samples
 from .species import LEAF_KINDS, Species
 
@@ -158,7 +158,7 @@ def _compiled(species: tuple[Species, ...]) -> Flora:
     forms = tuple(tuple(one.forms(kind) for kind in range(len(LEAF_KINDS))) for one in species)
     leaf = row_leaves(rows, forms, np.array([[one.leaf_transmission, one.blossom_transmission] for one in species]))
     amounts = average(rows, leaf)
-    bound = unit_bounds(rows)
+    bound = _with_drawn(rows, unit_bounds(rows))
     leaves, area = amounts.leaves, amounts.leaf_area[:, 1]
     wood = _wood_shares(amounts)
     leaf_count, leaf_area = leaves.sum(axis=1), area.sum(axis=1)
@@ -188,6 +188,20 @@ def _compiled(species: tuple[Species, ...]) -> Flora:
         area_nodes=amounts.leaf_area.sum(axis=2),
         colour_nodes=amounts.leaf_colour,
     )
+
+
+def _with_drawn(rows: NDArray[np.void], bound: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Bounds in which plants drawn by hand have theirs: the drawing, and what grows on it in any direction."""
+    bound = bound.copy()
+    for i in np.flatnonzero(rows["phantom"]):
+        own = rows[slice(*rows["drawn_rows"][i])]
+        child = own["next"][:, LATERAL]
+        farthest = np.hypot(bound[child, 0], np.maximum(bound[child, 2], -bound[child, 1]))
+        reach = np.where(child >= 0, own["size"][:, 0] * rows["length"][child].sum(axis=1) * farthest, 0.0)
+        across, height = np.hypot(own["knots"][..., 0], own["knots"][..., 1]), own["knots"][..., 2]
+        low, high = (height - reach[:, None]).min(), (height + reach[:, None]).max()
+        bound[i] = np.array([(across + reach[:, None]).max(), min(low, 0.0), max(high, 0.0)]) / rows["length"][i, 0]
+    return bound
 
 
 def _wood_shares(amounts: Averages) -> NDArray[np.float64]:
