@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 import pytest
@@ -102,7 +103,7 @@ def test_everything_is_inside_the_bound(drawn: int) -> None:
     for i in range(20):
         pieces = expand(one, trunk.take(np.array([i])))
         axis = trunk.frame[i, :, 2]
-        for mesh in sum(support.meshes(one, pieces), []):
+        for mesh in chain(*support.meshes(one, pieces)):
             way = mesh.positions - centre[i]
             along = way @ axis
             assert np.abs(along).max() <= half[i] * (1 + 1e-5)
@@ -144,8 +145,8 @@ def test_lines_are_even_and_their_frames_are_rotations() -> None:
 def test_too_many_drawn_branches_are_refused() -> None:
     n = MAX_DRAWN + 1
     points = np.array([[0, 0, 0], *([0, 0, i / n] for i in range(1, n + 1)), *([1, i, i / n] for i in range(1, n + 1))])
-    chain = np.stack([np.arange(n), np.arange(1, n + 1)], axis=1)
+    line = np.stack([np.arange(n), np.arange(1, n + 1)], axis=1)
     sides = np.stack([np.arange(1, n + 1), np.arange(n + 1, 2 * n + 1)], axis=1)
     radius = np.concatenate([np.linspace(1, 0.5, n + 1), np.full(n, 0.1)])
     with pytest.raises(SpeciesError, match="1,000"):
-        drawn_lines(drawn_branches(skeleton_from_edges(points, radius, np.concatenate([chain, sides]), "a brush")))
+        drawn_lines(drawn_branches(skeleton_from_edges(points, radius, np.concatenate([line, sides]), "a brush")))

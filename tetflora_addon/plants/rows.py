@@ -66,8 +66,8 @@ leads from the inside of the crown to the outside; ``worldly`` sub-plants whose 
 sky; ``gradient`` leaves that differ between inside and outside; ``exact`` plants that are all the same.
 
 A plant whose form is drawn by hand begins with a ``phantom`` row: a branch without wood, whose children are the
-``drawn`` rows from the first to before the last of ``drawn_rows``. Each of these is one branch with ``knots`` (metres in
-the plant's space, evenly spaced), ``radii`` over that of the base, ``frames`` along it, and its ``size``: length,
+``drawn`` rows from the first to before the last of ``drawn_rows``. Each of these is one branch with ``knots`` (metres,
+in the plant's space, evenly spaced), ``radii`` over that of the base, ``frames`` along it, and its ``size``: length,
 radius, vigour and place between inside and outside.
 """
 
