@@ -20,10 +20,12 @@ from . import (
     species_edit,
     species_files,
     species_preview,
+    use_as_form,
 )
 
 CLASSES = (
     add_plant.TETFLORA_OT_add_plant,
+    use_as_form.TETFLORA_OT_use_as_form,
     populate.TETFLORA_OT_populate,
     assign_species.TETFLORA_OT_assign_species,
     reseed.TETFLORA_OT_reseed,

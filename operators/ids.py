@@ -4,6 +4,7 @@
 
 ADD_PLANT = "tetflora.add_plant"
 POPULATE = "tetflora.populate"
+USE_AS_FORM = "tetflora.use_as_form"
 ASSIGN_SPECIES = "tetflora.assign_species"
 RESEED = "tetflora.reseed"
 SELECT_SPECIES = "tetflora.select_species"

@@ -17,6 +17,7 @@ class TETFLORA_MT_object(bpy.types.Menu):
         layout = self.layout
         layout.operator(ids.POPULATE, text="Populate with Plants", icon='OUTLINER_OB_POINTCLOUD')
         layout.operator(ids.MARK_OCCLUDER, text="Mark or Unmark as Hiding Plants", icon='MOD_MASK')
+        layout.operator(ids.USE_AS_FORM, icon='CURVE_DATA')
         layout.separator()
         layout.menu(TETFLORA_MT_species.__name__, text="Change Species", icon='OUTLINER_OB_EMPTY')
         layout.operator(ids.RESEED, icon='FILE_REFRESH')

@@ -5,6 +5,7 @@
 import bpy
 
 from ..operators import ids
+from ..tetflora_addon.blender.plant_form import FORM_TYPES
 from ..tetflora_addon.blender.species_items import catalogue
 from .base import SidebarPanel, picture, split_layout
 
@@ -37,9 +38,12 @@ class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
                 column.label(text=f'The catalogue has no "{plant.species}"', icon='ERROR')
             column.prop(plant, "seed")
             column.prop(plant, "enabled")
+            column.prop(plant, "form")
         else:
             column.label(text="The active object is not a plant", icon='INFO')
         layout.menu("TETFLORA_MT_add_plant", text="Add Plant", icon='ADD')
+        if context.active_object is not None and context.active_object.type in FORM_TYPES:
+            layout.operator(ids.USE_AS_FORM, icon='CURVE_DATA')
 
 
 class TETFLORA_PT_selected_plants(SidebarPanel, bpy.types.Panel):

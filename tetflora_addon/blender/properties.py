@@ -17,6 +17,7 @@ from bpy.props import (
 )
 
 from ..refinement.settings import RefinementSettings
+from .plant_form import FORM_TYPES
 from .species_choice import SpeciesChoice
 from .species_editor import TetFloraSpeciesEditor
 from .species_edits import TetFloraSpeciesEdit
@@ -41,6 +42,15 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
         name="Enabled",
         description="The plant takes part in refinement and rendering",
         default=True,
+    )
+    form: PointerProperty(
+        name="Form",
+        description=(
+            "Curve, hair curves, or mesh of edges that draws this plant's trunk, and limbs if wanted; the species "
+            "grows the rest on them. Without one, the species grows the whole plant"
+        ),
+        type=bpy.types.Object,
+        poll=lambda _group, candidate: candidate.type in FORM_TYPES,
     )
     is_occluder: BoolProperty(
         name="Hides Plants",

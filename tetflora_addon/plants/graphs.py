@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Graphs and forests as arrays: connected parts, trees from the root outwards, sums along the way.
+"""Graphs and forests as arrays: points that coincide, connected parts, trees from the root outwards, sums along it.
 
 A forest is an array ``parent`` of indices, -1 for roots. Loops run over the depth of a forest or its logarithm.
 """
@@ -75,3 +75,22 @@ def longest_way(parent: NDArray[np.int64], step: NDArray[np.float64]) -> NDArray
     for now in levels(parent):
         np.maximum.at(longest, parent[now], longest[now] + step[now])
     return longest
+
+
+def coinciding(points: NDArray[np.float64], within: float) -> NDArray[np.int64]:
+    """(n,) the first of the points that lie together, directly or by way of others, of each point.
+
+    Two points closer than ``within`` share a cell of twice that side in one of eight grids, shifted by half a cell.
+    """
+    n = len(points)
+    if within == 0:
+        return np.zeros(n, np.int64)
+    steps = (points - points.min(axis=0)) / (2 * within)
+    ends = [np.zeros((2, 0), np.int64)]
+    for shift in np.ndindex(2, 2, 2):
+        cell = np.floor(steps + 0.5 * np.array(shift)).astype(np.int64)
+        cell = cell @ (1, 1 << 21, 1 << 42)  # a side has half a million cells
+        order = np.argsort(cell, kind="stable")
+        same = np.diff(cell[order]) == 0
+        ends.append(np.stack([order[:-1][same], order[1:][same]]))
+    return connected(n, *np.concatenate(ends, axis=1))

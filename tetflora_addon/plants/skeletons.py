@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Skeletons that an artist draws: edges with radii in, branches of several orders out.
 
-A skeleton is a forest of points, each of which knows the one before it. At every fork the thickest child continues the
-branch and the others are branches of the next order, as botanists count them from the trunk (Gravelius's order of
-streams, turned upside down). What is not drawn grows from the species.
+A skeleton is a forest of points, each of which knows the one before it. At every fork one child, as a rule the
+thickest, continues the branch, and the others are branches of the next order: the main axis first, as Gravelius (1914)
+counts streams. What is not drawn grows from the species.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SpeciesError
-from .graphs import breadth_first, connected, levels, longest_way, summed_from_root, top
+from .graphs import breadth_first, coinciding, connected, levels, longest_way, summed_from_root, top
 from .species import MAX_ORDERS
 
 MAX_POINTS = 200_000
@@ -39,6 +39,8 @@ class Skeleton:
         Metres.
     parent : (p,) int32
         The point before, towards the root; -1 for roots. Parents stand before their children.
+    line : (p,) int32, optional
+        Which stroke of the artist's led to the point from the one before; all 0 where nobody knows.
 
     Raises
     ------
@@ -49,22 +51,25 @@ class Skeleton:
     points: NDArray[np.float64]
     radius: NDArray[np.float64]
     parent: NDArray[np.int32]
+    line: NDArray[np.int32] | None = None
 
     def __post_init__(self) -> None:
-        for name, dtype in (("points", np.float64), ("radius", np.float64), ("parent", np.int32)):
+        if self.line is None:
+            object.__setattr__(self, "line", np.zeros(len(self.parent), np.int32))
+        for name, dtype in (("points", np.float64), ("radius", np.float64), ("parent", np.int32), ("line", np.int32)):
             array = np.array(getattr(self, name), dtype=dtype, order="C")
             array.flags.writeable = False
             object.__setattr__(self, name, array)
         n = len(self.points)
-        if self.points.shape != (n, 3) or self.radius.shape != (n,) or self.parent.shape != (n,):
-            raise ValueError("a skeleton needs (p, 3) points, (p,) radii and (p,) parents")
+        if self.points.shape != (n, 3) or {self.radius.shape, self.parent.shape, self.line.shape} != {(n,)}:
+            raise ValueError("a skeleton needs (p, 3) points, (p,) radii, (p,) parents and (p,) lines")
         if not ((self.parent >= -1) & (self.parent < np.arange(n))).all():
             raise ValueError("a skeleton's parents must stand before their children; -1 is none")
 
     @cached_property
     def content(self) -> bytes:
         """Bytes that are equal for equal skeletons; what caches are keyed by."""
-        return b"".join(a.tobytes() for a in (self.points, self.radius, self.parent))
+        return b"".join(a.tobytes() for a in (self.points, self.radius, self.parent, self.line))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Skeleton) and self.content == other.content
@@ -121,7 +126,9 @@ class DrawnBranches:
         return _arc(self.knots, self.first)
 
 
-def skeleton_from_edges(points: ArrayLike, radius: ArrayLike | None, edges: ArrayLike, source: str) -> Skeleton:
+def skeleton_from_edges(
+    points: ArrayLike, radius: ArrayLike | None, edges: ArrayLike, source: str, line: ArrayLike | None = None
+) -> Skeleton:
     """A graph of edges made a forest.
 
     Parameters
@@ -134,6 +141,8 @@ def skeleton_from_edges(points: ArrayLike, radius: ArrayLike | None, edges: Arra
         Ends of each edge, in any order and direction.
     source : str
         Name of the thing that they are from, for messages.
+    line : (e,) int, optional
+        Which stroke of the artist's, such as a spline, each edge belongs to; branches go on along it.
 
     Returns
     -------
@@ -173,9 +182,10 @@ def skeleton_from_edges(points: ArrayLike, radius: ArrayLike | None, edges: Arra
             "simplify the mesh until only the centre lines of branches are left"
         )
     size = float(np.ptp(points, axis=0).max())
-    merged = _coinciding(points, size * MERGED_WITHIN)
+    merged = coinciding(points, size * MERGED_WITHIN)
     pairs = np.sort(merged[edges], axis=1)
-    pairs = np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0)
+    stays = np.flatnonzero(pairs[:, 0] != pairs[:, 1])
+    pairs, first = np.unique(pairs[stays], axis=0, return_index=True)
     if not len(pairs):
         raise SpeciesError(refused + "its edges have no length; draw a curve, or a mesh whose edges are the branches")
     thickest = np.zeros(len(points))
@@ -184,14 +194,20 @@ def skeleton_from_edges(points: ArrayLike, radius: ArrayLike | None, edges: Arra
     points, thickest = points[order], thickest[order]
     if not thickest.any():
         thickest = _pipe_radii(points, parent)
-    return Skeleton(points, thickest, parent)
+    strokes = np.zeros(len(points), np.int32)
+    if line is not None:
+        ends = np.sort(np.stack([order, np.where(parent < 0, order, order[parent])], axis=1), axis=1)
+        found = np.searchsorted(pairs @ (len(merged), 1), ends @ (len(merged), 1))[parent >= 0]
+        strokes[parent >= 0] = np.asarray(line)[stays[first[found]]]
+    return Skeleton(points, thickest, parent, strokes)
 
 
 def drawn_branches(skeleton: Skeleton) -> DrawnBranches:
     """Split a skeleton into branches.
 
-    At each fork the child with the largest radius goes on; of equals, the one with the longest way to a tip. A side
-    branch takes its radius at the fork from its own points, as far as these let it be told, not from its parent.
+    At each fork the child on the same line goes on; of equals, the one with the largest radius; of these, the one with
+    the longest way to a tip. A side branch takes its radius at the fork from its own points, as far as these let it be
+    told, not from its parent.
     """
     points, radius, parent = skeleton.points, skeleton.radius, skeleton.parent.astype(np.int64)
     n = len(points)
@@ -200,7 +216,8 @@ def drawn_branches(skeleton: Skeleton) -> DrawnBranches:
     step = np.linalg.norm(points - points[before], axis=1)
     far = longest_way(parent, step) + step
     thick, far = (np.rint(v / max(_SAME * float(v.max(initial=0.0)), 1e-300)) for v in (radius, far))
-    children = np.lexsort((index, -far, -thick, parent))[int(rooted.sum()) :]
+    leaves_line = skeleton.line != skeleton.line[before]
+    children = np.lexsort((index, -far, -thick, leaves_line, parent))[int(rooted.sum()) :]
     leads = np.zeros(n, dtype=bool)
     leads[children[np.diff(parent[children], prepend=-1) != 0]] = True  # the first child of each point continues it
     bears = np.bincount(parent[~rooted], minlength=n) > 0
@@ -278,25 +295,6 @@ def resampled(branches: DrawnBranches, most: int = 32) -> DrawnBranches:
     at = np.where(parent >= 0, np.minimum(place / np.maximum(length[parent], 1e-300), 1.0), 0.0)
     outward = _outward(generation, parent, at)
     return DrawnBranches(new_first, knots, branches.radius[kept], branches.order, branches.parent, at, length, outward)
-
-
-def _coinciding(points: NDArray[np.float64], within: float) -> NDArray[np.int64]:
-    """(n,) the first of the points that lie together, directly or by way of others, of each point.
-
-    Two points closer than ``within`` share a cell of twice that side in one of eight grids, shifted by half a cell.
-    """
-    n = len(points)
-    if within == 0:
-        return np.zeros(n, np.int64)
-    steps = (points - points.min(axis=0)) / (2 * within)
-    ends = [np.zeros((2, 0), np.int64)]
-    for shift in np.ndindex(2, 2, 2):
-        cell = np.floor(steps + 0.5 * np.array(shift)).astype(np.int64)
-        cell = cell @ (1, 1 << 21, 1 << 42)  # a side has half a million cells
-        order = np.argsort(cell, kind="stable")
-        same = np.diff(cell[order]) == 0
-        ends.append(np.stack([order[:-1][same], order[1:][same]]))
-    return connected(n, *np.concatenate(ends, axis=1))
 
 
 def _roots(points: NDArray[np.float64], pairs: NDArray[np.int64], size: float) -> NDArray[np.int64]:

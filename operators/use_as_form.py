@@ -1,0 +1,68 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Make a curve or skeleton that the artist drew the form of plants."""
+
+import bpy
+import numpy as np
+
+from ..tetflora_addon.blender.placement import Placement, new_seeds
+from ..tetflora_addon.blender.plant_form import FORM_TYPES, read_skeleton, upright_turn
+from ..tetflora_addon.blender.plant_objects import add_plants, plants_of
+from ..tetflora_addon.blender.species_items import catalogue, default_species
+from ..tetflora_addon.blender.species_values import present_species
+from ..tetflora_addon.blender.transforms import world_matrix
+from . import ids
+from .base import Reporting, counted, in_object_mode, select_only, selected_plants
+
+
+class TETFLORA_OT_use_as_form(Reporting, bpy.types.Operator):
+    """Make the active curve or mesh of edges the form of the selected plants, or of a new one in its place."""
+
+    bl_idname = ids.USE_AS_FORM
+    bl_label = "Make Plant from Form"
+    bl_description = (
+        "The active curve, hair curves or mesh of edges becomes trunk and limbs of the selected plants, or, where none "
+        "is selected, of a new plant in its place; the species grows the rest. The form itself is no longer rendered"
+    )
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not in_object_mode(cls, context):
+            return False
+        if context.active_object is not None and context.active_object.type in FORM_TYPES:
+            return True
+        cls.poll_message_set("Make a curve, hair curves or a mesh of edges active: click on it last")
+        return False
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        form, depsgraph = context.active_object, context.evaluated_depsgraph_get()
+        skeleton = read_skeleton(form, depsgraph)  # refuses what cannot be one before anything changes
+        plants = selected_plants(context)
+        if not plants:
+            plants = add_plants(context.scene, _in_place_of(form, context.scene, depsgraph), [_species(context.scene)])
+        for plant in plants:
+            plant.tetflora.form = form
+        form.hide_render = True
+        select_only(context, plants)
+        made = f"{counted(len(skeleton.points), 'point')} drawn"
+        self.report({'INFO'}, f'"{form.name}" is the form of {counted(len(plants), "plant")}: {made}')
+        return {'FINISHED'}
+
+
+def _in_place_of(form: bpy.types.Object, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Placement:
+    matrix = world_matrix(form, depsgraph)
+    return Placement(
+        position=matrix[None, :3, 3],
+        azimuth=np.array([upright_turn(matrix)]),
+        scale=np.ones(1),
+        species=np.zeros(1, np.int32),
+        seed=new_seeds(np.array([len(plants_of(scene.objects))])),
+        wanted=1,
+    )
+
+
+def _species(scene: bpy.types.Scene) -> str:
+    """The species that the editor shows."""
+    present = present_species(scene.tetflora.species_editor)
+    return present if present in catalogue() else default_species()
