@@ -83,16 +83,13 @@ def species_errors(flora: Any, seeds: int) -> tuple[float, float, float, float]:
 
 def foretold(flora: Any, subplants: Any, oriented: bool) -> np.ndarray:
     """Expected sums over sub-plants."""
-    contents, moments = (
-        session.part("tetflora_addon.refinement.contents"),
-        session.part("tetflora_addon.plants.moments"),
-    )
+    contents, orientation = (session.part(f"tetflora_addon.{n}") for n in ("refinement.contents", "plants.orientation"))
     amounts = contents.subplant_amounts(flora, subplants)
     out = np.zeros(_FIELDS)
     out[0], out[1] = amounts.leaf_area.sum(), amounts.wood_area.sum()
     out[2:5] = amounts.leaf_area @ flora.leaf_colours(subplants)
     if oriented:
-        each = moments.leaf_moments(flora.samples, subplants.row, subplants.frame[:, :, 2])
+        each = orientation.leaf_moments(flora.orientation, subplants)
         out[5:] = np.einsum("n,nij->ij", amounts.leaf_area, each).ravel()
     return out
 

@@ -13,8 +13,9 @@ from tests.engine import support
 from tetflora_addon.plants.compiled import Flora
 from tetflora_addon.plants.expansion import chunks, expand, open_subplants
 from tetflora_addon.plants.growth import Branches
+from tetflora_addon.plants.orientation import leaf_moments, wood_moments
 from tetflora_addon.plants.pieces import wood_areas
-from tetflora_addon.plants.samples import Points, leaf_moments, wood_moments
+from tetflora_addon.plants.samples import Points
 from tetflora_addon.refinement.contents import bounding_cylinders, subplant_amounts
 
 _FLOAT32 = 1e-6  # relative rounding of vertices
@@ -174,13 +175,10 @@ def test_orientation_of_whole_plants(species: int) -> None:
     flora = support.flora()
     trunk, pieces = support.grown(flora, support.plants(np.arange(12), species))
     tubes, leaves = support.meshes(flora, pieces)
-    axis = trunk.frame[:, :, 2]
-    expected = leaf_moments(flora.samples, trunk.row, axis).mean(axis=0)
+    expected = leaf_moments(flora.orientation, trunk).mean(axis=0)
     assert np.trace(expected) == pytest.approx(1)
-    np.testing.assert_allclose(support.moment(leaves[0]), expected, atol=0.025)
-    np.testing.assert_allclose(
-        support.moment(tubes[0]), wood_moments(flora.samples, trunk.row, axis).mean(axis=0), atol=0.03
-    )
+    np.testing.assert_allclose(support.moment(leaves[0]), expected, atol=0.02)
+    np.testing.assert_allclose(support.moment(tubes[0]), wood_moments(flora.orientation, trunk).mean(axis=0), atol=0.03)
 
 
 @pytest.mark.parametrize("species", [support.SPECIES.index(name) for name in support.DENSE], ids=support.DENSE)
@@ -194,7 +192,7 @@ def test_orientation_of_subplants_at_any_tilt(species: int) -> None:
         some = boughs.take(group[:40])
         _, leaves = support.meshes(flora, expand(flora, some))
         weight = subplant_amounts(flora, some).leaf_area
-        expected = np.einsum("n,nij->ij", weight, leaf_moments(flora.samples, some.row, some.frame[:, :, 2]))
+        expected = np.einsum("n,nij->ij", weight, leaf_moments(flora.orientation, some))
         np.testing.assert_allclose(support.moment(leaves[0]), expected / weight.sum(), atol=0.05)
 
 
@@ -235,8 +233,8 @@ def test_compiling_does_not_depend_on_neighbours() -> None:
     first = among.first_row[1]
     for name in ("bound", "leaf_count", "area_nodes", "colour_nodes", "full_wood", "polygons", "wood_colour"):
         assert (getattr(alone, name) == getattr(among, name)[first:]).all(), name
-    for name in ("leaf_moment", "own_leaf_moment", "wood_moment"):
-        assert (getattr(alone.samples, name) == getattr(among.samples, name)[first:]).all(), name
+    for name in ("leaves", "own_leaves", "wood"):
+        assert (getattr(alone.orientation, name) == getattr(among.orientation, name)[first:]).all(), name
     for mine, theirs in ((alone.samples.leaves, among.samples.leaves), (alone.samples.wood, among.samples.wood)):
         for name in ("position", "frame", "outward", "light"):
             ours = getattr(mine, name)

@@ -20,7 +20,7 @@ from tetflora_addon.plants.foliage import leaf_keys, leaf_places, outwardness, p
 from tetflora_addon.plants.growth import Branches, axes, branch_counts, children, leaf_counts, radius_at, spread
 from tetflora_addon.plants.members import expected_members, expected_polygons
 from tetflora_addon.plants.meshing import leaf_meshes
-from tetflora_addon.plants.moments import leaf_moments, wood_moments
+from tetflora_addon.plants.orientation import leaf_moments, wood_moments
 from tetflora_addon.plants.pieces import Pieces, clipped, wood_areas
 from tetflora_addon.plants.rows import FORK, LATERAL, SPUR, without_variation
 from tetflora_addon.refinement.contents import piece_amounts, subplant_amounts
@@ -100,13 +100,13 @@ def test_moments_of_what_depends_on_the_sky() -> None:
     for group in np.array_split(np.argsort(boughs.frame[:, 2, 2]), 4):
         some = boughs.take(group[:250])
         tubes, blades = support.meshes(flora, expand(flora, some))
-        amounts, axis = subplant_amounts(flora, some), some.frame[:, :, 2]
+        amounts = subplant_amounts(flora, some)
         weight = amounts.leaf_area
-        expected = np.einsum("n,nij->ij", weight, leaf_moments(flora.samples, some.row, axis)) / weight.sum()
+        expected = np.einsum("n,nij->ij", weight, leaf_moments(flora.orientation, some)) / weight.sum()
         areas = [support.face_areas(m).sum() for m in blades]
         found = sum(a * support.moment(m) for a, m in zip(areas, blades, strict=True)) / sum(areas)
         np.testing.assert_allclose(found, expected, atol=0.04)
-        expected = np.einsum("n,nij->ij", amounts.wood_area, wood_moments(flora.samples, some.row, axis))
+        expected = np.einsum("n,nij->ij", amounts.wood_area, wood_moments(flora.orientation, some))
         np.testing.assert_allclose(support.moment(tubes[0]), expected / amounts.wood_area.sum(), atol=0.05)
 
 

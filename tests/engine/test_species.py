@@ -10,6 +10,7 @@ import math
 import random
 import tracemalloc
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from tetflora_addon.plants.catalogue import list_species, load_species
 from tetflora_addon.plants.compiled import compile_species
 from tetflora_addon.plants.crown_shapes import CROWN_SHAPES, crown_ratio
 from tetflora_addon.plants.leaf_models import LEAF_MODELS, MAX_LEAF_POLYGONS, leaf_model
+from tetflora_addon.plants.orientation import leaf_moments
 from tetflora_addon.plants.schema import MAX_FILE_BYTES, ORDER_KEYS, read_species, species_from_dict
 from tetflora_addon.plants.species import MAX_ORDERS
 
@@ -355,7 +357,9 @@ def test_rare_leaves_and_branches_compile() -> None:
         flora = support.compiled(support.small(**changes))
         assert np.isfinite(flora.samples.leaves.position).all()
         rows = np.flatnonzero(flora.area_nodes[:, 0] > 0)
-        traces = np.trace(flora.samples.leaf_moment[rows][:, :, [[0, 3, 3], [3, 1, 3], [3, 3, 2]]], axis1=2, axis2=3)
+        subplants = support.trunks(flora.rows, support.plants(np.arange(len(rows))))
+        subplants = replace(subplants, row=rows.astype(np.int32))
+        traces = np.trace(leaf_moments(flora.orientation, subplants), axis1=1, axis2=2)
         assert traces == pytest.approx(np.ones_like(traces))
 
 

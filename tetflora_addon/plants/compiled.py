@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 
 from ..errors import SpeciesError
 from .averages import Averages, RowLeaves, average, quadratic, row_leaves
-from .bounds import leaf_reaches, unit_bounds
+from .bounds import leaf_boxes, leaf_reaches, unit_bounds, widest_radii
 from .growth import Branches, fullness
 from .leaf_models import LeafModel
-from .quality import with_quality
-from .rows import LATERAL, build_rows
+from .rows import build_rows
 from .samples import Samples, draw_samples
 from .species import LEAF_KINDS, Species
 
@@ -47,9 +46,11 @@ class Flora:
     bound : (r, 3) float64
         Radius, lowest and highest z of the sub-plant's axes for a branch of length 1, see `bounds.unit_bounds`.
     widest : (r,) float64
-        Greatest radius of the branch in radii of its base, which may flare.
+        Greatest distance of the sub-plant's wood from its axes, in radii of its base, see `bounds.widest_radii`.
     leaf_reach : (r,) float64
         How far leaves and short shoots of the sub-plant stick out beyond its axes at plant scale 1, metres.
+    leaf_box : (r, 2, 3) float64
+        Middle and half of the extent of the leaf that the row's own branch bears, of size 1.
     leaf_width : (r,) float64
         Mean width of its leaves at plant scale 1, metres; 0 without leaves.
     leaf_count : (r,) float64
@@ -82,6 +83,7 @@ class Flora:
     bound: NDArray[np.float64]
     widest: NDArray[np.float64]
     leaf_reach: NDArray[np.float64]
+    leaf_box: NDArray[np.float64]
     leaf_width: NDArray[np.float64]
     leaf_count: NDArray[np.float64]
     fixed_wood: NDArray[np.float64]
@@ -144,7 +146,7 @@ def compile_species(species: Sequence[Species]) -> Flora:
     SpeciesError
         A species whose leaf is still the name of a Blender object (the bridge to Blender has to replace it first).
     """
-    return _compiled(tuple(with_quality(one, one.quality) for one in species))
+    return _compiled(tuple(species))
 
 
 @lru_cache(maxsize=8)
@@ -158,7 +160,7 @@ def _compiled(species: tuple[Species, ...]) -> Flora:
     forms = tuple(tuple(one.forms(kind) for kind in range(len(LEAF_KINDS))) for one in species)
     leaf = row_leaves(rows, forms, np.array([[one.leaf_transmission, one.blossom_transmission] for one in species]))
     amounts = average(rows, leaf)
-    bound = _with_drawn(rows, unit_bounds(rows))
+    bound = unit_bounds(rows)
     leaves, area = amounts.leaves, amounts.leaf_area[:, 1]
     wood = _wood_shares(amounts)
     leaf_count, leaf_area = leaves.sum(axis=1), area.sum(axis=1)
@@ -172,8 +174,9 @@ def _compiled(species: tuple[Species, ...]) -> Flora:
         first_row=np.flatnonzero(np.diff(rows["species"], prepend=-1)),
         leaf=leaf,
         bound=bound,
-        widest=1 + rows["flare"],
+        widest=widest_radii(rows),
         leaf_reach=leaf_reaches(rows, bound, leaf.reach),
+        leaf_box=leaf_boxes(rows, forms),
         leaf_width=leaves @ (size * leaf.width) / np.maximum(leaf_count, 1e-300),
         leaf_count=leaf_count,
         fixed_wood=amounts.fixed_wood.sum(axis=1),
@@ -188,20 +191,6 @@ def _compiled(species: tuple[Species, ...]) -> Flora:
         area_nodes=amounts.leaf_area.sum(axis=2),
         colour_nodes=amounts.leaf_colour,
     )
-
-
-def _with_drawn(rows: NDArray[np.void], bound: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Bounds in which plants drawn by hand have theirs: the drawing, and what grows on it in any direction."""
-    bound = bound.copy()
-    for i in np.flatnonzero(rows["phantom"]):
-        own = rows[slice(*rows["drawn_rows"][i])]
-        child = own["next"][:, LATERAL]
-        farthest = np.hypot(bound[child, 0], np.maximum(bound[child, 2], -bound[child, 1]))
-        reach = np.where(child >= 0, own["size"][:, 0] * rows["length"][child].sum(axis=1) * farthest, 0.0)
-        across, height = np.hypot(own["knots"][..., 0], own["knots"][..., 1]), own["knots"][..., 2]
-        low, high = (height - reach[:, None]).min(), (height + reach[:, None]).max()
-        bound[i] = np.array([(across + reach[:, None]).max(), min(low, 0.0), max(high, 0.0)]) / rows["length"][i, 0]
-    return bound
 
 
 def _wood_shares(amounts: Averages) -> NDArray[np.float64]:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..plants.compiled import Flora
+from ..plants.orientation import leaf_moments, own_leaf_moments, wood_moments
 from ..plants.pieces import piece_leaf_colours
-from ..plants.samples import leaf_moments, wood_moments
 from ..refinement.contents import Contents, piece_amounts, subplant_amounts
 
 #: κ along an axis is ⟨|n·e|⟩, the moment gives ⟨(n·e)²⟩. The power of the second that is the first at 0, ⅓ (all ways:
@@ -66,17 +66,18 @@ def summarise(flora: Flora, contents: Contents, index: NDArray[np.integer], coun
         row = branches.row
         # A sub-plant shows the mean of all that grows on it, a piece only its own bark and leaves.
         if own is None:
-            amounts, axis = subplant_amounts(flora, branches), branches.frame[:, :, 2]
+            amounts = subplant_amounts(flora, branches)
             leaf_colour, wood_colour = flora.leaf_colours(branches), flora.wood_colour[row]
-            wood_moment, transmission = wood_moments(flora.samples, row, axis), flora.transmission[row]
+            leaf_moment = leaf_moments(flora.orientation, branches)
+            wood_moment, transmission = wood_moments(flora.orientation, branches), flora.transmission[row]
         else:
             own = own.take(keep)
             amounts, axis = piece_amounts(flora, own), _directions(own.end - own.start)
             leaf_colour, wood_colour = piece_leaf_colours(flora, own), rows["branch_colour"][row, 0]
+            leaf_moment = own_leaf_moments(flora.orientation, row, axis)
             wood_moment = (np.eye(3) - axis[:, :, None] * axis[:, None, :]) / 2
             transmission = flora.leaf.transmission[row]
         leaf, wood = amounts.leaf_area, amounts.wood_area / 2
-        leaf_moment = leaf_moments(flora.samples, row, axis, own=own is not None)
         moment = leaf[:, None, None] * leaf_moment + wood[:, None, None] * wood_moment
         colour = leaf[:, None] * leaf_colour + wood[:, None] * wood_colour
         values = np.concatenate(
@@ -86,9 +87,15 @@ def summarise(flora: Flora, contents: Contents, index: NDArray[np.integer], coun
             sums[:, k] += np.bincount(to, values[:, k], count)
     area = sums[:, 0]
     mean = sums / np.where(area > 0, area, 1)[:, None]
-    trace = np.einsum("nii->n", mean[:, 5:].reshape(-1, 3, 3))
-    moment = mean[:, 5:].reshape(-1, 3, 3) / np.where(trace > 0, trace, 1)[:, None, None]
-    return Summaries(area, mean[:, 1:4], mean[:, 4], moment)
+    return Summaries(area, mean[:, 1:4], mean[:, 4], _moments(mean[:, 5:].reshape(-1, 3, 3)))
+
+
+def _moments(sums: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Moments of trace 1 (n, 3, 3) of sums of polynomials, whose least eigenvalue may lie a little below 0."""
+    values, vectors = np.linalg.eigh((sums + sums.transpose(0, 2, 1)) / 2)
+    values = np.maximum(values, 0)
+    trace = values.sum(axis=1, keepdims=True)
+    return (vectors * (values / np.where(trace > 0, trace, 1))[:, None]) @ vectors.transpose(0, 2, 1)
 
 
 def _directions(vectors: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,0 +1,309 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How the surfaces of sub-plants are turned on the mean: moments of their normals, by where the sky is.
+
+Leaves that turn to the sky, and boughs that bend to it, do not turn with their branch. So the mean of n nᵀ in the
+branch's own axes is kept as a polynomial of the sky's direction in these axes. It is found from the highest order
+down: that of a sub-plant is the mean over its own leaves and over the sub-plants on it, whose own are known by then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .foliage import leaf_keys, leaf_places, place_leaves, settled
+from .growth import (
+    Axes,
+    Branches,
+    axes,
+    branch_counts,
+    chosen_children,
+    drawn_children,
+    fullness,
+    leaf_counts,
+    radius_at,
+)
+from .hashing import key_of_seed, mix, uniform
+from .leaf_models import LeafModel
+from .rows import FORK, LATERAL, SPUR
+
+_PIECE = 128
+_BRANCHES = 2048  # of each row that are looked at, each with the sky elsewhere
+_LEAVES = 3  # on each of them
+_SORTS = (LATERAL, FORK, SPUR)
+_ALONG, _CHILD = 111, 112  # draws of this module, beyond those of growth
+_UP = np.array([0.0, 0.0, 1.0])
+# Exponents of x, y, z: all polynomials of degree 3 on the sphere are sums of these.
+_EXPONENTS = np.array([(a, b, d - a - b) for d in (2, 3) for a in range(d + 1) for b in range(d + 1 - a)])
+_TERMS = len(_EXPONENTS) + 8
+_UPRIGHT = 1e-3  # squared sine of the tilt at which a branch begins to have sides
+_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+
+@dataclass(frozen=True)
+class Orientation:
+    """Polynomials of moments; arrays by row.
+
+    Attributes
+    ----------
+    leaves, own_leaves, wood : (r, 24, 6) float64
+        Coefficients of xx, yy, zz, xy, xz, yz of the mean of n nᵀ: over all leaves of the sub-plant, over those of its
+        branch itself where that is straight, and over its wood.
+    """
+
+    leaves: NDArray[np.float64]
+    own_leaves: NDArray[np.float64]
+    wood: NDArray[np.float64]
+
+
+def leaf_moments(orientation: Orientation, subplants: Branches) -> NDArray[np.float64]:
+    """Mean of n nᵀ over the leaves of sub-plants, (n, 3, 3) float64 of trace 1 (0 for rows without leaves)."""
+    return _evaluated(orientation.leaves, subplants.row, subplants.frame)
+
+
+def own_leaf_moments(
+    orientation: Orientation, row: NDArray[np.integer], axis: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The same (n, 3, 3) over the leaves that straight pieces of branches bear, given by row (n,) and axis (n, 3)."""
+    return _evaluated(orientation.own_leaves, row, _frames_along(axis))
+
+
+def wood_moments(orientation: Orientation, subplants: Branches) -> NDArray[np.float64]:
+    """Mean of n nᵀ over the branches of sub-plants, (n, 3, 3) float64 of trace 1."""
+    return _evaluated(orientation.wood, subplants.row, subplants.frame)
+
+
+def _evaluated(
+    coefficients: NDArray[np.float64], row: NDArray[np.integer], frame: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Moments (n, 3, 3) in the world, by polynomials (r, 24, 6) of rows (n,), for branches with frames (n, 3, 3)."""
+    basis = _basis(frame[:, 2, :])
+    local = np.zeros((len(row), 6))
+    for r in np.unique(row):
+        chosen = slice(None) if (row == r).all() else np.flatnonzero(row == r)
+        local[chosen] = _product(basis[chosen], coefficients[r])
+    trace = local[:, :3].sum(axis=1, keepdims=True)
+    return _turned(local / np.where(trace > 0, trace, 1), frame)
+
+
+def _basis(sky: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Functions (n, 24) of directions (n, 3): polynomials of degree 3, and the first harmonics of the azimuth."""
+    out = np.empty((_TERMS, len(sky)))
+    powers = [[np.ones(len(sky))] for _ in range(3)]
+    for axis, values in enumerate(np.ascontiguousarray(sky.T)):
+        for _ in range(3):
+            powers[axis].append(powers[axis][-1] * values)
+    for k, (a, b, c) in enumerate(_EXPONENTS):
+        np.multiply(powers[0][a], powers[1][b], out=out[k])
+        out[k] *= powers[2][c]
+    # Level sprays turn with the azimuth of the sky, however little the branch leans.
+    x, y, z = (powers[axis][1] for axis in range(3))
+    level = np.sqrt(x * x + y * y + _UPRIGHT)
+    c, s = x / level, y / level
+    for k, values in enumerate((c, s, c * c - s * s, 2 * c * s)):
+        out[len(_EXPONENTS) + k] = values
+        np.multiply(values, z, out=out[len(_EXPONENTS) + 4 + k])
+    return out.T
+
+
+def _product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Product of a tall array (n, k) and a small one, in pieces so small that no library starts threads for them."""
+    whole = len(a) // _PIECE * _PIECE
+    pieces = np.ascontiguousarray(a[:whole]).reshape(-1, _PIECE, a.shape[1]) @ b
+    return np.concatenate([pieces.reshape(whole, b.shape[1]), a[whole:] @ b])
+
+
+def _turned(six: NDArray[np.float64], frame: NDArray[np.float64]) -> NDArray[np.float64]:
+    """R M Rᵀ (n, 3, 3) of symmetric M given by six numbers (n, 6)."""
+    full = six[:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)
+    return frame @ full @ frame.transpose(0, 2, 1)
+
+
+def _six(moments: NDArray[np.float64], frame: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rᵀ M R as six numbers (n, 6) of symmetric M (n, 3, 3)."""
+    local = frame.transpose(0, 2, 1) @ moments @ frame
+    return np.stack([local[:, i, j] for i, j in _PAIRS], axis=1)
+
+
+def _frames_along(axis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Frames (n, 3, 3) whose third column is an axis (n, 3), turned about it as may be."""
+    aside = np.where(np.abs(axis[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
+    x = aside - (aside * axis).sum(axis=1, keepdims=True) * axis
+    x /= np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-300)
+    return np.stack([x, np.cross(axis, x), axis], axis=2)
+
+
+def orientation_of(
+    rows: NDArray[np.void],
+    forms: Sequence[Sequence[Sequence[LeafModel]]],
+    leaf_share: NDArray[np.float64],
+    wood: NDArray[np.float64],
+    length: NDArray[np.float64],
+) -> Orientation:
+    """Orientation of every row.
+
+    Parameters
+    ----------
+    rows : (r,) parameter table
+    forms : by species and kind
+        Models of leaves.
+    leaf_share : (r, r) float64
+        Expected area of leaves in a sub-plant by the row that bears them.
+    wood : (r, r) float64
+        Expected surface of branches by row, over length × radius of the sub-plant's own branch.
+    length : (r,) float64
+        Typical length of a branch at plant scale 1, metres.
+    """
+    out = Orientation(*np.zeros((3, len(rows), _TERMS, 6)))
+    turn = _model_moments(rows, forms)
+    leaf_area, wood_area = leaf_share.sum(axis=1), wood.sum(axis=1)
+    for i in range(len(rows) - 1, -1, -1):
+        branches = _looked_at(i, float(length[i]), bool(rows["order"][i] == 0))
+        if rows["phantom"][i]:
+            children, owner = drawn_children(rows, branches)
+            stands = np.ones(len(owner))
+        else:
+            lines = axes(rows, branches)
+            children, owner, stands = _one_child_each(rows, branches, lines)
+        row, scale = children.row, branches.scale[0]
+        # What grows on the children is turned as they say; own leaves and the own branch are looked at one by one.
+        weight = stands * fullness(rows, children) * leaf_area[row] * scale**2
+        leaves = _Points(branches.frame[owner], _evaluated(out.leaves, row, children.frame), weight)
+        weight = stands * children.length * children.radius * wood_area[row]
+        bark = _Points(branches.frame[owner], _evaluated(out.wood, row, children.frame), weight)
+        if not rows["phantom"][i]:
+            if leaf_share[i, i] > 0:
+                own = _own_leaves(rows, branches, lines, turn[i])
+                leaves = _Points.mixed(own, leaves, leaf_share[i, i] / leaf_area[i])
+                out.own_leaves[i] = _own_leaves(rows, branches, _straight(branches), turn[i]).fitted()
+            bark = _Points.mixed(_own_wood(rows, branches, lines), bark, wood[i, i] / wood_area[i])
+        if leaf_area[i] > 0:
+            out.leaves[i] = leaves.fitted()
+        out.wood[i] = bark.fitted()
+    return out
+
+
+@dataclass(frozen=True)
+class _Points:
+    """Moments that were met: frames (n, 3, 3) of the branches they were met on, moments (n, 3, 3), weights (n,)."""
+
+    frame: NDArray[np.float64]
+    moment: NDArray[np.float64]
+    weight: NDArray[np.float64]
+
+    @classmethod
+    def mixed(cls, a: _Points, b: _Points, share: float) -> _Points:
+        """Both together; the first has a known share of all."""
+        if b.weight.sum() <= 0:
+            return a
+        weights = [p.weight * (part / max(p.weight.sum(), 1e-300)) for p, part in ((a, share), (b, 1 - share))]
+        return cls(*(np.concatenate(pair) for pair in ((a.frame, b.frame), (a.moment, b.moment), weights)))
+
+    def fitted(self) -> NDArray[np.float64]:
+        """Coefficients (24, 6), by weighted least squares."""
+        basis = _basis(self.frame[:, 2, :])
+        weighted = basis * (self.weight / max(self.weight.sum(), 1e-300))[:, None]
+        normal = _inner(basis, weighted)
+        # Where branches can only stand in some ways, others are left to the least coefficients.
+        normal += 1e-9 * np.trace(normal) / len(normal) * np.eye(len(normal))
+        return np.linalg.solve(normal, _inner(weighted, _six(self.moment, self.frame)))
+
+
+def _inner(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """aᵀ b of tall arrays, in pieces so small that no library starts threads for them."""
+    whole = len(a) // _PIECE * _PIECE
+    left, right = (x[:whole].reshape(-1, _PIECE, x.shape[1]) for x in (a, b))
+    return (left.transpose(0, 2, 1) @ right).sum(axis=0) + a[whole:].T @ b[whole:]
+
+
+def _looked_at(row: int, length: float, upright: bool) -> Branches:
+    """Branches of a row, of length 1, with the sky all around them."""
+    n = _BRANCHES
+    key = mix(key_of_seed(np.arange(n)) ^ np.uint64(0x0E1E))
+    cos = 1 - 2 * (np.arange(n) + 0.5) / n  # Fibonacci's sphere
+    if upright:  # most plants stand, and few lie
+        cos = 1 - 2 * ((1 - cos) / 2) ** 3
+    around = np.pi * (3 - np.sqrt(5)) * np.arange(n)
+    sin = np.sqrt(1 - cos * cos)
+    sky = np.stack([sin * np.cos(around), sin * np.sin(around), cos], axis=1)
+    frame = _frames_along(sky).transpose(0, 2, 1)
+    one, none = np.ones(n), np.zeros(n)
+    scale = np.full(n, 1 / max(length, 1e-9))
+    return Branches(
+        np.full(n, row, np.int32),
+        np.arange(n, dtype=np.int32),
+        key,
+        np.zeros((n, 3)),
+        frame,
+        one,
+        one,
+        scale,
+        one,
+        none,
+    )
+
+
+def _one_child_each(
+    rows: NDArray[np.void], branches: Branches, lines: Axes
+) -> tuple[Branches, NDArray[np.int64], NDArray[np.float64]]:
+    """One child of each sort of each branch that has any: the children, their parents, and how many each stands for."""
+    grown, owners, stands = [Branches.empty()], [np.zeros(0, np.int64)], [np.zeros(0)]
+    for sort in _SORTS:
+        if rows["next"][branches.row[0], sort] < 0:
+            continue
+        counts = branch_counts(rows, branches, sort)
+        if not counts.any():  # so rare that no branch has any
+            counts = np.ones_like(counts)
+        some = np.flatnonzero(counts)
+        index = (uniform(branches.key[some], _CHILD + sort) * counts[some]).astype(np.int64)
+        grown.append(chosen_children(rows, branches, lines, some, index, counts, sort))
+        owners.append(some)
+        stands.append(counts[some].astype(np.float64))
+    return Branches.concatenate(grown), np.concatenate(owners), np.concatenate(stands)
+
+
+def _straight(branches: Branches) -> Axes:
+    """Centre lines of branches that do not bend."""
+    knots = np.stack([branches.position, branches.position + branches.frame[:, :, 2]], axis=1)
+    return Axes(knots, branches.frame[:, None], np.ones(len(branches), np.int64))
+
+
+def _own_leaves(rows: NDArray[np.void], branches: Branches, lines: Axes, turn: NDArray[np.float64]) -> _Points:
+    """Some leaves of each branch."""
+    counts = leaf_counts(rows, branches)
+    if not counts.any():
+        counts = np.ones_like(counts)
+    owner = np.repeat(np.flatnonzero(counts), _LEAVES)
+    number = counts[owner]
+    # Evenly over the leaves of each branch, beginning anywhere.
+    part = (uniform(branches.key, _CHILD)[owner] + np.arange(len(owner)) / _LEAVES) % 1.0
+    index = (part * number).astype(np.int64)
+    key = leaf_keys(branches, owner, index)
+    t = leaf_places(rows, branches, owner, index, counts, key)
+    leaves = place_leaves(rows, branches, lines, owner, index, key, t)
+    frame = settled(rows, branches.row[owner], leaves.frame, leaves.light, _UP).astype(np.float64)
+    moment = frame @ turn @ frame.transpose(0, 2, 1)
+    return _Points(branches.frame[owner], moment, number * leaves.size**2)
+
+
+def _own_wood(rows: NDArray[np.void], branches: Branches, lines: Axes) -> _Points:
+    """A place on each branch."""
+    t = uniform(branches.key, _ALONG)
+    _, frame = lines.at(np.arange(len(branches)), t)
+    axis = frame[:, :, 2]
+    moment = (np.eye(3) - axis[:, :, None] * axis[:, None, :]) / 2
+    return _Points(branches.frame, moment, radius_at(rows, branches, t))
+
+
+def _model_moments(rows: NDArray[np.void], forms: Sequence[Sequence[Sequence[LeafModel]]]) -> NDArray[np.float64]:
+    """Orientation moment (r, 3, 3) of the leaf that each row bears, in the leaf's own axes."""
+    table = np.zeros((len(forms), max(len(one) for one in forms), 3, 3))
+    for s, one in enumerate(forms):
+        for k, models in enumerate(one):
+            areas = np.array([m.area for m in models])
+            table[s, k] = np.einsum("f,fij->ij", areas / areas.sum(), np.array([m.moment for m in models]))
+    return table[rows["species"], rows["leaf_kind"]]
