@@ -14,6 +14,7 @@ from ..plants.leaf_models import LeafModel, leaf_model
 from ..plants.species import LEAF_KINDS, Species
 from .materials import bark_material, leaf_material
 from .meshes import UV_MAP, read_mesh_arrays
+from .plant_form import read_skeleton
 from .plant_kinds import form_of, species_of
 from .properties import leaf_objects
 from .species_edits import species_for
@@ -37,8 +38,6 @@ def resolved_species(scene: bpy.types.Scene, kind_of_plant: str, depsgraph: bpy.
     identifier, form = species_of(kind_of_plant), form_of(kind_of_plant)
     species = species_for(scene, identifier)
     if form is not None:
-        from .plant_form import read_skeleton
-
         species = replace(species, form=read_skeleton(form, depsgraph))
     chosen = leaf_objects(scene).get(identifier)
     if chosen is not None:

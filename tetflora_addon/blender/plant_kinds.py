@@ -16,8 +16,7 @@ _BREAK = "\n"
 def kind_of(plant: bpy.types.Object) -> str:
     """Kind of a plant."""
     group = plant.tetflora
-    form = getattr(group, "form", None)
-    return group.species if form is None else f"{group.species}{_BREAK}{form.name_full}"
+    return group.species if group.form is None else f"{group.species}{_BREAK}{group.form.name_full}"
 
 
 def species_of(kind: str) -> str:
