@@ -17,7 +17,6 @@ from tetflora_addon.plants.seeds import Seeds
 from tetflora_addon.refinement.contents import (
     Contents,
     bounding_box,
-    bounding_cylinders,
     node_amounts,
     piece_amounts,
     push_down,
@@ -95,12 +94,10 @@ def test_nothing_is_lost_or_held_twice(view: tuple[int, str]) -> None:
 @given(views)
 @settings(deadline=None, max_examples=20)
 def test_everything_is_on_the_right_side(view: tuple[int, str]) -> None:
-    """Ends of pieces and bounds of sub-plants, against every plane from their terminal up to the root."""
+    """Ends of pieces and vertices of sub-plants, against every plane from their terminal up to the root."""
     flora = support.small_flora()
     tree, contents = divided(flora, support.grove(5, 2.5), *view)
     scale = np.abs(bounding_box(flora, contents.subplants)).max()
-    centre, radius, half_height = bounding_cylinders(flora, contents.subplants)
-    axis = contents.subplants.frame[:, :, 2]
 
     def walk(cells: np.ndarray, signed: object) -> None:
         node = cells.astype(np.intp)
@@ -118,13 +115,16 @@ def test_everything_is_on_the_right_side(view: tuple[int, str]) -> None:
         ends = (np.einsum("ni,ni->n", planes[:, :3], p) for p in (contents.pieces.start, contents.pieces.end))
         return np.minimum(*(side * (d + planes[:, 3]) for d in ends))
 
-    def of_subplants(planes: np.ndarray, side: np.ndarray) -> np.ndarray:
-        along = np.einsum("ni,ni->n", planes[:, :3], axis)
-        reach = half_height * np.abs(along) + radius * np.sqrt(np.clip(1 - along**2, 0, 1))
-        return side * (np.einsum("ni,ni->n", planes[:, :3], centre) + planes[:, 3]) - reach
-
     walk(contents.piece_cell, of_pieces)
-    walk(contents.subplant_cell, of_subplants)
+    some = np.random.default_rng(0).permutation(len(contents.subplants))[:40]
+    for one in some:
+        tubes, leaves = support.meshes(flora, expand(flora, contents.subplants.take(one[None])))
+        points = np.concatenate([mesh.positions for mesh in (*tubes, *leaves)]).astype(np.float64)
+
+        def of_vertices(planes: np.ndarray, side: np.ndarray, points: np.ndarray = points) -> np.ndarray:
+            return side * (np.einsum("ni,ni->n", planes[:, :3], points) + planes[:, 3]) + 1e-6 * scale  # float32
+
+        walk(np.full(len(points), contents.subplant_cell[one]), of_vertices)
 
 
 @given(views)

@@ -9,10 +9,13 @@ thickness) is a pad.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from .crown_shapes import crown_ratio
+from .leaf_models import LeafModel
 from .rows import FORK, LATERAL, SPUR
 
 _SLABS = 48
@@ -23,10 +26,8 @@ _CROWN_SLOPE = 1 / 0.3  # steepest of the crown shapes
 def _axis_envelope(row: NDArray[np.void]) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """At each knot of a unit branch: widest radius, lowest and highest z; and the widest turn of each segment."""
     segments = int(row["segments"])
-    mean, variation = row["curvature"]
-    back = np.where(2 * np.arange(segments) < segments, abs(mean), abs(row["curvature_tip"]))
-    # A joint bends back by a, then aside by b: cos c = cos a cos b, and c² ≤ a² + b². Turns of joints add up at most.
-    joint = (np.hypot(back + variation, variation) + np.abs(row["attraction"]).sum()) / segments
+    # Turns of joints add up at most. The joint in the middle of an even number belongs to the outer half.
+    joint = np.repeat(_joint_turns(row), [(segments + 1) // 2, segments // 2])
     joint[0] = 0  # the first segment sets out straight
     turn = np.minimum(np.cumsum(joint), np.pi)
     sideways = np.sin(np.minimum(turn, np.pi / 2)) / segments
@@ -34,6 +35,72 @@ def _axis_envelope(row: NDArray[np.void]) -> tuple[NDArray, NDArray, NDArray, ND
     low = np.concatenate([[0], np.cumsum(np.cos(turn)) / segments])
     high = np.linspace(0, 1, segments + 1)
     return radius, low, high, turn
+
+
+def _joint_turns(row: NDArray[np.void]) -> NDArray[np.float64]:
+    """Widest turn (..., 2) of a joint of the inner and of the outer half of branches of rows (...)."""
+    back = np.stack([np.abs(row["curvature"][..., 0]), np.abs(row["curvature_tip"])], axis=-1)
+    variation = row["curvature"][..., 1, None]
+    # A joint bends back by a, then aside by b: cos c = cos a cos b, and c² ≤ a² + b².
+    pulled = np.abs(row["attraction"]).sum(axis=-1)[..., None]
+    return (np.hypot(back + variation, variation) + pulled) / row["segments"][..., None]
+
+
+def ring_stretch(rows: NDArray[np.void]) -> NDArray[np.float64]:
+    """Greatest distance (r,) of a tube's vertices from its axis at joints, in radii.
+
+    Notes
+    -----
+    A ring at a joint lies along the means of both segments' axes, made unit vectors. These need not be at right angles:
+    between frames that a rotation by c separates, the cosine of their angle is at most (1 - cos c) / (3 + cos c),
+    where the rotation's axis lies half way between them. A circle becomes an ellipse with the half axis √(1 + cosine).
+    """
+    turn = np.minimum(_joint_turns(rows).max(axis=-1), np.pi)
+    return np.where(rows["segments"] > 1, 2 / np.sqrt(3 + np.cos(turn)), 1.0)
+
+
+def widest_radii(rows: NDArray[np.void]) -> NDArray[np.float64]:
+    """Greatest distance (r,) of the wood of sub-plants from their axes, in radii of the base; without short shoots."""
+    out = np.maximum(1 + rows["flare"], np.where(rows["drawn"], np.sqrt(2.0), ring_stretch(rows)))
+    for index in range(len(rows) - 1, -1, -1):
+        for sort in (LATERAL, FORK):
+            child = rows["next"][index, sort]
+            if child >= 0:  # no thicker than its parent, but it may flare more
+                out[index] = max(out[index], rows["thickness"][child].sum() * out[child])
+        if rows["drawn"][index]:
+            out[index] *= max(rows["radii"][index].max(), 1.0)
+        if rows["phantom"][index]:  # as thick as the thickest that is drawn
+            out[index] = out[slice(*rows["drawn_rows"][index])].max()
+    return out
+
+
+def leaf_boxes(rows: NDArray[np.void], forms: Sequence[Sequence[Sequence[LeafModel]]]) -> NDArray[np.float64]:
+    """Boxes around all forms of the leaf that each row bears, of size 1 and in its own axes.
+
+    Parameters
+    ----------
+    rows : (r,) table
+    forms : by species and kind of leaf
+
+    Returns
+    -------
+    (r, 2, 3) float64
+        Middle and half of the extent; zero without leaves.
+    """
+    out = np.zeros((len(rows), 2, 3))
+    for index, row in enumerate(rows):
+        models = forms[row["species"]][row["leaf_kind"]]
+        if models and row["leaves"].sum() > 0:
+            points = np.concatenate([model.positions for model in models])
+            low, high = points.min(axis=0), points.max(axis=0)
+            out[index] = (low + high) / 2, (high - low) / 2
+    return out
+
+
+def own_leaf_reaches(rows: NDArray[np.void], model_reach: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far leaves stick out beyond the axes that bear them (r,), at plant scale 1, metres; see `leaf_reaches`."""
+    largest = rows["leaf_size"].sum(axis=1) * np.maximum(rows["leaf_size_tip"], 1)
+    return np.where(rows["leaves"].sum(axis=1) > 0, largest * model_reach, 0.0)
 
 
 def _tilted(bound: NDArray, angle: NDArray, scale: NDArray) -> tuple[NDArray, NDArray, NDArray]:
@@ -86,8 +153,7 @@ def leaf_reaches(
     model_reach : (r,) float64
         Distance of the farthest vertex from the base of the leaf that each row bears, for a leaf of size 1.
     """
-    largest = rows["leaf_size"].sum(axis=1) * np.maximum(rows["leaf_size_tip"], 1)
-    reach = np.where(rows["leaves"].sum(axis=1) > 0, largest * model_reach, 0.0)
+    reach, widest = own_leaf_reaches(rows, model_reach), widest_radii(rows)
     for index in range(len(rows) - 1, -1, -1):
         for sort in np.flatnonzero(rows["next"][index] >= 0):
             child = rows["next"][index, sort]
@@ -95,8 +161,10 @@ def leaf_reaches(
             if sort == SPUR:
                 radius, low, high = bounds[child]
                 length, thickness = rows["length"][child].sum(), rows["thickness"][child].sum()
-                farther += length * (np.hypot(radius, max(high, -low)) + thickness * (1 + rows["flare"][child]))
+                farther += length * (np.hypot(radius, max(high, -low)) + thickness * widest[child])
             reach[index] = max(reach[index], farther)
+        if rows["phantom"][index]:
+            reach[index] = reach[slice(*rows["drawn_rows"][index])].max()
     return reach
 
 

@@ -20,7 +20,9 @@ from .averages import Averages, RowLeaves, average, quadratic, row_leaves
 from .bounds import leaf_boxes, leaf_reaches, unit_bounds, widest_radii
 from .growth import Branches, fullness
 from .leaf_models import LeafModel
-from .rows import build_rows
+from .orientation import Orientation, orientation_of
+from .quality import with_quality
+from .rows import LATERAL, build_rows
 from .samples import Samples, draw_samples
 from .species import LEAF_KINDS, Species
 
@@ -69,6 +71,8 @@ class Flora:
         Share of scattered light that goes through the leaves of the sub-plant.
     samples : Samples
         Points on the leaves and wood of sub-plants.
+    orientation : Orientation
+        How their surfaces are turned.
     area_nodes : (r, 3) float64
         Expected one-sided area of leaves at `averages.NODES`, m² at plant scale 1.
     colour_nodes : (r, 3, 3) float64
@@ -95,6 +99,7 @@ class Flora:
     wood_colour: NDArray[np.float64]
     transmission: NDArray[np.float64]
     samples: Samples
+    orientation: Orientation
     area_nodes: NDArray[np.float64]
     colour_nodes: NDArray[np.float64]
 
@@ -146,7 +151,7 @@ def compile_species(species: Sequence[Species]) -> Flora:
     SpeciesError
         A species whose leaf is still the name of a Blender object (the bridge to Blender has to replace it first).
     """
-    return _compiled(tuple(species))
+    return _compiled(tuple(with_quality(one, one.quality) for one in species))
 
 
 @lru_cache(maxsize=8)
@@ -160,7 +165,7 @@ def _compiled(species: tuple[Species, ...]) -> Flora:
     forms = tuple(tuple(one.forms(kind) for kind in range(len(LEAF_KINDS))) for one in species)
     leaf = row_leaves(rows, forms, np.array([[one.leaf_transmission, one.blossom_transmission] for one in species]))
     amounts = average(rows, leaf)
-    bound = unit_bounds(rows)
+    bound = _with_drawn(rows, unit_bounds(rows))
     leaves, area = amounts.leaves, amounts.leaf_area[:, 1]
     wood = _wood_shares(amounts)
     leaf_count, leaf_area = leaves.sum(axis=1), area.sum(axis=1)
@@ -188,9 +193,24 @@ def _compiled(species: tuple[Species, ...]) -> Flora:
         wood_colour=wood @ rows["branch_colour"][:, 0] / wood.sum(axis=1, keepdims=True),
         transmission=area @ leaf.transmission / np.maximum(leaf_area, 1e-300),
         samples=draw_samples(rows, leaf, forms, area, wood, polygons, amounts.length),
+        orientation=orientation_of(rows, forms, area, wood, amounts.length),
         area_nodes=amounts.leaf_area.sum(axis=2),
         colour_nodes=amounts.leaf_colour,
     )
+
+
+def _with_drawn(rows: NDArray[np.void], bound: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Bounds in which plants drawn by hand have theirs: the drawing, and what grows on it in any direction."""
+    bound = bound.copy()
+    for i in np.flatnonzero(rows["phantom"]):
+        own = rows[slice(*rows["drawn_rows"][i])]
+        child = own["next"][:, LATERAL]
+        farthest = np.hypot(bound[child, 0], np.maximum(bound[child, 2], -bound[child, 1]))
+        reach = np.where(child >= 0, own["size"][:, 0] * rows["length"][child].sum(axis=1) * farthest, 0.0)
+        across, height = np.hypot(own["knots"][..., 0], own["knots"][..., 1]), own["knots"][..., 2]
+        low, high = (height - reach[:, None]).min(), (height + reach[:, None]).max()
+        bound[i] = np.array([(across + reach[:, None]).max(), min(low, 0.0), max(high, 0.0)]) / rows["length"][i, 0]
+    return bound
 
 
 def _wood_shares(amounts: Averages) -> NDArray[np.float64]:

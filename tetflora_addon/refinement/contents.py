@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What tetrahedra hold, and the update step: handing it on to the children of divided ones (paper, section 6.5).
 
-A plant is held as a sub-plant while its bound lies on one side of every plane. Where it straddles one it is opened into
-the sub-plants of the next order and the pieces of its own branch; pieces that straddle are clipped.
+A plant is held as a sub-plant while it lies on one side of every plane. Where it crosses one it is opened into the
+sub-plants of the next order and the pieces of its own branch; pieces that cross are clipped.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,8 @@ from ..plants.expansion import open_subplants
 from ..plants.growth import Branches, fullness, trunks
 from ..plants.pieces import Pieces, clipped, leaf_fraction, outward_ends, wood_areas
 from ..plants.seeds import Seeds
+from ..plants.sides import body_distances, bounding_bodies, crossing
+from ..plants.vectors import gathered
 from ..tetrahedra.tree import TetrahedralTree
 
 #: Sub-plants that are opened at a time; bounds the memory that opening takes to some hundred megabytes.
@@ -66,7 +69,7 @@ class Contents:
 
 
 def bounding_cylinders(flora: Flora, subplants: Branches) -> tuple[NDArray, NDArray, NDArray]:
-    """Cylinders about the sub-plants' branches that hold all of their vertices.
+    """Cylinders about the sub-plants' branches that hold all of their vertices, whatever the seed.
 
     Returns
     -------
@@ -75,19 +78,16 @@ def bounding_cylinders(flora: Flora, subplants: Branches) -> tuple[NDArray, NDAr
     radius, half_height : (n,) float64
         Across and along the branch's axis, metres.
     """
-    bound = flora.bound[subplants.row] * subplants.length[:, None]
-    pad = subplants.radius * flora.widest[subplants.row] + flora.leaf_reach[subplants.row] * subplants.scale
-    middle = (bound[:, 1] + bound[:, 2]) / 2
-    centre = subplants.position + middle[:, None] * subplants.frame[:, :, 2]
-    return centre, bound[:, 0] + pad, (bound[:, 2] - bound[:, 1]) / 2 + pad
+    bodies = bounding_bodies(flora, subplants)
+    return bodies[:3].T, bodies[6] + bodies[8], bodies[7] + bodies[8]
 
 
 def bounding_box(flora: Flora, subplants: Branches) -> NDArray[np.float64]:
     """Axis-aligned box (2, 3) of all sub-plants' bounds, metres."""
-    centre, radius, half_height = bounding_cylinders(flora, subplants)
-    axis = np.abs(subplants.frame[:, :, 2])
-    reach = half_height[:, None] * axis + radius[:, None] * np.sqrt(np.clip(1 - axis**2, 0, 1))
-    return np.stack([(centre - reach).min(axis=0), (centre + reach).max(axis=0)])
+    bodies = bounding_bodies(flora, subplants)
+    axis = np.abs(bodies[3:6])
+    reach = bodies[7] * axis + bodies[6] * np.sqrt(np.maximum(1 - axis**2, 0)) + bodies[8]
+    return np.stack([(bodies[:3] - reach).min(axis=1), (bodies[:3] + reach).max(axis=1)])
 
 
 def push_down(flora: Flora, tree: TetrahedralTree, contents: Contents) -> Contents:
@@ -109,21 +109,11 @@ def push_down(flora: Flora, tree: TetrahedralTree, contents: Contents) -> Conten
     loose, loose_cells = [contents.pieces], [contents.piece_cell]
     subplants, cells = contents.subplants, contents.subplant_cell
     while len(subplants):
-        inner = tree.children[cells, 0] >= 0
-        placed.append(subplants.take(~inner))
-        placed_cells.append(cells[~inner])
-        subplants, cells = subplants.take(inner), cells[inner]
-        plane = tree.planes(cells)
-        centre, radius, half_height = bounding_cylinders(flora, subplants)
-        distance = np.einsum("ni,ni->n", plane[:, :3], centre) + plane[:, 3]
-        along = np.abs(np.einsum("ni,ni->n", plane[:, :3], subplants.frame[:, :, 2]))
-        reach = half_height * along + radius * np.sqrt(np.clip(1 - along**2, 0, 1))
-        whole = np.abs(distance) > reach
-        side = (distance > 0).astype(np.int64)
-        straddling = np.flatnonzero(~whole)
-        parts, part_cells = [subplants.take(whole)], [tree.children[cells[whole], side[whole]]]
-        for start in range(0, len(straddling), OPENED_AT_ONCE):
-            chosen = straddling[start : start + OPENED_AT_ONCE]
+        cells, opened = _lowered(flora, tree, subplants, cells)
+        placed.append(subplants.take(~opened))
+        placed_cells.append(cells[~opened])
+        parts, part_cells = [Branches.empty()], [np.zeros(0, np.int32)]
+        for chosen in _alike(flora, subplants, np.flatnonzero(opened)):
             grown, owner, pieces, piece_owner = open_subplants(flora, subplants.take(chosen))
             parts.append(grown)
             part_cells.append(cells[chosen[owner]])
@@ -134,29 +124,65 @@ def push_down(flora: Flora, tree: TetrahedralTree, contents: Contents) -> Conten
     return Contents(Branches.concatenate(placed), np.concatenate(placed_cells), pieces, piece_cells)
 
 
+def _lowered(
+    flora: Flora, tree: TetrahedralTree, subplants: Branches, cells: NDArray
+) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+    """Nodes (n,) that sub-plants come down to whole, and whether they cross the planes of these."""
+    cells, crosses = cells.copy(), np.zeros(len(subplants), bool)
+    bodies = bounding_bodies(flora, subplants)
+    moving = np.argsort(subplants.row, kind="stable")  # all of a row together, as they are looked at
+    while True:
+        moving = moving[tree.children[cells[moving], 0] >= 0]
+        if len(moving) == 0:
+            return cells, crosses
+        planes = tree.planes(cells[moving])
+        distance, reach = body_distances(np.take(bodies, moving, axis=1), planes)
+        side = (distance > 0).astype(np.int64)
+        straddling = np.flatnonzero(np.abs(distance) <= reach)
+        found, side[straddling] = crossing(flora, subplants.take(moving[straddling]), planes[straddling])
+        whole = np.ones(len(moving), bool)
+        whole[straddling[found]] = False
+        crosses[moving[~whole]] = True
+        moving, side = moving[whole], side[whole]
+        cells[moving] = tree.children[cells[moving], side]
+
+
+def _alike(flora: Flora, subplants: Branches, chosen: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
+    """Runs of sub-plants whose branches have as many segments: bending takes as long for all as for the most."""
+    segments = flora.rows["segments"][subplants.row[chosen]]
+    for number in np.unique(segments):
+        some = chosen[segments == number]
+        yield from np.split(some, np.arange(OPENED_AT_ONCE, len(some), OPENED_AT_ONCE))
+
+
 def _push_down_pieces(tree: TetrahedralTree, pieces: Pieces, cells: NDArray) -> tuple[Pieces, NDArray[np.int32]]:
     placed, placed_cells = [Pieces.empty()], [np.zeros(0, np.int32)]
     while len(pieces):
-        inner = tree.children[cells, 0] >= 0
-        placed.append(pieces.take(~inner))
-        placed_cells.append(cells[~inner])
-        pieces, cells = pieces.take(inner), cells[inner]
-        plane = tree.planes(cells)
-        start, end = (np.einsum("ni,ni->n", plane[:, :3], p) + plane[:, 3] for p in (pieces.start, pieces.end))
-        crossing = (start < 0) != (end < 0)
-        whole = ~crossing
-        children = tree.children[cells]
-        lower, upper = clipped(pieces.take(crossing), start[crossing], end[crossing])
-        of_crossing, first = children[crossing], (start[crossing] >= 0).astype(np.int64)
-        every = np.arange(len(first))
-        pieces = Pieces.concatenate([pieces.take(whole), lower, upper])
-        cells = np.concatenate(
-            [
-                children[whole, (start[whole] >= 0).astype(np.int64)],
-                of_crossing[every, first],
-                of_crossing[every, 1 - first],
-            ]
-        )
+        cells, cut = cells.copy(), np.zeros(len(pieces), bool)
+        from_start, from_end = np.zeros((2, len(pieces)))
+        moving = np.arange(len(pieces))
+        while True:
+            moving = moving[tree.children[cells[moving], 0] >= 0]
+            if len(moving) == 0:
+                break
+            plane = tree.planes(cells[moving])
+            start, end = (
+                np.einsum("ni,ni->n", plane[:, :3], gathered(p, moving)) + plane[:, 3]
+                for p in (pieces.start, pieces.end)
+            )
+            whole = (start < 0) == (end < 0)
+            crossing_ones = moving[~whole]
+            cut[crossing_ones] = True
+            from_start[crossing_ones], from_end[crossing_ones] = start[~whole], end[~whole]
+            moving, side = moving[whole], (start[whole] >= 0).astype(np.int64)
+            cells[moving] = tree.children[cells[moving], side]
+        placed.append(pieces.take(~cut))
+        placed_cells.append(cells[~cut])
+        children = tree.children[cells[cut]]
+        lower, upper = clipped(pieces.take(cut), from_start[cut], from_end[cut])
+        first, every = (from_start[cut] >= 0).astype(np.int64), np.arange(len(children))
+        pieces = Pieces.concatenate([lower, upper])
+        cells = np.concatenate([children[every, first], children[every, 1 - first]])
     return Pieces.concatenate(placed), np.concatenate(placed_cells)
 
 
