@@ -205,9 +205,9 @@ def face_centres(mesh: MeshBuffers) -> NDArray[np.float64]:
     return np.add.reduceat(points, mesh.face_offsets[:-1], axis=0) / np.diff(mesh.face_offsets)[:, None]
 
 
-def moment(mesh: MeshBuffers) -> NDArray[np.float64]:
-    """Area-weighted mean (3, 3) of n nᵀ over the faces."""
-    vectors = face_vectors(mesh)
+def moment(*meshes: MeshBuffers) -> NDArray[np.float64]:
+    """Area-weighted mean (3, 3) of n nᵀ over the faces of all meshes."""
+    vectors = np.concatenate([face_vectors(mesh) for mesh in meshes])
     areas = np.linalg.norm(vectors, axis=1)
     scaled = vectors / np.sqrt(np.maximum(areas, 1e-300))[:, None]
     return scaled.T @ scaled / areas.sum()

@@ -1,88 +1,19 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is known of plants before they are grown, against plants that are: bounds for every seed, averages over many."""
+"""What is known of plants before they are grown, against plants that are: averages over many."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from tests.engine import support
-from tetflora_addon.plants.compiled import Flora
 from tetflora_addon.plants.expansion import chunks, expand, open_subplants
 from tetflora_addon.plants.growth import Branches
 from tetflora_addon.plants.orientation import leaf_moments, wood_moments
 from tetflora_addon.plants.pieces import wood_areas
 from tetflora_addon.plants.samples import Points
-from tetflora_addon.refinement.contents import bounding_cylinders, subplant_amounts
-
-_FLOAT32 = 1e-6  # relative rounding of vertices
-
-
-def outside(flora: Flora, subplants: Branches) -> float:
-    """How far the farthest vertex of any sub-plant lies outside its bound, as a fraction of the bound's size."""
-    worst = -1.0
-    centre, radius, half_height = bounding_cylinders(flora, subplants)
-    for i in range(len(subplants)):
-        one = expand(flora, subplants.take(np.array([i])))
-        tubes, leaves = support.meshes(flora, one)
-        axis = subplants.frame[i, :, 2]
-        for mesh in (*tubes, *leaves):
-            points = mesh.positions.astype(np.float64) - centre[i]
-            along = points @ axis
-            across = np.linalg.norm(points - along[:, None] * axis, axis=1)
-            size = radius[i] + half_height[i] + np.abs(centre[i]).max()
-            worst = max(worst, (across.max() - radius[i]) / size, (np.abs(along).max() - half_height[i]) / size)
-    return worst
-
-
-@pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
-def test_every_vertex_of_many_plants_is_inside_the_bound(species: int) -> None:
-    """As many as two million polygons make, at most 100; `benchmarks bounds` takes a thousand of each."""
-    flora = support.flora()
-    number = min(100, int(2e6 / flora.polygons[flora.first_row[species]]))
-    trunk = support.trunks(flora.rows, support.plants(np.arange(number), species))
-    assert outside(flora, trunk) < _FLOAT32
-
-
-@pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
-def test_every_vertex_of_subplants_is_inside_their_bounds(species: int) -> None:
-    flora = support.flora()
-    level = support.trunks(flora.rows, support.plants([1, 2], species))
-    while len(level):
-        level, *_ = open_subplants(flora, level.take(np.s_[:: max(1, len(level) // 12)]))
-        assert outside(flora, level.take(np.s_[:: max(1, len(level) // 25)])) < _FLOAT32
-
-
-RANGES = st.fixed_dictionaries(
-    {
-        "curvature": st.tuples(st.floats(-300, 300), st.floats(0, 60)),
-        "angle": st.tuples(st.floats(40, 140), st.floats(0, 40)),
-        "angle_tip": st.floats(0, 180),
-        "curvature_tip": st.floats(-300, 300),
-        "whorl": st.integers(1, 5),
-        "count_by_length": st.floats(0, 1),
-        "branch_start": st.floats(0, 0.99),
-        "segments": st.integers(1, 12),
-        "crown": st.sampled_from(["conical", "flame", "inverse conical", "tend flame", "spherical"]),
-        "taper": st.floats(0, 1),
-    }
-)
-
-
-@given(RANGES, RANGES, st.integers(0, 10**6))
-@settings(deadline=None, max_examples=60)
-def test_bounds_hold_for_any_species(first: dict, second: dict, seed: int) -> None:
-    """Branches that curl, hang and lean back; the extremes come from the ranges, not from the shipped species."""
-    data = support.small(order0={k: v for k, v in first.items() if "angle" not in k}, order1=second)
-    data["orders"][2].update({k: first[k] for k in ("angle", "angle_tip", "curvature", "segments")})
-    for order in data["orders"]:
-        for key in ("curvature", "angle"):
-            order[key] = list(order.get(key, [0, 0]))
-    flora = support.compiled(data)
-    assert outside(flora, support.trunks(flora.rows, support.plants(seed + np.arange(6)))) < _FLOAT32
+from tetflora_addon.refinement.contents import subplant_amounts
 
 
 def samples_of_plants(species: int, count: int) -> dict[str, np.ndarray]:
@@ -118,7 +49,8 @@ def test_averages_are_those_of_grown_plants(species: int) -> None:
         expected, values = flora.area_nodes[row, 0] if name == "leaf_area" else getattr(flora, name)[row], found[name]
         error = values.std() / np.sqrt(len(values))
         assert abs(values.mean() - expected) < 4 * error + 1e-9, name
-    assert found["wood"].sum() == pytest.approx(found["wood_expected"].sum(), rel=0.015)
+    ratio = found["wood"] / found["wood_expected"]
+    assert abs(ratio.mean() - 1) < 4 * ratio.std() / np.sqrt(len(ratio)) + 0.005
 
 
 @pytest.mark.parametrize(("follow", "whorl"), [(0.6, 1), (1.0, 3)])
@@ -177,7 +109,7 @@ def test_orientation_of_whole_plants(species: int) -> None:
     tubes, leaves = support.meshes(flora, pieces)
     expected = leaf_moments(flora.orientation, trunk).mean(axis=0)
     assert np.trace(expected) == pytest.approx(1)
-    np.testing.assert_allclose(support.moment(leaves[0]), expected, atol=0.02)
+    np.testing.assert_allclose(support.moment(*leaves), expected, atol=0.02)
     np.testing.assert_allclose(support.moment(tubes[0]), wood_moments(flora.orientation, trunk).mean(axis=0), atol=0.03)
 
 
@@ -193,7 +125,7 @@ def test_orientation_of_subplants_at_any_tilt(species: int) -> None:
         _, leaves = support.meshes(flora, expand(flora, some))
         weight = subplant_amounts(flora, some).leaf_area
         expected = np.einsum("n,nij->ij", weight, leaf_moments(flora.orientation, some))
-        np.testing.assert_allclose(support.moment(leaves[0]), expected / weight.sum(), atol=0.05)
+        np.testing.assert_allclose(support.moment(*leaves), expected / weight.sum(), atol=0.05)
 
 
 def sample_positions(points: Points, subplants: Branches) -> np.ndarray:

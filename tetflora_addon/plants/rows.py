@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from .crown_shapes import CROWN_SHAPES, crown_ratio
 from .drawn import MAX_SEGMENTS, DrawnLines, drawn_lines
 from .hashing import signed
+from .members import expected_forks
 from .skeletons import drawn_branches
 from .species import LEAF_KINDS, Order, Range, Species, fork_cuts
 
@@ -212,7 +213,9 @@ def _part(row: np.void, order: Order, low: float, high: float, before: float) ->
         row["length"], row["thickness"] = (factor, factor * relative), (1, 0)
         row["angle"] = np.radians(order.fork_angle)
         row["angle_tip"], row["azimuth"] = row["angle"][0], (0, 0.35)
-        row["whorl"], row["flare"], row["continues"] = 1, 0, True
+        # As wide at its base as what it comes from, or the fork would be an open pipe.
+        row["whorl"], row["continues"] = 1, True
+        row["flare"] = expected_forks(order.forks) ** (1 / row["fork_power"]) - 1
     else:
         row["length"] *= length
         if row["order"] == 0:  # whose thickness is a fraction of its length
