@@ -1,0 +1,203 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether bounds of sub-plants hold, and how tight they are.
+
+*Outside*: vertices of plants of many seeds that lie outside their compiled bounds. *Ratios*: the volume of the smallest
+body that planes may not enter without a sub-plant being opened, over that of the convex hull of its vertices; medians
+over the sub-plants of each species and order. That body is found from outside, by asking where planes begin to cross.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from statistics import median
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, HalfspaceIntersection
+
+from devtools import session
+
+from .plants import plants as planted
+from .report import Targets
+
+SEEDS, QUICK_SEEDS = 1000, 20
+#: Sub-plants of each order whose hulls are measured, as far as their polygons allow.
+SUBPLANTS, QUICK_SUBPLANTS = 24, 5
+HULL_POLYGONS, QUICK_HULL_POLYGONS = 400_000, 50_000
+AT_ONCE = 400_000
+#: Planes around each body: facets of the hull, and evenly all around where the hull is made a sphere.
+FACETS, AROUND = 80, 40
+_HALVINGS = 9
+_FLOAT32 = 1e-6
+
+TARGETS: Targets = {"outside": {"max": 0}, "hull_ratio_max": {"max": 4.0}}
+QUICK_TARGETS: Targets = TARGETS
+
+
+def run(quick: bool) -> dict[str, float]:
+    """Measure all species; see the table in ``docs/results.md`` for what the figures mean."""
+    catalogue, compiled = (session.part(f"tetflora_addon.plants.{n}") for n in ("catalogue", "compiled"))
+    beyond, begun = 0, time.perf_counter()
+    ratios: dict[str, float] = {}
+    cylinders: list[float] = []
+    seconds = 0.0
+    for name in catalogue.list_species():
+        flora = compiled.compile_species([catalogue.load_species(name)])
+        begun = time.perf_counter()
+        beyond += vertices_outside(flora, QUICK_SEEDS if quick else SEEDS)
+        seconds += time.perf_counter() - begun
+        polygons = QUICK_HULL_POLYGONS if quick else HULL_POLYGONS
+        for order, some in sorted(subplants(flora, QUICK_SUBPLANTS if quick else SUBPLANTS, polygons).items()):
+            found = [hull_ratios(flora, some.take(np.array([i]))) for i in range(len(some))]
+            ratios[f"hull_ratio_{name}_{order}"] = median(tight for tight, _ in found)
+            cylinders.append(median(loose for _, loose in found))
+    return {
+        "outside": beyond,
+        "hull_ratio_median": median(ratios.values()),
+        "hull_ratio_max": max(ratios.values()),
+        "hull_ratio_compiled_median": median(cylinders),
+        "hull_ratio_compiled_max": max(cylinders),
+        "outside_s": seconds,
+        **ratios,
+    }
+
+
+def grown(flora: Any, branches: Any) -> NDArray[np.float64]:
+    """All vertices (v, 3) of sub-plants of one species."""
+    part = session.part
+    meshing, foliage = part("tetflora_addon.plants.meshing"), part("tetflora_addon.plants.foliage")
+    pieces = part("tetflora_addon.plants.expansion").expand(flora, branches)
+    tubes = meshing.tube_buffers(flora, pieces)
+    out = [] if tubes is None else [tubes.positions]
+    for own, leaves in placed_leaves(flora, pieces.take(pieces.t1 == 1).branches):
+        row = own.row[:1]
+        frame = foliage.settled(flora.rows, row, leaves.frame, leaves.light, np.array([0.0, 0.0, 1.0]))
+        forms = flora.forms[0][flora.rows["leaf_kind"][row[0]]]
+        which = foliage.leaf_forms(len(forms), leaves.key)
+        for number, form in enumerate(forms):
+            some = np.flatnonzero(which == number)
+            shape = np.einsum("nij,vj->nvi", frame[some] * leaves.size[some, None, None], form.positions)
+            out.append((leaves.position[some, None] + shape).reshape(-1, 3))
+    return np.concatenate(out).astype(np.float64)
+
+
+def placed_leaves(flora: Any, branches: Any) -> Iterator[tuple[Any, Any]]:
+    """Branches and all leaves on their own axes, row by row."""
+    foliage, growth = (session.part(f"tetflora_addon.plants.{n}") for n in ("foliage", "growth"))
+    rows = flora.rows
+    for row in np.unique(branches.row):
+        if rows["leaves"][row].sum() > 0:
+            own = branches.take(branches.row == row)
+            counts = growth.leaf_counts(rows, own)
+            owner, index = growth.spread(counts)
+            key = foliage.leaf_keys(own, owner, index)
+            t = foliage.leaf_places(rows, own, owner, index, counts, key)
+            yield own, foliage.place_leaves(rows, own, growth.axes(rows, own), owner, index, key, t)
+
+
+def vertices_outside(flora: Any, seeds: int) -> int:
+    """Vertices of plants of many seeds outside their bodies.
+
+    Plants whose spheres around leaves and around the ends of wood lie inside have none; others are looked at whole.
+    """
+    part = session.part
+    growth, expansion, bounds = (part(f"tetflora_addon.plants.{n}") for n in ("growth", "expansion", "bounds"))
+    bodies_of = part("tetflora_addon.plants.sides").bounding_bodies
+    trunks = growth.trunks(flora.rows, planted(flora, seeds * float(flora.polygons[0])))
+    wide = np.maximum(1 + flora.rows["flare"], bounds.ring_stretch(flora.rows))
+    out = 0
+    for chunk in expansion.chunks(flora.polygons[trunks.row], AT_ONCE):
+        whole = trunks.take(chunk)
+        bodies, first = bodies_of(flora, whole), whole.plant[0]
+        pieces = expansion.expand(flora, whole)
+        plant = pieces.branches.plant - first
+        radius = pieces.branches.radius * wide[pieces.branches.row]
+        far = np.maximum(*(excess(bodies, plant, p) for p in (pieces.start, pieces.end))) + radius
+        doubtful = np.zeros(len(whole), bool)
+        doubtful[plant[far > 0]] = True
+        for own, leaves in placed_leaves(flora, pieces.take(pieces.t1 == 1).branches):
+            at, reach = own.plant[leaves.branch] - first, flora.leaf.reach[own.row[0]] * leaves.size
+            doubtful[at[excess(bodies, at, leaves.position) + reach > 0]] = True
+        for i in np.flatnonzero(doubtful):
+            points = grown(flora, whole.take(np.array([i])))
+            allowed = _FLOAT32 * (np.abs(points).max() + bodies[6:, i].sum())
+            out += int((excess(bodies, np.full(len(points), i), points) > allowed).sum())
+    return out
+
+
+def excess(bodies: NDArray[np.float64], which: NDArray, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far points (n, 3) lie outside some of `sides.bounding_bodies`, metres; negative inside."""
+    body = np.take(bodies, which, axis=1)
+    offset = points.T - body[:3]
+    along = np.einsum("in,in->n", offset, body[3:6])
+    across = np.sqrt(np.maximum(np.einsum("in,in->n", offset, offset) - along**2, 0))
+    return np.hypot(np.maximum(np.abs(along) - body[7], 0), np.maximum(across - body[6], 0)) - body[8]
+
+
+def subplants(flora: Any, number: int, polygons: float) -> dict[int, Any]:
+    """Sub-plants by order (100 for short shoots), from several plants."""
+    part = session.part
+    growth, expansion = part("tetflora_addon.plants.growth"), part("tetflora_addon.plants.expansion")
+    rng = np.random.default_rng(0)
+    level = growth.trunks(flora.rows, planted(flora, 30 * float(flora.polygons[0])))
+    kinds: dict[int, list[Any]] = {}
+    while len(level):
+        orders = flora.rows["order"][level.row]
+        for order in np.unique(orders):
+            kinds.setdefault(int(order), []).append(level.take(orders == order))
+        level = level.take(rng.permutation(len(level))[:120])
+        level, *_ = expansion.open_subplants(flora, level)
+    out = {}
+    for order, found in kinds.items():
+        every = growth.Branches.concatenate(found)
+        faces = flora.polygons[every.row].mean()
+        out[order] = every.take(rng.permutation(len(every))[: int(np.clip(polygons / faces, 2, number))])
+    return out
+
+
+def hull_ratios(flora: Any, subplant: Any) -> tuple[float, float]:
+    """Volume of the body that planes may not enter, and of the compiled one, over that of the vertices' hull."""
+    sides = session.part("tetflora_addon.plants.sides")
+    points = grown(flora, subplant)
+    hull = ConvexHull(points)
+    corners = points[hull.vertices]
+    normals, middle = directions(hull, corners), corners.mean(axis=0)
+    bodies = sides.bounding_bodies(flora, subplant)
+    least = (corners @ normals.T).max(axis=0)
+    many = np.repeat(bodies, len(normals), axis=1)
+    distance, reach = sides.body_distances(many, np.column_stack([normals, np.zeros(len(normals))]))
+    most = distance + reach
+    low, high = least.copy(), most.copy()
+    each = subplant.take(np.zeros(len(normals), np.int64))
+    for _ in range(_HALVINGS):
+        offset = (low + high) / 2
+        crosses, _ = sides.crossing(flora, each, np.column_stack([-normals, offset]))
+        low, high = np.where(crosses, offset, low), np.where(crosses, high, offset)
+    tight = volume(normals, np.maximum(high, least), middle)
+    radius, half, pad = bodies[6:, 0]
+    # A cylinder with rounded edges (Steiner's formula).
+    area = 2 * np.pi * radius * (radius + 2 * half)
+    mean_width = np.pi * (np.pi * radius + 2 * half)
+    compiled = np.pi * radius**2 * 2 * half + area * pad + mean_width * pad**2 + 4 / 3 * np.pi * pad**3
+    return tight / hull.volume, compiled / hull.volume
+
+
+def directions(hull: ConvexHull, corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit normals (k, 3) of planes around a hull."""
+    rng = np.random.default_rng(1)
+    facets = rng.permutation(hull.equations)[:FACETS, :3]
+    values, axes = np.linalg.eigh(np.cov(corners.T))
+    golden = np.arange(AROUND) * np.pi * (3 - 5**0.5)
+    z = 1 - (2 * np.arange(AROUND) + 1) / AROUND
+    sphere = np.stack([np.cos(golden) * np.sqrt(1 - z**2), np.sin(golden) * np.sqrt(1 - z**2), z], axis=1)
+    around = sphere / np.sqrt(np.maximum(values, 1e-9 * values.max())) @ axes.T
+    return np.concatenate([facets, around / np.linalg.norm(around, axis=1, keepdims=True)])
+
+
+def volume(normals: NDArray[np.float64], offsets: NDArray[np.float64], inside: NDArray[np.float64]) -> float:
+    """Volume of the points x with normals · x ≤ offsets."""
+    corners = HalfspaceIntersection(np.column_stack([normals, -offsets]), inside).intersections
+    return float(ConvexHull(corners).volume)
