@@ -33,7 +33,7 @@ def main() -> int:
     """Render all; exit code 1 if a picture is larger than the repository wants."""
     session.start()
     from .demo import run
-    from .species_sheet import render_sheet
+    from .species_sheet import render_opening, render_sheet
 
     IMAGES.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
@@ -42,6 +42,7 @@ def main() -> int:
         for name in ("cycles", "eevee", "top"):
             as_jpeg(out / f"{name}.png", IMAGES / f"row80-{name}.jpg")
     render_sheet(IMAGES / "species.jpg")
+    render_opening(IMAGES / "orders.jpg")
     session.stop()
     large = [p.name for p in IMAGES.iterdir() if p.stat().st_size > LARGEST]
     if large:

@@ -1,77 +1,91 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The catalogue as a picture (the paper's figure 4): one plant of each species, fully expanded."""
+"""Pictures of the catalogue (the paper's figure 4), and of one plant of which order after order is opened."""
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils import Vector
 
 from devtools import session
 
-from .row80 import add_daylight
-from .terrain import ground_material
+from .studio import render_cells, save_sheet
 
-PER_ROW = 7
-STEP, TERRACE = 8.0, 11.5
+COLUMNS, WIDTH, HEIGHT = 8, 240, 290
+SEED = 11
+#: The plant that is opened, and how wide one facet of its deferred parts is, metres.
+OPENED, FACET = "beech", 0.3
 
 
-def build(scene: bpy.types.Scene, seed: int = 11) -> list[str]:
-    """Place one plant of each species of the catalogue on terraces, as large as there is room; returns their names."""
-    catalogue = session.part("tetflora_addon.plants.catalogue")
-    known = catalogue.list_species()
-    flora = session.part("tetflora_addon.plants.compiled").compile_species([catalogue.load_species(i) for i in known])
-    trunk_rows = flora.first_row
-    samples, length = flora.samples, flora.rows["length"][trunk_rows, 0]
-    wood = np.array([samples.wood.position[f : f + 64].max(axis=0) for f in samples.wood.first[trunk_rows, -1]])
-    height, reach = length * wood[:, 2], length * np.abs(wood[:, :2]).max(axis=1)
-    reach += np.where(flora.leaf_count[trunk_rows] > 0, 0.5 * flora.leaf_reach[trunk_rows], 0.0)
-    terraces = math.ceil(len(known) / PER_ROW)
-    for i, identifier in enumerate(known):
-        line, place = divmod(i, PER_ROW)
+def _points(mesh: bpy.types.Mesh) -> np.ndarray:
+    points = np.zeros(3 * len(mesh.vertices), np.float32)
+    mesh.attributes["position"].data.foreach_get("vector", points)
+    return points.reshape(-1, 3)
+
+
+def species_cell(identifier: str, name: str, seed: int = SEED) -> Callable[[], tuple[np.ndarray, str]]:
+    """Puts one plant of a species into the scene, as a mesh."""
+
+    def build() -> tuple[np.ndarray, str]:
+        scene = bpy.context.scene
         empty = bpy.data.objects.new(identifier, None)
-        empty.tetflora.is_plant, empty.tetflora.species, empty.tetflora.seed = True, identifier, seed + i
-        empty.scale = (min(10.6 / float(height[i]), 4.2 / float(reach[i])),) * 3
-        empty.location = place * STEP, 20.0 * (terraces - 1 - line), TERRACE * (terraces - 1 - line)
+        empty.tetflora.is_plant, empty.tetflora.species, empty.tetflora.seed = True, identifier, seed
         scene.collection.objects.link(empty)
-    width = (min(PER_ROW, len(known)) - 1) * STEP
-    material = ground_material()
-    for line in range(terraces):
-        y, z = 20.0 * line, TERRACE * line
-        mesh = bpy.data.meshes.new("Terrace")
-        corners = [(-200, y - 10, z), (200, y - 10, z), (200, y + 10, z), (-200, y + 10, z)]
-        wall = [(-200, y + 10, z), (200, y + 10, z), (200, y + 10, z + TERRACE), (-200, y + 10, z + TERRACE)]
-        faces = [(0, 1, 2, 3), (4, 5, 6, 7)] if line < terraces - 1 else [(0, 1, 2, 3)]
-        mesh.from_pydata(corners + wall, [], faces)
-        mesh.materials.append(material)
-        scene.collection.objects.link(bpy.data.objects.new("Terrace", mesh))
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    rise = TERRACE * terraces
-    camera.data.type, camera.data.ortho_scale, camera.data.clip_end = 'ORTHO', width + 10.0, 500.0
-    camera.location = Vector((width / 2, -100.0, rise / 2 - 0.4))
-    camera.rotation_euler = (math.pi / 2, 0, 0)
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    add_daylight(scene, elevation=48.0, azimuth=25.0)
-    scene.view_settings.exposure = 0.6
-    scene.render.resolution_x = 1400
-    scene.render.resolution_y = math.floor(1400 * (rise + 0.8) / (width + 10.0))
-    return [info.name for info in known.values()]
+        bpy.context.view_layer.update()
+        make = session.part("tetflora_addon.blender.plant_mesh").make_plant_meshes
+        (plant,) = make(scene, bpy.context.evaluated_depsgraph_get(), [empty])
+        return _points(plant.data), name
+
+    return build
 
 
-def render_sheet(path: Path, samples: int = 64) -> None:
-    """Render the sheet as a JPEG."""
-    session.clean_file()
-    scene = bpy.context.scene
-    build(scene)
-    scene.tetflora.refine_at_render, scene.tetflora.expand_everything = False, True
-    session.part("tetflora_addon.blender.job").refine(scene, bpy.context.evaluated_depsgraph_get())
-    scene.render.engine = 'CYCLES'
-    scene.cycles.samples, scene.cycles.use_denoising = samples, False
-    scene.render.image_settings.file_format, scene.render.image_settings.quality = 'JPEG', 88
-    scene.render.filepath = str(path)
-    bpy.ops.render.render(write_still=True)
+def opened_cell(identifier: str, orders: int) -> Callable[[], tuple[np.ndarray, str]]:
+    """Puts one plant of which some orders are opened into the scene: their wood as it is, the rest as microsurfaces."""
+
+    def build() -> tuple[np.ndarray, str]:
+        part = session.part
+        scene, depsgraph = bpy.context.scene, bpy.context.evaluated_depsgraph_get()
+        flora = part("tetflora_addon.blender.job").compile_for((identifier,), scene, depsgraph)
+        single = part("tetflora_addon.blender.plant_mesh").single_seed(identifier, SEED)
+        closed = part("tetflora_addon.plants.growth").trunks(flora.rows, single)
+        meshing, materials = part("tetflora_addon.plants.meshing"), part("tetflora_addon.blender.leaf_forms")
+        parts = []
+        for _ in range(orders):
+            closed, _, pieces, _ = part("tetflora_addon.plants.expansion").open_subplants(flora, closed)
+            parts.append(("bark", 0, meshing.tube_buffers(flora, pieces)))
+            parts += [("leaf", leaf.form, leaf.buffers) for leaf in meshing.leaf_meshes(flora, pieces, 0)]
+        points = []
+        if len(closed):
+            facets = part("tetflora_addon.shading.microsurfaces").subplant_facets(
+                flora, closed, np.full(len(closed), FACET)
+            )
+            parts.append(("proxy", 0, facets))
+        for number, (kind, form, buffers) in enumerate(p for p in parts if p[2] is not None):
+            proxy = part("tetflora_addon.blender.materials").proxy_material
+            own = [proxy()] if kind == "proxy" else materials.materials_of(scene, flora.species[0], kind, form)
+            mesh = part("tetflora_addon.blender.meshes").write_mesh(f"{kind} {number}", buffers, own)
+            scene.collection.objects.link(bpy.data.objects.new(mesh.name, mesh))
+            points.append(_points(mesh))
+        count = sum(p[2].polygons for p in parts if p[2] is not None)
+        title = "Closed" if orders == 0 else f"{orders} order{'s' * (orders > 1)} opened"
+        return np.concatenate(points), f"{title}: {count:,} polygons"
+
+    return build
+
+
+def render_sheet(path: Path, samples: int = 96) -> None:
+    """Render one plant of each species of the catalogue, as a JPEG."""
+    known = session.part("tetflora_addon.plants.catalogue").list_species()
+    cells = [species_cell(identifier, info.name) for identifier, info in known.items()]
+    save_sheet(render_cells(cells, WIDTH, HEIGHT, samples), COLUMNS, path)
+
+
+def render_opening(path: Path, samples: int = 96) -> None:
+    """Render one plant with none of its orders opened, one, and so on to all, as a JPEG."""
+    catalogue = session.part("tetflora_addon.plants.catalogue")
+    orders = len(catalogue.load_species(OPENED).orders)
+    cells = [opened_cell(OPENED, number) for number in range(orders + 1)]
+    save_sheet(render_cells(cells, 380, 400, samples), len(cells), path)

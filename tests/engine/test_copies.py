@@ -74,3 +74,10 @@ def test_single_precision_turns_leaves_to_the_light(seed: int, light: float, til
         blade = along - (along * exact[:, :, 2]).sum(1, keepdims=True) * exact[:, :, 2]
         plain &= np.linalg.norm(blade, axis=1) > 0.1
         np.testing.assert_allclose(single[plain], exact[plain], atol=1e-5)
+
+
+def test_no_copies_are_a_mesh_without_faces() -> None:
+    """Of several forms of leaf, a chunk may have none of one."""
+    copies = Copies(LEAF_MODELS["ovate"], 0, 0.4)
+    copies.add(np.zeros((0, 3)), np.zeros((0, 3, 3), np.float32), np.zeros(0), np.zeros((0, 3)))
+    assert copies.buffers().polygons == 0

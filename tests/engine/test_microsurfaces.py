@@ -184,3 +184,18 @@ def test_pieces_without_leaves_have_facets_of_wood_only() -> None:
     none = pieces.take(np.zeros(len(pieces), bool))
     assert piece_facets(flora, none, np.zeros(0)) is None
     assert subplant_facets(flora, trunk.take(np.zeros(5, bool)), np.zeros(0)) is None
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_no_facet_lies_upon_another(order: int) -> None:
+    """Sub-plants with many times more facets than there are samples."""
+    flora = support.flora()
+    species = support.SPECIES.index("broadleaf_tree")
+    subplants = support.trunks(flora.rows, support.plants([5], species))
+    for _ in range(order):
+        subplants, *_ = open_subplants(flora, subplants)
+    subplants = subplants.take(np.array([subplants.length.argmax()]))
+    facets = subplant_facets(flora, subplants, np.full(1, 1e-3 if order else 0.02))
+    centres = support.face_centres(facets)
+    assert len(centres) > 4000
+    assert len(np.unique(np.round(centres, 5), axis=0)) > 0.999 * len(centres)

@@ -322,3 +322,18 @@ def test_children_of_each_sort_have_keys_of_their_own() -> None:
     assert len(np.unique(grown.key)) == len(grown)
     number = sum(branch_counts(flora.rows, trunk, sort) for sort in (LATERAL, FORK, SPUR))
     assert (np.bincount(owner, minlength=50) == number).all()
+
+
+def test_limbs_that_fork_are_as_long_as_those_that_do_not() -> None:
+    """All vigours: a limb's stems go on with what is left of its own length, which follows the crown already."""
+    forked = support.compiled(support.small(order1={"forks": [1, 0], "fork_at": 0.5, "length": [0.4, 0]}))
+    plain = support.compiled(support.small(order1={"length": [0.4, 0]}))
+    seeds = support.plants(np.arange(30))
+    length = []
+    for flora in (forked, plain):
+        pieces = expand(flora, support.trunks(flora.rows, seeds))
+        limbs = pieces.take(flora.rows["order"][pieces.branches.row] == 1)
+        length.append(np.linalg.norm(limbs.end - limbs.start, axis=1).sum())
+    assert length[0] == pytest.approx(length[1], rel=1e-6)
+    trunk, pieces = support.grown(forked, seeds)
+    assert wood_areas(forked, pieces).sum() == pytest.approx(subplant_amounts(forked, trunk).wood_area.sum(), rel=0.05)

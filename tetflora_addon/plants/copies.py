@@ -63,7 +63,7 @@ class Copies:
             for column in (1, 2):
                 point += shape[:, column, None] * scaled[axis, column]
             point += position[:, axis].astype(np.float32)
-        self.positions[new] = points.reshape(-1, len(size)).T
+        self.positions[new] = points.reshape(3 * len(shape), len(size)).T
         self.colour[new] = colour[:, None]
 
     def buffers(self) -> MeshBuffers:

@@ -372,7 +372,7 @@ def chosen_children(
         longest = parent.length * rows["nominal"][parent.row]
         radius = np.where(rows["pipe"][parent.row] > 0, parent.radius * rows["pipe_share"][parent.row] * vigour, radius)
     elif sort == FORK:
-        vigour, longest = parent.vigour, parent.length
+        vigour, longest = parent.vigour, parent.length / np.maximum(parent.vigour, 1e-9)  # which has the vigour already
         radius = radius * np.maximum(whorl, 1) ** (-1 / rows["fork_power"][parent.row])
         angle = np.where(whorl > 1, angle, 0.0)
     else:

@@ -102,7 +102,7 @@ class LeafModel:
     @cached_property
     def width(self) -> float:
         """Extent across the midrib, in units of the leaf's size; what its size on the picture is judged by."""
-        return float(np.ptp(self.positions[:, 0]))
+        return float(np.ptp(self.positions[:, [0, 2]], axis=0).max())
 
 
 def leaf_model(positions: ArrayLike, faces: list[list[int]], uv: ArrayLike | None = None) -> LeafModel:

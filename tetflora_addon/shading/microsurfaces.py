@@ -29,6 +29,9 @@ _FACET_PATH = 1 << 40  # child indices of facets start here
 _WOOD_PATH = 1 << 41
 # Draws of this module. Wood and leaves have counts of their own; none may meet another, or facets bunch up.
 _LEAF_COUNT, _WOOD_COUNT, _TURN, _START, _PLACE = 201, 202, 203, 204, 205
+_MOVE = 211  # three draws from here on
+_GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
+_MOVED = 0.04  # of the length of a sub-plant's branch
 _SKY = np.array([0.0, 0.0, 1.0])
 
 
@@ -138,11 +141,36 @@ def _facet_colours(flora: Flora, row: NDArray, key: NDArray, leaves: NDArray, ou
     return np.clip(mean + flora.rows["leaf_colour"][row, 1] * deviation[:, None], 0, 1)
 
 
-def _picked(points: Points, subplants: Branches, owner: NDArray, index: NDArray) -> NDArray[np.int64]:
-    """Sample (m,) for each facet: runs of them are spread over a sub-plant, and each starts its run elsewhere."""
+def _picked(
+    flora: Flora, points: Points, subplants: Branches, owner: NDArray, index: NDArray, key: NDArray[np.uint64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Samples for facets: runs of them are spread over a sub-plant, and each sub-plant starts its run elsewhere.
+
+    Returns
+    -------
+    (m,) int64, (m, 3) float64, (m, 3, 3) float64
+        Sample, its place in the world, and the rotation from its own axes to the world's. Where a sub-plant has more
+        facets than there are samples, none may lie upon another: whole plants are turned about their trunk, which is as
+        likely a plant; in others places are moved by a little.
+    """
     first, number = points.runs(subplants)
     start = (uniform(subplants.key, _START) * number).astype(np.int64)
-    return first[owner] + (start[owner] + index) % number[owner]
+    pick = first[owner] + (start[owner] + index) % number[owner]
+    rows, row = flora.rows, subplants.row[owner]
+    place = points.position[pick].astype(np.float64)
+    base = subplants.frame[owner]
+    again = index // number[owner]
+    turned = np.flatnonzero((again > 0) & (rows["order"][row] == 0) & ~rows["phantom"][row])
+    if len(turned):
+        angle = again[turned] * _GOLDEN_ANGLE
+        c, s = np.cos(angle), np.sin(angle)
+        x, y = base[turned, :, 0], base[turned, :, 1]
+        base[turned, :, 0], base[turned, :, 1] = c[:, None] * x + s[:, None] * y, c[:, None] * y - s[:, None] * x
+    moved = np.flatnonzero((again > 0) & ((rows["order"][row] > 0) | rows["phantom"][row]))
+    if len(moved):
+        place[moved] += _MOVED * np.stack([signed(key[moved], _MOVE + axis) for axis in range(3)], axis=1)
+    place = subplants.position[owner] + subplants.length[owner, None] * np.einsum("nij,nj->ni", base, place)
+    return pick, place, base
 
 
 def _leaves_of_subplants(flora: Flora, subplants: Branches, amounts: Amounts, side: NDArray) -> Facets:
@@ -150,13 +178,12 @@ def _leaves_of_subplants(flora: Flora, subplants: Branches, amounts: Amounts, si
     one = flora.one_leaf_area(subplants)
     facet = np.maximum(side**2, one)
     owner, index, key = _numbers(subplants.key, amounts.leaf_area, facet, _FACET_PATH, _LEAF_COUNT)
-    pick = _picked(points, subplants, owner, index)
-    base, leaf_row = subplants.frame[owner], points.row[pick]
-    place = np.einsum("nij,nj->ni", base, points.position[pick].astype(np.float64))
+    pick, place, base = _picked(flora, points, subplants, owner, index, key)
+    leaf_row = points.row[pick]
     frame = base @ points.frame[pick].astype(np.float64)
     frame = settled(rows, leaf_row, frame, points.light[pick].astype(np.float64), _SKY)
     half_leaf = 0.5 * rows["leaf_size"][leaf_row, 0] * subplants.scale[owner]
-    centre = subplants.position[owner] + subplants.length[owner, None] * place + half_leaf[:, None] * frame[:, :, 1]
+    centre = place + half_leaf[:, None] * frame[:, :, 1]
     # Sub-plants beyond the limbs know how far outside they are, and all that grows on them is there.
     outward = np.where(rows["outward"][subplants.row[owner]], points.outward[pick], subplants.outward[owner])
     return Facets(
@@ -192,11 +219,8 @@ def _leaves_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDAr
 def _wood_of_subplants(flora: Flora, subplants: Branches, amounts: Amounts, side: NDArray) -> Facets:
     points = flora.samples.wood
     owner, index, key = _numbers(subplants.key, amounts.wood_area / 2, side**2, _WOOD_PATH, _WOOD_COUNT)
-    pick = _picked(points, subplants, owner, index)
-    base = subplants.frame[owner]
-    place = np.einsum("nij,nj->ni", base, points.position[pick].astype(np.float64))
+    pick, centre, base = _picked(flora, points, subplants, owner, index, key)
     axis = np.einsum("nij,nj->ni", base, points.frame[pick, :, 2].astype(np.float64))
-    centre = subplants.position[owner] + subplants.length[owner, None] * place
     colour = flora.rows["branch_colour"][points.row[pick], 0]
     return Facets(centre, _across(axis, key), axis, side[owner], colour, np.zeros(len(owner)))
 

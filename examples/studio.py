@@ -1,0 +1,144 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A light studio for pictures of single plants, and contact sheets of such pictures."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from devtools import session
+
+from .row80 import add_daylight
+
+#: Degrees by which the camera looks down, and by which plants stand to its side of the sun.
+_PITCH, _SUN = 9.0, -40.0
+_FLOOR = (0.55, 0.57, 0.58, 1.0)
+
+
+def add_studio(points: np.ndarray, title: str, aspect: float) -> None:
+    """Floor, sun, sky and a camera that frames points (n, 3); the title stands under them.
+
+    Parameters
+    ----------
+    points : (n, 3) float
+        Of the plant that stands at the origin, metres.
+    title : str
+    aspect : float
+        Width of the picture over its height.
+    """
+    scene = bpy.context.scene
+    # A few twigs that reach far out must not make the rest small.
+    low, high = np.quantile(points, 0.002, axis=0), np.quantile(points, 0.998, axis=0)
+    low[2] = min(low[2], 0.0)
+    pitch = math.radians(_PITCH)
+    across = 2 * max(abs(low[0]), abs(high[0])) * 1.08
+    depth = max(abs(low[1]), abs(high[1])) * math.sin(pitch)
+    top, bottom = high[2] * math.cos(pitch) + depth, low[2] * math.cos(pitch) - depth
+    height = max((top - bottom) / 0.86, across / aspect)
+    middle = bottom + (top - bottom) / 2 - 0.05 * height
+    floor = bpy.data.meshes.new("Floor")
+    side = 400 * height
+    corners = [(-side, -side, 0), (side, -side, 0), (side, side, 0), (-side, side, 0)]
+    floor.from_pydata([(x, y, z + low[2]) for x, y, z in corners], [], [(0, 1, 2, 3)])
+    material = bpy.data.materials.new("Floor")
+    material.diffuse_color = _FLOOR
+    tree = session.part("tetflora_addon.blender.compat").shader_tree(material)
+    tree.nodes.clear()
+    diffuse, output = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new("ShaderNodeOutputMaterial")
+    diffuse.inputs["Color"].default_value = _FLOOR
+    tree.links.new(diffuse.outputs[0], output.inputs[0])
+    floor.materials.append(material)
+    scene.collection.objects.link(bpy.data.objects.new("Floor", floor))
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.type, camera.data.ortho_scale = 'ORTHO', height * max(aspect, 1.0)
+    up = Vector((0.0, math.sin(pitch), math.cos(pitch)))
+    forward = Vector((0.0, math.cos(pitch), -math.sin(pitch)))
+    distance = 20.0 * height
+    camera.location = middle * up - distance * forward
+    camera.rotation_euler = (math.pi / 2 - pitch, 0.0, 0.0)
+    camera.data.clip_end = 1000.0 * height
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    text = bpy.data.curves.new("Title", 'FONT')
+    text.body, text.size, text.align_x = title, 0.055 * height, 'CENTER'
+    label = bpy.data.objects.new("Title", text)
+    label.location = (middle - 0.47 * height) * up - 0.8 * distance * forward
+    label.rotation_euler = camera.rotation_euler
+    label.visible_shadow = label.visible_diffuse = False
+    ink = bpy.data.materials.new("Ink")
+    tree = session.part("tetflora_addon.blender.compat").shader_tree(ink)
+    tree.nodes.clear()
+    black, output = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeOutputMaterial")
+    black.inputs["Color"].default_value = (0.02, 0.02, 0.02, 1.0)
+    tree.links.new(black.outputs[0], output.inputs[0])
+    text.materials.append(ink)
+    scene.collection.objects.link(label)
+    add_daylight(scene, elevation=48.0, azimuth=180.0 - _SUN)
+    # The light of a clouded sky around the sun: coloured shadows would colour the plants.
+    background = next(n for n in scene.world.node_tree.nodes if n.type == 'BACKGROUND')
+    for link in list(background.inputs["Color"].links):
+        scene.world.node_tree.links.remove(link)
+    background.inputs["Color"].default_value, background.inputs["Strength"].default_value = (0.9, 0.95, 1.0, 1.0), 0.7
+
+
+def render_cells(
+    cells: Sequence[Callable[[], tuple[np.ndarray, str]]], width: int, height: int, samples: int
+) -> list[np.ndarray]:
+    """Render pictures of single plants.
+
+    Parameters
+    ----------
+    cells : sequence of callable
+        Each puts one plant at the origin of an empty scene and returns its points (n, 3) and a title.
+    width, height : int
+        Pixels of each picture.
+    samples : int
+
+    Returns
+    -------
+    list of (height, width, 4) float32
+        Display values, the first line at the bottom.
+    """
+    pictures = []
+    with tempfile.TemporaryDirectory() as folder:
+        for number, cell in enumerate(cells):
+            session.clean_file()
+            scene = bpy.context.scene
+            add_studio(*cell(), width / height)
+            scene.tetflora.refine_at_render = False
+            scene.render.engine = 'CYCLES'
+            scene.cycles.samples, scene.cycles.use_denoising = samples, False
+            scene.render.resolution_x, scene.render.resolution_y = width, height
+            session.part("tetflora_addon.blender.compat").set_still_format(scene.render.image_settings, 'PNG')
+            scene.render.filepath = str(Path(folder) / f"{number}.png")
+            bpy.ops.render.render(write_still=True)
+            image = bpy.data.images.load(scene.render.filepath)
+            image.colorspace_settings.name = "Non-Color"
+            pixels = np.zeros(4 * width * height, np.float32)
+            image.pixels.foreach_get(pixels)
+            pictures.append(pixels.reshape(height, width, 4))
+    return pictures
+
+
+def save_sheet(pictures: Sequence[np.ndarray], columns: int, path: Path, quality: int = 88) -> None:
+    """Store pictures of one size side by side, in rows from the top, as a JPEG."""
+    height, width = pictures[0].shape[:2]
+    rows = math.ceil(len(pictures) / columns)
+    sheet = np.ones((rows * height, columns * width, 4), np.float32) * pictures[0][-1, 0]
+    for number, picture in enumerate(pictures):
+        row, column = divmod(number, columns)
+        top = (rows - 1 - row) * height
+        sheet[top : top + height, column * width : (column + 1) * width] = picture
+    image = bpy.data.images.new("sheet", columns * width, rows * height)
+    image.colorspace_settings.name = "Non-Color"
+    image.pixels.foreach_set(sheet.ravel())
+    image.file_format, image.filepath_raw = 'JPEG', str(path)
+    image.save(quality=quality)
+    bpy.data.images.remove(image)
