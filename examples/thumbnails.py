@@ -52,7 +52,7 @@ def render_thumbnail(identifier: str, path: Path) -> None:
     camera.data.clip_end = 10.0 * side
     scene.collection.objects.link(camera)
     scene.camera = camera
-    add_daylight(scene, elevation=45.0, azimuth=120.0)
+    add_daylight(scene, elevation=45.0, azimuth=215.0)
     scene.tetflora.refine_at_render = False
     scene.render.engine, scene.render.film_transparent = 'CYCLES', True
     scene.cycles.samples, scene.cycles.use_denoising = SAMPLES, False

@@ -96,7 +96,7 @@ def leaf_model_of(name: str) -> LeafModel:
 
 def leaf_faces(name: str, seeds: list[int]) -> tuple[NDArray, NDArray]:
     """Area vectors (f, 3) of the faces of all leaves of some plants, and the vertices (v, 3), metres."""
-    flora = support.flora()
+    flora = support.described()
     _, pieces = support.grown(flora, support.plants(seeds, index_of(name)))
     leaves = support.meshes(flora, pieces)[1]
     return (
@@ -123,7 +123,7 @@ def test_a_species_is_written_as_its_table_is(name: str) -> None:
 
 @pytest.mark.parametrize("name", TABLES)
 def test_counts_that_are_compiled_are_those_of_the_table(name: str) -> None:
-    flora, wanted = support.flora(), expected(table_of(name))
+    flora, wanted = support.described(), expected(table_of(name))
     row = support.trunks(flora.rows, support.plants([0], index_of(name))).row[0]
     assert flora.leaf_count[row] == pytest.approx(wanted.leaves, rel=0.005)
     orders = flora.species[index_of(name)].orders
@@ -137,7 +137,7 @@ def test_counts_that_are_compiled_are_those_of_the_table(name: str) -> None:
 @pytest.mark.parametrize("name", TABLES)
 def test_plants_have_the_counts_and_proportions_of_the_table(name: str) -> None:
     """Numbers by order, and lengths and radii in those of the trunk, of five plants."""
-    flora, wanted, number = support.flora(), expected(table_of(name)), 5
+    flora, wanted, number = support.described(), expected(table_of(name)), 5
     trunk, pieces = support.grown(flora, support.plants(np.arange(number), index_of(name)))
     branches = pieces.take(pieces.t0 == 0).branches
     order = flora.rows["order"][branches.row]
@@ -154,7 +154,7 @@ def test_plants_have_the_counts_and_proportions_of_the_table(name: str) -> None:
 
 def test_the_willow_has_the_leaf_area_of_its_table_on_fewer_leaves() -> None:
     """Both without what the envelope cuts off the hanging branches: in proportion to their length."""
-    flora, full, ours = support.flora(), TABLES["willow"]["table"], table_of("willow")
+    flora, full, ours = support.described(), TABLES["willow"]["table"], table_of("willow")
     model = leaf_model_of("willow")
     one = full["LeafScale"] ** 2 * full["LeafScaleX"] * model.area / model.width
     # The table's own number of hanging branches: those by splits are as long as what they split from.
