@@ -33,6 +33,7 @@ from tetflora_addon.plants.growth import (
     trunks,
 )
 from tetflora_addon.plants.pieces import Pieces
+from tetflora_addon.plants.rows import FORK, SPUR
 from tetflora_addon.plants.seeds import Seeds
 
 TABLE = Path(__file__).resolve().parent.parent / "data" / "plants.json"
@@ -192,20 +193,22 @@ def test_frames_stay_rotations_and_branches_keep_their_length() -> None:
 def test_children_sit_on_their_parents() -> None:
     """At the axis, between the bare part and the tip, no thicker than the parent is there."""
     flora = support.flora()
-    trunk = trunks(flora.rows, support.plants(np.arange(9), np.arange(9) % len(support.SPECIES)))
+    trunk = trunks(flora.rows, support.plants(np.arange(30), np.arange(30) % len(support.SPECIES)))
     lines = axes(flora.rows, trunk)
     grown, owner = children(flora.rows, trunk, lines)
     counts = branch_counts(flora.rows, trunk)
-    assert (np.bincount(owner, minlength=len(trunk)) == counts).all()
-    most = flora.rows["count"][trunk.row, 0].sum(axis=1) + 1
-    least = flora.rows["count"][trunk.row, 0] @ [1, -1]
-    assert ((counts < most) & (counts >= np.floor(least))).all()
+    others = sum(branch_counts(flora.rows, trunk, sort) for sort in (FORK, SPUR))
+    assert (np.bincount(owner, minlength=len(trunk)) == counts + others).all()
+    whorl = np.maximum(flora.rows["whorl"][flora.rows["next"][trunk.row, 0]], 1)
+    most = flora.rows["count"][trunk.row, 0].sum(axis=1) + whorl
+    least = flora.rows["count"][trunk.row, 0] @ [1, -1] - whorl
+    assert ((counts < most) & (counts > least)).all()
     a, b = lines.knots[owner, :-1], lines.knots[owner, 1:]
     along = np.clip(((grown.position[:, None] - a) * (b - a)).sum(2) / np.maximum(((b - a) ** 2).sum(2), 1e-30), 0, 1)
     gap = np.linalg.norm(a + along[..., None] * (b - a) - grown.position[:, None], axis=2).min(axis=1)
     assert gap.max() < 1e-9
-    assert (grown.radius <= trunk.radius[owner]).all()
-    assert (grown.row == trunk.row[owner] + 1).all()
+    assert (grown.radius <= trunk.radius[owner] * (1 + flora.rows["flare"][trunk.row[owner]])).all()
+    assert (flora.rows["next"][trunk.row[owner]] == grown.row[:, None]).any(axis=1).all()
 
 
 @given(st.floats(0, 1), st.floats(0, np.pi), st.floats(0, 2 * np.pi), st.floats(0, np.pi))

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tests.engine import support
 from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.plants.growth import radius_at
-from tetflora_addon.plants.meshing import concatenate_buffers, tube_buffers
+from tetflora_addon.plants.meshing import concatenate_buffers, leaf_meshes, tube_buffers
 from tetflora_addon.plants.pieces import Pieces, clipped, leaf_fraction, wood_areas
 
 
@@ -57,9 +57,9 @@ def check_attributes(mesh: MeshBuffers) -> None:
 def test_meshes_of_shipped_species(species: int) -> None:
     flora = support.flora()
     _, pieces = support.grown(flora, support.plants([3, 4], species))
-    leaves = support.leaf_mesh(flora, pieces, species)
-    assert (leaves is None) == (flora.leaf_count[flora.first_row[species]] == 0)
-    for mesh in (tube_buffers(flora, pieces), *([] if leaves is None else [leaves])):
+    tubes, leaves = support.meshes(flora, pieces)
+    assert (not leaves) == (flora.leaf_count[flora.first_row[species]] == 0)
+    for mesh in (*tubes, *leaves):
         check_topology(mesh)
         check_attributes(mesh)
 
@@ -108,28 +108,30 @@ def test_a_straight_tube_is_a_frustum() -> None:
 
 
 def test_area_of_tubes_is_the_area_of_the_wood() -> None:
-    """Mitred joints take and give a little; a thousand branches within 2 %."""
+    """Mitred joints take and give a little, and the curve of a flare is straight between rings."""
     flora = support.flora()
     for species in range(len(support.SPECIES)):
         _, pieces = support.grown(flora, support.plants([1, 2], species))
         area = support.face_areas(tube_buffers(flora, pieces)).sum()
-        assert area == pytest.approx(wood_areas(flora, pieces).sum(), rel=0.02)
+        assert area == pytest.approx(wood_areas(flora, pieces).sum(), rel=0.03)
 
 
 def test_area_of_leaves_is_that_of_the_model_times_size_squared() -> None:
     flora = support.flora()
-    for species, (forms, _) in enumerate(flora.forms):
-        model = forms[0]
+    for species in range(len(support.SPECIES)):
         _, pieces = support.grown(flora, support.plants([1], species))
         tips = pieces.take(pieces.t1 == 1)
-        _, _, size = support.leaves_of(flora, tips.branches)
-        mesh = support.leaf_mesh(flora, pieces, species)
-        if len(size) == 0:
-            assert mesh is None
-            continue
-        assert mesh.polygons == len(size) * model.polygons
-        assert len(mesh.positions) == len(size) * len(model.positions)
-        assert support.face_areas(mesh).sum() == pytest.approx((size**2).sum() * model.area, rel=1e-4)
+        owner, _, size = support.leaves_of(flora, tips.branches)
+        number, area, single = 0, 0.0, True
+        for leaf in leaf_meshes(flora, pieces, species):
+            model = flora.forms[species][leaf.kind][leaf.form]
+            copies = leaf.buffers.polygons // model.polygons
+            assert len(leaf.buffers.positions) == copies * len(model.positions)
+            number, area = number + copies, area + support.face_areas(leaf.buffers).sum()
+            single &= len(flora.forms[species][leaf.kind]) == 1
+        assert number == len(size)
+        expected = (size**2 * flora.leaf.area[tips.branches.row[owner]]).sum()
+        assert area == pytest.approx(expected, rel=1e-4 if single else 0.03)  # forms are drawn by chance
 
 
 def test_uv_of_leaves_and_bark() -> None:

@@ -162,7 +162,7 @@ def test_what_a_quality_may_be(quality: float) -> None:
 def test_what_cannot_be_reached_is_said() -> None:
     with pytest.raises(SpeciesError, match=r"at most 2e\+07 are allowed; lower the quality"):
         with_quality(kind("oak"), QUALITY_LIMITS[1])
-    with pytest.raises(SpeciesError, match=r"grass: one plant cannot have 1e\+06 polygons"):
-        quality_for(kind("grass"), 1e6)
+    with pytest.raises(SpeciesError, match=r"grass: one plant cannot have 1e\+07 polygons"):
+        quality_for(kind("grass"), 1e7)
     with pytest.raises(SpeciesError, match="must be a number greater than 0"):
         quality_for(kind("grass"), math.nan)

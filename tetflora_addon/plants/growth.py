@@ -345,7 +345,7 @@ def chosen_children(
         whorl = rows["whorl"][row]
         node, within = index // whorl, index % whorl
         place = signed(np.where(within > 0, child_key(parent.key, node * whorl + path), key), Draw.PLACE)
-        share = (node + 0.5 + _PLACE_JITTER * place) / (counts[owner] // whorl)
+        share = (node + 0.5 + _PLACE_JITTER * place) / np.maximum(counts[owner] // whorl, 1)
         start = drawn(rows["start"][parent.row, sort], parent.key, _START[sort])
         t = start + (1 - start) * share
         low, high = rows["share"][parent.row, sort].T
