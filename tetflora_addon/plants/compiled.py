@@ -192,7 +192,7 @@ def _compiled(species: tuple[Species, ...]) -> Flora:
         fixed_faces=fixed,
         wood_colour=wood @ rows["branch_colour"][:, 0] / wood.sum(axis=1, keepdims=True),
         transmission=area @ leaf.transmission / np.maximum(leaf_area, 1e-300),
-        samples=draw_samples(rows, leaf, forms, area, wood, polygons, amounts.length),
+        samples=draw_samples(rows, area, wood, amounts.length),
         orientation=orientation_of(rows, forms, area, wood, amounts.length),
         area_nodes=amounts.leaf_area.sum(axis=2),
         colour_nodes=amounts.leaf_colour,

@@ -10,17 +10,14 @@ Kahn and Harris, "Estimation of particle transmission by random sampling", 1951)
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .averages import RowLeaves
 from .foliage import leaf_keys, leaf_places, outwardness, place_leaves
 from .growth import Axes, Branches, axes, branch_counts, chosen_children, chosen_drawn, leaf_counts, radius_at
 from .hashing import child_key, key_of_seed, mix
-from .leaf_models import LeafModel
 from .rows import FORK, LATERAL, SPUR, SPUR_ORDER
 from .stratified import evenly, systematic, thinned
 from .vectors import dot, gathered
@@ -86,11 +83,8 @@ class Samples:
 
 def draw_samples(
     rows: NDArray[np.void],
-    leaf: RowLeaves,
-    forms: Sequence[Sequence[Sequence[LeafModel]]],
     leaf_share: NDArray[np.float64],
     wood_share: NDArray[np.float64],
-    polygons: NDArray[np.float64],
     length: NDArray[np.float64],
 ) -> Samples:
     """Sample every row.
@@ -98,9 +92,6 @@ def draw_samples(
     Parameters
     ----------
     rows : (r,) parameter table
-    leaf, polygons : of no use any more
-    forms : by species and kind
-        Models of leaves.
     leaf_share, wood_share : (r, r) float64
         Expected area in a sub-plant by the row that contributes it.
     length : (r,) float64
