@@ -182,17 +182,7 @@ def test_leaves_are_inclined_as_measured(name: str) -> None:
     assert np.average(inclination, weights=area) == pytest.approx(measured, abs=5)
 
 
-def _density_cases() -> list[Any]:
-    cases = []
-    for name, one in FIGURES.items():
-        if one["density"]:
-            failing = "not_held" in one
-            marks = [pytest.mark.xfail(reason=one["not_held"], strict=True)] if failing else []
-            cases.append(pytest.param(name, marks=marks))
-    return cases
-
-
-@pytest.mark.parametrize("name", _density_cases())
+@pytest.mark.parametrize("name", [n for n, one in FIGURES.items() if one["density"]])
 def test_crowns_are_as_dense_as_measured(name: str) -> None:
     """Leaf area over the volume of an ellipsoid as wide and deep as the crown, as the figures were worked out."""
     density = []
