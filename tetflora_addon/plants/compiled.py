@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,10 +69,8 @@ class Flora:
         Area-weighted mean.
     transmission : (r,) float64
         Share of scattered light that goes through the leaves of the sub-plant.
-    samples : Samples
-        Points on the leaves and wood of sub-plants.
-    orientation : Orientation
-        How their surfaces are turned.
+    averages : Averages
+        All expected amounts by the row that contributes them.
     area_nodes : (r, 3) float64
         Expected one-sided area of leaves at `averages.NODES`, m² at plant scale 1.
     colour_nodes : (r, 3, 3) float64
@@ -98,10 +96,21 @@ class Flora:
     fixed_faces: NDArray[np.float64]
     wood_colour: NDArray[np.float64]
     transmission: NDArray[np.float64]
-    samples: Samples
-    orientation: Orientation
+    averages: Averages
     area_nodes: NDArray[np.float64]
     colour_nodes: NDArray[np.float64]
+
+    @cached_property
+    def samples(self) -> Samples:
+        """Points on the leaves and wood of sub-plants; drawn when first asked for, as only proxies need them."""
+        amounts = self.averages
+        return draw_samples(self.rows, amounts.leaf_area[:, 1], _wood_shares(amounts), amounts.length)
+
+    @cached_property
+    def orientation(self) -> Orientation:
+        """How the surfaces of sub-plants are turned; likewise."""
+        amounts = self.averages
+        return orientation_of(self.rows, self.forms, amounts.leaf_area[:, 1], _wood_shares(amounts), amounts.length)
 
     def species_of(self, row: NDArray[np.integer]) -> NDArray[np.integer]:
         """Index (n,) of the species that rows (n,) belong to."""
@@ -192,8 +201,7 @@ def _compiled(species: tuple[Species, ...]) -> Flora:
         fixed_faces=fixed,
         wood_colour=wood @ rows["branch_colour"][:, 0] / wood.sum(axis=1, keepdims=True),
         transmission=area @ leaf.transmission / np.maximum(leaf_area, 1e-300),
-        samples=draw_samples(rows, area, wood, amounts.length),
-        orientation=orientation_of(rows, forms, area, wood, amounts.length),
+        averages=amounts,
         area_nodes=amounts.leaf_area.sum(axis=2),
         colour_nodes=amounts.leaf_colour,
     )
