@@ -27,7 +27,7 @@ PANELS = {
     "populate": ("TETFLORA_PT_populate",),
     "refinement": ("TETFLORA_PT_refinement", "TETFLORA_PT_limits", "TETFLORA_PT_leaf_objects"),
     "statistics": ("TETFLORA_PT_statistics",),
-    "species": ("TETFLORA_PT_species", "TETFLORA_PT_species_whole"),
+    "species": ("TETFLORA_PT_plants", "TETFLORA_PT_species", "TETFLORA_PT_species_whole"),
 }
 
 
