@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tetflora_addon.errors import SpeciesError
-from tetflora_addon.plants.skeletons import DrawnBranches, Skeleton, drawn_branches, resampled, skeleton_from_edges
+from tetflora_addon.plants.drawn import MAX_SEGMENTS, drawn_lines
+from tetflora_addon.plants.skeletons import DrawnBranches, Skeleton, drawn_branches, skeleton_from_edges
 from tetflora_addon.plants.species import MAX_ORDERS
 
 
@@ -57,7 +58,7 @@ def _point_at(chain: np.ndarray, share: float) -> np.ndarray:
 
 
 def _check_structure(drawn: DrawnBranches) -> None:
-    """What holds for branches of any skeleton, resampled or not."""
+    """What holds for branches of any skeleton."""
     child = np.flatnonzero(drawn.parent >= 0)
     chains = _chains(drawn)
     assert (np.diff(drawn.order) >= 0).all()
@@ -244,48 +245,40 @@ def test_of_several_stems_the_largest_is_the_first() -> None:
 
 
 @several
-@given(trees, st.integers(1, 8))
-def test_resampling_keeps_structure_and_ends(skeleton: Skeleton, most: int) -> None:
+@given(trees)
+def test_even_lines_keep_ends(skeleton: Skeleton) -> None:
     drawn = drawn_branches(skeleton)
-    fewer = resampled(drawn, most)
-    _check_structure(fewer)
-    assert np.diff(fewer.first).max() <= most + 1
-    np.testing.assert_array_equal(np.diff(fewer.first), np.minimum(np.diff(drawn.first), most + 1))
-    np.testing.assert_array_equal(fewer.parent, drawn.parent)
-    np.testing.assert_array_equal(fewer.knots[fewer.first[1:] - 1], drawn.knots[drawn.first[1:] - 1])
-    trunk = drawn.parent < 0
-    np.testing.assert_array_equal(fewer.knots[fewer.first[:-1][trunk]], drawn.knots[drawn.first[:-1][trunk]])
-    np.testing.assert_array_equal(fewer.radius[fewer.first[1:] - 1], drawn.radius[drawn.first[1:] - 1])
+    lines = drawn_lines(drawn)
+    each = np.arange(len(drawn))
+    assert lines.segments.max() <= MAX_SEGMENTS
+    np.testing.assert_array_equal(lines.order, drawn.order)
+    for at, of in ((0, drawn.first[:-1]), (lines.segments, drawn.first[1:] - 1)):
+        np.testing.assert_allclose(lines.knots[each, at], drawn.knots[of], atol=1e-9)
+        np.testing.assert_allclose(lines.radii[each, at], np.maximum(drawn.radius[of], 1e-6), atol=1e-9)
+    assert (lines.length <= drawn.length * (1 + 1e-9)).all()
 
 
-def test_resampling_keeps_the_shape_of_a_fine_curve() -> None:
+def test_even_lines_keep_the_shape_of_a_fine_curve() -> None:
     turn = np.linspace(0, 4, 400)
     spiral = np.stack([np.cos(turn), np.sin(turn), turn], axis=1)
     radius = np.linspace(0.2, 0.1, 400)
     fine = drawn_branches(skeleton_from_edges(spiral, radius, np.stack([np.arange(399), np.arange(1, 400)], 1), "form"))
-    coarse = resampled(fine, 32)
-    where = np.array([_point_at(coarse.knots, share) for share in np.linspace(0, 1, 400)])
-    # An arc of 1/32 of 4 rad bulges by 1 - cos(1/16) = .002; the greedy choice is allowed three times that.
+    coarse = drawn_lines(fine)
+    where = np.array([_point_at(coarse.knots[0], share) for share in np.linspace(0, 1, 400)])
+    # An arc of 1/24 of 4 rad bulges by 1 - cos(1/12) = .0035.
     assert np.linalg.norm(where - fine.knots, axis=1).max() < 0.006
     assert abs(coarse.length[0] / fine.length[0] - 1) < 0.002
-    np.testing.assert_allclose(np.interp(coarse.knots[:, 2], turn, radius), coarse.radius, atol=1e-9)
+    np.testing.assert_allclose(np.interp(coarse.knots[0, :, 2], turn, radius), coarse.radii[0], atol=1e-9)
 
 
-def test_resampling_a_straight_stem_leaves_even_pieces() -> None:
+def test_even_lines_of_a_straight_stem_are_even() -> None:
     z = np.arange(101.0)
     stem = skeleton_from_edges(
         np.stack([0 * z, 0 * z, z], 1), None, np.stack([np.arange(100), np.arange(1, 101)], 1), ""
     )
     evenly = Skeleton(stem.points, np.ones(101), stem.parent)
-    pieces = np.diff(resampled(drawn_branches(evenly), 16).knots[:, 2])
-    assert len(pieces) == 16 and pieces.max() < 2.2 * pieces.min()
-
-
-def test_resampling_leaves_what_has_few_knots() -> None:
-    drawn = drawn_branches(_random_tree(20, 1, 0.2, 1))
-    assert resampled(drawn, 32) is drawn
-    with pytest.raises(ValueError, match="at least 1 segment"):
-        resampled(drawn, 0)
+    pieces = np.diff(drawn_lines(drawn_branches(evenly)).knots[0, :, 2])
+    assert len(pieces) == MAX_SEGMENTS and pieces.max() < 2.2 * pieces.min()
 
 
 def test_skeletons_are_equal_by_content_and_cannot_be_changed() -> None:

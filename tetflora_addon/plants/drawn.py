@@ -5,15 +5,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SpeciesError
-
-if TYPE_CHECKING:
-    from .skeletons import DrawnBranches
+from .skeletons import DrawnBranches
+from .vectors import perpendicular
 
 MAX_SEGMENTS = 24
 """Straight pieces of a drawn branch at most; more are made even."""
@@ -57,24 +55,17 @@ def drawn_lines(branches: DrawnBranches) -> DrawnLines:
     SpeciesError
         More than `MAX_DRAWN` branches.
     """
-    number = len(branches.order)
+    number = len(branches)
     if number > MAX_DRAWN:
         raise SpeciesError(
             f"The form has {number:,} branches, at most {MAX_DRAWN:,} can be drawn by hand; "
             "leave the thinnest away, the computer grows them"
         )
-    points = np.diff(branches.first)
-    segments = np.clip(_FINER * (points - 1), 1, MAX_SEGMENTS)
+    segments = np.clip(_FINER * (np.diff(branches.first) - 1), 1, MAX_SEGMENTS)
     # Fractions of the length at which knots lie, one row a branch; the last one is repeated.
     wanted = np.minimum(np.arange(MAX_SEGMENTS + 1) / segments[:, None], 1.0)
-    owner = np.repeat(np.arange(number), points)
-    steps = np.linalg.norm(np.diff(branches.knots, axis=0, prepend=branches.knots[:1]), axis=1)
-    steps[branches.first[:-1]] = 0
-    along = np.cumsum(steps)
-    along -= along[branches.first[:-1]][owner]
-    length = along[branches.first[1:] - 1]
     # One rising scale for all branches: that of branch b runs from 2 b to 2 b + 1.
-    place = 2 * owner + along / np.maximum(length, 1e-300)[owner]
+    place = 2 * branches.owner + branches.arc / np.maximum(branches.length, 1e-300)[branches.owner]
     at = (2 * np.arange(number)[:, None] + wanted).ravel()
     values = [np.interp(at, place, v).reshape(number, -1) for v in (*branches.knots.T, branches.radius)]
     knots, radii = np.stack(values[:3], axis=-1), np.maximum(values[3], 1e-6)
@@ -92,9 +83,7 @@ def _frames(knots: NDArray[np.float64], segments: NDArray[np.int64]) -> NDArray[
     last = np.minimum(np.arange(step.shape[1]), segments[:, None] - 1)[..., None]
     direction = np.take_along_axis(step / np.maximum(size, 1e-12), last, axis=1)
     z = np.where(np.linalg.norm(direction[:, 0], axis=1, keepdims=True) > 0.5, direction[:, 0], [0.0, 0.0, 1.0])
-    aside = np.where(np.abs(z[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
-    x = aside - (aside * z).sum(axis=1, keepdims=True) * z
-    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    x = perpendicular(z)
     out = np.empty((*direction.shape, 3))
     for s in range(direction.shape[1]):
         ahead = direction[:, s]

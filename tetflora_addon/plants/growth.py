@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .crown_shapes import crown_ratio
 from .hashing import Draw, child_key, key_of_seed, signed, uniform
 from .profiles import profile
-from .rows import FORK, LATERAL, SPUR, drawn, ranged
+from .rows import FORK, LATERAL, SPUR, ranged, varied
 from .seeds import Seeds
 from .vectors import by_component, columns, gathered
 
@@ -183,7 +183,7 @@ def axes(rows: NDArray[np.void], branches: Branches) -> Axes:
     outer_bend = rows["curvature_tip"][branches.row] / segments
     attraction = rows["attraction"][branches.row]
     attracted = np.flatnonzero(attraction.any(axis=1))
-    pull = drawn(attraction[attracted], branches.key[attracted], Draw.ATTRACTION) / segments[attracted]
+    pull = varied(attraction[attracted], branches.key[attracted], Draw.ATTRACTION) / segments[attracted]
     frame, knot = by_component(branches.frame), by_component(branches.position)
     knots[:, 0] = knot
     for s in range(most):
@@ -275,7 +275,7 @@ def fullness(rows: NDArray[np.void], branches: Branches) -> NDArray[np.float64]:
 def branch_counts(rows: NDArray[np.void], branches: Branches, sort: int = LATERAL) -> NDArray[np.int64]:
     """Number of children of one sort of each branch, in whole whorls; its expectation is exactly the range's mean."""
     row, key = branches.row, branches.key
-    wanted = drawn(rows["count"][row, sort], key, _COUNT[sort])
+    wanted = varied(rows["count"][row, sort], key, _COUNT[sort])
     child = rows["next"][row, sort]
     if sort == FORK:
         number = np.maximum(np.floor(wanted + uniform(key, _ROUND[sort])), 1)  # what divides goes on
@@ -346,7 +346,7 @@ def chosen_children(
         node, within = index // whorl, index % whorl
         place = signed(np.where(within > 0, child_key(parent.key, node * whorl + path), key), Draw.PLACE)
         share = (node + 0.5 + _PLACE_JITTER * place) / np.maximum(counts[owner] // whorl, 1)
-        start = drawn(rows["start"][parent.row, sort], parent.key, _START[sort])
+        start = varied(rows["start"][parent.row, sort], parent.key, _START[sort])
         t = start + (1 - start) * share
         low, high = rows["share"][parent.row, sort].T
         share = low + (high - low) * share
@@ -369,15 +369,15 @@ def chosen_children(
     radius = radius_at(rows, parent, t)
     if sort == LATERAL:
         vigour = crown_ratio(rows["crown"][parent.row], 1 - share)
-        longest = parent.length * rows["nominal"][parent.row]
+        measure = parent.length * rows["nominal"][parent.row] * vigour
         radius = np.where(rows["pipe"][parent.row] > 0, parent.radius * rows["pipe_share"][parent.row] * vigour, radius)
     elif sort == FORK:
-        vigour, longest = parent.vigour, parent.length / np.maximum(parent.vigour, 1e-9)  # which has the vigour already
+        vigour, measure = parent.vigour, parent.length  # which follows the crown already
         radius = radius * np.maximum(whorl, 1) ** (-1 / rows["fork_power"][parent.row])
         angle = np.where(whorl > 1, angle, 0.0)
     else:
-        vigour, longest = np.ones(len(index)), parent.scale
-    length = longest * ranged(rows, "length", row, key, Draw.LENGTH) * vigour
+        vigour, measure = np.ones(len(index)), parent.scale
+    length = measure * ranged(rows, "length", row, key, Draw.LENGTH)
     thickness = ranged(rows, "thickness", row, key, Draw.THICKNESS)
     radius = (length if sort == SPUR else radius) * thickness
     frame = turned(frame, azimuth, angle)

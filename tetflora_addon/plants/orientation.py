@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How the surfaces of sub-plants are turned on the mean: moments of their normals, by where the sky is.
 
-Leaves that turn to the sky, and boughs that bend to it, do not turn with their branch. So the mean of n nᵀ in the
-branch's own axes is kept as a polynomial of the sky's direction in these axes. It is found from the highest order
-down: that of a sub-plant is the mean over its own leaves and over the sub-plants on it, whose own are known by then.
+They are the orientations of the paper's summaries (section 6.5). Leaves that turn to the sky, and boughs that bend to
+it, do not turn with their branch. So the mean of n nᵀ in the branch's own axes is kept as a function of the sky's
+direction in these axes: a polynomial, and the first harmonics of its azimuth. It is found from the highest order down:
+that of a sub-plant is the mean over its own leaves and over the sub-plants on it, whose own are known by then.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from .growth import (
 from .hashing import key_of_seed, mix, uniform
 from .leaf_models import LeafModel
 from .rows import FORK, LATERAL, SPUR
+from .vectors import perpendicular
 
 _PIECE = 128
 _BRANCHES = 2048  # of each row that are looked at, each with the sky elsewhere
@@ -131,9 +133,7 @@ def _six(moments: NDArray[np.float64], frame: NDArray[np.float64]) -> NDArray[np
 
 def _frames_along(axis: NDArray[np.float64]) -> NDArray[np.float64]:
     """Frames (n, 3, 3) whose third column is an axis (n, 3), turned about it as may be."""
-    aside = np.where(np.abs(axis[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
-    x = aside - (aside * axis).sum(axis=1, keepdims=True) * axis
-    x /= np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-300)
+    x = perpendicular(axis)
     return np.stack([x, np.cross(axis, x), axis], axis=2)
 
 

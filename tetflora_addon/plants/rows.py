@@ -288,10 +288,10 @@ def ranged(rows: NDArray[np.void], name: str, row: NDArray[np.integer], key: NDA
     -------
     (n,) float64
     """
-    return drawn(rows[name][row], key, draw)
+    return varied(rows[name][row], key, draw)
 
 
-def drawn(values: NDArray[np.float64], key: NDArray[np.uint64], draw: int) -> NDArray[np.float64]:
+def varied(values: NDArray[np.float64], key: NDArray[np.uint64], draw: int) -> NDArray[np.float64]:
     """Mean + variation × a signed random number, of ranges (n, 2) or (1, 2) and keys (n,)."""
     mean, variation = values[..., 0], values[..., 1]
     if not variation.any():  # most are exact, and hashing is most of the time that this takes

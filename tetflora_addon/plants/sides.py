@@ -18,7 +18,7 @@ from .compiled import Flora
 from .foliage import leaf_keys, leaf_places, leaf_start, place_leaves, settled
 from .growth import Axes, Branches, axes, branch_counts, chosen_children, leaf_counts, radius_at, sorts_of, spread
 from .hashing import Draw
-from .rows import FORK, LATERAL, SPUR, drawn
+from .rows import FORK, LATERAL, SPUR, varied
 
 _SKY = np.array([0.0, 0.0, 1.0])
 _START = {LATERAL: Draw.BRANCH_START, SPUR: Draw.SPUR_START}
@@ -197,7 +197,7 @@ def _near_children(
     if sort == FORK:
         owner, index = spread(np.where(distance[-1] < reach, wanted, 0))
     else:
-        start = drawn(rows["start"][parents.row, sort], parents.key, _START[sort])
+        start = varied(rows["start"][parents.row, sort], parents.key, _START[sort])
         owner, index = _near(distance, parents.length, wanted, max(rows["whorl"][child], 1), start, reach)
     return chosen_children(rows, parents, lines, owner, index, counts, sort), owner
 

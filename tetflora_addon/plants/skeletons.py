@@ -253,50 +253,6 @@ def drawn_branches(skeleton: Skeleton) -> DrawnBranches:
     return DrawnBranches(first, knots, along, order, grown_on.astype(np.int32), at, length, outward)
 
 
-def resampled(branches: DrawnBranches, most: int = 32) -> DrawnBranches:
-    """The same branches with at most so many segments each; those that have fewer stay as they are.
-
-    The knots that are kept are the ends and, one after the other, those that deviate most from the line so far, in
-    place or in radius (top-down as in Ramer 1972 and Douglas and Peucker 1973, with a number of knots in place of a
-    tolerance). Branches that leave where a knot was dropped are moved onto their parent's new line.
-
-    Parameters
-    ----------
-    branches : DrawnBranches
-    most : int
-        Segments, 1 or more.
-
-    Returns
-    -------
-    DrawnBranches
-        The argument itself if there is nothing to do.
-    """
-    if most < 1:
-        raise ValueError(f"a branch needs at least 1 segment, not {most}")
-    if (np.diff(branches.first) <= most + 1).all():
-        return branches
-    kept = _kept(branches, most)
-    knots, first, parent = branches.knots.copy(), branches.first, branches.parent.astype(np.int64)
-    low, high = _chords(branches, kept)
-    generation = summed_from_root(parent, parent >= 0)
-    share = np.zeros(len(branches))
-    for g in range(1, int(generation.max()) + 1):  # parents first, since their bases move
-        now = np.flatnonzero(generation == g)
-        a, b = knots[low[now]], knots[high[now]]
-        along = ((knots[first[now]] - a) * (b - a)).sum(axis=1) / np.maximum(((b - a) ** 2).sum(axis=1), 1e-300)
-        share[now] = np.clip(along, 0, 1)
-        knots[first[now]] = a + share[now, None] * (b - a)
-    new_first = np.concatenate([[0], np.cumsum(np.add.reduceat(kept, first[:-1], dtype=np.int64))])
-    new_index = np.cumsum(kept) - 1
-    knots, low, high = knots[kept], new_index[low], new_index[high]
-    arc = _arc(knots, new_first)
-    length = arc[new_first[1:] - 1]
-    place = (1 - share) * arc[low] + share * arc[high]
-    at = np.where(parent >= 0, np.minimum(place / np.maximum(length[parent], 1e-300), 1.0), 0.0)
-    outward = _outward(generation, parent, at)
-    return DrawnBranches(new_first, knots, branches.radius[kept], branches.order, branches.parent, at, length, outward)
-
-
 def _roots(points: NDArray[np.float64], pairs: NDArray[np.int64], size: float) -> NDArray[np.int64]:
     """One point of each connected part, see `skeleton_from_edges`."""
     n = len(points)
@@ -352,43 +308,3 @@ def _outward(level: NDArray[np.int64], parent: NDArray[np.int64], at: NDArray[np
     for g in range(3, int(level.max(initial=0)) + 1):
         outward[level == g] = outward[parent[level == g]]
     return outward
-
-
-def _chords(branches: DrawnBranches, kept: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Kept knots (b,) and (b,) of the parent before and after the place where each branch leaves; any for trunks."""
-    first, parent = branches.first, np.maximum(branches.parent, 0)
-    start = np.cumsum(branches.length) - branches.length
-    place = start[parent] + branches.at * branches.length[parent]
-    below = np.searchsorted(start[branches.owner] + branches.arc, place, side="right") - 1
-    below = np.clip(below, first[parent], first[parent + 1] - 2)
-    before, after = _neighbours(kept)
-    return before[below], after[below + 1]
-
-
-def _neighbours(kept: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The last kept knot up to each knot (k,), and the first from it on; ends of branches are always kept."""
-    index = np.arange(len(kept))
-    before = np.maximum.accumulate(np.where(kept, index, 0))
-    after = np.minimum.accumulate(np.where(kept, index, len(kept) - 1)[::-1])[::-1]
-    return before, after
-
-
-def _kept(branches: DrawnBranches, most: int) -> NDArray[np.bool_]:
-    """Which knots (k,) the branches keep, so that none has more than ``most`` segments."""
-    first, owner = branches.first, branches.owner
-    place = np.column_stack([branches.knots, branches.radius])
-    long = np.diff(first) > most + 1
-    kept = ~long[owner]
-    kept[first[:-1]] = kept[first[1:] - 1] = True
-    for _ in range(most - 1):
-        before, after = _neighbours(kept)
-        chord = place[after] - place[before]
-        way = ((place - place[before]) * chord).sum(axis=1) / np.maximum((chord**2).sum(axis=1), 1e-300)
-        off = np.linalg.norm(place - place[before] - np.clip(way, 0, 1)[:, None] * chord, axis=1)
-        # Of a straight run, which deviates nowhere, the middle: ever finer halves instead of the first knots.
-        off += _SAME * np.minimum(branches.arc - branches.arc[before], branches.arc[after] - branches.arc)
-        off[kept] = -1.0
-        worst = np.maximum.reduceat(off, first[:-1])
-        found = np.flatnonzero((off == worst[owner]) & long[owner])
-        kept[found[np.unique(owner[found], return_index=True)[1]]] = True
-    return kept

@@ -62,3 +62,9 @@ def cross(a: NDArray, b: NDArray) -> NDArray:
 def unit(a: NDArray) -> NDArray:
     """Vectors (n, 3) scaled to length 1, in the precision that they have; zero vectors stay."""
     return a / np.maximum(np.sqrt(dot(a, a)), np.finfo(a.dtype).tiny)
+
+
+def perpendicular(axis: NDArray) -> NDArray:
+    """A unit vector (n, 3) across each of unit vectors (n, 3), turned about it as may be."""
+    helper = np.where(np.abs(axis[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
+    return unit(np.cross(axis, helper))

@@ -23,6 +23,7 @@ from ..plants.hashing import Draw, child_key, mix, signed, uniform
 from ..plants.meshing import concatenate_buffers
 from ..plants.pieces import Pieces
 from ..plants.samples import Points
+from ..plants.vectors import perpendicular
 from ..refinement.contents import Amounts, piece_amounts, subplant_amounts
 
 _FACET_PATH = 1 << 40  # child indices of facets start here
@@ -237,9 +238,7 @@ def _wood_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDArra
 
 def _across(axis: NDArray[np.float64], key: NDArray[np.uint64]) -> NDArray[np.float64]:
     """Unit vectors perpendicular to axes, turned about them at random: closed tubes face all ways around."""
-    helper = np.where(np.abs(axis[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
-    a = np.cross(axis, helper)
-    a /= np.linalg.norm(a, axis=1, keepdims=True)
+    a = perpendicular(axis)
     turn = 2 * np.pi * uniform(key, _TURN)[:, None]
     return np.cos(turn) * a + np.sin(turn) * np.cross(axis, a)
 
