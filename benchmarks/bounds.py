@@ -68,11 +68,11 @@ def run(quick: bool) -> dict[str, float]:
 def grown(flora: Any, branches: Any) -> NDArray[np.float64]:
     """All vertices (v, 3) of sub-plants of one species."""
     part = session.part
-    meshing, foliage = part("tetflora_addon.plants.meshing"), part("tetflora_addon.plants.foliage")
-    pieces = part("tetflora_addon.plants.expansion").expand(flora, branches)
-    tubes = meshing.tube_buffers(flora, pieces)
+    tubes, foliage = part("tetflora_addon.plants.tubes"), part("tetflora_addon.plants.foliage")
+    stems = list(part("tetflora_addon.plants.expansion").expand(flora, branches))
+    tubes = tubes.tube_buffers(flora, part("tetflora_addon.plants.pieces").Pieces.empty(), stems)
     out = [] if tubes is None else [tubes.positions]
-    for own, leaves in placed_leaves(flora, pieces.take(pieces.t1 == 1).branches):
+    for own, leaves in placed_leaves(flora, stems):
         row = own.row[:1]
         frame = foliage.settled(flora.rows, row, leaves.frame, leaves.light, np.array([0.0, 0.0, 1.0]))
         forms = flora.forms[0][flora.rows["leaf_kind"][row[0]]]
@@ -84,18 +84,19 @@ def grown(flora: Any, branches: Any) -> NDArray[np.float64]:
     return np.concatenate(out).astype(np.float64)
 
 
-def placed_leaves(flora: Any, branches: Any) -> Iterator[tuple[Any, Any]]:
+def placed_leaves(flora: Any, stems: list[Any]) -> Iterator[tuple[Any, Any]]:
     """Branches and all leaves on their own axes, row by row."""
     foliage, growth = (session.part(f"tetflora_addon.plants.{n}") for n in ("foliage", "growth"))
     rows = flora.rows
-    for row in np.unique(branches.row):
-        if rows["leaves"][row].sum() > 0:
-            own = branches.take(branches.row == row)
-            counts = growth.leaf_counts(rows, own)
-            owner, index = growth.spread(counts)
-            key = foliage.leaf_keys(own, owner, index)
-            t = foliage.leaf_places(rows, own, owner, index, counts, key)
-            yield own, foliage.place_leaves(rows, own, growth.axes(rows, own), owner, index, key, t)
+    for some in stems:
+        for row in np.unique(some.branches.row):
+            if rows["leaves"][row].sum() > 0:
+                own = some.take(some.branches.row == row)
+                counts = growth.leaf_counts(rows, own.branches)
+                owner, index = growth.spread(counts)
+                key = foliage.leaf_keys(own.branches, owner, index)
+                t = foliage.leaf_places(rows, own.branches, owner, index, counts, key)
+                yield own.branches, foliage.place_leaves(rows, own.branches, own.lines, owner, index, key, t)
 
 
 def vertices_outside(flora: Any, seeds: int) -> int:
@@ -112,13 +113,14 @@ def vertices_outside(flora: Any, seeds: int) -> int:
     for chunk in expansion.chunks(flora.polygons[trunks.row], AT_ONCE):
         whole = trunks.take(chunk)
         bodies, first = bodies_of(flora, whole), whole.plant[0]
-        pieces = expansion.expand(flora, whole)
-        plant = pieces.branches.plant - first
-        radius = pieces.branches.radius * wide[pieces.branches.row]
-        far = np.maximum(*(excess(bodies, plant, p) for p in (pieces.start, pieces.end))) + radius
+        stems = list(expansion.expand(flora, whole))
         doubtful = np.zeros(len(whole), bool)
-        doubtful[plant[far > 0]] = True
-        for own, leaves in placed_leaves(flora, pieces.take(pieces.t1 == 1).branches):
+        for some in stems:
+            owner, _, position = some.knots(flora.rows)
+            plant = some.branches.plant[owner] - first
+            radius = (some.branches.radius * wide[some.branches.row])[owner]
+            doubtful[plant[excess(bodies, plant, position) + radius > 0]] = True
+        for own, leaves in placed_leaves(flora, stems):
             at, reach = own.plant[leaves.branch] - first, flora.leaf.reach[own.row[0]] * leaves.size
             doubtful[at[excess(bodies, at, leaves.position) + reach > 0]] = True
         for i in np.flatnonzero(doubtful):

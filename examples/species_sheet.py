@@ -51,11 +51,12 @@ def opened_cell(identifier: str, orders: int) -> Callable[[], tuple[np.ndarray, 
         flora = part("tetflora_addon.blender.job").compile_for((identifier,), scene, depsgraph)
         single = part("tetflora_addon.blender.plant_mesh").single_seed(identifier, SEED)
         closed = part("tetflora_addon.plants.growth").trunks(flora.rows, single)
-        meshing, materials = part("tetflora_addon.plants.meshing"), part("tetflora_addon.blender.leaf_forms")
+        meshing, tubes = part("tetflora_addon.plants.meshing"), part("tetflora_addon.plants.tubes")
+        materials = part("tetflora_addon.blender.leaf_forms")
         parts = []
         for _ in range(orders):
             closed, _, pieces, _ = part("tetflora_addon.plants.expansion").open_subplants(flora, closed)
-            parts.append(("bark", 0, meshing.tube_buffers(flora, pieces)))
+            parts.append(("bark", 0, tubes.tube_buffers(flora, pieces)))
             parts += [("leaf", leaf.form, leaf.buffers) for leaf in meshing.leaf_meshes(flora, pieces, 0)]
         points = []
         if len(closed):

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -50,3 +50,29 @@ class MeshBuffers:
         """Bytes of all arrays together."""
         arrays = [self.positions, self.edge_verts, self.corner_verts, self.corner_edges, self.face_offsets]
         return sum(a.nbytes for a in arrays) + sum(a.nbytes for _, a in self.attributes.values())
+
+
+def concatenate_buffers(parts: Sequence[MeshBuffers]) -> MeshBuffers | None:
+    """Several meshes as one; they carry the same attributes. None where there are none."""
+    parts = [p for p in parts if p.polygons]
+    if len(parts) < 2:
+        return parts[0] if parts else None
+
+    def joined(name: str, offset_by: str) -> NDArray[np.int32]:
+        sizes = np.cumsum([0] + [len(getattr(p, offset_by)) for p in parts[:-1]])
+        return np.concatenate([getattr(p, name) + np.int32(s) for p, s in zip(parts, sizes, strict=True)])
+
+    corners = np.cumsum([0] + [len(p.corner_verts) for p in parts]).astype(np.int32)
+    starts = [p.face_offsets[:-1] + c for p, c in zip(parts, corners[:-1], strict=True)]
+    return MeshBuffers(
+        positions=np.concatenate([p.positions for p in parts]),
+        edge_verts=joined("edge_verts", "positions"),
+        corner_verts=joined("corner_verts", "positions"),
+        corner_edges=joined("corner_edges", "edge_verts"),
+        face_offsets=np.concatenate([*starts, corners[-1:]]),
+        attributes={
+            name: (domain, np.concatenate([p.attributes[name][1] for p in parts]))
+            for name, (domain, _) in parts[0].attributes.items()
+        },
+        smooth=parts[0].smooth,
+    )

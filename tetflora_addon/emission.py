@@ -14,14 +14,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .buffers import MeshBuffers
+from .buffers import MeshBuffers, concatenate_buffers
 from .plants.compiled import Flora
 from .plants.expansion import chunks, expand
 from .plants.growth import trunks
-from .plants.meshing import concatenate_buffers, leaf_meshes, tube_buffers
+from .plants.meshing import leaf_meshes
 from .plants.pieces import Pieces
 from .plants.seeds import Seeds
 from .plants.species import LEAF_KINDS
+from .plants.stems import Stems
+from .plants.tubes import tube_buffers
 from .refinement.camera import Camera
 from .refinement.contents import bounding_cylinders, piece_amounts, subplant_amounts
 from .refinement.decisions import Decision
@@ -78,7 +80,7 @@ def explicit_blocks(flora: Flora, result: Refinement) -> Iterator[Block]:
     of_subplant, of_piece = block_of_node[contents.subplant_cell], block_of_node[contents.piece_cell]
     for number in range(len(runs)):
         cut, whole = contents.pieces.take(of_piece == number), contents.subplants.take(of_subplant == number)
-        yield from _block(flora, Pieces.concatenate([cut, expand(flora, whole)]), number, (number + 1) / len(runs))
+        yield from _block(flora, cut, list(expand(flora, whole)), number, (number + 1) / len(runs))
 
 
 def expanded_blocks(flora: Flora, seeds: Seeds) -> Iterator[Block]:
@@ -86,19 +88,22 @@ def expanded_blocks(flora: Flora, seeds: Seeds) -> Iterator[Block]:
     plants = trunks(flora.rows, seeds)
     runs = list(chunks(flora.polygons[plants.row], BLOCK_POLYGONS))
     for number, run in enumerate(runs):
-        yield from _block(flora, expand(flora, plants.take(run)), number, (number + 1) / len(runs))
+        whole = list(expand(flora, plants.take(run)))
+        yield from _block(flora, Pieces.empty(), whole, number, (number + 1) / len(runs))
 
 
-def _block(flora: Flora, pieces: Pieces, number: int, fraction: float) -> Iterator[Block]:
-    species = flora.species_of(pieces.branches.row)
+def _block(flora: Flora, pieces: Pieces, stems: list[Stems], number: int, fraction: float) -> Iterator[Block]:
+    of_pieces = flora.species_of(pieces.branches.row)
+    of_stems = [flora.species_of(some.branches.row) for some in stems]
     made: list[tuple[str, int, int, MeshBuffers | None]] = []
-    own = None
-    for s in np.unique(species):
-        own = pieces.take(species == s)
-        made += [(LEAF_KINDS[m.kind], m.form, int(s), m.buffers) for m in leaf_meshes(flora, own, int(s))]
-        made.append(("bark", 0, int(s), tube_buffers(flora, own)))
+    for s in np.unique(np.concatenate([of_pieces, *of_stems])):
+        cut = pieces.take(of_pieces == s)
+        whole = [some.take(species == s) for some, species in zip(stems, of_stems, strict=True)]
+        made += [(LEAF_KINDS[m.kind], m.form, int(s), m.buffers) for m in leaf_meshes(flora, cut, int(s), whole)]
+        made.append(("bark", 0, int(s), tube_buffers(flora, cut, whole)))
+        del cut, whole
     # Whoever takes a block copies it into Blender: what it was made from, and what was taken, is not kept meanwhile.
-    del pieces, species, own
+    del pieces, stems
     while made:
         kind, form, s, buffers = made.pop(0)
         if buffers is not None:

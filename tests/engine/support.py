@@ -19,11 +19,12 @@ from tetflora_addon.plants.expansion import expand
 from tetflora_addon.plants.foliage import leaf_keys, leaf_places, place_leaves
 from tetflora_addon.plants.growth import Branches, axes, leaf_counts, spread, trunks
 from tetflora_addon.plants.members import expected_polygons
-from tetflora_addon.plants.meshing import leaf_meshes, tube_buffers
-from tetflora_addon.plants.pieces import Pieces
+from tetflora_addon.plants.meshing import leaf_meshes
+from tetflora_addon.plants.pieces import Pieces, whole_pieces
 from tetflora_addon.plants.quality import with_quality
 from tetflora_addon.plants.schema import species_from_dict
 from tetflora_addon.plants.seeds import Seeds
+from tetflora_addon.plants.tubes import tube_buffers
 from tetflora_addon.refinement.camera import Camera
 
 SPECIES = tuple(sorted(path.stem for path in builtin_folder().glob("*.json")))
@@ -162,10 +163,16 @@ def camera(
     return Camera(kind, eye, frame, (-half, half, -half, half), near, 1000.0, pixels, pixels)
 
 
+def expanded(one: Flora, subplants: Branches) -> Pieces:
+    """All branches of sub-plants, to the last twig, as pieces."""
+    stems = [whole_pieces(one.rows, some)[0] for some in expand(one, subplants)]
+    return Pieces.concatenate([Pieces.empty(), *stems])
+
+
 def grown(one: Flora, seeds: Seeds) -> tuple[Branches, Pieces]:
     """Trunks, and all branches of the plants as pieces."""
     whole = trunks(one.rows, seeds)
-    return whole, expand(one, whole)
+    return whole, expanded(one, whole)
 
 
 def leaves_of(one: Flora, branches: Branches) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from tests.engine import support
 from tetflora_addon.plants.bounds import ring_stretch, unit_bounds, widest_radii
 from tetflora_addon.plants.compiled import Flora
-from tetflora_addon.plants.expansion import expand, open_subplants
+from tetflora_addon.plants.expansion import open_subplants
 from tetflora_addon.plants.growth import Branches
 from tetflora_addon.plants.sides import body_distances, bounding_bodies, crossing
 
@@ -23,7 +23,7 @@ _FLOAT32 = 1e-6  # relative rounding of vertices
 
 def vertices(flora: Flora, subplant: Branches) -> np.ndarray:
     """All vertices (v, 3) of one sub-plant."""
-    tubes, leaves = support.meshes(flora, expand(flora, subplant))
+    tubes, leaves = support.meshes(flora, support.expanded(flora, subplant))
     return np.concatenate([mesh.positions for mesh in (*tubes, *leaves)]).astype(np.float64)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.engine import support
-from tetflora_addon.plants.expansion import chunks, expand, open_subplants
+from tetflora_addon.plants.expansion import chunks, open_subplants
 from tetflora_addon.plants.growth import Branches
 from tetflora_addon.plants.orientation import leaf_moments, wood_moments
 from tetflora_addon.plants.pieces import wood_areas
@@ -23,7 +23,7 @@ def samples_of_plants(species: int, count: int) -> dict[str, np.ndarray]:
     out: dict[str, list] = {"leaf_count": [], "leaf_area": [], "polygons": [], "wood": [], "wood_expected": []}
     for run in chunks(flora.polygons[trunk.row], 400_000):
         branches = trunk.take(run)
-        pieces = expand(flora, branches)
+        pieces = support.expanded(flora, branches)
         number = len(branches)
         plant = pieces.branches.plant - branches.plant[0]
         wood = np.bincount(plant, wood_areas(flora, pieces), number)
@@ -122,7 +122,7 @@ def test_orientation_of_subplants_at_any_tilt(species: int) -> None:
     steepness = np.argsort(boughs.frame[:, 2, 2])
     for group in np.array_split(steepness, 3):
         some = boughs.take(group[:40])
-        _, leaves = support.meshes(flora, expand(flora, some))
+        _, leaves = support.meshes(flora, support.expanded(flora, some))
         weight = subplant_amounts(flora, some).leaf_area
         expected = np.einsum("n,nij->ij", weight, leaf_moments(flora.orientation, some))
         np.testing.assert_allclose(support.moment(*leaves), expected / weight.sum(), atol=0.05)

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tetflora_addon.plants.compiled import Flora
-from tetflora_addon.plants.expansion import expand
 from tetflora_addon.plants.pieces import Pieces, wood_areas
 from tetflora_addon.plants.seeds import Seeds
 from tetflora_addon.refinement.contents import (
@@ -48,7 +47,7 @@ def divided(flora: Flora, seeds: Seeds, seed: int, kind: str, rounds: int = 4) -
 
 
 def expanded(flora: Flora, contents: Contents) -> Pieces:
-    return Pieces.concatenate([contents.pieces, expand(flora, contents.subplants)])
+    return Pieces.concatenate([contents.pieces, support.expanded(flora, contents.subplants)])
 
 
 def measures(flora: Flora, pieces: Pieces) -> tuple[float, float, int, int]:
@@ -118,7 +117,7 @@ def test_everything_is_on_the_right_side(view: tuple[int, str]) -> None:
     walk(contents.piece_cell, of_pieces)
     some = np.random.default_rng(0).permutation(len(contents.subplants))[:40]
     for one in some:
-        tubes, leaves = support.meshes(flora, expand(flora, contents.subplants.take(one[None])))
+        tubes, leaves = support.meshes(flora, support.expanded(flora, contents.subplants.take(one[None])))
         points = np.concatenate([mesh.positions for mesh in (*tubes, *leaves)]).astype(np.float64)
 
         def of_vertices(planes: np.ndarray, side: np.ndarray, points: np.ndarray = points) -> np.ndarray:

@@ -14,7 +14,7 @@ from tests.engine import support
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.plants.compiled import Flora, compile_species
 from tetflora_addon.plants.drawn import MAX_DRAWN, MAX_SEGMENTS, drawn_lines
-from tetflora_addon.plants.expansion import expand, open_subplants
+from tetflora_addon.plants.expansion import open_subplants
 from tetflora_addon.plants.pieces import wood_areas
 from tetflora_addon.plants.schema import species_from_dict
 from tetflora_addon.plants.skeletons import Skeleton, drawn_branches, skeleton_from_edges
@@ -45,7 +45,7 @@ def test_drawn_branches_are_where_they_were_drawn() -> None:
     one = flora()
     turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
     seeds = replace(support.plants([4], position=(10, 20, 1), scale=2.0), frame=turn[None])
-    pieces = expand(one, support.trunks(one.rows, seeds))
+    pieces = support.expanded(one, support.trunks(one.rows, seeds))
     own = pieces.take(one.rows["drawn"][pieces.branches.row])
     places = (2 * POINTS) @ turn.T + [10, 20, 1]
     step = own.end - own.start
@@ -101,7 +101,7 @@ def test_everything_is_inside_the_bound(drawn: int) -> None:
     trunk = support.trunks(one.rows, support.plants(np.arange(20), scale=1.5))
     centre, radius, half = bounding_cylinders(one, trunk)
     for i in range(20):
-        pieces = expand(one, trunk.take(np.array([i])))
+        pieces = support.expanded(one, trunk.take(np.array([i])))
         axis = trunk.frame[i, :, 2]
         for mesh in chain(*support.meshes(one, pieces)):
             way = mesh.positions - centre[i]
@@ -121,7 +121,7 @@ def test_tubes_follow_the_drawn_radii() -> None:
 
 def test_an_exact_species_gives_the_same_plant_for_every_seed() -> None:
     one = flora(exact=True)
-    a, b = (expand(one, support.trunks(one.rows, support.plants([s]))) for s in (1, 99))
+    a, b = (support.expanded(one, support.trunks(one.rows, support.plants([s]))) for s in (1, 99))
     np.testing.assert_array_equal(a.start, b.start)
     meshes = [support.meshes(one, p)[1][0].positions for p in (a, b)]
     np.testing.assert_array_equal(*meshes)

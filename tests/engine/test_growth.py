@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tetflora_addon.plants.compiled import Flora
-from tetflora_addon.plants.expansion import chunks, expand, open_subplants
+from tetflora_addon.plants.expansion import chunks, open_subplants
 from tetflora_addon.plants.foliage import face_light, leaf_keys, leaf_places, place_leaves
 from tetflora_addon.plants.growth import (
     Branches,
@@ -78,7 +78,7 @@ def test_a_subplant_alone_is_the_same_as_inside_the_whole(species: int, seed: in
         one_child = chosen_children(flora.rows, one, lines, np.zeros(1, np.int64), index, counts)
         assert same(one_child, children(flora.rows, one)[0].take(index))
         one = one_child
-    alone = by_key(expand(flora, one))
+    alone = by_key(support.expanded(flora, one))
     inside = by_key(whole.take(np.isin(whole.branches.key, alone.branches.key)))
     assert same(alone, inside)
 
@@ -107,7 +107,7 @@ def test_forwards_is_backwards_and_whole_is_in_chunks() -> None:
     forwards, _ = children(flora.rows, level)
     order = [np.lexsort([b.key, b.plant]) for b in (forwards, backwards)]
     assert same(forwards.take(order[0]), backwards.take(order[1]))
-    parts = [expand(flora, trunk.take(run)) for run in chunks(flora.polygons[trunk.row], 500)]
+    parts = [support.expanded(flora, trunk.take(run)) for run in chunks(flora.polygons[trunk.row], 500)]
     assert len(parts) > 3
     assert same(by_key(Pieces.concatenate(parts)), by_key(whole))
 

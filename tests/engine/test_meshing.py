@@ -10,10 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.engine import support
-from tetflora_addon.buffers import MeshBuffers
+from tetflora_addon.buffers import MeshBuffers, concatenate_buffers
+from tetflora_addon.plants.expansion import expand
 from tetflora_addon.plants.growth import radius_at
-from tetflora_addon.plants.meshing import concatenate_buffers, leaf_meshes, tube_buffers
+from tetflora_addon.plants.meshing import leaf_meshes
 from tetflora_addon.plants.pieces import Pieces, clipped, leaf_fraction, wood_areas
+from tetflora_addon.plants.tubes import tube_buffers
 
 
 def check_topology(mesh: MeshBuffers) -> None:
@@ -243,3 +245,22 @@ def test_no_mesh_without_contents() -> None:
     bare = pieces.take((pieces.branches.row == 1) & (pieces.t1 <= 0.5))
     assert len(bare)
     assert support.leaf_mesh(flora, bare, 0) is None
+
+
+def test_whole_branches_are_the_same_as_all_their_pieces() -> None:
+    """Down to the last digit, whichever way they came; in the emission whole branches pass by without being pieces."""
+    flora = support.flora()
+    for species in range(len(support.SPECIES)):
+        whole, pieces = support.grown(flora, support.plants([1, 2], species))
+        stems = list(expand(flora, whole))
+        meshes = [
+            [tube_buffers(flora, *some), *(leaf.buffers for leaf in leaf_meshes(flora, some[0], species, some[1]))]
+            for some in ((pieces, ()), (Pieces.empty(), stems))
+        ]
+        for cut, made in zip(*meshes, strict=True):
+            assert cut.polygons == made.polygons
+            check_topology(made)
+            faces = [support.face_vectors(m).round(9) + support.face_centres(m).round(6) for m in (cut, made)]
+            assert np.array_equal(*(np.sort(f.view([("", float)] * 3).reshape(-1)) for f in faces))
+            for name, (_, values) in cut.attributes.items():
+                assert values.sum() == pytest.approx(made.attributes[name][1].sum(), rel=1e-5)

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from tests.engine import support
 from tetflora_addon.plants.averages import quadratic
 from tetflora_addon.plants.compiled import Flora
-from tetflora_addon.plants.expansion import expand, open_subplants
+from tetflora_addon.plants.expansion import open_subplants
 from tetflora_addon.plants.foliage import leaf_keys, leaf_places, outwardness, place_leaves, settled
 from tetflora_addon.plants.growth import Branches, axes, branch_counts, children, leaf_counts, radius_at, spread
 from tetflora_addon.plants.members import expected_members, expected_polygons
@@ -99,7 +99,7 @@ def test_moments_of_what_depends_on_the_sky() -> None:
     boughs = boughs.take(flora.rows["order"][boughs.row] == 1)
     for group in np.array_split(np.argsort(boughs.frame[:, 2, 2]), 4):
         some = boughs.take(group[:250])
-        tubes, blades = support.meshes(flora, expand(flora, some))
+        tubes, blades = support.meshes(flora, support.expanded(flora, some))
         amounts = subplant_amounts(flora, some)
         weight = amounts.leaf_area
         expected = np.einsum("n,nij->ij", weight, leaf_moments(flora.orientation, some)) / weight.sum()
@@ -118,7 +118,7 @@ def test_samples_lie_where_attracted_boughs_have_their_leaves() -> None:
     points = flora.samples.leaves
     for group in np.array_split(np.argsort(boughs.frame[:, 2, 2]), 4):
         some = boughs.take(group[:200])
-        pieces = expand(flora, some)
+        pieces = support.expanded(flora, some)
         tips = pieces.take(pieces.t1 == 1)
         owner, found, _ = leaves(flora, tips.branches)
         area = found.size**2 * flora.leaf.area[tips.branches.row[owner]]
@@ -164,7 +164,7 @@ def test_a_fork_of_one_stem_goes_straight_on() -> None:
 
 def test_laterals_of_a_forked_branch_are_as_many_to_a_length() -> None:
     flora, trunk = trunk_of(np.arange(400), forks=[2, 0], fork_at=0.5, branches=[12, 2], branch_start=0.0)
-    pieces = expand(flora, trunk)
+    pieces = support.expanded(flora, trunk)
     orders = flora.rows["order"][pieces.branches.row]
     laterals = (pieces.t0 == 0) & (orders == 1)
     assert laterals.sum() / 400 == pytest.approx(12 * (0.5 + 2 * 0.5), rel=0.02)
@@ -268,7 +268,7 @@ def test_leaves_hang_as_far_as_asked() -> None:
 def test_spurs_and_blossoms_are_as_many_as_described() -> None:
     flora = rich()
     trunk = support.trunks(flora.rows, support.plants(np.arange(300)))
-    pieces = expand(flora, trunk)
+    pieces = support.expanded(flora, trunk)
     forms: dict[tuple[int, int], int] = {}
     for leaf in leaf_meshes(flora, pieces, 0):
         forms[leaf.kind, leaf.form] = leaf.buffers.polygons // flora.forms[0][leaf.kind][leaf.form].polygons
@@ -331,7 +331,7 @@ def test_limbs_that_fork_are_as_long_as_those_that_do_not() -> None:
     seeds = support.plants(np.arange(30))
     length = []
     for flora in (forked, plain):
-        pieces = expand(flora, support.trunks(flora.rows, seeds))
+        pieces = support.expanded(flora, support.trunks(flora.rows, seeds))
         limbs = pieces.take(flora.rows["order"][pieces.branches.row] == 1)
         length.append(np.linalg.norm(limbs.end - limbs.start, axis=1).sum())
     assert length[0] == pytest.approx(length[1], rel=1e-6)

@@ -13,11 +13,10 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from .. import emission
-from ..buffers import MeshBuffers
+from ..buffers import MeshBuffers, concatenate_buffers
 from ..errors import SceneError
 from ..plants.compiled import Flora
 from ..plants.growth import trunks
-from ..plants.meshing import concatenate_buffers
 from ..plants.seeds import Seeds
 from ..plants.species import Species
 from . import job

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from .compiled import Flora
 from .growth import Branches, axes, children, drawn_children
 from .pieces import Pieces, whole_pieces
+from .stems import Stems
 
 
 def open_subplants(flora: Flora, subplants: Branches) -> tuple[Branches, NDArray[np.int64], Pieces, NDArray[np.int64]]:
@@ -22,6 +23,25 @@ def open_subplants(flora: Flora, subplants: Branches) -> tuple[Branches, NDArray
     Branches, (m,) int64, Pieces, (k,) int64
         Children with the index of the sub-plant that each comes from, and pieces with theirs.
     """
+    stems, body, grown, owner = _opened(flora, subplants)
+    pieces, piece_owner = whole_pieces(flora.rows, stems)
+    return grown, body[owner], pieces, body[piece_owner]
+
+
+def expand(flora: Flora, subplants: Branches) -> Iterator[Stems]:
+    """All branches of sub-plants, to the last twig, order by order.
+
+    Notes
+    -----
+    Memory grows with the number of branches; split the sub-plants with `chunks` where there are many.
+    """
+    while len(subplants):
+        stems, _, subplants, _ = _opened(flora, subplants)
+        yield stems
+
+
+def _opened(flora: Flora, subplants: Branches) -> tuple[Stems, NDArray[np.int64], Branches, NDArray[np.int64]]:
+    """Branches of sub-plants with the index of the sub-plant of each, and their children with that of their parent."""
     rows = flora.rows
     phantom = rows["phantom"][subplants.row]
     if phantom.any():  # a form drawn by hand: its branches are known, and opened with the plant
@@ -31,23 +51,7 @@ def open_subplants(flora: Flora, subplants: Branches) -> tuple[Branches, NDArray
     else:
         bodies, body = subplants, np.arange(len(subplants))
     lines = axes(rows, bodies)
-    pieces, piece_owner = whole_pieces(rows, bodies, lines)
-    grown, owner = children(rows, bodies, lines)
-    return grown, body[owner], pieces, body[piece_owner]
-
-
-def expand(flora: Flora, subplants: Branches) -> Pieces:
-    """All branches of sub-plants, to the last twig, as pieces.
-
-    Notes
-    -----
-    Memory grows with the number of branches; split the sub-plants with `chunks` where there are many.
-    """
-    parts = [Pieces.empty()]
-    while len(subplants):
-        subplants, _, pieces, _ = open_subplants(flora, subplants)
-        parts.append(pieces)
-    return Pieces.concatenate(parts)
+    return Stems(bodies, lines), body, *children(rows, bodies, lines)
 
 
 def chunks(polygons: NDArray[np.float64], limit: float) -> Iterator[slice]:

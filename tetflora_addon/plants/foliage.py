@@ -35,7 +35,7 @@ class Leaves:
     size : (n,) float64
         Metres by which the leaf model is scaled.
     light : (n,) float64
-        How far it turns to the sky.
+        How far it turns to the sky; (1,) where that is the same for all.
     """
 
     branch: NDArray[np.int64]

@@ -105,6 +105,10 @@ class Axes:
     frames: NDArray[np.float64]
     segments: NDArray[np.int64]
 
+    def take(self, index: NDArray | slice) -> Axes:
+        """Selection by indices or slice."""
+        return Axes(_selected(self.knots, index), _selected(self.frames, index), self.segments[index])
+
     def at(self, branch: NDArray[np.integer], t: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
         """Positions (m, 3) and frames (m, 3, 3) at the fractions t (m,) of the axes of branches (m,)."""
         number = self.segments[branch]
@@ -121,6 +125,13 @@ class Axes:
     def frame(self, branch: NDArray[np.integer], segment: NDArray[np.integer]) -> NDArray[np.float64]:
         """Frames (m, 3, 3) of segments given by branch (m,) and number (m,)."""
         return _picked(self.frames, branch, segment)
+
+
+def _selected(array: NDArray, index: NDArray | slice) -> NDArray:
+    """``array[index]`` of an array whose first axis is the last in memory and whose second the one before."""
+    if isinstance(index, slice):
+        return array[index]
+    return np.moveaxis(np.take(np.moveaxis(array, (1, 0), (-2, -1)), index, axis=-1), (-2, -1), (1, 0))
 
 
 def _picked(array: NDArray, first: NDArray[np.integer], second: NDArray[np.integer]) -> NDArray:

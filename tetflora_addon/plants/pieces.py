@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from .averages import own_leaf_integrals, tube_perimeter
 from .compiled import Flora
 from .foliage import leaf_start, outwardness
-from .growth import Axes, Branches, spread
+from .growth import Branches
 from .profiles import profile_integral
-from .rows import flare_rings
+from .stems import Stems
 from .vectors import gathered
 
 
@@ -89,24 +89,13 @@ def along_branches(pieces: Pieces) -> Pieces:
     return pieces.take(np.concatenate([np.flatnonzero(~of_part), rest]))
 
 
-def whole_pieces(rows: NDArray[np.void], branches: Branches, lines: Axes) -> tuple[Pieces, NDArray[np.int64]]:
-    """All segments of branches as pieces, and the index of the branch of each; a flared base has some more."""
-    rings = rows["rings"][branches.row]
-    owner, index = spread(lines.segments + rings)
-    segment = np.maximum(index - rings[owner], 0)
-    number = lines.segments[owner]
-    t0, t1 = segment / number, (segment + 1) / number
-    start, end = lines.knot(owner, segment), lines.knot(owner, segment + 1)
-    flared = np.flatnonzero((index <= rings[owner]) & (rings[owner] > 0))
-    if len(flared):  # the first segment, cut where the flare bends most
-        at = np.concatenate([[0.0], flare_rings(int(rings.max()))])
-        i, r = index[flared], rings[owner[flared]]
-        low = at[i]
-        high = np.where(i < r, at[np.minimum(i + 1, len(at) - 1)], t1[flared])
-        whole, base, step = t1[flared, None], start[flared], end[flared] - start[flared]
-        t0[flared], t1[flared] = low, high
-        start[flared], end[flared] = base + step * (low[:, None] / whole), base + step * (high[:, None] / whole)
-    return Pieces(branches.take(owner), t0, t1, start, end), owner
+def whole_pieces(rows: NDArray[np.void], stems: Stems) -> tuple[Pieces, NDArray[np.int64]]:
+    """All segments of branches as pieces, and the index of the branch of each."""
+    owner, t, position = stems.knots(rows)
+    low = np.flatnonzero(owner[1:] == owner[:-1])
+    ends = gathered(position, low), gathered(position, low + 1)
+    owner = np.take(owner, low)
+    return Pieces(stems.branches.take(owner), t[low], t[low + 1], *ends), owner
 
 
 def clipped(

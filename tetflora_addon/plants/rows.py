@@ -287,6 +287,7 @@ def ranged(rows: NDArray[np.void], name: str, row: NDArray[np.integer], key: NDA
     Returns
     -------
     (n,) float64
+        Or (1,) where it is the same for all of one row.
     """
     return varied(rows[name][row], key, draw)
 
@@ -295,5 +296,5 @@ def varied(values: NDArray[np.float64], key: NDArray[np.uint64], draw: int) -> N
     """Mean + variation × a signed random number, of ranges (n, 2) or (1, 2) and keys (n,)."""
     mean, variation = values[..., 0], values[..., 1]
     if not variation.any():  # most are exact, and hashing is most of the time that this takes
-        return mean + np.zeros(len(key))
+        return mean if len(mean) == 1 else mean + np.zeros(len(key))
     return mean + variation * signed(key, draw)

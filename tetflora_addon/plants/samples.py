@@ -348,7 +348,8 @@ def _leaf_points(rows: NDArray[np.void], one: _Arrived, lines: Axes) -> _Points:
     leaves = place_leaves(rows, branches, lines, picked, index, key, t)
     outward = outwardness(rows, branches, picked, t)
     area = (one.weight * counts)[picked] * leaves.size**2
-    return _Points.on(rows, one, picked, leaves.position, leaves.frame, outward, leaves.light, area)
+    light = np.broadcast_to(leaves.light, len(leaves))  # may be one number for all
+    return _Points.on(rows, one, picked, leaves.position, leaves.frame, outward, light, area)
 
 
 def _drawn_child(rows: NDArray[np.void], one: _Arrived, number: int, places: int) -> _Arrived:

@@ -15,12 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..buffers import MeshBuffers
+from ..buffers import MeshBuffers, concatenate_buffers
 from ..plants.compiled import Flora
 from ..plants.foliage import leaf_start, mean_leaf_colours, outwardness, place_leaves, settled
 from ..plants.growth import Branches, axes, spread
 from ..plants.hashing import Draw, child_key, mix, signed, uniform
-from ..plants.meshing import concatenate_buffers
 from ..plants.pieces import Pieces
 from ..plants.samples import Points
 from ..plants.vectors import perpendicular
