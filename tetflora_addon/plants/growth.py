@@ -205,7 +205,9 @@ def axes(rows: NDArray[np.void], branches: Branches) -> Axes:
             )
             aside = bend[:, 1] * signed(branches.key, Draw.BEND + 2 * s + 1)
             frame = _bent(frame, -back, aside)
-            if len(attracted):
+            if len(attracted) == n:
+                frame = _pulled(frame, pull)
+            elif len(attracted):
                 frame[attracted] = _pulled(gathered(frame, attracted), pull)
         knot = np.where((s < segments)[:, None], knot + step * frame[:, :, 2], knot)
         frames[:, s], knots[:, s + 1] = frame, knot
@@ -266,14 +268,14 @@ def _pulled(frame: NDArray[np.float64], pull: NDArray[np.float64]) -> NDArray[np
     level = np.hypot(frame[:, 0, 2], frame[:, 1, 2])
     safe = np.maximum(level, 1e-12)
     kx, ky = frame[:, 1, 2] / safe, -frame[:, 0, 2] / safe  # z × sky
-    cos, sin = np.cos(pull * level)[:, None], np.sin(pull * level)[:, None]
+    cos, sin = np.cos(pull * level), np.sin(pull * level)
     out = np.empty_like(frame)
     for column in range(3):
-        v = frame[:, :, column]
-        along = kx * v[:, 0] + ky * v[:, 1]
-        across = np.stack([ky * v[:, 2], -kx * v[:, 2], kx * v[:, 1] - ky * v[:, 0]], axis=1)
-        axis = np.stack([kx * along, ky * along, np.zeros(len(along))], axis=1)
-        out[:, :, column] = cos * v + sin * across + (1 - cos) * axis
+        vx, vy, vz = frame[:, :, column].T
+        along = (1 - cos) * (kx * vx + ky * vy)
+        out[:, 0, column] = cos * vx + sin * (ky * vz) + kx * along
+        out[:, 1, column] = cos * vy - sin * (kx * vz) + ky * along
+        out[:, 2, column] = cos * vz + sin * (kx * vy - ky * vx)
     return out
 
 

@@ -64,9 +64,12 @@ def mix(z: NDArray[np.uint64]) -> NDArray[np.uint64]:
     """
     z = np.asarray(z, dtype=np.uint64)
     with np.errstate(over="ignore"):  # only scalars warn; wrapping is what is wanted
-        z = (z ^ (z >> np.uint64(30))) * _MIX_1
-        z = (z ^ (z >> np.uint64(27))) * _MIX_2
-        return z ^ (z >> np.uint64(31))
+        z = z ^ (z >> np.uint64(30))  # a new array, in which all that follows is worked out
+        z *= _MIX_1
+        z ^= z >> np.uint64(27)
+        z *= _MIX_2
+        z ^= z >> np.uint64(31)
+        return z
 
 
 def key_of_seed(seed: ArrayLike) -> NDArray[np.uint64]:
@@ -94,9 +97,15 @@ def uniform(key: NDArray[np.uint64], draw: int) -> NDArray[np.float64]:
     """
     with np.errstate(over="ignore"):
         z = mix(np.asarray(key, dtype=np.uint64) + np.uint64(draw) * _GOLDEN)
-    return (z >> np.uint64(11)).astype(np.float64) * _TO_UNIT
+    z >>= np.uint64(11)
+    out = z.astype(np.float64)
+    out *= _TO_UNIT
+    return out
 
 
 def signed(key: NDArray[np.uint64], draw: int) -> NDArray[np.float64]:
     """Numbers in [-1, 1), one for each key."""
-    return 2.0 * uniform(key, draw) - 1.0
+    out = uniform(key, draw)
+    out *= 2.0
+    out -= 1.0
+    return out
