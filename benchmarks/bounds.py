@@ -33,7 +33,7 @@ FACETS, AROUND = 80, 40
 _HALVINGS = 9
 _FLOAT32 = 1e-6
 
-TARGETS: Targets = {"outside": {"max": 0}, "hull_ratio_max": {"max": 4.0}}
+TARGETS: Targets = {"outside": {"max": 0}, "hull_ratio_median": {"max": 4.0}}
 QUICK_TARGETS: Targets = TARGETS
 
 
