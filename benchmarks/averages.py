@@ -83,8 +83,8 @@ def species_errors(flora: Any, seeds: int) -> tuple[float, float, float, float]:
 
 def foretold(flora: Any, subplants: Any, oriented: bool) -> np.ndarray:
     """Expected sums over sub-plants."""
-    contents, orientation = (session.part(f"tetflora_addon.{n}") for n in ("refinement.contents", "plants.orientation"))
-    amounts = contents.subplant_amounts(flora, subplants)
+    sizes, orientation = (session.part(f"tetflora_addon.{n}") for n in ("refinement.amounts", "plants.orientation"))
+    amounts = sizes.subplant_amounts(flora, subplants)
     out = np.zeros(_FIELDS)
     out[0], out[1] = amounts.leaf_area.sum(), amounts.wood_area.sum()
     out[2:5] = amounts.leaf_area @ flora.leaf_colours(subplants)

@@ -25,7 +25,7 @@ from .plants.species import LEAF_KINDS
 from .plants.stems import Stems
 from .plants.tubes import tube_buffers
 from .refinement.camera import Camera
-from .refinement.contents import bounding_cylinders, piece_amounts, subplant_amounts
+from .refinement.contents import bounding_cylinders
 from .refinement.decisions import Decision
 from .refinement.loop import Refinement
 from .shading.microsurfaces import kept_out_of_view, piece_facets, subplant_facets
@@ -133,11 +133,11 @@ def facet_buffers(
     parts: list[MeshBuffers | None] = []
     for things, branches, centre, cell, amounts, make in (
         (subplants, subplants, bounding_cylinders(flora, subplants)[0], contents.subplant_cell,
-         subplant_amounts(flora, subplants), subplant_facets),
+         contents.subplant_amounts, subplant_facets),
         (pieces, pieces.branches, (pieces.start + pieces.end) / 2, contents.piece_cell,
-         piece_amounts(flora, pieces), piece_facets),
+         contents.piece_amounts, piece_facets),
     ):  # fmt: skip
-        fine = facet_pixels * _extent(camera, centre)
+        fine = facet_pixels * camera.extent_around(centre)
         least = np.sqrt(HIDDEN_LEAVES * flora.one_leaf_area(branches))
         side = np.where(hidden[cell], np.maximum(coarse * fine, least), fine)
         expected = (amounts.leaf_area + amounts.wood_area) / side**2 + 1
@@ -149,14 +149,6 @@ def facet_buffers(
             made = make(flora, things.take(i), side[i], hidden[cell[i]])
             parts.append(kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5))
     return concatenate_buffers([p for p in parts if p is not None])
-
-
-def _extent(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Metres (n,) that a pixel spans at points (n, 3), in view or not."""
-    extent = camera.pixel_extent(points)
-    if camera.kind == "PERSP":  # beside and behind the camera depth says nothing, but distance does
-        extent = np.maximum(extent, camera.pixel_size * np.linalg.norm(points - camera.position, axis=1))
-    return extent
 
 
 def _runs(expected: NDArray[np.float64], chosen: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:

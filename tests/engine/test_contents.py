@@ -13,36 +13,33 @@ from tests.engine import support
 from tetflora_addon.plants.compiled import Flora
 from tetflora_addon.plants.pieces import Pieces, wood_areas
 from tetflora_addon.plants.seeds import Seeds
-from tetflora_addon.refinement.contents import (
-    Contents,
-    bounding_box,
-    node_amounts,
-    piece_amounts,
-    push_down,
-    subplant_amounts,
-)
-from tetflora_addon.tetrahedra.geometry import volume
+from tetflora_addon.refinement.amounts import piece_amounts, subplant_amounts
+from tetflora_addon.refinement.contents import Contents, Holdings, bounding_box
+from tetflora_addon.refinement.descent import Slack, push_down
+from tetflora_addon.tetrahedra.geometry import face_planes, volume
 from tetflora_addon.tetrahedra.roots import view_root
 from tetflora_addon.tetrahedra.tree import TetrahedralTree
 
 views = st.tuples(st.integers(0, 2**31), st.sampled_from(["PERSP", "ORTHO"]))
 
 
-def divided(flora: Flora, seeds: Seeds, seed: int, kind: str, rounds: int = 4) -> tuple[TetrahedralTree, Contents]:
+def divided(
+    flora: Flora, seeds: Seeds, seed: int, kind: str, rounds: int = 4, slack: Slack | None = None
+) -> tuple[TetrahedralTree, Contents]:
     """Plants in a tree that a random camera roots and random choices divide, handed on after every round."""
     rng = np.random.default_rng(seed)
     eye = rng.uniform(-12, 12, 3) * [1, 1, 0.3] + [0, 0, 2]  # beside, among, above and below the plants
     camera = support.camera(eye, rng.uniform(-3, 3, 3), kind=kind, view=0.8 if kind == "PERSP" else 6.0)
     contents = Contents.of_plants(flora, seeds)
     tree = view_root(camera, bounding_box(flora, contents.subplants))
-    contents = push_down(flora, tree, contents)
+    contents = push_down(flora, tree, contents, slack)
     for _ in range(rounds):
-        every = node_amounts(flora, contents, len(tree))
+        every = contents.sums(len(tree))
         nodes = np.flatnonzero(every.leaf_area + every.wood_area > 0)
         nodes = nodes[rng.random(len(nodes)) < 0.7]
         for _ in range(2):
             nodes = tree.split(nodes).ravel()
-        contents = push_down(flora, tree, contents)
+        contents = push_down(flora, tree, contents, slack)
     return tree, contents
 
 
@@ -150,7 +147,7 @@ def test_expected_amounts_do_not_depend_on_how_contents_are_cut() -> None:
     seeds = support.grove(300, 1.5)
     whole = subplant_amounts(flora, Contents.of_plants(flora, seeds).subplants)
     tree, contents = divided(flora, seeds, 3, "PERSP", rounds=3)
-    every = node_amounts(flora, contents, len(tree))
+    every = contents.sums(len(tree))
     things = [subplant_amounts(flora, contents.subplants), piece_amounts(flora, contents.pieces)]
     for name in ("leaf_area", "wood_area", "polygons"):
         total = getattr(every, name).sum()
@@ -181,11 +178,65 @@ def test_selection_and_joining() -> None:
     tree, contents = divided(flora, support.grove(4, 2.0), 1, "PERSP")
     chosen = np.random.default_rng(0).random(len(tree)) < 0.5
     a, b = contents.within(chosen), contents.within(~chosen)
-    both = Contents.joined(a, b)
+    both = Contents.joined([a, b])
     assert len(both.pieces) == len(contents.pieces)
     assert sorted(both.subplants.key) == sorted(contents.subplants.key)
     assert chosen[a.piece_cell].all()
     assert not chosen[b.subplant_cell].any()
+    assert len(Contents.joined([]).pieces) == 0
+
+
+@given(st.integers(0, 2**31))
+@settings(deadline=None, max_examples=20)
+def test_holdings_give_and_take(seed: int) -> None:
+    """Whatever is taken out and put back, in whatever order, everything is there once, with its own amounts."""
+    flora = support.small_flora()
+    tree, contents = divided(flora, support.grove(4, 2.0), 1, "PERSP")
+    rng = np.random.default_rng(seed)
+    held = Holdings(contents)
+    for _ in range(5):
+        chosen = rng.random(len(tree)) < rng.choice([0.05, 0.5, 0.95])
+        out = held.take_out(chosen)
+        assert chosen[out.subplant_cell].all()
+        assert chosen[out.piece_cell].all()
+        left = held.contents
+        assert not chosen[left.subplant_cell].any()
+        assert not chosen[left.piece_cell].any()
+        held.put(out)
+    for name in ("subplants", "pieces"):
+        whole, found = ((getattr(c, name), getattr(c, f"{name[:-1]}_amounts")) for c in (contents, held.contents))
+        key = [(c[0] if name == "subplants" else c[0].branches).key for c in (whole, found)]
+        order = [np.lexsort([c[1].polygons, c[1].wood_area, k]) for c, k in zip((whole, found), key, strict=True)]
+        assert (key[0][order[0]] == key[1][order[1]]).all()
+        for value in ("leaf_area", "wood_area", "polygons", "width"):
+            a, b = (getattr(c[1], value)[o] for c, o in zip((whole, found), order, strict=True))
+            assert (a == b).all()
+
+
+@given(views, st.floats(0.01, 0.5))
+@settings(deadline=None, max_examples=15)
+def test_what_reaches_a_little_beyond_a_plane_stays_whole(view: tuple[int, str], far: float) -> None:
+    """Nothing is lost or doubled, less is opened and cut, and hardly anything lies further beyond than allowed."""
+    flora = support.compiled(support.SMALL, support.shipped("bush"))
+    seeds = support.grove(6, 2.0, [0, 1, 0, 0, 1, 0])
+    exact, loose = (
+        divided(flora, seeds, *view, slack=slack) for slack in (None, lambda points: np.full(len(points), far))
+    )
+    assert len(loose[1].pieces) <= len(exact[1].pieces)
+    parts = [measures(flora, expanded(flora, contents)) for _, contents in (exact, loose)]
+    assert parts[1] == pytest.approx(parts[0], rel=1e-6)
+    tree, contents = loose
+    vertices = tree.vertices(contents.piece_cell)
+    middle = (contents.pieces.start + contents.pieces.end) / 2
+    outside = (face_planes(vertices)[..., :3] * middle[:, None]).sum(-1) + face_planes(vertices)[..., 3]
+    # A piece goes where most of it is; what is left of it beyond is within the slack at each of few planes.
+    assert (outside.max(axis=1, initial=-1) <= 3 * far).all()
+    for one in np.random.default_rng(view[0]).permutation(len(contents.subplants))[:20]:
+        meshes = support.meshes(flora, support.expanded(flora, contents.subplants.take(one[None])))
+        points = np.concatenate([m.positions for group in meshes for m in group]).astype(np.float64)
+        planes = face_planes(tree.vertices(contents.subplant_cell[one][None]))[0]
+        beyond = (points @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+        assert np.quantile(beyond, 0.9) <= 3 * far
 
 
 def test_bounding_box_holds_all_bounds() -> None:

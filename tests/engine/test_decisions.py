@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from tests.engine import support
-from tetflora_addon.refinement.contents import Amounts
-from tetflora_addon.refinement.decisions import Decision, decide, feature_pixels
+from tetflora_addon.refinement.amounts import Amounts
+from tetflora_addon.refinement.cells import Cells, feature_pixels
+from tetflora_addon.refinement.decisions import Decision, decide
 from tetflora_addon.refinement.settings import RefinementSettings
-from tetflora_addon.refinement.visibility import Visibility
 
 CAMERA = support.camera((0, 0, 0), (0, 10, 0), pixels=1000, view=1.0)
 SETTINGS = RefinementSettings()
@@ -39,9 +39,11 @@ def become(
     settings: RefinementSettings = SETTINGS,
 ) -> Decision:
     """One tetrahedron; by default leaves of a tenth of a pixel, seen in full."""
-    one = (np.array([v], float) for v in (leaf, wood, polygons, width))
-    seen = Visibility(*(np.array([v], float) for v in (pixels, transmittance, opacity, depth)), np.zeros((1, 1)))
-    return Decision(decide(cell(depth), Amounts(*one), seen, CAMERA, settings)[0])
+    amounts = Amounts(*(np.array([v], float) for v in (leaf, wood, polygons, width)))
+    span = np.array([np.sqrt(2) / (0.001 * depth)])  # of the unit corner, 1 mm a pixel at 1 m
+    seen = (np.array([v], float) for v in (pixels, opacity))
+    cells = Cells(np.array([0]), amounts, *seen, feature_pixels(cell(depth), amounts.width, CAMERA), span)
+    return Decision(decide(cells, np.array([transmittance]), settings)[0])
 
 
 def test_size_of_features() -> None:

@@ -18,7 +18,6 @@ from tetflora_addon.emission import expanded_blocks, explicit_blocks, facet_buff
 from tetflora_addon.plants.compiled import Flora
 from tetflora_addon.plants.seeds import Seeds
 from tetflora_addon.refinement.camera import Camera
-from tetflora_addon.refinement.contents import node_amounts
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.loop import Refinement
 from tetflora_addon.tetrahedra.geometry import volume
@@ -104,7 +103,7 @@ def test_explicit_polygons_are_about_as_many_as_expected() -> None:
 
 def test_facets_have_the_area_of_what_is_not_explicit() -> None:
     flora, _, camera, result = scene()
-    every = node_amounts(flora, result.contents, len(result.tree))
+    every = result.contents.sums(len(result.tree))
     proxies = result.chosen(Decision.PROXY, Decision.HIDDEN)
     mesh = facet_buffers(flora, result, camera)
     check_topology(mesh)

@@ -14,9 +14,10 @@ from tests.engine.test_contents import expanded, measures
 from tetflora_addon.plants.compiled import Flora
 from tetflora_addon.plants.seeds import Seeds
 from tetflora_addon.refinement.camera import Camera
+from tetflora_addon.refinement.cells import feature_pixels, mean_extinction
 from tetflora_addon.refinement.contents import Contents, bounding_box
-from tetflora_addon.refinement.decisions import Decision, feature_pixels
-from tetflora_addon.refinement.loop import Refinement, mean_extinction, refine
+from tetflora_addon.refinement.decisions import Decision
+from tetflora_addon.refinement.loop import Refinement, refine
 from tetflora_addon.refinement.settings import RefinementSettings
 from tetflora_addon.tetrahedra.geometry import volume
 from tetflora_addon.tetrahedra.roots import view_root
@@ -46,7 +47,7 @@ def check(flora: Flora, result: Refinement) -> None:
     held = np.concatenate([result.contents.subplant_cell, result.contents.piece_cell])
     assert np.isin(held, result.nodes).all()
     assert volume(tree.vertices(tree.terminals())).min() > 0
-    for array in (result.seen.pixels, result.seen.transmittance, result.amounts.leaf_area, result.amounts.width):
+    for array in (result.cells.pixels, result.transmittance, result.amounts.leaf_area, result.amounts.width):
         assert len(array) == len(result.nodes)
         assert np.isfinite(array).all()
     masks = [result.chosen(d) for d in (Decision.PROXY, Decision.HIDDEN, Decision.EXPLICIT)]
@@ -100,7 +101,7 @@ def test_random_views(seed: int, cutoff: float) -> None:
     check(flora, result)
     assert [s.passes for s in [*states, result]] == list(range(1, len(states) + 2))
     large = feature_pixels(result.tree.vertices(result.nodes), result.amounts.width, camera) >= 0.5
-    seen = result.seen.transmittance > RefinementSettings().hidden
+    seen = result.transmittance > RefinementSettings().hidden
     assert not (large & seen & (result.decision == Decision.PROXY)).any()
     assert not (seen & (result.decision == Decision.HIDDEN)).any()
     parts = measures(flora, expanded(flora, result.contents))
@@ -181,7 +182,7 @@ def test_dense_plants_hide_those_behind() -> None:
     seeds = support.plants(np.arange(24), species, np.stack([np.tile(np.arange(12) - 5.5, 2), rows, 0 * rows], axis=1))
     _, result = run(flora, seeds, support.camera((0, -12, 0.8), (0, 0, 0.8), pixels=200, view=0.5))
     depth = result.tree.vertices(result.nodes).mean(axis=1)[:, 1]
-    share, area, seen = result.seen.transmittance, result.amounts.leaf_area + 1e-12, result.seen.pixels > 0
+    share, area, seen = result.transmittance, result.amounts.leaf_area + 1e-12, result.cells.pixels > 0
     front, back = (np.average(share[m], weights=area[m]) for m in (seen & (depth < 10), seen & (depth > 20)))
     assert back < 0.5 * front
 

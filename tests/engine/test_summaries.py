@@ -106,7 +106,7 @@ def test_sums_do_not_depend_on_how_contents_are_cut() -> None:
     tree, contents = divided(flora, seeds, 5, "PERSP", rounds=3)
     shreds = expanded(flora, contents)
     none = contents.within(np.zeros(len(tree), bool))
-    shredded = Contents(none.subplants, none.subplant_cell, shreds, np.zeros(len(shreds), np.int32))
+    shredded = Contents.of(flora, none.subplants, none.subplant_cell, shreds, np.zeros(len(shreds), np.int32))
     for other in (of_everything(flora, contents, len(tree)), of_everything(flora, shredded, 1)):
         assert other.optical_area[0] == pytest.approx(whole.optical_area[0], rel=0.03)
         np.testing.assert_allclose(other.colour, whole.colour, rtol=0.03)

@@ -2,13 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The visibility step against rays cast one by one, whose order comes from their distances and not from the tree."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from tetflora_addon.refinement.camera import Camera
 from tetflora_addon.refinement.rasterise import buffer_size, occluder_depth, pixel_rays
 from tetflora_addon.refinement.silhouette import silhouette_pixels
-from tetflora_addon.refinement.visibility import visibility
+from tetflora_addon.refinement.visibility import AlphaBuffer
 from tetflora_addon.tetrahedra.geometry import face_planes
 from tetflora_addon.tetrahedra.roots import view_root
 
@@ -21,6 +23,14 @@ BOUNDS = np.array([[-6.0, 0.0, -4.0], [6.0, 30.0, 8.0]])
 def camera_of(kind, position=EYE, frame=FRAME):
     window = (-0.5, 0.5, -0.3, 0.3) if kind == "PERSP" else (-5.0, 5.0, -3.0, 3.0)
     return Camera(kind, position, frame, window, 0.1, 100.0, 320, 192)
+
+
+def visibility(vertices, extinction, rank, camera, resolution, occluders=None):
+    """All that the buffer says of tetrahedra that are drawn at once."""
+    buffer = AlphaBuffer(camera, resolution, occluders)
+    outline = buffer.add(np.arange(len(vertices)), vertices, extinction)
+    seen = buffer.transmittance(np.asarray(rank) - np.min(rank, initial=0))
+    return SimpleNamespace(transmittance=seen, alpha=buffer.alpha(), **vars(outline))
 
 
 def split_view(camera, cells, seed=0):
@@ -173,3 +183,27 @@ def test_ranks_decide_what_hides_what():
     near, far = np.argmin(rank), np.argmax(rank)
     assert forward.transmittance[near] > forward.transmittance[far]
     assert backward.transmittance[near] < backward.transmittance[far]
+
+
+@pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
+def test_tetrahedra_that_come_and_go_leave_the_others_as_they_are(kind):
+    """Drawn one after the other, with some taken away in between, they are seen as if drawn at once."""
+    camera = camera_of(kind)
+    vertices, rank = split_view(camera, 120)
+    rng = np.random.default_rng(3)
+    extinction = rng.uniform(0.0, 0.3, len(vertices))
+    once = visibility(vertices, extinction, rank, camera, 64)
+    buffer = AlphaBuffer(camera, 64)
+    parts = np.array_split(rng.permutation(len(vertices)), 5)
+    pixels = np.zeros(len(vertices))
+    for part in parts[:3]:
+        buffer.add(part, vertices[part], extinction[part])
+    away = np.zeros(len(vertices), bool)
+    away[parts[1]] = True
+    buffer.remove(away)
+    for part in (parts[1], *parts[3:]):
+        pixels[part] = buffer.add(part, vertices[part], extinction[part]).pixels
+    np.testing.assert_allclose(buffer.transmittance(rank), once.transmittance, atol=1e-9)
+    np.testing.assert_allclose(buffer.alpha(), once.alpha, atol=1e-12)
+    for part in (parts[1], *parts[3:]):
+        np.testing.assert_array_equal(pixels[part], once.pixels[part])

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from .crown_shapes import crown_ratio
 from .leaf_models import LeafModel
 from .rows import FORK, LATERAL, SPUR
+from .samples import Points
 
 _SLABS = 48
 _ANGLES = 33
@@ -211,3 +212,17 @@ def _crown_most(row: NDArray[np.void], low: NDArray[np.float64], high: NDArray[n
     inner = np.linspace(low, high, 5, axis=1)
     ratio = crown_ratio(np.full(inner.shape, row["crown"]), 1 - inner).max(axis=1)
     return np.minimum(ratio + _CROWN_SLOPE * (high - low) / 8, 1)
+
+
+def sampled_bounds(parts: Sequence[Points], rows: int) -> NDArray[np.float64]:
+    """Radius across the branch, and lowest and highest place along it (r, 3), that hold the samples of each row."""
+    out = np.zeros((rows, 3))
+    for points in parts:
+        across, along = np.hypot(points.position[:, 0], points.position[:, 1]), points.position[:, 2]
+        for row, (first, number) in enumerate(zip(points.first, points.number, strict=True)):
+            some = slice(int(first.min()), int((first + number).max()))  # the runs of a row follow one another
+            if some.stop > some.start:
+                out[row, 0] = max(out[row, 0], across[some].max())
+                out[row, 1] = min(out[row, 1], along[some].min())
+                out[row, 2] = max(out[row, 2], along[some].max())
+    return out

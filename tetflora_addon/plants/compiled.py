@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..errors import SpeciesError
 from .averages import Averages, RowLeaves, average, quadratic, row_leaves
-from .bounds import leaf_boxes, leaf_reaches, unit_bounds, widest_radii
+from .bounds import leaf_boxes, leaf_reaches, sampled_bounds, unit_bounds, widest_radii
 from .growth import Branches, fullness
 from .leaf_models import LeafModel
 from .orientation import Orientation, orientation_of
@@ -105,6 +105,12 @@ class Flora:
         """Points on the leaves and wood of sub-plants; drawn when first asked for, as only proxies need them."""
         amounts = self.averages
         return draw_samples(self.rows, amounts.leaf_area[:, 1], _wood_shares(amounts), amounts.length)
+
+    @cached_property
+    def sampled_bound(self) -> NDArray[np.float64]:
+        """Radius, and lowest and highest place along the branch (r, 3), of all samples; unit is the branch's length."""
+        parts = (self.samples.leaves, self.samples.wood)
+        return sampled_bounds(parts, len(self.rows))
 
     @cached_property
     def orientation(self) -> Orientation:

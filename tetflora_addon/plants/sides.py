@@ -51,8 +51,18 @@ def body_distances(bodies: NDArray[np.float64], planes: NDArray[np.float64]) -> 
     return _distance(planes, *bodies[:3]), reach
 
 
+def sampled_bodies(flora: Flora, subplants: Branches) -> NDArray[np.float64]:
+    """Bodies (9, n) as `bounding_bodies`, that hold what has been sampled of such sub-plants: nearly all, not all."""
+    bound = (flora.sampled_bound[subplants.row] * subplants.length[:, None]).T
+    out = np.zeros((9, len(subplants)))
+    out[3:6] = subplants.frame[:, :, 2].T
+    out[:3] = subplants.position.T + (bound[1] + bound[2]) / 2 * out[3:6]
+    out[6], out[7] = bound[0], (bound[2] - bound[1]) / 2
+    return out
+
+
 def crossing(
-    flora: Flora, subplants: Branches, planes: NDArray[np.float64]
+    flora: Flora, subplants: Branches, planes: NDArray[np.float64], slack: NDArray[np.float64] | float = 0.0
 ) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
     """Look at sub-plants as they grow: which have vertices on both sides of a plane each.
 
@@ -62,17 +72,20 @@ def crossing(
     subplants : Branches of n
         Those that straddle by their bodies; others only take time.
     planes : (n, 4) float64
+    slack : (n,) float64, optional
+        How far one may reach beyond its plane, metres.
 
     Returns
     -------
     crossing : (n,) bool
-        False: no vertex of the sub-plant lies beyond the plane. True: some do, or lie closer to it than the box of a
-        leaf or the sphere around a tube's ring tell apart; or it is a plant drawn by hand, which is always opened.
+        False: no vertex of the sub-plant lies beyond the plane by more. True: some do, or lie closer to it than the
+        box of a leaf or the sphere around a tube's ring tell apart; or it is a plant drawn by hand, always opened.
     side : (n,) int64
         Side of the base, which is that of the whole where it does not cross.
     """
     base = _distance(planes, *subplants.position.T)
     facing = planes * np.where(base < 0, -1.0, 1.0)[:, None]  # all bases on the positive side
+    facing[:, 3] += slack
     crosses = flora.rows["phantom"][subplants.row]
     for start in range(0, len(subplants), _AT_ONCE):
         part = slice(start, start + _AT_ONCE)

@@ -89,3 +89,13 @@ class Camera:
             return np.full(np.shape(points)[:-1], self.pixel_size)
         depth = self.to_camera_space(points)[..., 2]
         return self.pixel_size * np.maximum(depth, self.near)
+
+    def extent_around(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Metres (n,) that one pixel spans at points (n, 3), in view or not.
+
+        Beside and behind the camera depth says nothing, but distance does.
+        """
+        extent = self.pixel_extent(points)
+        if self.kind == "PERSP":
+            extent = np.maximum(extent, self.pixel_size * np.linalg.norm(points - self.position, axis=-1))
+        return extent

@@ -9,11 +9,8 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tetrahedra.geometry import squared_edges
-from .camera import Camera
-from .contents import Amounts
+from .cells import Cells
 from .settings import RefinementSettings
-from .visibility import Visibility
 
 
 class Decision(IntEnum):
@@ -26,33 +23,15 @@ class Decision(IntEnum):
     SPLIT = 4
 
 
-def feature_pixels(vertices: NDArray[np.float64], width: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:
-    """Size on the picture of what tetrahedra hold, where it is nearest to the eye.
-
-    Parameters
-    ----------
-    vertices : (n, 4, 3) float64
-    width : (n,) float64
-        Width of leaves or branches, metres.
-
-    Returns
-    -------
-    (n,) float64
-        Pixels.
-    """
-    return width / camera.pixel_extent(vertices).min(axis=1)
-
-
-def decide(
-    vertices: NDArray[np.float64], amounts: Amounts, seen: Visibility, camera: Camera, settings: RefinementSettings
-) -> NDArray[np.int8]:
+def decide(cells: Cells, transmittance: NDArray[np.float64], settings: RefinementSettings) -> NDArray[np.int8]:
     """Decide for terminal tetrahedra.
 
     Parameters
     ----------
-    vertices : (n, 4, 3) float64
-    amounts : Amounts of n
-    seen : Visibility of n
+    cells : Cells of n
+    transmittance : (n,) float64
+        Share of each one's light that nothing in front holds up; 0 out of view.
+    settings : RefinementSettings
 
     Returns
     -------
@@ -65,19 +44,28 @@ def decide(
     is not hidden × its own opacity. Leaves wider than ``leaf_limit`` pixels can only be drawn as leaves; a tetrahedron
     full of them is divided down to ``block`` pixels so that its hidden parts are found out, and then made explicit.
     """
-    contribution = seen.pixels * seen.transmittance * seen.opacity
-    holds = amounts.leaf_area + amounts.wood_area > 0
-    hidden = seen.transmittance <= settings.hidden  # out of view: transmittance is 0
-    large_leaves = feature_pixels(vertices, amounts.width, camera) >= settings.leaf_limit
-    no_gain = (amounts.polygons <= settings.few_polygons) | (seen.pixels <= settings.block**2)
-    small = contribution <= settings.cutoff**2
+    amounts = cells.amounts
+    holds = amounts.area > 0
+    hidden = transmittance <= settings.hidden  # out of view: transmittance is 0
+    large_leaves = cells.feature >= settings.leaf_limit
+    no_gain = (amounts.polygons <= settings.few_polygons) | (cells.pixels <= settings.block**2)
+    small = contributions(cells, transmittance) <= settings.cutoff**2
     out = np.full(len(holds), Decision.SPLIT, dtype=np.int8)
     # Large leaves never become a proxy: a block of them that is hardly seen is divided until its hidden parts show.
     out[small & ~large_leaves] = Decision.PROXY
     out[large_leaves & no_gain] = Decision.EXPLICIT
     out[hidden] = Decision.HIDDEN
-    if np.isfinite(settings.hidden_block):
-        extent = np.sqrt(squared_edges(vertices).max(axis=1)) / camera.pixel_extent(vertices.mean(axis=1))
-        out[hidden & (extent > settings.hidden_block)] = Decision.SPLIT
+    out[hidden & (cells.span > settings.hidden_block)] = Decision.SPLIT
     out[~holds] = Decision.EMPTY
     return out
+
+
+def contributions(cells: Cells, transmittance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Pixels (n,) that the contents of tetrahedra change."""
+    return cells.pixels * transmittance * cells.opacity
+
+
+def without_splits(decision: NDArray[np.int8], cells: Cells, settings: RefinementSettings) -> NDArray[np.int8]:
+    """What becomes of tetrahedra that would be divided when a limit forbids it: leaves of a pixel stay leaves."""
+    instead = np.where(cells.feature >= settings.leaf_limit, Decision.EXPLICIT, Decision.PROXY)
+    return np.where(decision == Decision.SPLIT, instead, decision).astype(np.int8)

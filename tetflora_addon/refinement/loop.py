@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The main loop: visibility, refinement, update, until the picture gains nothing more (paper, section 6.2)."""
+"""The main loop: visibility, refinement, update, until the picture gains nothing more (paper, section 6.2).
+
+A pass costs what it changes: only divided tetrahedra give their contents away, only new ones are drawn and summed up.
+"""
 
 from __future__ import annotations
 
@@ -12,17 +15,19 @@ from numpy.typing import NDArray
 
 from ..plants.compiled import Flora
 from ..plants.seeds import Seeds
-from ..tetrahedra.geometry import volume
 from ..tetrahedra.roots import view_root
 from ..tetrahedra.tree import TetrahedralTree
+from .amounts import Amounts
 from .camera import Camera
-from .contents import Amounts, Contents, bounding_box, node_amounts, push_down
-from .decisions import Decision, decide, feature_pixels
+from .cells import Cells
+from .contents import Contents, Holdings, bounding_box
+from .decisions import Decision, decide, without_splits
+from .descent import Slack, push_down
 from .rasterise import buffer_size, occluder_depth
 from .settings import RefinementSettings
 from .silhouette import silhouette_pixels
 from .statistics import Stopwatch
-from .visibility import Visibility, visibility
+from .visibility import AlphaBuffer
 
 #: Bisections between two visibility steps; three together divide a tetrahedron into eight.
 GENERATIONS = 3
@@ -32,19 +37,21 @@ GENERATIONS = 3
 class Refinement:
     """State of the loop after a pass; the last one is the result.
 
+    The tree and what it holds grow with the loop: of a state on the way they are right until the next one is asked for.
+
     Attributes
     ----------
     tree : TetrahedralTree
-    contents : Contents
+    holdings : Holdings
         All plants, in terminal nodes.
-    nodes : (t,) int
+    cells : Cells of t
         Terminal nodes that hold something.
+    transmittance : (t,) float64
+        Share of each one's light that nothing in front of it holds up.
     decision : (t,) int8
         `Decision` for each of them.
     rank : (t,) int32
         Front-to-back order of them.
-    amounts : Amounts of t
-    seen : Visibility of t
     passes : int
         Passes so far.
     complete : bool
@@ -54,31 +61,35 @@ class Refinement:
     """
 
     tree: TetrahedralTree
-    contents: Contents
-    nodes: NDArray[np.intp]
+    holdings: Holdings
+    cells: Cells
+    transmittance: NDArray[np.float64]
     decision: NDArray[np.int8]
     rank: NDArray[np.int32]
-    amounts: Amounts
-    seen: Visibility
     passes: int
     complete: bool
     seconds: dict[str, float]
+
+    @property
+    def nodes(self) -> NDArray[np.intp]:
+        """Terminal nodes (t,) that hold something."""
+        return self.cells.nodes
+
+    @property
+    def amounts(self) -> Amounts:
+        """What each of them (t,) holds."""
+        return self.cells.amounts
+
+    @property
+    def contents(self) -> Contents:
+        """All plants, in terminal nodes."""
+        return self.holdings.contents
 
     def chosen(self, *decisions: Decision) -> NDArray[np.bool_]:
         """Mask over all nodes of the tree (nodes,) of those with one of the decisions."""
         mask = np.zeros(len(self.tree), dtype=bool)
         mask[self.nodes[np.isin(self.decision, decisions)]] = True
         return mask
-
-
-def mean_extinction(amounts: Amounts, volumes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Extinction κ (n,) of tetrahedra in 1/m, as if surfaces faced all ways.
-
-    Notes
-    -----
-    Randomly turned, a leaf shows half its one-sided area and a closed branch a quarter of its surface (Cauchy 1832).
-    """
-    return (amounts.leaf_area / 2 + amounts.wood_area / 4) / volumes
 
 
 def refine(
@@ -103,53 +114,79 @@ def refine(
     """
     clock = Stopwatch()
     camera = camera.widened(settings.margin)
+    slack = _slack(camera, settings.visibility_resolution)
     contents = Contents.of_plants(flora, seeds)
     tree = view_root(camera, bounding_box(flora, contents.subplants))
-    contents = push_down(flora, tree, contents)
+    new = push_down(flora, tree, contents, slack)
+    holdings = Holdings(new)
     clock.lap("update")
     depth = None
     if occluders is not None and len(occluders):
         depth = occluder_depth(occluders, camera, *buffer_size(camera, settings.visibility_resolution))
-    clock.lap("visibility")
+    buffer = AlphaBuffer(camera, settings.visibility_resolution, depth)
     direction = {"eye": camera.position} if camera.kind == "PERSP" else {"direction": -camera.frame[:, 2]}
     # Generations count from the root's own pieces. Passes do not count: a late one may divide what is still coarse.
     deepest = tree.levels - 1 + settings.max_levels
+    cells = _new_cells(tree, new, camera, buffer)
+    clock.lap("visibility")
     passes = 0
     while True:
         passes += 1
-        every = node_amounts(flora, contents, len(tree))
-        nodes = np.flatnonzero(every.leaf_area + every.wood_area > 0)
-        amounts = _of(every, nodes)
-        vertices = tree.vertices(nodes)
-        rank = tree.order(**direction)[nodes]
-        clock.lap("update")
-        extinction = mean_extinction(amounts, volume(vertices))
-        seen = visibility(vertices, extinction, rank, camera, settings.visibility_resolution, depth)
+        rank = tree.order(**direction)
+        transmittance = buffer.transmittance(np.maximum(rank, 0))[cells.nodes]
         clock.lap("visibility")
-        decision = decide(vertices, amounts, seen, camera, settings)
+        decision = decide(cells, transmittance, settings)
         splitting = decision == Decision.SPLIT
         room = settings.max_tetrahedra - tree.tetrahedra_made
         full = bool(room < 2 * splitting.sum())
-        barred = splitting & (full | (tree.level[nodes] >= deepest))
+        barred = splitting & (full | (tree.level[cells.nodes] >= deepest))
         limited = bool(barred.any())
         if limited:
-            decision = np.where(barred, _without_splits(decision, vertices, amounts, camera, settings), decision)
+            decision = np.where(barred, without_splits(decision, cells, settings), decision)
             splitting &= ~barred
         clock.lap("refinement")
         state = Refinement(
-            tree, contents, nodes, decision, rank, amounts, seen, passes, not limited, dict(clock.seconds)
+            tree,
+            holdings,
+            cells,
+            transmittance,
+            decision,
+            rank[cells.nodes],
+            passes,
+            not limited,
+            dict(clock.seconds),
         )
         if not splitting.any():
             return state
         yield state
-        _split(
-            tree, nodes[splitting], seen.transmittance[splitting] * seen.opacity[splitting], camera, settings, deepest
-        )
+        dividing = np.zeros(len(tree), bool)
+        dividing[cells.nodes[splitting]] = True
+        shares = (transmittance * cells.opacity)[splitting]
+        _split(tree, cells.nodes[splitting], shares, camera, settings, deepest)
         clock.lap("refinement")
-        divided = tree.children[:, 0] >= 0
-        moving = contents.within(divided)
-        contents = Contents.joined(contents.within(~divided), push_down(flora, tree, moving))
+        new = push_down(flora, tree, holdings.take_out(dividing), slack)
+        holdings.put(new)
         clock.lap("update")
+        buffer.remove(dividing)
+        cells = Cells.joined([cells.take(~splitting), _new_cells(tree, new, camera, buffer)])
+        clock.lap("visibility")
+
+
+def _new_cells(tree: TetrahedralTree, new: Contents, camera: Camera, buffer: AlphaBuffer) -> Cells:
+    """Cells of all nodes that have got something."""
+    every = new.sums(len(tree))
+    nodes = np.flatnonzero(every.area > 0)
+    return Cells.seen(tree, nodes, every.take(nodes), camera, buffer)
+
+
+def _slack(camera: Camera, resolution: int) -> Slack:
+    """A pixel of the alpha buffer, in metres: nothing smaller can be told apart by what is decided from it."""
+    pixels = camera.width / buffer_size(camera, resolution)[0]
+
+    def slack(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        return pixels * camera.extent_around(points)
+
+    return slack
 
 
 def _split(
@@ -165,16 +202,3 @@ def _split(
         large = ~whole | (pixels * share > settings.cutoff**2)  # pixels are not known for what leaves the view
         large &= tree.level[nodes] < deepest
         nodes, share = nodes[large], share[large]
-
-
-def _without_splits(
-    decision: NDArray[np.int8], vertices: NDArray, amounts: Amounts, camera: Camera, settings: RefinementSettings
-) -> NDArray[np.int8]:
-    """What becomes of tetrahedra that would be split when a limit forbids it: leaves of a pixel stay leaves."""
-    leafy = feature_pixels(vertices, amounts.width, camera) >= settings.leaf_limit
-    instead = np.where(leafy, Decision.EXPLICIT, Decision.PROXY)
-    return np.where(decision == Decision.SPLIT, instead, decision).astype(np.int8)
-
-
-def _of(amounts: Amounts, nodes: NDArray) -> Amounts:
-    return Amounts(amounts.leaf_area[nodes], amounts.wood_area[nodes], amounts.polygons[nodes], amounts.width[nodes])

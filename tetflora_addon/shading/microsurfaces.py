@@ -23,7 +23,7 @@ from ..plants.hashing import Draw, child_key, mix, signed, uniform
 from ..plants.pieces import Pieces
 from ..plants.samples import Points
 from ..plants.vectors import perpendicular
-from ..refinement.contents import Amounts, piece_amounts, subplant_amounts
+from ..refinement.amounts import Amounts, piece_amounts, subplant_amounts
 
 _FACET_PATH = 1 << 40  # child indices of facets start here
 _WOOD_PATH = 1 << 41

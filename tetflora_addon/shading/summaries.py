@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..plants.compiled import Flora
 from ..plants.orientation import leaf_moments, own_leaf_moments, wood_moments
 from ..plants.pieces import piece_leaf_colours
-from ..refinement.contents import Contents, piece_amounts, subplant_amounts
+from ..refinement.contents import Contents
 
 #: κ along an axis is ⟨|n·e|⟩, the moment gives ⟨(n·e)²⟩. The power of the second that is the first at 0, ⅓ (all ways:
 #: ½) and 1; at ½ (normals around a circle) it gives .646 for 2/π = .637.
@@ -56,23 +56,22 @@ def summarise(flora: Flora, contents: Contents, index: NDArray[np.integer], coun
     sums = np.zeros((count, 14))  # area, colour × area, transmission × area, moment × area
     subplants, pieces = contents.subplants, contents.pieces
     rows = flora.rows
-    for cells, branches, own in (
-        (contents.subplant_cell, subplants, None),
-        (contents.piece_cell, pieces.branches, pieces),
+    for cells, branches, own, every in (
+        (contents.subplant_cell, subplants, None, contents.subplant_amounts),
+        (contents.piece_cell, pieces.branches, pieces, contents.piece_amounts),
     ):
         to = index[cells]
         keep = np.flatnonzero(to >= 0)
-        to, branches = to[keep], branches.take(keep)
+        to, branches, amounts = to[keep], branches.take(keep), every.take(keep)
         row = branches.row
         # A sub-plant shows the mean of all that grows on it, a piece only its own bark and leaves.
         if own is None:
-            amounts = subplant_amounts(flora, branches)
             leaf_colour, wood_colour = flora.leaf_colours(branches), flora.wood_colour[row]
             leaf_moment = leaf_moments(flora.orientation, branches)
             wood_moment, transmission = wood_moments(flora.orientation, branches), flora.transmission[row]
         else:
             own = own.take(keep)
-            amounts, axis = piece_amounts(flora, own), _directions(own.end - own.start)
+            axis = _directions(own.end - own.start)
             leaf_colour, wood_colour = piece_leaf_colours(flora, own), rows["branch_colour"][row, 0]
             leaf_moment = own_leaf_moments(flora.orientation, row, axis)
             wood_moment = (np.eye(3) - axis[:, :, None] * axis[:, None, :]) / 2

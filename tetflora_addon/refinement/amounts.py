@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How much there is of things and in tetrahedra, as far as decisions need it: areas, polygons, size of features."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..plants.averages import own_leaf_integrals
+from ..plants.compiled import Flora
+from ..plants.growth import Branches, fullness
+from ..plants.pieces import Pieces, leaf_fraction, outward_ends, wood_areas
+
+
+@dataclass(frozen=True)
+class Amounts:
+    """How much each thing (sub-plant or piece) or each tetrahedron holds.
+
+    Attributes
+    ----------
+    leaf_area : (n,) float64
+        One-sided area of leaves, m².
+    wood_area : (n,) float64
+        Surface of branches, m².
+    polygons : (n,) float64
+        Expected faces if made explicit.
+    width : (n,) float64
+        Width of the features, metres: that of the leaves, or of the branch where there are none. By tetrahedron: the
+        mean, weighted by area.
+    """
+
+    leaf_area: NDArray[np.float64]
+    wood_area: NDArray[np.float64]
+    polygons: NDArray[np.float64]
+    width: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.leaf_area)
+
+    @property
+    def area(self) -> NDArray[np.float64]:
+        """Leaves and wood together (n,), m²."""
+        return self.leaf_area + self.wood_area
+
+    def take(self, index: NDArray | slice) -> Amounts:
+        """Selection by indices, mask or slice."""
+        return Amounts(*(getattr(self, f.name)[index] for f in fields(self)))
+
+    @classmethod
+    def concatenate(cls, parts: Sequence[Amounts]) -> Amounts:
+        """All of several in one."""
+        return cls(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(cls)))
+
+    @classmethod
+    def empty(cls) -> Amounts:
+        """Of nothing."""
+        return cls(*np.zeros((4, 0)))
+
+
+def subplant_amounts(flora: Flora, subplants: Branches) -> Amounts:
+    """Compiled means for sub-plants."""
+    row = subplants.row
+    leafy = flora.leaf_count[row] > 0
+    return Amounts(
+        flora.leaf_areas(subplants),
+        flora.wood_areas(subplants),
+        flora.face_counts(subplants),
+        np.where(leafy, flora.leaf_width[row] * subplants.scale, 2 * subplants.radius),
+    )
+
+
+def piece_amounts(flora: Flora, pieces: Pieces) -> Amounts:
+    """Compiled means for pieces: the wood, and the leaves that the branch itself bears there."""
+    branches = pieces.branches
+    row, leaf = branches.row, flora.leaf
+    size, variation = flora.rows["leaf_size"][row].T
+    leaves = flora.rows["leaves"][row, 0] * fullness(flora.rows, branches) * leaf_fraction(flora, pieces)
+    return Amounts(
+        leaves * (size**2 + variation**2 / 3) * leaf.area[row] * branches.scale**2 * _size_factors(flora, pieces),
+        wood_areas(flora, pieces),
+        leaves * leaf.polygons[row] + flora.rows["sides"][row],
+        np.where(leaves > 0, leaf.width[row] * size * branches.scale, 2 * branches.radius),
+    )
+
+
+def _size_factors(flora: Flora, pieces: Pieces) -> NDArray[np.float64] | float:
+    """Mean factor (n,) on the area of leaves of pieces, by how far outside in the crown they sit."""
+    if not flora.rows["gradient"].any():
+        return 1.0
+    low, high = outward_ends(flora, pieces)
+    return own_leaf_integrals(flora.rows["leaf_size_tip"][pieces.branches.row], low, high)[0]
+
+
+def sums(amounts: Amounts, cells: NDArray[np.integer], number: int) -> Amounts:
+    """Sums over the things (n,) in each of a number of cells, given by ``cells`` (n,); the width is a mean."""
+    area = amounts.area
+    total = np.bincount(cells, area, number)
+    return Amounts(
+        np.bincount(cells, amounts.leaf_area, number),
+        np.bincount(cells, amounts.wood_area, number),
+        np.bincount(cells, amounts.polygons, number),
+        np.bincount(cells, area * amounts.width, number) / np.where(total > 0, total, 1),
+    )
