@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .bisection import bisect
+from .cuts import TOLERANCE, Pieces, cut_tetrahedra
+from .eight import divide_in_eight
 from .geometry import plane_distance
 
 #: Points that `TetrahedralTree.locate` takes down the tree at a time; bounds its memory to some tens of megabytes.
@@ -22,7 +24,8 @@ class TetrahedralTree:
     """Binary tree of planes over a convex region of space.
 
     Node 0 is the root. Inner nodes near it may be convex regions without a tetrahedron; terminal nodes are tetrahedra
-    once `split` is used (`tetflora_addon.tetrahedra.roots` sees to that).
+    once `split` is used (`tetflora_addon.tetrahedra.roots` sees to that). Between a tetrahedron and those that
+    `split_eight` or `cut` make of it there may be such regions too.
 
     Parameters
     ----------
@@ -116,13 +119,81 @@ class TetrahedralTree:
             If a node is not terminal, has no tetrahedron, or occurs twice.
         """
         nodes = np.asarray(nodes, np.intp)
-        vertices = self.vertices(nodes)
-        if np.isnan(vertices[:, 0, 0]).any():
-            raise ValueError("only nodes with a tetrahedron can be bisected; divide regions by a plane instead")
-        planes, halves = bisect(vertices)
+        planes, halves = bisect(self._tetrahedra(nodes))
         children = self.divide(nodes, planes)
         self.place(children.ravel(), halves.reshape(-1, 4, 3))
         return children
+
+    def split_eight(self, nodes: ArrayLike) -> NDArray[np.int32]:
+        """Divide terminal tetrahedra into the canonical eight, along the shortest inner diagonal.
+
+        Parameters
+        ----------
+        nodes : (n,) int
+            Terminal nodes with a tetrahedron, each once.
+
+        Returns
+        -------
+        (n, 8) int32
+            Terminals three levels further down, see `eight.divide_in_eight`; they inherit `inside`. The six nodes
+            between are regions without a tetrahedron.
+
+        Raises
+        ------
+        ValueError
+            If a node is not terminal, has no tetrahedron, or occurs twice.
+        """
+        nodes = np.asarray(nodes, np.intp)
+        planes, pieces = divide_in_eight(self._tetrahedra(nodes))
+        regions = nodes
+        for first, end in ((0, 1), (1, 3), (3, 7)):
+            regions = self.divide(regions, planes[:, first:end].reshape(-1, 4)).ravel()
+        self.place(regions, pieces.reshape(-1, 4, 3))
+        return regions.reshape(-1, 8)
+
+    def cut(
+        self, nodes: ArrayLike, planes: ArrayLike, tolerance: float = TOLERANCE
+    ) -> tuple[NDArray[np.int32], Pieces]:
+        """Divide terminal tetrahedra by given planes, and what these leave into tetrahedra again.
+
+        This is for the border of a view or a clipping plane that goes through a tree that was made without it.
+
+        Parameters
+        ----------
+        nodes : (n,) int
+            Terminal nodes with a tetrahedron, each once.
+        planes : (n, 4) float64
+            Cutting planes ``(nx, ny, nz, d)``, unit normals.
+        tolerance : float
+            Vertices nearer to the plane than this, in metres, count as on it.
+
+        Returns
+        -------
+        terminals : (m,) int32
+            Node of each piece; they inherit `inside`. A node that its plane does not divide stays as it is and stands
+            for its one piece.
+        pieces : Pieces of m
+            Their owners, as places in ``nodes``, sides and tetrahedra.
+
+        Raises
+        ------
+        ValueError
+            If a node is not terminal, has no tetrahedron, or occurs twice.
+        """
+        nodes, planes = np.asarray(nodes, np.intp), np.asarray(planes, np.float64)
+        self._check_terminal(nodes)
+        pieces = cut_tetrahedra(self._tetrahedra(nodes), planes, tolerance)
+        some = np.flatnonzero(pieces.divided)
+        halves = np.repeat(nodes.astype(np.int32)[:, None], 2, axis=1)
+        halves[some] = self.divide(nodes[some], planes[some])
+        terminals = halves[pieces.owner, pieces.side]
+        # Pieces of one side stand in a row. Each is cut off from those behind it, which are the region of the next.
+        for step in range(int(pieces.step.max(initial=0))):
+            now = np.flatnonzero((pieces.step == step) & ~pieces.last)
+            terminals[now], terminals[now + 1] = self.divide(terminals[now], pieces.plane[now]).T
+        new = pieces.divided[pieces.owner]
+        self.place(terminals[new], pieces.vertices[new])
+        return terminals, pieces
 
     def divide(self, nodes: ArrayLike, planes: ArrayLike) -> NDArray[np.int32]:
         """Divide terminal nodes by given planes; the children have no tetrahedra until `place` gives them some.
@@ -145,8 +216,7 @@ class TetrahedralTree:
             If a node is not terminal or occurs twice.
         """
         nodes = np.asarray(nodes, np.intp)
-        if (self.children[nodes, 0] >= 0).any() or (len(nodes) and np.bincount(nodes).max() > 1):
-            raise ValueError("only terminal nodes can be divided, and each only once")
+        self._check_terminal(nodes)
         first = self._size
         self._append(
             np.repeat(nodes.astype(np.int32), 2),
@@ -167,7 +237,9 @@ class TetrahedralTree:
         """Say of nodes ``(n,)``, before they are divided, that they lie within the view."""
         self._rows["inside"][nodes] = True
 
-    def order(self, eye: ArrayLike | None = None, direction: ArrayLike | None = None) -> NDArray[np.int32]:
+    def order(
+        self, eye: ArrayLike | None = None, direction: ArrayLike | None = None, back_to_front: bool = False
+    ) -> NDArray[np.int32]:
         """Front-to-back rank of each terminal; exact for any eye, as in a BSP tree (paper, section 4).
 
         At every plane the eye's side comes first. Ranks are offsets in that traversal, found without walking it:
@@ -179,11 +251,13 @@ class TetrahedralTree:
             Where rays start, metres, world space.
         direction : (3,) float64, optional
             Common direction of parallel rays; used if ``eye`` is None.
+        back_to_front : bool
+            Rank from the farthest terminal instead, as the paper draws its final image.
 
         Returns
         -------
         (len,) int32
-            0 for the nearest terminal and so on; −1 for inner nodes. Back to front is the reverse.
+            0 for the nearest terminal (the farthest if ``back_to_front``) and so on; −1 for inner nodes.
 
         Raises
         ------
@@ -204,8 +278,9 @@ class TetrahedralTree:
             else:
                 # The eye is infinitely far back along the direction.
                 near = planes[:, :3] @ np.asarray(direction, np.float64) < 0.0
-            first = np.where(near, children[nodes, 1], children[nodes, 0])
-            second = np.where(near, children[nodes, 0], children[nodes, 1])
+            # Rows of children are (side 0, side 1); which of both comes first is one more index, not two selections.
+            leading = (near != back_to_front).astype(np.intp)
+            first, second = children[nodes, leading], children[nodes, 1 - leading]
             place[first] = place[nodes]
             place[second] = place[nodes] + count[first]
         place[children[:, 0] >= 0] = -1
@@ -230,6 +305,16 @@ class TetrahedralTree:
             part = slice(start, start + POINTS_AT_ONCE)
             found[part] = self._descend(points[part])
         return found
+
+    def _tetrahedra(self, nodes: NDArray[np.intp]) -> NDArray[np.float64]:
+        vertices = self.vertices(nodes)
+        if np.isnan(vertices[:, 0, 0]).any():
+            raise ValueError("only nodes with a tetrahedron can be bisected or cut; divide regions by a plane instead")
+        return vertices
+
+    def _check_terminal(self, nodes: NDArray[np.intp]) -> None:
+        if (self.children[nodes, 0] >= 0).any() or (len(nodes) and np.bincount(nodes).max() > 1):
+            raise ValueError("only terminal nodes can be divided, and each only once")
 
     def _descend(self, points: NDArray[np.float64]) -> NDArray[np.int32]:
         node = np.zeros(len(points), np.int32)
