@@ -23,6 +23,7 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
         items=(
             ('MIX', "Species", "The species to populate with"),
             ('LEAVES', "Leaf Objects", "The meshes that replace leaves"),
+            ('FIELD', "Field Species", "The species of the active field of plants"),
         ),
     )
     action: EnumProperty(
@@ -39,12 +40,11 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
         return properties.bl_rna.properties["action"].enum_items[properties.action].description
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        settings = context.scene.tetflora
-        owner, entries, index = (
-            (settings.populate, settings.populate.mix, "mix_index")
-            if self.which == 'MIX'
-            else (settings, settings.leaf_objects, "leaf_objects_index")
-        )
+        owner, name = self._list(context)
+        if owner is None:
+            self.report({'ERROR'}, "Make a field of plants active first")
+            return {'CANCELLED'}
+        entries, index = getattr(owner, name), f"{name}_index"
         if self.action == 'ADD':
             present = {entry.species for entry in entries}
             species = next((s for s in catalogue() if s not in present), None) or default_species()
@@ -58,3 +58,11 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
         entries.remove(active)
         setattr(owner, index, max(min(active, len(entries) - 1), 0))
         return {'FINISHED'}
+
+    def _list(self, context: bpy.types.Context) -> tuple[bpy.types.PropertyGroup | None, str]:
+        """The list's owner, and its name there."""
+        if self.which == 'FIELD':
+            active = context.active_object
+            return (active.tetflora if active is not None and active.tetflora.is_field else None), "field_species"
+        settings = context.scene.tetflora
+        return (settings.populate, "mix") if self.which == 'MIX' else (settings, "leaf_objects")

@@ -6,10 +6,11 @@ from math import pi
 
 import bpy
 import numpy as np
-from bpy.props import FloatProperty, IntProperty, StringProperty
+from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..tetflora_addon.blender.placement import place
-from ..tetflora_addon.blender.plant_objects import add_plants, plants_of
+from ..tetflora_addon.blender.plant_objects import add_field, add_plants, trunks
+from ..tetflora_addon.blender.properties import EMPTIES_UNASKED, MOST_EMPTIES, MOST_PLANTS, STORAGE_ITEMS
 from ..tetflora_addon.blender.species_items import catalogue, default_species
 from ..tetflora_addon.blender.surfaces import mesh_triangles
 from ..tetflora_addon.errors import SceneError
@@ -17,7 +18,7 @@ from . import ids
 from .base import Reporting, counted, in_object_mode, select_only
 
 # Names that the operator shares with the scene's settings for populating.
-_SHARED = ("count", "seed", "slope_limit", "min_distance", "scale_min", "scale_max")
+_SHARED = ("count", "as_field", "seed", "slope_limit", "min_distance", "scale_min", "scale_max")
 
 
 class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
@@ -27,12 +28,19 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
     bl_label = "Populate"
     bl_description = (
         "Scatter plants over the selected meshes. What is not given is taken from the panel. "
-        "Each plant is an empty; thousands are fine, beyond some ten thousand Blender becomes slow"
+        "Each plant is an empty, or a vertex of one mesh where there are too many for that"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
     count: IntProperty(
-        name="Plants", description="Plants to place", default=100, min=1, max=100_000, options={'SKIP_SAVE'}
+        name="Plants", description="Plants to place", default=100, min=1, max=MOST_PLANTS, options={'SKIP_SAVE'}
+    )
+    as_field: EnumProperty(
+        name="Make",
+        description="What the plants are made as",
+        items=STORAGE_ITEMS,
+        default='AUTOMATIC',
+        options={'SKIP_SAVE'},
     )
     seed: IntProperty(
         name="Seed", description="Another seed is another arrangement and other plants", options={'SKIP_SAVE'}
@@ -87,9 +95,13 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
         scene = context.scene
         self._complete_from(scene)
         shares = _parse_shares(self.species)
+        if self.as_field == 'EMPTIES' and self.count > MOST_EMPTIES:
+            raise SceneError(
+                f"{self.count:,} plants are too many for objects of their own, at most {MOST_EMPTIES:,}; "
+                "make a Field, or fewer plants"
+            )
         depsgraph = context.evaluated_depsgraph_get()
         grounds = [obj for obj in context.selected_objects if obj.type == 'MESH']
-        standing = [obj.matrix_world.translation[:2] for obj in plants_of(scene.objects)]
         placement = place(
             np.concatenate([mesh_triangles(obj, depsgraph, "select a mesh with faces") for obj in grounds]),
             count=self.count,
@@ -98,16 +110,23 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
             min_distance=self.min_distance,
             scale_range=(self.scale_min, self.scale_max),
             shares=tuple(shares.values()),
-            occupied=np.array(standing).reshape(-1, 2),
+            occupied=trunks(scene, depsgraph),
         )
-        made = add_plants(scene, placement, tuple(shares))
+        in_field = self.as_field == 'FIELD' or (self.as_field == 'AUTOMATIC' and len(placement) > EMPTIES_UNASKED)
+        if in_field and len(placement):
+            made = [add_field(scene, placement, tuple(shares))]
+        else:
+            made = add_plants(scene, placement, tuple(shares))
+        where = f' in the field "{made[0].name}"' if in_field and made else ""
         select_only(context, [*made, *grounds])
         # The terrain stays selected and active, so that Populate can follow Populate.
         context.view_layer.objects.active = grounds[0]
         if placement.reason:
-            self.report({'WARNING'}, f"{counted(len(made), 'plant')} of {self.count:,} placed: {placement.reason}")
+            self.report(
+                {'WARNING'}, f"{counted(len(placement), 'plant')} of {self.count:,} placed{where}: {placement.reason}"
+            )
         else:
-            self.report({'INFO'}, f"{counted(len(made), 'plant')} placed")
+            self.report({'INFO'}, f"{counted(len(placement), 'plant')} placed{where}")
         return {'FINISHED'}
 
     def _complete_from(self, scene: bpy.types.Scene) -> None:

@@ -5,7 +5,8 @@
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
-from ..tetflora_addon.blender.plant_objects import plants_of, remove_plants
+from ..tetflora_addon.blender.plant_fields import fields_of
+from ..tetflora_addon.blender.plant_objects import plants_of, remove_fields, remove_plants
 from . import ids
 from .base import Reporting, counted, in_object_mode
 
@@ -42,7 +43,8 @@ class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> set[str]:
         objects = context.selected_objects if self.which == 'SELECTED' else context.scene.objects
         plants = [o for o in plants_of(objects) if self.which != 'SPECIES' or o.tetflora.species == self.species]
-        if not plants:
+        fields = [] if self.which == 'SPECIES' else fields_of(objects)
+        if not plants and not fields:
             none = {
                 'SELECTED': "No plants are selected",
                 'SPECIES': f'The scene has no plants of species "{self.species}"',
@@ -50,5 +52,6 @@ class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
             }
             self.report({'WARNING'}, f"{none[self.which]}; nothing removed")
             return {'CANCELLED'}
-        self.report({'INFO'}, f"{counted(remove_plants(plants), 'plant')} removed")
+        number = remove_plants(plants) + remove_fields(fields)
+        self.report({'INFO'}, f"{counted(number, 'plant')} removed")
         return {'FINISHED'}

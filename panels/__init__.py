@@ -18,6 +18,7 @@ from . import (
 CLASSES = (
     lists.TETFLORA_UL_mix,
     lists.TETFLORA_UL_leaf_objects,
+    lists.TETFLORA_UL_field_species,
     plants_panel.TETFLORA_PT_plants,
     plants_panel.TETFLORA_PT_selected_plants,
     species_panel.TETFLORA_MT_species_files,

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lists of species in panels: the mixture to populate with, and leaf objects."""
+"""Lists of species in panels: the mixture to populate with, leaf objects, and kinds of a field."""
 
 from collections.abc import Iterable
 
@@ -27,6 +27,15 @@ class TETFLORA_UL_leaf_objects(bpy.types.UIList):
         row.prop(item, "leaf", text="")
 
 
+class TETFLORA_UL_field_species(bpy.types.UIList):
+    """A number of the attribute species, and the kind of plant that it means."""
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, index, _flag) -> None:
+        row = layout.split(factor=0.12, align=True)
+        row.label(text=str(index))
+        row.prop(item, "species_choice", text="", emboss=False)
+
+
 def draw_list(
     layout: bpy.types.UILayout,
     cls: type[bpy.types.UIList],
@@ -40,7 +49,7 @@ def draw_list(
     ----------
     names : iterable of str
         The owner's collection and its active index.
-    which : {'MIX', 'LEAVES'}
+    which : {'MIX', 'LEAVES', 'FIELD'}
         As in the operator.
     """
     entries, index = names

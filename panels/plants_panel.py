@@ -5,9 +5,12 @@
 import bpy
 
 from ..operators import ids
+from ..tetflora_addon.blender.plant_copies import has_nodes
+from ..tetflora_addon.blender.plant_fields import FIELD_TYPES, stored_size
 from ..tetflora_addon.blender.plant_form import FORM_TYPES
 from ..tetflora_addon.blender.species_items import catalogue
 from .base import SidebarPanel, picture, split_layout
+from .lists import TETFLORA_UL_field_species, draw_list
 
 
 class TETFLORA_MT_species(bpy.types.Menu):
@@ -39,11 +42,38 @@ class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
             column.prop(plant, "seed")
             column.prop(plant, "enabled")
             column.prop(plant, "form")
+        elif active is not None and active.tetflora.is_field:
+            _draw_field(column, active)
         else:
             column.label(text="The active object is not a plant", icon='INFO')
         layout.menu("TETFLORA_MT_add_plant", text="Add Plant", icon='ADD')
         if context.active_object is not None and context.active_object.type in FORM_TYPES:
             layout.operator(ids.USE_AS_FORM, icon='CURVE_DATA')
+        if active is not None and active.type in FIELD_TYPES and not active.tetflora.is_plant:
+            field = active.tetflora.is_field
+            layout.operator(
+                ids.MARK_FIELD,
+                text="Field of Plants" if field else "Use as Field of Plants",
+                icon='CHECKMARK' if field else 'POINTCLOUD_DATA',
+                depress=field,
+            )
+
+
+def _draw_field(column: bpy.types.UILayout, obj: bpy.types.Object) -> None:
+    field, kinds = obj.tetflora, obj.tetflora.field_species
+    # What nodes make of the points is not counted: a panel is drawn at every movement of the mouse.
+    more = ", before its nodes" if has_nodes(obj) else ""
+    column.label(text=f"Field of {stored_size(obj):,} points{more}", icon='POINTCLOUD_DATA')
+    draw_list(column, TETFLORA_UL_field_species, field, ("field_species", "field_species_index"), 'FIELD')
+    if not kinds:
+        column.prop(field, "species_choice")
+    elif 0 <= field.field_species_index < len(kinds):
+        column.prop(kinds[field.field_species_index], "form")
+    for species in {entry.species for entry in kinds} or {field.species}:
+        if species not in catalogue():
+            column.label(text=f'The catalogue has no "{species}"', icon='ERROR')
+    column.prop(field, "seed")
+    column.prop(field, "enabled")
 
 
 class TETFLORA_PT_selected_plants(SidebarPanel, bpy.types.Panel):
@@ -59,6 +89,8 @@ class TETFLORA_PT_selected_plants(SidebarPanel, bpy.types.Panel):
         column.operator(ids.RESEED, icon='FILE_REFRESH')
         column.operator(ids.SELECT_SPECIES, text="Select All of This Species", icon='RESTRICT_SELECT_OFF')
         column.operator(ids.MAKE_PLANT_MESH, text="Make Real Meshes", icon='OUTLINER_OB_MESH')
+        column.operator(ids.MAKE_FIELD, icon='POINTCLOUD_DATA')
+        column.operator(ids.SPLIT_FIELD, icon='OUTLINER_OB_EMPTY')
         column = self.layout.column(align=True)
         column.operator(ids.REMOVE_PLANTS, text="Remove Selected", icon='X').which = 'SELECTED'
         column.operator(ids.REMOVE_PLANTS, text="Remove All Plants", icon='TRASH').which = 'ALL'

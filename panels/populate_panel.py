@@ -23,6 +23,7 @@ class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
             layout.label(text="First species of the catalogue", icon='INFO')
         column = layout.column(align=True)
         column.prop(settings, "count")
+        column.prop(settings, "as_field")
         column.prop(settings, "min_distance")
         column.prop(settings, "slope_limit")
         column = layout.column(align=True)

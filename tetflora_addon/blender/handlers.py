@@ -22,7 +22,7 @@ from ..errors import TetFloraError
 from . import job
 from .emit import result_collections
 from .migration import migrate
-from .scene_reader import NoPlantsError, has_plants, renderable_objects
+from .scene_reader import NoPlantsError, has_plants, holds_plants, renderable_objects
 
 
 @dataclass
@@ -149,7 +149,7 @@ def _view_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
     """The first rendered view layer with plants; one refinement has to serve all layers."""
     layers = [layer for layer in scene.view_layers if layer.use] or list(scene.view_layers)
     for layer in layers:
-        if any(obj.tetflora.is_plant for obj in renderable_objects(layer)):
+        if any(holds_plants(obj) for obj in renderable_objects(layer)):
             return layer
     return layers[0]
 

@@ -32,11 +32,15 @@ def _migrate(owner: bpy.types.Object | bpy.types.Scene, steps: list[Step]) -> bo
 
 
 def migrate() -> None:
-    """Bring all plants, occluders and scenes of the open file up to date.
+    """Bring all plants, fields, occluders and scenes of the open file up to date.
 
     What a newer TetFlora stored is left alone, and said on stderr. Linked data belongs to another file.
     """
-    owners = [(o, OBJECT_STEPS) for o in bpy.data.objects if o.tetflora.is_plant or o.tetflora.is_occluder]
+    owners = [
+        (o, OBJECT_STEPS)
+        for o in bpy.data.objects
+        if o.tetflora.is_plant or o.tetflora.is_field or o.tetflora.is_occluder
+    ]
     owners += [(s, SCENE_STEPS) for s in bpy.data.scenes if s.is_property_set("tetflora")]
     newer = sum([_migrate(owner, steps) for owner, steps in owners])
     if newer:

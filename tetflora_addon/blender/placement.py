@@ -19,7 +19,7 @@ from ..plants.hashing import child_key, key_of_seed, uniform
 _ROUNDS = 24
 _NO_DISTANCE = 1e-4  # metres; less is none, and its cells could not be counted
 _SMALLEST_ROUND = 512
-_LARGEST_ROUND = 200_000
+_LARGEST_ROUND = 2_000_000
 
 
 class _Draw(IntEnum):

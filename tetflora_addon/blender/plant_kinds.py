@@ -15,7 +15,11 @@ _BREAK = "\n"
 
 def kind_of(plant: bpy.types.Object) -> str:
     """Kind of a plant."""
-    group = plant.tetflora
+    return kind_of_choice(plant.tetflora)
+
+
+def kind_of_choice(group: bpy.types.PropertyGroup) -> str:
+    """Kind that a group of properties with a species and a form says."""
     return group.species if group.form is None else f"{group.species}{_BREAK}{group.form.name_full}"
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What TetFlora stores in a file: ``Object.tetflora`` on plants and occluders, ``Scene.tetflora`` for the rest."""
+"""What TetFlora stores in a file: ``Object.tetflora`` on plants, fields and occluders, ``Scene.tetflora`` otherwise."""
 
 from dataclasses import fields
 from math import pi, radians
@@ -22,11 +22,42 @@ from .species_choice import SpeciesChoice
 from .species_editor import TetFloraSpeciesEditor
 from .species_edits import TetFloraSpeciesEdit
 
+#: Most plants that Populate places at once, and most that it makes as objects.
+MOST_PLANTS = 10_000_000
+MOST_EMPTIES = 100_000
+#: Up to this many become empties if nobody says otherwise; beyond, Blender becomes slow.
+EMPTIES_UNASKED = 10_000
+STORAGE_ITEMS = (
+    ('AUTOMATIC', "Automatic", f"Empties up to {EMPTIES_UNASKED:,} plants, a field for more", 0),
+    ('EMPTIES', "Empties", "An object for each plant: each can be moved by itself, many make Blender slow", 1),
+    ('FIELD', "Field", "One object whose vertices are the plants: room for millions", 2),
+)
+
 _SETTINGS = RefinementSettings()
 
 
+_FORM = {
+    "name": "Form",
+    "description": (
+        "Curve, hair curves, or mesh of edges that draws this plant's trunk, and limbs if wanted; the species "
+        "grows the rest on them. Without one, the species grows the whole plant"
+    ),
+    "type": bpy.types.Object,
+    "poll": lambda _group, candidate: candidate.type in FORM_TYPES,
+}
+
+
+class TetFloraFieldEntry(bpy.types.PropertyGroup, SpeciesChoice):
+    """One kind of plant of a field; the attribute ``species`` of its points counts through these."""
+
+    form: PointerProperty(**_FORM)
+
+
 class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
-    """A plant is a species, a transform and a seed; nothing else is stored (paper, section 5)."""
+    """A plant is a species, a transform and a seed; nothing else is stored (paper, section 5).
+
+    A field is an object whose points are plants.
+    """
 
     version: IntProperty(name="Version", description="Layout of these properties", options={'HIDDEN'})
     is_plant: BoolProperty(
@@ -43,15 +74,21 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
         description="The plant takes part in refinement and rendering",
         default=True,
     )
-    form: PointerProperty(
-        name="Form",
+    form: PointerProperty(**_FORM)
+    is_field: BoolProperty(
+        name="Field of Plants",
         description=(
-            "Curve, hair curves, or mesh of edges that draws this plant's trunk, and limbs if wanted; the species "
-            "grows the rest on them. Without one, the species grows the whole plant"
+            "Each point of this mesh or point cloud stands for a plant; the attributes species, seed, rotation and "
+            "scale of the points say which, the list of species what the numbers in species mean"
         ),
-        type=bpy.types.Object,
-        poll=lambda _group, candidate: candidate.type in FORM_TYPES,
+        options=set(),
     )
+    field_species: CollectionProperty(
+        name="Field Species",
+        description="Species that the attribute species of a field's points counts through, from 0 on",
+        type=TetFloraFieldEntry,
+    )
+    field_species_index: IntProperty(name="Active Field Species", options={'HIDDEN', 'SKIP_SAVE'})
     is_occluder: BoolProperty(
         name="Hides Plants",
         description=(
@@ -98,7 +135,14 @@ class TetFloraPopulate(bpy.types.PropertyGroup):
         default=100,
         min=1,
         soft_max=10_000,
-        max=100_000,
+        max=MOST_PLANTS,
+        options=set(),
+    )
+    as_field: EnumProperty(
+        name="Make",
+        description="What the plants are made as",
+        items=STORAGE_ITEMS,
+        default='AUTOMATIC',
         options=set(),
     )
     seed: IntProperty(name="Seed", description="Another seed is another arrangement and other plants", options=set())
@@ -291,6 +335,7 @@ class TetFloraScene(bpy.types.PropertyGroup):
 
 
 CLASSES = (
+    TetFloraFieldEntry,
     TetFloraObject,
     TetFloraMixEntry,
     TetFloraLeafObject,

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Read from a scene what refinement needs: camera, plants and what hides them.
 
-Only here does TetFlora loop over objects; what comes out are plain arrays.
+Only here and in `plant_copies` does TetFlora loop over objects; what comes out are plain arrays.
 """
 
 from collections.abc import Iterator
@@ -15,6 +15,8 @@ from ..errors import SceneError
 from ..plants.hashing import child_key, key_of_seed
 from ..plants.seeds import Seeds
 from ..refinement.camera import Camera
+from .plant_copies import Copies, copies_of, may_instance
+from .plant_fields import Plants, read_field
 from .plant_kinds import kind_of, species_of
 from .species_items import catalogue
 from .surfaces import mesh_triangles
@@ -82,11 +84,13 @@ def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Camer
 
 
 def read_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Seeds:
-    """Enabled plants of a view layer that render, sorted by name.
+    """Enabled plants of a view layer that render: single ones by name, then instances, then fields.
 
-    Plants in instanced collections take part; each instance becomes an individual of its own. Of a plant's transform
-    the direction of its z axis and the azimuth of its x axis are kept, and the mean of the absolute scales: plants are
-    neither stretched nor mirrored.
+    Plants and fields that collections or geometry nodes instance take part; each instance becomes an individual of its
+    own.
+
+    Of a plant's transform the direction of its z axis and the azimuth of its x axis are kept, and the mean of the
+    absolute scales: plants are neither stretched nor mirrored.
 
     Raises
     ------
@@ -96,49 +100,110 @@ def read_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_lay
         A species that the catalogue does not have, a scale of 0, or a transform that is not a number; the message names
         the objects.
     """
-    names: list[str] = []
-    identifiers: list[str] = []
-    seeds: list[int] = []
-    matrices: list[NDArray[np.float64]] = []
-    found_any = False
-    for obj in sorted(renderable_objects(view_layer), key=lambda o: o.name_full):
-        group = obj.tetflora
-        if group.is_plant:
-            found_any = True
-            if group.enabled:
-                names.append(obj.name)
-                identifiers.append(kind_of(obj))
-                seeds.append(group.seed)
-                matrices.append(world_matrix(obj, depsgraph))
-    if any(o.is_instancer for o in view_layer.objects):
-        for obj, seed, matrix in _instances(depsgraph):
-            names.append(obj.name)
-            identifiers.append(kind_of(obj))
-            seeds.append(seed)
-            matrices.append(matrix)
-    if not names:
-        raise NoPlantsError(
-            "All plants of the scene are switched off; enable some in the sidebar's TetFlora tab"
-            if found_any
-            else "No plants are there to render; add some with Add > TetFlora Plant or with Populate "
-            "in the sidebar's TetFlora tab"
-        )
-    _check_species(names, identifiers)
-    transforms = np.array(matrices)
-    frame, scale, sound = frames_of(transforms[:, :3, :3])
-    sound &= np.isfinite(transforms).all(axis=(1, 2))
-    if not sound.all():
-        bad = [names[i] for i in np.flatnonzero(~sound)]
-        raise SceneError(f"{_listed(bad)}: scale 0 or no valid position; give a scale above 0 (Alt S resets it)")
-    kinds, species = np.unique(np.array(identifiers), return_inverse=True)
-    return Seeds(
-        identifiers=tuple(str(kind) for kind in kinds),
-        species=species.astype(np.int32).reshape(-1),
-        seed=np.array(seeds, dtype=np.int64),
-        position=transforms[:, :3, 3].copy(),
-        frame=frame,
-        scale=scale,
+    objects = sorted(renderable_objects(view_layer), key=lambda o: o.name_full)
+    own = [o for o in objects if o.tetflora.is_plant or o.tetflora.is_field]
+    read = [single_plants([o for o in own if o.tetflora.is_plant and o.tetflora.enabled], depsgraph)]
+    copies = copies_of([o for o in objects if may_instance(o)], depsgraph)
+    read += [_copied_plants(c) for c in copies if c.owner.tetflora.is_plant and c.geometry is None and _enabled(c)]
+    for obj in own:
+        if obj.tetflora.is_field and obj.tetflora.enabled:
+            read.append(read_field(obj, depsgraph, world_matrix(obj, depsgraph)[None]))
+    read += [
+        read_field(c.owner, depsgraph, c.matrices, c.keys, c.geometry)
+        for c in copies
+        if c.owner.tetflora.is_field and _enabled(c)
+    ]
+    read = [plants for plants in read if len(plants)]
+    if not read:
+        found = own or copies
+        off = found and not any(o.tetflora.enabled for o in (*own, *(c.owner for c in copies)))
+        raise NoPlantsError(_none_left(bool(off), [o.name for o in own if o.tetflora.is_field]))
+    return _merged(read)
+
+
+def _none_left(off: bool, fields: list[str]) -> str:
+    if off:
+        return "All plants of the scene are switched off; enable some in the sidebar's TetFlora tab"
+    if fields:
+        return f"{_listed(fields)}: a field of plants without points; give it vertices, or populate a terrain"
+    return (
+        "No plants are there to render; add some with Add > TetFlora Plant or with Populate in the sidebar's "
+        "TetFlora tab"
     )
+
+
+def _enabled(copies: Copies) -> bool:
+    return copies.owner.tetflora.enabled
+
+
+def single_plants(plants: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Plants:
+    """Plants that are objects, in their order.
+
+    Raises
+    ------
+    SceneError
+        As `read_plants`.
+    """
+    names, own = [obj.name for obj in plants], [kind_of(obj) for obj in plants]
+    _check_species(list(zip(names, own, strict=True)))
+    number = {kind: i for i, kind in enumerate(sorted(set(own)))}
+    species = np.array([number[kind] for kind in own], dtype=np.int32)
+    seeds = np.array([obj.tetflora.seed for obj in plants], dtype=np.int64)
+    matrices = np.array([world_matrix(obj, depsgraph) for obj in plants]).reshape(-1, 4, 4)
+    return _placed(names, tuple(number), species, seeds, matrices)
+
+
+def _copied_plants(copies: Copies) -> Plants:
+    """A plant that is instanced. Copies shall not be the same individual: each instance's key joins the seed."""
+    plant = copies.owner
+    seeds = child_key(key_of_seed(plant.tetflora.seed), copies.keys).view(np.int64)
+    return _placed([plant.name], (kind_of(plant),), np.zeros(len(seeds), np.int32), seeds, copies.matrices)
+
+
+def _placed(
+    names: list[str],
+    kinds: tuple[str, ...],
+    species: NDArray[np.int32],
+    seeds: NDArray[np.int64],
+    matrices: NDArray[np.float64],
+) -> Plants:
+    frame, scale, sound = frames_of(matrices[:, :3, :3])
+    sound &= np.isfinite(matrices).all(axis=(1, 2))
+    if not sound.all():
+        bad = [names[min(i, len(names) - 1)] for i in np.flatnonzero(~sound)[: _NAMED * len(names)].tolist()]
+        raise SceneError(
+            f"{_listed(list(dict.fromkeys(bad)))}: scale 0 or no valid position; give a scale above 0 (Alt S resets it)"
+        )
+    return Plants(names[0] if names else "", kinds, species, seeds, matrices[:, :3, 3].copy(), frame, scale)
+
+
+def _merged(read: list[Plants]) -> Seeds:
+    """Plants of all objects as one, with the kinds that occur."""
+    tables = []
+    for plants in read:
+        occurring = np.bincount(plants.species, minlength=len(plants.kinds)) > 0
+        tables.append({i: plants.kinds[i] for i in np.flatnonzero(occurring).tolist()})
+    _check_species([(plants.name, kind) for plants, table in zip(read, tables, strict=True) for kind in table.values()])
+    identifiers = tuple(sorted({kind for table in tables for kind in table.values()}))
+    number = {kind: i for i, kind in enumerate(identifiers)}
+    species = []
+    for plants, table in zip(read, tables, strict=True):
+        to_all = np.zeros(len(plants.kinds), np.int32)
+        to_all[list(table)] = [number[kind] for kind in table.values()]
+        species.append(to_all[plants.species])
+    return Seeds(
+        identifiers=identifiers,
+        species=_one(species),
+        seed=_one([plants.seed for plants in read]),
+        position=_one([plants.position for plants in read]),
+        frame=_one([plants.frame for plants in read]),
+        scale=_one([plants.scale for plants in read]),
+    )
+
+
+def _one(arrays: list[NDArray]) -> NDArray:
+    # Millions of frames are not copied where there is nothing to join.
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
 
 
 def read_occluders(
@@ -183,30 +248,29 @@ def renderable_objects(view_layer: bpy.types.ViewLayer) -> Iterator[bpy.types.Ob
                 yield obj
 
 
+def holds_plants(obj: bpy.types.Object) -> bool:
+    """Whether an object is a plant or a field, or may instance some; cheap."""
+    return obj.tetflora.is_plant or obj.tetflora.is_field or may_instance(obj)
+
+
 def has_plants(scene: bpy.types.Scene) -> bool:
     """Whether a scene may hold plants; cheap, and never wrong where there are some."""
-    return any(o.tetflora.is_plant or o.is_instancer for o in scene.objects)
+    if any(o.tetflora.is_plant or o.tetflora.is_field for o in scene.objects):
+        return True
+    # What is instanced need not lie in the scene, but somewhere.
+    somewhere = any(o.tetflora.is_plant or o.tetflora.is_field for o in bpy.data.objects)
+    return somewhere and any(may_instance(o) for o in scene.objects)
 
 
-def _instances(depsgraph: bpy.types.Depsgraph) -> Iterator[tuple[bpy.types.Object, int, NDArray[np.float64]]]:
-    for instance in depsgraph.object_instances:
-        if instance.is_instance and instance.show_self:
-            obj = instance.object
-            group = obj.tetflora
-            if group.is_plant and group.enabled and not obj.hide_render:
-                # Copies of a plant shall not be the same individual: the instance's own number joins the seed.
-                key = child_key(key_of_seed(group.seed), instance.random_id & 0xFFFFFFFF)
-                yield obj.original, int(key.view(np.int64)), np.array(instance.matrix_world)
-
-
-def _check_species(names: list[str], identifiers: list[str]) -> None:
+def _check_species(plants: list[tuple[str, str]]) -> None:
+    """Refuse kinds, each with the name of an object that has it, whose species nobody has."""
     known = catalogue()
-    bad = [i for i, identifier in enumerate(identifiers) if species_of(identifier) not in known]
+    bad = [(name, species) for name, kind in plants if (species := species_of(kind)) not in known]
     if bad:
-        species = species_of(identifiers[bad[0]])
-        same = [names[i] for i in bad if species_of(identifiers[i]) == species]
+        species = bad[0][1]
         raise SceneError(
-            f'{_listed(same)}: unknown species "{species}"; choose another in the sidebar\'s TetFlora tab, or put '
+            f'{_listed([name for name, other in bad if other == species])}: unknown species "{species}"; choose '
+            "another in the sidebar's TetFlora tab, or put "
             f"{species or 'its file'}{'.json' if species else ''} into the species folder named in the preferences"
         )
 

@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fields of plants: mark objects as fields, make a field of plants that are objects, and plants of a field."""
+
+import bpy
+
+from ..tetflora_addon.blender.plant_fields import FIELD_TYPES, fields_of
+from ..tetflora_addon.blender.plant_objects import field_from_plants, plants_from_field, prepare_scene
+from ..tetflora_addon.blender.properties import MOST_EMPTIES
+from ..tetflora_addon.blender.species_items import default_species
+from . import ids
+from .base import Reporting, counted, in_object_mode, plants_selected, select_only, selected_plants
+
+
+class TETFLORA_OT_mark_field(Reporting, bpy.types.Operator):
+    """Use the active mesh or point cloud as a field of plants, or no longer."""
+
+    bl_idname = ids.MARK_FIELD
+    bl_label = "Use as Field of Plants"
+    bl_description = (
+        "Each point of the active mesh or point cloud, as its modifiers leave it, becomes a plant. Attributes species, "
+        "seed, rotation and scale of the points say which. Again to end that"
+    )
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        active = context.active_object
+        if active is not None and (active.type in FIELD_TYPES or active.tetflora.is_field):
+            return True
+        cls.poll_message_set("Make a mesh or point cloud active: click on it last")
+        return False
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        obj = context.active_object
+        field = obj.tetflora
+        field.is_field = not field.is_field
+        if not field.is_field:
+            self.report({'INFO'}, f'"{obj.name}" is no field of plants any more')
+            return {'FINISHED'}
+        field.is_plant = False
+        if not field.field_species:
+            field.field_species.add().species = field.species or default_species()
+        prepare_scene(context.scene)
+        self.report({'INFO'}, f'Points of "{obj.name}" count as plants')
+        return {'FINISHED'}
+
+
+class TETFLORA_OT_make_field(Reporting, bpy.types.Operator):
+    """Make one field of the selected plants."""
+
+    bl_idname = ids.MAKE_FIELD
+    bl_label = "Make Field of Plants"
+    bl_description = (
+        "Replace the selected plants by one object whose vertices are the same individuals at the same places. It "
+        "keeps Blender fast with many plants; parents, constraints and animation of the single plants are lost"
+    )
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return in_object_mode(cls, context) and plants_selected(cls, context)
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        selected = selected_plants(context)
+        plants = [o for o in selected if o.tetflora.enabled and not o.hide_render and o.library is None]
+        if not plants:
+            self.report({'WARNING'}, "The selected plants are disabled, hidden in renders, or linked; nothing changed")
+            return {'CANCELLED'}
+        left = len(selected) - len(plants)
+        field = field_from_plants(context.scene, context.evaluated_depsgraph_get(), plants)
+        select_only(context, [field])
+        rest = f"; {counted(left, 'plant')} disabled, hidden in renders, or linked stay objects" if left else ""
+        self.report({'INFO'}, f'{counted(len(plants), "plant")} put into "{field.name}"{rest}')
+        return {'FINISHED'}
+
+
+class TETFLORA_OT_split_field(Reporting, bpy.types.Operator):
+    """Make an empty of each plant of the selected fields."""
+
+    bl_idname = ids.SPLIT_FIELD
+    bl_label = "Make Objects of Field"
+    bl_description = (
+        "Replace the selected fields by an empty for each plant: the same individuals at the same places. "
+        f"At most {MOST_EMPTIES:,} plants"
+    )
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not in_object_mode(cls, context):
+            return False
+        if fields_of(context.selected_objects):
+            return True
+        cls.poll_message_set("Select a field of plants first")
+        return False
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        depsgraph = context.evaluated_depsgraph_get()
+        made: list[bpy.types.Object] = []
+        for field in [o for o in fields_of(context.selected_objects) if o.library is None]:
+            made += plants_from_field(context.scene, depsgraph, field, MOST_EMPTIES - len(made))
+        if not made:
+            self.report({'WARNING'}, "The selected fields are linked; nothing changed")
+            return {'CANCELLED'}
+        select_only(context, made)
+        self.report({'INFO'}, f"{counted(len(made), 'plant')} made")
+        return {'FINISHED'}

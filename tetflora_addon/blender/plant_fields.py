@@ -1,0 +1,326 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Plant fields: objects whose points are plants, for numbers that empties cannot carry.
+
+A field is a mesh or point cloud whose object is marked as one. Attributes of its points say what grows there; whatever
+writes them will do. Nothing here goes from plant to plant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from ..plants.hashing import child_key, key_of_seed
+from .placement import new_seeds
+from .plant_copies import geometry_of
+from .plant_kinds import kind_of, kind_of_choice
+from .transforms import frames_of
+
+#: Types of objects that can be marked as fields.
+FIELD_TYPES = {'MESH', 'POINTCLOUD'}
+#: An attribute of this beginning goes before the one without, where other tools use the short name otherwise.
+PREFIX = "tf_"
+
+_INTEGERS = {'INT': np.int32, 'INT8': np.int8, 'BOOLEAN': np.bool_}
+_VECTOR = {'FLOAT_VECTOR': ("vector", 3)}
+_KEYS = {'QUATERNION': ("value", 4), 'FLOAT': ("value", 1), **_VECTOR}
+
+Points = bpy.types.Mesh | bpy.types.PointCloud
+
+
+@dataclass(frozen=True)
+class Plants:
+    """Plants as read from one object, in world space.
+
+    Attributes
+    ----------
+    name : str
+        Of the object.
+    kinds : tuple of str
+        That ``species`` counts through.
+    species : (n,) int32
+    seed : (n,) int64
+    position : (n, 3) float64
+    frame : (n, 3, 3) float64
+    scale : (n,) float64
+    """
+
+    name: str
+    kinds: tuple[str, ...]
+    species: NDArray[np.int32]
+    seed: NDArray[np.int64]
+    position: NDArray[np.float64]
+    frame: NDArray[np.float64]
+    scale: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.seed)
+
+
+def field_kinds(obj: bpy.types.Object) -> tuple[str, ...]:
+    """Kinds of plants that the attribute ``species`` of a field counts through; one at least."""
+    return tuple(kind_of_choice(entry) for entry in obj.tetflora.field_species) or (kind_of(obj),)
+
+
+def fields_of(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+    """Those of the objects that are fields."""
+    return [o for o in objects if o.tetflora.is_field]
+
+
+def stored_size(obj: bpy.types.Object) -> int:
+    """Number of points that a field stores, before modifiers; at no cost."""
+    return len(obj.data.points if obj.type == 'POINTCLOUD' else obj.data.vertices) if obj.type in FIELD_TYPES else 0
+
+
+def read_field(
+    obj: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    matrices: NDArray[np.float64],
+    keys: NDArray[np.uint64] | None = None,
+    geometry: bpy.types.GeometrySet | None = None,
+) -> Plants:
+    """Plants of a field, once for each of its places.
+
+    Of each point's transform the same is kept as of a plant that is an object.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        Original object.
+    depsgraph : bpy.types.Depsgraph
+        Decides about modifiers. A field that it does not hold is taken without them.
+    matrices : (k, 4, 4) float64
+        Places of the field.
+    keys : (k,) uint64, optional
+        Make other individuals of each place; None where the field stands for itself.
+    geometry : bpy.types.GeometrySet, optional
+        Read this instead of what the object evaluates to.
+
+    Raises
+    ------
+    SceneError
+        An attribute of a type or domain that cannot be used, or points without a place or size; the message names the
+        object, how many points and the first of them.
+    """
+    if geometry is None:
+        geometry = geometry_of(obj, depsgraph)
+        stored = [obj.data] if obj.type in FIELD_TYPES else []
+    parts = stored if geometry is None else [g for g in (geometry.mesh, geometry.pointcloud) if g is not None]
+    sizes = [_size(part) for part in parts]
+    position = _joined([_vectors(part, "position", size) for part, size in zip(parts, sizes, strict=True)], (0, 3))
+    linear = _joined([_linear(obj, part, size) for part, size in zip(parts, sizes, strict=True)], (0, 3, 3))
+    firsts = np.cumsum([0, *sizes])
+    seed = _joined([_seeds(obj, p, n, int(f)) for p, n, f in zip(parts, sizes, firsts, strict=False)], (0,))
+    kinds = field_kinds(obj)
+    species = _joined([_integers(obj, p, "species", n, 0) for p, n in zip(parts, sizes, strict=True)], (0,))
+    _refuse(obj, (species < 0) | (species >= len(kinds)), f"a species that its list of {len(kinds)} does not have")
+    if keys is not None:
+        seed = child_key(key_of_seed(seed), keys[:, None]).view(np.int64).reshape(-1)
+    world = matrices[:, :3, :3].astype(np.float64)
+    place = (position @ world.transpose(0, 2, 1) + matrices[:, None, :3, 3]).reshape(-1, 3)
+    frame, scale, sound = frames_of(_turned(world, linear))
+    sound &= np.isfinite(place).all(axis=1)
+    _refuse(obj, ~sound.reshape(len(matrices), -1).all(axis=0), "scale 0 or no valid position or rotation")
+    return Plants(obj.name, kinds, np.tile(species.astype(np.int32), len(matrices)), seed, place, frame, scale)
+
+
+def write_field(
+    name: str,
+    position: NDArray[np.float64],
+    rotation: NDArray[np.float64],
+    scale: NDArray[np.float64],
+    species: NDArray[np.int32],
+    seed: NDArray[np.int32],
+    identifiers: Sequence[str],
+    forms: Sequence[bpy.types.Object | None] | None = None,
+) -> bpy.types.Object:
+    """Make a field: an object with a mesh of vertices alone, linked to no collection yet.
+
+    A mesh, and no point cloud: its vertices are seen as dots in the viewport and not at all in renders, and every
+    version of Blender can make it.
+
+    Parameters
+    ----------
+    position : (n, 3) float
+        World space, metres.
+    rotation : (n, 4) float
+        Quaternions, w first.
+    scale : (n,) float
+    species : (n,) int32
+        Index into ``identifiers``.
+    seed : (n,) int32
+    identifiers : sequence of str
+    forms : sequence of objects or None, optional
+        Form of each kind.
+    """
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(len(seed))
+    mesh.attributes["position"].data.foreach_set("vector", _flat(position, np.float32))
+    for attribute, kind, values, dtype in (
+        ("rotation", 'QUATERNION', rotation, np.float32),
+        ("scale", 'FLOAT', scale, np.float32),
+        ("species", 'INT', species, np.int32),
+        ("seed", 'INT', seed, np.int32),
+    ):
+        mesh.attributes.new(attribute, kind, 'POINT').data.foreach_set("value", _flat(values, dtype))
+    mesh.update()
+    obj = bpy.data.objects.new(name, mesh)
+    group = obj.tetflora
+    group.is_field = True
+    for identifier, form in zip(identifiers, forms or [None] * len(identifiers), strict=True):
+        entry = group.field_species.add()
+        entry.species, entry.form = identifier, form
+    return obj
+
+
+def upright(azimuth: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Quaternions, (n, 4), of turns about the vertical in radians, (n,)."""
+    half, none = 0.5 * np.asarray(azimuth), np.zeros(len(azimuth))
+    return np.stack([np.cos(half), none, none, np.sin(half)], axis=1)
+
+
+def quaternions(frame: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit quaternions, (n, 4) with w first, of rotations, (n, 3, 3).
+
+    Each of the four ways to write it down is exact where its own component is large; the one with the largest is taken
+    (Shepperd, Journal of Guidance and Control, 1978).
+    """
+    r = frame
+    w = np.stack([1 + r[:, 0, 0] + r[:, 1, 1] + r[:, 2, 2], *(_axis(r, i) for i in range(3))], axis=1)
+    a, b, c = r[:, 2, 1] - r[:, 1, 2], r[:, 0, 2] - r[:, 2, 0], r[:, 1, 0] - r[:, 0, 1]
+    d, e, f = r[:, 1, 0] + r[:, 0, 1], r[:, 0, 2] + r[:, 2, 0], r[:, 2, 1] + r[:, 1, 2]
+    rows = ((w[:, 0], a, b, c), (a, w[:, 1], d, e), (b, d, w[:, 2], f), (c, e, f, w[:, 3]))
+    ways = np.stack([np.stack(row, axis=1) for row in rows], axis=1)
+    best = ways[np.arange(len(r)), np.argmax(w, axis=1)]
+    return best / np.linalg.norm(best, axis=1, keepdims=True)
+
+
+def _axis(r: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
+    return 1.0 + 2.0 * r[:, axis, axis] - np.trace(r, axis1=1, axis2=2)
+
+
+def _size(points: Points) -> int:
+    return len(points.points if isinstance(points, bpy.types.PointCloud) else points.vertices)
+
+
+def _attribute(obj: bpy.types.Object, points: Points, name: str, kinds: Iterable[str]) -> bpy.types.Attribute | None:
+    found = points.attributes.get(PREFIX + name) or points.attributes.get(name)
+    if found is None:
+        return None
+    if found.domain != 'POINT' or found.data_type not in kinds:
+        raise SceneError(
+            f'"{obj.name}": its attribute "{found.name}" is {found.data_type} on {found.domain}; a field of plants '
+            f"needs {' or '.join(sorted(kinds))} on POINT. Convert it, or store it as {PREFIX}{name}"
+        )
+    return found
+
+
+def _values(attribute: bpy.types.Attribute, size: int) -> NDArray[np.float32]:
+    """Values as stored: (n,) or (n, components)."""
+    key, width = _KEYS[attribute.data_type]
+    values = np.zeros((size, width), np.float32)
+    attribute.data.foreach_get(key, values.reshape(-1))
+    return values[:, 0] if width == 1 else values
+
+
+def _vectors(points: Points, name: str, size: int) -> NDArray[np.float64]:
+    # No points may mean no attribute either.
+    return _values(points.attributes[name], size).astype(np.float64) if size else np.zeros((0, 3))
+
+
+def _integers(
+    obj: bpy.types.Object, points: Points, name: str, size: int, default: NDArray[np.int64] | int
+) -> NDArray[np.int64]:
+    attribute = _attribute(obj, points, name, _INTEGERS)
+    if attribute is None:
+        return np.broadcast_to(np.asarray(default, np.int64), size)
+    values = np.zeros(size, _INTEGERS[attribute.data_type])
+    attribute.data.foreach_get("value", values)
+    return values.astype(np.int64)
+
+
+def _seeds(obj: bpy.types.Object, points: Points, size: int, first: int) -> NDArray[np.int64]:
+    """Seeds as stored; with a seed of the object's, or without stored ones, hashes of them or of the points' ids."""
+    roll = obj.tetflora.seed
+    if _attribute(obj, points, "seed", _INTEGERS) is not None:
+        seeds = _integers(obj, points, "seed", size, 0)
+        return new_seeds(seeds, roll).astype(np.int64) if roll else seeds
+    numbers = _integers(obj, points, "id", size, np.arange(first, first + size))
+    return new_seeds(numbers, roll).astype(np.int64)
+
+
+def _linear(obj: bpy.types.Object, points: Points, size: int) -> NDArray[np.float64]:
+    """Rotation times scale of each point in the field's space, (n, 3, 3)."""
+    rotation = _attribute(obj, points, "rotation", {'QUATERNION', 'FLOAT_VECTOR'})
+    if rotation is None:
+        linear = np.tile(np.eye(3), (size, 1, 1))
+    else:
+        values = _values(rotation, size).astype(np.float64)
+        linear = _from_quaternions(values) if values.shape[1] == 4 else _from_eulers(values)
+    scale = _attribute(obj, points, "scale", {'FLOAT', 'FLOAT_VECTOR'})
+    if scale is not None:
+        values = _values(scale, size).astype(np.float64)
+        if values.ndim == 1:
+            _refuse(obj, ~(values > 0.0), "a scale that is not above 0")
+            values = values[:, None]
+        linear *= values[:, None, :]
+    return linear
+
+
+def _from_quaternions(q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotations of quaternions of any length; one of no length turns nothing."""
+    squared = np.einsum("ij,ij->i", q, q)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        twice = np.where(squared > 0.0, 2.0 / squared, squared)  # keeps what is no number
+    w, x, y, z = np.ascontiguousarray(q.T)
+    out = np.zeros((len(q), 3, 3))
+    xx, yy, zz = twice * x * x, twice * y * y, twice * z * z
+    out[:, 0, 0], out[:, 1, 1], out[:, 2, 2] = 1.0 - yy - zz, 1.0 - xx - zz, 1.0 - xx - yy
+    for (i, j), product, turn in (((0, 1), x * y, z), ((0, 2), x * z, -y), ((1, 2), y * z, x)):
+        out[:, i, j] = twice * (product - w * turn)
+        out[:, j, i] = twice * (product + w * turn)
+    return out
+
+
+def _from_eulers(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotations of XYZ Euler angles in radians: first about x, last about z, as Blender's default."""
+    with np.errstate(invalid="ignore"):
+        (cx, cy, cz), (sx, sy, sz) = np.cos(angles).T, np.sin(angles).T
+    rows = (
+        (cy * cz, sx * sy * cz - cx * sz, cx * sy * cz + sx * sz),
+        (cy * sz, sx * sy * sz + cx * cz, cx * sy * sz - sx * cz),
+        (-sy, sx * cy, cx * cy),
+    )
+    return np.stack([np.stack(row, axis=1) for row in rows], axis=1)
+
+
+def _turned(world: NDArray[np.float64], linear: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(k, 3, 3) times (n, 3, 3), every one with every other: (k · n, 3, 3)."""
+    if len(world) == 1 and np.array_equal(world[0], np.eye(3)):
+        return linear
+    # One product of long matrices for each place, which is many times faster than millions of small ones.
+    rows = linear.transpose(0, 2, 1).reshape(-1, 3)
+    turned = rows @ world.transpose(0, 2, 1)  # (k, 3 n, 3)
+    return turned.reshape(-1, 3, 3).transpose(0, 2, 1)
+
+
+def _refuse(obj: bpy.types.Object, bad: NDArray[np.bool_], what: str) -> None:
+    if bad.any():
+        raise SceneError(
+            f'"{obj.name}": {int(bad.sum()):,} of {len(bad):,} points have {what}, the first is point '
+            f"{int(np.argmax(bad))}; correct or delete them, or switch the field off in the sidebar's TetFlora tab"
+        )
+
+
+def _joined(parts: list[NDArray], empty: tuple[int, ...]) -> NDArray:
+    return parts[0] if len(parts) == 1 else np.concatenate([np.zeros(empty, parts[0].dtype if parts else int), *parts])
+
+
+def _flat(values: NDArray, dtype: type) -> NDArray:
+    return np.ascontiguousarray(values, dtype=dtype).reshape(-1)
