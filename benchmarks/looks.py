@@ -1,0 +1,85 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What bark costs in Cycles where a trunk fills the picture, over a plain material of the same colour.
+
+Times are those of the processor, of all threads, which other programs disturb less than they do the clock. Each bark
+is rendered next to the plain material, and the least time of each counts.
+"""
+
+from __future__ import annotations
+
+import time
+from math import pi, tau
+
+import bpy
+
+from devtools import session
+
+from .report import Targets
+
+RADIUS, LENGTH = 0.4, 6.0
+COLOUR = (0.4, 0.3, 0.2)
+
+TARGETS: Targets = {"cycles_worst": {"max": 1.5}}
+QUICK_TARGETS: Targets = TARGETS
+
+
+def run(quick: bool) -> dict[str, float]:
+    """Measure all barks; `cycles_<bark>` is its time over that of the plain material."""
+    materials = session.part("tetflora_addon.blender.materials")
+    scene = bpy.context.scene
+    trunk, plain = _trunk_scene(scene), _plain_material()
+    scene.cycles.samples = 8 if quick else 32
+    ratios = {}
+    for character in materials.BARKS:
+        pair = (plain, materials.bark_material(f"Trunk of {character} bark", character))
+        seconds = [[_processor_seconds(trunk, m) for m in pair] for _ in range(2)]
+        plain_s, bark_s = (min(column) for column in zip(*seconds, strict=True))
+        ratios[f"cycles_{character}"] = bark_s / plain_s
+    return {**ratios, "cycles_worst": max(ratios.values())}
+
+
+def _trunk_scene(scene: bpy.types.Scene) -> bpy.types.Object:
+    """A trunk across the whole picture, under a sun and an even sky."""
+    bpy.ops.mesh.primitive_cylinder_add(vertices=64, radius=RADIUS, depth=LENGTH, end_fill_type='NOTHING')
+    trunk = bpy.context.object
+    mesh = trunk.data
+    mesh.shade_smooth()
+    mesh.uv_layers[0].name = "UVMap"
+    for loop, corner in zip(mesh.uv_layers[0].data, mesh.loops, strict=True):
+        loop.uv = (loop.uv[0], mesh.vertices[corner.vertex_index].co.z / (tau * RADIUS))
+    colour = mesh.attributes.new("tf_colour", 'FLOAT_VECTOR', 'FACE')
+    colour.data.foreach_set("vector", COLOUR * len(mesh.polygons))
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.type, camera.data.ortho_scale = 'ORTHO', 0.75
+    camera.location, camera.rotation_euler = (0.0, -5.0, 0.0), (pi / 2, 0.0, 0.0)
+    sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", 'SUN'))
+    sun.rotation_euler = (0.9, 0.0, 0.6)
+    for made in (camera, sun):
+        scene.collection.objects.link(made)
+    scene.camera = camera
+    scene.world = bpy.data.worlds.new("Sky")
+    render = scene.render
+    render.resolution_x, render.resolution_y, render.resolution_percentage = 320, 180, 100
+    render.engine = 'CYCLES'
+    scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
+    return trunk
+
+
+def _plain_material() -> bpy.types.Material:
+    """Principled as Blender gives it, with the colour of the faces."""
+    material = bpy.data.materials.new("Plain")
+    tree = session.part("tetflora_addon.blender.compat").shader_tree(material)
+    colour = tree.nodes.new("ShaderNodeAttribute")
+    colour.attribute_name = "tf_colour"
+    principled = next(node for node in tree.nodes if node.type == 'BSDF_PRINCIPLED')
+    tree.links.new(colour.outputs["Color"], principled.inputs["Base Color"])
+    return material
+
+
+def _processor_seconds(trunk: bpy.types.Object, material: bpy.types.Material) -> float:
+    trunk.data.materials.clear()
+    trunk.data.materials.append(material)
+    start = time.process_time()
+    bpy.ops.render.render()
+    return time.process_time() - start
