@@ -10,7 +10,7 @@ import pytest
 from tetflora_addon.refinement.camera import Camera
 from tetflora_addon.refinement.rasterise import buffer_size, occluder_depth, pixel_rays
 from tetflora_addon.refinement.silhouette import silhouette_pixels
-from tetflora_addon.refinement.visibility import AlphaBuffer
+from tetflora_addon.refinement.visibility import COARSEST, AlphaBuffer, Buffers
 from tetflora_addon.tetrahedra.geometry import face_planes
 from tetflora_addon.tetrahedra.roots import view_root
 
@@ -168,7 +168,7 @@ def test_opaque_cells_leave_nothing_behind_them_and_numbers_finite():
     for values in (found.pixels, found.transmittance, found.opacity, found.alpha):
         assert np.isfinite(values).all()
     first = np.argmin(rank)
-    assert found.transmittance[first] == 1.0
+    assert found.transmittance[first] == pytest.approx(1.0, abs=1e-12)
     assert np.isclose(found.opacity[first], 1.0)
     assert found.transmittance.min() < 0.5
 
@@ -207,3 +207,28 @@ def test_tetrahedra_that_come_and_go_leave_the_others_as_they_are(kind):
     np.testing.assert_allclose(buffer.alpha(), once.alpha, atol=1e-12)
     for part in (parts[1], *parts[3:]):
         np.testing.assert_array_equal(pixels[part], once.pixels[part])
+
+
+@pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
+def test_buffers_grow_with_what_is_drawn(kind):
+    """A coarse buffer for a few tetrahedra says what a fine one says; occluders are known to both."""
+    camera = camera_of(kind)
+    wall = np.array([[[-80.0, 9, -50], [-0.7, 9, -50], [-0.7, 9, 50]], [[-80.0, 9, -50], [-0.7, 9, 50], [-80, 9, 50]]])
+    buffers = Buffers(camera, 200, wall)
+    sizes, buffer = [], None
+    for cells in (1, 40, 300, 2000):
+        vertices, rank = split_view(camera, max(cells, 2))
+        finer = buffers.fit(buffer, cells)
+        sizes.append(finer.width)
+        buffer = finer
+        if cells in (40, 300):
+            seen = []
+            for one in (buffers.fit(None, cells), buffers.fit(None, 100_000)):
+                one.add(np.arange(len(vertices)), vertices, np.full(len(vertices), 0.05))
+                seen.append(one.transmittance(rank))
+            assert np.quantile(np.abs(seen[0] - seen[1]), 0.9) < 0.1
+            assert abs(seen[0].mean() - seen[1].mean()) < 0.02
+    assert sizes[0] == COARSEST
+    assert sizes[-1] == 200
+    assert sizes == sorted(sizes)
+    assert buffers.fit(buffer, 10) is buffer

@@ -30,7 +30,7 @@ Slack = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 OPENED_AT_ONCE = 40_000
 LOWERED_AT_ONCE = 200_000
 #: A sub-plant that reaches no further than this many slacks is known well enough by its samples.
-_SMALL = 4.0
+_SMALL = 16.0
 #: One whose middle is closer to a plane than this share of its reach crosses it, whatever its seed.
 _DEEP = 0.3
 

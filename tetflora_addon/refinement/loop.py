@@ -23,11 +23,11 @@ from .cells import Cells
 from .contents import Contents, Holdings, bounding_box
 from .decisions import Decision, decide, without_splits
 from .descent import Slack, push_down
-from .rasterise import buffer_size, occluder_depth
+from .rasterise import buffer_size
 from .settings import RefinementSettings
 from .silhouette import silhouette_pixels
 from .statistics import Stopwatch
-from .visibility import AlphaBuffer
+from .visibility import AlphaBuffer, Buffers
 
 #: Bisections between two visibility steps; three together divide a tetrahedron into eight.
 GENERATIONS = 3
@@ -120,14 +120,11 @@ def refine(
     new = push_down(flora, tree, contents, slack)
     holdings = Holdings(new)
     clock.lap("update")
-    depth = None
-    if occluders is not None and len(occluders):
-        depth = occluder_depth(occluders, camera, *buffer_size(camera, settings.visibility_resolution))
-    buffer = AlphaBuffer(camera, settings.visibility_resolution, depth)
+    buffers = Buffers(camera, settings.visibility_resolution, occluders)
     direction = {"eye": camera.position} if camera.kind == "PERSP" else {"direction": -camera.frame[:, 2]}
     # Generations count from the root's own pieces. Passes do not count: a late one may divide what is still coarse.
     deepest = tree.levels - 1 + settings.max_levels
-    cells = _new_cells(tree, new, camera, buffer)
+    cells, buffer = _drawn(tree, buffers, None, None, *_filled(tree, new))
     clock.lap("visibility")
     passes = 0
     while True:
@@ -168,15 +165,33 @@ def refine(
         holdings.put(new)
         clock.lap("update")
         buffer.remove(dividing)
-        cells = Cells.joined([cells.take(~splitting), _new_cells(tree, new, camera, buffer)])
+        cells, buffer = _drawn(tree, buffers, buffer, cells.take(~splitting), *_filled(tree, new))
         clock.lap("visibility")
 
 
-def _new_cells(tree: TetrahedralTree, new: Contents, camera: Camera, buffer: AlphaBuffer) -> Cells:
-    """Cells of all nodes that have got something."""
+def _filled(tree: TetrahedralTree, new: Contents) -> tuple[NDArray[np.intp], Amounts]:
+    """Nodes (n,) that have got something, and how much."""
     every = new.sums(len(tree))
     nodes = np.flatnonzero(every.area > 0)
-    return Cells.seen(tree, nodes, every.take(nodes), camera, buffer)
+    return nodes, every.take(nodes)
+
+
+def _drawn(
+    tree: TetrahedralTree,
+    buffers: Buffers,
+    buffer: AlphaBuffer | None,
+    cells: Cells | None,
+    nodes: NDArray[np.intp],
+    amounts: Amounts,
+) -> tuple[Cells, AlphaBuffer]:
+    """Cells that are there and new ones, and the buffer into which all of them are drawn."""
+    old = 0 if cells is None else len(cells)
+    finer = buffers.fit(buffer, old + len(nodes))
+    if old and finer is not buffer:
+        nodes = np.concatenate([cells.nodes, nodes])
+        amounts, cells = Amounts.concatenate([cells.amounts, amounts]), None
+    new = Cells.seen(tree, nodes, amounts, buffers.camera, finer)
+    return (Cells.joined([cells, new]) if cells is not None else new), finer
 
 
 def _slack(camera: Camera, resolution: int) -> Slack:

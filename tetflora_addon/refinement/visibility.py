@@ -16,12 +16,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .camera import Camera
-from .rasterise import buffer_size, tetrahedron_fragments
+from .rasterise import buffer_size, occluder_depth, tetrahedron_fragments
 from .silhouette import silhouette_pixels
 
 #: Optical depth of one fragment at most. e^−60 is no light at all, and larger numbers, or infinite ones, would take
 #: the precision from the cumulative sum over the whole image.
 OPAQUE = 60.0
+
+#: Longer side of the coarsest buffer, pixels.
+COARSEST = 32
+
+#: Pixels of a buffer along each side for every tetrahedron along it, were they spread over the picture side by side.
+_ACROSS = 8.0
 
 
 @dataclass(frozen=True)
@@ -55,6 +61,11 @@ class AlphaBuffer:
     occluders_depth : (height · width,) float64, optional
         Where each pixel's ray ends at an opaque polygon, as `occluder_depth` gives it for the same size.
 
+    Attributes
+    ----------
+    width, height : int
+        Size of the buffer, pixels.
+
     Raises
     ------
     ValueError
@@ -68,8 +79,10 @@ class AlphaBuffer:
         if self.end is not None and len(self.end) != self.width * self.height:
             raise ValueError(f"the occluders' buffer does not have {self.width} × {self.height} pixels")
         self._cell, self._pixel = np.zeros((2, 0), np.int32)
-        # Optical depth that a fragment brings into its pixel, the pixels that it stands for and those not occluded.
-        self._depth, self._coverage, self._open = np.zeros((3, 0))
+        # Optical depth that a fragment brings into its pixel, its share of its tetrahedron as far as it is not
+        # occluded, and the transmittance of what is before it.
+        self._depth, self._share, self._before = np.zeros((3, 0))
+        self._changed = np.zeros(self.width * self.height, bool)
 
     def add(self, cells: NDArray[np.integer], vertices: NDArray[np.float64], extinction: ArrayLike) -> Outline:
         """Draw tetrahedra.
@@ -104,22 +117,27 @@ class AlphaBuffer:
         final = self.camera.width * self.camera.height / (self.width * self.height)
         nearest = np.full(count, np.inf)
         np.minimum.at(nearest, cell, fragments.entry)
+        # What lies behind an occluder neither is seen nor hides anything.
+        open_ones = slice(None) if self.end is None else np.flatnonzero(share)
+        self._changed[pixel[open_ones]] = True
         for name, values in (
             ("_cell", np.asarray(cells, np.int32)[cell]),
             ("_pixel", pixel),
             ("_depth", own * np.minimum(coverage * share, 1.0)),
-            ("_coverage", coverage),
-            ("_open", coverage * share),
+            ("_share", coverage * share / np.maximum(weight, 1e-300)[cell]),
+            ("_before", np.ones(len(cell))),
         ):
-            setattr(self, name, np.concatenate([getattr(self, name), values]))
+            setattr(self, name, np.concatenate([getattr(self, name), values[open_ones]]))
         return Outline(np.where(whole & (weight > 0.0), pixels, weight * final), opacity, nearest)
 
     def remove(self, chosen: NDArray[np.bool_]) -> None:
         """Take away tetrahedra; ``chosen`` is a mask by their numbers."""
-        stay = np.flatnonzero(~chosen[self._cell])
-        if len(stay) < len(self._cell):
-            for name in ("_cell", "_pixel", "_depth", "_coverage", "_open"):
-                setattr(self, name, getattr(self, name)[stay])
+        go = chosen[self._cell]
+        if go.any():
+            self._changed[self._pixel[go]] = True
+            stay = np.flatnonzero(~go)
+            for name in ("_cell", "_pixel", "_depth", "_share", "_before"):
+                setattr(self, name, np.take(getattr(self, name), stay))
 
     def transmittance(self, rank: NDArray[np.integer]) -> NDArray[np.float64]:
         """Share of each tetrahedron's light, 0 to 1, that nothing in front holds up; 0 out of view.
@@ -127,31 +145,71 @@ class AlphaBuffer:
         Parameters
         ----------
         rank : (numbers,) int
-            Front-to-back rank by number, as `TetrahedralTree.order` gives it; smaller is nearer, none negative.
+            Front-to-back rank by number, as `TetrahedralTree.order` gives it; smaller is nearer, none negative. What
+            has been ranked before keeps its place relative to each other.
 
         Returns
         -------
         (numbers,) float64
         """
-        seen = self._open * np.exp(-self._depth_before(rank))
-        weight = np.bincount(self._cell, self._coverage, len(rank))
-        return np.bincount(self._cell, seen, len(rank)) / np.where(weight > 0.0, weight, 1.0)
+        # Only where something has come or gone is there anything to sort again.
+        some = np.flatnonzero(self._changed[self._pixel])
+        self._changed[:] = False
+        self._before[some] = np.exp(-self._depth_before(some, rank))
+        return np.bincount(self._cell, self._share * self._before, len(rank))
 
     def alpha(self) -> NDArray[np.float64]:
         """Opacity (height, width) of all tetrahedra together, as far as no occluder hides them; row 0 is lowest."""
         total = np.bincount(self._pixel, self._depth, self.width * self.height)
         return -np.expm1(-total).reshape(self.height, self.width)
 
-    def _depth_before(self, rank: NDArray[np.integer]) -> NDArray[np.float64]:
-        """Optical depth in front of each fragment within its pixel."""
+    def _depth_before(self, some: NDArray[np.intp], rank: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Optical depth in front of some fragments (n,), among which are all of their pixels."""
+        pixel, depth = np.take(self._pixel, some), np.take(self._depth, some)
         # One number to sort by is several times as fast as two.
-        key = self._pixel.astype(np.int64) * (int(rank.max(initial=0)) + 1) + np.take(rank, self._cell)
+        key = pixel.astype(np.int64) * (int(rank.max(initial=0)) + 1) + np.take(rank, np.take(self._cell, some))
         order = np.argsort(key)
-        depth = np.take(self._depth, order)
+        pixel, depth = np.take(pixel, order), np.take(depth, order)
         summed = np.cumsum(depth)
-        ends = np.cumsum(np.bincount(self._pixel, minlength=self.width * self.height))
         # What all earlier pixels hold is taken off again. Rounding must not leave less than nothing.
-        earlier = np.concatenate([[0.0], summed])[np.concatenate([[0], ends[:-1]])]
+        begins = np.flatnonzero(np.diff(pixel, prepend=-1))
+        earlier = np.repeat((summed - depth)[begins], np.diff(begins, append=len(pixel)))
         before = np.zeros_like(depth)
-        before[order] = np.maximum(summed - depth - np.take(earlier, np.take(self._pixel, order)), 0.0)
+        before[order] = np.maximum(summed - depth - earlier, 0.0)
         return before
+
+
+class Buffers:
+    """Alpha buffers as fine as what is drawn into them: a few large tetrahedra need no more than a few pixels each.
+
+    Parameters
+    ----------
+    camera : Camera
+    resolution : int
+        Longer side of the finest buffer, pixels.
+    occluders : (t, 3, 3) float64, optional
+        Triangles of explicit polygons that hide what is behind them, metres.
+    """
+
+    def __init__(self, camera: Camera, resolution: int, occluders: NDArray[np.float64] | None = None) -> None:
+        self.camera, self.resolution = camera, resolution
+        self.size = buffer_size(camera, resolution)
+        some = occluders is not None and len(occluders)
+        self.depth = occluder_depth(occluders, camera, *self.size) if some else None
+
+    def fit(self, buffer: AlphaBuffer | None, cells: int) -> AlphaBuffer:
+        """The buffer itself if it is fine enough for a number of tetrahedra, or a finer one that is empty."""
+        wanted = COARSEST
+        while wanted < self.resolution and wanted < _ACROSS * np.sqrt(cells):
+            wanted *= 2
+        wanted = min(wanted, self.resolution)
+        if buffer is not None and max(buffer.width, buffer.height) >= wanted:
+            return buffer
+        return AlphaBuffer(self.camera, wanted, None if self.depth is None else self._reduced(wanted))
+
+    def _reduced(self, resolution: int) -> NDArray[np.float64]:
+        """Occluders' depth in a coarser buffer: that of the pixel of the finest one in the middle."""
+        (width, height), (columns, rows) = self.size, buffer_size(self.camera, resolution)
+        row = ((np.arange(rows) + 0.5) * height / rows).astype(np.int64)
+        column = ((np.arange(columns) + 0.5) * width / columns).astype(np.int64)
+        return self.depth.reshape(height, width)[np.ix_(row, column)].ravel()
