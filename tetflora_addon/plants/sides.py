@@ -58,6 +58,7 @@ def sampled_bodies(flora: Flora, subplants: Branches) -> NDArray[np.float64]:
     out[3:6] = subplants.frame[:, :, 2].T
     out[:3] = subplants.position.T + (bound[1] + bound[2]) / 2 * out[3:6]
     out[6], out[7] = bound[0], (bound[2] - bound[1]) / 2
+    out[8] = flora.leaf_reach[subplants.row] * subplants.scale  # samples are where leaves begin
     return out
 
 
