@@ -130,6 +130,104 @@ def test_ranks_rise_along_every_ray(kind, window, seed, far):
         assert (highest == along)[held].all()
 
 
+def divide_at_random(tree, rng, rounds):
+    """All ways to divide, mixed, with planes through the middle of nodes and through their vertices."""
+    for _ in range(rounds):
+        nodes = rng.permutation(tree.terminals())[:400]
+        way = rng.integers(0, 5, len(nodes))
+        tree.split(nodes[way == 0])
+        tree.split_eight(nodes[way == 1])
+        tree.split_by_shape(nodes[way == 2])
+        cut = nodes[way == 3]
+        weights = rng.dirichlet([1, 1, 1, 1], (len(cut), 3))
+        fixed = rng.integers(0, 3, len(cut))
+        weights = np.where(np.arange(3)[:, None] < fixed[:, None, None], np.eye(4)[:3], weights)
+        vertices = tree.vertices(cut)
+        tree.cut(cut, geometry.plane_through(weights @ vertices, vertices[:, 3]))
+
+
+@CASES
+@settings(deadline=None, max_examples=15)
+def test_any_division_fills_the_root_and_points_are_found(kind, window, seed, far):
+    camera, bounds, rng = view(kind, window, seed, far)
+    tree = view_root(camera, bounds)
+    box = geometry.signed_volume(tree.vertices(tree.terminals())).sum()
+    divide_at_random(tree, rng, 3)
+    nodes = tree.terminals()
+    volumes = geometry.signed_volume(tree.vertices(nodes))
+    assert (volumes > 0).all()
+    np.testing.assert_allclose(volumes.sum(), box, rtol=1e-12)
+    assert tree.tetrahedra_made == (~np.isnan(tree.vertices(np.arange(len(tree)))[:, 0, 0])).sum()
+    points = rng.uniform(*bounds, (2000, 3))
+    found = tree.locate(points)
+    weights = geometry.barycentric(tree.vertices(found), points)
+    # Distance from the face that is passed most, metres: rounding of planes and the tolerance of cuts.
+    heights = 1 / np.linalg.norm(geometry.barycentric_gradients(tree.vertices(found)), axis=-1)
+    assert (weights * heights).min() > -1e-6
+    thick = nodes[geometry.quality(tree.vertices(nodes)) > 1e-2]
+    np.testing.assert_array_equal(tree.locate(tree.vertices(thick).mean(axis=1)), thick)
+    # What is in view stays in view, whichever way it is divided.
+    parents = tree.parent[1:]
+    assert (tree.inside[1:][tree.inside[parents]]).all()
+
+
+@CASES
+@settings(deadline=None, max_examples=15)
+def test_both_orders_are_exact_after_any_division(kind, window, seed, far):
+    camera, bounds, rng = view(kind, window, seed, far)
+    tree = view_root(camera, bounds)
+    divide_at_random(tree, rng, 3)
+    nodes = tree.terminals()
+    corner = tree.vertices(nodes[0])[1]
+    for eye in (camera.position, rng.uniform(*bounds), rng.uniform(-300, 300, 3), corner, None):
+        if eye is None:
+            how = {"direction": rng.normal(size=3)}
+            starts = rng.uniform(*bounds, (30, 3)) - 200 * how["direction"]
+            ends = starts + 400 * how["direction"]
+        else:
+            how = {"eye": eye}
+            starts = np.broadcast_to(eye, (30, 3))
+            ends = starts + 3 * (rng.uniform(*bounds, (30, 3)) - starts)
+        ranks, reverse = tree.order(**how), tree.order(**how, back_to_front=True)
+        np.testing.assert_array_equal(np.sort(ranks[nodes]), np.arange(len(nodes)))
+        np.testing.assert_array_equal(reverse[nodes], len(nodes) - 1 - ranks[nodes])
+        assert (np.delete(reverse, nodes) == -1).all()
+        steps = starts[:, None] + np.linspace(0, 1, 300)[:, None] * (ends - starts)[:, None]
+        cells = tree.locate(steps.reshape(-1, 3))
+        held = (geometry.barycentric(tree.vertices(cells), steps.reshape(-1, 3)).min(axis=-1) > 1e-6).reshape(30, 300)
+        along = np.where(held, ranks[cells].reshape(30, 300), -1)
+        assert (np.maximum.accumulate(along, axis=1) == along)[held].all()
+        back = np.where(held, reverse[cells].reshape(30, 300), len(nodes))
+        assert (np.minimum.accumulate(back, axis=1) == back)[held].all()
+
+
+def test_eight_and_cut_hang_where_they_say():
+    camera, bounds, rng = view("PERSP", "middle", 1)
+    tree = view_root(camera, bounds)
+    nodes = tree.terminals()
+    inside = tree.inside[nodes]
+    for split, of in ((tree.split_eight, nodes[::3]), (tree.split_by_shape, nodes[1::3])):
+        made = split(of)
+        assert made.shape == (len(of), 8)
+        np.testing.assert_array_equal(tree.parent[tree.parent[tree.parent[made]]], np.repeat(of[:, None], 8, axis=1))
+        np.testing.assert_array_equal(tree.level[made], np.repeat(tree.level[of, None] + 3, 8, axis=1))
+        np.testing.assert_array_equal(tree.inside[made[:, 0]], tree.inside[of])
+    rest = nodes[2::3]
+    through = tree.vertices(rest).mean(axis=1)
+    normals = rng.normal(size=(len(rest), 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    planes = np.column_stack([normals, -np.sum(normals * through, axis=1)])
+    planes[0, 3] += 1e6
+    terminals, pieces = tree.cut(rest, planes)
+    assert terminals[pieces.owner == 0].tolist() == [rest[0]] and not pieces.divided[0]
+    assert pieces.divided[1:].all()
+    np.testing.assert_array_equal(tree.vertices(terminals), pieces.vertices)
+    np.testing.assert_array_equal(tree.planes(rest[1:]), planes[1:])
+    np.testing.assert_array_equal(tree.inside[terminals], inside[2::3][pieces.owner])
+    assert set(terminals) <= set(tree.terminals())
+    np.testing.assert_array_equal(tree.locate(pieces.vertices.mean(axis=1)), terminals)
+
+
 def test_bisection_does_not_make_slivers():
     camera, bounds, _ = view("PERSP", "middle", 3)
     tree = view_root(camera, bounds)
@@ -172,8 +270,26 @@ def test_only_terminal_tetrahedra_are_split_and_only_once():
     tree.split([0])
     with pytest.raises(ValueError, match="terminal"):
         tree.split([0])
+    below = tree.terminals()[:1]
+    plane = np.array([[1.0, 0, 0, -9]])
+    for divide in (
+        tree.split_eight,
+        tree.split_by_shape,
+        lambda nodes: tree.cut(nodes, np.repeat(plane, len(nodes), 0)),
+    ):
+        with pytest.raises(ValueError, match="terminal"):
+            divide([0])
+        with pytest.raises(ValueError, match="only once"):
+            divide(np.repeat(below, 2))
+        with pytest.raises(ValueError, match="region"):
+            TetrahedralTree().split_eight([0])
+    assert tree.split_eight(np.zeros(0, int)).shape == (0, 8)
+    assert tree.split_by_shape(np.zeros(0, int)).shape == (0, 8)
+    assert len(tree.cut(np.zeros(0, int), np.zeros((0, 4)))[0]) == 0
     with pytest.raises(ValueError, match="region"):
         TetrahedralTree().split([0])
+    with pytest.raises(ValueError, match="region"):
+        TetrahedralTree().cut([0], plane)
     with pytest.raises(ValueError, match="eye or a direction"):
         tree.order()
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .bisection import bisect
 from .cuts import TOLERANCE, Pieces, cut_tetrahedra
-from .eight import divide_in_eight
+from .eight import divide_by_shape, divide_in_eight
 from .geometry import plane_distance
 
 #: Points that `TetrahedralTree.locate` takes down the tree at a time; bounds its memory to some tens of megabytes.
@@ -125,7 +125,7 @@ class TetrahedralTree:
         return children
 
     def split_eight(self, nodes: ArrayLike) -> NDArray[np.int32]:
-        """Divide terminal tetrahedra into the canonical eight, along the shortest inner diagonal.
+        """Divide terminal tetrahedra into the canonical eight, along the best inner diagonal.
 
         Parameters
         ----------
@@ -144,12 +144,16 @@ class TetrahedralTree:
             If a node is not terminal, has no tetrahedron, or occurs twice.
         """
         nodes = np.asarray(nodes, np.intp)
-        planes, pieces = divide_in_eight(self._tetrahedra(nodes))
-        regions = nodes
-        for first, end in ((0, 1), (1, 3), (3, 7)):
-            regions = self.divide(regions, planes[:, first:end].reshape(-1, 4)).ravel()
-        self.place(regions, pieces.reshape(-1, 4, 3))
-        return regions.reshape(-1, 8)
+        return self._divide_thrice(nodes, *divide_in_eight(self._tetrahedra(nodes)))
+
+    def split_by_shape(self, nodes: ArrayLike) -> NDArray[np.int32]:
+        """Divide terminal tetrahedra into eight as suits their shape: the canonical eight, or three bisections.
+
+        Parameters, result and errors are those of `split_eight`; see `eight.prefers_eight` for the choice.
+        """
+        nodes = np.asarray(nodes, np.intp)
+        planes, pieces, _ = divide_by_shape(self._tetrahedra(nodes))
+        return self._divide_thrice(nodes, planes, pieces)
 
     def cut(
         self, nodes: ArrayLike, planes: ArrayLike, tolerance: float = TOLERANCE
@@ -278,7 +282,6 @@ class TetrahedralTree:
             else:
                 # The eye is infinitely far back along the direction.
                 near = planes[:, :3] @ np.asarray(direction, np.float64) < 0.0
-            # Rows of children are (side 0, side 1); which of both comes first is one more index, not two selections.
             leading = (near != back_to_front).astype(np.intp)
             first, second = children[nodes, leading], children[nodes, 1 - leading]
             place[first] = place[nodes]
@@ -305,6 +308,16 @@ class TetrahedralTree:
             part = slice(start, start + POINTS_AT_ONCE)
             found[part] = self._descend(points[part])
         return found
+
+    def _divide_thrice(
+        self, nodes: NDArray[np.intp], planes: NDArray[np.float64], pieces: NDArray[np.float64]
+    ) -> NDArray[np.int32]:
+        """Divide nodes by seven planes each, in the order of a heap, and place the eight pieces."""
+        regions = nodes
+        for first, end in ((0, 1), (1, 3), (3, 7)):
+            regions = self.divide(regions, planes[:, first:end].reshape(-1, 4)).reshape(-1)
+        self.place(regions, pieces.reshape(-1, 4, 3))
+        return regions.reshape(-1, 8)
 
     def _tetrahedra(self, nodes: NDArray[np.intp]) -> NDArray[np.float64]:
         vertices = self.vertices(nodes)
