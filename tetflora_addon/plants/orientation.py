@@ -5,7 +5,9 @@
 They are the orientations of the paper's summaries (section 6.5). Leaves that turn to the sky, and boughs that bend to
 it, do not turn with their branch. So the mean of n nᵀ in the branch's own axes is kept as a function of the sky's
 direction in these axes: a polynomial, and the first harmonics of its azimuth. It is found from the highest order down:
-that of a sub-plant is the mean over its own leaves and over the sub-plants on it, whose own are known by then.
+that of a sub-plant is the mean over its own leaves and over the sub-plants on it, whose own are known by then. It is
+fitted for skies all around the branch, but half of them are where an upright plant has them, so that what the functions
+cannot follow is missed where no branch stands.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .foliage import leaf_keys, leaf_places, place_leaves, settled
+from .foliage import leaf_frames, leaf_keys, leaf_places, outwardness, settled
 from .growth import (
     Axes,
     Branches,
@@ -28,14 +30,16 @@ from .growth import (
     leaf_counts,
     radius_at,
 )
-from .hashing import key_of_seed, mix, uniform
+from .hashing import Draw, key_of_seed, mix, uniform
 from .leaf_models import LeafModel
-from .rows import FORK, LATERAL, SPUR
-from .vectors import perpendicular
+from .rows import FORK, LATERAL, SPUR, ranged
+from .stratified import thinned
+from .vectors import columns, cross, perpendicular
 
 _PIECE = 128
 _BRANCHES = 2048  # of each row that are looked at, each with the sky elsewhere
-_LEAVES = 3  # on each of them
+_MET = 256  # of each row that are grown upwards from the trunk, to see how they stand
+_LEAVES = 4  # on each of them
 _SORTS = (LATERAL, FORK, SPUR)
 _ALONG, _CHILD = 111, 112  # draws of this module, beyond those of growth
 _UP = np.array([0.0, 0.0, 1.0])
@@ -134,7 +138,7 @@ def _six(moments: NDArray[np.float64], frame: NDArray[np.float64]) -> NDArray[np
 def _frames_along(axis: NDArray[np.float64]) -> NDArray[np.float64]:
     """Frames (n, 3, 3) whose third column is an axis (n, 3), turned about it as may be."""
     x = perpendicular(axis)
-    return np.stack([x, np.cross(axis, x), axis], axis=2)
+    return columns(x, cross(axis, x), axis)
 
 
 def orientation_of(
@@ -161,56 +165,58 @@ def orientation_of(
     out = Orientation(*np.zeros((3, len(rows), _TERMS, 6)))
     turn = _model_moments(rows, forms)
     leaf_area, wood_area = leaf_share.sum(axis=1), wood.sum(axis=1)
+    skies = _skies_met(rows, length)
     for i in range(len(rows) - 1, -1, -1):
-        branches = _looked_at(i, float(length[i]), bool(rows["order"][i] == 0))
-        if rows["phantom"][i]:
-            children, owner = drawn_children(rows, branches)
-            stands = np.ones(len(owner))
-        else:
-            lines = axes(rows, branches)
-            children, owner, stands = _one_child_each(rows, branches, lines)
+        branches = _looked_at(i, float(length[i]), _skies_around(_BRANCHES, bool(rows["order"][i] == 0), skies[i]))
+        lines = axes(rows, branches)
+        children, owner, stands = _some_children(rows, branches, lines)
         row, scale = children.row, branches.scale[0]
+        basis = _basis(branches.frame[:, 2, :])
         # What grows on the children is turned as they say; own leaves and the own branch are looked at one by one.
         weight = stands * fullness(rows, children) * leaf_area[row] * scale**2
-        leaves = _Points(branches.frame[owner], _evaluated(out.leaves, row, children.frame), weight)
+        leaves = _Sums.of(len(branches), owner, _evaluated(out.leaves, row, children.frame), weight)
         weight = stands * children.length * children.radius * wood_area[row]
-        bark = _Points(branches.frame[owner], _evaluated(out.wood, row, children.frame), weight)
+        bark = _Sums.of(len(branches), owner, _evaluated(out.wood, row, children.frame), weight)
         if not rows["phantom"][i]:
             if leaf_share[i, i] > 0:
                 own = _own_leaves(rows, branches, lines, turn[i])
-                leaves = _Points.mixed(own, leaves, leaf_share[i, i] / leaf_area[i])
-                out.own_leaves[i] = _own_leaves(rows, branches, _straight(branches), turn[i]).fitted()
-            bark = _Points.mixed(_own_wood(rows, branches, lines), bark, wood[i, i] / wood_area[i])
+                leaves = own.mixed(leaves, leaf_share[i, i] / leaf_area[i])
+                out.own_leaves[i] = _own_leaves(rows, branches, _straight(branches), turn[i]).fitted(branches, basis)
+            bark = _own_wood(rows, branches, lines).mixed(bark, wood[i, i] / wood_area[i])
         if leaf_area[i] > 0:
-            out.leaves[i] = leaves.fitted()
-        out.wood[i] = bark.fitted()
+            out.leaves[i] = leaves.fitted(branches, basis)
+        out.wood[i] = bark.fitted(branches, basis)
     return out
 
 
 @dataclass(frozen=True)
-class _Points:
-    """Moments that were met: frames (n, 3, 3) of the branches they were met on, moments (n, 3, 3), weights (n,)."""
+class _Sums:
+    """What was met on each of n branches: sums of moments × weights (n, 3, 3), and of weights (n,)."""
 
-    frame: NDArray[np.float64]
     moment: NDArray[np.float64]
     weight: NDArray[np.float64]
 
     @classmethod
-    def mixed(cls, a: _Points, b: _Points, share: float) -> _Points:
-        """Both together; the first has a known share of all."""
-        if b.weight.sum() <= 0:
-            return a
-        weights = [p.weight * (part / max(p.weight.sum(), 1e-300)) for p, part in ((a, share), (b, 1 - share))]
-        return cls(*(np.concatenate(pair) for pair in ((a.frame, b.frame), (a.moment, b.moment), weights)))
+    def of(cls, n: int, owner: NDArray[np.int64], moment: NDArray[np.float64], weight: NDArray[np.float64]) -> _Sums:
+        """Sums over things (m,) on branches (m,) of n, with moments (m, 3, 3)."""
+        values = (moment * weight[:, None, None]).reshape(-1, 9).T
+        sums = np.stack([np.bincount(owner, one, n) for one in values], axis=1)
+        return cls(sums.reshape(n, 3, 3), np.bincount(owner, weight, n))
 
-    def fitted(self) -> NDArray[np.float64]:
-        """Coefficients (24, 6), by weighted least squares."""
-        basis = _basis(self.frame[:, 2, :])
-        weighted = basis * (self.weight / max(self.weight.sum(), 1e-300))[:, None]
-        normal = _inner(basis, weighted)
+    def mixed(self, other: _Sums, share: float) -> _Sums:
+        """Both together; this one has a known share of all."""
+        if other.weight.sum() <= 0:
+            return self
+        a, b = (part / max(p.weight.sum(), 1e-300) for p, part in ((self, share), (other, 1 - share)))
+        return _Sums(self.moment * a + other.moment * b, self.weight * a + other.weight * b)
+
+    def fitted(self, branches: Branches, basis: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Coefficients (24, 6), by weighted least squares; ``basis`` (n, 24) for the sky of the branches."""
+        whole = max(self.weight.sum(), 1e-300)
+        normal = _inner(basis, basis * (self.weight / whole)[:, None])
         # Where branches can only stand in some ways, others are left to the least coefficients.
         normal += 1e-9 * np.trace(normal) / len(normal) * np.eye(len(normal))
-        return np.linalg.solve(normal, _inner(weighted, _six(self.moment, self.frame)))
+        return np.linalg.solve(normal, _inner(basis, _six(self.moment / whole, branches.frame)))
 
 
 def _inner(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -220,16 +226,43 @@ def _inner(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64
     return (left.transpose(0, 2, 1) @ right).sum(axis=0) + a[whole:].T @ b[whole:]
 
 
-def _looked_at(row: int, length: float, upright: bool) -> Branches:
-    """Branches of a row, of length 1, with the sky all around them."""
-    n = _BRANCHES
-    key = mix(key_of_seed(np.arange(n)) ^ np.uint64(0x0E1E))
+def _skies_met(rows: NDArray[np.void], length: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Directions (m, 3) of the sky in the axes of some branches of each row, on plants that stand as they should."""
+    met: list[list[NDArray[np.float64]]] = [[] for _ in rows]
+    out = []
+    for i in range(len(rows)):
+        if met[i]:
+            some = np.concatenate(met[i])
+            sky = some[thinned(len(some), _MET)]
+        else:  # a trunk
+            key = key_of_seed(np.arange(_MET))
+            tilt = ranged(rows, "angle", np.full(_MET, i), key, Draw.ANGLE)
+            sky = np.stack([-np.sin(tilt), np.zeros(_MET), np.cos(tilt)], axis=1)
+        out.append(sky)
+        if (rows["next"][i] >= 0).any() or rows["phantom"][i]:
+            branches = _looked_at(i, float(length[i]), sky)
+            children, *_ = _some_children(rows, branches, axes(rows, branches))
+            for row in np.unique(children.row):
+                met[row].append(children.frame[children.row == row, 2])
+    return out
+
+
+def _skies_around(n: int, upright: bool, met: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Directions (n, 3) of the sky, every other one of those that are met, the rest all around."""
     cos = 1 - 2 * (np.arange(n) + 0.5) / n  # Fibonacci's sphere
     if upright:  # most plants stand, and few lie
         cos = 1 - 2 * ((1 - cos) / 2) ** 3
     around = np.pi * (3 - np.sqrt(5)) * np.arange(n)
     sin = np.sqrt(1 - cos * cos)
     sky = np.stack([sin * np.cos(around), sin * np.sin(around), cos], axis=1)
+    sky[1::2] = met[thinned(len(met), len(sky[1::2]))]
+    return sky
+
+
+def _looked_at(row: int, length: float, sky: NDArray[np.float64]) -> Branches:
+    """Branches of a row, of length 1, with the sky in given directions (n, 3) of their axes."""
+    n = len(sky)
+    key = mix(key_of_seed(np.arange(n)) ^ np.uint64(0x0E1E))
     frame = _frames_along(sky).transpose(0, 2, 1)
     one, none = np.ones(n), np.zeros(n)
     scale = np.full(n, 1 / max(length, 1e-9))
@@ -247,10 +280,16 @@ def _looked_at(row: int, length: float, upright: bool) -> Branches:
     )
 
 
-def _one_child_each(
+def _some_children(
     rows: NDArray[np.void], branches: Branches, lines: Axes
 ) -> tuple[Branches, NDArray[np.int64], NDArray[np.float64]]:
-    """One child of each sort of each branch that has any: the children, their parents, and how many each stands for."""
+    """One child of each sort of each branch that has any: the children, their parents, and how many each stands for.
+
+    Of plants that are drawn by hand all branches that are drawn.
+    """
+    if rows["phantom"][branches.row[0]]:
+        children, owner = drawn_children(rows, branches)
+        return children, owner, np.ones(len(owner))
     grown, owners, stands = [Branches.empty()], [np.zeros(0, np.int64)], [np.zeros(0)]
     for sort in _SORTS:
         if rows["next"][branches.row[0], sort] < 0:
@@ -272,31 +311,49 @@ def _straight(branches: Branches) -> Axes:
     return Axes(knots, branches.frame[:, None], np.ones(len(branches), np.int64))
 
 
-def _own_leaves(rows: NDArray[np.void], branches: Branches, lines: Axes, turn: NDArray[np.float64]) -> _Points:
+def _own_leaves(rows: NDArray[np.void], branches: Branches, lines: Axes, turn: NDArray[np.float64]) -> _Sums:
     """Some leaves of each branch."""
     counts = leaf_counts(rows, branches)
     if not counts.any():
         counts = np.ones_like(counts)
-    owner = np.repeat(np.flatnonzero(counts), _LEAVES)
-    number = counts[owner]
+    bearers = np.flatnonzero(counts)
+    owner, each = np.repeat(bearers, _LEAVES), np.tile(np.arange(_LEAVES), len(bearers))
+    row, number = branches.row[:1], counts[owner]
     # Evenly over the leaves of each branch, beginning anywhere.
-    part = (uniform(branches.key, _CHILD)[owner] + np.arange(len(owner)) / _LEAVES) % 1.0
+    part = (uniform(branches.key, _CHILD)[owner] + each / _LEAVES) % 1.0
     index = (part * number).astype(np.int64)
+    if rows["leaf_spray"][row[0]] > 0:  # one leaf after the other, so that both sides of the spray have as many
+        index = (index - index % _LEAVES + each) % number
     key = leaf_keys(branches, owner, index)
     t = leaf_places(rows, branches, owner, index, counts, key)
-    leaves = place_leaves(rows, branches, lines, owner, index, key, t)
-    frame = settled(rows, branches.row[owner], leaves.frame, leaves.light, _UP).astype(np.float64)
-    moment = frame @ turn @ frame.transpose(0, 2, 1)
-    return _Points(branches.frame[owner], moment, number * leaves.size**2)
+    roll = uniform(branches.key, Draw.ROLL)[owner]
+    if rows["leaf_spray"][row[0]] == 0:
+        # The first leaf stands anywhere around the branch, and so does any other: evenly, a good deal of chance goes.
+        roll, index = roll + each / _LEAVES, np.zeros_like(index)
+    _, along = lines.at(owner, t)
+    frame = leaf_frames(rows, row, along.astype(np.float32), roll, index, key)
+    light = ranged(rows, "leaf_light", row, key, Draw.LEAF_LIGHT)
+    frame = settled(rows, row, frame, light, _UP)
+    size = ranged(rows, "leaf_size", row, key, Draw.LEAF_SIZE)
+    size = size * (1 + (rows["leaf_size_tip"][row] - 1) * outwardness(rows, branches, owner, t))
+    weight = number * (size * branches.scale[owner]) ** 2
+    # F T Fᵀ, summed over the leaves of each branch: their frames side by side.
+    left = _product(frame.reshape(-1, 3).astype(np.float64), turn).reshape(-1, 3, 3) * weight[:, None, None]
+    left, right = (f.reshape(-1, _LEAVES, 3, 3).swapaxes(1, 2).reshape(-1, 3, 3 * _LEAVES) for f in (left, frame))
+    out = _Sums(np.zeros((len(branches), 3, 3)), np.zeros(len(branches)))
+    out.moment[bearers] = left @ right.transpose(0, 2, 1)
+    out.weight[bearers] = weight.reshape(-1, _LEAVES).sum(axis=1)
+    return out
 
 
-def _own_wood(rows: NDArray[np.void], branches: Branches, lines: Axes) -> _Points:
+def _own_wood(rows: NDArray[np.void], branches: Branches, lines: Axes) -> _Sums:
     """A place on each branch."""
     t = uniform(branches.key, _ALONG)
     _, frame = lines.at(np.arange(len(branches)), t)
     axis = frame[:, :, 2]
     moment = (np.eye(3) - axis[:, :, None] * axis[:, None, :]) / 2
-    return _Points(branches.frame, moment, radius_at(rows, branches, t))
+    radius = radius_at(rows, branches, t)
+    return _Sums(moment * radius[:, None, None], radius)
 
 
 def _model_moments(rows: NDArray[np.void], forms: Sequence[Sequence[Sequence[LeafModel]]]) -> NDArray[np.float64]:
