@@ -86,7 +86,7 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not in_object_mode(cls, context):
             return False
-        if not any(obj.type == 'MESH' for obj in context.selected_objects):
+        if not _grounds(context):
             cls.poll_message_set("Select the mesh on which plants shall grow")
             return False
         return True
@@ -101,7 +101,7 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
                 "make a Field, or fewer plants"
             )
         depsgraph = context.evaluated_depsgraph_get()
-        grounds = [obj for obj in context.selected_objects if obj.type == 'MESH']
+        grounds = _grounds(context)
         placement = place(
             np.concatenate([mesh_triangles(obj, depsgraph, "select a mesh with faces") for obj in grounds]),
             count=self.count,
@@ -138,6 +138,11 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
         if not self.species:
             mix = [(entry.species, entry.weight) for entry in settings.mix if entry.species]
             self.species = ", ".join(f"{name}:{share:g}" for name, share in mix) or default_species()
+
+
+def _grounds(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """Selected meshes; those of fields are plants, not ground."""
+    return [obj for obj in context.selected_objects if obj.type == 'MESH' and not obj.tetflora.is_field]
 
 
 def _parse_shares(text: str) -> dict[str, float]:

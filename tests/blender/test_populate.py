@@ -200,3 +200,56 @@ def test_a_mesh_without_faces_is_named():
     select(add_mesh("Bare", faces=()))
     with pytest.raises(RuntimeError, match='"Bare" has no faces'):
         bpy.ops.tetflora.populate(count=3, species="bush")
+
+
+def _populated(**options):
+    """Plants of the scene after Populate, in order of their places."""
+    import bpy
+
+    bpy.context.view_layer.update()
+    bpy.ops.tetflora.populate(count=60, seed=3, min_distance=1.0, species="bush:2, conifer", **options)
+    bpy.context.view_layer.update()
+    graph = bpy.context.evaluated_depsgraph_get()
+    read = part("scene_reader").read_plants(bpy.context.scene, graph, bpy.context.view_layer)
+    order = np.lexsort(np.round(read.position.T, 3))
+    return read.identifiers, read.species[order], read.seed[order], read.position[order], read.frame[order]
+
+
+def test_a_field_holds_the_same_plants_as_empties():
+    import bpy
+
+    select(add_mesh("ground", size=20.0))
+    empties = _populated(as_field='EMPTIES')
+    assert not [o for o in bpy.data.objects if o.tetflora.is_field]
+    bpy.ops.tetflora.remove_plants(which='ALL')
+    field = _populated(as_field='FIELD')
+    assert [o.name for o in bpy.data.objects] == ["Field of plants", "ground"]
+    assert field[0] == empties[0]
+    for ours, theirs in zip(field[1:], empties[1:], strict=True):
+        assert np.allclose(ours, theirs, atol=1e-5)
+
+
+def test_many_plants_become_a_field_unasked():
+    import bpy
+
+    ground = add_mesh("ground", size=20.0)
+    select(ground)
+    bpy.ops.tetflora.populate(count=10_001, min_distance=0.0, species="bush")
+    fields = [o for o in bpy.data.objects if o.tetflora.is_field]
+    assert [len(o.data.vertices) for o in fields] == [10_001]
+    assert not [o for o in bpy.data.objects if o.tetflora.is_plant]
+    assert bpy.context.view_layer.objects.active == ground
+    with pytest.raises(RuntimeError, match="too many for objects of their own, at most 100,000"):
+        bpy.ops.tetflora.populate(count=100_001, as_field='EMPTIES')
+
+
+def test_plants_of_fields_keep_others_away():
+    import bpy
+
+    select(add_mesh("ground", size=15.0))
+    for seed in (1, 2):
+        bpy.ops.tetflora.populate(count=40, seed=seed, min_distance=2.0, species="bush", as_field='FIELD')
+        bpy.context.view_layer.update()
+    places = [v.co[:2] for o in bpy.data.objects if o.tetflora.is_field for v in o.data.vertices]
+    assert len(places) == 80
+    assert _distances(np.array(places)).min() >= 2.0 - 1e-4

@@ -81,14 +81,14 @@ def copies_of(objects: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgrap
         elif has_nodes(obj):
             try:
                 walk = _Walk(depsgraph)
-                walk.nodes(obj, world_matrix(obj, depsgraph)[None], _name_keys([obj]))
+                walk.nodes(obj, world_matrix(obj, depsgraph)[None].astype(np.float64), _name_keys([obj]))
                 found += walk.found
             except _OneByOne:
                 left.add(obj)
     for collection, instancers in groups.items():
         try:
             walk = _Walk(depsgraph)
-            matrices = np.array([world_matrix(obj, depsgraph) for obj in instancers])
+            matrices = np.array([world_matrix(obj, depsgraph) for obj in instancers], dtype=np.float64)
             walk.collection(collection, matrices, _name_keys(instancers))
             found += walk.found
         except _OneByOne:
@@ -159,7 +159,9 @@ class _Walk:
             if target is None or start == end:
                 continue
             rows = order[start:end]
-            places = (matrices[:, None] @ transform[rows]).reshape(-1, 4, 4)
+            # Columns one after the other: a single product for each place, not one for each instance.
+            columns = transform[rows].reshape(-1, 4) @ matrices.transpose(0, 2, 1)
+            places = columns.reshape(-1, 4, 4).transpose(0, 2, 1)
             names = child_key(keys[:, None], number[rows]).reshape(-1)
             if isinstance(target, bpy.types.Object):
                 self.object(target.original, places, names)
@@ -173,7 +175,7 @@ class _Walk:
 
 
 def _read_instances(points: bpy.types.PointCloud) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.int64]]:
-    """Reference, transform (n, 4, 4) and identifier of each instance."""
+    """Reference, columns of the transform (n, 4, 4) and identifier of each instance."""
     size = len(points.points)
     reference, number = np.zeros(size, np.int32), np.arange(size)
     transform = np.zeros((size, 4, 4), np.float32)
@@ -183,8 +185,7 @@ def _read_instances(points: bpy.types.PointCloud) -> tuple[NDArray[np.int32], ND
         given = np.zeros(size, np.int32)
         own.data.foreach_get("value", given)
         number = given.astype(np.int64)
-    # Blender stores columns one after the other.
-    return reference, transform.transpose(0, 2, 1).astype(np.float64), number
+    return reference, transform.astype(np.float64), number
 
 
 def _one_by_one(instancers: set[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Iterator[Copies]:
@@ -196,7 +197,7 @@ def _one_by_one(instancers: set[bpy.types.Object], depsgraph: bpy.types.Depsgrap
             # Parts of an object that are of another type come once more, as objects of that type.
             if (group.is_plant or group.is_field) and not original.hide_render and obj.type == original.type:
                 key = key_of_seed(np.array([instance.random_id]))
-                yield Copies(original, None, np.array(instance.matrix_world)[None], key)
+                yield Copies(original, None, np.array(instance.matrix_world, dtype=np.float64)[None], key)
 
 
 def _name_keys(objects: Sequence[bpy.types.Object]) -> NDArray[np.uint64]:

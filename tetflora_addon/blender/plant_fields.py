@@ -108,24 +108,29 @@ def read_field(
         An attribute of a type or domain that cannot be used, or points without a place or size; the message names the
         object, how many points and the first of them.
     """
+    geometry = geometry or geometry_of(obj, depsgraph)
     if geometry is None:
-        geometry = geometry_of(obj, depsgraph)
-        stored = [obj.data] if obj.type in FIELD_TYPES else []
-    parts = stored if geometry is None else [g for g in (geometry.mesh, geometry.pointcloud) if g is not None]
+        parts = [obj.data] if obj.type in FIELD_TYPES else []
+    else:
+        parts = [part for part in (geometry.mesh, geometry.pointcloud) if part is not None]
     sizes = [_size(part) for part in parts]
-    position = _joined([_vectors(part, "position", size) for part, size in zip(parts, sizes, strict=True)], (0, 3))
-    linear = _joined([_linear(obj, part, size) for part, size in zip(parts, sizes, strict=True)], (0, 3, 3))
-    firsts = np.cumsum([0, *sizes])
-    seed = _joined([_seeds(obj, p, n, int(f)) for p, n, f in zip(parts, sizes, firsts, strict=False)], (0,))
+    sized = list(zip(parts, sizes, strict=True))
+    position = _joined([_positions(part, size) for part, size in sized], (0, 3))
+    rotation = _joined([_rotations(obj, part, size) for part, size in sized], (3, 3, 0))
+    own_scale = _joined([_scales(obj, part, size, 1 if len(parts) == 1 else 3) for part, size in sized], (3, 0))
+    firsts = np.cumsum([0, *sizes]).tolist()
+    seed = _joined([_seeds(obj, *part, first) for part, first in zip(sized, firsts, strict=False)], (0,))
     kinds = field_kinds(obj)
-    species = _joined([_integers(obj, p, "species", n, 0) for p, n in zip(parts, sizes, strict=True)], (0,))
+    species = _joined([_integers(obj, part, "species", size, 0) for part, size in sized], (0,))
     _refuse(obj, (species < 0) | (species >= len(kinds)), f"a species that its list of {len(kinds)} does not have")
     if keys is not None:
         seed = child_key(key_of_seed(seed), keys[:, None]).view(np.int64).reshape(-1)
-    world = matrices[:, :3, :3].astype(np.float64)
-    place = (position @ world.transpose(0, 2, 1) + matrices[:, None, :3, 3]).reshape(-1, 3)
-    frame, scale, sound = frames_of(_turned(world, linear))
-    sound &= np.isfinite(place).all(axis=1)
+    matrices = matrices.astype(np.float64)  # single precision in some versions of Blender
+    world = matrices[:, :3, :3]
+    with np.errstate(invalid="ignore", over="ignore"):  # what is no number is refused below
+        place = (position @ world.transpose(0, 2, 1) + matrices[:, None, :3, 3]).reshape(-1, 3)
+        frame, scale, sound = _frames(world, rotation, own_scale)
+        sound &= np.isfinite(place.sum(axis=1))
     _refuse(obj, ~sound.reshape(len(matrices), -1).all(axis=0), "scale 0 or no valid position or rotation")
     return Plants(obj.name, kinds, np.tile(species.astype(np.int32), len(matrices)), seed, place, frame, scale)
 
@@ -229,9 +234,9 @@ def _values(attribute: bpy.types.Attribute, size: int) -> NDArray[np.float32]:
     return values[:, 0] if width == 1 else values
 
 
-def _vectors(points: Points, name: str, size: int) -> NDArray[np.float64]:
+def _positions(points: Points, size: int) -> NDArray[np.float64]:
     # No points may mean no attribute either.
-    return _values(points.attributes[name], size).astype(np.float64) if size else np.zeros((0, 3))
+    return _values(points.attributes["position"], size).astype(np.float64) if size else np.zeros((0, 3))
 
 
 def _integers(
@@ -255,59 +260,71 @@ def _seeds(obj: bpy.types.Object, points: Points, size: int, first: int) -> NDAr
     return new_seeds(numbers, roll).astype(np.int64)
 
 
-def _linear(obj: bpy.types.Object, points: Points, size: int) -> NDArray[np.float64]:
-    """Rotation times scale of each point in the field's space, (n, 3, 3)."""
-    rotation = _attribute(obj, points, "rotation", {'QUATERNION', 'FLOAT_VECTOR'})
-    if rotation is None:
-        linear = np.tile(np.eye(3), (size, 1, 1))
-    else:
-        values = _values(rotation, size).astype(np.float64)
-        linear = _from_quaternions(values) if values.shape[1] == 4 else _from_eulers(values)
-    scale = _attribute(obj, points, "scale", {'FLOAT', 'FLOAT_VECTOR'})
-    if scale is not None:
-        values = _values(scale, size).astype(np.float64)
-        if values.ndim == 1:
-            _refuse(obj, ~(values > 0.0), "a scale that is not above 0")
-            values = values[:, None]
-        linear *= values[:, None, :]
-    return linear
+def _rotations(obj: bpy.types.Object, points: Points, size: int) -> NDArray[np.float64]:
+    """Rotation of each point in the field's space, (3, 3, n): whole rows of numbers are what numpy is fast with."""
+    attribute = _attribute(obj, points, "rotation", {'QUATERNION', 'FLOAT_VECTOR'})
+    if attribute is None:
+        return np.repeat(np.eye(3)[:, :, None], size, axis=2)
+    values = np.ascontiguousarray(_values(attribute, size).T, np.float64)
+    return _from_quaternions(values) if len(values) == 4 else _from_eulers(values)
+
+
+def _scales(obj: bpy.types.Object, points: Points, size: int, least: int) -> NDArray[np.float64]:
+    """Scale of each point along its axes, (3, n), or (1, n) where one number holds for all and ``least`` is 1."""
+    attribute = _attribute(obj, points, "scale", {'FLOAT', 'FLOAT_VECTOR'})
+    if attribute is None:
+        return np.ones((least, size))
+    values = _values(attribute, size)
+    if values.ndim == 1:
+        _refuse(obj, ~(values > 0.0), "a scale that is not above 0")
+        values = np.broadcast_to(values[:, None], (size, least))
+    return np.ascontiguousarray(values.T, np.float64)
 
 
 def _from_quaternions(q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rotations of quaternions of any length; one of no length turns nothing."""
-    squared = np.einsum("ij,ij->i", q, q)
+    """Rotations, (3, 3, n), of quaternions of any length, (4, n); one of no length turns nothing."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        twice = np.where(squared > 0.0, 2.0 / squared, squared)  # keeps what is no number
-    w, x, y, z = np.ascontiguousarray(q.T)
-    out = np.zeros((len(q), 3, 3))
-    xx, yy, zz = twice * x * x, twice * y * y, twice * z * z
-    out[:, 0, 0], out[:, 1, 1], out[:, 2, 2] = 1.0 - yy - zz, 1.0 - xx - zz, 1.0 - xx - yy
-    for (i, j), product, turn in (((0, 1), x * y, z), ((0, 2), x * z, -y), ((1, 2), y * z, x)):
-        out[:, i, j] = twice * (product - w * turn)
-        out[:, j, i] = twice * (product + w * turn)
+        squared = np.einsum("in,in->n", q, q)
+        twice = np.where(squared == 0.0, 0.0, 2.0 / squared)
+        w, x, y, z = q
+        out = np.zeros((3, 3, q.shape[1]))
+        xx, yy, zz = twice * x * x, twice * y * y, twice * z * z
+        out[0, 0], out[1, 1], out[2, 2] = 1.0 - yy - zz, 1.0 - xx - zz, 1.0 - xx - yy
+        for (i, j), product, turn in (((0, 1), x * y, z), ((0, 2), x * z, -y), ((1, 2), y * z, x)):
+            out[i, j] = twice * (product - w * turn)
+            out[j, i] = twice * (product + w * turn)
     return out
 
 
 def _from_eulers(angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rotations of XYZ Euler angles in radians: first about x, last about z, as Blender's default."""
+    """Rotations, (3, 3, n), of XYZ Euler angles in radians, (3, n): first about x, last about z, as Blender's."""
     with np.errstate(invalid="ignore"):
-        (cx, cy, cz), (sx, sy, sz) = np.cos(angles).T, np.sin(angles).T
+        (cx, cy, cz), (sx, sy, sz) = np.cos(angles), np.sin(angles)
     rows = (
         (cy * cz, sx * sy * cz - cx * sz, cx * sy * cz + sx * sz),
         (cy * sz, sx * sy * sz + cx * cz, cx * sy * sz - sx * cz),
         (-sy, sx * cy, cx * cy),
     )
-    return np.stack([np.stack(row, axis=1) for row in rows], axis=1)
+    return np.stack([np.stack(row) for row in rows])
 
 
-def _turned(world: NDArray[np.float64], linear: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(k, 3, 3) times (n, 3, 3), every one with every other: (k · n, 3, 3)."""
-    if len(world) == 1 and np.array_equal(world[0], np.eye(3)):
-        return linear
-    # One product of long matrices for each place, which is many times faster than millions of small ones.
-    rows = linear.transpose(0, 2, 1).reshape(-1, 3)
-    turned = rows @ world.transpose(0, 2, 1)  # (k, 3 n, 3)
-    return turned.reshape(-1, 3, 3).transpose(0, 2, 1)
+def _frames(
+    world: NDArray[np.float64], rotation: NDArray[np.float64], scale: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Frames, scales and soundness, as `frames_of`, of all points (3, 3, n) in all places (k, 3, 3): k · n of each."""
+    places, size = len(world), rotation.shape[2]
+    frames, scales, sound = frames_of(world)
+    even = np.allclose(frames * scales[:, None, None], world, rtol=0.0, atol=1e-6 * np.abs(scales).max(initial=0.0))
+    if even and sound.all() and len(scale) == 1:
+        # Nothing is sheared, mirrored or stretched: what comes out are rotations already.
+        linear, found = frames, (scales[:, None] * scale).reshape(-1)
+    else:
+        # Of a scale along axes a column each; a scale alone holds for all of them.
+        linear, rotation, found = world, rotation * scale, None
+    turned = (linear @ rotation.reshape(3, -1)).reshape(places, 3, 3, size).transpose(0, 3, 1, 2).reshape(-1, 3, 3)
+    if found is None:
+        return frames_of(turned)
+    return turned, found, np.isfinite(turned.sum(axis=(1, 2))) & np.isfinite(found)
 
 
 def _refuse(obj: bpy.types.Object, bad: NDArray[np.bool_], what: str) -> None:
@@ -319,7 +336,11 @@ def _refuse(obj: bpy.types.Object, bad: NDArray[np.bool_], what: str) -> None:
 
 
 def _joined(parts: list[NDArray], empty: tuple[int, ...]) -> NDArray:
-    return parts[0] if len(parts) == 1 else np.concatenate([np.zeros(empty, parts[0].dtype if parts else int), *parts])
+    """Arrays as one along the axis that is 0 in ``empty``, which is the shape where there are none."""
+    if not parts:
+        return np.zeros(empty, int)
+    # Millions of frames are not copied where there is nothing to join.
+    return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=empty.index(0))
 
 
 def _flat(values: NDArray, dtype: type) -> NDArray:

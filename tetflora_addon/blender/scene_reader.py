@@ -149,7 +149,8 @@ def single_plants(plants: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph
     number = {kind: i for i, kind in enumerate(sorted(set(own)))}
     species = np.array([number[kind] for kind in own], dtype=np.int32)
     seeds = np.array([obj.tetflora.seed for obj in plants], dtype=np.int64)
-    matrices = np.array([world_matrix(obj, depsgraph) for obj in plants]).reshape(-1, 4, 4)
+    # Matrices of Blender's become single precision in some versions; seeds are double throughout.
+    matrices = np.array([world_matrix(obj, depsgraph) for obj in plants], dtype=np.float64).reshape(-1, 4, 4)
     return _placed(names, tuple(number), species, seeds, matrices)
 
 
