@@ -20,9 +20,10 @@ class TETFLORA_PT_refinement(SidebarPanel, bpy.types.Panel):
         settings = context.scene.tetflora
         column = layout.column()
         column.active = not settings.expand_everything
+        column.prop(settings, "quality")
         column.prop(settings, "cutoff")
-        column.prop(settings, "visibility_resolution")
         column.prop(settings, "proxy_form")
+        column.prop(settings, "max_polygons")
         cycles = getattr(context.scene, "cycles", None)
         if settings.proxy_form == 'SHELLS' and cycles is not None:
             column.prop(cycles, "transparent_max_bounces", text="Transparent")
@@ -49,7 +50,8 @@ class TETFLORA_PT_limits(SidebarPanel, bpy.types.Panel):
         settings = context.scene.tetflora
         column = layout.column()
         column.active = not settings.expand_everything
-        for name in ("leaf_limit", "few_polygons", "block", "hidden", "max_tetrahedra", "max_levels"):
+        names = ("leaf_limit", "facet", "visibility_resolution", "few_polygons", "block", "hidden")
+        for name in (*names, "max_memory", "max_tetrahedra", "max_levels"):
             column.prop(settings, name)
         layout.prop(settings, "expand_everything")
 

@@ -29,6 +29,7 @@ def rows_of(text: str) -> tuple[tuple[str, str], ...]:
             ("Polygons made", f"{figures['polygons_meshed']:,}"),
             ("    share of all", share),
             ("Faces of proxies", f"{figures['polygons_proxy']:,}"),
+            ("    pixels each", f"{figures.get('facet_pixels', 0.0):.2g}"),
             ("Tetrahedra made", f"{figures['tetrahedra_made']:,}"),
             ("    not divided", f"{figures['tetrahedra_terminal']:,}"),
             ("    proxies", f"{figures['tetrahedra_proxy']:,}"),

@@ -25,9 +25,9 @@ from .plants.species import LEAF_KINDS
 from .plants.stems import Stems
 from .plants.tubes import tube_buffers
 from .refinement.camera import Camera
-from .refinement.contents import bounding_cylinders
 from .refinement.decisions import Decision
 from .refinement.loop import Refinement
+from .shading.facet_sizes import HIDDEN_LEAVES, piece_facet_sizes, subplant_facet_sizes
 from .shading.microsurfaces import kept_out_of_view, piece_facets, subplant_facets
 from .shading.shells import shell_buffers
 from .shading.summaries import extinction_matrices, summarise
@@ -37,8 +37,6 @@ from .tetrahedra.geometry import volume
 BLOCK_POLYGONS = 250_000
 #: Facets that are made at a time, about; thick wood close to the eye is cut into very many.
 FACETS_AT_ONCE = 200_000
-#: Leaves that one facet of a hidden tetrahedron stands for at least: plants beside the camera only cast shadows.
-HIDDEN_LEAVES = 8
 
 
 @dataclass(frozen=True)
@@ -111,9 +109,7 @@ def _block(flora: Flora, pieces: Pieces, stems: list[Stems], number: int, fracti
         del buffers
 
 
-def facet_buffers(
-    flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.6, coarse: float = 2.0
-) -> MeshBuffers | None:
+def facet_buffers(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.6) -> MeshBuffers | None:
     """Proxies as microsurfaces: facets of all that is not explicit.
 
     Parameters
@@ -122,31 +118,24 @@ def facet_buffers(
     result : Refinement
     camera : Camera
     facet_pixels : float
-        Side of a facet in pixels.
-    coarse : float
-        How much larger facets of hidden tetrahedra are; there, one stands for at least `HIDDEN_LEAVES` leaves, and
-        wood gets no more facets than it has faces.
+        Side of a facet that is seen, in pixels; see `shading.facet_sizes` for the others.
     """
     contents = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN))
     hidden = result.chosen(Decision.HIDDEN)
-    subplants, pieces = contents.subplants, contents.pieces
     parts: list[MeshBuffers | None] = []
-    for things, branches, centre, cell, amounts, make in (
-        (subplants, subplants, bounding_cylinders(flora, subplants)[0], contents.subplant_cell,
-         contents.subplant_amounts, subplant_facets),
-        (pieces, pieces.branches, (pieces.start + pieces.end) / 2, contents.piece_cell,
-         contents.piece_amounts, piece_facets),
-    ):  # fmt: skip
-        fine = facet_pixels * camera.extent_around(centre)
-        least = np.sqrt(HIDDEN_LEAVES * flora.one_leaf_area(branches))
-        side = np.where(hidden[cell], np.maximum(coarse * fine, least), fine)
-        expected = (amounts.leaf_area + amounts.wood_area) / side**2 + 1
+    for things, cell, make, sizes_of in (
+        (contents.subplants, contents.subplant_cell, subplant_facets, subplant_facet_sizes),
+        (contents.pieces, contents.piece_cell, piece_facets, piece_facet_sizes),
+    ):
+        sizes = sizes_of(flora, contents, camera, hidden)
+        leaf, wood = sizes.sides(facet_pixels)
+        expected = sizes.counts(facet_pixels) + 1
         inside = result.tree.inside[cell]
         seen, beside = np.flatnonzero(inside), np.flatnonzero(~inside)
-        parts += [make(flora, things.take(i), side[i], hidden[cell[i]]) for i in _runs(expected, seen)]
+        parts += [make(flora, things.take(i), leaf[i], wood[i]) for i in _runs(expected, seen)]
         # What is beside the view must not reach into the picture.
         for i in _runs(expected, beside):
-            made = make(flora, things.take(i), side[i], hidden[cell[i]])
+            made = make(flora, things.take(i), leaf[i], wood[i])
             parts.append(kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5))
     return concatenate_buffers([p for p in parts if p is not None])
 

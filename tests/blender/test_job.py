@@ -77,6 +77,20 @@ def test_statistics_say_what_is_in_the_scene():
     assert json.loads(scene.tetflora.statistics) == json.loads(json.dumps(statistics.as_dict()))
 
 
+@pytest.mark.parametrize("form", ['MICROSURFACES', 'SHELLS'])
+def test_the_result_fits_the_budget(form):
+    """In the scene, not in expectation; and the statistics say how coarse the facets became."""
+    scene = _forest()
+    free = _refine(scene, proxy_form=form)
+    whole = free.polygons_meshed + free.polygons_proxy
+    for share in (0.5, 0.2):
+        fitted = _refine(scene, max_polygons=int(share * whole))
+        faces = sum(len(o.data.polygons) for o in _made(scene))
+        assert faces == fitted.polygons_meshed + fitted.polygons_proxy <= share * whole
+        assert fitted.polygons_meshed < free.polygons_meshed
+        assert (fitted.facet_pixels >= free.facet_pixels > 0) == (form == 'MICROSURFACES')
+
+
 def test_results_carry_uvs_materials_and_smooth_tubes():
     scene = _forest()
     _refine(scene)

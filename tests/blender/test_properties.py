@@ -35,6 +35,23 @@ def test_settings_mirror_the_engine():
     assert (read.cutoff, read.max_tetrahedra) == (3.5, 1234)
 
 
+def test_qualities_set_what_they_say_and_are_recognised():
+    import bpy
+
+    qualities = session.part("tetflora_addon.refinement.settings").QUALITIES
+    settings = bpy.context.scene.tetflora
+    assert settings.quality == 'FINAL'
+    for name, values in qualities.items():
+        settings.quality = name
+        assert settings.quality == name
+        for field, value in values.items():
+            assert getattr(settings, field) == pytest.approx(value)
+    settings.cutoff = 3.7
+    assert settings.quality == 'CUSTOM'
+    settings.quality = 'CUSTOM'
+    assert settings.cutoff == pytest.approx(3.7)
+
+
 def test_everything_the_artist_sees_is_explained():
     import bpy
 

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -15,7 +17,8 @@ from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.plants.compiled import Flora
 from tetflora_addon.plants.expansion import open_subplants
 from tetflora_addon.plants.growth import Branches, trunks
-from tetflora_addon.refinement.contents import bounding_cylinders, piece_amounts, subplant_amounts
+from tetflora_addon.refinement.contents import Contents, bounding_cylinders, piece_amounts, subplant_amounts
+from tetflora_addon.shading.facet_sizes import piece_facet_sizes, subplant_facet_sizes
 from tetflora_addon.shading.microsurfaces import piece_facets, subplant_facets
 
 
@@ -118,23 +121,33 @@ def test_hidden_wood_gets_no_more_facets_than_it_has_faces() -> None:
     """Plants beside the eye, where a pixel is a millimetre: the area stays, the number is that of their polygons."""
     flora = support.small_flora()
     plants, pieces = support.grown(flora, support.plants(np.arange(20)))
-    for made, faces, amounts in (
+    contents = Contents.of(flora, plants, np.zeros(20, int), pieces, np.zeros(len(pieces), int))
+    camera = SimpleNamespace(extent_around=lambda points: np.full(len(points), 1e-3))
+    for sizes_of, make, things, faces, amounts in (
         (
-            subplant_facets(flora, plants, np.full(20, 1e-3), np.ones(20, bool)),
+            subplant_facet_sizes,
+            subplant_facets,
+            plants,
             20 * (flora.polygons[0] - flora.leaf_count[0] * flora.leaf.polygons[0]),
-            subplant_amounts(flora, plants),
+            contents.subplant_amounts,
         ),
         (
-            piece_facets(flora, pieces, np.full(len(pieces), 1e-3), np.ones(len(pieces), bool)),
+            piece_facet_sizes,
+            piece_facets,
+            pieces,
             flora.rows["sides"][pieces.branches.row].sum(),
-            piece_amounts(flora, pieces),
+            contents.piece_amounts,
         ),
     ):
+        sizes = sizes_of(flora, contents, camera, np.ones(1, bool))
+        made = make(flora, things, *sizes.sides(1.0))
+        assert made.polygons == pytest.approx(sizes.counts(1.0).sum(), rel=0.02)
         wood = part(made, False)
-        assert wood.sum() == pytest.approx(faces, rel=0.01)
-        assert support.face_areas(made)[wood].sum() == pytest.approx(amounts.wood_area.sum() / 2, rel=0.01)
-    fine = subplant_facets(flora, plants.take(np.s_[:1]), np.array([3e-3]), np.zeros(1, bool))
-    assert part(fine, False).sum() > faces / 20 * 5
+        assert wood.sum() <= faces * 1.01
+        assert support.face_areas(made)[wood].sum() == pytest.approx(amounts.wood_area.sum() / 2, rel=0.1)
+        seen = sizes_of(flora, contents, camera, np.zeros(1, bool))
+        assert part(make(flora, things, *seen.sides(3.0)), False).sum() > faces * 5
+        assert (seen.sides(3.0)[0] >= np.sqrt(seen.one_leaf)).all()
 
 
 def test_facets_are_squares_no_smaller_than_leaves() -> None:

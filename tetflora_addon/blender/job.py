@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 
 from .. import emission
+from ..budget import afford
 from ..plants.compiled import Flora, compile_species
 from ..plants.growth import trunks
 from ..plants.seeds import Seeds
@@ -124,13 +125,15 @@ def refine_steps(
             yield from _write_blocks(results, flora, emission.expanded_blocks(flora, seeds), statistics, 0.05)
         else:
             refinement = yield from _run_loop(flora, seeds, camera, settings, occluders)
+            facets = scene.tetflora.proxy_form != 'SHELLS'
+            refinement, side = afford(flora, refinement, camera, settings, facets)
             clock.lap("refine")
             _count(statistics, refinement)
             results.open()
             blocks = emission.explicit_blocks(flora, refinement)
             yield from _write_blocks(results, flora, blocks, statistics, _LOOP_SHARE)
             yield Progress(0.95, "Making proxies")
-            _write_proxies(results, flora, refinement, camera, statistics, scene.tetflora.proxy_form)
+            _write_proxies(results, flora, refinement, camera, statistics, side if facets else None)
         clock.lap("emit")
     except BaseException:  # an error, Esc (GeneratorExit) or Ctrl+C: nothing of ours may stay behind
         results.discard()
@@ -215,6 +218,7 @@ def _count(statistics: Statistics, refinement: Refinement) -> None:
     statistics.tetrahedra_terminal = len(refinement.tree.terminals())
     statistics.tetrahedra_proxy = int(np.isin(refinement.decision, (Decision.PROXY, Decision.HIDDEN)).sum())
     statistics.levels = refinement.passes
+    statistics.complete = refinement.complete
 
 
 def _write_blocks(
@@ -230,12 +234,19 @@ def _write_blocks(
 
 
 def _write_proxies(
-    results: Results, flora: Flora, refinement: Refinement, camera: Camera, statistics: Statistics, form: str
+    results: Results,
+    flora: Flora,
+    refinement: Refinement,
+    camera: Camera,
+    statistics: Statistics,
+    facet_pixels: float | None,
 ) -> None:
-    if form == 'SHELLS':
+    """Facets of so many pixels, or shells where None."""
+    if facet_pixels is None:
         buffers, material = emission.proxy_shells(flora, refinement), shell_material
     else:
-        buffers, material = emission.facet_buffers(flora, refinement, camera), proxy_material
+        buffers, material = emission.facet_buffers(flora, refinement, camera, facet_pixels), proxy_material
+    statistics.facet_pixels = facet_pixels or 0.0
     if buffers is not None:
         results.add("TetFlora proxies", "proxy", buffers, [material()])
         statistics.polygons_proxy += buffers.polygons

@@ -18,6 +18,7 @@ from bpy.props import (
 
 from ..refinement.settings import RefinementSettings
 from .plant_form import FORM_TYPES
+from .qualities import quality_number, set_quality
 from .species_choice import SpeciesChoice
 from .species_editor import TetFloraSpeciesEditor
 from .species_edits import TetFloraSpeciesEdit
@@ -273,6 +274,47 @@ class TetFloraScene(bpy.types.PropertyGroup):
         default=_SETTINGS.max_levels,
         min=1,
         max=200,
+    )
+
+    facet: FloatProperty(
+        name="Facets",
+        description="Side in pixels of the small facets that proxies are drawn with. Larger is fewer and coarser",
+        subtype='PIXEL',
+        default=_SETTINGS.facet,
+        min=0.1,
+        soft_max=4.0,
+        max=100.0,
+    )
+    max_polygons: IntProperty(
+        name="Most Polygons",
+        description=(
+            "Polygons that may be made in all, those of proxies included; 0 for no limit. Where more would be needed, "
+            "those that are seen best are made first, and the rest becomes coarser proxies"
+        ),
+        default=_SETTINGS.max_polygons,
+        min=0,
+        soft_max=100_000_000,
+        step=100_000,
+    )
+    max_memory: FloatProperty(
+        name="Most Memory",
+        description="Gigabytes that the result may take in Blender and while it renders, about; 0 for no limit",
+        default=_SETTINGS.max_memory,
+        min=0.0,
+        soft_max=256.0,
+        precision=1,
+    )
+    quality: EnumProperty(
+        name="Quality",
+        description="How fine the result is; sets the cutoff, the limit for leaves, the facets and the visibility",
+        items=(
+            ('DRAFT', "Draft", "For setting up a scene: quick and coarse"),
+            ('PREVIEW', "Preview", "For judging light and composition"),
+            ('FINAL', "Final", "For the picture: no leaf of half a pixel is missing"),
+            ('CUSTOM', "Custom", "Values of your own"),
+        ),
+        get=quality_number,
+        set=set_quality,
     )
 
     proxy_form: EnumProperty(

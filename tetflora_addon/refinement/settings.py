@@ -37,6 +37,12 @@ class RefinementSettings:
         Refinement stops before it makes more.
     max_levels : int
         Generations of bisection at most.
+    facet : float
+        Side of the facets of proxies, pixels.
+    max_polygons : int
+        Polygons that may be made in all, facets included; 0 for no limit.
+    max_memory : float
+        Gigabytes that they may take in Blender and a renderer together, about; 0 for no limit.
     """
 
     cutoff: float = 2.0
@@ -49,3 +55,14 @@ class RefinementSettings:
     visibility_resolution: int = 256
     max_tetrahedra: int = 400_000
     max_levels: int = 60
+    facet: float = 0.6
+    max_polygons: int = 0
+    max_memory: float = 0.0
+
+
+#: What the qualities of the panel stand for.
+QUALITIES: dict[str, dict[str, float]] = {
+    "DRAFT": {"cutoff": 6.0, "leaf_limit": 2.0, "facet": 1.5, "visibility_resolution": 128},
+    "PREVIEW": {"cutoff": 3.0, "leaf_limit": 1.0, "facet": 1.0, "visibility_resolution": 192},
+    "FINAL": {"cutoff": 2.0, "leaf_limit": 0.5, "facet": 0.6, "visibility_resolution": 256},
+}

@@ -26,6 +26,10 @@ class Statistics:
         All tetrahedra ever made; those that are not divided further; those of them that are drawn as approximations.
     levels : int
         Passes through the loop.
+    facet_pixels : float
+        Side of the facets of proxies, pixels; larger than asked for where a budget made them so; 0 for shells.
+    complete : bool
+        False where a limit of the settings stopped the loop.
     seconds : dict of str to float
         Wall clock by stage: ``read``, ``compile``, ``refine``, ``emit``.
     memory_mb : float
@@ -40,6 +44,8 @@ class Statistics:
     tetrahedra_terminal: int = 0
     tetrahedra_proxy: int = 0
     levels: int = 0
+    facet_pixels: float = 0.0
+    complete: bool = True
     seconds: dict[str, float] = field(default_factory=dict)
     memory_mb: float = 0.0
 

@@ -59,7 +59,7 @@ class Facets:
 
 
 def subplant_facets(
-    flora: Flora, subplants: Branches, side: NDArray[np.float64], coarse: NDArray[np.bool_] | None = None
+    flora: Flora, subplants: Branches, leaf_side: NDArray[np.float64], wood_side: NDArray[np.float64] | None = None
 ) -> MeshBuffers | None:
     """Facets of sub-plants.
 
@@ -67,32 +67,28 @@ def subplant_facets(
     ----------
     flora : Flora
     subplants : Branches of n
-    side : (n,) float64
-        Wanted side of a facet, metres; facets are never smaller than the leaves that they stand for.
-    coarse : (n,) bool, optional
-        Where no one looks: wood is cut into no more facets than it has faces. Elsewhere it is cut as fine as the side
-        asks for, or thin twigs would become blots.
+    leaf_side, wood_side : (n,) float64
+        Wanted side of a facet for leaves and for wood (the same if not given), metres; those for leaves are never
+        smaller than the leaves that they stand for.
     """
     amounts = subplant_amounts(flora, subplants)
-    wood = _wood_sides(side, amounts, flora.branch_faces(subplants), coarse)
     return concatenate_buffers(
         [
-            _buffers(_leaves_of_subplants(flora, subplants, amounts, side)),
-            _buffers(_wood_of_subplants(flora, subplants, amounts, wood)),
+            _buffers(_leaves_of_subplants(flora, subplants, amounts, leaf_side)),
+            _buffers(_wood_of_subplants(flora, subplants, amounts, leaf_side if wood_side is None else wood_side)),
         ]
     )
 
 
 def piece_facets(
-    flora: Flora, pieces: Pieces, side: NDArray[np.float64], coarse: NDArray[np.bool_] | None = None
+    flora: Flora, pieces: Pieces, leaf_side: NDArray[np.float64], wood_side: NDArray[np.float64] | None = None
 ) -> MeshBuffers | None:
     """Facets of pieces of branches; parameters as for `subplant_facets`."""
     amounts = piece_amounts(flora, pieces)
-    wood = _wood_sides(side, amounts, flora.rows["sides"][pieces.branches.row], coarse)
     return concatenate_buffers(
         [
-            _buffers(_leaves_of_pieces(flora, pieces, amounts, side)),
-            _buffers(_wood_of_pieces(flora, pieces, amounts, wood)),
+            _buffers(_leaves_of_pieces(flora, pieces, amounts, leaf_side)),
+            _buffers(_wood_of_pieces(flora, pieces, amounts, leaf_side if wood_side is None else wood_side)),
         ]
     )
 
@@ -118,13 +114,6 @@ def kept_out_of_view(
     reach = np.linalg.norm(corners - centre, axis=2).max(axis=1)
     share = np.clip(clearance(centre[:, 0]) / np.maximum(reach, 1e-12), smallest, 1.0)[:, None, None]
     return replace(buffers, positions=(centre + share * (corners - centre)).reshape(-1, 3).astype(np.float32))
-
-
-def _wood_sides(side: NDArray, amounts: Amounts, faces: NDArray, coarse: NDArray[np.bool_] | None) -> NDArray:
-    if coarse is None:
-        return side
-    least = np.sqrt(amounts.wood_area / 2 / np.maximum(faces, 1))
-    return np.where(coarse, np.maximum(side, least), side)
 
 
 def _numbers(key: NDArray, area: NDArray, facet: NDArray, path: int, draw: int) -> tuple[NDArray, NDArray, NDArray]:

@@ -1,0 +1,89 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How large the facets are that stand for sub-plants and pieces, and how many that will make.
+
+About as large as a pixel is wide there; twice that where nobody looks, and there one stands for several leaves, for
+hidden plants only cast shadows and light up others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..plants.compiled import Flora
+from ..plants.growth import Branches
+from ..refinement.amounts import Amounts
+from ..refinement.camera import Camera
+from ..refinement.contents import Contents, bounding_cylinders
+
+#: How much larger facets of hidden tetrahedra are.
+COARSE = 2.0
+#: Leaves that one of them stands for at least.
+HIDDEN_LEAVES = 8
+
+
+@dataclass(frozen=True)
+class FacetSizes:
+    """What sizes and numbers of facets follow from, for one kind of things.
+
+    Attributes
+    ----------
+    extent : (n,) float64
+        Metres that a pixel spans.
+    one_leaf : (n,) float64
+        Area of a leaf, m².
+    least_wood : (n,) float64
+        Side of facets of which there are as many as the wood has faces, metres.
+    hidden : (n,) bool
+        Where nobody looks.
+    amounts : Amounts of n
+    """
+
+    extent: NDArray[np.float64]
+    one_leaf: NDArray[np.float64]
+    least_wood: NDArray[np.float64]
+    hidden: NDArray[np.bool_]
+    amounts: Amounts
+
+    def sides(self, pixels: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Sides (n,), (n,) of facets of leaves and of wood, metres, where those that are seen have so many pixels."""
+        fine = pixels * self.extent
+        coarse = np.maximum(COARSE * fine, np.sqrt(HIDDEN_LEAVES * self.one_leaf))
+        side = np.where(self.hidden, coarse, fine)
+        # Where nobody looks, wood is cut into no more facets than it has faces. Elsewhere it is cut as fine as the
+        # side asks for, or thin twigs would become blots.
+        wood = np.where(self.hidden, np.maximum(side, self.least_wood), side)
+        return np.maximum(side, np.sqrt(self.one_leaf)), wood
+
+    def counts(self, pixels: float) -> NDArray[np.float64]:
+        """Expected number (n,) of facets."""
+        leaf, wood = self.sides(pixels)
+        # Branches are closed: half of their surface is never seen.
+        leaves = self.amounts.leaf_area / np.maximum(leaf, 1e-12) ** 2
+        return leaves + self.amounts.wood_area / 2 / np.maximum(wood, 1e-12) ** 2
+
+
+def subplant_facet_sizes(flora: Flora, contents: Contents, camera: Camera, hidden: NDArray[np.bool_]) -> FacetSizes:
+    """Facets of the sub-plants of contents; ``hidden`` (nodes,) says in which nodes nobody looks."""
+    own = contents.subplants
+    extent = camera.extent_around(bounding_cylinders(flora, own)[0])
+    amounts, faces = contents.subplant_amounts, flora.branch_faces(own)
+    return _sizes(flora, own, extent, faces, hidden[contents.subplant_cell], amounts)
+
+
+def piece_facet_sizes(flora: Flora, contents: Contents, camera: Camera, hidden: NDArray[np.bool_]) -> FacetSizes:
+    """Facets of the pieces of contents; parameters as for `subplant_facet_sizes`."""
+    own = contents.pieces
+    extent = camera.extent_around((own.start + own.end) / 2)
+    faces = flora.rows["sides"][own.branches.row]
+    return _sizes(flora, own.branches, extent, faces, hidden[contents.piece_cell], contents.piece_amounts)
+
+
+def _sizes(
+    flora: Flora, branches: Branches, extent: NDArray, faces: NDArray, hidden: NDArray, amounts: Amounts
+) -> FacetSizes:
+    least = np.sqrt(amounts.wood_area / 2 / np.maximum(faces, 1))
+    return FacetSizes(extent, flora.one_leaf_area(branches), least, hidden, amounts)
