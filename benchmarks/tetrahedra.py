@@ -31,6 +31,7 @@ TARGETS: Targets = {
     "pyramid_shape_worst": {"min": 0.746},
     "pyramid_eight_worst": {"min": 0.746},
     "pyramid_bisection_worst": {"min": 0.337},
+    "pieces_shape_share": {"min": 0.8},
     "inverted": {"max": 0},
 }
 QUICK_TARGETS: Targets = TARGETS

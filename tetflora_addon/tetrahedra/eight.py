@@ -23,10 +23,11 @@ from .geometry import EDGES, plane_through, quality, signed_volume, squared_edge
 #: Vertices (a, b, c, d) for each diagonal ``k``, which joins the middles of ac, ``EDGES[k]``, and bd, ``EDGES[5 - k]``.
 _NAMES = tuple((EDGES[k][0], EDGES[5 - k][0], EDGES[k][1], EDGES[5 - k][1]) for k in range(3))
 
-#: Bisection must leave a worst quality better by this factor to be preferred, as what it leaves loses more later on
-#: than what the eight leave. Of factors from 1 to 1.33 this one kept most pieces around views at .8 of their quality:
-#: all but one in 288, that at .79. With 1, one falls to .74.
-HANDICAP = 1.15
+#: A tetrahedron of better quality than the first counts as compact. Bisection must leave a compact one a worst quality
+#: better by the second to be preferred, as what it leaves loses more later on than what the eight leave. Of thresholds
+#: and factors tried, these kept most at .8 of their quality over eight divisions: all halves of view pyramids, and all
+#: but a few in a thousand of the pieces around views, those at .79. Without, some fall to .74.
+COMPACT, HANDICAP = 0.5, 1.15
 
 
 def _tables() -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -124,7 +125,8 @@ def divide_in_eight(
 def prefers_eight(vertices: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Whether the eight or longest-edge bisection three times keeps tetrahedra in better shape.
 
-    Both give eight of equal volume, three planes deep. Worst qualities are compared, with `HANDICAP` on bisection.
+    Both give eight of equal volume, three planes deep. Worst qualities are compared, with a `HANDICAP` on bisection of
+    compact tetrahedra.
 
     Parameters
     ----------
@@ -142,7 +144,7 @@ def prefers_eight(vertices: NDArray[np.float64]) -> NDArray[np.bool_]:
     subvolumes" (section 4). The eight leave compact shapes at least three quarters of their quality, but cannot help
     with long ones: where opposite edges differ much, all three diagonals are equally bad. Those gain by bisection.
     """
-    return _prefers_eight(divide_in_eight(vertices)[1], bisect_thrice(vertices)[1])
+    return _prefers_eight(vertices, divide_in_eight(vertices)[1], bisect_thrice(vertices)[1])
 
 
 def divide_by_shape(
@@ -165,7 +167,7 @@ def divide_by_shape(
         Which were divided into the canonical eight; the others were bisected three times.
     """
     (planes, children), (other, halves) = divide_in_eight(vertices), bisect_thrice(vertices)
-    chosen = _prefers_eight(children, halves)
+    chosen = _prefers_eight(vertices, children, halves)
     bisected = ~chosen
     planes[bisected], children[bisected] = other[bisected], halves[bisected]
     return planes, children, chosen
@@ -181,5 +183,8 @@ def bisect_thrice(vertices: NDArray[np.float64]) -> tuple[NDArray[np.float64], N
     return np.concatenate(planes, axis=1), pieces.reshape(len(vertices), 8, 4, 3)
 
 
-def _prefers_eight(eight: NDArray[np.float64], bisected: NDArray[np.float64]) -> NDArray[np.bool_]:
-    return HANDICAP * np.min(quality(eight), axis=1) >= np.min(quality(bisected), axis=1)
+def _prefers_eight(
+    vertices: NDArray[np.float64], eight: NDArray[np.float64], bisected: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    handicap = np.where(quality(vertices) > COMPACT, HANDICAP, 1.0 + TIE)
+    return handicap * np.min(quality(eight), axis=1) >= np.min(quality(bisected), axis=1)
