@@ -43,8 +43,8 @@ _LEAVES = 4  # on each of them
 _SORTS = (LATERAL, FORK, SPUR)
 _ALONG, _CHILD = 111, 112  # draws of this module, beyond those of growth
 _UP = np.array([0.0, 0.0, 1.0])
-# Exponents of x, y, z: all polynomials of degree 3 on the sphere are sums of these.
-_EXPONENTS = np.array([(a, b, d - a - b) for d in (2, 3) for a in range(d + 1) for b in range(d + 1 - a)])
+# Exponents of x, y, z: all polynomials of degree 4 on the sphere are sums of these.
+_EXPONENTS = np.array([(a, b, d - a - b) for d in (3, 4) for a in range(d + 1) for b in range(d + 1 - a)])
 _TERMS = len(_EXPONENTS) + 8
 _UPRIGHT = 1e-3  # squared sine of the tilt at which a branch begins to have sides
 _PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
@@ -56,7 +56,7 @@ class Orientation:
 
     Attributes
     ----------
-    leaves, own_leaves, wood : (r, 24, 6) float64
+    leaves, own_leaves, wood : (r, 33, 6) float64
         Coefficients of xx, yy, zz, xy, xz, yz of the mean of n nᵀ: over all leaves of the sub-plant, over those of its
         branch itself where that is straight, and over its wood.
     """
@@ -86,7 +86,7 @@ def wood_moments(orientation: Orientation, subplants: Branches) -> NDArray[np.fl
 def _evaluated(
     coefficients: NDArray[np.float64], row: NDArray[np.integer], frame: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Moments (n, 3, 3) in the world, by polynomials (r, 24, 6) of rows (n,), for branches with frames (n, 3, 3)."""
+    """Moments (n, 3, 3) in the world, by polynomials (r, 33, 6) of rows (n,), for branches with frames (n, 3, 3)."""
     basis = _basis(frame[:, 2, :])
     local = np.zeros((len(row), 6))
     for r in np.unique(row):
@@ -97,11 +97,11 @@ def _evaluated(
 
 
 def _basis(sky: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Functions (n, 24) of directions (n, 3): polynomials of degree 3, and the first harmonics of the azimuth."""
+    """Functions (n, 33) of directions (n, 3): polynomials of degree 4, and the first harmonics of the azimuth."""
     out = np.empty((_TERMS, len(sky)))
     powers = [[np.ones(len(sky))] for _ in range(3)]
     for axis, values in enumerate(np.ascontiguousarray(sky.T)):
-        for _ in range(3):
+        for _ in range(_EXPONENTS.max()):
             powers[axis].append(powers[axis][-1] * values)
     for k, (a, b, c) in enumerate(_EXPONENTS):
         np.multiply(powers[0][a], powers[1][b], out=out[k])
@@ -173,18 +173,18 @@ def orientation_of(
         row, scale = children.row, branches.scale[0]
         basis = _basis(branches.frame[:, 2, :])
         # What grows on the children is turned as they say; own leaves and the own branch are looked at one by one.
-        weight = stands * fullness(rows, children) * leaf_area[row] * scale**2
-        leaves = _Sums.of(len(branches), owner, _evaluated(out.leaves, row, children.frame), weight)
+        if leaf_area[i] > 0:
+            weight = stands * fullness(rows, children) * leaf_area[row] * scale**2
+            leaves = _Sums.of(len(branches), owner, _evaluated(out.leaves, row, children.frame), weight)
+            if leaf_share[i, i] > 0:
+                leaves = _own_leaves(rows, branches, lines, turn[i]).mixed(leaves, leaf_share[i, i] / leaf_area[i])
+                straight = _own_leaves(rows, branches, _straight(branches), turn[i])
+                out.own_leaves[i] = straight.fitted(branches, basis)
+            out.leaves[i] = leaves.fitted(branches, basis)
         weight = stands * children.length * children.radius * wood_area[row]
         bark = _Sums.of(len(branches), owner, _evaluated(out.wood, row, children.frame), weight)
         if not rows["phantom"][i]:
-            if leaf_share[i, i] > 0:
-                own = _own_leaves(rows, branches, lines, turn[i])
-                leaves = own.mixed(leaves, leaf_share[i, i] / leaf_area[i])
-                out.own_leaves[i] = _own_leaves(rows, branches, _straight(branches), turn[i]).fitted(branches, basis)
             bark = _own_wood(rows, branches, lines).mixed(bark, wood[i, i] / wood_area[i])
-        if leaf_area[i] > 0:
-            out.leaves[i] = leaves.fitted(branches, basis)
         out.wood[i] = bark.fitted(branches, basis)
     return out
 
@@ -211,7 +211,7 @@ class _Sums:
         return _Sums(self.moment * a + other.moment * b, self.weight * a + other.weight * b)
 
     def fitted(self, branches: Branches, basis: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Coefficients (24, 6), by weighted least squares; ``basis`` (n, 24) for the sky of the branches."""
+        """Coefficients (33, 6), by weighted least squares; ``basis`` (n, 33) for the sky of the branches."""
         whole = max(self.weight.sum(), 1e-300)
         normal = _inner(basis, basis * (self.weight / whole)[:, None])
         # Where branches can only stand in some ways, others are left to the least coefficients.
