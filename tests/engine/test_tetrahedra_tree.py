@@ -281,8 +281,8 @@ def test_only_terminal_tetrahedra_are_split_and_only_once():
             divide([0])
         with pytest.raises(ValueError, match="only once"):
             divide(np.repeat(below, 2))
-        with pytest.raises(ValueError, match="region"):
-            TetrahedralTree().split_eight([0])
+    with pytest.raises(ValueError, match="region"):
+        TetrahedralTree().split_eight([0])
     assert tree.split_eight(np.zeros(0, int)).shape == (0, 8)
     assert tree.split_by_shape(np.zeros(0, int)).shape == (0, 8)
     assert len(tree.cut(np.zeros(0, int), np.zeros((0, 4)))[0]) == 0
