@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -126,6 +128,41 @@ def test_orientation_of_subplants_at_any_tilt(species: int) -> None:
         weight = subplant_amounts(flora, some).leaf_area
         expected = np.einsum("n,nij->ij", weight, leaf_moments(flora.orientation, some))
         np.testing.assert_allclose(support.moment(*leaves), expected / weight.sum(), atol=0.05)
+
+
+@pytest.mark.parametrize("name", ["fern", "palm", "rowan", "willow"])
+def test_orientation_of_standing_plants_to_a_hundredth(name: str) -> None:
+    """Level sprays, hanging leaves, leaves turned to the sky: boughs as they stand, all together."""
+    flora = support.flora()
+    species = support.SPECIES.index(name)
+    number = int(np.clip(1e6 / flora.polygons[flora.first_row[species]], 4, 60))
+    boughs, *_ = open_subplants(flora, support.trunks(flora.rows, support.plants(np.arange(number), species)))
+    _, leaves = support.meshes(flora, support.expanded(flora, boughs))
+    weight = subplant_amounts(flora, boughs).leaf_area
+    expected = np.einsum("n,nij->ij", weight, leaf_moments(flora.orientation, boughs)) / weight.sum()
+    # How far they face up; which way to the side is the chance of a few plants.
+    assert support.moment(*leaves)[2, 2] == pytest.approx(expected[2, 2], abs=0.01)
+
+
+@pytest.mark.parametrize("name", ["beech", "birch", "bush", "fern", "palm", "willow"])
+def test_orientation_of_branches_turned_any_way(name: str) -> None:
+    """Leafy branches turned as no plant of the species has them, sorted by how steeply they stand then."""
+    flora = support.flora()
+    species = support.SPECIES.index(name)
+    some = support.trunks(flora.rows, support.plants(np.arange(100 if name in ("fern", "palm") else 4), species))
+    while flora.leaf_count[some.row].mean() > 200:
+        some, *_ = open_subplants(flora, some)
+    random = np.random.default_rng(5)
+    some = some.take(random.permutation(np.flatnonzero(flora.leaf_areas(some) > 0))[:900])
+    turn, _ = np.linalg.qr(random.normal(size=(len(some), 3, 3)))
+    turn *= np.sign(np.linalg.det(turn))[:, None, None]
+    some = replace(some, frame=turn)
+    for group in np.array_split(np.argsort(turn[:, 2, 2]), 3):
+        part = some.take(group)
+        _, leaves = support.meshes(flora, support.expanded(flora, part))
+        weight = subplant_amounts(flora, part).leaf_area
+        expected = np.einsum("n,nij->ij", weight, leaf_moments(flora.orientation, part)) / weight.sum()
+        np.testing.assert_allclose(support.moment(*leaves), expected, atol=0.02)
 
 
 def sample_positions(points: Points, subplants: Branches) -> np.ndarray:
