@@ -360,6 +360,24 @@ def test_marking_and_removing():
     assert not ground.tetflora.is_field
 
 
+def test_a_field_alone_is_a_forest_for_renders_and_estimates():
+    import bpy
+
+    scene = bpy.context.scene
+    reader, job = part("scene_reader"), part("job")
+    assert not reader.has_plants(scene)
+    seeds = [1, 2, 3]
+    field = _field(seed=('INT', seeds))
+    assert reader.has_plants(scene)
+    of_field = job.estimate(scene, depsgraph())
+    bpy.data.objects.remove(field)
+    for seed, place in zip(seeds, PLACES, strict=True):
+        add_plant(f"{seed}", seed=seed, location=place)
+    of_empties = job.estimate(scene, depsgraph())
+    assert of_field.plants == of_empties.plants == 3
+    assert of_field.polygons_full == of_empties.polygons_full > 0
+
+
 def test_rotations_to_quaternions_and_back():
     frames = np.linalg.qr(np.random.default_rng(3).normal(size=(200, 3, 3)))[0]
     frames *= np.sign(np.linalg.det(frames))[:, None, None]
