@@ -13,7 +13,7 @@ from pathlib import Path
 from devtools import session
 
 #: Benchmarks by name, in the order of ``all``.
-NAMES = ("row80", "forms", "plants", "bounds", "averages", "looks", "tetrahedra")
+NAMES = ("row80", "forms", "plants", "bounds", "averages", "looks", "tetrahedra", "landscape", "growth", "budget")
 
 
 def main() -> int:

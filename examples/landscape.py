@@ -1,0 +1,92 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A landscape as the paper's (section 8.2): 8,636 plants of ten species on the Jacksboro fault, as one plant field.
+
+The density stays the same whatever the number: more plants cover more land, behind those that are there already.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from devtools import session
+
+from .row80 import add_daylight
+from .terrain import Terrain, elevation
+
+PLANTS = 8_636
+#: Relative numbers of the species.
+SPECIES = {
+    "bush": 0.40,
+    "grass": 0.50,
+    "flower": 0.35,
+    "broadleaf_tree": 0.045,
+    "aspen": 0.03,
+    "conifer": 0.02,
+    "fern": 0.02,
+    "birch": 0.008,
+    "dead_tree": 0.004,
+    "rowan": 0.003,
+}
+_SCALE = 0.1
+_ACROSS = 420.0  # metres that the paper's number of plants takes along each side
+_ROW, _COLUMN = 96, 120  # of the elevation model, where the land begins that the camera sees first
+
+
+def build(scene: bpy.types.Scene, plants: int = PLANTS, pixels: int = 512) -> None:
+    """Fill an empty scene with ground, a field of plants, camera, sun and sky.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    plants : int
+        Number of plants; the elevation model has room for some half a million, beyond that they stand closer.
+    pixels : int
+        Sides of the picture.
+    """
+    heights, spacing = elevation()
+    side = _ACROSS * np.sqrt(plants / PLANTS)
+    wanted = int(side / (spacing * _SCALE)) + 2
+    rows, columns = min(wanted, heights.shape[0]), min(wanted, heights.shape[1])
+    # Land grows away from the camera and to both sides of it.
+    row = min(_ROW, heights.shape[0] - rows)
+    column = int(np.clip(_COLUMN + (_ACROSS / (spacing * _SCALE) - columns) / 2, 0, heights.shape[1] - columns))
+    ground = Terrain(corner=(row, column), shape=(rows, columns), scale=_SCALE)
+    surface = ground.add_object(scene, "Ground", spacing=max(3.0, side / 400))
+    plant(scene, surface, plants)
+    width, length = ground.size
+    eye = Vector((width / 2, -25.0, 0.0))
+    eye.z = float(ground.height(eye.x, 0.0)) + 38.0
+    target = Vector((width / 2, min(length, _ACROSS) * 0.4, 0.0))
+    target.z = float(ground.height(target.x, target.y)) - 6.0
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.lens, camera.data.clip_end = 32.0, 20_000.0
+    camera.location = eye
+    camera.rotation_euler = (target - eye).to_track_quat('-Z', 'Y').to_euler()
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    add_daylight(scene, elevation=35.0, azimuth=75.0)
+    scene.view_settings.exposure = 0.8
+    scene.view_settings.look = 'AgX - Medium High Contrast'
+    render = scene.render
+    render.resolution_x = render.resolution_y = pixels
+    render.resolution_percentage = 100
+
+
+def plant(scene: bpy.types.Scene, surface: bpy.types.Object, plants: int) -> bpy.types.Object:
+    """Scatter plants over a surface, as one object of points."""
+    part = session.part
+    placement, surfaces = part("tetflora_addon.blender.placement"), part("tetflora_addon.blender.surfaces")
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    found = placement.place(
+        surfaces.mesh_triangles(surface, depsgraph, "the ground has faces"),
+        count=plants,
+        seed=7,
+        slope_limit=np.radians(60.0),
+        min_distance=0.9,
+        scale_range=(0.8, 1.35),
+        shares=tuple(SPECIES.values()),
+    )
+    return part("tetflora_addon.blender.plant_objects").add_field(scene, found, tuple(SPECIES))
