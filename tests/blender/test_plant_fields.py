@@ -320,6 +320,20 @@ def test_a_field_that_is_hidden_in_viewports_renders():
     assert _plants().seed.tolist() == [1, 2, 3]
 
 
+def test_a_field_that_is_being_edited_is_read():
+    import bpy
+
+    field = _field(seed=('INT', [1, 2, 3]))
+    select(field)
+    bpy.ops.object.mode_set(mode='EDIT')
+    try:
+        assert _plants().seed.tolist() == [1, 2, 3]
+        field.modifiers.new("more", 'ARRAY').count = 2
+        assert _plants().seed.tolist() == [1, 2, 3] * 2
+    finally:
+        bpy.ops.object.mode_set(mode='OBJECT')
+
+
 def test_a_field_and_its_plants_are_the_same_forest():
     import bpy
 

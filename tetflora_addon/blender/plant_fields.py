@@ -109,7 +109,10 @@ def read_field(
         object, how many points and the first of them.
     """
     geometry = geometry or geometry_of(obj, depsgraph)
-    if geometry is None:
+    if geometry is not None and obj.type == 'MESH' and obj.data.is_editmode:
+        # What is evaluated has no attributes then. Blender keeps this copy with the evaluated object, and frees it.
+        parts = [obj.evaluated_get(depsgraph).to_mesh()]
+    elif geometry is None:
         parts = [obj.data] if obj.type in FIELD_TYPES else []
     else:
         parts = [part for part in (geometry.mesh, geometry.pointcloud) if part is not None]
