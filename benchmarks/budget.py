@@ -9,6 +9,7 @@ the reference.
 from __future__ import annotations
 
 import tempfile
+from itertools import pairwise
 from pathlib import Path
 
 import bpy
@@ -56,5 +57,5 @@ def run(quick: bool) -> dict[str, float]:
             figures[f"flip_{name}"] = errors[-1]
             figures[f"facet_pixels_{name}"] = fitted.facet_pixels
             figures[f"refine_emit_s_{name}"] = seconds
-    figures["falls"] = float(all(a > b for a, b in zip(errors, errors[1:], strict=False)))
+    figures["falls"] = float(all(a > b for a, b in pairwise(errors)))
     return figures
