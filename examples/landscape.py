@@ -42,18 +42,20 @@ def build(scene: bpy.types.Scene, plants: int = PLANTS, pixels: int = 512) -> No
     ----------
     scene : bpy.types.Scene
     plants : int
-        Number of plants; the elevation model has room for some half a million, beyond that they stand closer.
+        Number of plants.
     pixels : int
         Sides of the picture.
     """
     heights, spacing = elevation()
     side = _ACROSS * np.sqrt(plants / PLANTS)
-    wanted = int(side / (spacing * _SCALE)) + 2
+    # The elevation model has room for some half a million; for more it is a larger copy of the land.
+    scale = max(_SCALE, side / ((min(heights.shape) - 2) * spacing))
+    wanted = int(side / (spacing * scale)) + 2
     rows, columns = min(wanted, heights.shape[0]), min(wanted, heights.shape[1])
     # Land grows away from the camera and to both sides of it.
     row = min(_ROW, heights.shape[0] - rows)
-    column = int(np.clip(_COLUMN + (_ACROSS / (spacing * _SCALE) - columns) / 2, 0, heights.shape[1] - columns))
-    ground = Terrain(corner=(row, column), shape=(rows, columns), scale=_SCALE)
+    column = int(np.clip(_COLUMN + (_ACROSS / (spacing * scale) - columns) / 2, 0, heights.shape[1] - columns))
+    ground = Terrain(corner=(row, column), shape=(rows, columns), scale=scale)
     surface = ground.add_object(scene, "Ground", spacing=max(3.0, side / 400))
     plant(scene, surface, plants)
     width, length = ground.size
