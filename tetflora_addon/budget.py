@@ -19,7 +19,7 @@ from .refinement.camera import Camera
 from .refinement.decisions import Decision, contributions
 from .refinement.loop import Refinement
 from .refinement.settings import RefinementSettings
-from .shading.facet_sizes import piece_facet_sizes, subplant_facet_sizes
+from .shading.facet_sizes import piece_facet_sizes, polygon_facet_sizes, subplant_facet_sizes
 
 #: Bytes that a polygon takes in Blender and in a renderer together, about: 110 and 500.
 BYTES_PER_POLYGON = 610
@@ -99,6 +99,7 @@ class _Facets:
         self.parts = [
             (subplant_facet_sizes(flora, contents, camera, hidden), index[contents.subplant_cell]),
             (piece_facet_sizes(flora, contents, camera, hidden), index[contents.piece_cell]),
+            (polygon_facet_sizes(contents, camera, hidden), index[contents.polygon_cell]),
         ]
 
     def by_cell(self, pixels: float) -> NDArray[np.float64]:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .buffers import MeshBuffers, concatenate_buffers
+from .explicit_emission import polygon_facets
 from .plants.compiled import Flora
 from .plants.expansion import chunks, expand
 from .plants.growth import trunks
@@ -110,7 +111,7 @@ def _block(flora: Flora, pieces: Pieces, stems: list[Stems], number: int, fracti
 
 
 def facet_buffers(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.6) -> MeshBuffers | None:
-    """Proxies as microsurfaces: facets of all that is not explicit.
+    """Proxies as microsurfaces: facets of all that is not explicit, and of no polygon that is kept as it is.
 
     Parameters
     ----------
@@ -137,6 +138,7 @@ def facet_buffers(flora: Flora, result: Refinement, camera: Camera, facet_pixels
         for i in _runs(expected, beside):
             made = make(flora, things.take(i), leaf[i], wood[i])
             parts.append(kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5))
+    parts += polygon_facets(contents, result, camera, facet_pixels)
     return concatenate_buffers([p for p in parts if p is not None])
 
 

@@ -14,6 +14,7 @@ from ..plants.averages import own_leaf_integrals
 from ..plants.compiled import Flora
 from ..plants.growth import Branches, fullness
 from ..plants.pieces import Pieces, leaf_fraction, outward_ends, wood_areas
+from .polygons import Polygons
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,8 @@ class Amounts:
         Expected faces if made explicit.
     width : (n,) float64
         Width of the features, metres: that of the leaves, or of the branch where there are none. By tetrahedron: the
-        mean, weighted by area.
+        mean, weighted by area. Infinite where polygons are drawn as they are whatever is decided; these count for a
+        tetrahedron that holds nothing else.
     """
 
     leaf_area: NDArray[np.float64]
@@ -87,6 +89,16 @@ def piece_amounts(flora: Flora, pieces: Pieces) -> Amounts:
     )
 
 
+def polygon_amounts(polygons: Polygons, width: NDArray[np.float64] | None = None) -> Amounts:
+    """What explicit polygons are, as far as they are not transparent; ``width`` (n,) in place of the surfaces' own."""
+    meshes, face = polygons.meshes, polygons.face
+    area = polygons.areas() * meshes.coverage[meshes.slot[face]]
+    solid = meshes.solid[face]
+    if width is None:
+        width = meshes.width[face] * meshes.mean_scale[polygons.instance]
+    return Amounts(np.where(solid, 0.0, area), np.where(solid, area, 0.0), np.ones(len(face)), width)
+
+
 def _size_factors(flora: Flora, pieces: Pieces) -> NDArray[np.float64] | float:
     """Mean factor (n,) on the area of leaves of pieces, by how far outside in the crown they sit."""
     if not flora.rows["gradient"].any():
@@ -97,11 +109,14 @@ def _size_factors(flora: Flora, pieces: Pieces) -> NDArray[np.float64] | float:
 
 def sums(amounts: Amounts, cells: NDArray[np.integer], number: int) -> Amounts:
     """Sums over the things (n,) in each of a number of cells, given by ``cells`` (n,); the width is a mean."""
-    area = amounts.area
-    total = np.bincount(cells, area, number)
+    area, fine = amounts.area, np.isfinite(amounts.width)
+    small = np.where(fine, area, 0.0)
+    total = np.bincount(cells, small, number)
+    width = np.bincount(cells, small * np.where(fine, amounts.width, 0.0), number) / np.where(total > 0, total, 1)
+    only_large = (total == 0) & (np.bincount(cells, ~fine, number) > 0)
     return Amounts(
         np.bincount(cells, amounts.leaf_area, number),
         np.bincount(cells, amounts.wood_area, number),
         np.bincount(cells, amounts.polygons, number),
-        np.bincount(cells, area * amounts.width, number) / np.where(total > 0, total, 1),
+        np.where(only_large, np.inf, width),
     )

@@ -1,15 +1,16 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What tetrahedra hold: sub-plants and pieces of branches, and how much they are (paper, section 6.5).
+"""What tetrahedra hold: sub-plants, pieces of branches, explicit polygons, and how much they are (paper, section 6.5).
 
 A plant is held as a sub-plant while it lies on one side of every plane. Where it crosses one it is opened into the
-sub-plants of the next order and the pieces of its own branch, see `descent`.
+sub-plants of the next order and the pieces of its own branch, see `descent`. Polygons come from meshes that were
+modelled elsewhere.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +20,19 @@ from ..plants.growth import Branches, trunks
 from ..plants.pieces import Pieces
 from ..plants.seeds import Seeds
 from ..plants.sides import bounding_bodies
-from .amounts import Amounts, piece_amounts, subplant_amounts, sums
+from .amounts import Amounts, piece_amounts, polygon_amounts, subplant_amounts, sums
+from .camera import Camera
+from .polygons import Polygons
+
+#: Side in pixels from which on a polygon is large: more than facets have, even where nobody looks.
+LARGE = 2.0
+_NONE = np.zeros(0, np.int32)
+_KINDS = ("subplant", "piece", "polygon")
 
 
 @dataclass(frozen=True)
 class Contents:
-    """Sub-plants and pieces of branches, each in one terminal tetrahedron.
+    """Sub-plants, pieces of branches and explicit polygons, each in one terminal tetrahedron.
 
     Attributes
     ----------
@@ -35,6 +43,9 @@ class Contents:
     pieces : Pieces of m
     piece_cell : (m,) int32
     piece_amounts : Amounts of m
+    polygons : Polygons of k
+    polygon_cell : (k,) int32
+    polygon_amounts : Amounts of k
     """
 
     subplants: Branches
@@ -43,34 +54,50 @@ class Contents:
     pieces: Pieces
     piece_cell: NDArray[np.int32]
     piece_amounts: Amounts
+    polygons: Polygons = field(default_factory=Polygons.empty)
+    polygon_cell: NDArray[np.int32] = field(default_factory=_NONE.copy)
+    polygon_amounts: Amounts = field(default_factory=Amounts.empty)
 
     @classmethod
     def of(
         cls, flora: Flora, subplants: Branches, subplant_cell: NDArray, pieces: Pieces, piece_cell: NDArray
     ) -> Contents:
-        """Things in cells, with their amounts."""
+        """Parts of plants in cells, with their amounts."""
         amounts = subplant_amounts(flora, subplants), piece_amounts(flora, pieces)
         return cls(subplants, subplant_cell, amounts[0], pieces, piece_cell, amounts[1])
 
     @classmethod
     def of_plants(cls, flora: Flora, seeds: Seeds) -> Contents:
         """Whole plants, all in the root."""
-        none = np.zeros(0, np.int32)
-        return cls.of(flora, trunks(flora.rows, seeds), np.zeros(len(seeds), np.int32), Pieces.empty(), none)
+        return cls.of(flora, trunks(flora.rows, seeds), np.zeros(len(seeds), np.int32), Pieces.empty(), _NONE)
+
+    @classmethod
+    def of_polygons(cls, polygons: Polygons, large: NDArray[np.bool_] | None = None) -> Contents:
+        """Polygons, all in the root; large ones (k,) are drawn as they are whatever is decided about their cells."""
+        amounts = polygon_amounts(polygons)
+        if large is not None:
+            amounts = replace(amounts, width=np.where(large, np.inf, amounts.width))
+        return replace(
+            cls.empty(), polygons=polygons, polygon_cell=np.zeros(len(polygons), np.int32), polygon_amounts=amounts
+        )
 
     @classmethod
     def empty(cls) -> Contents:
         """Nothing."""
-        none = np.zeros(0, np.int32)
-        return cls(Branches.empty(), none, Amounts.empty(), Pieces.empty(), none, Amounts.empty())
+        return cls(Branches.empty(), _NONE, Amounts.empty(), Pieces.empty(), _NONE, Amounts.empty())
+
+    @property
+    def cells(self) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
+        """Nodes of sub-plants, of pieces and of polygons."""
+        return self.subplant_cell, self.piece_cell, self.polygon_cell
 
     def within(self, chosen: NDArray[np.bool_]) -> Contents:
         """The part that lies in chosen nodes; ``chosen`` is (nodes,) bool."""
-        return self.take(chosen[self.subplant_cell], chosen[self.piece_cell])
+        return self.take(*(chosen[c] for c in self.cells))
 
-    def take(self, subplants: NDArray[np.bool_], pieces: NDArray[np.bool_]) -> Contents:
-        """Selection by masks (n,) and (m,)."""
-        s, p = np.flatnonzero(subplants), np.flatnonzero(pieces)
+    def take(self, subplants: NDArray[np.bool_], pieces: NDArray[np.bool_], polygons: NDArray[np.bool_]) -> Contents:
+        """Selection by masks (n,), (m,) and (k,)."""
+        s, p, q = (np.flatnonzero(mask) for mask in (subplants, pieces, polygons))
         return Contents(
             self.subplants.take(s),
             self.subplant_cell[s],
@@ -78,6 +105,9 @@ class Contents:
             self.pieces.take(p),
             self.piece_cell[p],
             self.piece_amounts.take(p),
+            self.polygons.take(q),
+            self.polygon_cell[q],
+            self.polygon_amounts.take(q),
         )
 
     @classmethod
@@ -92,12 +122,21 @@ class Contents:
             Pieces.concatenate([p.pieces for p in parts]),
             np.concatenate([p.piece_cell for p in parts]),
             Amounts.concatenate([p.piece_amounts for p in parts]),
+            Polygons.concatenate([p.polygons for p in parts]),
+            np.concatenate([p.polygon_cell for p in parts]),
+            Amounts.concatenate([p.polygon_amounts for p in parts]),
         )
 
     def sums(self, nodes: int) -> Amounts:
         """What each of a number of nodes holds."""
-        cells = np.concatenate([self.subplant_cell, self.piece_cell])
-        return sums(Amounts.concatenate([self.subplant_amounts, self.piece_amounts]), cells, nodes)
+        amounts = [getattr(self, f"{kind}_amounts") for kind in _KINDS]
+        return sums(Amounts.concatenate(amounts), np.concatenate(self.cells), nodes)
+
+    def bounding_box(self, flora: Flora) -> NDArray[np.float64]:
+        """Axis-aligned box (2, 3) of all that is there, metres."""
+        boxes = [bounding_box(flora, self.subplants)] if len(self.subplants) else []
+        boxes += [self.polygons.bounding_box()] if len(self.polygons) else []
+        return np.stack([np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)])
 
 
 class Holdings:
@@ -126,14 +165,14 @@ class Holdings:
         """Remove and return what lies in chosen nodes; ``chosen`` is (nodes,) bool."""
         out, kept = [], []
         for part in self._parts:
-            masks = [chosen[np.maximum(c, 0)] & (c >= 0) for c in (part.subplant_cell, part.piece_cell)]
-            if not (masks[0].any() or masks[1].any()):
+            masks = [chosen[np.maximum(c, 0)] & (c >= 0) for c in part.cells]
+            if not any(m.any() for m in masks):
                 kept.append(part)
                 continue
             out.append(part.take(*masks))
             # What is taken is only marked here; copying what stays would cost more than all else that moves.
-            cells = [np.where(m, -1, c) for m, c in zip(masks, (part.subplant_cell, part.piece_cell), strict=True)]
-            part = _with_cells(part, *cells)
+            cells = [np.where(m, np.int32(-1), c) for m, c in zip(masks, part.cells, strict=True)]
+            part = replace(part, **{f"{kind}_cell": c for kind, c in zip(_KINDS, cells, strict=True)})
             if 2 * sum((c < 0).sum() for c in cells) > sum(map(len, cells)):
                 part = _living(part)
             kept.append(part)
@@ -141,14 +180,17 @@ class Holdings:
         return Contents.joined(out)
 
 
-def _with_cells(part: Contents, subplant_cell: NDArray[np.int32], piece_cell: NDArray[np.int32]) -> Contents:
-    return Contents(part.subplants, subplant_cell, part.subplant_amounts, part.pieces, piece_cell, part.piece_amounts)
-
-
 def _living(part: Contents) -> Contents:
     """Without what has been taken out."""
-    masks = part.subplant_cell >= 0, part.piece_cell >= 0
-    return part if masks[0].all() and masks[1].all() else part.take(*masks)
+    masks = [c >= 0 for c in part.cells]
+    return part if all(m.all() for m in masks) else part.take(*masks)
+
+
+def large_polygons(polygons: Polygons, camera: Camera) -> NDArray[np.bool_]:
+    """Polygons (n,) for which no facet could stand, other than leaves, which several may be drawn as one."""
+    meshes, face = polygons.meshes, polygons.face
+    optical = polygons.areas() * np.where(meshes.solid[face], 0.5, 1.0)
+    return ~meshes.leaf[face] & (optical >= (LARGE * camera.extent_around(polygons.centre)) ** 2)
 
 
 def bounding_cylinders(flora: Flora, subplants: Branches) -> tuple[NDArray, NDArray, NDArray]:

@@ -3,13 +3,14 @@
 """The update step: handing contents of divided tetrahedra on to their children (paper, section 6.5).
 
 What lies on one side of a plane goes there whole. Sub-plants that cross it are opened into the sub-plants of the next
-order and the pieces of their own branch; pieces that cross are clipped. The picture cannot tell what is smaller than a
-pixel of the alpha buffer: what reaches beyond a plane by less than such a *slack* does not cross it.
+order and the pieces of their own branch; pieces and polygons that cross are clipped. The picture cannot tell what is
+smaller than a pixel of the alpha buffer: what reaches beyond a plane by less than such a *slack* does not cross it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,9 @@ from ..plants.pieces import Pieces, clipped
 from ..plants.sides import body_distances, bounding_bodies, crossing, sampled_bodies
 from ..plants.vectors import gathered
 from ..tetrahedra.tree import TetrahedralTree
+from .amounts import Amounts, polygon_amounts
 from .contents import Contents
+from .polygons import Polygons, cut
 
 #: Metres (n,) at points (n, 3) that the picture cannot tell.
 Slack = Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -50,7 +53,7 @@ def push_down(flora: Flora, tree: TetrahedralTree, contents: Contents, slack: Sl
     Returns
     -------
     Contents
-        The same plants in terminal nodes; nothing is lost or held twice.
+        The same plants and polygons in terminal nodes; nothing is lost or held twice.
     """
     placed, placed_cells = [Branches.empty()], [np.zeros(0, np.int32)]
     loose, loose_cells = [contents.pieces], [contents.piece_cell]
@@ -68,7 +71,11 @@ def push_down(flora: Flora, tree: TetrahedralTree, contents: Contents, slack: Sl
             loose_cells.append(cells[chosen[piece_owner]])
         subplants, cells = Branches.concatenate(parts), np.concatenate(part_cells)
     pieces, piece_cells = _push_down_pieces(tree, Pieces.concatenate(loose), np.concatenate(loose_cells), slack)
-    return Contents.of(flora, Branches.concatenate(placed), np.concatenate(placed_cells), pieces, piece_cells)
+    plants = Contents.of(flora, Branches.concatenate(placed), np.concatenate(placed_cells), pieces, piece_cells)
+    polygons, cells, amounts = _push_down_polygons(
+        tree, contents.polygons, contents.polygon_cell, contents.polygon_amounts, slack
+    )
+    return replace(plants, polygons=polygons, polygon_cell=cells, polygon_amounts=amounts)
 
 
 def _lowered(
@@ -157,3 +164,52 @@ def _push_down_pieces(
         pieces = Pieces.concatenate([lower, upper])
         cells = np.concatenate([children[every, first], children[every, 1 - first]])
     return Pieces.concatenate(placed), np.concatenate(placed_cells)
+
+
+def _push_down_polygons(
+    tree: TetrahedralTree, polygons: Polygons, cells: NDArray, amounts: Amounts, slack: Slack | None
+) -> tuple[Polygons, NDArray[np.int32], Amounts]:
+    placed: list[Polygons] = []
+    placed_cells, placed_amounts = [np.zeros(0, np.int32)], [Amounts.empty()]
+    while len(polygons):
+        cells, crosses = cells.copy(), np.zeros(len(polygons), bool)
+        for start in range(0, len(polygons), LOWERED_AT_ONCE):
+            some = slice(start, start + LOWERED_AT_ONCE)
+            cells[some], crosses[some] = _lowered_polygons(tree, polygons.take(some), cells[some], slack)
+        placed.append(polygons.take(~crosses))
+        placed_cells.append(cells[~crosses])
+        placed_amounts.append(amounts.take(~crosses))
+        polygons, cells, width = polygons.take(crosses), cells[crosses], amounts.width[crosses]
+        loose = 0.0 if slack is None else slack(polygons.centre)
+        owner, side, polygons = cut(polygons, tree.planes(cells), loose)
+        cells = tree.children[cells[owner], side]
+        amounts = polygon_amounts(polygons, width[owner])
+    return Polygons.concatenate(placed), np.concatenate(placed_cells), Amounts.concatenate(placed_amounts)
+
+
+def _lowered_polygons(
+    tree: TetrahedralTree, polygons: Polygons, cells: NDArray, slack: Slack | None
+) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+    """Nodes (n,) that polygons come down to whole, and whether they cross the planes of these."""
+    cells, crosses = cells.copy(), np.zeros(len(polygons), bool)
+    loose = polygons.touching()
+    if slack is not None:
+        loose = np.maximum(loose, slack(polygons.centre))
+    reach = polygons.reach - loose
+    moving = np.arange(len(polygons))
+    while True:
+        moving = moving[tree.children[cells[moving], 0] >= 0]
+        if len(moving) == 0:
+            return cells, crosses
+        planes = tree.planes(cells[moving])
+        distance = np.einsum("ni,ni->n", polygons.centre[moving], planes[:, :3]) + planes[:, 3]
+        whole = np.abs(distance) > reach[moving]
+        unclear = np.flatnonzero(~whole)
+        if len(unclear):
+            # The sphere is no more than a first guess; corners tell. The larger part says where it goes.
+            low, high = polygons.take(moving[unclear]).distances(planes[unclear])
+            whole[unclear] = np.minimum(-low, high) <= loose[moving[unclear]]
+            distance[unclear] = high + low
+        crosses[moving[~whole]] = True
+        moving, side = moving[whole], (distance[whole] >= 0).astype(np.int64)
+        cells[moving] = tree.children[cells[moving], side]

@@ -20,9 +20,10 @@ from ..tetrahedra.tree import TetrahedralTree
 from .amounts import Amounts
 from .camera import Camera
 from .cells import Cells
-from .contents import Contents, Holdings, bounding_box
+from .contents import Contents, Holdings, large_polygons
 from .decisions import Decision, decide, without_splits
 from .descent import Slack, push_down
+from .polygons import Polygons
 from .rasterise import buffer_size
 from .settings import RefinementSettings
 from .silhouette import silhouette_pixels
@@ -43,7 +44,7 @@ class Refinement:
     ----------
     tree : TetrahedralTree
     holdings : Holdings
-        All plants, in terminal nodes.
+        All plants and polygons, in terminal nodes.
     cells : Cells of t
         Terminal nodes that hold something.
     transmittance : (t,) float64
@@ -98,6 +99,7 @@ def refine(
     camera: Camera,
     settings: RefinementSettings,
     occluders: NDArray[np.float64] | None = None,
+    polygons: Polygons | None = None,
 ) -> Generator[Refinement, None, Refinement]:
     """Run the loop; yields the state after the decisions of each pass and returns the last.
 
@@ -106,17 +108,21 @@ def refine(
     flora : Flora
         Compiled species, in the order of ``seeds.identifiers``.
     seeds : Seeds
-        At least one plant.
+        At least one plant, or none where there are polygons.
     camera : Camera
     settings : RefinementSettings
     occluders : (t, 3, 3) float64, optional
         Triangles of explicit polygons that hide what is behind them, metres.
+    polygons : Polygons, optional
+        Explicit polygons that take part.
     """
     clock = Stopwatch()
     camera = camera.widened(settings.margin)
     slack = _slack(camera, settings.visibility_resolution)
     contents = Contents.of_plants(flora, seeds)
-    tree = view_root(camera, bounding_box(flora, contents.subplants))
+    if polygons is not None:
+        contents = Contents.joined([contents, Contents.of_polygons(polygons, large_polygons(polygons, camera))])
+    tree = view_root(camera, contents.bounding_box(flora))
     new = push_down(flora, tree, contents, slack)
     holdings = Holdings(new)
     clock.lap("update")

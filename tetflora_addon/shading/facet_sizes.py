@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How large the facets are that stand for sub-plants and pieces, and how many that will make.
+"""How large the facets are that stand for sub-plants, pieces and polygons, and how many that will make.
 
 About as large as a pixel is wide there; twice that where nobody looks, and there one stands for several leaves, for
 hidden plants only cast shadows and light up others.
@@ -64,6 +64,60 @@ class FacetSizes:
         # Branches are closed: half of their surface is never seen.
         leaves = self.amounts.leaf_area / np.maximum(leaf, 1e-12) ** 2
         return leaves + self.amounts.wood_area / 2 / np.maximum(wood, 1e-12) ** 2
+
+
+@dataclass(frozen=True)
+class PolygonFacetSizes:
+    """What sizes and numbers of facets follow from, for explicit polygons.
+
+    Attributes
+    ----------
+    extent : (n,) float64
+        Metres that a pixel spans.
+    face : (n,) float64
+        Area of the face that each is, or is a fragment of, m².
+    leaf, hidden : (n,) bool
+        Faces of leaves; where nobody looks.
+    optical : (n,) float64
+        Area that facets stand for, m²: of solids half, as the far side is never seen.
+    solid : (n,) bool
+    """
+
+    extent: NDArray[np.float64]
+    face: NDArray[np.float64]
+    leaf: NDArray[np.bool_]
+    hidden: NDArray[np.bool_]
+    optical: NDArray[np.float64]
+    solid: NDArray[np.bool_]
+
+    def sides(self, pixels: float) -> NDArray[np.float64]:
+        """Sides (n,) of facets, metres, where those that are seen have so many pixels."""
+        fine = pixels * self.extent
+        coarse = COARSE * fine
+        coarse = np.where(self.leaf, np.maximum(coarse, np.sqrt(HIDDEN_LEAVES * self.face)), coarse)
+        return np.where(self.hidden, coarse, fine)
+
+    def kept(self, pixels: float) -> NDArray[np.bool_]:
+        """Polygons (n,) that are drawn as they are: a facet or more would take their place."""
+        return self.face * np.where(self.solid, 0.5, 1.0) >= self.sides(pixels) ** 2
+
+    def counts(self, pixels: float) -> NDArray[np.float64]:
+        """Expected number (n,) of faces."""
+        return np.where(self.kept(pixels), 1.0, self.optical / np.maximum(self.sides(pixels), 1e-12) ** 2)
+
+
+def polygon_facet_sizes(contents: Contents, camera: Camera, hidden: NDArray[np.bool_]) -> PolygonFacetSizes:
+    """Facets of the polygons of contents; ``hidden`` (nodes,) says in which nodes nobody looks."""
+    own, amounts = contents.polygons, contents.polygon_amounts
+    meshes = own.meshes
+    return PolygonFacetSizes(
+        camera.extent_around(own.centre),
+        meshes.face_areas(own.face, own.instance),
+        meshes.leaf[own.face],
+        hidden[contents.polygon_cell],
+        amounts.leaf_area + amounts.wood_area / 2,
+        meshes.solid[own.face],
+    )
 
 
 def subplant_facet_sizes(flora: Flora, contents: Contents, camera: Camera, hidden: NDArray[np.bool_]) -> FacetSizes:

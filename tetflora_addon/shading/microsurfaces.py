@@ -74,8 +74,8 @@ def subplant_facets(
     amounts = subplant_amounts(flora, subplants)
     return concatenate_buffers(
         [
-            _buffers(_leaves_of_subplants(flora, subplants, amounts, leaf_side)),
-            _buffers(_wood_of_subplants(flora, subplants, amounts, leaf_side if wood_side is None else wood_side)),
+            facet_mesh(_leaves_of_subplants(flora, subplants, amounts, leaf_side)),
+            facet_mesh(_wood_of_subplants(flora, subplants, amounts, leaf_side if wood_side is None else wood_side)),
         ]
     )
 
@@ -87,8 +87,8 @@ def piece_facets(
     amounts = piece_amounts(flora, pieces)
     return concatenate_buffers(
         [
-            _buffers(_leaves_of_pieces(flora, pieces, amounts, leaf_side)),
-            _buffers(_wood_of_pieces(flora, pieces, amounts, leaf_side if wood_side is None else wood_side)),
+            facet_mesh(_leaves_of_pieces(flora, pieces, amounts, leaf_side)),
+            facet_mesh(_wood_of_pieces(flora, pieces, amounts, leaf_side if wood_side is None else wood_side)),
         ]
     )
 
@@ -231,7 +231,8 @@ def _across(axis: NDArray[np.float64], key: NDArray[np.uint64]) -> NDArray[np.fl
     return np.cos(turn) * a + np.sin(turn) * np.cross(axis, a)
 
 
-def _buffers(facets: Facets) -> MeshBuffers:
+def facet_mesh(facets: Facets) -> MeshBuffers:
+    """Squares as a mesh, a face each, with the attributes that the material of proxies reads."""
     n = len(facets.side)
     half = 0.5 * facets.side[:, None]
     a, b = half * facets.across, half * facets.along

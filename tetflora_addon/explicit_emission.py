@@ -1,0 +1,214 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Explicit polygons after refinement: kept as they are where they are seen, facets where they are small or hidden.
+
+A face whose fragments are all kept comes out as the face that it was: what nobody needed to cut is not cut.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .buffers import MeshBuffers
+from .plants.expansion import chunks
+from .plants.growth import spread
+from .refinement.camera import Camera
+from .refinement.contents import Contents
+from .refinement.decisions import Decision
+from .refinement.loop import Refinement
+from .refinement.polygons import Polygons, shares
+from .shading.facet_sizes import HIDDEN_LEAVES, polygon_facet_sizes
+from .shading.microsurfaces import facet_mesh, kept_out_of_view
+from .shading.polygon_facets import chosen_facets
+
+#: Polygons in a block, about.
+BLOCK_POLYGONS = 250_000
+#: Attributes by their numbers of components; a fourth and further ones are none that a mesh could hold.
+_FLOATS = {1: (), 2: (2,), 3: (3,)}
+#: What is missing of a face by rounding errors alone.
+_WHOLE = 1e-6
+
+
+@dataclass(frozen=True)
+class PolygonBlock:
+    """Polygons of one surface in one block of space.
+
+    Attributes
+    ----------
+    surface : int
+        Index into the surfaces of the meshes.
+    number : int
+        Of the block, front to back.
+    buffers : MeshBuffers
+        ``material_index`` is the surface's slot.
+    fraction : float
+        Share of all polygons that is done with this block.
+    """
+
+    surface: int
+    number: int
+    buffers: MeshBuffers
+    fraction: float
+
+
+def polygon_blocks(result: Refinement, camera: Camera, facet_pixels: float | None = 0.6) -> Iterator[PolygonBlock]:
+    """Polygons that are kept: all in explicit tetrahedra, and those in others that are no smaller than a facet.
+
+    Parameters
+    ----------
+    result : Refinement
+    camera : Camera
+    facet_pixels : float or None
+        Side of a facet that is seen, in pixels; None where proxies are shells, which stand for all that they hold.
+    """
+    contents = result.contents
+    if not len(contents.polygons):
+        return
+    cell = contents.polygon_cell
+    kept = ~result.chosen(Decision.PROXY, Decision.HIDDEN)[cell]
+    if facet_pixels is not None:
+        some = np.flatnonzero(~kept)
+        kept[some] = _proxies_kept(contents, result, camera, facet_pixels)[some]
+    rank = np.zeros(len(result.tree), np.int64)
+    rank[result.nodes] = result.rank
+    polygons, rank = contents.polygons.take(kept), rank[cell[kept]]
+    order = np.argsort(rank, kind="stable")
+    polygons = mended(polygons.take(order))
+    runs = list(chunks(np.ones(len(polygons)), BLOCK_POLYGONS))
+    for number, run in enumerate(runs):
+        own = polygons.take(run)
+        surface = own.meshes.surface[own.instance]
+        for s in np.unique(surface):
+            buffers = polygon_buffers(own.take(surface == s))
+            yield PolygonBlock(int(s), number, buffers, (number + 1) / len(runs))
+
+
+def polygon_facets(
+    contents: Contents, result: Refinement, camera: Camera, facet_pixels: float
+) -> list[MeshBuffers | None]:
+    """Facets of the polygons of proxies (``contents``) that are not kept."""
+    if not len(contents.polygons):
+        return []
+    sizes = polygon_facet_sizes(contents, camera, result.chosen(Decision.HIDDEN))
+    left = np.flatnonzero(~sizes.kept(facet_pixels))
+    left = left[np.argsort(contents.polygon_cell[left], kind="stable")]
+    side, inside = sizes.sides(facet_pixels), result.tree.inside[contents.polygon_cell]
+    parts = []
+    for some, seen in ((left[inside[left]], True), (left[~inside[left]], False)):
+        made = facet_mesh(chosen_facets(contents.polygons.take(some), sizes.optical[some], side[some]))
+        parts.append(made if seen else kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5))
+    return parts
+
+
+def _proxies_kept(contents: Contents, result: Refinement, camera: Camera, facet_pixels: float) -> NDArray[np.bool_]:
+    return polygon_facet_sizes(contents, camera, result.chosen(Decision.HIDDEN)).kept(facet_pixels)
+
+
+def mended(polygons: Polygons) -> Polygons:
+    """The same polygons, with a face in place of its first fragment where all of its fragments are there."""
+    cut = np.flatnonzero(polygons.part >= 0)
+    if not len(cut):
+        return polygons
+    meshes = polygons.meshes
+    key = polygons.instance[cut].astype(np.int64) * len(meshes.face_size) + polygons.face[cut]
+    _, first, number = np.unique(key, return_index=True, return_inverse=True)
+    number = number.reshape(-1)
+    there = np.bincount(number, shares(polygons.weights)[polygons.part[cut]])
+    complete = there >= meshes.face_size[polygons.face[cut[first]]] - 2 - _WHOLE
+    part = polygons.part.copy()
+    part[cut[complete[number]]] = -1
+    stays = np.ones(len(polygons), bool)
+    stays[cut[complete[number]]] = False
+    stays[cut[first[complete]]] = True
+    return replace(polygons, part=part).take(stays)
+
+
+def polygon_buffers(polygons: Polygons) -> MeshBuffers:
+    """Polygons of one surface as a mesh in world space.
+
+    Whole faces share vertices and edges as in the surface, unless they come to one twice; fragments are triangles by
+    themselves. Faces of mirrored instances are turned around, as Blender does it for objects. Normals, where the
+    surface has any, are the attribute ``custom_normal``.
+    """
+    meshes = polygons.meshes
+    cut = polygons.part >= 0
+    whole, pieces = polygons.take(~cut), polygons.take(cut)
+    corner, instance, size = _face_corners(whole)
+    # Corners of faces that come to a vertex twice get vertices of their own, so that the mesh is valid.
+    own_place = np.repeat(meshes.knotted[whole.face], size)
+    count = len(meshes.positions)
+    place = np.where(own_place, count + corner, meshes.corner_verts[corner])
+    places = count + len(meshes.corner_verts)
+    vertices, corner_verts = np.unique(instance.astype(np.int64) * places + place, return_inverse=True)
+    own, vertex = np.divmod(vertices, max(places, 1))
+    loose = vertex >= count
+    vertex[loose] = meshes.corner_verts[vertex[loose] - count]
+    points = meshes.to_world(meshes.positions[vertex][:, None], own)[:, 0]
+    offsets = np.cumsum([0, *size])
+    edges, corner_edges = _edges(corner_verts.reshape(-1), offsets, len(vertices))
+
+    turn = np.where(meshes.mirrored[pieces.instance][:, None], [[0, 2, 1]], [[0, 1, 2]])
+    weights = np.take_along_axis(pieces.weights[pieces.part], turn[:, :, None], axis=1)
+    triangle = pieces.triangle[pieces.part]
+    fragments = (weights @ meshes.corners(triangle, pieces.instance)).reshape(-1, 3)
+    every = np.arange(len(fragments))
+    after = every - every % 3 + (every + 1) % 3
+
+    surface = int(meshes.surface[polygons.instance[0]])
+    shown = meshes.surfaces[surface]
+    first = meshes.first_corner[surface]
+    attributes: dict[str, tuple[str, NDArray]] = {}
+    for name, values in shown.attributes.items():
+        if values.shape[1] in _FLOATS:
+            both = _at_corners(values, corner - first, meshes.triangles[triangle] - first, weights)
+            attributes[name] = ("CORNER", both.reshape(-1, *_FLOATS[values.shape[1]]).astype(np.float32))
+    if shown.normals is not None:
+        normals = _at_corners(shown.normals, corner - first, meshes.triangles[triangle] - first, weights)
+        which = np.concatenate([instance, np.repeat(pieces.instance, 3)])
+        normals = np.einsum("ni,nij->nj", normals, meshes.cofactors[which])
+        normals *= np.where(meshes.mirrored[which], -1.0, 1.0)[:, None]
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+        attributes["custom_normal"] = ("CORNER", normals.astype(np.float32))
+    faces = np.concatenate([whole.face, pieces.face])
+    attributes["material_index"] = ("FACE", shown.material[faces - meshes.first_face[surface]].astype(np.int32))
+    return MeshBuffers(
+        positions=np.concatenate([points, fragments]).astype(np.float32),
+        edge_verts=np.concatenate([edges, np.stack([every, after], axis=1) + len(points)]).astype(np.int32),
+        corner_verts=np.concatenate([corner_verts.reshape(-1), every + len(points)]).astype(np.int32),
+        corner_edges=np.concatenate([corner_edges, every + len(edges)]).astype(np.int32),
+        face_offsets=np.concatenate([offsets, offsets[-1] + 3 * (1 + np.arange(len(pieces)))]).astype(np.int32),
+        attributes=attributes,
+        smooth=shown.normals is not None,
+    )
+
+
+def _face_corners(whole: Polygons) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.int64]]:
+    """Corners (c,) of faces, the instance (c,) of each, and how many (f,) each face has."""
+    meshes = whole.meshes
+    size = meshes.face_size[whole.face]
+    owner, index = spread(size)
+    mirrored = meshes.mirrored[whole.instance][owner]
+    index = np.where(mirrored, size[owner] - 1 - index, index)
+    return meshes.face_start[whole.face][owner] + index, whole.instance[owner], size
+
+
+def _edges(corner_verts: NDArray, offsets: NDArray, vertices: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Edges (e, 2) of faces, each once, and that from each corner (c,) to the next."""
+    following = np.arange(len(corner_verts)) + 1
+    following[offsets[1:] - 1] = offsets[:-1]
+    after = corner_verts[following]
+    key = np.minimum(corner_verts, after) * max(vertices, 1) + np.maximum(corner_verts, after)
+    edges, number = np.unique(key, return_inverse=True)
+    return np.stack(np.divmod(edges, max(vertices, 1)), axis=1), number.reshape(-1)
+
+
+def _at_corners(
+    values: NDArray, corner: NDArray[np.integer], triangle: NDArray[np.integer], weights: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Values at corners of whole faces, then at those of fragments (n, 3, 3) of triangles (n, 3)."""
+    between = (weights @ values[triangle].astype(np.float64)).reshape(-1, values.shape[1])
+    return np.concatenate([values[corner].astype(np.float64), between])

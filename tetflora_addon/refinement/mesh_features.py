@@ -1,0 +1,162 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the faces of a mesh from elsewhere are part of: sheets such as leaves, or solids such as trunks, and how wide.
+
+A species says which of its polygons are leaves. Of other meshes only the connections between faces are known, after
+vertices at the same place are taken for one, for many files split them at seams.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: A flat sheet's boundary is longer than this, squared, in relation to its area (a disc has 4π, a half ball 2π): what
+#: has less is bent back upon itself.
+_SHEET = 2 * np.pi
+#: A face of a leaf has at least this share, squared, of the leaf's extent.
+_LEAF_SHARE = 1 / 16
+#: How often curvature is averaged over neighbours: some faces around a branch.
+_ROUNDS = 6
+
+
+def mesh_features(
+    positions: NDArray[np.float64], corner_verts: NDArray[np.integer], face_offsets: NDArray[np.integer]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.float64]]:
+    """Classify the faces of a mesh.
+
+    Parameters
+    ----------
+    positions : (v, 3) float64
+    corner_verts : (c,) int
+    face_offsets : (f + 1,) int
+
+    Returns
+    -------
+    solid : (f,) bool
+        Of a closed surface, or a tube with open ends: half of it is never seen.
+    leaf : (f,) bool
+        Of a sheet that consists of few faces.
+    width : (f,) float64
+        Of the leaf, or the local thickness of the solid, in the unit of the positions.
+
+    Notes
+    -----
+    Components are connected faces. The width of a sheet is its area over its extent. That of a solid is 1 / H, with
+    Steiner's mean curvature H of polyhedra (half the sum of edge length × signed angle, over the area) averaged over
+    neighbours: 2 r for a long tube, r for a ball, no less for rough ground, where bumps and hollows cancel. Edges of
+    no, one or many faces, faces of no area and faces that touch themselves are all taken as they come.
+    """
+    faces = len(face_offsets) - 1
+    if not faces:
+        return np.zeros(0, bool), np.zeros(0, bool), np.zeros(0)
+    welded = _welded(positions)[corner_verts]
+    sizes = np.diff(face_offsets)
+    face_of_corner = np.repeat(np.arange(faces), sizes)
+    following = np.arange(len(corner_verts)) + 1
+    following[face_offsets[1:] - 1] = face_offsets[:-1]
+    component = _components(face_of_corner, welded, following)
+    vector, centre = _measures(positions, corner_verts, face_offsets, following, sizes)
+    area = np.linalg.norm(vector, axis=1)
+    number = int(component.max()) + 1
+    total = np.bincount(component, area, number)
+    extent = _extents(positions[corner_verts], component[face_of_corner], number)
+
+    # Edges, as pairs of welded vertices; both half edges of a pair lie side by side after sorting.
+    start, end = welded, welded[following]
+    length = np.linalg.norm(positions[corner_verts[following]] - positions[corner_verts], axis=1)
+    low, high = np.minimum(start, end).astype(np.int64), np.maximum(start, end)
+    key = low * (int(welded.max()) + 1) + high
+    order = np.argsort(key, kind="stable")
+    first = np.flatnonzero(np.diff(key[order], prepend=-1))
+    uses = np.diff(first, append=len(order))
+    real = start[order[first]] != end[order[first]]
+    alone = order[first[(uses == 1) & real]]
+    boundary = np.bincount(component[face_of_corner[alone]], length[alone], number)
+    closed = (boundary**2 < _SHEET * total) & (total > 0)
+    pairs = first[(uses == 2) & real]
+    a, b = face_of_corner[order[pairs]], face_of_corner[order[pairs + 1]]
+
+    solid = closed[component]
+    mean_width = np.where(closed, 0.5, 1.0) * total / np.where(extent > 0, extent, 1.0)
+    width = mean_width[component]
+    curved = 2.0 * _mean_curvature(vector, area, centre, a, b, length[order[pairs]], faces)
+    with np.errstate(divide="ignore"):
+        local = np.where(curved > 0, 2.0 / np.maximum(curved, 1e-300), np.inf)
+    width = np.where(solid, np.minimum(width, local), width)
+    leaf = ~solid & (area >= _LEAF_SHARE * extent[component] ** 2)
+    return solid, leaf, width
+
+
+def _welded(positions: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Number (v,) of the place of each vertex."""
+    order = np.lexsort(positions.T)
+    sorted_ = positions[order]
+    new = np.ones(len(order), bool)
+    new[1:] = (sorted_[1:] != sorted_[:-1]).any(axis=1)
+    place = np.zeros(len(order), np.int64)
+    place[order] = np.cumsum(new) - 1
+    return place
+
+
+def _components(face: NDArray, vertex: NDArray, following: NDArray) -> NDArray[np.int64]:
+    """Connected component (f,) of each face: labels of vertices sink to the least along edges, and are followed."""
+    label = np.arange(int(vertex.max()) + 1)
+    a, b = vertex, vertex[following]
+    while True:
+        least = np.minimum(label[a], label[b])
+        before = label.copy()
+        # Labels are vertices themselves: what they point to sinks, too, so that long chains take few rounds.
+        for target in (label[a], label[b], a, b):
+            np.minimum.at(label, target, least)
+        while True:
+            shorter = label[label]
+            if (shorter == label).all():
+                break
+            label = shorter
+        if (label == before).all():
+            break
+    of_face = np.zeros(int(face.max()) + 1, np.int64)
+    of_face[face] = label[vertex]
+    return np.unique(of_face, return_inverse=True)[1].reshape(-1)
+
+
+def _measures(
+    positions: NDArray, corner_verts: NDArray, face_offsets: NDArray, following: NDArray, sizes: NDArray
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Area vectors and mean corners (f, 3) of faces."""
+    points = positions[corner_verts]
+    centre = np.add.reduceat(points, face_offsets[:-1], axis=0) / sizes[:, None]
+    points = points - np.repeat(centre, sizes, axis=0)
+    return 0.5 * np.add.reduceat(np.cross(points, points[following]), face_offsets[:-1], axis=0), centre
+
+
+def _extents(points: NDArray[np.float64], component: NDArray, number: int) -> NDArray[np.float64]:
+    """Diagonals (n,) of the boxes around components."""
+    order = np.argsort(component, kind="stable")
+    first = np.searchsorted(component[order], np.arange(number))
+    points = points[order]
+    return np.linalg.norm(np.maximum.reduceat(points, first) - np.minimum.reduceat(points, first), axis=1)
+
+
+def _mean_curvature(
+    vector: NDArray, area: NDArray, centre: NDArray, a: NDArray, b: NDArray, length: NDArray, faces: int
+) -> NDArray[np.float64]:
+    """Mean curvature H (f,), averaged over neighbours; positive where the surface bulges to the side of its normals.
+
+    Faces that are turned inside out would make it negative; what counts is its amount.
+    """
+    normal = vector / np.maximum(area, 1e-300)[:, None]
+    angle = np.arctan2(
+        np.linalg.norm(np.cross(normal[a], normal[b]), axis=1), np.einsum("ni,ni->n", normal[a], normal[b])
+    )
+    bulge = np.einsum("ni,ni->n", normal[a] - normal[b], centre[a] - centre[b])
+    own = 0.25 * length * angle * np.sign(bulge)  # half of ½ l θ to either face
+    own[(area[a] <= 0) | (area[b] <= 0)] = 0.0
+    integral = np.bincount(a, own, faces) + np.bincount(b, own, faces)
+    around, weight = area.copy(), 1.0 + np.bincount(a, minlength=faces) + np.bincount(b, minlength=faces)
+    for _ in range(_ROUNDS):
+        integral, around = (
+            (v + np.bincount(a, v[b], faces) + np.bincount(b, v[a], faces)) / weight for v in (integral, around)
+        )
+    return np.abs(integral) / np.maximum(around, 1e-300)

@@ -1,0 +1,407 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Explicit polygons (paper, sections 5 and 6.1): faces of meshes that were modelled elsewhere, and fragments of them.
+
+Nothing is copied when polygons move from tetrahedron to tetrahedron. A whole face is two numbers, the face and the
+instance of its mesh. A fragment, clipped off by a plane, is a triangle in the barycentric coordinates of one of the
+triangles of its face: places, texture coordinates and all other attributes of its corners follow from these, are
+affine by construction, and the fragments of a face add up to it whatever the sequence of cuts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..plants.growth import spread
+
+#: Faces and triangles that are measured at a time; bounds what that takes to some hundred megabytes.
+MEASURED_AT_ONCE = 200_000
+#: A fragment that reaches beyond a plane by less than this share of its size is not cut again by rounding errors.
+_TOUCHING = 1e-9
+
+
+@dataclass(frozen=True)
+class Surface:
+    """One mesh in its own space, shared by all of its instances.
+
+    Attributes
+    ----------
+    name : str
+        Of the object, for messages and results.
+    positions : (v, 3) float64
+        Vertices in the mesh's own space.
+    corner_verts : (c,) int32
+        Vertex of each face corner.
+    face_offsets : (f + 1,) int32
+        Where each face's corners start.
+    triangles : (t, 3) int32
+        Corners of the triangles that faces consist of: n − 2 for a face of n corners, face after face.
+    material : (f,) int32
+        Slot of each face.
+    colours : (s, 3) float64
+        Mean colour of each slot's material, linear RGB.
+    transmission, coverage : (s,) float64
+        Share of scattered light that goes through, and of the surface that is there at all (1 without transparency).
+    solid : (f,) bool
+        The face belongs to a closed or nearly closed surface, of which half is never seen; see `mesh_features`.
+    leaf : (f,) bool
+        The face is a good part of what it is connected to, as that of a leaf is.
+    width : (f,) float64
+        Width of the feature that the face belongs to, in the mesh's own units.
+    attributes : mapping of str to (c, k) float32
+        Interpolated across faces: texture coordinates (k = 2), colours and vectors (k = 3), numbers (k = 1).
+    normals : (c, 3) float32 or None
+        Of corners where any face is smooth, in the mesh's own space.
+    """
+
+    name: str
+    positions: NDArray[np.float64]
+    corner_verts: NDArray[np.int32]
+    face_offsets: NDArray[np.int32]
+    triangles: NDArray[np.int32]
+    material: NDArray[np.int32]
+    colours: NDArray[np.float64]
+    transmission: NDArray[np.float64]
+    coverage: NDArray[np.float64]
+    solid: NDArray[np.bool_]
+    leaf: NDArray[np.bool_]
+    width: NDArray[np.float64]
+    attributes: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
+    normals: NDArray[np.float32] | None = None
+
+
+class Meshes:
+    """Surfaces and where their instances stand; polygons refer to its faces, triangles and instances by number.
+
+    Parameters
+    ----------
+    surfaces : sequence of Surface
+    surface : (i,) int
+        Which of them each instance shows.
+    matrices : (i, 4, 4) float64
+        Of instances, to world space; any affine map.
+
+    Raises
+    ------
+    ValueError
+        A position or matrix holds something that is no finite number; the message names the surface.
+    """
+
+    def __init__(self, surfaces: Sequence[Surface], surface: NDArray[np.integer], matrices: NDArray) -> None:
+        self.surfaces = tuple(surfaces)
+        self.surface = np.asarray(surface, np.int32)
+        matrices = np.asarray(matrices, np.float64).reshape(-1, 4, 4)
+        sound = np.isfinite(matrices).all(axis=(1, 2))
+        broken = [s.name for s in surfaces if not np.isfinite(s.positions).all()]
+        broken += [surfaces[s].name for s in self.surface[~sound]]
+        if broken:
+            raise ValueError(
+                f'"{broken[0]}" has vertices or a transform that are no finite numbers; delete such vertices or reset '
+                "the transform"
+            )
+        # Rows times these are vectors in the world; the cofactors do the same for area vectors.
+        self.linear = np.ascontiguousarray(matrices[:, :3, :3].transpose(0, 2, 1))
+        self.origin = matrices[:, :3, 3].copy()
+        rows = self.linear
+        self.cofactors = np.stack(
+            [np.cross(rows[:, 1], rows[:, 2]), np.cross(rows[:, 2], rows[:, 0]), np.cross(rows[:, 0], rows[:, 1])], 1
+        )
+        self.mirrored = np.linalg.det(rows) < 0
+        self.largest = np.linalg.norm(rows, ord=2, axis=(1, 2)) if len(rows) else np.zeros(0)
+        self.mean_scale = np.linalg.norm(rows, axis=2).mean(axis=1)
+
+        def starts(sizes: list[int]) -> NDArray[np.int64]:
+            return np.cumsum([0, *sizes])
+
+        def joined(arrays: list[NDArray], empty: NDArray) -> NDArray:
+            return np.concatenate([empty, *arrays])
+
+        self.first_vertex = starts([len(s.positions) for s in surfaces])
+        self.first_corner = starts([len(s.corner_verts) for s in surfaces])
+        self.first_face = starts([len(s.material) for s in surfaces])
+        self.first_triangle = starts([len(s.triangles) for s in surfaces])
+        self.first_slot = starts([len(s.colours) for s in surfaces])
+        every = list(enumerate(surfaces))
+        none, flat = np.zeros(0, np.int64), np.zeros((0, 3))
+        self.positions = joined([s.positions for s in surfaces], flat)
+        self.corner_verts = joined([s.corner_verts + self.first_vertex[i] for i, s in every], none)
+        self.face_start = joined([s.face_offsets[:-1] + self.first_corner[i] for i, s in every], none)
+        self.face_size = joined([np.diff(s.face_offsets) for s in surfaces], none)
+        self.triangles = joined([s.triangles + self.first_corner[i] for i, s in every], np.zeros((0, 3), np.int64))
+        self.face_triangle = np.cumsum(self.face_size - 2) - (self.face_size - 2)
+        self.slot = joined([s.material + self.first_slot[i] for i, s in every], none)
+        self.colours = joined([s.colours for s in surfaces], flat)
+        self.transmission = joined([s.transmission for s in surfaces], np.zeros(0))
+        self.coverage = joined([s.coverage for s in surfaces], np.zeros(0))
+        self.solid = joined([s.solid for s in surfaces], np.zeros(0, bool))
+        self.leaf = joined([s.leaf for s in surfaces], np.zeros(0, bool))
+        self.width = joined([s.width for s in surfaces], np.zeros(0))
+        a, b, c = (self.positions[self.corner_verts[self.triangles[:, k]]] for k in range(3))
+        self.area_vectors = 0.5 * np.cross(b - a, c - a)
+        self._measure_faces()
+
+    def _measure_faces(self) -> None:
+        """Centres (f, 3) of the boxes around faces, and the radii (f,) of the spheres about these that hold them."""
+        points = self.positions[self.corner_verts]
+        if len(self.face_start):
+            low = np.minimum.reduceat(points, self.face_start, axis=0)
+            high = np.maximum.reduceat(points, self.face_start, axis=0)
+            self.centres = (low + high) / 2
+            away = np.linalg.norm(points - np.repeat(self.centres, self.face_size, axis=0), axis=1)
+            self.radii = np.maximum.reduceat(away, self.face_start)
+            # Faces that come to a vertex twice, which a valid mesh does not have.
+            face = np.repeat(np.arange(len(self.face_start)), self.face_size)
+            order = np.lexsort([self.corner_verts, face])
+            twice = (np.diff(face[order]) == 0) & (np.diff(self.corner_verts[order]) == 0)
+            self.knotted = np.bincount(face[order[1:][twice]], minlength=len(self.face_start)) > 0
+        else:
+            self.centres, self.radii, self.knotted = np.zeros((0, 3)), np.zeros(0), np.zeros(0, bool)
+
+    @property
+    def faces(self) -> int:
+        """Faces of all instances together."""
+        return int(np.diff(self.first_face)[self.surface].sum())
+
+    def to_world(self, points: NDArray[np.float64], instance: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Points (n, k, 3) of instances (n,) in world space, metres."""
+        return points @ self.linear[instance] + self.origin[instance, None]
+
+    def corners(self, triangle: NDArray[np.integer], instance: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Corners (n, 3, 3) of triangles of instances in world space, metres."""
+        return self.to_world(self.positions[self.corner_verts[self.triangles[triangle]]], instance)
+
+    def vectors(self, triangle: NDArray[np.integer], instance: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Area vectors (n, 3) of triangles of instances in world space, m²."""
+        return np.einsum("ni,nij->nj", self.area_vectors[triangle], self.cofactors[instance])
+
+    def face_areas(self, face: NDArray[np.integer], instance: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Areas (n,) of faces of instances, m²."""
+        areas = np.zeros(len(face))
+        for start in range(0, len(face), MEASURED_AT_ONCE):
+            some = slice(start, start + MEASURED_AT_ONCE)
+            owner, index = spread(self.face_size[face[some]] - 2)
+            own = self.vectors(self.face_triangle[face[some]][owner] + index, instance[some][owner])
+            areas[some] = np.bincount(owner, np.linalg.norm(own, axis=1), len(face[some]))
+        return areas
+
+
+@dataclass(frozen=True)
+class Polygons:
+    """Whole faces and fragments of faces, n in all, m of them fragments.
+
+    Attributes
+    ----------
+    meshes : Meshes
+        What the numbers below count through.
+    face, instance : (n,) int32
+    part : (n,) int32
+        Row of the two arrays below, −1 for whole faces.
+    triangle : (m,) int32
+    weights : (m, 3, 3) float64
+        Barycentric coordinates in the triangle, for each corner of the fragment a row.
+    centre : (n, 3) float64
+        Somewhere within, metres, world space.
+    reach : (n,) float64
+        Distance from there within which all of it lies, metres.
+    """
+
+    meshes: Meshes
+    face: NDArray[np.int32]
+    instance: NDArray[np.int32]
+    part: NDArray[np.int32]
+    triangle: NDArray[np.int32]
+    weights: NDArray[np.float64]
+    centre: NDArray[np.float64]
+    reach: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.face)
+
+    @classmethod
+    def everything(cls, meshes: Meshes) -> Polygons:
+        """All faces of all instances, whole."""
+        instance, face = spread(np.diff(meshes.first_face)[meshes.surface])
+        face += meshes.first_face[meshes.surface][instance]
+        centre = np.zeros((len(face), 3))
+        for start in range(0, len(face), MEASURED_AT_ONCE):
+            some = slice(start, start + MEASURED_AT_ONCE)
+            centre[some] = meshes.to_world(meshes.centres[face[some], None], instance[some])[:, 0]
+        reach = meshes.radii[face] * meshes.largest[instance]
+        whole = np.full(len(face), -1, np.int32)
+        none = np.zeros(0, np.int32), np.zeros((0, 3, 3))
+        return cls(meshes, face.astype(np.int32), instance.astype(np.int32), whole, *none, centre, reach)
+
+    @classmethod
+    def empty(cls) -> Polygons:
+        """None at all."""
+        return cls.everything(_NOTHING)
+
+    @classmethod
+    def fragments(
+        cls, meshes: Meshes, face: NDArray, instance: NDArray, triangle: NDArray, weights: NDArray
+    ) -> Polygons:
+        """Fragments (n,) of faces, given by a triangle (n,) each and weights (n, 3, 3) in it."""
+        corners = weights @ meshes.corners(triangle, instance)
+        centre = corners.mean(axis=1)
+        reach = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1, initial=0.0)
+        part = np.arange(len(face), dtype=np.int32)
+        numbers = (np.asarray(a, np.int32) for a in (face, instance, part, triangle))
+        return cls(meshes, *numbers, weights, centre, reach)
+
+    def take(self, index: NDArray | slice) -> Polygons:
+        """Selection by indices, mask or slice."""
+        part = self.part[index]
+        cut = np.flatnonzero(part >= 0)
+        rows = part[cut]
+        part = np.full(len(part), -1, np.int32)
+        part[cut] = np.arange(len(cut), dtype=np.int32)
+        some = (a[index] for a in (self.face, self.instance))
+        more = (a[rows] for a in (self.triangle, self.weights))
+        return Polygons(self.meshes, *some, part, *more, self.centre[index], self.reach[index])
+
+    @classmethod
+    def concatenate(cls, parts: Sequence[Polygons]) -> Polygons:
+        """All of several in one; they refer to the same meshes."""
+        parts = [p for p in parts if len(p)] or [cls.empty()]
+        if len(parts) == 1:
+            return parts[0]
+        first = np.cumsum([0] + [len(p.triangle) for p in parts[:-1]])
+        shifted = [np.where(p.part < 0, p.part, p.part + n) for p, n in zip(parts, first, strict=True)]
+        own = {
+            name: np.concatenate([getattr(p, name) for p in parts])
+            for name in ("face", "instance", "triangle", "weights", "centre", "reach")
+        }
+        return replace(parts[0], part=np.concatenate(shifted).astype(np.int32), **own)
+
+    def triangles(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+        """Triangles of whole faces, and fragments, in the order of the polygons.
+
+        Returns
+        -------
+        owner : (k,) int64
+            Polygon that each belongs to.
+        triangle : (k,) int64
+        share : (k,) float64
+            Of the triangle's area: 1 except for fragments.
+        """
+        cut = self.part >= 0
+        owner, index = spread(np.where(cut, 1, self.meshes.face_size[self.face] - 2))
+        triangle, share = self.meshes.face_triangle[self.face][owner] + index, np.ones(len(owner))
+        own = np.flatnonzero(cut[owner])
+        rows = self.part[owner[own]]
+        triangle[own], share[own] = self.triangle[rows], shares(self.weights)[rows]
+        return owner, triangle, share
+
+    def as_fragments(self) -> tuple[NDArray[np.int64], Polygons]:
+        """Whole faces become their triangles; returns the polygon that each fragment comes from, and fragments."""
+        owner, triangle, _ = self.triangles()
+        weights = np.broadcast_to(np.eye(3), (len(owner), 3, 3)).copy()
+        own = np.flatnonzero(self.part[owner] >= 0)
+        weights[own] = self.weights[self.part[owner[own]]]
+        return owner, Polygons.fragments(self.meshes, self.face[owner], self.instance[owner], triangle, weights)
+
+    def areas(self) -> NDArray[np.float64]:
+        """Areas (n,), m²."""
+        areas = np.zeros(len(self))
+        for start in range(0, len(self), MEASURED_AT_ONCE):
+            some = self.take(slice(start, start + MEASURED_AT_ONCE))
+            owner, triangle, share = some.triangles()
+            own = np.linalg.norm(self.meshes.vectors(triangle, some.instance[owner]), axis=1)
+            areas[start : start + len(some)] = np.bincount(owner, share * own, len(some))
+        return areas
+
+    def bounding_box(self) -> NDArray[np.float64]:
+        """Axis-aligned box (2, 3) around all of them, metres; there must be one at least."""
+        return np.stack([(self.centre.T - self.reach).min(axis=1), (self.centre.T + self.reach).max(axis=1)])
+
+    def distances(self, planes: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Least and greatest signed distances (n,) of the corners from planes (n, 4), metres."""
+        low, high = np.zeros((2, len(self)))
+        whole, cut = np.flatnonzero(self.part < 0), np.flatnonzero(self.part >= 0)
+        if len(whole):
+            meshes, face = self.meshes, self.face[whole]
+            owner, index = spread(meshes.face_size[face])
+            points = meshes.positions[meshes.corner_verts[meshes.face_start[face][owner] + index]]
+            points = meshes.to_world(points[:, None], self.instance[whole][owner])[:, 0]
+            plane = planes[whole][owner]
+            distance = np.einsum("ni,ni->n", points, plane[:, :3]) + plane[:, 3]
+            first = np.flatnonzero(index == 0)
+            low[whole], high[whole] = np.minimum.reduceat(distance, first), np.maximum.reduceat(distance, first)
+        if len(cut):
+            distance = self.take(cut).corner_distances(planes[cut])
+            low[cut], high[cut] = distance.min(axis=1), distance.max(axis=1)
+        return low, high
+
+    def corner_distances(self, planes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Signed distances (n, 3) of the corners of fragments from planes (n, 4), metres."""
+        corners = self.weights[self.part] @ self.meshes.corners(self.triangle[self.part], self.instance)
+        return np.einsum("nki,ni->nk", corners, planes[:, :3]) + planes[:, 3:]
+
+    def touching(self) -> NDArray[np.float64]:
+        """Metres (n,) within which rounding errors may carry a corner across a plane."""
+        return _TOUCHING * self.reach
+
+
+def shares(weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Share (n,) of its triangle's area that a fragment with weights (n, 3, 3) takes."""
+    a, b = weights[:, 1, 1:] - weights[:, 0, 1:], weights[:, 2, 1:] - weights[:, 0, 1:]
+    return np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+
+def cut(polygons: Polygons, planes: NDArray[np.float64], slack: NDArray[np.float64] | float = 0.0) -> tuple:
+    """Clip polygons by a plane each.
+
+    Parameters
+    ----------
+    polygons : Polygons of n
+    planes : (n, 4) float64
+        Signed distances are n·x + d.
+    slack : (n,) float64
+        Triangles that reach beyond their plane by no more than this stay whole, metres.
+
+    Returns
+    -------
+    owner : (k,) int64
+        Polygon that each fragment comes from.
+    side : (k,) int64
+        0 where the distance is negative, 1 elsewhere.
+    fragments : Polygons of k
+        A triangle that crosses leaves one fragment on one side and two on the other.
+    """
+    owner, whole = polygons.as_fragments()
+    distance = whole.corner_distances(planes[owner])
+    low, high = distance.min(axis=1, initial=np.inf), distance.max(axis=1, initial=-np.inf)
+    loose = np.broadcast_to(slack, len(polygons))[owner]
+    crosses = np.minimum(-low, high) > np.maximum(loose, whole.touching())
+    stays, some = np.flatnonzero(~crosses), np.flatnonzero(crosses)
+    positive = distance[some] >= 0
+    # The corner that is alone on its side comes first.
+    alone = np.where(positive.sum(axis=1) == 1, positive.argmax(axis=1), positive.argmin(axis=1))
+    turn = (alone[:, None] + np.arange(3)) % 3
+    w = np.take_along_axis(whole.weights[some], turn[:, :, None], axis=1)
+    d = np.take_along_axis(distance[some], turn, axis=1)
+    first, second = (
+        w[:, 0] + (w[:, k] - w[:, 0]) * np.clip(d[:, :1] / (d[:, :1] - d[:, k : k + 1]), 0.0, 1.0) for k in (1, 2)
+    )
+    made = np.concatenate(
+        [
+            np.stack([w[:, 0], first, second], axis=1),
+            np.stack([first, w[:, 1], w[:, 2]], axis=1),
+            np.stack([first, w[:, 2], second], axis=1),
+        ]
+    )
+    sides = (d[:, 0] >= 0).astype(np.int64)
+    from_, side = np.tile(some, 3), np.concatenate([sides, 1 - sides, 1 - sides])
+    kept = np.flatnonzero(shares(made) > 0)  # a cut through a corner leaves pieces of no size
+    made, from_, side = made[kept], from_[kept], side[kept]
+    new = Polygons.fragments(polygons.meshes, whole.face[from_], whole.instance[from_], whole.triangle[from_], made)
+    larger = (high[stays] >= -low[stays]).astype(np.int64)
+    parts = Polygons.concatenate([whole.take(stays), new])
+    return np.concatenate([owner[stays], owner[from_]]), np.concatenate([larger, side]), parts
+
+
+_NOTHING = Meshes((), np.zeros(0, np.int32), np.zeros((0, 4, 4)))
