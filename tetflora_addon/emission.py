@@ -131,7 +131,7 @@ def facet_buffers(flora: Flora, result: Refinement, camera: Camera, facet_pixels
         sizes = sizes_of(flora, contents, camera, hidden)
         leaf, wood = sizes.sides(facet_pixels)
         expected = sizes.counts(facet_pixels) + 1
-        inside = result.tree.inside[cell]
+        inside = result.in_view[cell]
         seen, beside = np.flatnonzero(inside), np.flatnonzero(~inside)
         parts += [make(flora, things.take(i), leaf[i], wood[i]) for i in _runs(expected, seen)]
         # What is beside the view must not reach into the picture.

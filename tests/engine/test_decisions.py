@@ -42,7 +42,9 @@ def become(
     amounts = Amounts(*(np.array([v], float) for v in (leaf, wood, polygons, width)))
     span = np.array([np.sqrt(2) / (0.001 * depth)])  # of the unit corner, 1 mm a pixel at 1 m
     seen = (np.array([v], float) for v in (pixels, opacity))
-    cells = Cells(np.array([0]), amounts, *seen, feature_pixels(cell(depth), amounts.width, CAMERA), span)
+    cells = Cells(
+        np.array([0]), amounts, *seen, feature_pixels(cell(depth), amounts.width, CAMERA), span, np.array([True])
+    )
     return Decision(decide(cells, np.array([transmittance]), settings)[0])
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The camera as the engine sees it: a window at unit depth, projection and its inverse."""
+"""The camera as the engine sees it: a window at unit depth or on the sphere, projection and its inverse."""
 
 from __future__ import annotations
 
@@ -10,31 +10,42 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+#: Cosine of the latitude from which on panoramas count as if no pixels were added towards the poles: 84 degrees.
+LEAST_COSINE = 0.1
+
 
 @dataclass(frozen=True)
 class Camera:
-    """A perspective or orthographic camera.
+    """A perspective, orthographic or panoramic camera.
 
     Camera space is Blender's: +x right, +y up, looking along −z. *Depth* is the distance along the viewing direction.
 
     Attributes
     ----------
-    kind : {'PERSP', 'ORTHO'}
-        Perspective, or parallel rays along the viewing direction.
+    kind : {'PERSP', 'ORTHO', 'PANO'}
+        Perspective, parallel rays along the viewing direction, or an equirectangular panorama: columns are longitudes
+        and rows are latitudes.
     position : (3,) float64
         The eye; for ``'ORTHO'`` the point from which depth is counted.
     frame : (3, 3) float64
         Rotation; columns are the camera's x, y and z axes in world space.
     window : tuple of float
-        ``(left, right, bottom, top)`` of the picture at depth 1 (``'PERSP'``) or at any depth in metres
-        (``'ORTHO'``). Lens shift, sensor fit and pixel aspect are in it; it need not be symmetric.
+        ``(left, right, bottom, top)`` of the picture at depth 1 (``'PERSP'``), at any depth in metres (``'ORTHO'``), or
+        in radians (``'PANO'``): longitude from the viewing direction to the right, latitude from its plane upwards.
+        Lens shift, sensor fit and pixel aspect are in it; it need not be symmetric.
     near, far : float
         Clipping depths, metres, ``0 < near < far``.
     width, height : int
         Size of the final picture in pixels.
+    lens_radius : float
+        Radius of the lens, metres; 0 where all is sharp.
+    focus : float
+        Depth that is sharp, metres.
+    shutter : tuple of Camera
+        The camera at other times while the shutter is open; empty where it does not move.
     """
 
-    kind: Literal["PERSP", "ORTHO"]
+    kind: Literal["PERSP", "ORTHO", "PANO"]
     position: NDArray[np.float64]
     frame: NDArray[np.float64]
     window: tuple[float, float, float, float]
@@ -42,10 +53,18 @@ class Camera:
     far: float
     width: int
     height: int
+    lens_radius: float = 0.0
+    focus: float = np.inf
+    shutter: tuple[Camera, ...] = ()
+
+    @property
+    def line_of_sight(self) -> dict[str, NDArray[np.float64]]:
+        """What `TetrahedralTree.order` needs to know of the camera: the eye or the direction of its rays."""
+        return {"direction": -self.frame[:, 2]} if self.kind == "ORTHO" else {"eye": self.position}
 
     @property
     def pixel_size(self) -> float:
-        """Side of a pixel at depth 1 (perspective) or at any depth (orthographic), metres."""
+        """Side of a pixel at depth 1 (perspective), at any depth (orthographic) or 1 m away (panorama), metres."""
         left, right, bottom, top = self.window
         return float(np.sqrt((right - left) * (top - bottom) / (self.width * self.height)))
 
@@ -57,6 +76,8 @@ class Camera:
         """Distance of world points (n, 3) from the space that the picture shows, metres; negative within it."""
         x, y, depth = self.to_camera_space(points).T
         left, right, bottom, top = self.window
+        if self.kind == "PANO":
+            return self._beside_panorama(np.stack([x, y, depth], axis=-1))
         if self.kind == "ORTHO":
             return np.max([x - right, left - x, y - top, bottom - y], axis=0)
         walls = [
@@ -67,18 +88,60 @@ class Camera:
         ]
         return np.max([distance / np.hypot(1.0, slope) for distance, slope in walls], axis=0)
 
-    def widened(self, margin: float) -> Camera:
-        """The same camera with more around its picture: ``margin`` of its width and height on each side."""
+    def widened(self, margin: float, margin_up: float | None = None) -> Camera:
+        """The same camera with more around its picture.
+
+        Parameters
+        ----------
+        margin : float
+            Share of the picture's width that is added on the left and on the right.
+        margin_up : float, optional
+            Share of its height that is added below and above; as ``margin`` if it is not given.
+        """
         left, right, bottom, top = self.window
         # Whole pixels, so that the pixels of the picture stay where they are.
-        across, up = round(margin * self.width), round(margin * self.height)
-        dx, dy = across * (right - left) / self.width, up * (top - bottom) / self.height
+        across = round(margin * self.width)
+        up = round((margin if margin_up is None else margin_up) * self.height)
+        step_x, step_y = (right - left) / self.width, (top - bottom) / self.height
+        if self.kind == "PANO":
+            # There is nothing beyond the poles, nor beyond the whole way round.
+            across = min(across, int((2.0 * np.pi - (right - left)) / (2.0 * step_x) + 1e-9))
+            up = min(up, max(int(min(np.pi / 2.0 - top, bottom + np.pi / 2.0) / step_y + 1e-9), 0))
         return replace(
             self,
-            window=(left - dx, right + dx, bottom - dy, top + dy),
+            window=(left - across * step_x, right + across * step_x, bottom - up * step_y, top + up * step_y),
             width=self.width + 2 * across,
             height=self.height + 2 * up,
         )
+
+    def longitude_latitude(self, local: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Place on a panorama of points ``(..., 3)`` in camera space, radians.
+
+        The longitude is the one nearest to the middle of the window.
+        """
+        x, y, depth = np.moveaxis(local, -1, 0)
+        middle = (self.window[0] + self.window[1]) / 2.0
+        longitude = np.arctan2(x, depth) - middle
+        longitude = middle + longitude - 2.0 * np.pi * np.round(longitude / (2.0 * np.pi))
+        return longitude, np.arctan2(y, np.hypot(x, depth))
+
+    def _beside_panorama(self, local: NDArray[np.float64]) -> NDArray[np.float64]:
+        left, right, bottom, top = self.window
+        longitude, latitude = self.longitude_latitude(local)
+        far, across = np.linalg.norm(local, axis=-1), np.hypot(local[..., 0], local[..., 2])
+
+        def beyond(angle: NDArray[np.float64], metres: NDArray[np.float64]) -> NDArray[np.float64]:
+            return metres * np.sin(np.clip(angle, -np.pi / 2.0, np.pi / 2.0))
+
+        # What goes all the way round or to a pole has no walls there.
+        beside = np.full(far.shape, -np.inf)
+        if right - left < 2.0 * np.pi - 1e-9:
+            beside = np.maximum(beside, beyond(np.maximum(longitude - right, left - longitude), across))
+        if top < np.pi / 2.0 - 1e-9:
+            beside = np.maximum(beside, beyond(latitude - top, far))
+        if bottom > -np.pi / 2.0 + 1e-9:
+            beside = np.maximum(beside, beyond(bottom - latitude, far))
+        return beside
 
     def pixel_extent(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Metres that one pixel spans at each of the world points ``(..., 3)``; result ``(...)``.
@@ -87,6 +150,12 @@ class Camera:
         """
         if self.kind == "ORTHO":
             return np.full(np.shape(points)[:-1], self.pixel_size)
+        if self.kind == "PANO":
+            local = self.to_camera_space(points)
+            distance = np.maximum(np.linalg.norm(local, axis=-1), self.near)
+            # Towards the poles a picture has more pixels for each solid angle.
+            cosine = np.hypot(local[..., 0], local[..., 2]) / distance
+            return self.pixel_size * distance * np.sqrt(np.clip(cosine, LEAST_COSINE, 1.0))
         depth = self.to_camera_space(points)[..., 2]
         return self.pixel_size * np.maximum(depth, self.near)
 

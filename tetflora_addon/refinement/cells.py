@@ -31,7 +31,9 @@ class Cells:
     feature : (n,) float64
         Width in pixels of what they hold, where it is nearest to the eye.
     span : (n,) float64
-        Longest edge in pixels at their depth.
+        Longest edge in pixels at their distance.
+    whole : (n,) bool
+        Whether all of each is in view. What crosses the border of the view has pixels of its seen part only.
     """
 
     nodes: NDArray[np.intp]
@@ -40,6 +42,7 @@ class Cells:
     opacity: NDArray[np.float64]
     feature: NDArray[np.float64]
     span: NDArray[np.float64]
+    whole: NDArray[np.bool_]
 
     def __len__(self) -> int:
         return len(self.nodes)
@@ -51,9 +54,9 @@ class Cells:
         """Draw tetrahedra into the alpha buffer and keep what it says of each by itself."""
         vertices = tree.vertices(nodes)
         outline = buffer.add(nodes, vertices, mean_extinction(amounts, volume(vertices)))
-        span = np.sqrt(squared_edges(vertices).max(axis=1)) / camera.pixel_extent(vertices.mean(axis=1))
+        span = np.sqrt(squared_edges(vertices).max(axis=1)) / camera.extent_around(vertices.mean(axis=1))
         feature = feature_pixels(vertices, amounts.width, camera)
-        return cls(nodes, amounts, outline.pixels, outline.opacity, feature, span)
+        return cls(nodes, amounts, outline.pixels, outline.opacity, feature, span, outline.whole)
 
     def take(self, index: NDArray) -> Cells:
         """Selection by indices or mask."""

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from .cells import Cells
 from .settings import RefinementSettings
 
+#: Longest edge, in sides of a block, from which on what crosses the border of the view is divided for its unseen part.
+ACROSS_THE_BORDER = 1.5
+
 
 class Decision(IntEnum):
     """What is done with a terminal tetrahedron."""
@@ -43,13 +46,18 @@ def decide(cells: Cells, transmittance: NDArray[np.float64], settings: Refinemen
     A tetrahedron's *contribution* is the number of pixels that its contents change: its pixels × the share of them that
     is not hidden × its own opacity. Leaves wider than ``leaf_limit`` pixels can only be drawn as leaves; a tetrahedron
     full of them is divided down to ``block`` pixels so that its hidden parts are found out, and then made explicit.
+
+    What crosses the border of the view counts by its seen part. That may be small while the tetrahedron is not: then it
+    is divided until the rest is known to be out of view, or all of it would be made as fine as what is seen.
     """
     amounts = cells.amounts
     holds = amounts.area > 0
     hidden = transmittance <= settings.hidden  # out of view: transmittance is 0
     large_leaves = cells.feature >= settings.leaf_limit
-    no_gain = (amounts.polygons <= settings.few_polygons) | (cells.pixels <= settings.block**2)
-    small = contributions(cells, transmittance) <= settings.cutoff**2
+    few = amounts.polygons <= settings.few_polygons
+    crossing = ~cells.whole & ~few & (cells.span > ACROSS_THE_BORDER * settings.block)
+    no_gain = few | ((cells.pixels <= settings.block**2) & ~crossing)
+    small = (contributions(cells, transmittance) <= settings.cutoff**2) & ~crossing
     out = np.full(len(holds), Decision.SPLIT, dtype=np.int8)
     # Large leaves never become a proxy: a block of them that is hardly seen is divided until its hidden parts show.
     out[small & ~large_leaves] = Decision.PROXY

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from ..plants.compiled import Flora
 from ..plants.seeds import Seeds
-from ..tetrahedra.roots import view_root
 from ..tetrahedra.tree import TetrahedralTree
 from .amounts import Amounts
 from .camera import Camera
@@ -24,10 +23,10 @@ from .contents import Contents, Holdings, large_polygons
 from .decisions import Decision, decide, without_splits
 from .descent import Slack, push_down
 from .polygons import Polygons
-from .rasterise import buffer_size
 from .settings import RefinementSettings
-from .silhouette import silhouette_pixels
+from .silhouette import expected_pixels
 from .statistics import Stopwatch
+from .views import buffers_for, pixels_of_buffer, root_for, widened_for
 from .visibility import AlphaBuffer, Buffers
 
 #: Bisections between two visibility steps; three together divide a tetrahedron into eight.
@@ -86,6 +85,16 @@ class Refinement:
         """All plants, in terminal nodes."""
         return self.holdings.contents
 
+    @property
+    def in_view(self) -> NDArray[np.bool_]:
+        """Mask over all nodes of the tree (nodes,): those that hold something and are within the view, if in part."""
+        # The pieces of a view's own root know whether they are part of it. Others are where pixels of them are.
+        if self.tree.inside.any():
+            return self.tree.inside
+        mask = np.zeros(len(self.tree), dtype=bool)
+        mask[self.nodes[self.cells.pixels > 0.0]] = True
+        return mask
+
     def chosen(self, *decisions: Decision) -> NDArray[np.bool_]:
         """Mask over all nodes of the tree (nodes,) of those with one of the decisions."""
         mask = np.zeros(len(self.tree), dtype=bool)
@@ -117,17 +126,16 @@ def refine(
         Explicit polygons that take part.
     """
     clock = Stopwatch()
-    camera = camera.widened(settings.margin)
-    slack = _slack(camera, settings.visibility_resolution)
     contents = Contents.of_plants(flora, seeds)
+    camera = widened_for(camera, settings.margin, flora, contents.subplants)
+    slack = _slack(camera, settings.visibility_resolution)
     if polygons is not None:
         contents = Contents.joined([contents, Contents.of_polygons(polygons, large_polygons(polygons, camera))])
-    tree = view_root(camera, contents.bounding_box(flora))
+    tree = root_for(camera, settings, contents.bounding_box(flora))
     new = push_down(flora, tree, contents, slack)
     holdings = Holdings(new)
     clock.lap("update")
-    buffers = Buffers(camera, settings.visibility_resolution, occluders)
-    direction = {"eye": camera.position} if camera.kind == "PERSP" else {"direction": -camera.frame[:, 2]}
+    buffers = buffers_for(camera, settings.visibility_resolution, occluders)
     # Generations count from the root's own pieces. Passes do not count: a late one may divide what is still coarse.
     deepest = tree.levels - 1 + settings.max_levels
     cells, buffer = _drawn(tree, buffers, None, None, *_filled(tree, new))
@@ -135,7 +143,7 @@ def refine(
     passes = 0
     while True:
         passes += 1
-        rank = tree.order(**direction)
+        rank = tree.order(**camera.line_of_sight)
         transmittance = buffer.transmittance(np.maximum(rank, 0))[cells.nodes]
         clock.lap("visibility")
         decision = decide(cells, transmittance, settings)
@@ -202,7 +210,7 @@ def _drawn(
 
 def _slack(camera: Camera, resolution: int) -> Slack:
     """A pixel of the alpha buffer, in metres: nothing smaller can be told apart by what is decided from it."""
-    pixels = camera.width / buffer_size(camera, resolution)[0]
+    pixels = pixels_of_buffer(camera, resolution)
 
     def slack(points: NDArray[np.float64]) -> NDArray[np.float64]:
         return pixels * camera.extent_around(points)
@@ -219,7 +227,8 @@ def _split(
             return
         nodes = tree.split(nodes).reshape(-1)
         share = np.repeat(share, 2)
-        pixels, whole = silhouette_pixels(tree.vertices(nodes), camera)
-        large = ~whole | (pixels * share > settings.cutoff**2)  # pixels are not known for what leaves the view
+        pixels, whole = expected_pixels(tree.vertices(nodes), camera)
+        # What is beside the view is divided for other reasons than its pixels.
+        large = (pixels * share > settings.cutoff**2) | (~whole & (share == 0.0))
         large &= tree.level[nodes] < deepest
         nodes, share = nodes[large], share[large]

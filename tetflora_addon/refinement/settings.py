@@ -41,6 +41,9 @@ class RefinementSettings:
         Side of the facets of proxies, pixels.
     max_polygons : int
         Polygons that may be made in all, facets included; 0 for no limit.
+    anchored : bool
+        The tetrahedra stay where they are in the world while the camera moves, see `tetrahedra.world_root`; otherwise
+        they begin with the view. Panoramas are always anchored.
     max_memory : float
         Gigabytes that they may take in Blender and a renderer together, about; 0 for no limit.
     """
@@ -58,6 +61,7 @@ class RefinementSettings:
     facet: float = 0.6
     max_polygons: int = 0
     max_memory: float = 0.0
+    anchored: bool = False
 
 
 #: What the qualities of the panel stand for.

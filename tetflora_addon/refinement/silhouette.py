@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tetrahedra.geometry import EDGES, FACES
+from ..tetrahedra.geometry import EDGES, FACES, projected_area
 from .camera import Camera
 
 
@@ -37,6 +37,43 @@ def silhouette_pixels(vertices: NDArray[np.float64], camera: Camera) -> tuple[ND
     area, whole = silhouette_area(local, low, high, camera)
     left, right, bottom, top = camera.window
     return area * (camera.width * camera.height / ((right - left) * (top - bottom))), whole
+
+
+def expected_pixels(vertices: NDArray[np.float64], camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Silhouette areas of tetrahedra on the final image, also of those that are partly in view.
+
+    Parameters
+    ----------
+    vertices, camera
+        As for `silhouette_pixels`; the camera may be panoramic.
+
+    Returns
+    -------
+    pixels : (n,) float64
+        Exact for those that are whole in view. Of others half the pixels of the seen part of the box around them, which
+        a tetrahedron hardly ever exceeds; 0 out of view. On a panorama from the area across the line of sight.
+    whole : (n,) bool
+    """
+    if camera.kind == "PANO":
+        return _on_the_sphere(vertices, camera)
+    local = camera.to_camera_space(vertices)
+    low, high, _ = window_bounds(local, camera)
+    area, whole = silhouette_area(local, low, high, camera)
+    left, right, bottom, top = camera.window
+    seen = np.clip(np.minimum(high, [right, top]) - np.maximum(low, [left, bottom]), 0.0, None)
+    area = np.where(whole, area, np.prod(seen, axis=1) / 2.0)
+    return area / camera.pixel_size**2, whole
+
+
+def _on_the_sphere(vertices: NDArray[np.float64], camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    middle = vertices.mean(axis=1)
+    towards = middle - camera.position
+    distance = np.linalg.norm(towards, axis=1)
+    area = projected_area(vertices, towards / np.maximum(distance, 1e-300)[:, None])
+    # Nothing covers more than the whole sphere; what is around the eye covers much of it.
+    pixels = np.minimum(area, 4.0 * np.pi * np.maximum(distance, camera.near) ** 2) / camera.pixel_extent(middle) ** 2
+    beside = camera.clearance(vertices.reshape(-1, 3)).reshape(-1, 4)
+    return np.where((beside > 0.0).all(axis=1), 0.0, pixels), (beside <= 0.0).all(axis=1)
 
 
 def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:

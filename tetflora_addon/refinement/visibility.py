@@ -42,11 +42,14 @@ class Outline:
         Mean of 1 − e^−τ over its own silhouette, 0 to 1; 0 out of view.
     nearest : (n,) float64
         Least distance from the eye along the buffer's rays, metres; infinite out of view.
+    whole : (n,) bool
+        Whether all of it is in view.
     """
 
     pixels: NDArray[np.float64]
     opacity: NDArray[np.float64]
     nearest: NDArray[np.float64]
+    whole: NDArray[np.bool_]
 
 
 class AlphaBuffer:
@@ -60,6 +63,8 @@ class AlphaBuffer:
         Longer side of the buffer, pixels; `buffer_size` gives both sides.
     occluders_depth : (height · width,) float64, optional
         Where each pixel's ray ends at an opaque polygon, as `occluder_depth` gives it for the same size.
+    worth : (height · width,) float64, optional
+        Pixels of the final picture that each pixel stands for, where the picture is not the camera's own.
 
     Attributes
     ----------
@@ -72,8 +77,14 @@ class AlphaBuffer:
         If the occluders were drawn for a buffer of another size.
     """
 
-    def __init__(self, camera: Camera, resolution: int, occluders_depth: NDArray[np.float64] | None = None) -> None:
-        self.camera = camera
+    def __init__(
+        self,
+        camera: Camera,
+        resolution: int,
+        occluders_depth: NDArray[np.float64] | None = None,
+        worth: NDArray[np.float64] | None = None,
+    ) -> None:
+        self.camera, self.worth = camera, worth
         self.width, self.height = buffer_size(camera, resolution)
         self.end = None if occluders_depth is None else np.ravel(occluders_depth)
         if self.end is not None and len(self.end) != self.width * self.height:
@@ -111,10 +122,14 @@ class AlphaBuffer:
             depth = np.asarray(extinction, np.float64)[cell] * fragments.thickness
         # 0 · ∞ where a ray touches an opaque cell in a point: nothing.
         own = np.nan_to_num(np.minimum(depth, OPAQUE), nan=0.0)
-        weight = np.bincount(cell, coverage, count)
-        opacity = np.bincount(cell, -coverage * np.expm1(-own), count) / np.where(weight > 0.0, weight, 1.0)
+        counted = coverage if self.worth is None else coverage * self.worth[pixel]
+        weight = np.bincount(cell, counted, count)
+        opacity = np.bincount(cell, -counted * np.expm1(-own), count) / np.where(weight > 0.0, weight, 1.0)
         pixels, whole = silhouette_pixels(vertices, self.camera)
         final = self.camera.width * self.camera.height / (self.width * self.height)
+        exact = whole & (weight > 0.0)
+        if self.worth is not None:
+            exact, final = np.zeros(count, bool), 1.0
         nearest = np.full(count, np.inf)
         np.minimum.at(nearest, cell, fragments.entry)
         # What lies behind an occluder neither is seen nor hides anything.
@@ -124,11 +139,11 @@ class AlphaBuffer:
             ("_cell", np.asarray(cells, np.int32)[cell]),
             ("_pixel", pixel),
             ("_depth", own * np.minimum(coverage * share, 1.0)),
-            ("_share", coverage * share / np.maximum(weight, 1e-300)[cell]),
+            ("_share", counted * share / np.maximum(weight, 1e-300)[cell]),
             ("_before", np.ones(len(cell))),
         ):
             setattr(self, name, np.concatenate([getattr(self, name), values[open_ones]]))
-        return Outline(np.where(whole & (weight > 0.0), pixels, weight * final), opacity, nearest)
+        return Outline(np.where(exact, pixels, weight * final), opacity, nearest, whole)
 
     def remove(self, chosen: NDArray[np.bool_]) -> None:
         """Take away tetrahedra; ``chosen`` is a mask by their numbers."""
@@ -179,6 +194,14 @@ class AlphaBuffer:
         return before
 
 
+def fitting(cells: int, finest: int) -> int:
+    """Longer side, in pixels, of a buffer for a number of tetrahedra."""
+    wanted = COARSEST
+    while wanted < finest and wanted < _ACROSS * np.sqrt(cells):
+        wanted *= 2
+    return min(wanted, finest)
+
+
 class Buffers:
     """Alpha buffers as fine as what is drawn into them: a few large tetrahedra need no more than a few pixels each.
 
@@ -199,10 +222,7 @@ class Buffers:
 
     def fit(self, buffer: AlphaBuffer | None, cells: int) -> AlphaBuffer:
         """The buffer itself if it is fine enough for a number of tetrahedra, or a finer one that is empty."""
-        wanted = COARSEST
-        while wanted < self.resolution and wanted < _ACROSS * np.sqrt(cells):
-            wanted *= 2
-        wanted = min(wanted, self.resolution)
+        wanted = fitting(cells, self.resolution)
         if buffer is not None and max(buffer.width, buffer.height) >= wanted:
             return buffer
         return AlphaBuffer(self.camera, wanted, None if self.depth is None else self._reduced(wanted))
