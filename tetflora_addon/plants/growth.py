@@ -7,18 +7,17 @@ A branch is also a *sub-plant*: it and all that grows on it. Every function take
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
-
 import numpy as np
 from numpy.typing import NDArray
 
+from .axes import Axes, axes
+from .branches import Branches
 from .crown_shapes import crown_ratio
 from .hashing import Draw, child_key, key_of_seed, signed, uniform
 from .profiles import profile
 from .rows import FORK, LATERAL, SPUR, ranged, varied
 from .seeds import Seeds
-from .vectors import by_component, columns, gathered
+from .vectors import columns
 
 _PLACE_JITTER = 0.5  # of the distance from one child to the next: together children lie evenly along the whole parent
 # Each sort of children has child indices of its own, below those of leaves.
@@ -27,118 +26,6 @@ _DRAWN_PATH = 1 << 29
 _COUNT = (Draw.BRANCHES, Draw.FORKS, Draw.SPURS)
 _ROUND = (Draw.BRANCHES_ROUND, Draw.FORKS_ROUND, Draw.SPURS_ROUND)
 _START = (Draw.BRANCH_START, Draw.BRANCH_START, Draw.SPUR_START)
-
-
-@dataclass(frozen=True)
-class Branches:
-    """Branches (or sub-plants) as a structure of arrays.
-
-    Attributes
-    ----------
-    row : (n,) int32
-        Row of the parameter table: which kind of branch of which species.
-    plant : (n,) int32
-        Index of the plant that it belongs to.
-    key : (n,) uint64
-        Hash of the plant's seed and the path of child indices.
-    position : (n, 3) float64
-        Base, metres, world space.
-    frame : (n, 3, 3) float64
-        Columns are the local axes at the base; the branch sets out along the third, the first points away from the
-        parent.
-    length, radius : (n,) float64
-        Length of the axis and radius at its base, metres.
-    scale : (n,) float64
-        Scale of the plant, which leaves take as well.
-    vigour : (n,) float64
-        Length as the crown's shape has it here, relative to the longest; numbers of branches and leaves may follow it.
-    outward : (n,) float64
-        Where it leaves its limb (the branch of order 1), 0 inside the crown to 1 outside; 0 for limbs and trunks
-        themselves, along which it grows.
-    """
-
-    row: NDArray[np.int32]
-    plant: NDArray[np.int32]
-    key: NDArray[np.uint64]
-    position: NDArray[np.float64]
-    frame: NDArray[np.float64]
-    length: NDArray[np.float64]
-    radius: NDArray[np.float64]
-    scale: NDArray[np.float64]
-    vigour: NDArray[np.float64]
-    outward: NDArray[np.float64]
-
-    def __len__(self) -> int:
-        return len(self.row)
-
-    def take(self, index: NDArray | slice) -> Branches:
-        """Selection by indices, mask or slice."""
-        return Branches(*(gathered(getattr(self, f.name), index) for f in fields(self)))
-
-    @classmethod
-    def concatenate(cls, parts: Sequence[Branches]) -> Branches:
-        """All branches of several in one."""
-        return cls(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(cls)))
-
-    @classmethod
-    def empty(cls) -> Branches:
-        """No branches."""
-        floats = [np.zeros(s) for s in ((0, 3), (0, 3, 3), 0, 0, 0, 0, 0)]
-        return cls(np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros(0, np.uint64), *floats)
-
-
-@dataclass(frozen=True)
-class Axes:
-    """Centre lines of branches: straight segments.
-
-    Attributes
-    ----------
-    knots : (n, S + 1, 3) float64
-        Ends of the segments; a branch with fewer than S segments repeats its last knot.
-    frames : (n, S, 3, 3) float64
-        Local axes along each segment.
-    segments : (n,) int64
-        Number of segments.
-    """
-
-    knots: NDArray[np.float64]
-    frames: NDArray[np.float64]
-    segments: NDArray[np.int64]
-
-    def take(self, index: NDArray | slice) -> Axes:
-        """Selection by indices or slice."""
-        return Axes(_selected(self.knots, index), _selected(self.frames, index), self.segments[index])
-
-    def at(self, branch: NDArray[np.integer], t: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
-        """Positions (m, 3) and frames (m, 3, 3) at the fractions t (m,) of the axes of branches (m,)."""
-        number = self.segments[branch]
-        along = t * number
-        segment = np.minimum(along.astype(np.int64), number - 1)
-        start = self.knot(branch, segment)
-        step = self.knot(branch, segment + 1) - start
-        return start + (along - segment)[:, None] * step, self.frame(branch, segment)
-
-    def knot(self, branch: NDArray[np.integer], number: NDArray[np.integer]) -> NDArray[np.float64]:
-        """Positions (m, 3) of knots given by branch (m,) and number (m,)."""
-        return _picked(self.knots, branch, number)
-
-    def frame(self, branch: NDArray[np.integer], segment: NDArray[np.integer]) -> NDArray[np.float64]:
-        """Frames (m, 3, 3) of segments given by branch (m,) and number (m,)."""
-        return _picked(self.frames, branch, segment)
-
-
-def _selected(array: NDArray, index: NDArray | slice) -> NDArray:
-    """``array[index]`` of an array whose first axis is the last in memory and whose second the one before."""
-    if isinstance(index, slice):
-        return array[index]
-    return np.moveaxis(np.take(np.moveaxis(array, (1, 0), (-2, -1)), index, axis=-1), (-2, -1), (1, 0))
-
-
-def _picked(array: NDArray, first: NDArray[np.integer], second: NDArray[np.integer]) -> NDArray:
-    """``array[first, second]`` of an array whose first axis is the last in memory and whose second the one before."""
-    flat = np.moveaxis(array, (1, 0), (-2, -1))
-    flat = flat.reshape(*flat.shape[:-2], -1)
-    return np.moveaxis(np.take(flat, second * len(array) + first, axis=-1), -1, 0)
 
 
 def turned(frame: NDArray[np.float64], azimuth: NDArray[np.float64], angle: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -181,51 +68,6 @@ def trunks(rows: NDArray[np.void], seeds: Seeds) -> Branches:
     return Branches(row, plant, key, seeds.position, frame, length, radius, scale, one, none)
 
 
-def axes(rows: NDArray[np.void], branches: Branches) -> Axes:
-    """Centre lines; each joint bends by its share of the order's curvature, and turns to the sky or the ground."""
-    segments = rows["segments"][branches.row]
-    most = int(segments.max(initial=1))
-    n = len(branches)
-    # Branches last in memory, see `vectors`. Zeros, not empty: padding must be finite.
-    knots = np.moveaxis(np.zeros((3, most + 1, n)), (1, 2), (1, 0))
-    frames = np.moveaxis(np.zeros((3, 3, most, n)), (2, 3), (1, 0))
-    step = (branches.length / segments)[:, None]
-    bend = rows["curvature"][branches.row] / segments[:, None]
-    outer_bend = rows["curvature_tip"][branches.row] / segments
-    attraction = rows["attraction"][branches.row]
-    attracted = np.flatnonzero(attraction.any(axis=1))
-    pull = varied(attraction[attracted], branches.key[attracted], Draw.ATTRACTION) / segments[attracted]
-    frame, knot = by_component(branches.frame), by_component(branches.position)
-    knots[:, 0] = knot
-    for s in range(most):
-        if s:
-            # The joint in the middle of an even number of segments belongs to the outer half.
-            back = np.where(2 * s < segments, bend[:, 0], outer_bend) + bend[:, 1] * signed(
-                branches.key, Draw.BEND + 2 * s
-            )
-            aside = bend[:, 1] * signed(branches.key, Draw.BEND + 2 * s + 1)
-            frame = _bent(frame, -back, aside)
-            if len(attracted) == n:
-                frame = _pulled(frame, pull)
-            elif len(attracted):
-                frame[attracted] = _pulled(gathered(frame, attracted), pull)
-        knot = np.where((s < segments)[:, None], knot + step * frame[:, :, 2], knot)
-        frames[:, s], knots[:, s + 1] = frame, knot
-    by_hand = np.flatnonzero(rows["drawn"][branches.row])
-    if len(by_hand):
-        knots[by_hand], frames[by_hand] = _drawn_axes(rows, branches.take(by_hand), most)
-    return Axes(knots, frames, segments)
-
-
-def _drawn_axes(rows: NDArray[np.void], branches: Branches, most: int) -> tuple[NDArray, NDArray]:
-    """Knots (n, most + 1, 3) and frames (n, most, 3, 3) of branches drawn by hand, where their plants stand."""
-    local, line = rows["frames"][branches.row], rows["knots"][branches.row]
-    turn = branches.frame @ local[:, 0].transpose(0, 2, 1)
-    scale = branches.length / rows["size"][branches.row, 0]
-    knots = np.einsum("nij,nsj->nsi", turn * scale[:, None, None], line - line[:, :1]) + branches.position[:, None]
-    return knots[:, : most + 1], (turn[:, None] @ local)[:, :most]
-
-
 def drawn_children(rows: NDArray[np.void], plants: Branches) -> tuple[Branches, NDArray[np.int64]]:
     """Branches that are drawn by hand, of plants whose form is, and the index of each one's plant."""
     first, last = rows["drawn_rows"][plants.row].T
@@ -253,30 +95,6 @@ def chosen_drawn(
         vigour,
         outward,
     )
-
-
-def _bent(frame: NDArray[np.float64], pitch: NDArray[np.float64], yaw: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rotate about the local y by pitch, then about the new local x by yaw."""
-    x, y, z = frame[:, :, 0], frame[:, :, 1], frame[:, :, 2]
-    cp, sp, cy, sy = (f(v)[:, None] for v in (pitch, yaw) for f in (np.cos, np.sin))
-    forward = sp * x + cp * z
-    return columns(cp * x - sp * z, cy * y + sy * forward, cy * forward - sy * y)
-
-
-def _pulled(frame: NDArray[np.float64], pull: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Turn frames to the sky by an angle (n,) times the sine of their tilt, about the level axis (Rodrigues)."""
-    level = np.hypot(frame[:, 0, 2], frame[:, 1, 2])
-    safe = np.maximum(level, 1e-12)
-    kx, ky = frame[:, 1, 2] / safe, -frame[:, 0, 2] / safe  # z × sky
-    cos, sin = np.cos(pull * level), np.sin(pull * level)
-    out = np.empty_like(frame)
-    for column in range(3):
-        vx, vy, vz = frame[:, :, column].T
-        along = (1 - cos) * (kx * vx + ky * vy)
-        out[:, 0, column] = cos * vx + sin * (ky * vz) + kx * along
-        out[:, 1, column] = cos * vy - sin * (kx * vz) + ky * along
-        out[:, 2, column] = cos * vz + sin * (kx * vy - ky * vx)
-    return out
 
 
 def fullness(rows: NDArray[np.void], branches: Branches) -> NDArray[np.float64]:

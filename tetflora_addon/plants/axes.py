@@ -1,0 +1,148 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Centre lines of branches: straight segments that bend at joints, and turn to the sky or the ground."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .branches import Branches
+from .hashing import Draw, signed
+from .rows import varied
+from .vectors import by_component, columns, gathered
+
+
+@dataclass(frozen=True)
+class Axes:
+    """Centre lines of branches: straight segments.
+
+    Attributes
+    ----------
+    knots : (n, S + 1, 3) float64
+        Ends of the segments; a branch with fewer than S segments repeats its last knot.
+    frames : (n, S, 3, 3) float64
+        Local axes along each segment.
+    segments : (n,) int64
+        Number of segments.
+    """
+
+    knots: NDArray[np.float64]
+    frames: NDArray[np.float64]
+    segments: NDArray[np.int64]
+
+    def take(self, index: NDArray | slice) -> Axes:
+        """Selection by indices or slice."""
+        return Axes(_selected(self.knots, index), _selected(self.frames, index), self.segments[index])
+
+    def at(self, branch: NDArray[np.integer], t: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
+        """Positions (m, 3) and frames (m, 3, 3) at the fractions t (m,) of the axes of branches (m,)."""
+        number = self.segments[branch]
+        along = t * number
+        segment = np.minimum(along.astype(np.int64), number - 1)
+        start = self.knot(branch, segment)
+        step = self.knot(branch, segment + 1) - start
+        return start + (along - segment)[:, None] * step, self.frame(branch, segment)
+
+    def knot(self, branch: NDArray[np.integer], number: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Positions (m, 3) of knots given by branch (m,) and number (m,)."""
+        return _picked(self.knots, branch, number)
+
+    def frame(self, branch: NDArray[np.integer], segment: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Frames (m, 3, 3) of segments given by branch (m,) and number (m,)."""
+        return _picked(self.frames, branch, segment)
+
+
+def _selected(array: NDArray, index: NDArray | slice) -> NDArray:
+    """``array[index]`` of an array whose first axis is the last in memory and whose second the one before."""
+    if isinstance(index, slice):
+        return array[index]
+    return _to_front(np.take(_to_back(array), index, axis=-1))
+
+
+def _picked(array: NDArray, first: NDArray[np.integer], second: NDArray[np.integer]) -> NDArray:
+    """``array[first, second]`` of an array whose first axis is the last in memory and whose second the one before."""
+    flat = _to_back(array)
+    flat = flat.reshape(*flat.shape[:-2], -1)
+    picked = np.take(flat, second * len(array) + first, axis=-1)
+    return picked.transpose(-1, *range(picked.ndim - 1))
+
+
+def _to_back(array: NDArray) -> NDArray:
+    """(n, S, ...) to (..., S, n), as it lies in memory."""
+    return array.transpose(*range(2, array.ndim), 1, 0)
+
+
+def _to_front(array: NDArray) -> NDArray:
+    """(..., S, n) to (n, S, ...)."""
+    return array.transpose(-1, -2, *range(array.ndim - 2))
+
+
+def axes(rows: NDArray[np.void], branches: Branches) -> Axes:
+    """Centre lines; each joint bends by its share of the order's curvature, and turns to the sky or the ground."""
+    segments = rows["segments"][branches.row]
+    most = int(segments.max(initial=1))
+    n = len(branches)
+    # Branches last in memory, see `vectors`. Zeros, not empty: padding must be finite.
+    knots, frames = _to_front(np.zeros((3, most + 1, n))), _to_front(np.zeros((3, 3, most, n)))
+    step = (branches.length / segments)[:, None]
+    bend = rows["curvature"][branches.row] / segments[:, None]
+    outer_bend = rows["curvature_tip"][branches.row] / segments
+    attraction = rows["attraction"][branches.row]
+    attracted = np.flatnonzero(attraction.any(axis=1))
+    pull = varied(attraction[attracted], branches.key[attracted], Draw.ATTRACTION) / segments[attracted]
+    frame, knot = by_component(branches.frame), by_component(branches.position)
+    knots[:, 0] = knot
+    for s in range(most):
+        if s:
+            # The joint in the middle of an even number of segments belongs to the outer half.
+            back = np.where(2 * s < segments, bend[:, 0], outer_bend) + bend[:, 1] * signed(
+                branches.key, Draw.BEND + 2 * s
+            )
+            aside = bend[:, 1] * signed(branches.key, Draw.BEND + 2 * s + 1)
+            frame = _bent(frame, -back, aside)
+            if len(attracted) == n:
+                frame = _pulled(frame, pull)
+            elif len(attracted):
+                frame[attracted] = _pulled(gathered(frame, attracted), pull)
+        knot = np.where((s < segments)[:, None], knot + step * frame[:, :, 2], knot)
+        frames[:, s], knots[:, s + 1] = frame, knot
+    by_hand = np.flatnonzero(rows["drawn"][branches.row])
+    if len(by_hand):
+        knots[by_hand], frames[by_hand] = _drawn_axes(rows, branches.take(by_hand), most)
+    return Axes(knots, frames, segments)
+
+
+def _drawn_axes(rows: NDArray[np.void], branches: Branches, most: int) -> tuple[NDArray, NDArray]:
+    """Knots (n, most + 1, 3) and frames (n, most, 3, 3) of branches drawn by hand, where their plants stand."""
+    local, line = rows["frames"][branches.row], rows["knots"][branches.row]
+    turn = branches.frame @ local[:, 0].transpose(0, 2, 1)
+    scale = branches.length / rows["size"][branches.row, 0]
+    knots = np.einsum("nij,nsj->nsi", turn * scale[:, None, None], line - line[:, :1]) + branches.position[:, None]
+    return knots[:, : most + 1], (turn[:, None] @ local)[:, :most]
+
+
+def _bent(frame: NDArray[np.float64], pitch: NDArray[np.float64], yaw: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotate about the local y by pitch, then about the new local x by yaw."""
+    x, y, z = frame[:, :, 0], frame[:, :, 1], frame[:, :, 2]
+    cp, sp, cy, sy = (f(v)[:, None] for v in (pitch, yaw) for f in (np.cos, np.sin))
+    forward = sp * x + cp * z
+    return columns(cp * x - sp * z, cy * y + sy * forward, cy * forward - sy * y)
+
+
+def _pulled(frame: NDArray[np.float64], pull: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Turn frames to the sky by an angle (n,) times the sine of their tilt, about the level axis (Rodrigues)."""
+    level = np.hypot(frame[:, 0, 2], frame[:, 1, 2])
+    safe = np.maximum(level, 1e-12)
+    kx, ky = frame[:, 1, 2] / safe, -frame[:, 0, 2] / safe  # z × sky
+    cos, sin = np.cos(pull * level), np.sin(pull * level)
+    out = np.empty_like(frame)
+    for column in range(3):
+        vx, vy, vz = frame[:, :, column].T
+        along = (1 - cos) * (kx * vx + ky * vy)
+        out[:, 0, column] = cos * vx + sin * (ky * vz) + kx * along
+        out[:, 1, column] = cos * vy - sin * (kx * vz) + ky * along
+        out[:, 2, column] = cos * vz + sin * (kx * vy - ky * vx)
+    return out

@@ -1,0 +1,71 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Branches, or what grows on them as well, as a structure of arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .vectors import gathered
+
+
+@dataclass(frozen=True)
+class Branches:
+    """Branches (or sub-plants) as a structure of arrays.
+
+    Attributes
+    ----------
+    row : (n,) int32
+        Row of the parameter table: which kind of branch of which species.
+    plant : (n,) int32
+        Index of the plant that it belongs to.
+    key : (n,) uint64
+        Hash of the plant's seed and the path of child indices.
+    position : (n, 3) float64
+        Base, metres, world space.
+    frame : (n, 3, 3) float64
+        Columns are the local axes at the base; the branch sets out along the third, the first points away from the
+        parent.
+    length, radius : (n,) float64
+        Length of the axis and radius at its base, metres.
+    scale : (n,) float64
+        Scale of the plant, which leaves take as well.
+    vigour : (n,) float64
+        Length as the crown's shape has it here, relative to the longest; numbers of branches and leaves may follow it.
+    outward : (n,) float64
+        Where it leaves its limb (the branch of order 1), 0 inside the crown to 1 outside; 0 for limbs and trunks
+        themselves, along which it grows.
+    """
+
+    row: NDArray[np.int32]
+    plant: NDArray[np.int32]
+    key: NDArray[np.uint64]
+    position: NDArray[np.float64]
+    frame: NDArray[np.float64]
+    length: NDArray[np.float64]
+    radius: NDArray[np.float64]
+    scale: NDArray[np.float64]
+    vigour: NDArray[np.float64]
+    outward: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+    def take(self, index: NDArray | slice) -> Branches:
+        """Selection by indices, mask or slice."""
+        return Branches(*(gathered(getattr(self, f.name), index) for f in fields(self)))
+
+    @classmethod
+    def concatenate(cls, parts: Sequence[Branches]) -> Branches:
+        """All branches of several in one."""
+        return cls(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(cls)))
+
+    @classmethod
+    def empty(cls) -> Branches:
+        """No branches."""
+        floats = [np.zeros(s) for s in ((0, 3), (0, 3, 3), 0, 0, 0, 0, 0)]
+        return cls(np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros(0, np.uint64), *floats)
