@@ -13,7 +13,19 @@ from pathlib import Path
 from devtools import session
 
 #: Benchmarks by name, in the order of ``all``.
-NAMES = ("row80", "forms", "plants", "bounds", "averages", "looks", "tetrahedra", "landscape", "growth", "budget")
+NAMES = (
+    "row80",
+    "forms",
+    "plants",
+    "bounds",
+    "averages",
+    "looks",
+    "tetrahedra",
+    "landscape",
+    "growth",
+    "budget",
+    "stages",
+)
 
 
 def main() -> int:
