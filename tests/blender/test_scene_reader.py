@@ -108,7 +108,6 @@ def test_a_parented_and_animated_camera_is_read_where_it_is():
     ("break_it", "says"),
     [
         (lambda scene, obj: setattr(scene, "camera", None), "no active camera"),
-        (lambda scene, obj: setattr(obj.data, "type", 'PANO'), "neither perspective nor orthographic"),
         (lambda scene, obj: setattr(scene, "camera", add_plant("empty")), "but not a camera"),
         (lambda scene, obj: setattr(obj, "scale", (0.0, 1.0, 1.0)), "scale 0"),
         (lambda scene, obj: setattr(obj, "location", (float("nan"), 0.0, 0.0)), "no valid position"),

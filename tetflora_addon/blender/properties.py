@@ -17,6 +17,7 @@ from bpy.props import (
 )
 
 from ..refinement.settings import RefinementSettings
+from .explicit_objects import PROPERTY as EXPLICIT
 from .plant_form import FORM_TYPES
 from .qualities import quality_number, set_quality
 from .species_choice import SpeciesChoice
@@ -98,6 +99,7 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
         ),
         options=set(),
     )
+    is_explicit: BoolProperty(**EXPLICIT)
 
 
 class TetFloraMixEntry(bpy.types.PropertyGroup, SpeciesChoice):
@@ -304,6 +306,7 @@ class TetFloraScene(bpy.types.PropertyGroup):
         soft_max=256.0,
         precision=1,
     )
+    anchored: BoolProperty(name="Anchored in the World", description="Divide space alike in all frames of a film")
     quality: EnumProperty(
         name="Quality",
         description="How fine the result is; sets the cutoff, the limit for leaves, the facets and the visibility",

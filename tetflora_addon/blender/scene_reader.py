@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from ..plants.hashing import child_key, key_of_seed
 from ..plants.seeds import Seeds
-from ..refinement.camera import Camera
+from .camera_reader import read_camera as read_camera
 from .plant_copies import Copies, copies_of, may_instance
 from .plant_fields import Plants, read_field
 from .plant_kinds import kind_of, species_of
@@ -30,57 +30,6 @@ _NAMED = 3  # objects that a message names before it only counts
 
 class NoPlantsError(SceneError):
     """There is nothing to refine; a renderer may pass over it in silence."""
-
-
-def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Camera:
-    """The active camera as it is evaluated now.
-
-    ``camera.view_frame`` already knows about lens shift, sensor fit and pixel aspect. A scaled or sheared camera is
-    taken without scale and shear, as renderers do.
-
-    Raises
-    ------
-    SceneError
-        No camera, not a camera, panoramic, no extent in depth, or a transform that is not a number.
-    """
-    if scene.camera is None:
-        raise SceneError(
-            f'The scene "{scene.name}" has no active camera; add one (Add > Camera) '
-            "or choose one in the scene's properties"
-        )
-    evaluated = scene.camera.evaluated_get(depsgraph)
-    name, data = scene.camera.name, evaluated.data
-    if scene.camera.type != 'CAMERA':
-        raise SceneError(
-            f'"{name}" is the scene\'s active camera but not a camera; choose one in the scene\'s properties'
-        )
-    if data.type not in {'PERSP', 'ORTHO'}:
-        raise SceneError(
-            f'The camera "{name}" is neither perspective nor orthographic; change its type under Lens in its properties'
-        )
-    if not 0.0 < data.clip_start < data.clip_end:
-        raise SceneError(f'The camera "{name}" sees nothing: make its Clip End larger than its Clip Start')
-    corners = np.array(data.view_frame(scene=scene))  # (4, 3), camera space
-    picture = corners[:, :2] / -corners[:, 2:] if data.type == 'PERSP' else corners[:, :2]
-    (left, bottom), (right, top) = picture.min(axis=0), picture.max(axis=0)
-    matrix = world_matrix(scene.camera, depsgraph)
-    frame, _, sound = frames_of(matrix[None, :3, :3])
-    if not (sound[0] and np.isfinite(matrix).all()):
-        raise SceneError(f'The camera "{name}" has scale 0 or no valid position; press Alt S and Alt G on it')
-    if np.linalg.det(matrix[:3, :3]) < 0.0:
-        # A mirrored camera sees the same pyramid from the other side.
-        left, right = -right, -left
-    share = scene.render.resolution_percentage / 100.0
-    return Camera(
-        kind=data.type,
-        position=matrix[:3, 3].copy(),
-        frame=frame[0],
-        window=(float(left), float(right), float(bottom), float(top)),
-        near=float(data.clip_start),
-        far=float(data.clip_end),
-        width=max(int(scene.render.resolution_x * share), 1),
-        height=max(int(scene.render.resolution_y * share), 1),
-    )
 
 
 def read_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Seeds:
