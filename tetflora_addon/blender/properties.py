@@ -17,7 +17,6 @@ from bpy.props import (
 )
 
 from ..refinement.settings import RefinementSettings
-from .explicit_objects import PROPERTY as EXPLICIT
 from .plant_form import FORM_TYPES
 from .qualities import quality_number, set_quality
 from .species_choice import SpeciesChoice
@@ -99,7 +98,6 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
         ),
         options=set(),
     )
-    is_explicit: BoolProperty(**EXPLICIT)
 
 
 class TetFloraMixEntry(bpy.types.PropertyGroup, SpeciesChoice):
