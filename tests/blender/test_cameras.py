@@ -13,13 +13,7 @@ from tests.blender import renders
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, part
 
 
-@pytest.fixture(autouse=True)
-def no_motion_blur():
-    """Settings of renders outlive a test."""
-    import bpy
-
-    yield
-    bpy.context.scene.render.use_motion_blur = False
+pytestmark = pytest.mark.usefixtures("clean_file")
 
 
 def _read():
@@ -158,3 +152,35 @@ def test_a_panorama_is_rendered_as_if_all_were_expanded():
     assert 0.02 < plants.mean() < 0.5
     assert np.abs(refined - expanded)[plants].mean() < 0.1 * np.abs(expanded - bare)[plants].mean() + 0.02
     assert refined[plants].mean() == pytest.approx(expanded[plants].mean(), rel=0.05)
+
+
+def test_longitudes_and_latitudes_are_those_of_cycles():
+    """A small dark square is where the engine says, right of the middle and left, above and below."""
+    import bpy
+
+    scene = bpy.context.scene
+    renders.small_scene(0.8, 4)
+    obj = add_camera(location=(1.0, -2.0, 1.0), rotation=(1.3, 0.2, 0.4))
+    obj.data.type, obj.data.panorama_type = 'PANO', 'EQUIRECTANGULAR'
+    obj.data.longitude_min, obj.data.longitude_max = -1.0, 1.5
+    obj.data.latitude_min, obj.data.latitude_max = -0.9, 0.6
+    scene.render.resolution_x, scene.render.resolution_y = 100, 60
+    square = add_mesh(size=0.25)
+    material = bpy.data.materials.new("black")
+    renders.compat().shader_tree(material).nodes["Principled BSDF"].inputs["Base Color"].default_value = (0, 0, 0, 1)
+    square.data.materials.append(material)
+    for longitude, latitude in ((0.9, 0.3), (-0.5, -0.6)):
+        depsgraph().update()
+        camera = _read()
+        towards = [
+            math.cos(latitude) * math.sin(longitude),
+            math.sin(latitude),
+            -math.cos(latitude) * math.cos(longitude),
+        ]
+        square.location = camera.position + 4.0 * camera.frame @ towards
+        square.rotation_euler = obj.rotation_euler
+        depsgraph().update()
+        rows, columns = np.nonzero(renders.picture().mean(axis=2) < 0.4)
+        left, right, bottom, top = camera.window
+        found = left + (columns.mean() + 0.5) * (right - left) / 100, bottom + (rows.mean() + 0.5) * (top - bottom) / 60
+        assert found == pytest.approx((longitude, latitude), abs=0.03)
