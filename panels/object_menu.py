@@ -17,6 +17,7 @@ class TETFLORA_MT_object(bpy.types.Menu):
         layout = self.layout
         layout.operator(ids.POPULATE, text="Populate with Plants", icon='OUTLINER_OB_POINTCLOUD')
         layout.operator(ids.MARK_OCCLUDER, text="Mark or Unmark as Hiding Plants", icon='MOD_MASK')
+        layout.operator(ids.MARK_EXPLICIT, text="Refine or Leave These Meshes", icon='MESH_ICOSPHERE')
         layout.operator(ids.USE_AS_FORM, icon='CURVE_DATA')
         layout.operator(ids.MARK_FIELD, text="Use or Stop Using as Field of Plants", icon='POINTCLOUD_DATA')
         layout.operator(ids.MAKE_FIELD, icon='POINTCLOUD_DATA')

@@ -5,6 +5,7 @@
 import bpy
 
 from ..operators import ids
+from ..operators.mark_explicit import can_be_explicit
 from .base import SidebarPanel, split_layout
 from .lists import TETFLORA_UL_leaf_objects, draw_list
 
@@ -29,6 +30,9 @@ class TETFLORA_PT_refinement(SidebarPanel, bpy.types.Panel):
             column.prop(cycles, "transparent_max_bounces", text="Transparent")
             if cycles.transparent_max_bounces < 128:
                 column.label(text="Too few: Cycles draws shells black", icon='ERROR')
+        active = context.active_object
+        if active is not None and (can_be_explicit(active) or active.tetflora.is_explicit):
+            layout.prop(active.tetflora, "is_explicit")
         layout.prop(settings, "refine_at_render")
         row = layout.row(align=True)
         row.scale_y = 1.4

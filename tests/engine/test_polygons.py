@@ -305,11 +305,14 @@ def test_tubes_are_solid_and_as_wide_as_they_are(radius: float, length: float, s
     np.testing.assert_allclose(one.width, 2 * radius, rtol=0.1)
 
 
-def test_cards_are_leaves_and_ground_is_neither_leaf_nor_solid() -> None:
-    card = surface(np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.2, 0], [0, 0.2, 0]], float), [[0, 1, 2], [0, 2, 3]])
-    assert card.leaf.all()
-    assert not card.solid.any()
-    assert card.width == pytest.approx(0.09, abs=0.01)
+def test_cards_are_leaves_and_ground_and_walls_are_neither_leaf_nor_solid() -> None:
+    card = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.2, 0], [0, 0.2, 0]], float)
+    many = np.concatenate([card + [i, 0, 0] for i in range(100)])
+    own = [[4 * i + k for k in face] for i in range(100) for face in ([0, 1, 2], [0, 2, 3])]
+    cards, wall = surface(many, own), surface(card, [[0, 1, 2, 3]])
+    assert cards.leaf.all()
+    assert not (cards.solid.any() or wall.solid.any() or wall.leaf.any())
+    assert cards.width == pytest.approx(0.09, abs=0.01)
     side = 20
     place = np.stack(np.meshgrid(np.arange(side), np.arange(side), indexing="ij"), -1).reshape(-1, 2)
     height = mix(np.arange(side * side).astype(np.uint64)) / 2**64

@@ -1,8 +1,16 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Results in the scene: a collection of objects that refinement makes, replaces and clears, and nothing else."""
+"""Results in the scene: a collection of objects that refinement makes, replaces and clears, and nothing else.
+
+Objects whose polygons are refined are hidden as long as the results are shown in their place. How visible they were is
+stored with them in custom properties, so that it outlives a file, a rename, and results that somebody deleted by hand;
+whatever removes results gives it back.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import bpy
 
@@ -13,8 +21,11 @@ from .node_tools import is_ours, tag
 #: Custom property of a result collection: 'VIEW' for what the artist keeps, 'RENDER' for what lives while rendering.
 PURPOSE = "tetflora_purpose"
 NAMES = {'VIEW': "TetFlora", 'RENDER': "TetFlora render"}
-#: Custom property of a result object: 'leaf', 'blossom', 'bark' or 'proxy'.
+#: Custom property of a result object: 'leaf', 'blossom', 'bark', 'explicit' or 'proxy'.
 KIND = "tetflora_kind"
+#: Custom properties of objects that results stand for: hide_render and hide_viewport as they were before.
+#: Results of a render come last and go first.
+HIDDEN = {'VIEW': "tetflora_hidden", 'RENDER': "tetflora_hidden_for_render"}
 
 
 class Results:
@@ -52,6 +63,13 @@ class Results:
         self.collection.objects.link(made)
         return made
 
+    def hide(self, originals: Sequence[bpy.types.Object]) -> None:
+        """Hide objects whose place the results take, in viewports too unless they are made for a render alone."""
+        for original in originals:
+            original[HIDDEN[self.purpose]] = [original.hide_render, original.hide_viewport]
+            original.hide_render = True
+            original.hide_viewport = original.hide_viewport or self.purpose == 'VIEW'
+
     def discard(self) -> None:
         """Remove all that was made."""
         if self.collection is not None:
@@ -71,8 +89,40 @@ def has_results(scene: bpy.types.Scene) -> bool:
 
 
 def remove_results(scene: bpy.types.Scene, purpose: str | None = None, keep: bpy.types.Collection | None = None) -> int:
-    """Remove result collections with what was made for them; returns the number of datablocks removed."""
+    """Remove result collections with what was made for them; returns the number of datablocks removed.
+
+    What was hidden for their sake is shown again as it was.
+    """
+    for which in ('RENDER', 'VIEW'):
+        if purpose in {None, which}:
+            _show_originals(scene, which)
     return sum(_remove_collection(scene, c) for c in result_collections(scene, purpose) if c != keep)
+
+
+def _show_originals(scene: bpy.types.Scene, purpose: str) -> None:
+    for original in _hidden(scene, purpose):
+        original.hide_render, original.hide_viewport = map(bool, original[HIDDEN[purpose]])
+        del original[HIDDEN[purpose]]
+
+
+def _hidden(scene: bpy.types.Scene, purpose: str) -> list[bpy.types.Object]:
+    return [o for o in scene.objects if HIDDEN[purpose] in o]
+
+
+@contextmanager
+def originals_shown(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Iterator[None]:
+    """While the scene is read, objects that results hide are as visible as the artist left them."""
+    before = {o: (o.hide_render, o.hide_viewport) for purpose in HIDDEN for o in _hidden(scene, purpose)}
+    for purpose in ('RENDER', 'VIEW'):
+        for o in _hidden(scene, purpose):
+            o.hide_render, o.hide_viewport = map(bool, o[HIDDEN[purpose]])
+    try:
+        if before:
+            depsgraph.update()
+        yield
+    finally:
+        for o, flags in before.items():
+            o.hide_render, o.hide_viewport = flags
 
 
 def _remove_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) -> int:

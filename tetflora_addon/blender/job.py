@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The whole way from a scene with plants to meshes and proxies, as steps that can be shown, stopped and undone."""
+"""The whole way from a scene of plants and meshes to results, as steps that can be shown, stopped and undone."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from .. import emission
+from .. import emission, explicit_emission
 from ..budget import afford
 from ..plants.compiled import Flora, compile_species
 from ..plants.growth import trunks
@@ -20,14 +20,17 @@ from ..refinement.camera import Camera
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 from ..refinement.loop import refine as refine_loop
+from ..refinement.polygons import Polygons
 from ..refinement.settings import RefinementSettings
 from ..refinement.statistics import Statistics, Stopwatch
-from .emit import Results, has_results, remove_results
+from .emit import Results, has_results, originals_shown, remove_results
+from .explicit_objects import Explicit, read_explicit
 from .leaf_forms import materials_of, resolved_species
 from .materials import proxy_material
 from .properties import settings_from
-from .scene_reader import read_camera, read_occluders, read_plants
+from .scene_reader import NoPlantsError, read_camera, read_occluders, read_plants
 from .shell_material import shell_material
+from .species_items import catalogue
 
 __all__ = ["Progress", "clear", "compile_for", "estimate", "has_results", "partition", "refine", "refine_steps"]
 
@@ -72,13 +75,47 @@ def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statisti
     TetFloraError
         As `refine`.
     """
-    seeds = read_plants(scene, depsgraph, depsgraph.view_layer)
-    flora = compile_for(seeds.identifiers, scene, depsgraph)
-    return Statistics(plants=len(seeds), polygons_full=_polygons_full(flora, seeds))
+    given = _read(scene, depsgraph, depsgraph.view_layer)
+    flora = compile_for(given.species, scene, depsgraph)
+    return Statistics(plants=len(given.seeds), polygons_full=_polygons_full(flora, given))
 
 
-def _polygons_full(flora: Flora, seeds: Seeds) -> int:
-    return round(flora.polygons[trunks(flora.rows, seeds).row].sum())
+@dataclass(frozen=True)
+class _Given:
+    """What a scene holds; ``explicit`` is None where no mesh takes part."""
+
+    seeds: Seeds
+    explicit: Explicit | None
+    occluders: np.ndarray
+
+    @property
+    def species(self) -> tuple[str, ...]:
+        """Species to compile; without plants any will do, since none grows."""
+        return self.seeds.identifiers or (min(catalogue()),)
+
+    @property
+    def polygons(self) -> Polygons | None:
+        """All explicit polygons."""
+        return None if self.explicit is None else Polygons.everything(self.explicit.meshes)
+
+
+def _read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> _Given:
+    with originals_shown(scene, depsgraph):
+        explicit = read_explicit(depsgraph, view_layer)
+        try:
+            seeds = read_plants(scene, depsgraph, view_layer)
+        except NoPlantsError:
+            if explicit is None:
+                raise
+            none = np.zeros(0)
+            frames = none.reshape(0, 3), none.reshape(0, 3, 3)
+            seeds = Seeds((), none.astype(np.int32), none.astype(np.int64), *frames, none)
+        return _Given(seeds, explicit, read_occluders(scene, depsgraph))
+
+
+def _polygons_full(flora: Flora, given: _Given) -> int:
+    plants = round(flora.polygons[trunks(flora.rows, given.seeds).row].sum())
+    return plants + (given.explicit.meshes.faces if given.explicit else 0)
 
 
 def refine_steps(
@@ -105,26 +142,28 @@ def refine_steps(
     Raises
     ------
     TetFloraError
-        No camera, no plants, unknown species, unusable plants or occluders; the message says which.
+        No camera, nothing to refine, unknown species, unusable plants or meshes; the message says which.
     """
     clock = Stopwatch()
     yield Progress(0.0, "Reading the scene")
     camera = read_camera(scene, depsgraph)
-    seeds = read_plants(scene, depsgraph, view_layer or depsgraph.view_layer)
-    occluders = read_occluders(scene, depsgraph)
+    given = _read(scene, depsgraph, view_layer or depsgraph.view_layer)
     settings = _settings(scene)
     clock.lap("read")
     yield Progress(0.02, "Compiling species")
-    flora = compile_for(seeds.identifiers, scene, depsgraph)
+    flora = compile_for(given.species, scene, depsgraph)
     clock.lap("compile")
-    statistics = Statistics(plants=len(seeds), polygons_full=_polygons_full(flora, seeds), seconds=clock.seconds)
+    full = _polygons_full(flora, given)
+    statistics = Statistics(plants=len(given.seeds), polygons_full=full, seconds=clock.seconds)
+    originals = []
     results = Results(scene, 'RENDER' if for_render else 'VIEW')
     try:
         if scene.tetflora.expand_everything:
             results.open()
-            yield from _write_blocks(results, flora, emission.expanded_blocks(flora, seeds), statistics, 0.05)
+            # Explicit objects are what they are; they stay in view by themselves.
+            yield from _write_blocks(results, flora, emission.expanded_blocks(flora, given.seeds), statistics, 0.05)
         else:
-            refinement = yield from _run_loop(flora, seeds, camera, settings, occluders)
+            refinement = yield from _run_loop(flora, given, camera, settings)
             facets = scene.tetflora.proxy_form != 'SHELLS'
             refinement, side = afford(flora, refinement, camera, settings, facets)
             clock.lap("refine")
@@ -132,6 +171,10 @@ def refine_steps(
             results.open()
             blocks = emission.explicit_blocks(flora, refinement)
             yield from _write_blocks(results, flora, blocks, statistics, _LOOP_SHARE)
+            if given.explicit is not None:
+                originals = given.explicit.originals
+                kept = explicit_emission.polygon_blocks(refinement, camera, side if facets else None)
+                yield from _write_polygons(results, given.explicit, kept, statistics)
             yield Progress(0.95, "Making proxies")
             _write_proxies(results, flora, refinement, camera, statistics, side if facets else None)
         clock.lap("emit")
@@ -139,6 +182,7 @@ def refine_steps(
         results.discard()
         raise
     remove_results(scene, results.purpose, keep=results.collection)
+    results.hide(originals)
     statistics.seconds = dict(clock.seconds)
     scene.tetflora.statistics = json.dumps(statistics.as_dict())
     return statistics
@@ -162,9 +206,8 @@ def partition(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[C
     TetFloraError
         As `refine_steps`.
     """
-    camera, seeds = read_camera(scene, depsgraph), read_plants(scene, depsgraph, depsgraph.view_layer)
-    flora = compile_for(seeds.identifiers, scene, depsgraph)
-    loop = _run_loop(flora, seeds, camera, _settings(scene), read_occluders(scene, depsgraph))
+    camera, given = read_camera(scene, depsgraph), _read(scene, depsgraph, depsgraph.view_layer)
+    loop = _run_loop(compile_for(given.species, scene, depsgraph), given, camera, _settings(scene))
     while True:
         try:
             next(loop)
@@ -197,9 +240,9 @@ def _settings(scene: bpy.types.Scene) -> RefinementSettings:
 
 
 def _run_loop(
-    flora: Flora, seeds: Seeds, camera: Camera, settings: RefinementSettings, occluders: np.ndarray
+    flora: Flora, given: _Given, camera: Camera, settings: RefinementSettings
 ) -> Generator[Progress, None, Refinement]:
-    loop = refine_loop(flora, seeds, camera, settings, occluders)
+    loop = refine_loop(flora, given.seeds, camera, settings, given.occluders, given.polygons)
     fraction = 0.05
     while True:
         try:
@@ -231,6 +274,17 @@ def _write_blocks(
         statistics.polygons_meshed += block.buffers.polygons
         statistics.memory_mb += block.buffers.nbytes / 1e6
         yield Progress(start + (0.95 - start) * block.fraction, f"Making polygons: {statistics.polygons_meshed:,}")
+
+
+def _write_polygons(
+    results: Results, explicit: Explicit, blocks: object, statistics: Statistics
+) -> Generator[Progress, None, None]:
+    for block in blocks:
+        name = explicit.meshes.surfaces[block.surface].name
+        results.add(f"{name} {block.number:03d}", "explicit", block.buffers, explicit.materials[block.surface])
+        statistics.polygons_meshed += block.buffers.polygons
+        statistics.memory_mb += block.buffers.nbytes / 1e6
+        yield Progress(0.95, f"Keeping polygons: {statistics.polygons_meshed:,}")
 
 
 def _write_proxies(

@@ -17,6 +17,7 @@ from bpy.props import (
 )
 
 from ..refinement.settings import RefinementSettings
+from .explicit_objects import PROPERTY as EXPLICIT
 from .plant_form import FORM_TYPES
 from .qualities import quality_number, set_quality
 from .species_choice import SpeciesChoice
@@ -98,6 +99,7 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
         ),
         options=set(),
     )
+    is_explicit: BoolProperty(**EXPLICIT)
 
 
 class TetFloraMixEntry(bpy.types.PropertyGroup, SpeciesChoice):

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 _SHEET = 2 * np.pi
 #: A face of a leaf has at least this share, squared, of the leaf's extent.
 _LEAF_SHARE = 1 / 16
+#: Leaves are many: none is larger than this share of the area of all in the mesh. A wall of one face is no leaf.
+_ONE_OF_MANY = 1 / 64
 #: How often curvature is averaged over neighbours: some faces around a branch.
 _ROUNDS = 6
 
@@ -36,7 +38,7 @@ def mesh_features(
     solid : (f,) bool
         Of a closed surface, or a tube with open ends: half of it is never seen.
     leaf : (f,) bool
-        Of a sheet that consists of few faces.
+        Of a sheet that consists of few faces, and is one of many.
     width : (f,) float64
         Of the leaf, or the local thickness of the solid, in the unit of the positions.
 
@@ -85,6 +87,7 @@ def mesh_features(
         local = np.where(curved > 0, 2.0 / np.maximum(curved, 1e-300), np.inf)
     width = np.where(solid, np.minimum(width, local), width)
     leaf = ~solid & (area >= _LEAF_SHARE * extent[component] ** 2)
+    leaf &= total[component] <= _ONE_OF_MANY * area[leaf].sum()
     return solid, leaf, width
 
 

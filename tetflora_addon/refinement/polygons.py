@@ -49,7 +49,7 @@ class Surface:
     solid : (f,) bool
         The face belongs to a closed or nearly closed surface, of which half is never seen; see `mesh_features`.
     leaf : (f,) bool
-        The face is a good part of what it is connected to, as that of a leaf is.
+        The face is a good part of one of many like things, such as leaves, of which several may be drawn as one.
     width : (f,) float64
         Width of the feature that the face belongs to, in the mesh's own units.
     attributes : mapping of str to (c, k) float32
