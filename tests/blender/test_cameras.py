@@ -12,7 +12,6 @@ import pytest
 from tests.blender import renders
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, part
 
-
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 

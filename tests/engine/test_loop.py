@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -68,17 +70,23 @@ CAMERAS = {
 
 @pytest.mark.parametrize("place", CAMERAS)
 @pytest.mark.parametrize("number", [1, 5])
-def test_cameras(place: str, number: int) -> None:
+@pytest.mark.parametrize("anchored", [False, True])
+def test_cameras(place: str, number: int, anchored: bool) -> None:
     flora = support.small_flora()
     eye, target, kind, view = CAMERAS[place]
     seeds = support.grove(number, 2.0)
-    _, result = run(flora, seeds, support.camera(eye, target, kind=kind, view=view))
+    _, result = run(flora, seeds, support.camera(eye, target, kind=kind, view=view), anchored=anchored)
     check(flora, result)
     assert result.complete
+    seen = (result.decision == Decision.PROXY) | (result.decision == Decision.EXPLICIT)
+    assert result.in_view[result.nodes[seen]].all()
     parts = measures(flora, expanded(flora, result.contents))
     whole = measures(flora, support.grown(flora, seeds)[1])
     assert parts == pytest.approx(whole, rel=1e-6)
-    if "turned away" in place:
+    if "turned away" in place and anchored:
+        # A piece of space that reaches into the view may keep a few polygons rather than be divided.
+        assert (result.amounts.polygons[result.decision != Decision.HIDDEN] <= RefinementSettings().few_polygons).all()
+    elif "turned away" in place:
         assert (result.decision == Decision.HIDDEN).all()
         assert result.passes == 1
     elif place == "before it":
@@ -87,6 +95,29 @@ def test_cameras(place: str, number: int) -> None:
         # A root that reaches to the eye may keep a few polygons rather than be divided.
         few = RefinementSettings().few_polygons
         assert (result.amounts.polygons[result.decision == Decision.EXPLICIT] <= few).all()
+
+
+@pytest.mark.parametrize("eye", [(0.2, 0.1, 2.2), (0.0, 0.0, 0.5), (0.0, 0.0, 2.0)])
+@pytest.mark.parametrize("sort", ["view", "anchored", "panorama"])
+def test_an_eye_in_the_crown(sort: str, eye: tuple[float, ...]) -> None:
+    """It ends, nothing is lost, and nothing large that is seen is left to a proxy."""
+    flora, seeds = support.small_flora(), support.grove(5, 2.0)
+    camera = support.camera(eye, (3, 3, 2), view=1.2, pixels=256, near=0.02)
+    if sort == "panorama":
+        sphere = (-np.pi, np.pi, -np.pi / 2, np.pi / 2)
+        camera = replace(camera, kind="PANO", window=sphere, width=512, height=256)
+    _, result = run(flora, seeds, camera, anchored=sort == "anchored")
+    check(flora, result)
+    assert result.complete
+    parts = measures(flora, expanded(flora, result.contents))
+    assert parts == pytest.approx(measures(flora, support.grown(flora, seeds)[1]), rel=1e-6)
+    large = feature_pixels(result.tree.vertices(result.nodes), result.amounts.width, camera) >= 0.5
+    seen = result.transmittance > RefinementSettings().hidden
+    assert not (large & seen & (result.decision == Decision.PROXY)).any()
+    assert not (seen & (result.decision == Decision.HIDDEN)).any()
+    if sort == "panorama":
+        assert result.in_view[result.nodes].all()
+        assert (result.decision == Decision.EXPLICIT).any()
 
 
 @given(st.integers(0, 2**31), st.sampled_from([1.0, 4.0, 10.0]))
