@@ -192,11 +192,13 @@ def _leaves_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDAr
     one = (size**2 + variation**2 / 3) * flora.leaf.area[row] * branches.scale**2
     facet = np.maximum(side**2, one)
     # Pieces of one branch have its key; the end's position tells them apart.
-    own = mix(branches.key ^ pieces.t1.view(np.uint64))
-    owner, index, key = _numbers(own, amounts.leaf_area, facet, _FACET_PATH, _LEAF_COUNT)
+    numbered = mix(branches.key ^ pieces.t1.view(np.uint64))
+    owner, index, key = _numbers(numbered, amounts.leaf_area, facet, _FACET_PATH, _LEAF_COUNT)
     first = np.maximum(pieces.t0, leaf_start(rows, branches))[owner]
     t = first + (pieces.t1[owner] - first) * uniform(key, _PLACE)
-    leaves = place_leaves(rows, branches, axes(rows, branches), owner, index, key, t)
+    bearers = np.flatnonzero(np.bincount(owner, minlength=len(branches)))  # far from all pieces get a facet
+    own = branches.take(bearers)
+    leaves = place_leaves(rows, own, axes(rows, own), np.searchsorted(bearers, owner), index, key, t)
     frame = settled(rows, row[owner], leaves.frame, leaves.light, _SKY)
     centre = leaves.position + 0.5 * leaves.size[:, None] * frame[:, :, 1]
     outward = outwardness(rows, branches, owner, t)
