@@ -267,10 +267,12 @@ def _count(statistics: Statistics, refinement: Refinement) -> None:
 def _write_blocks(
     results: Results, flora: Flora, blocks: object, statistics: Statistics, start: float
 ) -> Generator[Progress, None, None]:
+    materials: dict[tuple[int, str, int], list[bpy.types.Material]] = {}
     for block in blocks:
-        species = flora.species[block.species]
-        materials = materials_of(results.scene, species, block.kind, block.form)
-        results.add(f"{species.name} {block.kind} {block.number:03d}", block.kind, block.buffers, materials)
+        species, what = flora.species[block.species], (block.species, block.kind, block.form)
+        if what not in materials:
+            materials[what] = materials_of(results.scene, species, block.kind, block.form)
+        results.add(f"{species.name} {block.kind} {block.number:03d}", block.kind, block.buffers, materials[what])
         statistics.polygons_meshed += block.buffers.polygons
         statistics.memory_mb += block.buffers.nbytes / 1e6
         yield Progress(start + (0.95 - start) * block.fraction, f"Making polygons: {statistics.polygons_meshed:,}")
