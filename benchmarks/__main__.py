@@ -25,6 +25,7 @@ NAMES = (
     "growth",
     "budget",
     "stages",
+    "foreign",
 )
 
 

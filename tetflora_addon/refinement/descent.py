@@ -192,24 +192,24 @@ def _lowered_polygons(
 ) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
     """Nodes (n,) that polygons come down to whole, and whether they cross the planes of these."""
     cells, crosses = cells.copy(), np.zeros(len(polygons), bool)
-    loose = polygons.touching()
-    if slack is not None:
-        loose = np.maximum(loose, slack(polygons.centre))
-    reach = polygons.reach - loose
-    moving = np.arange(len(polygons))
-    while True:
-        moving = moving[tree.children[cells[moving], 0] >= 0]
-        if len(moving) == 0:
-            return cells, crosses
+    centre, reach, touching = polygons.centre, polygons.reach, polygons.touching()
+    moving = np.flatnonzero(tree.children[cells, 0] >= 0)
+    while len(moving):
         planes = tree.planes(cells[moving])
-        distance = np.einsum("ni,ni->n", polygons.centre[moving], planes[:, :3]) + planes[:, 3]
-        whole = np.abs(distance) > reach[moving]
+        distance = np.einsum("ni,ni->n", np.take(centre, moving, axis=0), planes[:, :3]) + planes[:, 3]
+        whole = np.abs(distance) > np.take(reach, moving)
+        # The sphere is no more than a first guess; the slack is not worked out for what it settles, nor are corners.
         unclear = np.flatnonzero(~whole)
-        if len(unclear):
-            # The sphere is no more than a first guess; corners tell. The larger part says where it goes.
-            low, high = polygons.take(moving[unclear]).distances(planes[unclear])
-            whole[unclear] = np.minimum(-low, high) <= loose[moving[unclear]]
-            distance[unclear] = high + low
+        some = moving[unclear]
+        loose = touching[some] if slack is None else np.maximum(touching[some], slack(centre[some]))
+        whole[unclear] = np.abs(distance[unclear]) > reach[some] - loose
+        left = np.flatnonzero(~whole[unclear])
+        if len(left):
+            low, high = polygons.take(some[left]).distances(planes[unclear[left]])
+            whole[unclear[left]] = np.minimum(-low, high) <= loose[left]
+            distance[unclear[left]] = high + low  # the larger part says where it goes
         crosses[moving[~whole]] = True
         moving, side = moving[whole], (distance[whole] >= 0).astype(np.int64)
-        cells[moving] = tree.children[cells[moving], side]
+        cells[moving] = at = tree.children[cells[moving], side]
+        moving = moving[tree.children[at, 0] >= 0]
+    return cells, crosses
