@@ -55,7 +55,7 @@ class TETFLORA_PT_limits(SidebarPanel, bpy.types.Panel):
         column = layout.column()
         column.active = not settings.expand_everything
         names = ("leaf_limit", "facet", "visibility_resolution", "few_polygons", "block", "hidden")
-        for name in (*names, "max_memory", "max_tetrahedra", "max_levels"):
+        for name in (*names, "max_memory", "max_tetrahedra", "max_levels", "max_passes"):
             column.prop(settings, name)
         layout.prop(settings, "expand_everything")
 

@@ -60,7 +60,10 @@ def test_refining_again_replaces():
     second = _refine(scene)
     assert sorted(o.name.split(".")[0] for o in _made(scene)) == names
     for key, value in first.as_dict().items():
-        if key != "seconds":
+        if key == "steps":
+            assert [{**s, "seconds": 0} for s in second.as_dict()[key]] == [{**s, "seconds": 0} for s in value]
+            assert len(value) == first.levels
+        elif key != "seconds":
             assert second.as_dict()[key] == value
 
 

@@ -21,6 +21,7 @@ from tetflora_addon.refinement.contents import Contents, bounding_box
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.loop import Refinement, refine
 from tetflora_addon.refinement.settings import RefinementSettings
+from tetflora_addon.refinement.steps import step_of
 from tetflora_addon.tetrahedra.geometry import volume
 from tetflora_addon.tetrahedra.roots import view_root
 
@@ -160,6 +161,37 @@ def test_tetrahedra_are_limited(limit: int) -> None:
     assert result.tree.tetrahedra_made <= limit
     assert not result.complete
     assert not (result.decision == Decision.SPLIT).any()
+
+
+def test_each_pass_is_told_and_can_be_the_last() -> None:
+    """Figures of every state on the way; a limit on passes gives the very same states, decided without divisions."""
+    flora = support.small_flora()
+    camera = support.camera((0, -14, 3), (0, 0, 1.5), pixels=256)
+    loop = refine(flora, support.grove(9, 2.0), camera, RefinementSettings(**FAST))
+    told = []
+    while True:
+        try:
+            told.append(step_of(next(loop)))
+        except StopIteration as stop:
+            told.append(step_of(stop.value))
+            break
+    assert len(told) > 2
+    for name in ("tetrahedra_made", "levels", "seconds"):
+        values = [getattr(step, name) for step in told]
+        assert values == sorted(values)
+        assert values[-1] > 0
+    assert [step.split > 0 for step in told] == [True] * (len(told) - 1) + [False]
+    assert all(step.memory_mb > 0 for step in told)
+    for passes, step in enumerate(told, start=1):
+        _, result = run(flora, support.grove(9, 2.0), camera, max_passes=passes)
+        check(flora, result)
+        last = step_of(result)
+        assert result.passes == passes
+        assert result.complete == (step.split == 0)
+        for name in ("tetrahedra_made", "subplants", "pieces"):
+            assert getattr(last, name) == getattr(step, name)
+        assert last.split == 0
+        assert last.proxy + last.explicit == step.proxy + step.explicit + step.split
 
 
 @pytest.mark.parametrize("limit", [0, 1, 4, 7])

@@ -23,6 +23,7 @@ from ..refinement.loop import refine as refine_loop
 from ..refinement.polygons import Polygons
 from ..refinement.settings import RefinementSettings
 from ..refinement.statistics import Statistics, Stopwatch
+from ..refinement.steps import step_of
 from .emit import Results, has_results, originals_shown, remove_results
 from .explicit_objects import Explicit, read_explicit
 from .leaf_forms import materials_of, resolved_species
@@ -163,7 +164,7 @@ def refine_steps(
             # Explicit objects are what they are; they stay in view by themselves.
             yield from _write_blocks(results, flora, emission.expanded_blocks(flora, given.seeds), statistics, 0.05)
         else:
-            refinement = yield from _run_loop(flora, given, camera, settings)
+            refinement = yield from _run_loop(flora, given, camera, settings, statistics)
             facets = scene.tetflora.proxy_form != 'SHELLS'
             refinement, side = afford(flora, refinement, camera, settings, facets)
             clock.lap("refine")
@@ -240,15 +241,20 @@ def _settings(scene: bpy.types.Scene) -> RefinementSettings:
 
 
 def _run_loop(
-    flora: Flora, given: _Given, camera: Camera, settings: RefinementSettings
+    flora: Flora, given: _Given, camera: Camera, settings: RefinementSettings, statistics: Statistics | None = None
 ) -> Generator[Progress, None, Refinement]:
+    """Refine; the statistics get a step for each pass."""
     loop = refine_loop(flora, given.seeds, camera, settings, given.occluders, given.polygons)
     fraction = 0.05
     while True:
         try:
             state = next(loop)
         except StopIteration as stop:
+            if statistics is not None:
+                statistics.steps.append(step_of(stop.value))
             return stop.value
+        if statistics is not None:
+            statistics.steps.append(step_of(state))
         waiting = int((state.decision == Decision.SPLIT).sum())
         fraction += 0.15 * (_LOOP_SHARE - fraction)  # nobody knows how many passes will follow
         yield Progress(

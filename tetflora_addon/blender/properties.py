@@ -19,7 +19,7 @@ from bpy.props import (
 from ..refinement.settings import RefinementSettings
 from .explicit_objects import PROPERTY as EXPLICIT
 from .plant_form import FORM_TYPES
-from .qualities import quality_number, set_quality
+from .refinement_properties import RefinementProperties
 from .species_choice import SpeciesChoice
 from .species_editor import TetFloraSpeciesEditor
 from .species_edits import TetFloraSpeciesEdit
@@ -34,8 +34,6 @@ STORAGE_ITEMS = (
     ('EMPTIES', "Empties", "An object for each plant: each can be moved by itself, many make Blender slow", 1),
     ('FIELD', "Field", "One object whose vertices are the plants: room for millions", 2),
 )
-
-_SETTINGS = RefinementSettings()
 
 
 _FORM = {
@@ -192,133 +190,10 @@ class TetFloraPopulate(bpy.types.PropertyGroup):
     mix_index: IntProperty(name="Active Species", options={'HIDDEN', 'SKIP_SAVE'})
 
 
-class TetFloraScene(bpy.types.PropertyGroup):
-    """Settings of a scene; the first block mirrors `RefinementSettings` field by field."""
+class TetFloraScene(RefinementProperties, bpy.types.PropertyGroup):
+    """Settings of a scene."""
 
     version: IntProperty(name="Version", description="Layout of these properties", options={'HIDDEN'})
-
-    cutoff: FloatProperty(
-        name="Cutoff",
-        description=(
-            "Side in pixels of the final picture under which space is divided no further. "
-            "Smaller is finer and slower; 1 to 4 pixels are hard to tell apart"
-        ),
-        subtype='PIXEL',
-        default=_SETTINGS.cutoff,
-        min=0.25,
-        soft_min=0.5,
-        soft_max=16.0,
-        max=1000.0,
-    )
-    leaf_limit: FloatProperty(
-        name="Leaf Limit",
-        description=(
-            "Width in pixels from which on leaves stay real leaves. Larger saves polygons; "
-            "above about half a pixel the loss shows"
-        ),
-        subtype='PIXEL',
-        default=_SETTINGS.leaf_limit,
-        min=0.05,
-        soft_max=4.0,
-        max=1000.0,
-    )
-    block: FloatProperty(
-        name="Block",
-        description=(
-            "Side in pixels from which on visible space is divided even where all of it becomes polygons, "
-            "so that hidden parts are found. Smaller finds more of them and takes longer"
-        ),
-        subtype='PIXEL',
-        default=_SETTINGS.block,
-        min=1.0,
-        soft_max=256.0,
-        max=10_000.0,
-    )
-    few_polygons: IntProperty(
-        name="Few Polygons",
-        description="Space that holds fewer polygons than this is divided no further",
-        default=_SETTINGS.few_polygons,
-        min=0,
-        soft_max=5_000,
-    )
-    hidden: FloatProperty(
-        name="Hidden Below",
-        description="Space counts as hidden if less than this share of it is seen. Larger saves polygons in thickets",
-        subtype='FACTOR',
-        default=_SETTINGS.hidden,
-        min=0.0,
-        max=1.0,
-    )
-    visibility_resolution: IntProperty(
-        name="Visibility",
-        description=(
-            "Longer side, in pixels, of the small picture that tells what hides what. "
-            "Larger tells it more exactly; time grows with its square"
-        ),
-        subtype='PIXEL',
-        default=_SETTINGS.visibility_resolution,
-        min=16,
-        soft_min=64,
-        soft_max=1024,
-        max=4096,
-    )
-    max_tetrahedra: IntProperty(
-        name="Most Tetrahedra",
-        description="Refinement stops before it makes more pieces of space than this. It bounds time and memory",
-        default=_SETTINGS.max_tetrahedra,
-        min=100,
-        soft_min=10_000,
-        soft_max=2_000_000,
-    )
-    max_levels: IntProperty(
-        name="Most Levels",
-        description="How often a piece of space may be halved at most",
-        default=_SETTINGS.max_levels,
-        min=1,
-        max=200,
-    )
-
-    facet: FloatProperty(
-        name="Facets",
-        description="Side in pixels of the small facets that proxies are drawn with. Larger is fewer and coarser",
-        subtype='PIXEL',
-        default=_SETTINGS.facet,
-        min=0.1,
-        soft_max=4.0,
-        max=100.0,
-    )
-    max_polygons: IntProperty(
-        name="Most Polygons",
-        description=(
-            "Polygons that may be made in all, those of proxies included; 0 for no limit. Where more would be needed, "
-            "those that are seen best are made first, and the rest becomes coarser proxies"
-        ),
-        default=_SETTINGS.max_polygons,
-        min=0,
-        soft_max=100_000_000,
-        step=100_000,
-    )
-    max_memory: FloatProperty(
-        name="Most Memory",
-        description="Gigabytes that the result may take in Blender and while it renders, about; 0 for no limit",
-        default=_SETTINGS.max_memory,
-        min=0.0,
-        soft_max=256.0,
-        precision=1,
-    )
-    anchored: BoolProperty(name="Anchored in the World", description="Divide space alike in all frames of a film")
-    quality: EnumProperty(
-        name="Quality",
-        description="How fine the result is; sets the cutoff, the limit for leaves, the facets and the visibility",
-        items=(
-            ('DRAFT', "Draft", "For setting up a scene: quick and coarse"),
-            ('PREVIEW', "Preview", "For judging light and composition"),
-            ('FINAL', "Final", "For the picture: no leaf of half a pixel is missing"),
-            ('CUSTOM', "Custom", "Values of your own"),
-        ),
-        get=quality_number,
-        set=set_quality,
-    )
 
     proxy_form: EnumProperty(
         name="Proxies",

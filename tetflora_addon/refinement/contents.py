@@ -10,7 +10,7 @@ modelled elsewhere.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -157,6 +157,16 @@ class Holdings:
         self._parts = [Contents.joined([_living(p) for p in self._parts])]
         return self._parts[0]
 
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Numbers of sub-plants, pieces and polygons."""
+        return tuple(int(sum((part.cells[kind] >= 0).sum() for part in self._parts)) for kind in range(len(_KINDS)))
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays, of what has been taken out but not yet left behind as well."""
+        return sum(_nbytes(part) for part in self._parts)
+
     def put(self, contents: Contents) -> None:
         """Add contents."""
         self._parts.append(contents)
@@ -178,6 +188,12 @@ class Holdings:
             kept.append(part)
         self._parts = kept
         return Contents.joined(out)
+
+
+def _nbytes(thing: object) -> int:
+    if isinstance(thing, np.ndarray):
+        return thing.nbytes
+    return sum(_nbytes(getattr(thing, f.name)) for f in fields(thing)) if is_dataclass(thing) else 0
 
 
 def _living(part: Contents) -> Contents:

@@ -37,6 +37,8 @@ class RefinementSettings:
         Refinement stops before it makes more.
     max_levels : int
         Generations of bisection at most.
+    max_passes : int
+        Passes of the loop at most, to show the state after each; 0 for no limit.
     facet : float
         Side of the facets of proxies, pixels.
     max_polygons : int
@@ -44,6 +46,9 @@ class RefinementSettings:
     anchored : bool
         The tetrahedra stay where they are in the world while the camera moves, see `tetrahedra.world_root`; otherwise
         they begin with the view. Panoramas are always anchored.
+    shadow_cutoff : float
+        Side, in pixels where it falls, under which the shadow of what is hidden gains nothing from being finer; 0 leaves
+        shadows as coarse as what is hidden, see `lights`.
     max_memory : float
         Gigabytes that they may take in Blender and a renderer together, about; 0 for no limit.
     """
@@ -58,10 +63,12 @@ class RefinementSettings:
     visibility_resolution: int = 256
     max_tetrahedra: int = 400_000
     max_levels: int = 60
+    max_passes: int = 0
     facet: float = 0.6
     max_polygons: int = 0
     max_memory: float = 0.0
     anchored: bool = False
+    shadow_cutoff: float = 0.0
 
 
 #: What the qualities of the panel stand for.

@@ -8,6 +8,40 @@ import time
 from dataclasses import asdict, dataclass, field
 
 
+@dataclass(frozen=True)
+class Step:
+    """The state after one pass through the loop.
+
+    Attributes
+    ----------
+    tetrahedra_made, levels : int
+        All tetrahedra ever made, and how deep their tree is.
+    split, proxy, hidden, explicit : int
+        Tetrahedra that hold something, by what was decided on them.
+    subplants, pieces, foreign : int
+        Things that they hold: sub-plants, pieces of branches, polygons of meshes that are not ours.
+    polygons : int
+        Expected polygons of what is to be explicit.
+    seconds : float
+        Wall clock since the loop began.
+    memory_mb : float
+        Megabytes of the tree and of what it holds.
+    """
+
+    tetrahedra_made: int
+    levels: int
+    split: int
+    proxy: int
+    hidden: int
+    explicit: int
+    subplants: int
+    pieces: int
+    foreign: int
+    polygons: int
+    seconds: float
+    memory_mb: float
+
+
 @dataclass
 class Statistics:
     """Counts and seconds of one refinement; ``as_dict`` is what JSON output holds.
@@ -34,6 +68,8 @@ class Statistics:
         Wall clock by stage: ``read``, ``compile``, ``refine``, ``emit``.
     memory_mb : float
         Estimated megabytes of the meshes that were handed to Blender.
+    steps : list of Step
+        One for each pass through the loop.
     """
 
     plants: int = 0
@@ -48,6 +84,7 @@ class Statistics:
     complete: bool = True
     seconds: dict[str, float] = field(default_factory=dict)
     memory_mb: float = 0.0
+    steps: list[Step] = field(default_factory=list)
 
     def as_dict(self) -> dict:
         """Plain dictionary, ready for JSON."""
