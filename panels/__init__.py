@@ -31,6 +31,7 @@ CLASSES = (
     refinement_panel.TETFLORA_PT_limits,
     refinement_panel.TETFLORA_PT_leaf_objects,
     statistics_panel.TETFLORA_PT_statistics,
+    statistics_panel.TETFLORA_PT_steps,
     add_menu.TETFLORA_MT_add_plant,
     plants_panel.TETFLORA_MT_species,
     object_menu.TETFLORA_MT_object,

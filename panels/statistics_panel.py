@@ -64,3 +64,33 @@ class TETFLORA_PT_statistics(SidebarPanel, bpy.types.Panel):
         for name, value in rows:
             names.label(text=name)
             values.label(text=value)
+
+
+@lru_cache(maxsize=8)
+def steps_of(text: str) -> tuple[tuple[str, ...], ...]:
+    """Rows of the table of passes: number, tetrahedra, those to divide, polygons, seconds; none if there are none."""
+    try:
+        return tuple(
+            (f"{n}", *(f"{s[key]:,}" for key in ("tetrahedra_made", "split", "polygons")), f"{s['seconds']:.1f}")
+            for n, s in enumerate(json.loads(text)["steps"], start=1)
+        )
+    except (ValueError, KeyError, TypeError):
+        return ()
+
+
+class TETFLORA_PT_steps(SidebarPanel, bpy.types.Panel):
+    """Passes."""
+
+    bl_label = "Passes"
+    bl_parent_id = "TETFLORA_PT_statistics"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return bool(steps_of(context.scene.tetflora.statistics))
+
+    def draw(self, context: bpy.types.Context) -> None:
+        grid = self.layout.grid_flow(row_major=True, columns=5, even_columns=False, align=True)
+        for row in (("Pass", "Tetrahedra", "To divide", "Polygons", "s"), *steps_of(context.scene.tetflora.statistics)):
+            for text in row:
+                grid.label(text=text)

@@ -169,12 +169,17 @@ def test_refine_makes_meshes_and_figures_and_clear_takes_them_back():
     assert figures["plants"] == 2
     assert figures["polygons_meshed"] + figures["polygons_proxy"] > 0
     rows = dict(session.part("panels.statistics_panel").rows_of(scene.tetflora.statistics))
+    passes = session.part("panels.statistics_panel").steps_of(scene.tetflora.statistics)
+    assert [int(row[0]) for row in passes] == list(range(1, len(passes) + 1))
+    assert passes[-1][1] == rows["Tetrahedra made"]
+    assert passes[-1][2] == "0"
     assert rows["Plants"] == "2"
     assert rows["Polygons if expanded"] == f"{figures['polygons_full']:,}"
     assert len(bpy.data.meshes) > 0
     assert _ops().clear() == {'FINISHED'}
     assert datablocks() == before
     assert session.part("panels.statistics_panel").rows_of(scene.tetflora.statistics) == ()
+    assert session.part("panels.statistics_panel").steps_of(scene.tetflora.statistics) == ()
 
 
 @pytest.mark.parametrize(
