@@ -288,7 +288,8 @@ def test_steps_in_the_window_give_what_the_script_gives(clean_file, window):
     made = datablocks()
     _ops().refine()
     at_once = json.loads(scene.tetflora.statistics)
-    assert {k: v for k, v in stepped.items() if k != "seconds"} == {k: v for k, v in at_once.items() if k != "seconds"}
+    timed = {"seconds", "steps"}
+    assert {k: stepped[k] for k in set(stepped) - timed} == {k: at_once[k] for k in set(at_once) - timed}
     assert {k: len(v) for k, v in datablocks().items()} == {k: len(v) for k, v in made.items()}
 
 
