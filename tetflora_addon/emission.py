@@ -149,14 +149,22 @@ def _runs(expected: NDArray[np.float64], chosen: NDArray[np.int64]) -> Iterator[
 
 
 def proxy_shells(flora: Flora, result: Refinement) -> MeshBuffers | None:
-    """Proxies as shells: the tetrahedra themselves, filled with a cloud of their extinction, colour and orientation."""
+    """Proxies as shells: the tetrahedra themselves, filled with a cloud of their extinction, colour and orientation.
+
+    Tetrahedra that hold nothing but large polygons have an extinction of 0.
+    """
     proxies = np.isin(result.decision, (Decision.PROXY, Decision.HIDDEN))
     nodes = result.nodes[proxies]
     if len(nodes) == 0:
         return None
     index = np.full(len(result.tree), -1, dtype=np.int64)
     index[nodes] = np.arange(len(nodes))
-    summaries = summarise(flora, result.contents, index, len(nodes))
+    contents = result.contents
+    # Large polygons are drawn as they are; a fog in their place would be no wall.
+    fine = np.isfinite(contents.polygon_amounts.width)
+    if not fine.all():
+        contents = contents.take(*(np.ones(len(c), bool) for c in contents.cells[:2]), fine)
+    summaries = summarise(flora, contents, index, len(nodes))
     vertices = result.tree.vertices(nodes)
     matrices, normal, plane = extinction_matrices(summaries, volume(vertices))
     return shell_buffers(vertices, summaries.colour, summaries.transmission, matrices, normal, plane)

@@ -63,16 +63,18 @@ def polygon_blocks(result: Refinement, camera: Camera, facet_pixels: float | Non
     result : Refinement
     camera : Camera
     facet_pixels : float or None
-        Side of a facet that is seen, in pixels; None where proxies are shells, which stand for all that they hold.
+        Side of a facet that is seen, in pixels; None where proxies are shells, which stand for all but large polygons.
     """
     contents = result.contents
     if not len(contents.polygons):
         return
     cell = contents.polygon_cell
     kept = ~result.chosen(Decision.PROXY, Decision.HIDDEN)[cell]
-    if facet_pixels is not None:
-        some = np.flatnonzero(~kept)
-        kept[some] = _proxies_kept(contents, result, camera, facet_pixels)[some]
+    if facet_pixels is None:
+        kept |= ~np.isfinite(contents.polygon_amounts.width)
+    else:
+        sizes = polygon_facet_sizes(contents, camera, result.chosen(Decision.HIDDEN))
+        kept |= sizes.kept(facet_pixels)
     rank = np.zeros(len(result.tree), np.int64)
     rank[result.nodes] = result.rank
     polygons, rank = contents.polygons.take(kept), rank[cell[kept]]
@@ -102,10 +104,6 @@ def polygon_facets(
         made = facet_mesh(chosen_facets(contents.polygons.take(some), sizes.optical[some], side[some]))
         parts.append(made if seen else kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5))
     return parts
-
-
-def _proxies_kept(contents: Contents, result: Refinement, camera: Camera, facet_pixels: float) -> NDArray[np.bool_]:
-    return polygon_facet_sizes(contents, camera, result.chosen(Decision.HIDDEN)).kept(facet_pixels)
 
 
 def mended(polygons: Polygons) -> Polygons:

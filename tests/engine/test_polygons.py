@@ -13,7 +13,9 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tests.engine.test_meshing import check_topology
+from tetflora_addon.budget import afford
 from tetflora_addon.buffers import MeshBuffers
+from tetflora_addon.emission import facet_buffers, proxy_shells
 from tetflora_addon.explicit_emission import mended, polygon_blocks, polygon_buffers, polygon_facets
 from tetflora_addon.plants.hashing import mix
 from tetflora_addon.refinement.contents import Contents
@@ -278,6 +280,52 @@ def test_explicit_everywhere_is_the_original() -> None:
     assert total == pytest.approx(meshes.face_areas(np.tile(np.arange(300), 6), np.repeat(np.arange(6), 300)).sum())
     assert seen.any()
     assert [b.fraction for b in blocks] == sorted(b.fraction for b in blocks)
+
+
+def rough(number: int = 30, size: float = 40.0) -> Meshes:
+    """A rough plain of large faces through the grove."""
+    step = np.linspace(-size, size, number)
+    x, y = (a.ravel() for a in np.meshgrid(step, step + size, indexing="ij"))
+    faces = [[i, i + number, i + number + 1, i + 1] for i in range(number * (number - 1)) if (i + 1) % number]
+    plain_ = surface(np.stack([x, y, 0.2 * np.sin(3 * x)], axis=1), faces)
+    leaves = grove()[0]
+    matrices = np.tile(np.eye(4), (1 + len(leaves.surface), 1, 1))
+    matrices[1:, :3, 3] = leaves.origin
+    return Meshes([plain_, leaves.surfaces[0]], np.minimum(np.arange(len(matrices)), 1), matrices)
+
+
+@pytest.mark.parametrize("facet_pixels", [0.6, None])
+def test_large_polygons_stay_whole_among_proxies(facet_pixels: float | None) -> None:
+    """Ground is neither fog nor facets because leaves above it are, and does not make leaves explicit."""
+    meshes, camera = rough(), grove()[1]
+    result = refined(meshes, camera)
+    blocks = list(polygon_blocks(result, camera, facet_pixels))
+    near = [b.buffers for b in blocks if b.surface == 0]
+    alone = refined(grove()[0], camera)
+    ground = meshes.face_areas(np.arange(29**2), np.zeros(29**2, int))
+    assert sum(support.face_areas(b).sum() for b in near) > 0.9 * ground.sum()
+    assert sum(b.polygons for b in near) < 1.5 * 29**2
+    leaves = [
+        sum(b.buffers.polygons for b in every if b.surface == s)
+        for every, s in ((blocks, 1), (list(polygon_blocks(alone, camera, facet_pixels)), 0))
+    ]
+    assert leaves[0] == pytest.approx(leaves[1], rel=0.4)
+    shells = proxy_shells(support.small_flora(), result)
+    assert np.isfinite(shells.attributes["tf_kappa"][1]).all()
+
+
+def test_a_budget_counts_polygons() -> None:
+    meshes, camera = grove()
+    result, flora = refined(meshes, camera), support.small_flora()
+    sizes = []
+    for most in (0, 3_000, 1_000):
+        options = RefinementSettings(max_polygons=most)
+        fitted, side = afford(flora, result, camera, options)
+        made = [b.buffers for b in polygon_blocks(fitted, camera, side)]
+        facets = facet_buffers(flora, fitted, camera, side)
+        sizes.append(sum(b.polygons for b in made) + (facets.polygons if facets else 0))
+        assert sizes[-1] <= (most or np.inf)
+    assert sizes[0] > sizes[1] > sizes[2] > 500
 
 
 def tube(radius: float, length: float, sides: int = 8, rings: int = 20) -> tuple[np.ndarray, list[list[int]]]:
