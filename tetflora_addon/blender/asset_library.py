@@ -53,16 +53,20 @@ def write_asset_library(folder: Path) -> tuple[Path, int]:
     """
     known = list_species(species_folders())
     path = folder / FILE
+    plants: list[bpy.types.Object] = []
     with _names_free({info.name for info in known.values()}):
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            plants = {_asset(info) for info in known.values()}
-            bpy.data.libraries.write(str(path), plants, fake_user=True, compress=True)
+            for info in known.values():
+                species = load_species(info.identifier, species_folders())
+                plants.append(bpy.data.objects.new(info.name, None))
+                _make_asset(plants[-1], info, species.orders[0].length.mean)
+            bpy.data.libraries.write(str(path), set(plants), fake_user=True, compress=True)
             _write_catalog(folder / _CATALOGS_FILE)
         except (OSError, RuntimeError) as error:
             raise SceneError(f"The asset library cannot be written: {error}") from None
         finally:
-            bpy.data.batch_remove([o for o in bpy.data.objects if o.get(_TEMPORARY)])
+            bpy.data.batch_remove(plants)
     return path, len(known)
 
 
@@ -73,9 +77,6 @@ def add_to_preferences(folder: Path) -> bool:
         return False
     libraries.new(name=LIBRARY, directory=str(folder))
     return True
-
-
-_TEMPORARY = "tetflora_temporary"  # on objects that are only made to be written
 
 
 @contextmanager
@@ -91,11 +92,8 @@ def _names_free(names: set[str]) -> Iterator[None]:
             obj.name = name
 
 
-def _asset(info: SpeciesInfo) -> bpy.types.Object:
-    species = load_species(info.identifier, species_folders())
-    obj = bpy.data.objects.new(info.name, None)
-    obj[_TEMPORARY] = True
-    obj.empty_display_type, obj.empty_display_size = 'SINGLE_ARROW', species.orders[0].length.mean
+def _make_asset(obj: bpy.types.Object, info: SpeciesInfo, height: float) -> None:
+    obj.empty_display_type, obj.empty_display_size = 'SINGLE_ARROW', height
     group = obj.tetflora
     group.version, group.is_plant, group.species, group.seed = VERSION, True, info.identifier, 1
     obj.asset_mark()
@@ -106,7 +104,6 @@ def _asset(info: SpeciesInfo) -> bpy.types.Object:
     picture = thumbnail_file(info.identifier)
     if picture is not None:
         _set_preview(obj, picture)
-    return obj
 
 
 def _set_preview(obj: bpy.types.Object, picture: Path) -> None:
@@ -130,12 +127,9 @@ def _write_catalog(path: Path) -> None:
 @persistent
 def _on_import(context: bpy.types.BlendImportContext, _other: object = None) -> None:
     """Plants came from another file: this scene needs what a scene with plants needs."""
+    # Dragged assets are still linked here, and become the file's own afterwards.
     objects = [item.id for item in context.import_items if isinstance(item.id, bpy.types.Object)]
-    plants = [obj for obj in objects if obj.tetflora.is_plant and obj.library is None]
-    for plant in plants:
-        if _TEMPORARY in plant:
-            del plant[_TEMPORARY]
-    if plants:
+    if any(obj.tetflora.is_plant for obj in objects):
         prepare_scene(bpy.context.scene)
 
 

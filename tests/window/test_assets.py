@@ -1,0 +1,35 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The catalogue as an asset library, in the real window: a plant is dragged from the asset browser into the scene."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from devtools import window
+
+HERE = Path(__file__).parent
+
+
+@pytest.fixture(scope="module")
+def seen(full_blender: str, resources: Path, pictures: Path) -> dict:
+    result = window.run_in_window(full_blender, HERE / "asset_steps.py", pictures / "assets", 180, resources)
+    assert result["ok"], result["error"]
+    return result["values"]
+
+
+def test_the_library_is_known_to_blender(seen: dict) -> None:
+    assert "TetFlora" in seen["libraries"]
+
+
+def test_a_plant_that_is_dropped_is_a_plant(seen: dict) -> None:
+    """One object of this file, of a species of the catalogue, in a scene that is ready for it."""
+    assert len(seen["plants"]) == 1
+    _, is_plant, species, own = seen["plants"][0]
+    assert is_plant
+    assert species
+    assert own
+    assert seen["marks"] == []
+    assert seen["locked"]
