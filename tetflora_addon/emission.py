@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .buffers import MeshBuffers, concatenate_buffers
-from .explicit_emission import polygon_facets
 from .plants.compiled import Flora
 from .plants.expansion import chunks, expand
 from .plants.growth import trunks
@@ -30,6 +29,7 @@ from .refinement.decisions import Decision
 from .refinement.loop import Refinement
 from .shading.facet_sizes import HIDDEN_LEAVES, piece_facet_sizes, subplant_facet_sizes
 from .shading.microsurfaces import kept_out_of_view, piece_facets, subplant_facets
+from .shading.polygon_facets import polygon_facets
 from .shading.shells import shell_buffers
 from .shading.summaries import extinction_matrices, summarise
 from .tetrahedra.geometry import volume

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Explicit polygons after refinement: kept as they are where they are seen, facets where they are small or hidden.
+"""Explicit polygons that refinement keeps: where they are seen, and where a facet would be no smaller.
 
 A face whose fragments are all kept comes out as the face that it was: what nobody needed to cut is not cut.
 """
@@ -17,13 +17,10 @@ from .buffers import MeshBuffers
 from .plants.expansion import chunks
 from .plants.growth import spread
 from .refinement.camera import Camera
-from .refinement.contents import Contents
 from .refinement.decisions import Decision
 from .refinement.loop import Refinement
 from .refinement.polygons import Polygons, shares
-from .shading.facet_sizes import HIDDEN_LEAVES, polygon_facet_sizes
-from .shading.microsurfaces import facet_mesh, kept_out_of_view
-from .shading.polygon_facets import chosen_facets
+from .shading.facet_sizes import polygon_facet_sizes
 
 #: Polygons in a block, about.
 BLOCK_POLYGONS = 250_000
@@ -87,23 +84,6 @@ def polygon_blocks(result: Refinement, camera: Camera, facet_pixels: float | Non
         for s in np.unique(surface):
             buffers = polygon_buffers(own.take(surface == s))
             yield PolygonBlock(int(s), number, buffers, (number + 1) / len(runs))
-
-
-def polygon_facets(
-    contents: Contents, result: Refinement, camera: Camera, facet_pixels: float
-) -> list[MeshBuffers | None]:
-    """Facets of the polygons of proxies (``contents``) that are not kept."""
-    if not len(contents.polygons):
-        return []
-    sizes = polygon_facet_sizes(contents, camera, result.chosen(Decision.HIDDEN))
-    left = np.flatnonzero(~sizes.kept(facet_pixels))
-    left = left[np.argsort(contents.polygon_cell[left], kind="stable")]
-    side, inside = sizes.sides(facet_pixels), result.tree.inside[contents.polygon_cell]
-    parts = []
-    for some, seen in ((left[inside[left]], True), (left[~inside[left]], False)):
-        made = facet_mesh(chosen_facets(contents.polygons.take(some), sizes.optical[some], side[some]))
-        parts.append(made if seen else kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5))
-    return parts
 
 
 def mended(polygons: Polygons) -> Polygons:

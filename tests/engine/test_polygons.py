@@ -16,7 +16,7 @@ from tests.engine.test_meshing import check_topology
 from tetflora_addon.budget import afford
 from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.emission import facet_buffers, proxy_shells
-from tetflora_addon.explicit_emission import mended, polygon_blocks, polygon_buffers, polygon_facets
+from tetflora_addon.explicit_emission import mended, polygon_blocks, polygon_buffers
 from tetflora_addon.plants.hashing import mix
 from tetflora_addon.refinement.contents import Contents
 from tetflora_addon.refinement.decisions import Decision
@@ -25,6 +25,7 @@ from tetflora_addon.refinement.loop import Refinement, refine
 from tetflora_addon.refinement.mesh_features import mesh_features
 from tetflora_addon.refinement.polygons import Meshes, Polygons, Surface, cut, shares
 from tetflora_addon.refinement.settings import RefinementSettings
+from tetflora_addon.shading.polygon_facets import polygon_facets
 from tetflora_addon.shading.summaries import summarise
 from tetflora_addon.tetrahedra.roots import view_root
 

@@ -12,11 +12,34 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..buffers import MeshBuffers
 from ..plants.hashing import key_of_seed, mix, uniform
+from ..refinement.camera import Camera
+from ..refinement.contents import Contents
+from ..refinement.decisions import Decision
+from ..refinement.loop import Refinement
 from ..refinement.polygons import Polygons
-from .microsurfaces import Facets
+from .facet_sizes import HIDDEN_LEAVES, polygon_facet_sizes
+from .microsurfaces import Facets, facet_mesh, kept_out_of_view
 
 _FIRST, _PLACE_U, _PLACE_V = 221, 222, 223
+
+
+def polygon_facets(
+    contents: Contents, result: Refinement, camera: Camera, facet_pixels: float
+) -> list[MeshBuffers | None]:
+    """Facets of the polygons of proxies (``contents``) that are not kept as they are, see `facet_sizes`."""
+    if not len(contents.polygons):
+        return []
+    sizes = polygon_facet_sizes(contents, camera, result.chosen(Decision.HIDDEN))
+    left = np.flatnonzero(~sizes.kept(facet_pixels))
+    left = left[np.argsort(contents.polygon_cell[left], kind="stable")]
+    side, inside = sizes.sides(facet_pixels), result.tree.inside[contents.polygon_cell]
+    parts = []
+    for some, seen in ((left[inside[left]], True), (left[~inside[left]], False)):
+        made = facet_mesh(chosen_facets(contents.polygons.take(some), sizes.optical[some], side[some]))
+        parts.append(made if seen else kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5))
+    return parts
 
 
 def chosen_facets(polygons: Polygons, optical: NDArray[np.float64], side: NDArray[np.float64]) -> Facets:
