@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,6 +92,11 @@ class Contents:
         """Nodes of sub-plants, of pieces and of polygons."""
         return self.subplant_cell, self.piece_cell, self.polygon_cell
 
+    @cached_property
+    def nbytes(self) -> int:
+        """Bytes of all arrays."""
+        return _nbytes(self)
+
     def within(self, chosen: NDArray[np.bool_]) -> Contents:
         """The part that lies in chosen nodes; ``chosen`` is (nodes,) bool."""
         return self.take(*(chosen[c] for c in self.cells))
@@ -165,7 +171,7 @@ class Holdings:
     @property
     def nbytes(self) -> int:
         """Bytes of all arrays, of what has been taken out but not yet left behind as well."""
-        return sum(_nbytes(part) for part in self._parts)
+        return sum(part.nbytes for part in self._parts)
 
     def put(self, contents: Contents) -> None:
         """Add contents."""
