@@ -33,6 +33,7 @@ def main() -> int:
     """Render all; exit code 1 if a picture is larger than the repository wants."""
     session.start()
     from .demo import run
+    from .landscape import render_landscape
     from .species_sheet import render_opening, render_sheet
 
     IMAGES.mkdir(parents=True, exist_ok=True)
@@ -41,6 +42,8 @@ def main() -> int:
         run(out, 960)
         for name in ("cycles", "eevee", "top"):
             as_jpeg(out / f"{name}.png", IMAGES / f"row80-{name}.jpg")
+        render_landscape(out / "landscape.png")
+        as_jpeg(out / "landscape.png", IMAGES / "landscape.jpg")
     render_sheet(IMAGES / "species.jpg")
     render_opening(IMAGES / "orders.jpg")
     session.stop()

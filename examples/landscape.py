@@ -7,6 +7,8 @@ The density stays the same whatever the number: more plants cover more land, beh
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 import numpy as np
 from mathutils import Vector
@@ -75,6 +77,20 @@ def build(scene: bpy.types.Scene, plants: int = PLANTS, pixels: int = 512) -> No
     render = scene.render
     render.resolution_x = render.resolution_y = pixels
     render.resolution_percentage = 100
+
+
+def render_landscape(path: Path, width: int = 960, samples: int = 64) -> None:
+    """Refine the landscape in a file of its own and render it, wide, in Cycles."""
+    session.clean_file()
+    scene = bpy.context.scene
+    build(scene)
+    render = scene.render
+    render.resolution_x, render.resolution_y = width, width * 9 // 16
+    render.engine, render.image_settings.file_format, render.filepath = 'CYCLES', 'PNG', str(path)
+    scene.cycles.samples, scene.cycles.use_denoising = samples, False
+    scene.tetflora.refine_at_render = False
+    session.part("tetflora_addon.blender.job").refine(scene, bpy.context.evaluated_depsgraph_get())
+    bpy.ops.render.render(write_still=True)
 
 
 def plant(scene: bpy.types.Scene, surface: bpy.types.Object, plants: int) -> bpy.types.Object:
