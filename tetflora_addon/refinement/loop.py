@@ -7,7 +7,7 @@ A pass costs what it changes: only divided tetrahedra give their contents away, 
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,15 +22,18 @@ from .cells import Cells
 from .contents import Contents, Holdings, large_polygons
 from .decisions import Decision, decide, without_splits
 from .descent import Slack, push_down
+from .lights import Light, decide_by_shadows, seen_ground, shadows_of
 from .polygons import Polygons
 from .settings import RefinementSettings
 from .silhouette import expected_pixels
 from .statistics import Stopwatch
-from .views import buffers_for, pixels_of_buffer, root_for, widened_for
+from .views import buffers_for, is_anchored, pixels_of_buffer, root_for, widened_for
 from .visibility import AlphaBuffer, Buffers
 
 #: Bisections between two visibility steps; three together divide a tetrahedron into eight parts.
 GENERATIONS = 3
+#: Share of their pixels that counts for what is divided for its shadow: as often as can be, where it is in view.
+ALWAYS = 1e30
 
 
 @dataclass(frozen=True)
@@ -109,6 +112,7 @@ def refine(
     settings: RefinementSettings,
     occluders: NDArray[np.float64] | None = None,
     polygons: Polygons | None = None,
+    lights: Sequence[Light] = (),
 ) -> Generator[Refinement, None, Refinement]:
     """Run the loop; yields the state after the decisions of each pass and returns the last.
 
@@ -124,6 +128,8 @@ def refine(
         Triangles of explicit polygons that hide what is behind them, metres.
     polygons : Polygons, optional
         Explicit polygons that take part.
+    lights : sequence of Light
+        Whose shadows of what is hidden are refined if ``settings.shadow_cutoff`` is above 0.
     """
     clock = Stopwatch()
     contents = Contents.of_plants(flora, seeds)
@@ -135,6 +141,8 @@ def refine(
     new = push_down(flora, tree, contents, slack)
     holdings = Holdings(new)
     clock.lap("update")
+    lights = lights if settings.shadow_cutoff > 0.0 else ()
+    ground = seen_ground(camera, occluders, float(np.median(seeds.position[:, 2]))) if lights and len(seeds) else None
     buffers = buffers_for(camera, settings.visibility_resolution, occluders)
     # Generations count from the root's own pieces. Passes do not count: a late one may divide what is still coarse.
     deepest = tree.levels - 1 + settings.max_levels
@@ -148,12 +156,20 @@ def refine(
         clock.lap("visibility")
         decision = decide(cells, transmittance, settings)
         splitting = decision == Decision.SPLIT
+        by_shadow = ground is not None and not splitting.any()
+        if by_shadow:
+            # Only now it is known what is seen, and can receive shadows.
+            shadows = shadows_of(tree, cells, decision, lights, camera, ground, settings)
+            decision = decide_by_shadows(decision, shadows, cells, settings)
+            splitting = decision == Decision.SPLIT
         room = settings.max_tetrahedra - tree.tetrahedra_made
         full = bool(room < 2 * splitting.sum())
-        barred = splitting & (full | (tree.level[cells.nodes] >= deepest))
+        last = passes == settings.max_passes
+        barred = splitting & (full | last | (tree.level[cells.nodes] >= deepest))
         limited = bool(barred.any())
         if limited:
-            decision = np.where(barred, without_splits(decision, cells, settings), decision)
+            instead = Decision.HIDDEN if by_shadow else without_splits(decision, cells, settings)
+            decision = np.where(barred, instead, decision).astype(np.int8)
             splitting &= ~barred
         clock.lap("refinement")
         state = Refinement(
@@ -172,7 +188,7 @@ def refine(
         yield state
         dividing = np.zeros(len(tree), bool)
         dividing[cells.nodes[splitting]] = True
-        shares = (transmittance * cells.opacity)[splitting]
+        shares = np.where(by_shadow, ALWAYS, transmittance * cells.opacity)[splitting]
         _split(tree, cells.nodes[splitting], shares, camera, settings, deepest)
         clock.lap("refinement")
         new = push_down(flora, tree, holdings.take_out(dividing), slack)
@@ -228,6 +244,8 @@ def _split(
     pixels, _ = expected_pixels(tree.vertices(nodes), camera)
     # An eighth has a quarter of the pixels: where that is above the cutoff, all eight would be made anyway.
     large = (pixels * share > 4.0 * settings.cutoff**2) & (tree.level[nodes] + GENERATIONS <= deepest)
+    # In an anchored tree the same place must be divided alike, whatever the camera sees of it.
+    large &= not is_anchored(camera, settings)
     if large.any() and tree.tetrahedra_made + 8 * large.sum() <= settings.max_tetrahedra:
         tree.split_by_shape(nodes[large])
         nodes, share = nodes[~large], share[~large]

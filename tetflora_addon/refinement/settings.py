@@ -47,8 +47,8 @@ class RefinementSettings:
         The tetrahedra stay where they are in the world while the camera moves, see `tetrahedra.world_root`; otherwise
         they begin with the view. Panoramas are always anchored.
     shadow_cutoff : float
-        Side, in pixels where it falls, under which the shadow of what is hidden gains nothing from being finer; 0 leaves
-        shadows as coarse as what is hidden, see `lights`.
+        Side, in pixels where it falls, under which the shadow of what is hidden gains nothing from being finer, see
+        `lights`; 4 is fine enough. With 0 shadows are as coarse as what is hidden.
     max_memory : float
         Gigabytes that they may take in Blender and a renderer together, about; 0 for no limit.
     """
