@@ -280,7 +280,7 @@ def test_the_refined_picture_is_that_of_the_mesh():
     from tests.blender.renders import picture
 
     scene = _scene()
-    leaves = _leaves(count=30_000, size=0.035, spread=3.0)
+    leaves = _leaves(count=30_000, size=0.025, spread=3.0)
     leaves.location.z = -1.0
     scene.world = bpy.data.worlds.new("sky")
     part("compat").shader_tree(scene.world).nodes["Background"].inputs["Color"].default_value = (0.8, 0.8, 0.8, 1.0)

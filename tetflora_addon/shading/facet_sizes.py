@@ -23,6 +23,10 @@ from ..refinement.contents import Contents, bounding_cylinders
 COARSE = 2.0
 #: Leaves that one of them stands for at least.
 HIDDEN_LEAVES = 8
+#: Facets of explicit polygons in relation to those of plants, and leaves' faces that a hidden one stands for. They are
+#: squares for narrow, clustered cards: in the benchmark of foreign trees twice as many halve the error of the picture.
+FINER = 2 / 3
+HIDDEN_FACES = 4
 
 
 @dataclass(frozen=True)
@@ -91,10 +95,10 @@ class PolygonFacetSizes:
     solid: NDArray[np.bool_]
 
     def sides(self, pixels: float) -> NDArray[np.float64]:
-        """Sides (n,) of facets, metres, where those that are seen have so many pixels."""
-        fine = pixels * self.extent
+        """Sides (n,) of facets, metres, where those of plants that are seen have so many pixels."""
+        fine = FINER * pixels * self.extent
         coarse = COARSE * fine
-        coarse = np.where(self.leaf, np.maximum(coarse, np.sqrt(HIDDEN_LEAVES * self.face)), coarse)
+        coarse = np.where(self.leaf, np.maximum(coarse, np.sqrt(HIDDEN_FACES * self.face)), coarse)
         return np.where(self.hidden, coarse, fine)
 
     def kept(self, pixels: float) -> NDArray[np.bool_]:

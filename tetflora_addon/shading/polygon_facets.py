@@ -19,7 +19,7 @@ from ..refinement.contents import Contents
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 from ..refinement.polygons import Polygons
-from .facet_sizes import HIDDEN_LEAVES, polygon_facet_sizes
+from .facet_sizes import HIDDEN_FACES, polygon_facet_sizes
 from .microsurfaces import Facets, facet_mesh, kept_out_of_view
 
 _FIRST, _PLACE_U, _PLACE_V = 221, 222, 223
@@ -38,7 +38,7 @@ def polygon_facets(
     parts = []
     for some, seen in ((left[inside[left]], True), (left[~inside[left]], False)):
         made = facet_mesh(chosen_facets(contents.polygons.take(some), sizes.optical[some], side[some]))
-        parts.append(made if seen else kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5))
+        parts.append(made if seen else kept_out_of_view(made, camera.clearance, HIDDEN_FACES**-0.5))
     return parts
 
 
