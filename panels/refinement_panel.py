@@ -23,6 +23,7 @@ class TETFLORA_PT_refinement(SidebarPanel, bpy.types.Panel):
         column.active = not settings.expand_everything
         column.prop(settings, "quality")
         column.prop(settings, "cutoff")
+        column.prop(settings, "shadow_cutoff")
         column.prop(settings, "proxy_form")
         column.prop(settings, "max_polygons")
         cycles = getattr(context.scene, "cycles", None)
@@ -55,7 +56,7 @@ class TETFLORA_PT_limits(SidebarPanel, bpy.types.Panel):
         column = layout.column()
         column.active = not settings.expand_everything
         names = ("leaf_limit", "facet", "visibility_resolution", "few_polygons", "block", "hidden")
-        for name in (*names, "max_memory", "max_tetrahedra", "max_levels", "max_passes"):
+        for name in (*names, "max_memory", "max_tetrahedra", "max_levels", "max_passes", "anchored"):
             column.prop(settings, name)
         layout.prop(settings, "expand_everything")
 

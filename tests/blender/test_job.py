@@ -94,6 +94,26 @@ def test_the_result_fits_the_budget(form):
         assert (fitted.facet_pixels >= free.facet_pixels > 0) == (form == 'MICROSURFACES')
 
 
+def test_shadows_of_what_is_behind_the_camera_are_refined_if_asked_for():
+    """A tree behind the camera, the sun behind the tree: its shadow is in the picture."""
+    import bpy
+
+    camera = add_camera(location=(0.0, -12.0, 4.0))
+    camera.rotation_euler = (1.2, 0.0, 0.0)
+    add_plant("tree", location=(0.0, -18.0, 0.0))
+    scene = bpy.context.scene
+    sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", 'SUN'))
+    sun.rotation_euler = (1.05, 0.0, 0.0)  # it shines to where the camera looks
+    scene.collection.objects.link(sun)
+    scene.render.resolution_x, scene.render.resolution_y = 320, 240
+    coarse = _refine(scene)
+    fine = _refine(scene, shadow_cutoff=4.0)
+    assert coarse.polygons_meshed == 0
+    assert fine.polygons_meshed > 300
+    sun.hide_render = True
+    assert _refine(scene).polygons_meshed == 0
+
+
 def test_results_carry_uvs_materials_and_smooth_tubes():
     scene = _forest()
     _refine(scene)

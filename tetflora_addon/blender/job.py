@@ -18,6 +18,7 @@ from ..plants.growth import trunks
 from ..plants.seeds import Seeds
 from ..refinement.camera import Camera
 from ..refinement.decisions import Decision
+from ..refinement.lights import Light
 from ..refinement.loop import Refinement
 from ..refinement.loop import refine as refine_loop
 from ..refinement.polygons import Polygons
@@ -27,6 +28,7 @@ from ..refinement.steps import step_of
 from .emit import Results, has_results, originals_shown, remove_results
 from .explicit_objects import Explicit, read_explicit
 from .leaf_forms import materials_of, resolved_species
+from .light_reader import read_lights
 from .materials import proxy_material
 from .properties import settings_from
 from .scene_reader import NoPlantsError, read_camera, read_occluders, read_plants
@@ -88,6 +90,7 @@ class _Given:
     seeds: Seeds
     explicit: Explicit | None
     occluders: np.ndarray
+    lights: tuple[Light, ...]
 
     @property
     def species(self) -> tuple[str, ...]:
@@ -111,7 +114,8 @@ def _read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bp
             none = np.zeros(0)
             frames = none.reshape(0, 3), none.reshape(0, 3, 3)
             seeds = Seeds((), none.astype(np.int32), none.astype(np.int64), *frames, none)
-        return _Given(seeds, explicit, read_occluders(scene, depsgraph))
+        lights = read_lights(scene, depsgraph) if scene.tetflora.shadow_cutoff > 0.0 else ()
+        return _Given(seeds, explicit, read_occluders(scene, depsgraph), lights)
 
 
 def _polygons_full(flora: Flora, given: _Given) -> int:
@@ -244,7 +248,7 @@ def _run_loop(
     flora: Flora, given: _Given, camera: Camera, settings: RefinementSettings, statistics: Statistics | None = None
 ) -> Generator[Progress, None, Refinement]:
     """Refine; the statistics get a step for each pass."""
-    loop = refine_loop(flora, given.seeds, camera, settings, given.occluders, given.polygons)
+    loop = refine_loop(flora, given.seeds, camera, settings, given.occluders, given.polygons, given.lights)
     fraction = 0.05
     while True:
         try:

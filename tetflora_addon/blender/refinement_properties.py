@@ -94,6 +94,18 @@ class RefinementProperties:
         max=200,
     )
 
+    shadow_cutoff: FloatProperty(
+        name="Shadow Cutoff",
+        description=(
+            "Side in pixels under which shadows of hidden plants are refined no further; 0 leaves them coarse. "
+            "About 4 pixels makes shadows of trees behind the camera sharp, for a quarter more polygons or so"
+        ),
+        subtype='PIXEL',
+        default=_SETTINGS.shadow_cutoff,
+        min=0.0,
+        soft_max=16.0,
+        max=1000.0,
+    )
     max_passes: IntProperty(
         name="Stop After",
         description=(
@@ -132,7 +144,14 @@ class RefinementProperties:
         soft_max=256.0,
         precision=1,
     )
-    anchored: BoolProperty(name="Anchored in the World", description="Divide space alike in all frames of a film")
+    anchored: BoolProperty(
+        name="Anchored in the World",
+        description=(
+            "Divide space alike in all frames of a film, whatever the camera does, so that less changes from frame to "
+            "frame. Somewhat more is made than where space is divided from the camera. Panoramas always are"
+        ),
+        default=_SETTINGS.anchored,
+    )
     quality: EnumProperty(
         name="Quality",
         description="How fine the result is; sets the cutoff, the limit for leaves, the facets and the visibility",
