@@ -18,12 +18,13 @@ from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.emission import facet_buffers, proxy_shells
 from tetflora_addon.explicit_emission import mended, polygon_blocks, polygon_buffers
 from tetflora_addon.plants.hashing import mix
+from tetflora_addon.refinement.clipping import cut
 from tetflora_addon.refinement.contents import Contents
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.descent import push_down
 from tetflora_addon.refinement.loop import Refinement, refine
 from tetflora_addon.refinement.mesh_features import mesh_features
-from tetflora_addon.refinement.polygons import Meshes, Polygons, Surface, cut, shares
+from tetflora_addon.refinement.polygons import Meshes, Polygons, Surface, shares
 from tetflora_addon.refinement.settings import RefinementSettings
 from tetflora_addon.shading.polygon_facets import polygon_facets
 from tetflora_addon.shading.summaries import summarise

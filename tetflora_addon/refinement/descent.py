@@ -23,8 +23,9 @@ from ..plants.sides import body_distances, bounding_bodies, crossing, sampled_bo
 from ..plants.vectors import gathered
 from ..tetrahedra.tree import TetrahedralTree
 from .amounts import Amounts, polygon_amounts
+from .clipping import cut
 from .contents import Contents
-from .polygons import Polygons, cut
+from .polygons import Polygons
 
 #: Metres (n,) at points (n, 3) that the picture cannot tell.
 Slack = Callable[[NDArray[np.float64]], NDArray[np.float64]]
