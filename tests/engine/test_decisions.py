@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tests.engine import support
 from tetflora_addon.refinement.amounts import Amounts
 from tetflora_addon.refinement.cells import Cells, feature_pixels
-from tetflora_addon.refinement.decisions import Decision, decide
+from tetflora_addon.refinement.decisions import Decision, decide, gains_nothing
 from tetflora_addon.refinement.settings import RefinementSettings
 
 CAMERA = support.camera((0, 0, 0), (0, 10, 0), pixels=1000, view=1.0)
@@ -111,3 +111,20 @@ def test_what_can_never_be(case: dict, cutoff: float) -> None:
         assert case["pixels"] * case["transmittance"] * case["opacity"] <= cutoff**2
     if out == Decision.SPLIT:
         assert become(**case, settings=replace(options, cutoff=cutoff / 2)) == Decision.SPLIT
+
+
+def test_the_last_few_cells_are_not_worth_a_pass() -> None:
+    """Only if they are few among many, change next to nothing of the picture and hold next to nothing."""
+    count = 1000
+    amounts = Amounts(*(np.full(count, v) for v in (1.0, 0.1, 1000.0, 0.1)))
+    cells = Cells(
+        np.arange(count), amounts, *(np.full(count, v) for v in (1000.0, 1.0, 0.1, 1.0)), np.ones(count, bool)
+    )
+    seen, splitting = np.ones(count), np.zeros(count, bool)
+    splitting[:2] = True  # 2,000 of a million pixels, 2,000 polygons
+    assert gains_nothing(splitting, cells, seen, CAMERA)
+    many = np.zeros(count, bool)
+    many[:20] = True
+    assert not gains_nothing(many, cells, 0.01 * seen, CAMERA)
+    assert not gains_nothing(splitting, replace(cells, pixels=1200.0 * seen), seen, CAMERA)
+    assert not gains_nothing(splitting, replace(cells, amounts=replace(amounts, polygons=2e4 * seen)), seen, CAMERA)

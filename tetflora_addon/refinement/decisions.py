@@ -9,11 +9,16 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from .camera import Camera
 from .cells import Cells
 from .settings import RefinementSettings
 
 #: Longest edge, in sides of a block, from which on what crosses the border of the view is divided for its unseen part.
 ACROSS_THE_BORDER = 1.5
+
+
+#: Share of all cells, share of the picture, and polygons, for which a pass of the loop is not worth its time.
+FEW, NO_GAIN, NO_POLYGONS = 0.005, 0.002, 20_000
 
 
 class Decision(IntEnum):
@@ -71,6 +76,19 @@ def decide(cells: Cells, transmittance: NDArray[np.float64], settings: Refinemen
 def contributions(cells: Cells, transmittance: NDArray[np.float64]) -> NDArray[np.float64]:
     """Pixels (n,) that the contents of tetrahedra change."""
     return cells.pixels * transmittance * cells.opacity
+
+
+def gains_nothing(
+    splitting: NDArray[np.bool_], cells: Cells, transmittance: NDArray[np.float64], camera: Camera
+) -> bool:
+    """Whether the picture gains nothing by dividing the last few cells: next to none of its pixels would change.
+
+    Nor may they hold much, as they become polygons or proxies whole.
+    """
+    if splitting.sum() > FEW * len(cells):
+        return False
+    gain = contributions(cells, transmittance)[splitting].sum() / (camera.width * camera.height)
+    return bool(gain <= NO_GAIN and cells.amounts.polygons[splitting].sum() <= NO_POLYGONS)
 
 
 def without_splits(decision: NDArray[np.int8], cells: Cells, settings: RefinementSettings) -> NDArray[np.int8]:

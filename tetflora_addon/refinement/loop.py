@@ -20,7 +20,7 @@ from .amounts import Amounts
 from .camera import Camera
 from .cells import Cells
 from .contents import Contents, Holdings, large_polygons
-from .decisions import Decision, decide, without_splits
+from .decisions import Decision, decide, gains_nothing, without_splits
 from .descent import Slack, push_down
 from .lights import Light, decide_by_shadows, seen_ground, shadows_of
 from .polygons import Polygons
@@ -156,6 +156,9 @@ def refine(
         clock.lap("visibility")
         decision = decide(cells, transmittance, settings)
         splitting = decision == Decision.SPLIT
+        if gains_nothing(splitting, cells, transmittance, camera):
+            decision = without_splits(decision, cells, settings)
+            splitting[:] = False
         by_shadow = ground is not None and not splitting.any()
         if by_shadow:
             # Only now it is known what is seen, and can receive shadows.
