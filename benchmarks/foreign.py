@@ -24,7 +24,7 @@ from .report import Targets, peak_mb
 from .row80 import timed_refine, timed_render
 
 TREES, QUICK_TREES = 18, 6
-SAMPLES, QUICK_SAMPLES = 80, 8
+SAMPLES, QUICK_SAMPLES = 64, 8
 #: Metres from the eye to the foremost trees.
 DISTANCES = (15.0, 60.0, 240.0)
 #: Children of a branch, their length in relation to it, segments and sides of their tubes, by order.
