@@ -174,6 +174,21 @@ def test_results_for_a_render_and_those_of_the_artist_do_not_meet():
     assert not leaves.hide_render
 
 
+def test_a_render_refines_a_scene_that_has_meshes_alone():
+    """Refine at Render needs no plant; afterwards the original is as it was."""
+    scene = _scene()
+    leaves = _leaves()
+    handlers = part("handlers")
+    assert scene.tetflora.refine_at_render
+    handlers.on_render_pre(scene)
+    assert handlers.render_errors() == []
+    assert _made(scene)
+    assert leaves.hide_render
+    handlers.on_render_end(scene)
+    assert not _made(scene)
+    assert not leaves.hide_render
+
+
 def test_instances_of_collections_take_part_each_in_its_place():
     """With all that the collection shows; the empty is hidden, the collection is not."""
     import bpy

@@ -202,7 +202,7 @@ def test_nodes_instance_plants_and_fields(what):
     assert np.allclose(read.scale, 2.0)
     assert len(set(read.seed.tolist()) - {3}) == 3
     assert _plants().seed.tolist() == read.seed.tolist()
-    assert part("scene_reader").has_plants(bpy.context.scene)
+    assert part("scene_reader").has_contents(bpy.context.scene)
     plant.hide_render = True
     with pytest.raises(errors().SceneError, match="No plants"):
         _plants()
@@ -379,10 +379,10 @@ def test_a_field_alone_is_a_forest_for_renders_and_estimates():
 
     scene = bpy.context.scene
     reader, job = part("scene_reader"), part("job")
-    assert not reader.has_plants(scene)
+    assert not reader.has_contents(scene)
     seeds = [1, 2, 3]
     field = _field(seed=('INT', seeds))
-    assert reader.has_plants(scene)
+    assert reader.has_contents(scene)
     of_field = job.estimate(scene, depsgraph())
     bpy.data.objects.remove(field)
     for seed, place in zip(seeds, PLACES, strict=True):

@@ -22,7 +22,7 @@ from ..errors import TetFloraError
 from . import job
 from .emit import result_collections
 from .migration import migrate
-from .scene_reader import NoPlantsError, has_plants, holds_plants, renderable_objects
+from .scene_reader import NoPlantsError, has_contents, may_take_part, renderable_objects
 
 
 @dataclass
@@ -60,7 +60,7 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     _rendering.busy = True
     try:
         _take_back(scene)
-        if scene.tetflora.refine_at_render and has_plants(scene):
+        if scene.tetflora.refine_at_render and has_contents(scene):
             _make(scene)
     except NoPlantsError:
         pass  # all of them are disabled or hidden: the artist wants no forest
@@ -146,10 +146,10 @@ def _named(names: list[str]) -> list[bpy.types.Collection]:
 
 
 def _view_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
-    """The first rendered view layer with plants; one refinement has to serve all layers."""
+    """The first rendered view layer with something to refine; one refinement has to serve all layers."""
     layers = [layer for layer in scene.view_layers if layer.use] or list(scene.view_layers)
     for layer in layers:
-        if any(holds_plants(obj) for obj in renderable_objects(layer)):
+        if any(may_take_part(obj) for obj in renderable_objects(layer)):
             return layer
     return layers[0]
 

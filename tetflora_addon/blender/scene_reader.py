@@ -198,18 +198,22 @@ def renderable_objects(view_layer: bpy.types.ViewLayer) -> Iterator[bpy.types.Ob
                 yield obj
 
 
-def holds_plants(obj: bpy.types.Object) -> bool:
-    """Whether an object is a plant or a field, or may instance some; cheap."""
-    return obj.tetflora.is_plant or obj.tetflora.is_field or may_instance(obj)
+def takes_part(obj: bpy.types.Object) -> bool:
+    """Whether an object is a plant, a field of plants, or a mesh that takes part in refinement."""
+    return obj.tetflora.is_plant or obj.tetflora.is_field or obj.tetflora.is_explicit
 
 
-def has_plants(scene: bpy.types.Scene) -> bool:
-    """Whether a scene may hold plants; cheap, and never wrong where there are some."""
-    if any(o.tetflora.is_plant or o.tetflora.is_field for o in scene.objects):
+def may_take_part(obj: bpy.types.Object) -> bool:
+    """Whether an object takes part in refinement, or may instance some that do; cheap."""
+    return takes_part(obj) or may_instance(obj)
+
+
+def has_contents(scene: bpy.types.Scene) -> bool:
+    """Whether a scene may hold something to refine; cheap, and never wrong where there is something."""
+    if any(takes_part(o) for o in scene.objects):
         return True
     # What is instanced need not lie in the scene, but somewhere.
-    somewhere = any(o.tetflora.is_plant or o.tetflora.is_field for o in bpy.data.objects)
-    return somewhere and any(may_instance(o) for o in scene.objects)
+    return any(takes_part(o) for o in bpy.data.objects) and any(may_instance(o) for o in scene.objects)
 
 
 def _check_species(plants: list[tuple[str, str]]) -> None:
