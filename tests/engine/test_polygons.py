@@ -246,17 +246,18 @@ def refined(meshes: Meshes, camera: object, **options: float) -> Refinement:
             return stop.value
 
 
-def test_near_polygons_stay_and_far_ones_become_facets_of_the_same_area() -> None:
+@pytest.mark.parametrize("anchored", [False, True])
+def test_near_polygons_stay_and_far_ones_become_facets_of_the_same_area(anchored: bool) -> None:
     """No plant is needed. Leaves near the eye are there as they were, all others are there as area, to 1e-6."""
     meshes, camera = grove()
-    result = refined(meshes, camera)
+    result = refined(meshes, camera, anchored=anchored)
     whole = Polygons.everything(meshes)
     assert result.contents.polygons.areas().sum() == pytest.approx(whole.areas().sum(), rel=1e-9)
     assert {Decision.PROXY, Decision.EXPLICIT} <= set(result.decision.tolist())
     blocks = [b.buffers for b in polygon_blocks(result, camera)]
     kept = sum(support.face_areas(b).sum() for b in blocks)
     proxies = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN))
-    beside = ~result.tree.inside[proxies.polygon_cell]
+    beside = ~result.in_view[proxies.polygon_cell]
     facets = [support.face_areas(b) for b in polygon_facets(proxies, result, camera, 0.6) if b.polygons]
     drawn = np.concatenate(facets).sum()
     assert 0.1 < kept / (kept + drawn) < 0.95

@@ -34,7 +34,7 @@ def polygon_facets(
     sizes = polygon_facet_sizes(contents, camera, result.chosen(Decision.HIDDEN))
     left = np.flatnonzero(~sizes.kept(facet_pixels))
     left = left[np.argsort(contents.polygon_cell[left], kind="stable")]
-    side, inside = sizes.sides(facet_pixels), result.tree.inside[contents.polygon_cell]
+    side, inside = sizes.sides(facet_pixels), result.in_view[contents.polygon_cell]
     parts = []
     for some, seen in ((left[inside[left]], True), (left[~inside[left]], False)):
         made = facet_mesh(chosen_facets(contents.polygons.take(some), sizes.optical[some], side[some]))
