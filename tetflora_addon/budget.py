@@ -66,10 +66,11 @@ def afford(
     polygons = np.where(explicit, result.amounts.polygons, 0.0)
 
     count = _Facets(flora, result, camera) if facets else None
+    shells = 4.0 + _large(result)
 
     def proxies(factor: float) -> NDArray[np.float64]:
         """Faces (cells,) of all cells as proxies, with facets larger by a factor."""
-        return count.by_cell(factor * side) if count else np.full(len(explicit), 4.0)
+        return count.by_cell(factor * side) if count else shells
 
     as_asked = proxies(1.0)
     if polygons.sum() + as_asked[~explicit].sum() <= allowed:
@@ -86,6 +87,13 @@ def afford(
         factor = _smallest(lambda f: proxies(f)[~kept].sum() <= left)
     decision = np.where(explicit & ~kept, Decision.PROXY, result.decision).astype(np.int8)
     return replace(result, decision=decision), factor * side
+
+
+def _large(result: Refinement) -> NDArray[np.float64]:
+    """Polygons (cells,) that stay as they are although their cell is a proxy."""
+    contents = result.contents
+    large = np.isinf(contents.polygon_amounts.width)
+    return np.bincount(contents.polygon_cell[large], minlength=len(result.tree))[result.nodes].astype(np.float64)
 
 
 class _Facets:

@@ -111,7 +111,14 @@ def _block(flora: Flora, pieces: Pieces, stems: list[Stems], number: int, fracti
 
 
 def facet_buffers(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.6) -> MeshBuffers | None:
+    """All of `facet_blocks` in one mesh, None where there are none."""
+    return concatenate_buffers(list(facet_blocks(flora, result, camera, facet_pixels)))
+
+
+def facet_blocks(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.6) -> Iterator[MeshBuffers]:
     """Proxies as microsurfaces: facets of all that is not explicit, and of no polygon that is kept as it is.
+
+    Meshes have about `BLOCK_POLYGONS` facets each, so that only one of them is held at a time beside Blender's own.
 
     Parameters
     ----------
@@ -121,9 +128,21 @@ def facet_buffers(flora: Flora, result: Refinement, camera: Camera, facet_pixels
     facet_pixels : float
         Side of a facet that is seen, in pixels; see `shading.facet_sizes` for the others.
     """
+    parts: list[MeshBuffers] = []
+    for made in _facets(flora, result, camera, facet_pixels):
+        if made is not None:
+            parts.append(made)
+        if sum(p.polygons for p in parts) >= BLOCK_POLYGONS:
+            yield concatenate_buffers(parts)
+            parts = []
+    if parts:
+        yield concatenate_buffers(parts)
+
+
+def _facets(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float) -> Iterator[MeshBuffers | None]:
+    """Facets in runs of about `FACETS_AT_ONCE`."""
     contents = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN))
     hidden = result.chosen(Decision.HIDDEN)
-    parts: list[MeshBuffers | None] = []
     for things, cell, make, sizes_of in (
         (contents.subplants, contents.subplant_cell, subplant_facets, subplant_facet_sizes),
         (contents.pieces, contents.piece_cell, piece_facets, piece_facet_sizes),
@@ -133,13 +152,13 @@ def facet_buffers(flora: Flora, result: Refinement, camera: Camera, facet_pixels
         expected = sizes.counts(facet_pixels) + 1
         inside = result.in_view[cell]
         seen, beside = np.flatnonzero(inside), np.flatnonzero(~inside)
-        parts += [make(flora, things.take(i), leaf[i], wood[i]) for i in _runs(expected, seen)]
+        for i in _runs(expected, seen):
+            yield make(flora, things.take(i), leaf[i], wood[i])
         # What is beside the view must not reach into the picture.
         for i in _runs(expected, beside):
             made = make(flora, things.take(i), leaf[i], wood[i])
-            parts.append(kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5))
-    parts += polygon_facets(contents, result, camera, facet_pixels)
-    return concatenate_buffers([p for p in parts if p is not None])
+            yield kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5)
+    yield from polygon_facets(contents, result, camera, facet_pixels)
 
 
 def _runs(expected: NDArray[np.float64], chosen: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:

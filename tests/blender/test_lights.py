@@ -27,7 +27,7 @@ def _add(name, kind, **properties):
 def _read():
     import bpy
 
-    return part("light_reader").read_lights(bpy.context.scene, depsgraph())
+    return part("light_reader").read_lights(depsgraph(), bpy.context.view_layer)
 
 
 def test_every_kind_of_light_is_read_by_name():

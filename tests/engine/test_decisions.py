@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tests.engine import support
 from tetflora_addon.refinement.amounts import Amounts
 from tetflora_addon.refinement.cells import Cells, feature_pixels
-from tetflora_addon.refinement.decisions import Decision, decide, gains_nothing
+from tetflora_addon.refinement.decisions import Decision, decide, gains_nothing, without_splits
 from tetflora_addon.refinement.settings import RefinementSettings
 
 CAMERA = support.camera((0, 0, 0), (0, 10, 0), pixels=1000, view=1.0)
@@ -111,6 +111,20 @@ def test_what_can_never_be(case: dict, cutoff: float) -> None:
         assert case["pixels"] * case["transmittance"] * case["opacity"] <= cutoff**2
     if out == Decision.SPLIT:
         assert become(**case, settings=replace(options, cutoff=cutoff / 2)) == Decision.SPLIT
+
+
+def test_a_limit_leaves_what_is_hidden_hidden_and_makes_no_forest_of_leaves() -> None:
+    """Nor large space full of leaves of which nobody knows how far away they are."""
+    count = 4
+    amounts = Amounts(*(np.array(v, float) for v in ([1] * 4, [0.1] * 4, [1e6, 1e4, 1e6, 1e6], [1] * 4)))
+    pixels, feature = np.array([1e6, 1e6, 900.0, 1e6]), np.array([2.0, 2.0, 2.0, 0.1])
+    cells = Cells(np.arange(count), amounts, pixels, np.ones(count), feature, np.ones(count), np.ones(count, bool))
+    split = np.full(count, Decision.SPLIT, np.int8)
+    seen = without_splits(split, cells, np.ones(count), SETTINGS)
+    assert seen.tolist() == [Decision.PROXY, Decision.EXPLICIT, Decision.EXPLICIT, Decision.PROXY]
+    assert (without_splits(split, cells, np.zeros(count), SETTINGS) == Decision.HIDDEN).all()
+    kept = np.array([Decision.PROXY, Decision.HIDDEN, Decision.EXPLICIT, Decision.EMPTY], np.int8)
+    assert (without_splits(kept, cells, np.zeros(count), SETTINGS) == kept).all()
 
 
 def test_the_last_few_cells_are_not_worth_a_pass() -> None:

@@ -162,6 +162,32 @@ def test_facets_are_made_in_chunks_that_are_bounded(monkeypatch: pytest.MonkeyPa
         assert np.median(numbers) < 2 * 2_000
 
 
+def test_facets_come_in_blocks_of_bounded_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Together they are all facets; only the last block is small."""
+    flora, _, camera, result = scene()
+    once = facet_buffers(flora, result, camera)
+    monkeypatch.setattr(emission, "FACETS_AT_ONCE", 300)
+    monkeypatch.setattr(emission, "BLOCK_POLYGONS", 700)
+    blocks = [b.polygons for b in emission.facet_blocks(flora, result, camera)]
+    assert sum(blocks) == once.polygons
+    assert len(blocks) > 3
+    assert min(blocks[:-1]) >= 700
+    assert max(blocks) < 2 * 700
+
+
+def test_what_was_off_screen_comes_back_identical() -> None:
+    """The camera turns away and back again: polygons and facets are the same to the last digit."""
+    flora, seeds, camera, _ = scene()
+    away = replace(camera, frame=camera.frame @ np.diag([-1.0, 1.0, -1.0]))
+    made = []
+    for view in (camera, away, camera):
+        _, result = run(flora, seeds, view)
+        blocks = [b.buffers for b in explicit_blocks(flora, result)]
+        made.append([m.positions for m in (*blocks, facet_buffers(flora, result, view))])
+    assert all(np.array_equal(a, b) for a, b in zip(made[0], made[2], strict=True))
+    assert sum(map(len, made[1])) < sum(map(len, made[0])) / 2
+
+
 def test_shells_are_the_cells_of_proxies() -> None:
     flora, _, _, result = scene()
     mesh = proxy_shells(flora, result)

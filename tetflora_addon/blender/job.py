@@ -114,7 +114,7 @@ def _read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bp
             none = np.zeros(0)
             frames = none.reshape(0, 3), none.reshape(0, 3, 3)
             seeds = Seeds((), none.astype(np.int32), none.astype(np.int64), *frames, none)
-        lights = read_lights(scene, depsgraph) if scene.tetflora.shadow_cutoff > 0.0 else ()
+        lights = read_lights(depsgraph, view_layer) if scene.tetflora.shadow_cutoff > 0.0 else ()
         return _Given(seeds, explicit, read_occluders(scene, depsgraph), lights)
 
 
@@ -181,7 +181,7 @@ def refine_steps(
                 kept = explicit_emission.polygon_blocks(refinement, camera, side if facets else None)
                 yield from _write_polygons(results, given.explicit, kept, statistics)
             yield Progress(0.95, "Making proxies")
-            _write_proxies(results, flora, refinement, camera, statistics, side if facets else None)
+            yield from _write_proxies(results, flora, refinement, camera, statistics, side if facets else None)
         clock.lap("emit")
     except BaseException:  # an error, Esc (GeneratorExit) or Ctrl+C: nothing of ours may stay behind
         results.discard()
@@ -306,14 +306,16 @@ def _write_proxies(
     camera: Camera,
     statistics: Statistics,
     facet_pixels: float | None,
-) -> None:
+) -> Generator[Progress, None, None]:
     """Facets of so many pixels, or shells where None."""
     if facet_pixels is None:
-        buffers, material = emission.proxy_shells(flora, refinement), shell_material
+        shells = emission.proxy_shells(flora, refinement)
+        blocks, material = iter([] if shells is None else [shells]), shell_material
     else:
-        buffers, material = emission.facet_buffers(flora, refinement, camera, facet_pixels), proxy_material
+        blocks, material = emission.facet_blocks(flora, refinement, camera, facet_pixels), proxy_material
     statistics.facet_pixels = facet_pixels or 0.0
-    if buffers is not None:
-        results.add("TetFlora proxies", "proxy", buffers, [material()])
+    for number, buffers in enumerate(blocks):
+        results.add(f"TetFlora proxies {number:03d}", "proxy", buffers, [material()])
         statistics.polygons_proxy += buffers.polygons
         statistics.memory_mb += buffers.nbytes / 1e6
+        yield Progress(0.95 + 0.05 * (1 - 0.9**number), f"Making proxies: {statistics.polygons_proxy:,} faces")

@@ -8,18 +8,19 @@ import bpy
 import numpy as np
 
 from ..refinement.lights import Light
+from .scene_reader import renderable_objects
 from .transforms import world_matrix
 
 
-def read_lights(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[Light, ...]:
+def read_lights(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> tuple[Light, ...]:
     """Lights that render, shine and cast shadows, by name; an area counts as a point as wide as its longer side.
 
     Lights that collections or geometry nodes instance are not among them, nor is what the world's sky gives: its
     shadows are too soft to have a shape. A light that is placed nowhere is passed over.
     """
     found = []
-    for obj in sorted(scene.objects, key=lambda o: o.name_full):
-        if obj.type != 'LIGHT' or obj.hide_render:
+    for obj in sorted(renderable_objects(view_layer), key=lambda o: o.name_full):
+        if obj.type != 'LIGHT':
             continue
         data = obj.evaluated_get(depsgraph).data
         if data.energy <= 0.0 or not data.use_shadow:

@@ -20,6 +20,9 @@ ACROSS_THE_BORDER = 1.5
 #: Share of all cells, share of the picture, and polygons, for which a pass of the loop is not worth its time.
 FEW, NO_GAIN, NO_POLYGONS = 0.005, 0.002, 20_000
 
+#: A tetrahedron of more blocks than this on each side is no one's last word on what it holds.
+UNKNOWN = 4.0
+
 
 class Decision(IntEnum):
     """What is done with a terminal tetrahedron."""
@@ -91,7 +94,16 @@ def gains_nothing(
     return bool(gain <= NO_GAIN and cells.amounts.polygons[splitting].sum() <= NO_POLYGONS)
 
 
-def without_splits(decision: NDArray[np.int8], cells: Cells, settings: RefinementSettings) -> NDArray[np.int8]:
-    """What becomes of tetrahedra that would be divided when a limit forbids it: leaves of a pixel stay leaves."""
-    instead = np.where(cells.feature >= settings.leaf_limit, Decision.EXPLICIT, Decision.PROXY)
+def without_splits(
+    decision: NDArray[np.int8], cells: Cells, transmittance: NDArray[np.float64], settings: RefinementSettings
+) -> NDArray[np.int8]:
+    """What becomes of tetrahedra that would be divided when a limit forbids it: leaves of a pixel stay leaves.
+
+    Unless there are very many of them in a tetrahedron that is still large: of most it is not known how far away, and
+    whether hidden, they are.
+    """
+    leafy = cells.feature >= settings.leaf_limit
+    known = (cells.pixels <= (UNKNOWN * settings.block) ** 2) | (cells.amounts.polygons <= NO_POLYGONS)
+    instead = np.where(leafy & known, Decision.EXPLICIT, Decision.PROXY)
+    instead = np.where(transmittance <= settings.hidden, Decision.HIDDEN, instead)
     return np.where(decision == Decision.SPLIT, instead, decision).astype(np.int8)

@@ -142,7 +142,7 @@ def refine(
     holdings = Holdings(new)
     clock.lap("update")
     lights = lights if settings.shadow_cutoff > 0.0 else ()
-    ground = seen_ground(camera, occluders, float(np.median(seeds.position[:, 2]))) if lights and len(seeds) else None
+    ground = seen_ground(camera, occluders, _height(seeds, polygons)) if lights else None
     buffers = buffers_for(camera, settings.visibility_resolution, occluders)
     # Generations count from the root's own pieces. Passes do not count: a late one may divide what is still coarse.
     deepest = tree.levels - 1 + settings.max_levels
@@ -157,7 +157,7 @@ def refine(
         decision = decide(cells, transmittance, settings)
         splitting = decision == Decision.SPLIT
         if gains_nothing(splitting, cells, transmittance, camera):
-            decision = without_splits(decision, cells, settings)
+            decision = without_splits(decision, cells, transmittance, settings)
             splitting[:] = False
         by_shadow = ground is not None and not splitting.any()
         if by_shadow:
@@ -171,7 +171,7 @@ def refine(
         barred = splitting & (full | last | (tree.level[cells.nodes] >= deepest))
         limited = bool(barred.any())
         if limited:
-            instead = Decision.HIDDEN if by_shadow else without_splits(decision, cells, settings)
+            instead = Decision.HIDDEN if by_shadow else without_splits(decision, cells, transmittance, settings)
             decision = np.where(barred, instead, decision).astype(np.int8)
             splitting &= ~barred
         clock.lap("refinement")
@@ -200,6 +200,12 @@ def refine(
         buffer.remove(dividing)
         cells, buffer = _drawn(tree, buffers, buffer, cells.take(~splitting), *_filled(tree, new))
         clock.lap("visibility")
+
+
+def _height(seeds: Seeds, polygons: Polygons | None) -> float:
+    """Median height of what there is, metres."""
+    heights = [seeds.position[:, 2], *([] if polygons is None else [polygons.centre[:, 2]])]
+    return float(np.median(np.concatenate(heights)))
 
 
 def _filled(tree: TetrahedralTree, new: Contents) -> tuple[NDArray[np.intp], Amounts]:
