@@ -4,7 +4,7 @@
 
 import bpy
 
-from ..tetflora_addon.blender import job
+from ..tetflora_addon.blender import emit, job
 from . import ids
 from .base import Reporting, counted, in_object_mode
 
@@ -14,18 +14,25 @@ class TETFLORA_OT_clear(Reporting, bpy.types.Operator):
 
     bl_idname = ids.CLEAR
     bl_label = "Clear"
-    bl_description = "Remove all meshes, materials and proxies that Refine made, and nothing else. The plants stay"
+    bl_description = (
+        "Remove all meshes, materials and proxies that Refine made, and nothing else. The plants stay, and meshes that "
+        "were hidden for their sake are shown again"
+    )
     bl_options = {'REGISTER', 'UNDO'}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if not in_object_mode(cls, context):
             return False
-        if not job.has_results(context.scene):
+        # Results may have been deleted by hand, which leaves hidden what they stood for.
+        if not (job.has_results(context.scene) or emit.hidden_originals(context.scene)):
             cls.poll_message_set("Refine has made nothing yet")
             return False
         return True
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        self.report({'INFO'}, f"{counted(job.clear(context.scene), 'datablock')} removed")
+        hidden = emit.hidden_originals(context.scene, 'VIEW')
+        removed = f"{counted(job.clear(context.scene), 'datablock')} removed"
+        shown = sum(emit.HIDDEN['VIEW'] not in original for original in hidden)
+        self.report({'INFO'}, f"{removed}, {counted(shown, 'object')} shown again" if shown else removed)
         return {'FINISHED'}

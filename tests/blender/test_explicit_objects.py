@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph, errors, part
+from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph, errors, part, select
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -273,6 +273,19 @@ def test_what_cannot_be_refined_is_named(what):
     assert not stone.hide_render
 
 
+def test_what_is_linked_is_refused_because_its_file_keeps_its_flags(tmp_path):
+    import bpy
+
+    scene, path = _scene(), str(tmp_path / "rocks.blend")
+    bpy.data.libraries.write(path, {_leaves("source")})
+    bpy.data.batch_remove([bpy.data.objects["source"]])
+    with bpy.data.libraries.load(path, link=True) as (_, wanted):
+        wanted.objects = ["source"]
+    scene.collection.objects.link(wanted.objects[0])
+    with pytest.raises(errors().SceneError, match=r'"source" is linked .* library override'):
+        _refine(scene)
+
+
 def test_plants_meshes_and_occluders_together():
     """A mesh that hides plants takes part as well, and a hidden plant costs less than one that is seen."""
     scene = _scene()
@@ -373,8 +386,6 @@ def test_instances_of_nodes_take_part_and_their_maker_is_hidden():
 
 def test_the_operator_marks_and_unmarks():
     import bpy
-
-    from tests.blender.scenes import select
 
     add_camera()
     stone, plant = add_mesh("stone"), add_plant()

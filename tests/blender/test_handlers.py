@@ -208,6 +208,29 @@ def test_a_file_saved_in_the_middle_of_a_render_holds_nothing_of_it(stage, stub,
     assert not bpy.data.collections[0].hide_render
 
 
+def test_a_file_saved_in_the_middle_of_a_render_holds_meshes_as_the_artist_left_them(stage, tmp_path):
+    """And the render goes on without them; a mark that a crash left behind is taken back on load."""
+    import bpy
+
+    rock, handlers, path = add_mesh("rock"), part("handlers"), str(tmp_path / "middle.blend")
+    rock.tetflora.is_explicit = True
+    handlers.on_render_pre(stage)
+    mark = rock["tetflora_hidden_for_render"]
+    bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
+    assert (rock.hide_render, rock["tetflora_hidden_for_render"]) == (True, mark)
+    handlers.on_render_end(stage)
+    assert not rock.hide_render
+    with bpy.data.libraries.load(path) as (_, wanted):
+        wanted.objects = ["rock"]
+    (stored,) = wanted.objects
+    assert not stored.hide_render
+    assert "tetflora_hidden_for_render" not in stored
+    rock["tetflora_hidden_for_render"], rock.hide_render = mark, True  # as a crash leaves it
+    handlers.on_load_post("")
+    assert not rock.hide_render
+    assert "tetflora_hidden_for_render" not in rock
+
+
 def test_the_real_job_puts_plants_into_the_picture_and_leaves_none_behind(stage, tmp_path):
     before = datablocks()
     stage.camera.location.z = 6.0

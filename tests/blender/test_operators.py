@@ -182,6 +182,56 @@ def test_refine_makes_meshes_and_figures_and_clear_takes_them_back():
     assert session.part("panels.statistics_panel").steps_of(scene.tetflora.statistics) == ()
 
 
+def _refined_rock():
+    """A square that was refined by the button."""
+    add_camera(location=(0.0, -60.0, 2.0))
+    rock = add_mesh("rock")
+    rock.tetflora.is_explicit = True
+    tiny_render()
+    _ops().refine()
+    assert (rock.hide_render, rock.hide_viewport) == (True, True)
+    return rock
+
+
+@pytest.mark.parametrize("unlinked", [False, True])
+def test_clear_shows_what_results_that_were_deleted_by_hand_hid(unlinked):
+    """Also where the mesh was unlinked from the scene, or the scene was renamed meanwhile."""
+    import bpy
+
+    rock, scene = _refined_rock(), bpy.context.scene
+    (made,) = (c for c in bpy.data.collections if "tetflora_purpose" in c)
+    bpy.data.batch_remove([*made.objects, made])
+    if unlinked:
+        rock.use_fake_user = True
+        scene.collection.objects.unlink(rock)
+        scene.name = "renamed"
+    assert not part("job").has_results(scene)
+    assert _ops().clear() == {'FINISHED'}
+    assert (rock.hide_render, rock.hide_viewport) == (False, False)
+    assert not _ops().clear.poll()
+
+
+def test_clear_shows_a_mesh_only_when_no_scene_has_results_in_its_place():
+    """A scene that is renamed keeps its claim."""
+    import bpy
+
+    rock, first = _refined_rock(), bpy.context.scene
+    second = bpy.data.scenes.new("second")
+    for obj in (rock, first.camera):
+        second.collection.objects.link(obj)
+    second.camera = first.camera
+    with bpy.context.temp_override(scene=second, view_layer=second.view_layers[0]):
+        part("job").refine(second, bpy.context.evaluated_depsgraph_get())
+    assert part("job").has_results(second)
+    second.name = "other"
+    _ops().clear()
+    assert (rock.hide_render, rock.hide_viewport) == (True, True)
+    assert not _ops().clear.poll()
+    part("job").clear(second)
+    assert (rock.hide_render, rock.hide_viewport) == (False, False)
+    assert "tetflora_hidden" not in rock
+
+
 @pytest.mark.parametrize(
     ("break_it", "says"),
     [

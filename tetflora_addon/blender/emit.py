@@ -4,11 +4,13 @@
 
 Objects whose polygons are refined are hidden as long as the results are shown in their place. How visible they were is
 stored with them in custom properties, so that it outlives a file, a rename, and results that somebody deleted by hand;
-whatever removes results gives it back.
+whatever removes results gives it back. An object may be hidden for several scenes: it is shown when the last of them
+has no results any more.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
@@ -23,8 +25,8 @@ PURPOSE = "tetflora_purpose"
 NAMES = {'VIEW': "TetFlora", 'RENDER': "TetFlora render"}
 #: Custom property of a result object: 'leaf', 'blossom', 'bark', 'explicit' or 'proxy'.
 KIND = "tetflora_kind"
-#: Custom properties of objects that results stand for: hide_render and hide_viewport as they were before.
-#: Results of a render come last and go first.
+#: Custom properties of objects that results stand for, as JSON: hide_render and hide_viewport as they were before
+#: ("flags"), and the names of the scenes whose results they are ("scenes"). Results of a render come last and go first.
 HIDDEN = {'VIEW': "tetflora_hidden", 'RENDER': "tetflora_hidden_for_render"}
 
 
@@ -66,7 +68,9 @@ class Results:
     def hide(self, originals: Sequence[bpy.types.Object]) -> None:
         """Hide objects whose place the results take, in viewports too unless they are made for a render alone."""
         for original in originals:
-            original[HIDDEN[self.purpose]] = [original.hide_render, original.hide_viewport]
+            # Hidden for another scene already: how it looks now is not how the artist left it.
+            flags, scenes = _marker(original, self.purpose) or ([original.hide_render, original.hide_viewport], [])
+            _mark(original, self.purpose, flags, sorted({*scenes, self.scene.name}))
             original.hide_render = True
             original.hide_viewport = original.hide_viewport or self.purpose == 'VIEW'
 
@@ -99,23 +103,93 @@ def remove_results(scene: bpy.types.Scene, purpose: str | None = None, keep: bpy
     return sum(_remove_collection(scene, c) for c in result_collections(scene, purpose) if c != keep)
 
 
+def hidden_originals(scene: bpy.types.Scene, purpose: str | None = None) -> list[bpy.types.Object]:
+    """Objects that Clear would show, or release, in a scene: hidden for its results, or for results that are no more.
+
+    Wherever they are: somebody may have unlinked them from the scene meanwhile.
+    """
+    purposes = HIDDEN if purpose is None else [purpose]
+    return [o for which in purposes for o in _marked(which) if _concerns(scene, o, which)]
+
+
 def _show_originals(scene: bpy.types.Scene, purpose: str) -> None:
-    for original in _hidden(scene, purpose):
-        original.hide_render, original.hide_viewport = map(bool, original[HIDDEN[purpose]])
-        del original[HIDDEN[purpose]]
+    for original in hidden_originals(scene, purpose):
+        flags, _ = _marker(original, purpose)
+        others = _others(scene, original, purpose)
+        if others:
+            _mark(original, purpose, flags, others)
+        else:
+            _show(original, purpose)
 
 
-def _hidden(scene: bpy.types.Scene, purpose: str) -> list[bpy.types.Object]:
-    return [o for o in scene.objects if HIDDEN[purpose] in o]
+def _show(original: bpy.types.Object, purpose: str) -> None:
+    original.hide_render, original.hide_viewport = _marker(original, purpose)[0]
+    del original[HIDDEN[purpose]]
+
+
+def _marked(purpose: str) -> list[bpy.types.Object]:
+    """Objects of this file that are hidden; a library's own marks are the business of its file."""
+    return [o for o in bpy.data.objects if HIDDEN[purpose] in o and o.library is None]
+
+
+def _marker(original: bpy.types.Object, purpose: str) -> tuple[list[bool], list[str]] | None:
+    """Flags before it was hidden, and names of scenes; None if it is not hidden."""
+    stored = original.get(HIDDEN[purpose])
+    if stored is None:
+        return None
+    if not isinstance(stored, str):  # flags alone, as early versions stored them
+        return [bool(flag) for flag in stored], []
+    marker = json.loads(stored)
+    return marker["flags"], marker["scenes"]
+
+
+def _mark(original: bpy.types.Object, purpose: str, flags: list[bool], scenes: list[str]) -> None:
+    original[HIDDEN[purpose]] = json.dumps({"flags": flags, "scenes": scenes})
+
+
+def _concerns(scene: bpy.types.Scene, original: bpy.types.Object, purpose: str) -> bool:
+    return scene.name in _marker(original, purpose)[1] or not _others(scene, original, purpose)
+
+
+def _others(scene: bpy.types.Scene, original: bpy.types.Object, purpose: str) -> list[str]:
+    """Names of other scenes with results in the place of an object."""
+    names = _marker(original, purpose)[1]
+    renamed = any(name not in bpy.data.scenes for name in names)
+    return [
+        other.name
+        for other in bpy.data.scenes
+        if other != scene
+        and result_collections(other, purpose)
+        and (other.name in names or (renamed and other.objects.get(original.name) == original))
+    ]
+
+
+def lift_render_marks() -> dict[str, str]:
+    """Show everything that is hidden for a render; returns the marks by object, for `restore_render_marks`."""
+    lifted = {}
+    for original in _marked('RENDER'):
+        lifted[original.name] = original[HIDDEN['RENDER']]
+        _show(original, 'RENDER')
+    return lifted
+
+
+def restore_render_marks(lifted: dict[str, str]) -> None:
+    """Hide again what `lift_render_marks` showed."""
+    for name, mark in lifted.items():
+        original = bpy.data.objects.get((name, None))
+        if original is not None:
+            original[HIDDEN['RENDER']] = mark
+            original.hide_render = True
 
 
 @contextmanager
 def originals_shown(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Iterator[None]:
-    """While the scene is read, objects that results hide are as visible as the artist left them."""
-    before = {o: (o.hide_render, o.hide_viewport) for purpose in HIDDEN for o in _hidden(scene, purpose)}
-    for purpose in ('RENDER', 'VIEW'):
-        for o in _hidden(scene, purpose):
-            o.hide_render, o.hide_viewport = map(bool, o[HIDDEN[purpose]])
+    """While the scene is read, objects that results hide, be it those of another scene, are as the artist left them."""
+    marked = {purpose: _marked(purpose) for purpose in ('RENDER', 'VIEW')}
+    before = {o: (o.hide_render, o.hide_viewport) for every in marked.values() for o in every}
+    for purpose, every in marked.items():
+        for o in every:
+            o.hide_render, o.hide_viewport = _marker(o, purpose)[0]
     try:
         if before:
             depsgraph.update()

@@ -66,7 +66,8 @@ def read_explicit(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLaye
     Raises
     ------
     SceneError
-        A marked object without faces, or with numbers that are none; the message names it.
+        A marked object without faces, or with numbers that are none, or one that is linked and cannot be hidden; the
+        message names it.
     """
     if not any(o.tetflora.is_explicit for o in bpy.data.objects):
         return None
@@ -93,6 +94,12 @@ def read_explicit(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLaye
             raise SceneError(
                 f'"{obj.name}" has no faces to refine: give it some, or switch off Refine This Mesh in the sidebar\'s '
                 "TetFlora tab"
+            )
+    for obj in sorted(found, key=lambda o: o.name_full):
+        if obj.library is not None:
+            raise SceneError(
+                f'"{obj.name}" is linked from another file, and this file cannot remember that it is hidden while '
+                "results are shown in its place: make it local or a library override (Object > Relations)"
             )
     try:
         meshes = Meshes(reader.surfaces, np.array(reader.surface), np.array(reader.matrices))

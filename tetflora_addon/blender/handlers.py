@@ -20,7 +20,7 @@ from bpy.app.handlers import persistent
 
 from ..errors import TetFloraError
 from . import job
-from .emit import result_collections
+from .emit import lift_render_marks, restore_render_marks, result_collections
 from .migration import migrate
 from .scene_reader import NoPlantsError, has_contents, may_take_part, renderable_objects
 
@@ -31,6 +31,7 @@ class _Rendering:
 
     busy: bool = False
     hidden: list[str] = field(default_factory=list)
+    lifted: dict[str, str] = field(default_factory=dict)  # marks of originals, while a file is written
     bounces: int | None = None
     errors: list[str] = field(default_factory=list)
 
@@ -90,6 +91,7 @@ def on_render_end(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
 def on_save_pre(_path: object, _other: object = None) -> None:
     """Before a file is written: meshes that are only hidden for a render are stored as shown."""
     _show_hidden()
+    _rendering.lifted = lift_render_marks()
 
 
 @persistent
@@ -97,15 +99,22 @@ def on_save_post(_path: object, _other: object = None) -> None:
     """After a file was written, in the middle of a render: hide them again."""
     for collection in _named(_rendering.hidden):
         collection.hide_render = True
+    restore_render_marks(_rendering.lifted)
+    _rendering.lifted.clear()
 
 
 @persistent
 def on_load_post(_path: object, _other: object = None) -> None:
-    """After a file was read: nothing of an earlier render counts any more; bring old properties up to date."""
+    """After a file was read: nothing of an earlier render counts any more; bring old properties up to date.
+
+    Meshes that are marked as hidden for a render come from a crash in its middle, and are shown.
+    """
     _rendering.busy = False
     _rendering.bounces = None
     _rendering.hidden.clear()
+    _rendering.lifted.clear()
     _rendering.errors.clear()
+    lift_render_marks()
     migrate()
 
 
