@@ -107,7 +107,7 @@ def test_far_meshes_become_proxies_of_their_colour():
     assert not _made(scene)
     (proxies,) = _made(scene, "proxy")
     assert 0 < len(proxies.data.polygons) == statistics.polygons_proxy < 2_000
-    assert _area([proxies]) == pytest.approx(_area([leaves]), rel=1e-3)
+    assert _area([proxies]) == pytest.approx(_area([leaves]), rel=4 * statistics.polygons_proxy**-0.5)
     colour = np.zeros((len(proxies.data.polygons), 3), np.float32)
     proxies.data.attributes["tf_colour"].data.foreach_get("vector", colour.ravel())
     np.testing.assert_allclose(colour, np.tile([0.2, 0.5, 0.1], (len(colour), 1)), atol=1e-6)

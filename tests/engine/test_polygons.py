@@ -248,7 +248,7 @@ def refined(meshes: Meshes, camera: object, **options: float) -> Refinement:
 
 @pytest.mark.parametrize("anchored", [False, True])
 def test_near_polygons_stay_and_far_ones_become_facets_of_the_same_area(anchored: bool) -> None:
-    """No plant is needed. Leaves near the eye are there as they were, all others are there as area, to 1e-6."""
+    """No plant is needed. Leaves near the eye are there as they were, all others are there as area, but for chance."""
     meshes, camera = grove()
     result = refined(meshes, camera, anchored=anchored)
     whole = Polygons.everything(meshes)
@@ -260,10 +260,12 @@ def test_near_polygons_stay_and_far_ones_become_facets_of_the_same_area(anchored
     beside = ~result.in_view[proxies.polygon_cell]
     facets = [support.face_areas(b) for b in polygon_facets(proxies, result, camera, 0.6) if b.polygons]
     drawn = np.concatenate(facets).sum()
+    chance = 2 * np.sqrt((np.concatenate(facets) ** 2).sum())  # facets are there or not; of a mesh, not independently
+    assert chance < 0.1 * drawn
     assert 0.1 < kept / (kept + drawn) < 0.95
     # Facets beside the view may have been made smaller, so that they do not reach into it.
     loss = 0.5 * proxies.polygon_amounts.area[beside].sum()
-    assert whole.areas().sum() - loss <= kept + drawn + 1e-4 <= whole.areas().sum() * (1 + 1e-4) + 1e-4
+    assert whole.areas().sum() - loss - chance <= kept + drawn <= whole.areas().sum() + chance
     assert sum(b.polygons for b in blocks) + len(np.concatenate(facets)) < 0.7 * len(whole)
     near = whole.take(np.linalg.norm(whole.centre - camera.position, axis=1) < 7)
     inside = camera.clearance(near.centre) < -0.5

@@ -3,8 +3,9 @@
 """Facets that stand for explicit polygons: stochastic simplification (Cook, Halstead, Planck and Ryu, SIGGRAPH 2007).
 
 Of many small triangles few are chosen by chance, in proportion to their area, and each is drawn as a square that makes
-up for those that are left out. Choices are spread evenly along the list of triangles, which is in the order of
-tetrahedra and faces, so that each region of space gets its share to within one facet.
+up for those that are left out. What a triangle gets follows from its own number and nothing else, so that its facets
+stay where they are when others come into view or are kept as they are. Chances are spread evenly along the triangles of
+a mesh, so that the area of all is that of the mesh with little noise.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..buffers import MeshBuffers
-from ..plants.hashing import key_of_seed, mix, uniform
+from ..plants.growth import spread
+from ..plants.hashing import child_key, key_of_seed, mix, uniform
 from ..refinement.camera import Camera
 from ..refinement.contents import Contents
 from ..refinement.decisions import Decision
@@ -22,7 +24,9 @@ from ..refinement.polygons import Polygons
 from .facet_sizes import HIDDEN_FACES, polygon_facet_sizes
 from .microsurfaces import Facets, facet_mesh, kept_out_of_view
 
-_FIRST, _PLACE_U, _PLACE_V = 221, 222, 223
+_PLACE_U, _PLACE_V = 222, 223
+#: The golden section of 2⁶⁴, made odd.
+_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 
 
 def polygon_facets(
@@ -33,7 +37,6 @@ def polygon_facets(
         return []
     sizes = polygon_facet_sizes(contents, camera, result.chosen(Decision.HIDDEN))
     left = np.flatnonzero(~sizes.kept(facet_pixels))
-    left = left[np.argsort(contents.polygon_cell[left], kind="stable")]
     side, inside = sizes.sides(facet_pixels), result.in_view[contents.polygon_cell]
     parts = []
     for some, seen in ((left[inside[left]], True), (left[~inside[left]], False)):
@@ -48,12 +51,11 @@ def chosen_facets(polygons: Polygons, optical: NDArray[np.float64], side: NDArra
     Parameters
     ----------
     polygons : Polygons of n
-        In the order in which facets are to be spread.
+        Whole faces and fragments, in any order.
     optical : (n,) float64
         Area that they stand for, m².
     side : (n,) float64
-        Wanted side of facets, metres. All are made larger or smaller by one common factor, close to 1, so that their
-        area is that of the polygons exactly.
+        Of facets, metres. Their number is a matter of chance; its expectation is the area over that of a facet.
     """
     meshes = polygons.meshes
     owner, triangle, share = polygons.triangles()
@@ -61,20 +63,16 @@ def chosen_facets(polygons: Polygons, optical: NDArray[np.float64], side: NDArra
     own = share * np.linalg.norm(vector, axis=1)
     of_polygon = np.bincount(owner, own, len(polygons))
     rate = optical / (np.maximum(of_polygon, 1e-300) * np.maximum(side, 1e-12) ** 2)
-    sums = np.cumsum(own * rate[owner])
-    total = sums[-1] if len(sums) else 0.0
-    # The first place is chance; so is the number of facets that a fraction of one asks for.
-    first = float(uniform(key_of_seed(len(owner)), _FIRST))
-    places = first + np.arange(int(np.ceil(total - first)) if total > first else 0)
-    pick = np.searchsorted(sums, places, side="right")
-    pick = pick[pick < len(owner)]
-    area = np.einsum("n,n->", side[owner[pick]], side[owner[pick]])
-    factor = np.sqrt(optical.sum() / area) if area > 0 and total >= 1 else 1.0
+    key = _keys(polygons, owner)
+    # Steps by the golden section: any run of a mesh's triangles has its share of facets to within one or two (Weyl's
+    # sequence), from a place that chance chooses for each instance and fragment.
+    turned = key + triangle.astype(np.uint64) * _GOLDEN
+    chance = (turned >> np.uint64(11)).astype(np.float64) * 2.0**-53
+    pick, number = spread(np.floor(own * rate[owner] + chance).astype(np.int64))
 
     thing = owner[pick]
     face, instance = polygons.face[thing], polygons.instance[thing]
-    # Alike for a triangle wherever it is held; several facets of one lie apart.
-    key = mix(key_of_seed(triangle[pick]) ^ key_of_seed(instance) + np.arange(len(pick)).astype(np.uint64))
+    key = child_key(mix(key_of_seed(triangle[pick]) ^ key[pick]), number)  # several facets of a triangle lie apart
     weights = np.broadcast_to(np.eye(3), (len(pick), 3, 3)).copy()
     cut = np.flatnonzero(polygons.part[thing] >= 0)
     weights[cut] = polygons.weights[polygons.part[thing[cut]]]
@@ -91,10 +89,20 @@ def chosen_facets(polygons: Polygons, optical: NDArray[np.float64], side: NDArra
         centre,
         np.cross(along, normal),
         along,
-        factor * side[thing],
+        side[thing],
         meshes.colours[slot],
         meshes.transmission[slot],
     )
+
+
+def _keys(polygons: Polygons, owner: NDArray[np.int64]) -> NDArray[np.uint64]:
+    """Keys (m,) of the instances that triangles of polygons (m,) belong to, and of the very fragments that they are."""
+    key = key_of_seed(polygons.instance)
+    cut = np.flatnonzero(polygons.part >= 0)
+    corners = polygons.weights[polygons.part[cut]].reshape(-1, 9) + 0.0  # no negative zeros, which have other bits
+    for bits in np.ascontiguousarray(corners).view(np.uint64).T:
+        key[cut] = mix(key[cut] ^ bits)
+    return key[owner]
 
 
 def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
