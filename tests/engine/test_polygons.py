@@ -26,6 +26,7 @@ from tetflora_addon.refinement.loop import Refinement, refine
 from tetflora_addon.refinement.mesh_features import mesh_features
 from tetflora_addon.refinement.polygons import Meshes, Polygons, Surface, shares
 from tetflora_addon.refinement.settings import RefinementSettings
+from tetflora_addon.refinement.views import widened_for
 from tetflora_addon.shading.polygon_facets import polygon_facets
 from tetflora_addon.shading.summaries import summarise
 from tetflora_addon.tetrahedra.roots import view_root
@@ -285,6 +286,18 @@ def test_explicit_everywhere_is_the_original() -> None:
     assert total == pytest.approx(meshes.face_areas(np.tile(np.arange(300), 6), np.repeat(np.arange(6), 300)).sum())
     assert seen.any()
     assert [b.fraction for b in blocks] == sorted(b.fraction for b in blocks)
+
+
+def test_lens_and_shutter_widen_the_view_for_polygons_alone() -> None:
+    meshes, camera = grove(6)
+    flora, polygons = support.small_flora(), Polygons.everything(meshes)
+    nobody = Contents.empty().subplants
+    sharp = widened_for(camera, 0.04, flora, nobody, polygons)
+    assert sharp.window == camera.widened(0.04).window
+    blurred = widened_for(replace(camera, lens_radius=0.2, focus=20.0), 0.04, flora, nobody, polygons)
+    assert blurred.width > sharp.width
+    empty = polygons.take(slice(0))
+    assert widened_for(replace(camera, lens_radius=0.2, focus=20.0), 0.04, flora, nobody, empty).width == sharp.width
 
 
 def rough(number: int = 30, size: float = 40.0) -> Meshes:

@@ -133,7 +133,7 @@ def refine(
     """
     clock = Stopwatch()
     contents = Contents.of_plants(flora, seeds)
-    camera = widened_for(camera, settings.margin, flora, contents.subplants)
+    camera = widened_for(camera, settings.margin, flora, contents.subplants, polygons)
     slack = _slack(camera, settings.visibility_resolution)
     if polygons is not None:
         contents = Contents.joined([contents, Contents.of_polygons(polygons, large_polygons(polygons, camera))])

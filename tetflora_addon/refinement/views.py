@@ -19,17 +19,26 @@ from .blur import blur_margins
 from .camera import Camera
 from .contents import bounding_cylinders
 from .panorama import PanoramaBuffers, face_side
+from .polygons import Polygons
 from .rasterise import buffer_size
 from .settings import RefinementSettings
 from .visibility import Buffers
 
 
-def widened_for(camera: Camera, margin: float, flora: Flora, subplants: Branches) -> Camera:
-    """The camera with a margin, in shares of the picture, and what depth of field and motion blur add to it."""
+def widened_for(
+    camera: Camera, margin: float, flora: Flora, subplants: Branches, polygons: Polygons | None = None
+) -> Camera:
+    """The camera with a margin, in shares of the picture, and what depth of field and motion blur add to it.
+
+    Polygons count by their centres: what is one large face from the eye to the horizon asks for no margin.
+    """
     if not (camera.lens_radius > 0.0 or camera.shutter):
         return camera.widened(margin)
     centre, radius, half_height = bounding_cylinders(flora, subplants)
-    across, up = blur_margins(camera, centre, np.hypot(radius, half_height))
+    reach = np.hypot(radius, half_height)
+    if polygons is not None:
+        centre, reach = np.concatenate([centre, polygons.centre]), np.append(reach, np.zeros(len(polygons)))
+    across, up = blur_margins(camera, centre, reach)
     return camera.widened(margin + across, margin + up)
 
 
