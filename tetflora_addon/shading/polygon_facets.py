@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..buffers import MeshBuffers
 from ..plants.growth import spread
 from ..plants.hashing import child_key, key_of_seed, mix, uniform
+from ..plants.vectors import unit
 from ..refinement.camera import Camera
 from ..refinement.contents import Contents
 from ..refinement.decisions import Decision
@@ -80,10 +81,10 @@ def chosen_facets(polygons: Polygons, optical: NDArray[np.float64], side: NDArra
     root, v = np.sqrt(uniform(key, _PLACE_U)), uniform(key, _PLACE_V)
     at = np.stack([1 - root, root * (1 - v), root * v], axis=1)
     centre = np.einsum("nk,nki->ni", at, corners)
-    normal = _unit(vector[pick])
+    normal = unit(vector[pick])
     edges = np.roll(corners, -1, axis=1) - corners
     longest = np.linalg.norm(edges, axis=2).argmax(axis=1)
-    along = _unit(edges[np.arange(len(pick)), longest])
+    along = unit(edges[np.arange(len(pick)), longest])
     slot = meshes.slot[face]
     return Facets(
         centre,
@@ -103,7 +104,3 @@ def _keys(polygons: Polygons, owner: NDArray[np.int64]) -> NDArray[np.uint64]:
     for bits in np.ascontiguousarray(corners).view(np.uint64).T:
         key[cut] = mix(key[cut] ^ bits)
     return key[owner]
-
-
-def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..plants.compiled import Flora
 from ..plants.orientation import leaf_moments, own_leaf_moments, wood_moments
 from ..plants.pieces import piece_leaf_colours
+from ..plants.vectors import unit
 from ..refinement.contents import Contents
 from ..refinement.polygons import MEASURED_AT_ONCE
 
@@ -72,7 +73,7 @@ def summarise(flora: Flora, contents: Contents, index: NDArray[np.integer], coun
             wood_moment, transmission = wood_moments(flora.orientation, branches), flora.transmission[row]
         else:
             own = own.take(keep)
-            axis = _directions(own.end - own.start)
+            axis = unit(own.end - own.start)
             leaf_colour, wood_colour = piece_leaf_colours(flora, own), rows["branch_colour"][row, 0]
             leaf_moment = own_leaf_moments(flora.orientation, row, axis)
             wood_moment = (np.eye(3) - axis[:, :, None] * axis[:, None, :]) / 2
@@ -122,10 +123,6 @@ def _moments(sums: NDArray[np.float64]) -> NDArray[np.float64]:
     values = np.maximum(values, 0)
     trace = values.sum(axis=1, keepdims=True)
     return (vectors * (values / np.where(trace > 0, trace, 1))[:, None]) @ vectors.transpose(0, 2, 1)
-
-
-def _directions(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300)
 
 
 def extinction_matrices(summaries: Summaries, volumes: NDArray[np.float64]) -> tuple[NDArray, NDArray, NDArray]:
