@@ -99,7 +99,7 @@ def read_explicit(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLaye
         if obj.library is not None:
             raise SceneError(
                 f'"{obj.name}" is linked from another file, and this file cannot remember that it is hidden while '
-                "results are shown in its place: make it local or a library override (Object > Relations)"
+                "results are shown in its place: make it local, or make a library override of it, in the Object menu"
             )
     try:
         meshes = Meshes(reader.surfaces, np.array(reader.surface), np.array(reader.matrices))
