@@ -130,7 +130,7 @@ def facet_blocks(flora: Flora, result: Refinement, camera: Camera, facet_pixels:
     """
     parts: list[MeshBuffers] = []
     for made in _facets(flora, result, camera, facet_pixels):
-        if made is not None:
+        if made is not None and made.polygons:
             parts.append(made)
         if sum(p.polygons for p in parts) >= BLOCK_POLYGONS:
             yield concatenate_buffers(parts)

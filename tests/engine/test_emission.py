@@ -210,6 +210,8 @@ def test_nothing_to_draw() -> None:
     assert proxy_shells(flora, explicit) is None
     assert facet_buffers(flora, explicit, camera) is None
     assert list(explicit_blocks(flora, with_decision(result, Decision.PROXY))) == []
+    # Facets so large that none of what there is makes one.
+    assert list(emission.facet_blocks(flora, with_decision(result, Decision.PROXY), camera, 1e9)) == []
 
 
 def test_copies_of_a_seed_are_all_made() -> None:
