@@ -9,7 +9,7 @@ import json
 import numpy as np
 import pytest
 
-from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, errors, part, tiny_render
+from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph, errors, part, tiny_render
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -229,6 +229,30 @@ def test_a_file_saved_in_the_middle_of_a_render_holds_meshes_as_the_artist_left_
     handlers.on_load_post("")
     assert not rock.hide_render
     assert "tetflora_hidden_for_render" not in rock
+
+
+def test_a_library_override_comes_back_after_its_file_was_saved_and_read(stage, tmp_path):
+    """Blender stores that it is hidden, but not the property that says how it was."""
+    import bpy
+
+    rock, library, path = add_mesh("rock"), str(tmp_path / "rocks.blend"), str(tmp_path / "forest.blend")
+    rock.tetflora.is_explicit = True
+    bpy.data.libraries.write(library, {rock})
+    bpy.data.batch_remove([rock])
+    with bpy.data.libraries.load(library, link=True) as (_, wanted):
+        wanted.objects = ["rock"]
+    override = wanted.objects[0].override_create(remap_local_usages=True)
+    stage.collection.objects.link(override)
+    part("job").refine(stage, depsgraph())
+    assert override.hide_render
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    assert "tetflora_hidden_overrides" not in stage
+    bpy.ops.wm.open_mainfile(filepath=path)
+    scene, rock = bpy.context.scene, bpy.data.objects["rock", None]
+    assert rock.hide_render
+    assert "tetflora_hidden_overrides" not in scene
+    part("job").clear(scene)
+    assert not (rock.hide_render or rock.hide_viewport)
 
 
 def test_the_real_job_puts_plants_into_the_picture_and_leaves_none_behind(stage, tmp_path):

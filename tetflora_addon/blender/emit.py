@@ -28,6 +28,8 @@ KIND = "tetflora_kind"
 #: Custom properties of objects that results stand for, as JSON: hide_render and hide_viewport as they were before
 #: ("flags"), and the names of the scenes whose results they are ("scenes"). Results of a render come last and go first.
 HIDDEN = {'VIEW': "tetflora_hidden", 'RENDER': "tetflora_hidden_for_render"}
+#: Custom property of scenes in files: marks of library overrides, which Blender does not store with them.
+OVERRIDES = "tetflora_hidden_overrides"
 
 
 class Results:
@@ -180,6 +182,29 @@ def restore_render_marks(lifted: dict[str, str]) -> None:
         if original is not None:
             original[HIDDEN['RENDER']] = mark
             original.hide_render = True
+
+
+def pack_override_marks() -> None:
+    """Put marks of library overrides where a file keeps them: of overrides Blender stores flags, but no new property.
+
+    While a file is written and no longer: what a scene refers to by a property could not be deleted.
+    """
+    packed = [{"object": o, "mark": o[HIDDEN['VIEW']]} for o in _marked('VIEW') if o.override_library is not None]
+    home = next((scene for scene in bpy.data.scenes if scene.library is None), None)
+    if packed and home is not None:
+        home[OVERRIDES] = packed
+
+
+def unpack_override_marks() -> None:
+    """Give library overrides back what `pack_override_marks` kept."""
+    for scene in bpy.data.scenes:
+        if scene.library is not None or OVERRIDES not in scene:
+            continue
+        for entry in scene[OVERRIDES]:
+            original = entry["object"]
+            if original is not None and original.library is None:
+                original[HIDDEN['VIEW']] = entry["mark"]
+        del scene[OVERRIDES]
 
 
 @contextmanager

@@ -20,7 +20,13 @@ from bpy.app.handlers import persistent
 
 from ..errors import TetFloraError
 from . import job
-from .emit import lift_render_marks, restore_render_marks, result_collections
+from .emit import (
+    lift_render_marks,
+    pack_override_marks,
+    restore_render_marks,
+    result_collections,
+    unpack_override_marks,
+)
 from .migration import migrate
 from .scene_reader import NoPlantsError, has_contents, may_take_part, renderable_objects
 
@@ -92,6 +98,7 @@ def on_save_pre(_path: object, _other: object = None) -> None:
     """Before a file is written: meshes that are only hidden for a render are stored as shown."""
     _show_hidden()
     _rendering.lifted = lift_render_marks()
+    pack_override_marks()
 
 
 @persistent
@@ -99,6 +106,7 @@ def on_save_post(_path: object, _other: object = None) -> None:
     """After a file was written, in the middle of a render: hide them again."""
     for collection in _named(_rendering.hidden):
         collection.hide_render = True
+    unpack_override_marks()
     restore_render_marks(_rendering.lifted)
     _rendering.lifted.clear()
 
@@ -115,6 +123,7 @@ def on_load_post(_path: object, _other: object = None) -> None:
     _rendering.lifted.clear()
     _rendering.errors.clear()
     lift_render_marks()
+    unpack_override_marks()
     migrate()
 
 
