@@ -145,7 +145,7 @@ class RefinementProperties:
         precision=1,
     )
     anchored: BoolProperty(
-        name="Anchored in the World",
+        name="Anchored",
         description=(
             "Divide space alike in all frames of a film, whatever the camera does, so that less changes from frame to "
             "frame. Somewhat more is made than where space is divided from the camera. Panoramas always are"
