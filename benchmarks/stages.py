@@ -87,10 +87,10 @@ def run(quick: bool) -> dict[str, float]:
         lap("polygons", block.buffers.nbytes)
         meshes.write_mesh("block", block.buffers)
         lap("write", block.buffers.nbytes)
-    facets = emission.facet_buffers(flora, result, camera)
-    lap("facets", facets.nbytes)
-    meshes.write_mesh("facets", facets)
-    lap("write", facets.nbytes)
+    for facets in emission.facet_blocks(flora, result, camera):
+        lap("facets", facets.nbytes)
+        meshes.write_mesh("facets", facets)
+        lap("write", facets.nbytes)
     speed = copy_speed()
     figures = {"copy_gb_per_s": speed / 1e9, "total_s": sum(seconds.values())}
     for stage, took in seconds.items():

@@ -24,8 +24,10 @@ class TETFLORA_OT_clear(Reporting, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not in_object_mode(cls, context):
             return False
-        # Results may have been deleted by hand, which leaves hidden what they stood for.
-        if not (job.has_results(context.scene) or emit.hidden_originals(context.scene)):
+        # Results may have been deleted by hand, which leaves hidden what they stood for. Only then are all objects
+        # looked through: a panel asks at every movement of the mouse.
+        scene = context.scene
+        if not (job.has_results(scene) or (scene.tetflora.statistics and emit.hidden_originals(scene))):
             cls.poll_message_set("Refine has made nothing yet")
             return False
         return True

@@ -3,13 +3,12 @@
 """Mark meshes as hiding plants."""
 
 import bpy
-from bpy.props import EnumProperty
 
 from . import ids
-from .base import Reporting, counted
+from .marking import Marking, action_property
 
 
-class TETFLORA_OT_mark_occluder(Reporting, bpy.types.Operator):
+class TETFLORA_OT_mark_occluder(Marking, bpy.types.Operator):
     """Mark the selected meshes as hiding the plants behind them, or take the mark away."""
 
     bl_idname = ids.MARK_OCCLUDER
@@ -19,32 +18,10 @@ class TETFLORA_OT_mark_occluder(Reporting, bpy.types.Operator):
         "next to nothing. Again to take the mark away"
     )
     bl_options = {'REGISTER', 'UNDO'}
+    mark, nothing, marked = "is_occluder", "Select meshes first", "Plants behind {} count as hidden"
 
-    action: EnumProperty(
-        name="Action",
-        description="What happens to the mark",
-        items=(
-            ('TOGGLE', "Toggle", "Mark all, or unmark them if all are marked"),
-            ('MARK', "Mark", "Plants behind the meshes count as hidden"),
-            ('UNMARK', "Unmark", "The meshes do not matter to refinement"),
-        ),
-        default='TOGGLE',
-        options={'SKIP_SAVE'},
-    )
+    action: action_property("Plants behind the meshes count as hidden", "The meshes do not matter to refinement")
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if any(o.type == 'MESH' or o.tetflora.is_occluder for o in context.selected_objects):
-            return True
-        cls.poll_message_set("Select meshes first")
-        return False
-
-    def run(self, context: bpy.types.Context) -> set[str]:
-        # Something marked that has since been converted can still be unmarked.
-        meshes = [o for o in context.selected_objects if o.type == 'MESH' or o.tetflora.is_occluder]
-        mark = self.action == 'MARK' or (self.action == 'TOGGLE' and not all(o.tetflora.is_occluder for o in meshes))
-        for obj in meshes:
-            obj.tetflora.is_occluder = mark and obj.type == 'MESH'
-        number = counted(len(meshes), "object")
-        self.report({'INFO'}, f"Plants behind {number} count as hidden" if mark else f"{number} unmarked")
-        return {'FINISHED'}
+    @staticmethod
+    def fits(obj: bpy.types.Object) -> bool:
+        return obj.type == 'MESH'

@@ -10,6 +10,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+#: Polygons in a block, about; some 60 MB of buffers.
+BLOCK_POLYGONS = 250_000
+
 
 @dataclass(frozen=True)
 class MeshBuffers:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .buffers import MeshBuffers, concatenate_buffers
+from .buffers import BLOCK_POLYGONS, MeshBuffers, concatenate_buffers
 from .plants.compiled import Flora
 from .plants.expansion import chunks, expand
 from .plants.growth import trunks
@@ -34,8 +34,6 @@ from .shading.shells import shell_buffers
 from .shading.summaries import extinction_matrices, summarise
 from .tetrahedra.geometry import volume
 
-#: Polygons in a block, about; some 60 MB of buffers.
-BLOCK_POLYGONS = 250_000
 #: Facets that are made at a time, about; thick wood close to the eye is cut into very many.
 FACETS_AT_ONCE = 200_000
 
@@ -108,11 +106,6 @@ def _block(flora: Flora, pieces: Pieces, stems: list[Stems], number: int, fracti
         if buffers is not None:
             yield Block(kind, form, s, number, buffers, fraction)
         del buffers
-
-
-def facet_buffers(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.6) -> MeshBuffers | None:
-    """All of `facet_blocks` in one mesh, None where there are none."""
-    return concatenate_buffers(list(facet_blocks(flora, result, camera, facet_pixels)))
 
 
 def facet_blocks(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.6) -> Iterator[MeshBuffers]:

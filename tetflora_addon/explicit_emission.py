@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .buffers import MeshBuffers
+from .buffers import BLOCK_POLYGONS, MeshBuffers
 from .plants.expansion import chunks
 from .plants.growth import spread
 from .refinement.camera import Camera
@@ -22,8 +22,6 @@ from .refinement.loop import Refinement
 from .refinement.polygons import Polygons, shares
 from .shading.facet_sizes import polygon_facet_sizes
 
-#: Polygons in a block, about.
-BLOCK_POLYGONS = 250_000
 #: Attributes by their numbers of components; a fourth and further ones are none that a mesh could hold.
 _FLOATS = {1: (), 2: (2,), 3: (3,)}
 #: What is missing of a face by rounding errors alone.

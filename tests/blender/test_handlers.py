@@ -42,7 +42,7 @@ class _Stub:
         assert for_render
         if self.error is not None:
             raise self.error
-        camera = part("scene_reader").read_camera(scene, depsgraph)
+        camera = part("camera_reader").read_camera(scene, depsgraph)
         seeds = part("scene_reader").read_plants(scene, depsgraph, view_layer)
         self.cameras.append(camera.position.round(4).tolist())
         self.plants.append(seeds.position.round(4).tolist())

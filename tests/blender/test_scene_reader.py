@@ -17,7 +17,7 @@ pytestmark = pytest.mark.usefixtures("clean_file")
 def _camera():
     import bpy
 
-    return part("scene_reader").read_camera(bpy.context.scene, depsgraph())
+    return part("camera_reader").read_camera(bpy.context.scene, depsgraph())
 
 
 def _plants():

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tetflora_addon.buffers import MeshBuffers
+from tetflora_addon.buffers import MeshBuffers, concatenate_buffers
+from tetflora_addon.emission import facet_blocks
 from tetflora_addon.plants.catalogue import builtin_folder, load_species
 from tetflora_addon.plants.compiled import Flora, compile_species
 from tetflora_addon.plants.expansion import expand
@@ -26,6 +27,7 @@ from tetflora_addon.plants.schema import species_from_dict
 from tetflora_addon.plants.seeds import Seeds
 from tetflora_addon.plants.tubes import tube_buffers
 from tetflora_addon.refinement.camera import Camera
+from tetflora_addon.refinement.loop import Refinement
 
 SPECIES = tuple(sorted(path.stem for path in builtin_folder().glob("*.json")))
 #: Species of so many alike branches that a few plants settle means of place and direction (a palm has 30 fronds).
@@ -231,3 +233,8 @@ def moment(*meshes: MeshBuffers) -> NDArray[np.float64]:
     areas = np.linalg.norm(vectors, axis=1)
     scaled = vectors / np.sqrt(np.maximum(areas, 1e-300))[:, None]
     return scaled.T @ scaled / areas.sum()
+
+
+def facet_buffers(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.6) -> MeshBuffers | None:
+    """All facets of proxies in one mesh; None where there are none."""
+    return concatenate_buffers(list(facet_blocks(flora, result, camera, facet_pixels)))

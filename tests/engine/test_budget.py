@@ -12,9 +12,10 @@ from hypothesis import given
 from hypothesis import settings as examples
 from hypothesis import strategies as st
 
+from tests.engine import support
 from tests.engine.test_emission import scene
 from tetflora_addon.budget import BYTES_PER_POLYGON, afford, polygons_allowed
-from tetflora_addon.emission import explicit_blocks, facet_buffers
+from tetflora_addon.emission import explicit_blocks
 from tetflora_addon.refinement.decisions import Decision, contributions
 from tetflora_addon.refinement.settings import RefinementSettings
 
@@ -26,7 +27,7 @@ def made(limit: int, facets: bool = True) -> tuple[int, int, float, object]:
     flora, _, camera, result = scene()
     fitted, side = afford(flora, result, camera, replace(SETTINGS, max_polygons=limit), facets)
     leaves = sum(b.buffers.polygons for b in explicit_blocks(flora, fitted))
-    proxies = facet_buffers(flora, fitted, camera, side)
+    proxies = support.facet_buffers(flora, fitted, camera, side)
     return leaves, proxies.polygons if proxies else 0, side, fitted
 
 

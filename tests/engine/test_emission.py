@@ -14,7 +14,7 @@ from tests.engine import support
 from tests.engine.test_loop import run
 from tests.engine.test_meshing import check_topology
 from tetflora_addon import emission
-from tetflora_addon.emission import expanded_blocks, explicit_blocks, facet_buffers, proxy_shells
+from tetflora_addon.emission import expanded_blocks, explicit_blocks, proxy_shells
 from tetflora_addon.plants.compiled import Flora
 from tetflora_addon.plants.seeds import Seeds
 from tetflora_addon.refinement.camera import Camera
@@ -105,7 +105,7 @@ def test_facets_have_the_area_of_what_is_not_explicit() -> None:
     flora, _, camera, result = scene()
     every = result.contents.sums(len(result.tree))
     proxies = result.chosen(Decision.PROXY, Decision.HIDDEN)
-    mesh = facet_buffers(flora, result, camera)
+    mesh = support.facet_buffers(flora, result, camera)
     check_topology(mesh)
     optical = (every.leaf_area + every.wood_area / 2)[proxies].sum()
     assert support.face_areas(mesh).sum() == pytest.approx(optical, rel=0.05)
@@ -116,7 +116,7 @@ def test_facets_are_as_large_as_asked_for_and_larger_where_hidden() -> None:
     flora, _, camera, result = scene()
     numbers = {}
     for decision in (Decision.PROXY, Decision.HIDDEN):
-        mesh = facet_buffers(flora, with_decision(result, decision), camera, facet_pixels=0.5)
+        mesh = support.facet_buffers(flora, with_decision(result, decision), camera, facet_pixels=0.5)
         numbers[decision] = mesh.polygons
         wood = mesh.attributes["tf_transmission"][1] == 0
         centre = support.face_centres(mesh)[wood]
@@ -131,9 +131,9 @@ def test_facets_are_as_large_as_asked_for_and_larger_where_hidden() -> None:
 
 def test_chunks_of_facets_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     flora, _, camera, result = scene()
-    once = facet_buffers(flora, result, camera)
+    once = support.facet_buffers(flora, result, camera)
     monkeypatch.setattr(emission, "FACETS_AT_ONCE", 500)
-    chunked = facet_buffers(flora, result, camera)
+    chunked = support.facet_buffers(flora, result, camera)
     assert chunked.polygons == once.polygons
     quads = [np.unique(m.positions.reshape(-1, 12), axis=0) for m in (once, chunked)]
     assert (quads[0] == quads[1]).all()
@@ -153,7 +153,7 @@ def test_facets_are_made_in_chunks_that_are_bounded(monkeypatch: pytest.MonkeyPa
 
         monkeypatch.setattr(emission, name, counted)
     monkeypatch.setattr(emission, "FACETS_AT_ONCE", 2_000)
-    total = facet_buffers(flora, with_decision(result, Decision.PROXY), camera, facet_pixels=0.15)
+    total = support.facet_buffers(flora, with_decision(result, Decision.PROXY), camera, facet_pixels=0.15)
     assert sum(map(sum, made.values())) == total.polygons
     for numbers in made.values():
         assert sum(numbers) > 8_000
@@ -165,7 +165,7 @@ def test_facets_are_made_in_chunks_that_are_bounded(monkeypatch: pytest.MonkeyPa
 def test_facets_come_in_blocks_of_bounded_size(monkeypatch: pytest.MonkeyPatch) -> None:
     """Together they are all facets; only the last block is small."""
     flora, _, camera, result = scene()
-    once = facet_buffers(flora, result, camera)
+    once = support.facet_buffers(flora, result, camera)
     monkeypatch.setattr(emission, "FACETS_AT_ONCE", 300)
     monkeypatch.setattr(emission, "BLOCK_POLYGONS", 700)
     blocks = [b.polygons for b in emission.facet_blocks(flora, result, camera)]
@@ -183,7 +183,7 @@ def test_what_was_off_screen_comes_back_identical() -> None:
     for view in (camera, away, camera):
         _, result = run(flora, seeds, view)
         blocks = [b.buffers for b in explicit_blocks(flora, result)]
-        made.append([m.positions for m in (*blocks, facet_buffers(flora, result, view))])
+        made.append([m.positions for m in (*blocks, support.facet_buffers(flora, result, view))])
     assert all(np.array_equal(a, b) for a, b in zip(made[0], made[2], strict=True))
     assert sum(map(len, made[1])) < sum(map(len, made[0])) / 2
 
@@ -208,7 +208,7 @@ def test_nothing_to_draw() -> None:
     flora, _, camera, result = scene()
     explicit = with_decision(result, Decision.EXPLICIT)
     assert proxy_shells(flora, explicit) is None
-    assert facet_buffers(flora, explicit, camera) is None
+    assert support.facet_buffers(flora, explicit, camera) is None
     assert list(explicit_blocks(flora, with_decision(result, Decision.PROXY))) == []
     # Facets so large that none of what there is makes one.
     assert list(emission.facet_blocks(flora, with_decision(result, Decision.PROXY), camera, 1e9)) == []

@@ -15,7 +15,7 @@ from tests.engine import support
 from tests.engine.test_meshing import check_topology
 from tetflora_addon.budget import afford
 from tetflora_addon.buffers import MeshBuffers
-from tetflora_addon.emission import facet_buffers, proxy_shells
+from tetflora_addon.emission import proxy_shells
 from tetflora_addon.explicit_emission import mended, polygon_blocks, polygon_buffers
 from tetflora_addon.plants.hashing import mix
 from tetflora_addon.refinement.clipping import cut
@@ -340,7 +340,7 @@ def test_a_budget_counts_polygons() -> None:
         options = RefinementSettings(max_polygons=most)
         fitted, side = afford(flora, result, camera, options)
         made = [b.buffers for b in polygon_blocks(fitted, camera, side)]
-        facets = facet_buffers(flora, fitted, camera, side)
+        facets = support.facet_buffers(flora, fitted, camera, side)
         sizes.append(sum(b.polygons for b in made) + (facets.polygons if facets else 0))
         assert sizes[-1] <= (most or np.inf)
     assert sizes[0] > sizes[1] > sizes[2] > 500

@@ -19,9 +19,9 @@ import bpy
 
 from ..errors import SceneError, TetFloraError
 from . import handlers, job
+from .camera_reader import read_camera
 from .compat import EEVEE_ENGINES, eevee_engine
 from .properties import TetFloraScene
-from .scene_reader import read_camera
 
 NAME = "tetflora"
 

@@ -25,13 +25,14 @@ from ..refinement.polygons import Polygons
 from ..refinement.settings import RefinementSettings
 from ..refinement.statistics import Statistics, Stopwatch
 from ..refinement.steps import step_of
+from .camera_reader import read_camera
 from .emit import Results, has_results, originals_shown, remove_results
 from .explicit_objects import Explicit, read_explicit
 from .leaf_forms import materials_of, resolved_species
 from .light_reader import read_lights
 from .materials import proxy_material
 from .properties import settings_from
-from .scene_reader import NoPlantsError, read_camera, read_occluders, read_plants
+from .scene_reader import NoPlantsError, read_occluders, read_plants
 from .shell_material import shell_material
 from .species_items import catalogue
 
@@ -212,7 +213,7 @@ def partition(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[C
         As `refine_steps`.
     """
     camera, given = read_camera(scene, depsgraph), _read(scene, depsgraph, depsgraph.view_layer)
-    loop = _run_loop(compile_for(given.species, scene, depsgraph), given, camera, _settings(scene))
+    loop = _run_loop(compile_for(given.species, scene, depsgraph), given, camera, _settings(scene), Statistics())
     while True:
         try:
             next(loop)
@@ -245,20 +246,19 @@ def _settings(scene: bpy.types.Scene) -> RefinementSettings:
 
 
 def _run_loop(
-    flora: Flora, given: _Given, camera: Camera, settings: RefinementSettings, statistics: Statistics | None = None
+    flora: Flora, given: _Given, camera: Camera, settings: RefinementSettings, statistics: Statistics
 ) -> Generator[Progress, None, Refinement]:
     """Refine; the statistics get a step for each pass."""
     loop = refine_loop(flora, given.seeds, camera, settings, given.occluders, given.polygons, given.lights)
     fraction = 0.05
     while True:
         try:
-            state = next(loop)
+            state, last = next(loop), False
         except StopIteration as stop:
-            if statistics is not None:
-                statistics.steps.append(step_of(stop.value))
-            return stop.value
-        if statistics is not None:
-            statistics.steps.append(step_of(state))
+            state, last = stop.value, True
+        statistics.steps.append(step_of(state))
+        if last:
+            return state
         waiting = int((state.decision == Decision.SPLIT).sum())
         fraction += 0.15 * (_LOOP_SHARE - fraction)  # nobody knows how many passes will follow
         yield Progress(

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from ..plants.hashing import child_key, key_of_seed
 from ..plants.seeds import Seeds
-from .camera_reader import read_camera as read_camera
 from .plant_copies import Copies, copies_of, may_instance
 from .plant_fields import Plants, read_field
 from .plant_kinds import kind_of, species_of

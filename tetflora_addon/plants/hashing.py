@@ -103,6 +103,16 @@ def uniform(key: NDArray[np.uint64], draw: int) -> NDArray[np.float64]:
     return out
 
 
+def stepped(key: NDArray[np.uint64], index: NDArray[np.integer]) -> NDArray[np.float64]:
+    """Numbers in [0, 1) that are spread evenly along consecutive indices (n,), beginning where each key (n,) says.
+
+    Steps by the golden section (H. Weyl, "Über die Gleichverteilung von Zahlen mod. Eins", 1916): of any run of them,
+    the share that falls into an interval is its length, to within one or two.
+    """
+    turned = key + np.asarray(index).astype(np.uint64) * _GOLDEN
+    return (turned >> np.uint64(11)).astype(np.float64) * _TO_UNIT
+
+
 def signed(key: NDArray[np.uint64], draw: int) -> NDArray[np.float64]:
     """Numbers in [-1, 1), one for each key."""
     out = uniform(key, draw)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..buffers import MeshBuffers
 from ..plants.growth import spread
-from ..plants.hashing import child_key, key_of_seed, mix, uniform
+from ..plants.hashing import child_key, key_of_seed, mix, stepped, uniform
 from ..plants.vectors import unit
 from ..refinement.camera import Camera
 from ..refinement.contents import Contents
@@ -26,8 +26,6 @@ from .facet_sizes import HIDDEN_FACES, polygon_facet_sizes
 from .microsurfaces import Facets, facet_mesh, kept_out_of_view
 
 _PLACE_U, _PLACE_V = 222, 223
-#: The golden section of 2⁶⁴, made odd.
-_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 
 
 def polygon_facets(
@@ -65,11 +63,7 @@ def chosen_facets(polygons: Polygons, optical: NDArray[np.float64], side: NDArra
     of_polygon = np.bincount(owner, own, len(polygons))
     rate = optical / (np.maximum(of_polygon, 1e-300) * np.maximum(side, 1e-12) ** 2)
     key = _keys(polygons, owner)
-    # Steps by the golden section: any run of a mesh's triangles has its share of facets to within one or two (Weyl's
-    # sequence), from a place that chance chooses for each instance and fragment.
-    turned = key + triangle.astype(np.uint64) * _GOLDEN
-    chance = (turned >> np.uint64(11)).astype(np.float64) * 2.0**-53
-    pick, number = spread(np.floor(own * rate[owner] + chance).astype(np.int64))
+    pick, number = spread(np.floor(own * rate[owner] + stepped(key, triangle)).astype(np.int64))
 
     thing = owner[pick]
     face, instance = polygons.face[thing], polygons.instance[thing]
