@@ -60,10 +60,9 @@ def opened_cell(identifier: str, orders: int) -> Callable[[], tuple[np.ndarray, 
             parts += [("leaf", leaf.form, leaf.buffers) for leaf in meshing.leaf_meshes(flora, pieces, 0)]
         points = []
         if len(closed):
-            facets = part("tetflora_addon.shading.microsurfaces").subplant_facets(
-                flora, closed, np.full(len(closed), FACET)
-            )
-            parts.append(("proxy", 0, facets))
+            surfaces = part("tetflora_addon.shading.microsurfaces")
+            facets = surfaces.subplant_facets(flora, closed, np.full(len(closed), FACET))
+            parts.append(("proxy", 0, surfaces.facet_mesh(facets)))
         for number, (kind, form, buffers) in enumerate(p for p in parts if p[2] is not None):
             proxy = part("tetflora_addon.blender.materials").proxy_material
             own = [proxy()] if kind == "proxy" else materials.materials_of(scene, flora.species[0], kind, form)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .buffers import BLOCK_POLYGONS, MeshBuffers, concatenate_buffers
+from .buffers import BLOCK_POLYGONS, MeshBuffers
 from .plants.compiled import Flora
 from .plants.expansion import chunks, expand
 from .plants.growth import trunks
@@ -28,7 +28,14 @@ from .refinement.camera import Camera
 from .refinement.decisions import Decision
 from .refinement.loop import Refinement
 from .shading.facet_sizes import HIDDEN_LEAVES, piece_facet_sizes, subplant_facet_sizes
-from .shading.microsurfaces import kept_out_of_view, piece_facets, subplant_facets
+from .shading.microsurfaces import (
+    Facets,
+    concatenate_facets,
+    facet_mesh,
+    kept_out_of_view,
+    piece_facets,
+    subplant_facets,
+)
 from .shading.polygon_facets import polygon_facets
 from .shading.shells import shell_buffers
 from .shading.summaries import extinction_matrices, summarise
@@ -121,18 +128,24 @@ def facet_blocks(flora: Flora, result: Refinement, camera: Camera, facet_pixels:
     facet_pixels : float
         Side of a facet that is seen, in pixels; see `shading.facet_sizes` for the others.
     """
-    parts: list[MeshBuffers] = []
+    for facets in _blocks_of_facets(flora, result, camera, facet_pixels):
+        yield facet_mesh(facets)
+
+
+def _blocks_of_facets(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float) -> Iterator[Facets]:
+    """Facets in blocks of about `BLOCK_POLYGONS`, none of them empty."""
+    parts: list[Facets] = []
     for made in _facets(flora, result, camera, facet_pixels):
-        if made is not None and made.polygons:
+        if len(made):
             parts.append(made)
-        if sum(p.polygons for p in parts) >= BLOCK_POLYGONS:
-            yield concatenate_buffers(parts)
+        if sum(map(len, parts)) >= BLOCK_POLYGONS:
+            yield concatenate_facets(parts)
             parts = []
     if parts:
-        yield concatenate_buffers(parts)
+        yield concatenate_facets(parts)
 
 
-def _facets(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float) -> Iterator[MeshBuffers | None]:
+def _facets(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float) -> Iterator[Facets]:
     """Facets in runs of about `FACETS_AT_ONCE`."""
     contents = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN))
     hidden = result.chosen(Decision.HIDDEN)
@@ -151,7 +164,8 @@ def _facets(flora: Flora, result: Refinement, camera: Camera, facet_pixels: floa
         for i in _runs(expected, beside):
             made = make(flora, things.take(i), leaf[i], wood[i])
             yield kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5)
-    yield from polygon_facets(contents, result, camera, facet_pixels)
+    if len(contents.polygons):
+        yield polygon_facets(contents, result, camera, facet_pixels)
 
 
 def _runs(expected: NDArray[np.float64], chosen: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:

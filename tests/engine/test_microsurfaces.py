@@ -19,13 +19,11 @@ from tetflora_addon.plants.expansion import open_subplants
 from tetflora_addon.plants.growth import Branches, trunks
 from tetflora_addon.refinement.contents import Contents, bounding_cylinders, piece_amounts, subplant_amounts
 from tetflora_addon.shading.facet_sizes import piece_facet_sizes, subplant_facet_sizes
-from tetflora_addon.shading.microsurfaces import piece_facets, subplant_facets
+from tetflora_addon.shading.microsurfaces import facet_mesh, piece_facets, subplant_facets
 
 
 def facets(flora: Flora, subplants: Branches, side: float) -> MeshBuffers:
-    made = subplant_facets(flora, subplants, np.full(len(subplants), side))
-    assert made is not None
-    return made
+    return facet_mesh(subplant_facets(flora, subplants, np.full(len(subplants), side)))
 
 
 def part(mesh: MeshBuffers, leaves: bool) -> np.ndarray:
@@ -63,7 +61,7 @@ def test_small_shares_are_met_on_average_and_from_all_samples() -> None:
     n = 20_000
     plants = trunks(flora.rows, support.plants(np.arange(n)))
     side = np.sqrt(subplant_amounts(flora, plants).leaf_area * 10)
-    mesh = subplant_facets(flora, plants, side)
+    mesh = facet_mesh(subplant_facets(flora, plants, side))
     leaves = part(mesh, True)
     assert leaves.sum() == pytest.approx(n / 10, abs=4 * np.sqrt(n * 0.09))
     heights = support.face_centres(mesh)[leaves][:, 2]
@@ -102,8 +100,8 @@ def test_facets_stay_by_their_plant(seed: int, side: float, scale: float) -> Non
     """Centres within the bound, but for half a leaf; corners half a diagonal further."""
     flora = support.small_flora()
     plant = trunks(flora.rows, support.plants(seed, scale=scale, position=(3, 4, 5)))
-    mesh = subplant_facets(flora, plant, np.array([side * scale]))
-    if mesh is None:
+    mesh = facet_mesh(subplant_facets(flora, plant, np.array([side * scale])))
+    if not mesh.polygons:
         return
     centre, radius, half_height = bounding_cylinders(flora, plant)
     offset = support.face_centres(mesh) - centre
@@ -140,13 +138,13 @@ def test_hidden_wood_gets_no_more_facets_than_it_has_faces() -> None:
         ),
     ):
         sizes = sizes_of(flora, contents, camera, np.ones(1, bool))
-        made = make(flora, things, *sizes.sides(1.0))
+        made = facet_mesh(make(flora, things, *sizes.sides(1.0)))
         assert made.polygons == pytest.approx(sizes.counts(1.0).sum(), rel=0.02)
         wood = part(made, False)
         assert wood.sum() <= faces * 1.01
         assert support.face_areas(made)[wood].sum() == pytest.approx(amounts.wood_area.sum() / 2, rel=0.1)
         seen = sizes_of(flora, contents, camera, np.zeros(1, bool))
-        assert part(make(flora, things, *seen.sides(3.0)), False).sum() > faces * 5
+        assert part(facet_mesh(make(flora, things, *seen.sides(3.0))), False).sum() > faces * 5
         assert (seen.sides(3.0)[0] >= np.sqrt(seen.one_leaf)).all()
 
 
@@ -176,7 +174,7 @@ def test_pieces_keep_area_place_and_orientation() -> None:
     flora = support.small_flora()
     _, pieces = support.grown(flora, support.grove(16, 4.0))
     amounts = piece_amounts(flora, pieces)
-    mesh = piece_facets(flora, pieces, np.full(len(pieces), 0.05))
+    mesh = facet_mesh(piece_facets(flora, pieces, np.full(len(pieces), 0.05)))
     check_topology(mesh)
     areas = support.face_areas(mesh)
     for leaves, expected in ((True, amounts.leaf_area), (False, amounts.wood_area / 2)):
@@ -193,11 +191,11 @@ def test_pieces_without_leaves_have_facets_of_wood_only() -> None:
     flora = support.small_flora()
     trunk = trunks(flora.rows, support.plants(np.arange(5)))
     _, _, pieces, _ = open_subplants(flora, trunk)
-    mesh = piece_facets(flora, pieces, np.full(len(pieces), 0.02))
+    mesh = facet_mesh(piece_facets(flora, pieces, np.full(len(pieces), 0.02)))
     assert part(mesh, False).all()
     none = pieces.take(np.zeros(len(pieces), bool))
-    assert piece_facets(flora, none, np.zeros(0)) is None
-    assert subplant_facets(flora, trunk.take(np.zeros(5, bool)), np.zeros(0)) is None
+    assert len(piece_facets(flora, none, np.zeros(0))) == 0
+    assert len(subplant_facets(flora, trunk.take(np.zeros(5, bool)), np.zeros(0))) == 0
 
 
 @pytest.mark.parametrize("order", [0, 1])
@@ -209,7 +207,6 @@ def test_no_facet_lies_upon_another(order: int) -> None:
     for _ in range(order):
         subplants, *_ = open_subplants(flora, subplants)
     subplants = subplants.take(np.array([subplants.length.argmax()]))
-    facets = subplant_facets(flora, subplants, np.full(1, 0.01 if order else 0.03))
-    centres = support.face_centres(facets)
+    centres = subplant_facets(flora, subplants, np.full(1, 0.01 if order else 0.03)).centre
     assert len(centres) > 4000
     assert len(np.unique(np.round(centres, 5), axis=0)) > 0.95 * len(centres)

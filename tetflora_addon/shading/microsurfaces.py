@@ -9,13 +9,13 @@ average.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..buffers import MeshBuffers, concatenate_buffers
+from ..buffers import MeshBuffers
 from ..plants.compiled import Flora
 from ..plants.foliage import leaf_start, mean_leaf_colours, outwardness, place_leaves, settled
 from ..plants.growth import Branches, axes, spread
@@ -57,10 +57,25 @@ class Facets:
     colour: NDArray[np.float64]
     transmission: NDArray[np.float64]
 
+    def __len__(self) -> int:
+        return len(self.side)
+
+    @property
+    def normal(self) -> NDArray[np.float64]:
+        """Unit vectors (n, 3) that facets are perpendicular to."""
+        return np.cross(self.across, self.along)
+
+
+def concatenate_facets(parts: Sequence[Facets]) -> Facets:
+    """Facets of one or more parts, in their order."""
+    if len(parts) == 1:
+        return parts[0]
+    return Facets(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Facets)))
+
 
 def subplant_facets(
     flora: Flora, subplants: Branches, leaf_side: NDArray[np.float64], wood_side: NDArray[np.float64] | None = None
-) -> MeshBuffers | None:
+) -> Facets:
     """Facets of sub-plants.
 
     Parameters
@@ -72,48 +87,42 @@ def subplant_facets(
         smaller than the leaves that they stand for.
     """
     amounts = subplant_amounts(flora, subplants)
-    return concatenate_buffers(
+    return concatenate_facets(
         [
-            facet_mesh(_leaves_of_subplants(flora, subplants, amounts, leaf_side)),
-            facet_mesh(_wood_of_subplants(flora, subplants, amounts, leaf_side if wood_side is None else wood_side)),
+            _leaves_of_subplants(flora, subplants, amounts, leaf_side),
+            _wood_of_subplants(flora, subplants, amounts, leaf_side if wood_side is None else wood_side),
         ]
     )
 
 
 def piece_facets(
     flora: Flora, pieces: Pieces, leaf_side: NDArray[np.float64], wood_side: NDArray[np.float64] | None = None
-) -> MeshBuffers | None:
+) -> Facets:
     """Facets of pieces of branches; parameters as for `subplant_facets`."""
     amounts = piece_amounts(flora, pieces)
-    return concatenate_buffers(
+    return concatenate_facets(
         [
-            facet_mesh(_leaves_of_pieces(flora, pieces, amounts, leaf_side)),
-            facet_mesh(_wood_of_pieces(flora, pieces, amounts, leaf_side if wood_side is None else wood_side)),
+            _leaves_of_pieces(flora, pieces, amounts, leaf_side),
+            _wood_of_pieces(flora, pieces, amounts, leaf_side if wood_side is None else wood_side),
         ]
     )
 
 
-def kept_out_of_view(
-    buffers: MeshBuffers | None, clearance: Callable[[NDArray], NDArray], smallest: float
-) -> MeshBuffers | None:
+def kept_out_of_view(facets: Facets, clearance: Callable[[NDArray], NDArray], smallest: float) -> Facets:
     """Shrink facets of what is out of view where they would reach into it.
 
     Parameters
     ----------
-    buffers : MeshBuffers or None
-        Of `subplant_facets` or `piece_facets`.
+    facets : Facets
+        Of `subplant_facets`, `piece_facets` or `polygon_facets`.
     clearance : callable
         Distance (n,) of points (n, 3) from the view, metres.
     smallest : float
         Least share of its side that a facet keeps, 0 to 1.
     """
-    if buffers is None:
-        return None
-    corners = buffers.positions.reshape(-1, 4, 3).astype(np.float64)
-    centre = corners.mean(axis=1, keepdims=True)
-    reach = np.linalg.norm(corners - centre, axis=2).max(axis=1)
-    share = np.clip(clearance(centre[:, 0]) / np.maximum(reach, 1e-12), smallest, 1.0)[:, None, None]
-    return replace(buffers, positions=(centre + share * (corners - centre)).reshape(-1, 3).astype(np.float32))
+    reach = facets.side / np.sqrt(2)  # half a diagonal
+    share = np.clip(clearance(facets.centre) / np.maximum(reach, 1e-12), smallest, 1.0)
+    return replace(facets, side=facets.side * share)
 
 
 def _numbers(key: NDArray, area: NDArray, facet: NDArray, path: int, draw: int) -> tuple[NDArray, NDArray, NDArray]:

@@ -13,7 +13,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..buffers import MeshBuffers
 from ..plants.growth import spread
 from ..plants.hashing import child_key, key_of_seed, mix, stepped, uniform
 from ..plants.vectors import unit
@@ -23,25 +22,21 @@ from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 from ..refinement.polygons import Polygons
 from .facet_sizes import HIDDEN_FACES, polygon_facet_sizes
-from .microsurfaces import Facets, facet_mesh, kept_out_of_view
+from .microsurfaces import Facets, concatenate_facets, kept_out_of_view
 
 _PLACE_U, _PLACE_V = 222, 223
 
 
-def polygon_facets(
-    contents: Contents, result: Refinement, camera: Camera, facet_pixels: float
-) -> list[MeshBuffers | None]:
+def polygon_facets(contents: Contents, result: Refinement, camera: Camera, facet_pixels: float) -> Facets:
     """Facets of the polygons of proxies (``contents``) that are not kept as they are, see `facet_sizes`."""
-    if not len(contents.polygons):
-        return []
     sizes = polygon_facet_sizes(contents, camera, result.chosen(Decision.HIDDEN))
     left = np.flatnonzero(~sizes.kept(facet_pixels))
     side, inside = sizes.sides(facet_pixels), result.in_view[contents.polygon_cell]
-    parts = []
-    for some, seen in ((left[inside[left]], True), (left[~inside[left]], False)):
-        made = facet_mesh(chosen_facets(contents.polygons.take(some), sizes.optical[some], side[some]))
-        parts.append(made if seen else kept_out_of_view(made, camera.clearance, HIDDEN_FACES**-0.5))
-    return parts
+    seen, beside = (
+        chosen_facets(contents.polygons.take(some), sizes.optical[some], side[some])
+        for some in (left[inside[left]], left[~inside[left]])
+    )
+    return concatenate_facets([seen, kept_out_of_view(beside, camera.clearance, HIDDEN_FACES**-0.5)])
 
 
 def chosen_facets(polygons: Polygons, optical: NDArray[np.float64], side: NDArray[np.float64]) -> Facets:
