@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,43 +22,19 @@ from ..tetrahedra.tree import TetrahedralTree
 from .camera import Camera
 from .cells import Cells, mean_extinction
 from .decisions import Decision
+from .light_views import Light, light_views
 from .panorama import face_cameras
 from .rasterise import buffer_size, occluder_depth, pixel_rays, tetrahedron_fragments
 from .settings import RefinementSettings
 from .visibility import AlphaBuffer
+
+__all__ = ["Light", "Shadows", "decide_by_shadows", "seen_ground", "shadows_of"]
 
 #: Pixels of a light's buffer along each side of a field of which is known what receives its light: points that the
 #: camera sees lie less close together than the pixels of a light.
 FIELD = 4
 #: Longer side of the small picture whose pixels tell where ground is seen.
 GROUND = 160
-#: Spots wider than this half angle, radians, are looked at as if they shone all around.
-_WIDE = 1.2
-
-
-@dataclass(frozen=True)
-class Light:
-    """Where light comes from.
-
-    Attributes
-    ----------
-    kind : {'SUN', 'SPOT', 'POINT'}
-        Parallel rays, a cone, or all around; an area counts as a point as wide.
-    position : (3,) float64
-        Metres, world space; of no meaning for the sun.
-    direction : (3,) float64
-        Unit vector in which it shines; of no meaning for a point.
-    width : float
-        Angle in radians under which the sun is seen, or diameter in metres of the others: shadows are blurred by it.
-    angle : float
-        Half of the spot's cone, radians.
-    """
-
-    kind: Literal["SUN", "SPOT", "POINT"]
-    position: NDArray[np.float64]
-    direction: NDArray[np.float64]
-    width: float = 0.0
-    angle: float = np.pi
 
 
 @dataclass(frozen=True)
@@ -130,8 +105,8 @@ def shadows_of(
         return Shadows(pixels, feature)
     # Metres that a pixel of the picture spans where light is received.
     receiving = camera.extent_around(points), camera.extent_around(vertices.mean(axis=1))
-    for light in lights:
-        for view in _views(light, vertices, points, settings.visibility_resolution):
+    for light in (one for one in lights if one.shadow):
+        for view in light_views(light, vertices, points, settings.visibility_resolution):
             size = buffer_size(view, settings.visibility_resolution)
             buffer = AlphaBuffer(view, settings.visibility_resolution)
             buffer.add(np.arange(count), vertices, extinction)
@@ -186,45 +161,6 @@ def seen_ground(camera: Camera, occluders: NDArray[np.float64] | None, height: f
         some = np.flatnonzero(level < camera.far)
         found.append(origins[some] + level[some, None] * directions[some])
     return np.concatenate(found)
-
-
-def _views(light: Light, vertices: NDArray[np.float64], points: NDArray[np.float64], resolution: int) -> list[Camera]:
-    """Flat cameras through which a light sees what receives it."""
-    frame = _frame(light.direction)
-    if light.kind == "SUN":
-        received, corners = points @ frame, vertices.reshape(-1, 3) @ frame
-        # Only where something stands between the sun and what receives its light: ground goes on to the horizon.
-        low = np.maximum(received.min(axis=0), corners.min(axis=0))[:2] - 1e-3
-        high = np.minimum(received.max(axis=0), corners.max(axis=0))[:2] + 1e-3
-        if (low >= high).any():
-            return []
-        depth = np.concatenate([received[:, 2], corners[:, 2]])
-        start, far = depth.max() + 1.0, float(np.ptp(depth)) + 2.0
-        window = (float(low[0]), float(high[0]), float(low[1]), float(high[1]))
-        return [Camera("ORTHO", frame[:, 2] * start, frame, window, 0.1, far, *_shape(*(high - low)))]
-    distance = np.linalg.norm(np.concatenate([vertices.reshape(-1, 3), points]) - light.position, axis=1)
-    far = float(distance.max()) + 1.0
-    if light.kind == "SPOT" and light.angle < _WIDE:
-        side = float(np.tan(max(light.angle, 1e-3)))
-        window = (-side, side, -side, side)
-        return [Camera("PERSP", light.position, frame, window, 1e-2, far, resolution, resolution)]
-    around = Camera("PANO", light.position, frame, (-np.pi, np.pi, -np.pi / 2, np.pi / 2), 1e-2, far, 4, 2)
-    return face_cameras(around, resolution)
-
-
-def _shape(width: float, height: float) -> tuple[int, int]:
-    """Size in pixels of a picture with square pixels; how large does not matter."""
-    scale = 4096 / max(width, height)
-    return max(round(width * scale), 1), max(round(height * scale), 1)
-
-
-def _frame(direction: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Frame of a camera that looks in a direction."""
-    back = -np.asarray(direction, np.float64) / np.linalg.norm(direction)
-    aside = np.eye(3)[np.argmin(np.abs(back))]
-    right = np.cross(aside, back)
-    right /= np.linalg.norm(right)
-    return np.stack([right, np.cross(back, right), back], axis=1)
 
 
 def _fields(pixel: NDArray[np.integer], size: tuple[int, int]) -> tuple[NDArray[np.int64], int]:
