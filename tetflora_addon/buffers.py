@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the engine hands to Blender: one mesh as plain arrays, in Blender's own memory layout."""
+"""What the engine hands to Blender: one mesh or cloud of points as plain arrays, in Blender's own memory layout."""
 
 from __future__ import annotations
 
@@ -53,6 +53,35 @@ class MeshBuffers:
         """Bytes of all arrays together."""
         arrays = [self.positions, self.edge_verts, self.corner_verts, self.corner_edges, self.face_offsets]
         return sum(a.nbytes for a in arrays) + sum(a.nbytes for _, a in self.attributes.values())
+
+
+@dataclass(frozen=True)
+class PointBuffers:
+    """One cloud of points that are drawn as spheres.
+
+    Attributes
+    ----------
+    positions : (n, 3) float32
+        Centres, metres, world space.
+    radius : (n,) float32
+        Metres.
+    attributes : mapping of str to ndarray
+        Name to values of the points: ``(n,)`` or ``(n, 3)`` float32.
+    """
+
+    positions: NDArray[np.float32]
+    radius: NDArray[np.float32]
+    attributes: Mapping[str, NDArray] = field(default_factory=dict)
+
+    @property
+    def polygons(self) -> int:
+        """Number of points: each takes the place of one polygon."""
+        return len(self.radius)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays together."""
+        return self.positions.nbytes + self.radius.nbytes + sum(a.nbytes for a in self.attributes.values())
 
 
 def concatenate_buffers(parts: Sequence[MeshBuffers]) -> MeshBuffers | None:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .buffers import BLOCK_POLYGONS, MeshBuffers
+from .buffers import BLOCK_POLYGONS, MeshBuffers, PointBuffers
 from .plants.compiled import Flora
 from .plants.expansion import chunks, expand
 from .plants.growth import trunks
@@ -28,6 +28,7 @@ from .refinement.camera import Camera
 from .refinement.decisions import Decision
 from .refinement.loop import Refinement
 from .shading.facet_sizes import HIDDEN_LEAVES, piece_facet_sizes, subplant_facet_sizes
+from .shading.microspheres import spheres
 from .shading.microsurfaces import (
     Facets,
     concatenate_facets,
@@ -128,24 +129,36 @@ def facet_blocks(flora: Flora, result: Refinement, camera: Camera, facet_pixels:
     facet_pixels : float
         Side of a facet that is seen, in pixels; see `shading.facet_sizes` for the others.
     """
-    for facets in _blocks_of_facets(flora, result, camera, facet_pixels):
-        yield facet_mesh(facets)
+    for parts in _facet_parts(flora, result, camera, facet_pixels):
+        yield facet_mesh(concatenate_facets([facets for facets, _ in parts]))
 
 
-def _blocks_of_facets(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float) -> Iterator[Facets]:
+def sphere_blocks(
+    flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.6
+) -> Iterator[PointBuffers]:
+    """Proxies as microspheres, one for each facet of `facet_blocks`; parameters and size of blocks are the same."""
+    for parts in _facet_parts(flora, result, camera, facet_pixels):
+        yield spheres(parts, camera)
+
+
+#: Some facets, and whether the camera sees them: neither hidden nor beside the view.
+_Part = tuple[Facets, bool]
+
+
+def _facet_parts(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float) -> Iterator[list[_Part]]:
     """Facets in blocks of about `BLOCK_POLYGONS`, none of them empty."""
-    parts: list[Facets] = []
+    parts: list[_Part] = []
     for made in _facets(flora, result, camera, facet_pixels):
-        if len(made):
+        if len(made[0]):
             parts.append(made)
-        if sum(map(len, parts)) >= BLOCK_POLYGONS:
-            yield concatenate_facets(parts)
+        if sum(len(facets) for facets, _ in parts) >= BLOCK_POLYGONS:
+            yield parts
             parts = []
     if parts:
-        yield concatenate_facets(parts)
+        yield parts
 
 
-def _facets(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float) -> Iterator[Facets]:
+def _facets(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float) -> Iterator[_Part]:
     """Facets in runs of about `FACETS_AT_ONCE`."""
     contents = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN))
     hidden = result.chosen(Decision.HIDDEN)
@@ -157,15 +170,15 @@ def _facets(flora: Flora, result: Refinement, camera: Camera, facet_pixels: floa
         leaf, wood = sizes.sides(facet_pixels)
         expected = sizes.counts(facet_pixels) + 1
         inside = result.in_view[cell]
-        seen, beside = np.flatnonzero(inside), np.flatnonzero(~inside)
-        for i in _runs(expected, seen):
-            yield make(flora, things.take(i), leaf[i], wood[i])
+        for nobody_looks in (False, True):
+            for i in _runs(expected, np.flatnonzero(inside & (sizes.hidden == nobody_looks))):
+                yield make(flora, things.take(i), leaf[i], wood[i]), not nobody_looks
         # What is beside the view must not reach into the picture.
-        for i in _runs(expected, beside):
+        for i in _runs(expected, np.flatnonzero(~inside)):
             made = make(flora, things.take(i), leaf[i], wood[i])
-            yield kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5)
+            yield kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5), False
     if len(contents.polygons):
-        yield polygon_facets(contents, result, camera, facet_pixels)
+        yield from polygon_facets(contents, result, camera, facet_pixels)
 
 
 def _runs(expected: NDArray[np.float64], chosen: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:

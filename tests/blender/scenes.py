@@ -93,6 +93,17 @@ def datablocks():
     import bpy
 
     found = {}
-    for kind in ("objects", "meshes", "collections", "materials", "node_groups", "cameras", "curves", "images"):
+    kinds = (
+        "objects",
+        "meshes",
+        "pointclouds",
+        "collections",
+        "materials",
+        "node_groups",
+        "cameras",
+        "curves",
+        "images",
+    )
+    for kind in (*kinds, "images"):
         found[kind] = sorted(d.name for d in getattr(bpy.data, kind) if d.name != "Render Result")
     return found

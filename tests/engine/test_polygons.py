@@ -259,7 +259,7 @@ def test_near_polygons_stay_and_far_ones_become_facets_of_the_same_area(anchored
     kept = sum(support.face_areas(b).sum() for b in blocks)
     proxies = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN))
     beside = ~result.in_view[proxies.polygon_cell]
-    facets = polygon_facets(proxies, result, camera, 0.6).side ** 2
+    facets = np.concatenate([f.side**2 for f, _ in polygon_facets(proxies, result, camera, 0.6)])
     drawn = facets.sum()
     chance = 2 * np.sqrt((facets**2).sum())  # facets are there or not; of a mesh, not independently
     assert chance < 0.1 * drawn

@@ -44,3 +44,18 @@ def disable_bump_correction(material: bpy.types.Material) -> None:
     cycles = getattr(material, "cycles", None)
     if cycles is not None and hasattr(cycles, "use_bump_map_correction"):
         cycles.use_bump_map_correction = False
+
+
+def can_resize_point_clouds() -> bool:
+    """Whether point clouds can be filled from Python; without, only geometry nodes make points."""
+    return "resize" in bpy.types.PointCloud.bl_rna.functions
+
+
+def blend_in_mesh_order(material: bpy.types.Material) -> None:
+    """Let EEVEE draw a material's faces one over another in their order in the mesh, with exact opacity.
+
+    The other way, dithering, needs hundreds of samples for what is a few cells deep. Cycles has no such setting.
+    """
+    material.surface_render_method = 'BLENDED'
+    material.use_transparency_overlap = True
+    material.use_transparent_shadow = True

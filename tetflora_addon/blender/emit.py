@@ -16,9 +16,10 @@ from contextlib import contextmanager
 
 import bpy
 
-from ..buffers import MeshBuffers
+from ..buffers import MeshBuffers, PointBuffers
 from .meshes import write_mesh
 from .node_tools import is_ours, tag
+from .point_clouds import point_object
 
 #: Custom property of a result collection: 'VIEW' for what the artist keeps, 'RENDER' for what lives while rendering.
 PURPOSE = "tetflora_purpose"
@@ -58,9 +59,16 @@ class Results:
 
     def add(self, name: str, kind: str, buffers: MeshBuffers, materials: list[bpy.types.Material]) -> bpy.types.Object:
         """Write one mesh as an object of the collection."""
-        mesh = write_mesh(name, buffers, materials)
-        tag(mesh)
-        made = bpy.data.objects.new(name, mesh)
+        return self._link(bpy.data.objects.new(name, write_mesh(name, buffers, materials)), kind)
+
+    def add_points(
+        self, name: str, kind: str, buffers: PointBuffers, materials: list[bpy.types.Material]
+    ) -> bpy.types.Object:
+        """Write one cloud of points, which has one material, as an object of the collection."""
+        return self._link(point_object(name, buffers, *materials), kind)
+
+    def _link(self, made: bpy.types.Object, kind: str) -> bpy.types.Object:
+        tag(made.data)
         made[KIND] = kind
         made.hide_select = True  # millions of polygons under the cursor; the plants are what is edited
         tag(made)
@@ -225,31 +233,35 @@ def originals_shown(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> I
 
 
 def _remove_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) -> int:
-    meshes, objects = [], []
+    data, objects, groups = [], [], set()
     for held in list(collection.objects):
         if is_ours(held):
             objects.append(held)
             if held.data is not None and is_ours(held.data):
-                meshes.append(held.data)
+                data.append(held.data)
+            groups |= {m.node_group for m in held.modifiers if m.type == 'NODES' and m.node_group is not None}
         elif held.name not in scene.collection.objects:
             scene.collection.objects.link(held)  # the artist put it here; it stays in the scene
     for child in list(collection.children):
         if child.name not in scene.collection.children:
             scene.collection.children.link(child)
-    materials = {m for mesh in meshes for m in mesh.materials if m is not None and is_ours(m)}
-    removed = [*objects, *(m for m in meshes if m.users <= 1), collection]
+    materials = {m for d in data for m in d.materials if m is not None and is_ours(m)}
+    removed = [*objects, *(d for d in data if d.users <= 1), collection]
     bpy.data.batch_remove(removed)
-    return len(removed) + _remove_unused(materials)
+    return len(removed) + _remove_unused(materials, groups)
 
 
-def _remove_unused(materials: set[bpy.types.Material]) -> int:
-    """Remove materials of ours that nothing uses any more, and their node groups."""
-    groups = set()
+def _remove_unused(materials: set[bpy.types.Material], groups: set[bpy.types.NodeTree]) -> int:
+    """Remove groups and materials of ours that nothing uses any more, and the node groups of these."""
+    removed = _remove_groups(groups)  # first: groups of geometry nodes use materials
     unused = [m for m in materials if m.users == 0]
-    for material in unused:
-        groups |= {n.node_tree for n in material.node_tree.nodes if n.type == 'GROUP' and n.node_tree is not None}
+    groups = {n.node_tree for m in unused for n in m.node_tree.nodes if n.type == 'GROUP' and n.node_tree is not None}
     bpy.data.batch_remove(unused)
-    removed = len(unused)
+    return removed + len(unused) + _remove_groups(groups)
+
+
+def _remove_groups(groups: set[bpy.types.NodeTree]) -> int:
+    removed = 0
     while True:
         empty = [g for g in groups if g.users == 0 and is_ours(g)]
         if not empty:

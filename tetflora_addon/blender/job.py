@@ -30,7 +30,7 @@ from .emit import Results, has_results, originals_shown, remove_results
 from .explicit_objects import Explicit, read_explicit
 from .leaf_forms import materials_of, resolved_species
 from .light_reader import read_lights
-from .materials import proxy_material
+from .materials import proxy_material, sphere_material
 from .properties import settings_from
 from .scene_reader import NoPlantsError, read_occluders, read_plants
 from .shell_material import shell_material
@@ -182,7 +182,7 @@ def refine_steps(
                 kept = explicit_emission.polygon_blocks(refinement, camera, side if facets else None)
                 yield from _write_polygons(results, given.explicit, kept, statistics)
             yield Progress(0.95, "Making proxies")
-            yield from _write_proxies(results, flora, refinement, camera, statistics, side if facets else None)
+            yield from _write_proxies(results, flora, refinement, camera, statistics, side)
         clock.lap("emit")
     except BaseException:  # an error, Esc (GeneratorExit) or Ctrl+C: nothing of ours may stay behind
         results.discard()
@@ -300,22 +300,22 @@ def _write_polygons(
 
 
 def _write_proxies(
-    results: Results,
-    flora: Flora,
-    refinement: Refinement,
-    camera: Camera,
-    statistics: Statistics,
-    facet_pixels: float | None,
+    results: Results, flora: Flora, refinement: Refinement, camera: Camera, statistics: Statistics, facet_pixels: float
 ) -> Generator[Progress, None, None]:
-    """Facets of so many pixels, or shells where None."""
-    if facet_pixels is None:
+    """Proxies in the form that the scene asks for; facets and spheres of so many pixels."""
+    form = results.scene.tetflora.proxy_form
+    add, material = results.add, proxy_material
+    if form == 'SHELLS':
         shells = emission.proxy_shells(flora, refinement)
-        blocks, material = iter([] if shells is None else [shells]), shell_material
+        blocks, material, facet_pixels = iter([] if shells is None else [shells]), shell_material, 0.0
+    elif form == 'MICROSPHERES':
+        blocks = emission.sphere_blocks(flora, refinement, camera, facet_pixels)
+        add, material = results.add_points, sphere_material
     else:
-        blocks, material = emission.facet_blocks(flora, refinement, camera, facet_pixels), proxy_material
-    statistics.facet_pixels = facet_pixels or 0.0
+        blocks = emission.facet_blocks(flora, refinement, camera, facet_pixels)
+    statistics.facet_pixels = facet_pixels
     for number, buffers in enumerate(blocks):
-        results.add(f"TetFlora proxies {number:03d}", "proxy", buffers, [material()])
+        add(f"TetFlora proxies {number:03d}", "proxy", buffers, [material()])
         statistics.polygons_proxy += buffers.polygons
         statistics.memory_mb += buffers.nbytes / 1e6
-        yield Progress(0.95 + 0.05 * (1 - 0.9**number), f"Making proxies: {statistics.polygons_proxy:,} faces")
+        yield Progress(0.95 + 0.05 * (1 - 0.9**number), f"Making proxies: {statistics.polygons_proxy:,}")

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Materials of leaves, bark and microsurfaces: one scattering group for all, so that they match at a distance."""
+"""Materials of leaves, bark, microsurfaces and microspheres: one scattering group for all, so that they match."""
 
 from __future__ import annotations
 
@@ -11,17 +11,27 @@ from .compat import disable_bump_correction, shader_tree
 from .node_tools import Graph, add_socket, find_socket, get_or_create, new_group
 from .shell_material import shell_material
 
-__all__ = ["BARKS", "bark_material", "leaf_material", "proxy_material", "scatter_group", "shell_material"]
+__all__ = [
+    "BARKS",
+    "bark_material",
+    "leaf_material",
+    "proxy_material",
+    "scatter_group",
+    "shell_material",
+    "sphere_material",
+]
 
 SCATTER = "TetFlora Scatter"
 BLADE = "TetFlora Leaf Blade"
 PROXY = "TetFlora proxy"
+SPHERE = "TetFlora microsphere"
 
 # Raise these when what they count changes: existing files then get the new nodes beside the old ones.
 _SCATTER_VERSION = 2
 _LEAF_VERSION = 2
 _BLADE_VERSION = 1
 _PROXY_VERSION = 2
+_SPHERE_VERSION = 1
 
 # Light that has passed through a leaf lost more of its blue than light that was reflected: chlorophyll and carotenoids
 # absorb on the whole way. Products over 1 are cut off.
@@ -196,6 +206,24 @@ def proxy_material() -> bpy.types.Material:
         material.diffuse_color = (0.1, 0.25, 0.05, 1.0)
 
     return get_or_create(bpy.data.materials, PROXY, _PROXY_VERSION, bpy.data.materials.new, build)
+
+
+def sphere_material() -> bpy.types.Material:
+    """Material "TetFlora microsphere" of all microspheres: opaque, matt, with the sphere's own normal.
+
+    Cycles meets spheres of a point cloud from outside alone. So what falls on a sphere is reflected by the half that it
+    falls on or, for the share ``tf_transmission``, comes out of the other half, and nothing is lost within.
+    """
+
+    def build(material: bpy.types.Material) -> None:
+        graph = Graph(shader_tree(material))
+        geometry = graph.node("ShaderNodeNewGeometry").outputs
+        colour, transmission = graph.attribute("tf_colour", "Color"), graph.attribute("tf_transmission", "Fac")
+        inputs = {"Colour": colour, "Transmission": transmission, "Gloss": 0.0, "Normal": geometry["Normal"]}
+        _finish(graph, inputs)
+        material.diffuse_color = (0.1, 0.25, 0.05, 1.0)
+
+    return get_or_create(bpy.data.materials, SPHERE, _SPHERE_VERSION, bpy.data.materials.new, build)
 
 
 def _finish(graph: Graph, inputs: dict) -> None:

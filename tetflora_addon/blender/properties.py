@@ -213,6 +213,13 @@ class TetFloraScene(RefinementProperties, bpy.types.PropertyGroup):
                 'MESH_CONE',
                 1,
             ),
+            (
+                'MICROSPHERES',
+                "Microspheres",
+                "A cloud of opaque spheres of about a pixel, as many as there would be facets. Least memory",
+                'POINTCLOUD_DATA',
+                2,
+            ),
         ),
         default='MICROSURFACES',
     )

@@ -10,6 +10,8 @@ a mesh, so that the area of all is that of the mesh with little noise.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,21 +24,30 @@ from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 from ..refinement.polygons import Polygons
 from .facet_sizes import HIDDEN_FACES, polygon_facet_sizes
-from .microsurfaces import Facets, concatenate_facets, kept_out_of_view
+from .microsurfaces import Facets, kept_out_of_view
 
 _PLACE_U, _PLACE_V = 222, 223
 
 
-def polygon_facets(contents: Contents, result: Refinement, camera: Camera, facet_pixels: float) -> Facets:
-    """Facets of the polygons of proxies (``contents``) that are not kept as they are, see `facet_sizes`."""
+def polygon_facets(
+    contents: Contents, result: Refinement, camera: Camera, facet_pixels: float
+) -> Iterator[tuple[Facets, bool]]:
+    """Facets of the polygons of proxies (``contents``) that are not kept as they are, see `facet_sizes`.
+
+    Yields
+    ------
+    (Facets, bool)
+        Some of them, and whether they are seen: neither hidden nor beside the view.
+    """
     sizes = polygon_facet_sizes(contents, camera, result.chosen(Decision.HIDDEN))
-    left = np.flatnonzero(~sizes.kept(facet_pixels))
     side, inside = sizes.sides(facet_pixels), result.in_view[contents.polygon_cell]
-    seen, beside = (
-        chosen_facets(contents.polygons.take(some), sizes.optical[some], side[some])
-        for some in (left[inside[left]], left[~inside[left]])
-    )
-    return concatenate_facets([seen, kept_out_of_view(beside, camera.clearance, HIDDEN_FACES**-0.5)])
+    left = ~sizes.kept(facet_pixels)
+    for hidden in (False, True):
+        some = np.flatnonzero(left & inside & (sizes.hidden == hidden))
+        yield chosen_facets(contents.polygons.take(some), sizes.optical[some], side[some]), not hidden
+    some = np.flatnonzero(left & ~inside)
+    beside = chosen_facets(contents.polygons.take(some), sizes.optical[some], side[some])
+    yield kept_out_of_view(beside, camera.clearance, HIDDEN_FACES**-0.5), False
 
 
 def chosen_facets(polygons: Polygons, optical: NDArray[np.float64], side: NDArray[np.float64]) -> Facets:

@@ -1,0 +1,92 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Microspheres in the scene: made, counted, replaced and cleared like any other form, and shaded as spheres."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.blender.scenes import datablocks, part
+from tests.blender.test_job import _forest, _job, _made, _refine
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+
+def _proxies(scene):
+    return [o for o in _made(scene) if o["tetflora_kind"] == "proxy"]
+
+
+def _points(made):
+    """Attributes of the points that are drawn."""
+    import bpy
+
+    evaluated = made.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    geometry = evaluated.evaluated_geometry()  # keeps the cloud alive
+    cloud = geometry.pointcloud
+    found = {}
+    for name, size in (("position", 3), ("radius", 1), ("tf_colour", 3), ("tf_transmission", 1)):
+        values = np.zeros((len(cloud.points), size), np.float32)
+        cloud.attributes[name].data.foreach_get("vector" if size == 3 else "value", values.reshape(-1))
+        found[name] = values if size == 3 else values[:, 0]
+    return found, [m.name for m in cloud.materials]
+
+
+def test_spheres_take_the_places_of_facets_and_clear_removes_them():
+    import bpy
+
+    scene = _forest()
+    before = datablocks()
+    facets = _refine(scene, proxy_form='MICROSURFACES')
+    mesh = _proxies(scene)[0].data
+    places = np.zeros((len(mesh.vertices), 3), np.float32)
+    mesh.attributes["position"].data.foreach_get("vector", places.reshape(-1))
+    places = places.reshape(-1, 4, 3).mean(axis=1)
+    spheres = _refine(scene, proxy_form='MICROSPHERES')
+    assert spheres.polygons_proxy == facets.polygons_proxy == len(places)
+    assert spheres.facet_pixels == facets.facet_pixels
+    assert spheres.memory_mb < facets.memory_mb
+    (made,) = _proxies(scene)
+    points, materials = _points(made)
+    assert materials == ["TetFlora microsphere"]
+    assert points["position"] == pytest.approx(places, abs=1e-4)
+    assert points["radius"].min() > 0
+    assert 0 <= points["tf_colour"].min() <= points["tf_colour"].max() <= 1
+    assert len(np.unique(points["tf_transmission"])) == 2  # wood and leaves
+    _refine(scene)
+    assert len(_proxies(scene)) == 1
+    assert _job().clear(scene) > 3
+    assert datablocks() == before
+    assert not bpy.data.pointclouds
+
+
+def test_the_group_for_vertices_makes_the_same_points():
+    """What versions without `PointCloud.resize` use works on all."""
+    import bpy
+
+    clouds = part("point_clouds")
+    random = np.random.default_rng(1)
+    colour, radius = random.random((5, 3), np.float32), random.random(5, np.float32)
+    buffers = part("point_clouds").PointBuffers(
+        random.random((5, 3), np.float32), radius, {"tf_colour": colour, "tf_transmission": radius / 2}
+    )
+    material = part("materials").sphere_material()
+    for by_nodes in {True, not part("compat").can_resize_point_clouds()}:
+        made = clouds.point_object("spheres", buffers, material, by_nodes=by_nodes)
+        bpy.context.collection.objects.link(made)
+        points, materials = _points(made)
+        assert materials == [material.name]
+        assert (points["position"] == buffers.positions).all()
+        assert (points["radius"] == radius).all()
+        assert (points["tf_colour"] == colour).all()
+        assert (points["tf_transmission"] == radius / 2).all()
+
+
+def test_what_was_written_wrongly_leaves_nothing_behind():
+    clouds, buffers = part("point_clouds"), part("point_clouds").PointBuffers
+    part("materials").sphere_material()
+    before = datablocks()
+    wrong = buffers(np.zeros((4, 3), np.float32), np.ones(3, np.float32))
+    with pytest.raises(ValueError, match="radius"):
+        clouds.point_object("spheres", wrong, part("materials").sphere_material())
+    assert datablocks() == before
