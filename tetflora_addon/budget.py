@@ -23,6 +23,8 @@ from .shading.facet_sizes import piece_facet_sizes, polygon_facet_sizes, subplan
 
 #: Bytes that a polygon takes in Blender and in a renderer together, about: 110 and 500.
 BYTES_PER_POLYGON = 610
+#: The same of a microsphere, as a point cloud.
+BYTES_PER_SPHERE = 210
 #: Expected numbers are means; so much of the budget is kept back.
 _RESERVE = 0.06
 #: Share of the budget that facets may take before real leaves get theirs.
@@ -37,7 +39,12 @@ def polygons_allowed(settings: RefinementSettings) -> float:
 
 
 def afford(
-    flora: Flora, result: Refinement, camera: Camera, settings: RefinementSettings, facets: bool = True
+    flora: Flora,
+    result: Refinement,
+    camera: Camera,
+    settings: RefinementSettings,
+    facets: bool = True,
+    facet_bytes: float = BYTES_PER_POLYGON,
 ) -> tuple[Refinement, float]:
     """Decisions that fit into the budget of the settings.
 
@@ -49,7 +56,9 @@ def afford(
     camera : Camera
     settings : RefinementSettings
     facets : bool
-        Proxies are microsurfaces, whose number follows their size; shells have four faces each.
+        Proxies are microsurfaces or microspheres, whose number follows their size; shells have four faces each.
+    facet_bytes : float
+        Memory that one of them takes.
 
     Returns
     -------
@@ -59,9 +68,19 @@ def afford(
         Side of a facet in pixels.
     """
     side = settings.facet
-    allowed = (1 - _RESERVE) * polygons_allowed(settings)
-    if not np.isfinite(allowed):
-        return result, side
+    # What counts as a part of a polygon for memory is a whole one for those who limit polygons: a budget for each.
+    memory = replace(settings, max_polygons=0), facet_bytes / BYTES_PER_POLYGON
+    for limits, weight in ((replace(settings, max_memory=0.0), 1.0), memory):
+        allowed = (1 - _RESERVE) * polygons_allowed(limits)
+        if np.isfinite(allowed):
+            result, side = _fitted(flora, result, camera, allowed, side, weight, facets)
+    return result, side
+
+
+def _fitted(
+    flora: Flora, result: Refinement, camera: Camera, allowed: float, side: float, weight: float, facets: bool
+) -> tuple[Refinement, float]:
+    """Decisions and a side of facets, no less than the one given, where a facet counts as a share of a polygon."""
     explicit = result.decision == Decision.EXPLICIT
     polygons = np.where(explicit, result.amounts.polygons, 0.0)
 
@@ -70,7 +89,7 @@ def afford(
 
     def proxies(factor: float) -> NDArray[np.float64]:
         """Faces (cells,) of all cells as proxies, with facets larger by a factor."""
-        return count.by_cell(factor * side) if count else shells
+        return count.by_cell(factor * side, weight) if count else shells
 
     as_asked = proxies(1.0)
     if polygons.sum() + as_asked[~explicit].sum() <= allowed:
@@ -104,15 +123,18 @@ class _Facets:
         index = np.zeros(len(result.tree), np.int64)
         index[result.nodes] = np.arange(len(result.nodes))
         self.number = len(result.nodes)
-        self.parts = [
+        self.plants = [
             (subplant_facet_sizes(flora, contents, camera, hidden), index[contents.subplant_cell]),
             (piece_facet_sizes(flora, contents, camera, hidden), index[contents.piece_cell]),
-            (polygon_facet_sizes(contents, camera, hidden), index[contents.polygon_cell]),
         ]
+        self.polygons = polygon_facet_sizes(contents, camera, hidden)
+        self.polygon_cell = index[contents.polygon_cell]
 
-    def by_cell(self, pixels: float) -> NDArray[np.float64]:
-        """Facets (cells,) where those that are seen have so many pixels."""
-        return sum(np.bincount(cell, sizes.counts(pixels), self.number) for sizes, cell in self.parts)
+    def by_cell(self, pixels: float, weight: float = 1.0) -> NDArray[np.float64]:
+        """Facets (cells,) where those that are seen have so many pixels; each counts as much as the weight says."""
+        made = sum(np.bincount(cell, sizes.counts(pixels), self.number) for sizes, cell in self.plants)
+        kept, counts = self.polygons.kept(pixels), self.polygons.counts(pixels)
+        return weight * made + np.bincount(self.polygon_cell, np.where(kept, 1.0, weight) * counts, self.number)
 
 
 def _smallest(fits: Callable[[float], bool]) -> float:

@@ -13,9 +13,9 @@ from hypothesis import settings as examples
 from hypothesis import strategies as st
 
 from tests.engine import support
-from tests.engine.test_emission import scene
-from tetflora_addon.budget import BYTES_PER_POLYGON, afford, polygons_allowed
-from tetflora_addon.emission import explicit_blocks
+from tests.engine.test_emission import scene, with_decision
+from tetflora_addon.budget import BYTES_PER_POLYGON, BYTES_PER_SPHERE, afford, polygons_allowed
+from tetflora_addon.emission import explicit_blocks, sphere_blocks
 from tetflora_addon.refinement.decisions import Decision, contributions
 from tetflora_addon.refinement.settings import RefinementSettings
 
@@ -80,3 +80,22 @@ def test_memory_and_polygons_limit_each_other() -> None:
     assert polygons_allowed(both) == pytest.approx(1e9 / BYTES_PER_POLYGON)
     assert polygons_allowed(replace(both, max_memory=100.0)) == 5_000_000
     assert np.isinf(polygons_allowed(SETTINGS))
+
+
+def test_spheres_take_less_of_a_budget_of_memory_and_as_much_of_one_of_polygons() -> None:
+    flora, _, camera, result = scene()
+    everything = with_decision(result, Decision.PROXY)
+
+    def spheres(**limits: float) -> int:
+        settings = replace(SETTINGS, **limits)
+        fitted, side = afford(flora, everything, camera, settings, facet_bytes=BYTES_PER_SPHERE)
+        return sum(block.polygons for block in sphere_blocks(flora, fitted, camera, side))
+
+    whole = spheres()
+    memory = 0.3 * whole * BYTES_PER_SPHERE / 1e9
+    assert 0.6 * 0.3 * whole < spheres(max_memory=memory) <= 0.3 * whole
+    assert 0.6 * 0.2 * whole < spheres(max_memory=memory, max_polygons=whole // 5) <= 0.2 * whole
+    assert spheres(max_memory=memory, max_polygons=whole) == spheres(max_memory=memory)
+    tight = replace(SETTINGS, max_memory=memory)
+    sides = [afford(flora, everything, camera, tight, True, size)[1] for size in (BYTES_PER_POLYGON, BYTES_PER_SPHERE)]
+    assert sides[0] > sides[1]

@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 
 from .. import emission, explicit_emission
-from ..budget import afford
+from ..budget import BYTES_PER_POLYGON, BYTES_PER_SPHERE, afford
 from ..plants.compiled import Flora, compile_species
 from ..plants.growth import trunks
 from ..plants.seeds import Seeds
@@ -171,7 +171,8 @@ def refine_steps(
         else:
             refinement = yield from _run_loop(flora, given, camera, settings, statistics)
             facets = scene.tetflora.proxy_form != 'SHELLS'
-            refinement, side = afford(flora, refinement, camera, settings, facets)
+            facet_bytes = BYTES_PER_SPHERE if scene.tetflora.proxy_form == 'MICROSPHERES' else BYTES_PER_POLYGON
+            refinement, side = afford(flora, refinement, camera, settings, facets, facet_bytes)
             clock.lap("refine")
             _count(statistics, refinement)
             results.open()

@@ -195,35 +195,26 @@ def bark_material(species_name: str, character: str = "ridged") -> bpy.types.Mat
 
 def proxy_material() -> bpy.types.Material:
     """Material "TetFlora proxy" of all microsurfaces: as a leaf where ``tf_transmission`` is above 0, else as bark."""
-
-    def build(material: bpy.types.Material) -> None:
-        graph = Graph(shader_tree(material))
-        geometry = graph.node("ShaderNodeNewGeometry").outputs
-        colour, transmission = graph.attribute("tf_colour", "Color"), graph.attribute("tf_transmission", "Fac")
-        gloss = graph.math('MULTIPLY', graph.math('GREATER_THAN', transmission, 0.0), GLOSS)
-        inputs = {"Colour": colour, "Transmission": transmission, "Gloss": gloss, "Normal": geometry["Normal"]}
-        _finish(graph, inputs)
-        material.diffuse_color = (0.1, 0.25, 0.05, 1.0)
-
-    return get_or_create(bpy.data.materials, PROXY, _PROXY_VERSION, bpy.data.materials.new, build)
+    return get_or_create(bpy.data.materials, PROXY, _PROXY_VERSION, bpy.data.materials.new, _build_proxy)
 
 
 def sphere_material() -> bpy.types.Material:
-    """Material "TetFlora microsphere" of all microspheres: opaque, matt, with the sphere's own normal.
+    """Material "TetFlora microsphere" of all microspheres: what microsurfaces have, with the sphere's own normal.
 
     Cycles meets spheres of a point cloud from outside alone. So what falls on a sphere is reflected by the half that it
     falls on or, for the share ``tf_transmission``, comes out of the other half, and nothing is lost within.
     """
+    return get_or_create(bpy.data.materials, SPHERE, _SPHERE_VERSION, bpy.data.materials.new, _build_proxy)
 
-    def build(material: bpy.types.Material) -> None:
-        graph = Graph(shader_tree(material))
-        geometry = graph.node("ShaderNodeNewGeometry").outputs
-        colour, transmission = graph.attribute("tf_colour", "Color"), graph.attribute("tf_transmission", "Fac")
-        inputs = {"Colour": colour, "Transmission": transmission, "Gloss": 0.0, "Normal": geometry["Normal"]}
-        _finish(graph, inputs)
-        material.diffuse_color = (0.1, 0.25, 0.05, 1.0)
 
-    return get_or_create(bpy.data.materials, SPHERE, _SPHERE_VERSION, bpy.data.materials.new, build)
+def _build_proxy(material: bpy.types.Material) -> None:
+    graph = Graph(shader_tree(material))
+    geometry = graph.node("ShaderNodeNewGeometry").outputs
+    colour, transmission = graph.attribute("tf_colour", "Color"), graph.attribute("tf_transmission", "Fac")
+    gloss = graph.math('MULTIPLY', graph.math('GREATER_THAN', transmission, 0.0), GLOSS)
+    inputs = {"Colour": colour, "Transmission": transmission, "Gloss": gloss, "Normal": geometry["Normal"]}
+    _finish(graph, inputs)
+    material.diffuse_color = (0.1, 0.25, 0.05, 1.0)
 
 
 def _finish(graph: Graph, inputs: dict) -> None:
