@@ -31,9 +31,9 @@ from .light_scattering import (
 from .light_sources import World, arriving, split_areas
 
 #: Longer side in pixels of the sky's buffers, for each pixel of a lamp's: what comes from all sides has no edges.
-SKY_SHARE = 0.2
+SKY_SHARE = 0.1
 #: Limits of both, pixels.
-LEAST_PIXELS, MOST_PIXELS = 48, 2048
+SKY_PIXELS, LAMP_PIXELS = (32, 96), (64, 2048)
 #: Orders of scattering that are gathered one by one.
 ORDERS = 2
 #: Greatest share of an order that the next one has: 1 would never end.
@@ -334,7 +334,7 @@ def shadow_pass(
         views = _views(light, clouds, occluders, resolution) if light.shadow and len(clouds) else []
         buffers = [_buffer(view, light, clouds, occluders, resolution) for view in views]
         lamps.append(Lit(light, buffers))
-    fine = int(np.clip(resolution * SKY_SHARE, LEAST_PIXELS, MOST_PIXELS))
+    fine = int(np.clip(resolution * SKY_SHARE, *SKY_PIXELS))
     sky: list[LightBuffer | None] = []
     for towards in DIRECTIONS:
         light = Light("SUN", np.zeros(3), -towards)
@@ -347,7 +347,7 @@ def shadow_pass(
 
 def light_resolution(camera: Camera) -> int:
     """Longer side in pixels of a lamp's buffer: that of the picture (paper: "of proportional size")."""
-    return int(np.clip(max(camera.width, camera.height), LEAST_PIXELS, MOST_PIXELS))
+    return int(np.clip(max(camera.width, camera.height), *LAMP_PIXELS))
 
 
 def to_eye(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:

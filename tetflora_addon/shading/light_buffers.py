@@ -79,16 +79,19 @@ class LightBuffer:
         key = self._key(pixel, entry)
         order = np.argsort(key)
         self._order_key, self._cell = key[order], cell[order]
-        self._pixel, self._entry = pixel[order].astype(np.int64), entry[order]
-        self._thickness, self._depth = thickness[order], depth[order]
-        summed = np.cumsum(self._depth)
+        self._pixel = pixel[order].astype(np.int32)
+        # Sums need doubles; what is looked up does not.
+        entry, thickness, depth = entry[order], thickness[order], depth[order]
+        self._entry, self._thickness, self._depth = (a.astype(np.float32) for a in (entry, thickness, depth))
+        summed = np.cumsum(depth)
         begins = np.flatnonzero(np.diff(self._pixel, prepend=-1))
         length = np.diff(begins, append=len(order))
         #: First fragment of each fragment's pixel.
-        self._first = np.repeat(begins, length)
-        self._before = np.maximum(summed - self._depth - np.repeat((summed - self._depth)[begins], length), 0.0)
-        own = self._cell.astype(np.int64) * (self.width * self.height) + self._pixel
-        self._by_cell = np.argsort(own)
+        self._first = np.repeat(begins, length).astype(np.int32)
+        before = summed - depth - np.repeat((summed - depth)[begins], length)
+        self._before = np.maximum(before, 0.0).astype(np.float32)
+        own = self._cell * np.int64(self.width * self.height) + self._pixel
+        self._by_cell = np.argsort(own).astype(np.int32)
         self._own_key = own[self._by_cell]
 
     def __len__(self) -> int:
@@ -172,7 +175,7 @@ class LightBuffer:
         Two stretches in a row are one: T = T₁ T₂, L = L₁ T₂ + L₂. Doubling their length covers all in few rounds
         (Hillis and Steele, "Data Parallel Algorithms", 1986).
         """
-        through = np.exp(-self._depth)
+        through = np.exp(-self._depth.astype(np.float64))
         light = emitted * (1.0 - through)[:, None]
         every = np.arange(len(self))
         longest = int((every - self._first).max()) + 1
