@@ -21,6 +21,7 @@ NAMES = (
     "plants",
     "bounds",
     "averages",
+    "extinction",
     "looks",
     "tetrahedra",
     "landscape",

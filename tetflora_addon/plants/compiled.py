@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..errors import SpeciesError
 from .averages import Averages, RowLeaves, average, quadratic, row_leaves
 from .bounds import leaf_boxes, leaf_reaches, sampled_bounds, unit_bounds, widest_radii
+from .clumping import Clumping, fit_clumping
 from .growth import Branches, fullness
 from .leaf_models import LeafModel
 from .orientation import Orientation, orientation_of
@@ -117,6 +118,14 @@ class Flora:
         """How the surfaces of sub-plants are turned; likewise."""
         amounts = self.averages
         return orientation_of(self.rows, self.forms, amounts.leaf_area[:, 1], _wood_shares(amounts), amounts.length)
+
+    @cached_property
+    def clumping(self) -> Clumping:
+        """How much lighter sub-plants are than even fogs of their area; fitted when first asked for, as above."""
+        amounts = self.averages
+        wood = _wood_shares(amounts) * (amounts.length * amounts.radius)[:, None]
+        area = amounts.leaf_area[:, 1] + wood / 2
+        return fit_clumping(self.rows, self.forms, area, self.polygons, self.leaf_width, amounts.length)
 
     def species_of(self, row: NDArray[np.integer]) -> NDArray[np.integer]:
         """Index (n,) of the species that rows (n,) belong to."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..plants.clumping import factors
 from ..plants.compiled import Flora
 from ..plants.orientation import leaf_moments, own_leaf_moments, wood_moments
 from ..plants.pieces import piece_leaf_colours
@@ -28,19 +29,29 @@ class Summaries:
     Attributes
     ----------
     optical_area : (n,) float64
-        m²; leaves count once, the closed surfaces of branches and other solids half.
+        m², as it is; leaves count once, the closed surfaces of branches and other solids half.
     colour : (n, 3) float64
         Linear RGB.
     transmission : (n,) float64
         Share of scattered light that goes through.
     moment : (n, 3, 3) float64
         Mean of n nᵀ; its trace is 1 where there is anything.
+    clumping : (n, 2) float64, optional
+        What the factor on their extinction follows from, see `plants.clumping.factors`; 1 where not given, and for what
+        polygons contribute.
     """
 
     optical_area: NDArray[np.float64]
     colour: NDArray[np.float64]
     transmission: NDArray[np.float64]
     moment: NDArray[np.float64]
+    clumping: NDArray[np.float64] | None = None
+
+    def effective_area(self, volumes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Area (n,) that an even fog in tetrahedra of given volumes (n,) would have, to be as dark as they are; m²."""
+        if self.clumping is None:
+            return self.optical_area
+        return self.optical_area * factors(self.clumping, volumes)
 
 
 def summarise(flora: Flora, contents: Contents, index: NDArray[np.integer], count: int) -> Summaries:
@@ -55,7 +66,7 @@ def summarise(flora: Flora, contents: Contents, index: NDArray[np.integer], coun
     count : int
         Number of summaries.
     """
-    sums = np.zeros((count, 14))  # area, colour × area, transmission × area, moment × area
+    sums = np.zeros((count, 16))  # area, then times area: colour, transmission, moment, clumping
     subplants, pieces = contents.subplants, contents.pieces
     rows = flora.rows
     for cells, branches, own, every in (
@@ -64,6 +75,9 @@ def summarise(flora: Flora, contents: Contents, index: NDArray[np.integer], coun
     ):
         to = index[cells]
         keep = np.flatnonzero(to >= 0)
+        if len(keep) == 0:  # what proxies need of plants is not worked out where there are none
+            continue
+        clumping = flora.clumping
         to, branches, amounts = to[keep], branches.take(keep), every.take(keep)
         row = branches.row
         # A sub-plant shows the mean of all that grows on it, a piece only its own bark and leaves.
@@ -71,6 +85,7 @@ def summarise(flora: Flora, contents: Contents, index: NDArray[np.integer], coun
             leaf_colour, wood_colour = flora.leaf_colours(branches), flora.wood_colour[row]
             leaf_moment = leaf_moments(flora.orientation, branches)
             wood_moment, transmission = wood_moments(flora.orientation, branches), flora.transmission[row]
+            clumped = clumping.coefficients(branches, clumping.whole)
         else:
             own = own.take(keep)
             axis = unit(own.end - own.start)
@@ -78,17 +93,17 @@ def summarise(flora: Flora, contents: Contents, index: NDArray[np.integer], coun
             leaf_moment = own_leaf_moments(flora.orientation, row, axis)
             wood_moment = (np.eye(3) - axis[:, :, None] * axis[:, None, :]) / 2
             transmission = flora.leaf.transmission[row]
+            clumped = clumping.coefficients(branches, clumping.own)
         leaf, wood = amounts.leaf_area, amounts.wood_area / 2
         moment = leaf[:, None, None] * leaf_moment + wood[:, None, None] * wood_moment
         colour = leaf[:, None] * leaf_colour + wood[:, None] * wood_colour
-        values = np.concatenate(
-            [(leaf + wood)[:, None], colour, (leaf * transmission)[:, None], moment.reshape(-1, 9)], axis=1
-        )
-        _add(sums, to, values)
+        area = (leaf + wood)[:, None]
+        values = [area, colour, (leaf * transmission)[:, None], moment.reshape(-1, 9), area * clumped]
+        _add(sums, to, np.concatenate(values, axis=1))
     _add_polygons(sums, contents, index)
     area = sums[:, 0]
     mean = sums / np.where(area > 0, area, 1)[:, None]
-    return Summaries(area, mean[:, 1:4], mean[:, 4], _moments(mean[:, 5:].reshape(-1, 3, 3)))
+    return Summaries(area, mean[:, 1:4], mean[:, 4], _moments(mean[:, 5:14].reshape(-1, 3, 3)), mean[:, 14:])
 
 
 def _add(sums: NDArray[np.float64], to: NDArray[np.integer], values: NDArray[np.float64]) -> None:
@@ -111,8 +126,9 @@ def _add_polygons(sums: NDArray[np.float64], contents: Contents, index: NDArray[
         normal = vector / np.maximum(area, 1e-300)[:, None]
         optical = (area * share * meshes.coverage[slot] * np.where(solid, 0.5, 1.0))[:, None]
         moment = (normal[:, :, None] * normal[:, None, :]).reshape(-1, 9)
+        even = np.broadcast_to([1.0, 0.0], (len(face), 2))
         seen = np.concatenate(
-            [np.ones_like(optical), meshes.colours[slot], meshes.transmission[slot][:, None], moment], axis=1
+            [np.ones_like(optical), meshes.colours[slot], meshes.transmission[slot][:, None], moment, even], axis=1
         )
         _add(sums, index[contents.polygon_cell[some]][owner], optical * seen)
 
@@ -126,7 +142,7 @@ def _moments(sums: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def extinction_matrices(summaries: Summaries, volumes: NDArray[np.float64]) -> tuple[NDArray, NDArray, NDArray]:
-    """Extinction by direction, and the plane that the surfaces resemble.
+    """Extinction by direction, as it is between clusters of leaves, and the plane that the surfaces resemble.
 
     Returns
     -------
@@ -140,7 +156,7 @@ def extinction_matrices(summaries: Summaries, volumes: NDArray[np.float64]) -> t
         paper's plane term (section 7) for two-sided surfaces.
     """
     values, vectors = np.linalg.eigh(summaries.moment)
-    density = summaries.optical_area / volumes
+    density = summaries.effective_area(volumes) / volumes
     axes_squared = np.clip(values, 0, 1) ** (2 * _ROOT) * density[:, None] ** 2
     s = np.einsum("nik,nk,njk->nij", vectors, axes_squared, vectors)
     packed = np.stack([s[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))], axis=1)
