@@ -36,7 +36,7 @@ def test_every_kind_of_light_is_read_by_name():
     _add("c", 'AREA', shape='RECTANGLE', size=0.5, size_y=2.0)
     _add("d", 'POINT', shadow_soft_size=0.25)
     lights = _read()
-    assert [light.kind for light in lights] == ['SUN', 'SPOT', 'POINT', 'POINT']
+    assert [light.kind for light in lights] == ['SUN', 'SPOT', 'AREA', 'POINT']
     assert [light.width for light in lights] == pytest.approx([0.02, 0.2, 2.0, 0.5])
     assert lights[0].direction == pytest.approx((0.0, 1.0, 0.0), abs=1e-6)
     assert lights[1].position == pytest.approx((1.0, 2.0, 3.0))
@@ -44,9 +44,15 @@ def test_every_kind_of_light_is_read_by_name():
     assert all(np.linalg.norm(light.direction) == pytest.approx(1.0) for light in lights)
 
 
-def test_lights_without_shadows_are_left_out():
+def test_dark_and_lost_lights_are_left_out():
     _add("dark", 'SUN', energy=0.0)
-    _add("shadowless", 'POINT', use_shadow=False)
+    _add("black", 'SUN', color=(0.0, 0.0, 0.0))
     _add("hidden", 'POINT').hide_render = True
     _add("nowhere", 'POINT').scale = (0.0, 0.0, 0.0)
     assert _read() == ()
+
+
+def test_lights_without_shadows_say_so():
+    _add("a", 'POINT', use_shadow=False)
+    _add("b", 'POINT')
+    assert [light.shadow for light in _read()] == [False, True]

@@ -76,7 +76,7 @@ def _colour(data: bpy.types.Light) -> NDArray[np.float64]:
 
 def _emissions(data: bpy.types.Light) -> Iterator[bpy.types.Node]:
     """The emission that a light's own nodes lead to its output."""
-    tree = data.node_tree if data.use_nodes else None
+    tree = data.node_tree if getattr(data, "use_nodes", True) else None
     output = next((n for n in tree.nodes if n.type == 'OUTPUT_LIGHT' and n.is_active_output), None) if tree else None
     if output is not None and output.inputs["Surface"].is_linked:
         node = output.inputs["Surface"].links[0].from_node

@@ -1,0 +1,192 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light as it is read from a scene against Cycles' own, and the material that shows baked light."""
+
+from __future__ import annotations
+
+from math import pi, radians
+
+import numpy as np
+import pytest
+
+from devtools import session
+from tests.blender.renders import compat, picture, small_scene
+from tests.blender.scenes import add_mesh, depsgraph, part
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+UP = np.array([[0.0, 0.0, 1.0]])
+
+
+def sources():
+    return session.part("tetflora_addon.shading.light_sources")
+
+
+def white_plane():
+    """A white diffuse square of 4 m at the origin."""
+    import bpy
+
+    plane = add_mesh(size=2.0)
+    material = bpy.data.materials.new("white")
+    tree = compat().shader_tree(material)
+    tree.nodes.clear()
+    diffuse, output = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new("ShaderNodeOutputMaterial")
+    diffuse.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    tree.links.new(diffuse.outputs[0], output.inputs["Surface"])
+    plane.data.materials.append(material)
+    return plane
+
+
+def add_light(kind, location=(0.3, 0.2, 3.0), turn=(0.0, 0.0, 0.0), **properties):
+    import bpy
+
+    data = bpy.data.lights.new("light", kind)
+    for key, value in properties.items():
+        setattr(data, key, value)
+    made = bpy.data.objects.new("light", data)
+    made.location, made.rotation_euler = location, turn
+    bpy.context.scene.collection.objects.link(made)
+
+
+def irradiance_of_lights():
+    """W/m² at the origin on level ground, by the engine."""
+    import bpy
+
+    found = part("light_reader").read_lights(depsgraph(), bpy.context.view_layer)
+    total = np.zeros(3)
+    for light in sources().split_areas(found):
+        towards, arriving = sources().arriving(light, np.zeros((1, 3)))
+        total += arriving[0] * max(towards[0, 2], 0.0)
+    return total
+
+
+LIGHTS = {
+    "sun": ('SUN', {"energy": 2.5, "color": (1.0, 0.8, 0.6), "turn": (0.0, radians(35.0), 0.0)}),
+    "point": ('POINT', {"energy": 100.0, "shadow_soft_size": 0.1}),
+    "spot": ('SPOT', {"energy": 100.0, "spot_size": 0.5, "spot_blend": 0.6, "shadow_soft_size": 0.01}),
+    "square": ('AREA', {"energy": 100.0, "size": 1.0}),
+    "ellipse": ('AREA', {"energy": 100.0, "shape": 'ELLIPSE', "size": 1.0, "size_y": 0.3, "turn": (0.2, 0.1, 0.0)}),
+    "exposed": ('POINT', {"energy": 25.0, "exposure": 2.0, "shadow_soft_size": 0.1}),
+}
+
+
+@pytest.mark.parametrize("name", LIGHTS)
+def test_irradiance_is_that_of_cycles(name):
+    kind, properties = LIGHTS[name]
+    small_scene(sky=0.0, samples=64, size=8, width=0.02)
+    white_plane()
+    add_light(kind, **properties)
+    assert irradiance_of_lights() / pi == pytest.approx(picture().mean(axis=(0, 1)), rel=0.012)
+
+
+def world_irradiance(world, normals=UP):
+    directions = session.part("tetflora_addon.shading.light_directions")
+    return directions.irradiance(np.tile(world.parts.sum(axis=0), (len(normals), 1, 1)), normals)
+
+
+def test_a_plain_world():
+    import bpy
+
+    small_scene(sky=0.25, samples=1)
+    found = part("world_reader").read_world(bpy.context.scene)
+    assert world_irradiance(found.world)[0] == pytest.approx(0.25 * pi, rel=1e-3)
+    assert not found.suns
+    assert not found.note
+    bpy.context.scene.world = None
+    assert part("world_reader").read_world(bpy.context.scene).world.dark
+
+
+def feed_background(kind):
+    import bpy
+
+    tree = bpy.context.scene.world.node_tree
+    node = tree.nodes.new(kind)
+    tree.links.new(node.outputs[0], tree.nodes["Background"].inputs["Color"])
+    return node
+
+
+@pytest.mark.parametrize("tilt", [0.0, 90.0])
+def test_an_image_is_the_right_way_round(tilt):
+    """Irradiance of planes that face up and +X, under a sky with one bright side, as in Cycles."""
+    import bpy
+
+    small_scene(sky=0.0, samples=256, size=8, width=0.02)
+    rng = np.random.default_rng(3)
+    image = bpy.data.images.new("sky", 32, 16, float_buffer=True)
+    pixels = np.ones((16, 32, 4), np.float32)
+    pixels[..., :3] = rng.uniform(0.0, 0.2, 3)
+    pixels[9:14, 12:19, :3] += rng.uniform(1.0, 2.0, 3)
+    image.pixels.foreach_set(pixels.ravel())
+    feed_background("ShaderNodeTexEnvironment").image = image
+    plane, camera = white_plane(), bpy.context.scene.camera
+    plane.rotation_euler = camera.rotation_euler = (0.0, radians(tilt), 0.0)
+    normal = np.array([[np.sin(radians(tilt)), 0.0, np.cos(radians(tilt))]])
+    camera.location = 50.0 * normal[0]
+    found = part("world_reader").read_world(bpy.context.scene)
+    wanted = picture().mean(axis=(0, 1)) * pi
+    assert world_irradiance(found.world, normal)[0] == pytest.approx(wanted, rel=0.08)
+
+
+def test_skies_give_ground_as_much_light_as_in_cycles():
+    import bpy
+
+    small_scene(sky=0.0, samples=256, size=8, width=0.02)
+    white_plane()
+    sky = feed_background("ShaderNodeTexSky")
+    for kind in (item.identifier for item in sky.bl_rna.properties["sky_type"].enum_items):
+        sky.sky_type = kind
+        sky.sun_elevation, sky.sun_rotation = radians(40.0), 1.0
+        sky.sun_direction = (0.5, 0.5, 0.6)
+        found = part("world_reader").read_world(bpy.context.scene)
+        total = world_irradiance(found.world)[0]
+        for sun in found.suns:
+            total = total + sun.colour * -sun.direction[2]
+        assert not found.note
+        assert total == pytest.approx(picture().mean(axis=(0, 1)) * pi, rel=0.12)
+
+
+def test_what_cannot_be_read_is_said():
+    import bpy
+
+    small_scene(sky=0.0, samples=1)
+    feed_background("ShaderNodeTexNoise")
+    found = part("world_reader").read_world(bpy.context.scene)
+    assert "grey" in found.note
+    assert not found.world.dark
+
+
+def baked_square(front, back, colour=0.5):
+    import bpy
+
+    square = add_mesh(size=0.5, z=1.0)
+    attributes = part("baked_material").baked_attributes(
+        'FACE', np.array([front], np.float32), np.array([back], np.float32)
+    )
+    attributes = {**attributes, "tf_colour": ('FACE', np.full((1, 3), colour, np.float32))}
+    for name, (domain, values) in attributes.items():
+        square.data.attributes.new(name, 'FLOAT_VECTOR', domain).data.foreach_set("vector", values.ravel())
+    square.data.materials.append(part("baked_material").baked_material())
+    bpy.context.view_layer.update()
+    return square
+
+
+@pytest.mark.parametrize("engine", ["CYCLES", "EEVEE"])
+def test_the_camera_sees_what_was_baked(engine):
+    """Front and back, whatever lights there are."""
+    small_scene(
+        sky=0.7, samples=4, sun=20.0, width=0.5, engine="CYCLES" if engine == "CYCLES" else compat().eevee_engine()
+    )
+    square = baked_square((0.1, 0.2, 0.3), (0.4, 0.05, 0.6))
+    assert picture().mean(axis=(0, 1)) == pytest.approx([0.1, 0.2, 0.3], rel=0.01)
+    square.rotation_euler = (pi, 0.0, 0.0)
+    assert picture().mean(axis=(0, 1)) == pytest.approx([0.4, 0.05, 0.6], rel=0.01)
+
+
+def test_it_throws_a_shadow_and_lights_nothing():
+    import bpy
+
+    small_scene(sky=0.0, samples=32, sun=0.0, width=0.4)
+    bpy.context.scene.camera.location = (0.0, 0.0, 0.6)
+    white_plane()
+    assert picture().mean() == pytest.approx(1.0, rel=0.02)
+    baked_square((50.0, 50.0, 50.0), (50.0, 50.0, 50.0), colour=0.0)
+    assert picture().mean() < 0.02
