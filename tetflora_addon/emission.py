@@ -134,11 +134,14 @@ def facet_blocks(flora: Flora, result: Refinement, camera: Camera, facet_pixels:
 
 
 def sphere_blocks(
-    flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.6
+    flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.6, disc: float = np.pi
 ) -> Iterator[PointBuffers]:
-    """Proxies as microspheres, one for each facet of `facet_blocks`; parameters and size of blocks are the same."""
+    """Proxies as microspheres, one for each facet of `facet_blocks`; parameters and size of blocks are the same.
+
+    What is drawn of a sphere of radius 1 has the area ``disc``, see `shading.microspheres`.
+    """
     for parts in _facet_parts(flora, result, camera, facet_pixels):
-        yield spheres(parts, camera)
+        yield spheres(parts, camera, disc)
 
 
 #: Some facets, and whether the camera sees them: neither hidden nor beside the view.

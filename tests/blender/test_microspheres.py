@@ -36,6 +36,7 @@ def test_spheres_take_the_places_of_facets_and_clear_removes_them():
     import bpy
 
     scene = _forest()
+    scene.render.engine = 'CYCLES'
     before = datablocks()
     facets = _refine(scene, proxy_form='MICROSURFACES')
     mesh = _proxies(scene)[0].data
@@ -53,8 +54,11 @@ def test_spheres_take_the_places_of_facets_and_clear_removes_them():
     assert points["radius"].min() > 0
     assert 0 <= points["tf_colour"].min() <= points["tf_colour"].max() <= 1
     assert len(np.unique(points["tf_transmission"])) == 2  # wood and leaves
+    scene.render.engine = part("compat").eevee_engine()  # which draws less of a sphere
     _refine(scene)
     assert len(_proxies(scene)) == 1
+    larger, _ = _points(_proxies(scene)[0])
+    assert larger["radius"] == pytest.approx(points["radius"] * np.sqrt(np.pi / 2), rel=1e-4)
     assert _job().clear(scene) > 3
     assert datablocks() == before
     assert not bpy.data.pointclouds
@@ -90,3 +94,19 @@ def test_what_was_written_wrongly_leaves_nothing_behind():
     with pytest.raises(ValueError, match="radius"):
         clouds.point_object("spheres", wrong, part("materials").sphere_material())
     assert datablocks() == before
+
+
+@pytest.mark.parametrize("transmission", [0.0, 0.5])
+def test_white_spheres_vanish_before_a_white_sky(transmission):
+    """What falls on a sphere comes back from it, through it or from its surface, and nothing else does."""
+    import bpy
+
+    from tests.blender.renders import picture, small_scene
+
+    small_scene(sky=1.0, samples=64)
+    white = {"tf_colour": np.ones((1, 3), np.float32), "tf_transmission": np.full(1, transmission, np.float32)}
+    clouds = part("point_clouds")
+    buffers = clouds.PointBuffers(np.zeros((1, 3), np.float32), np.full(1, 1.5, np.float32), white)
+    made = clouds.point_object("sphere", buffers, part("materials").sphere_material())
+    bpy.context.collection.objects.link(made)
+    assert picture()[..., 0].mean() == pytest.approx(1.0, abs=0.01)

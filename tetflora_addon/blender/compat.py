@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from math import pi
+
 import bpy
 
 EEVEE_ENGINES = ("BLENDER_EEVEE", "BLENDER_EEVEE_NEXT")
@@ -59,3 +61,11 @@ def blend_in_mesh_order(material: bpy.types.Material) -> None:
     material.surface_render_method = 'BLENDED'
     material.use_transparency_overlap = True
     material.use_transparent_shadow = True
+
+
+def drawn_disc(engine: str) -> float:
+    """Area that a renderer draws for a point of radius 1 of a point cloud.
+
+    EEVEE draws a square that stands on its corner, within the circle that Cycles draws.
+    """
+    return 2.0 if engine in EEVEE_ENGINES else pi

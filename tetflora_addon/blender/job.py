@@ -26,6 +26,7 @@ from ..refinement.settings import RefinementSettings
 from ..refinement.statistics import Statistics, Stopwatch
 from ..refinement.steps import step_of
 from .camera_reader import read_camera
+from .compat import drawn_disc
 from .emit import Results, has_results, originals_shown, remove_results
 from .explicit_objects import Explicit, read_explicit
 from .leaf_forms import materials_of, resolved_species
@@ -310,7 +311,9 @@ def _write_proxies(
         shells = emission.proxy_shells(flora, refinement)
         blocks, material, facet_pixels = iter([] if shells is None else [shells]), shell_material, 0.0
     elif form == 'MICROSPHERES':
-        blocks = emission.sphere_blocks(flora, refinement, camera, facet_pixels)
+        blocks = emission.sphere_blocks(
+            flora, refinement, camera, facet_pixels, drawn_disc(results.scene.render.engine)
+        )
         add, material = results.add_points, sphere_material
     else:
         blocks = emission.facet_blocks(flora, refinement, camera, facet_pixels)

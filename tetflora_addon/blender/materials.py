@@ -202,28 +202,40 @@ def sphere_material() -> bpy.types.Material:
     """Material "TetFlora microsphere" of all microspheres: what microsurfaces have, with the sphere's own normal.
 
     Cycles meets spheres of a point cloud from outside alone. So what falls on a sphere is reflected by the half that it
-    falls on or, for the share ``tf_transmission``, comes out of the other half, and nothing is lost within.
+    falls on or, for the share ``tf_transmission``, comes out of the other half, and nothing is lost within. EEVEE does
+    the same for a slab as thick as the sphere; without that the sphere would shade its own other half.
     """
-    return get_or_create(bpy.data.materials, SPHERE, _SPHERE_VERSION, bpy.data.materials.new, _build_proxy)
+
+    def build(material: bpy.types.Material) -> None:
+        _build_proxy(material, "radius")
+        material.thickness_mode = 'SLAB'
+
+    return get_or_create(bpy.data.materials, SPHERE, _SPHERE_VERSION, bpy.data.materials.new, build)
 
 
-def _build_proxy(material: bpy.types.Material) -> None:
+def _build_proxy(material: bpy.types.Material, half_thickness: str | None = None) -> None:
+    """Nodes of proxies; an attribute says how thick they are."""
     graph = Graph(shader_tree(material))
     geometry = graph.node("ShaderNodeNewGeometry").outputs
     colour, transmission = graph.attribute("tf_colour", "Color"), graph.attribute("tf_transmission", "Fac")
     gloss = graph.math('MULTIPLY', graph.math('GREATER_THAN', transmission, 0.0), GLOSS)
     inputs = {"Colour": colour, "Transmission": transmission, "Gloss": gloss, "Normal": geometry["Normal"]}
-    _finish(graph, inputs)
+    thickness = None
+    if half_thickness is not None:
+        thickness = graph.math('MULTIPLY', graph.attribute(half_thickness, "Fac"), 2.0)
+    _finish(graph, inputs, thickness)
     material.diffuse_color = (0.1, 0.25, 0.05, 1.0)
 
 
-def _finish(graph: Graph, inputs: dict) -> None:
-    """Feed the scatter group and lead it to the output."""
+def _finish(graph: Graph, inputs: dict, thickness: bpy.types.NodeSocket | None = None) -> None:
+    """Feed the scatter group and lead it to the output; sheets have no thickness."""
     scatter = graph.node("ShaderNodeGroup", node_tree=scatter_group())
     for key, value in inputs.items():
         graph.feed(find_socket(scatter.inputs, key), value)
-    # EEVEE otherwise takes the whole mesh's extent for the thickness of each leaf.
-    thin = graph.node("ShaderNodeValue")
-    thin.outputs[0].default_value = 0.0
-    graph.node("ShaderNodeOutputMaterial", {"Surface": scatter, "Thickness": thin})
+    if thickness is None:
+        # EEVEE otherwise takes the whole mesh's extent for the thickness of each leaf.
+        value = graph.node("ShaderNodeValue")
+        value.outputs[0].default_value = 0.0
+        thickness = value.outputs[0]
+    graph.node("ShaderNodeOutputMaterial", {"Surface": scatter, "Thickness": thickness})
     graph.arrange()

@@ -23,7 +23,7 @@ LEAST_COVER = 0.1
 MEAN_COVER = 0.5
 
 
-def spheres(parts: Sequence[tuple[Facets, bool]], camera: Camera) -> PointBuffers:
+def spheres(parts: Sequence[tuple[Facets, bool]], camera: Camera, disc: float = np.pi) -> PointBuffers:
     """Spheres in the place of facets, one each, with their colours and transmission.
 
     Parameters
@@ -32,6 +32,8 @@ def spheres(parts: Sequence[tuple[Facets, bool]], camera: Camera) -> PointBuffer
         Facets, n in all, and whether the camera sees them. Spheres of those cover what facets cover for it, others what
         facets cover as a mean over all directions: they only cast shadows and light up others.
     camera : Camera
+    disc : float
+        Area that a renderer draws for a sphere of radius 1; some draw fewer pixels than there are in a circle.
 
     Returns
     -------
@@ -42,7 +44,7 @@ def spheres(parts: Sequence[tuple[Facets, bool]], camera: Camera) -> PointBuffer
     facets = concatenate_facets([facets for facets, _ in parts])
     return PointBuffers(
         positions=facets.centre.astype(np.float32),
-        radius=(facets.side * np.sqrt(cover / np.pi)).astype(np.float32),
+        radius=(facets.side * np.sqrt(cover / disc)).astype(np.float32),
         attributes={
             "tf_colour": facets.colour.astype(np.float32),
             "tf_transmission": facets.transmission.astype(np.float32),
