@@ -35,10 +35,10 @@ from .seeds import Seeds
 _POLYGONS, _PAIR, _PLANTS, _LARGEST = 200_000, 500_000, 6, 400_000
 _VIEWS = 4  # directions that plants are seen from, shared out among them, but at least
 _LEAST_VIEWS = 2  # for each
-_RAYS = 40  # to a side of what is looked at
+_RAYS = 28  # to a side of what is looked at
 _SIZES = 4  # of cells,
 _FINEST, _COARSEST = 2.0, 0.2  # from so many widths of a leaf to this share of the plant
-_SEGMENTS = 60_000  # of rays, for each size: fewer rays through finer cells
+_SEGMENTS = 50_000  # of rays, for each size: fewer rays through finer cells
 #: Root (in widths of a leaf), density, offset, and difference of an order's from that where nothing is known; and the
 #: weights that these have against what is seen.
 _PRIOR = np.array([0.5, 0.3, 0.5, 0.0])
