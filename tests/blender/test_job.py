@@ -210,7 +210,7 @@ def test_estimates_agree_with_what_is_made():
     assert expanded.polygons_meshed == pytest.approx(estimate.polygons_full, rel=0.1)
 
 
-@pytest.mark.parametrize(("form", "bound"), [('MICROSURFACES', 0.03), ('SHELLS', 0.06)])
+@pytest.mark.parametrize(("form", "bound"), [('MICROSURFACES', 0.03), ('MICROSPHERES', 0.04), ('SHELLS', 0.06)])
 def test_the_refined_picture_is_that_of_the_plants(form, bound):
     """Mean radiance over blocks of the picture, refined against expanded; the leaf limit makes most of it proxies."""
     import bpy

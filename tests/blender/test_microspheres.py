@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
@@ -62,6 +64,20 @@ def test_spheres_take_the_places_of_facets_and_clear_removes_them():
     assert _job().clear(scene) > 3
     assert datablocks() == before
     assert not bpy.data.pointclouds
+
+
+def test_refine_at_render_takes_spheres_back():
+    import bpy
+
+    from tests.blender.scenes import tiny_render
+
+    scene = _forest()
+    tiny_render(size=160)
+    scene.tetflora.proxy_form, scene.tetflora.refine_at_render = 'MICROSPHERES', True
+    before = datablocks()
+    bpy.ops.render.render()
+    assert json.loads(scene.tetflora.statistics)["polygons_proxy"] > 0
+    assert datablocks() == before
 
 
 def test_the_group_for_vertices_makes_the_same_points():
