@@ -28,6 +28,7 @@ from .light_scattering import (
     particle_direct,
     scattered_shares,
 )
+from .light_sheets import Sheets
 from .light_sources import World, arriving, split_areas
 
 #: Longer side in pixels of the sky's buffers, for each pixel of a lamp's: what comes from all sides has no edges.
@@ -56,14 +57,18 @@ class Illumination:
     Attributes
     ----------
     clouds : Clouds of n
+    sheets : Sheets
+        What stands in the light in place of some of the clouds.
     lamps : list of Lit
         Areas are several of them.
     ambient : (n, 4, 9, 3) float32
         Light from the sky and from what is lit, at the tetrahedra's key points, by harmonic and colour.
     """
 
-    def __init__(self, clouds: Clouds, lamps: list[Lit], sky: list[LightBuffer | None], world: World) -> None:
-        self.clouds, self.lamps = clouds, lamps
+    def __init__(
+        self, clouds: Clouds, sheets: Sheets, lamps: list[Lit], sky: list[LightBuffer | None], world: World
+    ) -> None:
+        self.clouds, self.sheets, self.lamps = clouds, sheets, lamps
         self._sky, self._world = sky, world
         self._sources, self._ground = np.zeros((len(clouds), 3)), np.zeros(3)
         self.ambient = np.zeros((len(clouds), 4, HARMONICS, 3), np.float32)
@@ -75,7 +80,7 @@ class Illumination:
         return self.ambient.nbytes + sum(b.nbytes for b in buffers)
 
     def direct(
-        self, points: NDArray[np.float64], cells: NDArray[np.integer]
+        self, points: NDArray[np.float64], cells: NDArray[np.integer], sheets: NDArray[np.integer] | None = None
     ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
         """Light of each lamp at points.
 
@@ -85,6 +90,8 @@ class Illumination:
             Metres.
         cells : (m,) int
             Tetrahedron (index into the clouds) that holds each, −1 for none.
+        sheets : (m,) int, optional
+            Sheet (index) on which each lies, which does not shadow it.
 
         Yields
         ------
@@ -96,8 +103,7 @@ class Illumination:
         for lit in self.lamps:
             towards, light = arriving(lit.light, points)
             if lit.buffers:
-                own = self.clouds.own_depth(points, cells, towards)
-                light = light * _through(lit.buffers, points, cells, own)[:, None]
+                light = light * self._through(lit.buffers, points, cells, towards, sheets)[:, None]
             yield towards, light
 
     def around(self, points: NDArray[np.float64], cells: NDArray[np.integer]) -> NDArray[np.float64]:
@@ -137,6 +143,7 @@ class Illumination:
         transmission: NDArray[np.float64],
         cells: NDArray[np.integer],
         camera: Camera | None = None,
+        sheets: NDArray[np.integer] | None = None,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Outgoing radiance of facets or leaves.
 
@@ -152,6 +159,8 @@ class Illumination:
             As for `direct`.
         camera : Camera, optional
             For the gloss; without, it is spread evenly.
+        sheets : (m,) int, optional
+            As for `direct`.
 
         Returns
         -------
@@ -164,7 +173,8 @@ class Illumination:
             shares = scattered_shares(colour[part], transmission[part])
             view = None if camera is None else to_eye(camera, centre[part])
             sides = facet_ambient(normal[part], shares, self.around(centre[part], cells[part]), view)
-            for towards, light in self.direct(centre[part], cells[part]):
+            on = None if sheets is None else sheets[part]
+            for towards, light in self.direct(centre[part], cells[part], on):
                 added = facet_direct(normal[part], shares, towards, light, view)
                 sides = sides[0] + added[0], sides[1] + added[1]
             front[part], back[part] = sides
@@ -239,7 +249,7 @@ class Illumination:
             Gathered one by one; the rest is their geometric series.
         """
         count = len(self.clouds)
-        points, cells = self.clouds.key_points.reshape(-1, 3), np.repeat(np.arange(count), 4)
+        points, cells, sheets, keys = self.sheets.samples(self.clouds)
         up = np.array([[0.0, 0.0, 1.0]])
         bright = irradiance(self._world.parts.sum(axis=0)[None], up)[0]
         for lit in self.lamps:
@@ -248,20 +258,20 @@ class Illumination:
         self._ground = np.asarray(ground, np.float64) * bright / np.pi
         if not count:
             return
-        sky = self._from_sky(points, cells)
+        sky = keys.means(self._from_sky(points, cells, sheets))
         first = fluence(sky)
-        for _, light in self.direct(points, cells):
-            first += light
+        for _, light in self.direct(points, cells, sheets):
+            first += keys.means(light)
         gathered = last = np.zeros_like(sky)
         for order in range(orders):
-            passing = (first + fluence(gathered)).reshape(count, 4, 3).mean(axis=1)
+            passing = keys.by_cell(first + fluence(gathered))
             self._sources = self.clouds.albedo * passing / (4.0 * np.pi)
-            before, every = last, self._from_clouds(points)
+            before, every = last, keys.means(self._from_clouds(points))
             last, gathered = every - gathered, every
             if order == orders - 1:
                 share = self._again(fluence(before), fluence(last))
                 gathered = gathered + last * (share / (1.0 - share))
-        passing = (first + fluence(gathered)).reshape(count, 4, 3).mean(axis=1)
+        passing = keys.by_cell(first + fluence(gathered))
         self._sources = self.clouds.albedo * passing / (4.0 * np.pi)
         self.ambient[:] = (sky + gathered).reshape(count, 4, HARMONICS, 3)
 
@@ -273,7 +283,29 @@ class Illumination:
         share = (weight @ last) / np.where(former > 0.0, former, np.inf)
         return np.clip(share, 0.0, _MOST_AGAIN)
 
-    def _from_sky(self, points: NDArray[np.float64], cells: NDArray[np.integer]) -> NDArray[np.float64]:
+    def _through(
+        self,
+        buffers: list[LightBuffer],
+        points: NDArray[np.float64],
+        cells: NDArray[np.integer],
+        towards: NDArray[np.float64],
+        sheets: NDArray[np.integer] | None,
+    ) -> NDArray[np.float64]:
+        """Transmittance (m,) through the first of several views that sees each point."""
+        empty = np.append(self.sheets.replaced, True)[cells]
+        own = np.where(empty, 0.0, self.clouds.own_depth(points, cells, towards))
+        owner = np.where(empty, -1, cells) if sheets is None else np.where(sheets < 0, cells, sheets + len(self.clouds))
+        result, waiting = np.exp(-own), np.ones(len(points), bool)
+        for buffer in buffers:
+            some = np.flatnonzero(waiting)
+            through, seen = buffer.transmittance(points[some], owner[some], own[some])
+            result[some[seen]] = through[seen]
+            waiting[some[seen]] = False
+        return result
+
+    def _from_sky(
+        self, points: NDArray[np.float64], cells: NDArray[np.integer], sheets: NDArray[np.integer] | None = None
+    ) -> NDArray[np.float64]:
         """Light of the sky (m, 9, 3) that nothing holds up."""
         result = np.zeros((len(points), HARMONICS, 3))
         if self._world.dark:
@@ -281,16 +313,17 @@ class Illumination:
         for part, buffer, towards in zip(self._world.parts, self._sky, DIRECTIONS, strict=True):
             through = np.ones(len(points))
             if buffer is not None:
-                through = _through([buffer], points, cells, self.clouds.own_depth(points, cells, towards))
+                through = self._through([buffer], points, cells, towards, sheets)
             result += through[:, None, None] * part
         return result
 
     def _from_clouds(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Light (m, 9, 3) that tetrahedra and polygons scatter."""
         result = np.zeros((len(points), HARMONICS, 3))
+        emitted = np.concatenate([self._sources, self._sources[self.sheets.cell]])
         for buffer, towards in zip(self._sky, DIRECTIONS, strict=True):
             if buffer is not None:
-                light = buffer.scattered(points, self._sources, self._ground)
+                light = buffer.scattered(points, emitted, self._ground)
                 result += harmonics(towards)[:, None] * light[:, None, :] * SOLID_ANGLE
         return result
 
@@ -303,6 +336,7 @@ def shadow_pass(
     resolution: int = 512,
     ground: ArrayLike = (0.0, 0.0, 0.0),
     orders: int = ORDERS,
+    sheets: Sheets | None = None,
 ) -> Illumination:
     """Look at a scene from all of its lights.
 
@@ -320,6 +354,9 @@ def shadow_pass(
         Mean colour of the polygons, which lights crowns from below.
     orders : int
         Orders of scattering that are gathered one by one, at least 1.
+    sheets : Sheets, optional
+        Facets and leaves as they are drawn. Clumps that are smaller than tetrahedra shadow themselves, which an even
+        cloud does not know of; with sheets the resolution should be such that a pixel is about as large as one.
 
     Returns
     -------
@@ -329,18 +366,20 @@ def shadow_pass(
     -----
     Penumbras of the sun and of lamps that are no areas are as sharp as the buffer.
     """
+    sheets = Sheets.none(len(clouds)) if sheets is None else sheets
     lamps = []
     for light in split_areas(tuple(lights)):
         views = _views(light, clouds, occluders, resolution) if light.shadow and len(clouds) else []
-        buffers = [_buffer(view, light, clouds, occluders, resolution) for view in views]
+        buffers = [_buffer(view, light, clouds, sheets, occluders, resolution) for view in views]
         lamps.append(Lit(light, buffers))
-    fine = int(np.clip(resolution * SKY_SHARE, *SKY_PIXELS))
+    # Between sheets there are gaps that coarse pixels do not see.
+    fine = resolution if len(sheets) else int(np.clip(resolution * SKY_SHARE, *SKY_PIXELS))
     sky: list[LightBuffer | None] = []
     for towards in DIRECTIONS:
         light = Light("SUN", np.zeros(3), -towards)
         views = _views(light, clouds, occluders, fine) if len(clouds) else []
-        sky.append(_buffer(views[0], light, clouds, occluders, fine) if views else None)
-    found = Illumination(clouds, lamps, sky, world)
+        sky.append(_buffer(views[0], light, clouds, sheets, occluders, fine) if views else None)
+    found = Illumination(clouds, sheets, lamps, sky, world)
     found.scatter(np.asarray(ground, np.float64), max(orders, 1))
     return found
 
@@ -368,20 +407,13 @@ def _views(light: Light, clouds: Clouds, occluders: NDArray[np.float64] | None, 
 
 
 def _buffer(
-    view: Camera, light: Light, clouds: Clouds, occluders: NDArray[np.float64] | None, resolution: int
+    view: Camera,
+    light: Light,
+    clouds: Clouds,
+    sheets: Sheets,
+    occluders: NDArray[np.float64] | None,
+    resolution: int,
 ) -> LightBuffer:
     along = light.direction if light.kind == "SUN" else -to_eye(view, clouds.vertices.mean(axis=1))
-    return LightBuffer(view, resolution, clouds.vertices, clouds.extinction(along), occluders)
-
-
-def _through(
-    buffers: list[LightBuffer], points: NDArray[np.float64], cells: NDArray[np.integer], own: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Transmittance (m,) through the first of several views that sees each point."""
-    result, waiting = np.exp(-own), np.ones(len(points), bool)
-    for buffer in buffers:
-        some = np.flatnonzero(waiting)
-        through, seen = buffer.transmittance(points[some], cells[some], own[some])
-        result[some[seen]] = through[seen]
-        waiting[some[seen]] = False
-    return result
+    extinction = np.where(sheets.replaced, 0.0, clouds.extinction(along))
+    return LightBuffer(view, resolution, clouds.vertices, extinction, occluders, sheets.corners)

@@ -10,6 +10,7 @@ comes from the same order. Samples are blended between the four nearest pixels.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,8 @@ from ..refinement.visibility import OPAQUE
 BIAS = 1.5
 #: Points that are looked up together; some 500 bytes each.
 POINTS_AT_ONCE = 1 << 18
+#: Parts along each side of a sheet at most, and the share of a pixel that one covers at most.
+_MOST_CUTS, _MOST_COVERED = 24, 0.98
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,9 @@ class LightBuffer:
         κ ≥ 0 along the light, 1/m.
     occluders : (t, 3, 3) float64, optional
         Opaque triangles, metres.
+    sheets : (m, 4, 3) float64, optional
+        Corners of opaque facets or leaves, which count by the share of each pixel that they cover. They are owners
+        n to n + m − 1, after the tetrahedra.
     """
 
     def __init__(
@@ -58,6 +64,7 @@ class LightBuffer:
         vertices: NDArray[np.float64],
         extinction: NDArray[np.float64],
         occluders: NDArray[np.float64] | None = None,
+        sheets: NDArray[np.float64] | None = None,
     ) -> None:
         self.camera = camera
         self.width, self.height = buffer_size(camera, resolution)
@@ -73,6 +80,8 @@ class LightBuffer:
             shifted = end[hit] + BIAS * across * (1.0 if camera.kind == "ORTHO" else end[hit])
             nothing = np.zeros(len(hit))
             parts.append((np.full(len(hit), -1, np.int32), hit, shifted, nothing, np.full(len(hit), OPAQUE)))
+        if sheets is not None and len(sheets):
+            parts += [(own + np.int32(len(vertices)), *rest) for own, *rest in self._sheet_fragments(sheets)]
         cell, pixel, entry, thickness, depth = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
         # One number to sort and to look up by: the pixel, and the distance as its fraction.
         self._reach = float(entry.max(initial=0.0)) * 1.001 + 1e-9
@@ -94,6 +103,41 @@ class LightBuffer:
         self._by_cell = np.argsort(own).astype(np.int32)
         self._own_key = own[self._by_cell]
 
+    def _sheet_fragments(self, sheets: NDArray[np.float64]) -> Iterator[tuple[NDArray, ...]]:
+        """Owner, pixel, entry, thickness 0 and optical depth of sheets, those of about the same size at a time.
+
+        A sheet that covers the share c of a pixel lets 1 − c through: its optical depth is −ln (1 − c).
+        """
+        across = self.camera.pixel_size * self.camera.width / self.width
+        centre = sheets.mean(axis=1)
+        vector = np.cross(sheets[:, 2] - sheets[:, 0], sheets[:, 3] - sheets[:, 1]) / 2.0
+        if self.camera.kind == "ORTHO":
+            seen, pixel_area = np.abs(vector @ self.camera.frame[:, 2]), np.full(len(sheets), across**2)
+        else:
+            away = centre - self.camera.position
+            distance = np.maximum(np.linalg.norm(away, axis=1), 1e-9)
+            seen = np.abs(np.sum(vector * away, axis=1)) / distance
+            # Beside the middle of a flat view a pixel sees less of the sphere.
+            pixel_area = (across * distance) ** 2 * np.abs(away @ self.camera.frame[:, 2] / distance) ** 3
+        longest = np.linalg.norm(sheets - np.roll(sheets, 1, axis=1), axis=2).max(axis=1)
+        cuts = np.clip(np.ceil(longest / np.sqrt(np.maximum(pixel_area, 1e-18)) / 0.7), 1, _MOST_CUTS).astype(int)
+        for count in np.unique(cuts):
+            some = np.flatnonzero(cuts == count)
+            x = (np.arange(count) + 0.5) / count
+            u, v = np.repeat(x, count), np.tile(x, count)
+            weights = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=1)
+            points = np.einsum("kc,mcx->mkx", weights, sheets[some]).reshape(-1, 3)
+            taps, inside = self._taps(points)
+            owner = np.repeat(some, count**2)[inside]
+            nearest = taps.pixel[np.arange(len(owner)), taps.weight.argmax(axis=1)] if len(owner) else owner
+            key, first, own = np.unique(
+                owner * (self.width * self.height) + nearest, return_index=True, return_inverse=True
+            )
+            share = np.bincount(own.ravel(), (seen / pixel_area)[owner] / count**2, len(key))
+            metres = np.bincount(own.ravel(), taps.metres, len(key)) / np.maximum(np.bincount(own.ravel()), 1)
+            depth = -np.log1p(-np.minimum(share, _MOST_COVERED))
+            yield owner[first].astype(np.int32), nearest[first].astype(np.int32), metres, np.zeros(len(key)), depth
+
     def __len__(self) -> int:
         return len(self._pixel)
 
@@ -112,7 +156,7 @@ class LightBuffer:
         points : (m, 3) float64
             Metres, world space.
         cells : (m,) int
-            Tetrahedron that holds each, −1 where there is none.
+            Tetrahedron that holds each or sheet on which it lies, −1 where there is none.
         own_depth : (m,) float64
             Optical depth of that tetrahedron between where light enters it and the point. However coarse the pixels,
             none darkens itself by more, and no point is darkened by less.
@@ -133,7 +177,7 @@ class LightBuffer:
             own, has = self._own(taps, cells[part][inside])
             # Small ones may overlap; what begins before the last fragment was counted in full.
             counted = np.where(own < place, self._depth[own], self._partly(own, taps)) if len(self) else 0.0
-            drawn, exact = np.where(has, counted, 0.0), own_depth[part][inside][:, None]
+            drawn, exact = np.where(has & (own <= place), counted, 0.0), own_depth[part][inside][:, None]
             # Where the point's own tetrahedron does not reach into a pixel, its neighbours do, or nothing is there.
             depth = np.maximum(np.maximum(depth - drawn, 0.0) + np.minimum(drawn, exact), exact)
             some = np.flatnonzero(inside) + start
@@ -150,8 +194,8 @@ class LightBuffer:
         ----------
         points : (m, 3) float64
             Metres.
-        sources : (n, 3) float64
-            Radiance J of each tetrahedron, were it thick: it gives J (1 − e^−τ).
+        sources : (n + m, 3) float64
+            Radiance J of each tetrahedron, were it thick, and of each sheet: they give J (1 − e^−τ).
         polygons : (3,) float64
             Radiance of all polygons.
         """
