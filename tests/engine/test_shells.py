@@ -116,3 +116,45 @@ def test_no_cells_and_wrong_shapes():
         build(cells(1), normal=np.zeros((3, 3)))
     with pytest.raises(ValueError, match="vertices must have shape"):
         shell_buffers(np.zeros((5, 3)), *[np.zeros(5)] * 5)
+
+
+def test_rank_writes_cells_back_to_front():
+    """Whoever blends faces in their order then sees the farthest first; all attributes go with their cells."""
+    vertices = cells(5, 30)
+    rank = np.random.default_rng(6).permutation(30)
+    light = np.random.default_rng(7).random((30, 4, 3))
+    colour = np.random.default_rng(8).random((30, 3))
+    plain = build(vertices, colour=colour, light=light)
+    ranked = build(vertices, colour=colour, light=light, rank=rank)
+    order = np.argsort(-rank)
+    for name, (domain, values) in plain.attributes.items():
+        moved = values.reshape(30, 4, *values.shape[1:])[order].reshape(values.shape)
+        assert ranked.attributes[name][0] == domain
+        np.testing.assert_array_equal(ranked.attributes[name][1], moved, err_msg=name)
+    np.testing.assert_array_equal(ranked.positions, plain.positions.reshape(30, 4, 3)[order].reshape(-1, 3))
+    np.testing.assert_array_equal(ranked.corner_verts, plain.corner_verts)
+
+
+def test_light_stays_with_its_corner():
+    """Cells of either orientation: the radiance that is written is that of the position beside it."""
+    vertices = cells(9, 40)
+    light = vertices @ np.array([[1.0, 0.0, 2.0], [0.5, 1.0, 0.0], [0.0, 3.0, 1.0]])
+    buffers = build(vertices, light=light)
+    written = np.stack([buffers.attributes[f"tf_light{k}"][1][::4] for k in range(4)], axis=1)
+    places = buffers.positions.reshape(40, 4, 3).astype(np.float64)
+    expected = places @ np.array([[1.0, 0.0, 2.0], [0.5, 1.0, 0.0], [0.0, 3.0, 1.0]])
+    np.testing.assert_allclose(written, expected, atol=1e-5)
+    assert not any(name.startswith("tf_light") for name in build(vertices).attributes)
+    with pytest.raises(ValueError, match="light must have shape"):
+        build(vertices, light=light[:, :3])
+
+
+def test_the_noise_of_a_cell_is_even_and_its_own():
+    vertices = cells(10, 4000, 5000.0)
+    noise = build(vertices).attributes["tf_random"][1][::4]
+    assert 0.0 <= noise.min() <= noise.max() < 1.0
+    # Standard deviation of the mean of 4,000 even numbers: .0046.
+    assert abs(noise.mean() - 0.5) < 0.02
+    assert np.histogram(noise, 8, (0.0, 1.0))[0].min() > 400
+    turned = np.random.default_rng(1).permuted(np.arange(4))
+    np.testing.assert_array_equal(build(vertices[::-1][:, turned]).attributes["tf_random"][1][::4][::-1], noise)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..buffers import MeshBuffers
+from ..plants.hashing import mix, uniform
 
 # Faces of a positively oriented tetrahedron, wound outwards; face i lies opposite vertex i.
 _FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]], dtype=np.int32)
@@ -83,6 +84,17 @@ def barycentric_gradients(vertices: ArrayLike) -> tuple[NDArray[np.float64], NDA
     return gradients, flat
 
 
+def _cell_noise(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Even random number (n,) in [0, 1) of each cell (n, 4, 3): the same wherever the same cell comes up again."""
+    # Corners as Blender stores them, so that the last bits of doubles do not matter; adding up forgets their order.
+    places = np.ascontiguousarray(corners, dtype=np.float32) + np.float32(0.0)  # no negative zeros
+    bits = places.view(np.uint32).astype(np.uint64)
+    key = mix(bits[..., 0])
+    for axis in (1, 2):
+        key = mix(key ^ bits[..., axis])
+    return uniform(key.sum(axis=1, dtype=np.uint64), 0)
+
+
 def shell_buffers(
     vertices: ArrayLike,
     colour: ArrayLike,
@@ -90,6 +102,9 @@ def shell_buffers(
     S: ArrayLike,
     normal: ArrayLike,
     plane: ArrayLike,
+    *,
+    rank: ArrayLike | None = None,
+    light: ArrayLike | None = None,
 ) -> MeshBuffers:
     """One mesh of all proxy tetrahedra, with the attributes that the shell material reads.
 
@@ -109,6 +124,12 @@ def shell_buffers(
         Axis of the largest eigenvalue of the contents' moment; any length and sign.
     plane : (n,) float
         Weight of the plane term against the particle term, 0 to 1.
+    rank : (n,) number, optional
+        Place of each cell front to back as the camera sees them, in any unit. Cells are then written back to front:
+        EEVEE blends the faces of a mesh in their order. Without it cells keep theirs.
+    light : (n, 4, 3) float, optional
+        Radiance that the contents scatter towards the camera at each corner, albedo and phase included, W/(m² sr);
+        becomes ``tf_light0`` to ``tf_light3`` for the material of baked light.
 
     Returns
     -------
@@ -136,12 +157,21 @@ def shell_buffers(
         "normal": (np.asarray(normal, dtype=np.float64), (count, 3)),
         "plane": (np.asarray(plane, dtype=np.float64), (count,)),
     }
+    if light is not None:
+        values["light"] = (np.asarray(light, dtype=np.float64), (count, 4, 3))
+    if rank is not None:
+        values["rank"] = (np.asarray(rank), (count,))
     for name, (array, shape) in values.items():
         if array.shape != shape:
             raise ValueError(f"{name} must have shape {shape} for {count} tetrahedra, not {array.shape}")
 
+    if rank is not None:
+        order = np.argsort(values["rank"][0], kind='stable')[::-1]
+        corners = corners[order]
+        values = {name: (array[order], shape) for name, (array, shape) in values.items()}
     spans = corners[:, 1:] - corners[:, :1]
     inverted = np.einsum("ij,ij->i", spans[:, 0], np.cross(spans[:, 1], spans[:, 2])) < 0.0
+    random = _cell_noise(corners)
     corners = np.where(inverted[:, None, None], corners[:, [0, 2, 1, 3]], corners)
     gradients, flat = barycentric_gradients(corners)
     matrices = np.where(flat[:, None], 0.0, values["S"][0])
@@ -152,6 +182,11 @@ def shell_buffers(
     def per_face(array: NDArray) -> tuple[str, NDArray[np.float32]]:
         return "FACE", np.repeat(array.astype(np.float32), 4, axis=0)
 
+    baked = {}
+    if light is not None:
+        given = values["light"][0]
+        given = np.where(inverted[:, None, None], given[:, [0, 2, 1, 3]], given)
+        baked = {f"tf_light{k}": per_face(given[:, k]) for k in range(4)}
     first_vertex = np.arange(count, dtype=np.int32)[:, None, None] * 4
     first_edge = np.arange(count, dtype=np.int32)[:, None, None] * 6
     return MeshBuffers(
@@ -168,10 +203,12 @@ def shell_buffers(
             "tf_s1": per_face(matrices[:, 3:]),
             "tf_normal": per_face(axes),
             "tf_plane": per_face(values["plane"][0]),
+            "tf_random": per_face(random),
             "tf_bary": ("POINT", np.tile(_BARYCENTRIC, (count, 1))),
             "tf_g1": per_face(gradients[:, 0]),
             "tf_g2": per_face(gradients[:, 1]),
             "tf_g3": per_face(gradients[:, 2]),
+            **baked,
         },
         smooth=False,
     )
