@@ -29,6 +29,7 @@ NAMES = (
     "budget",
     "stages",
     "foreign",
+    "closed_form",
 )
 
 
