@@ -17,6 +17,7 @@ from tetflora_addon.shading.illumination import Illumination, shadow_pass
 from tetflora_addon.shading.light_clouds import Clouds
 from tetflora_addon.shading.light_directions import DIRECTIONS, SOLID_ANGLE, harmonics, irradiance
 from tetflora_addon.shading.light_scattering import particle_ambient, scattered_shares, sphere_phase
+from tetflora_addon.shading.light_sheets import Sheets
 from tetflora_addon.shading.light_sources import World, arriving, split_areas
 from tetflora_addon.tetrahedra.geometry import signed_volume
 
@@ -267,3 +268,40 @@ def test_nothing_to_light() -> None:
     up = np.array([[0.0, 0.0, 1.0]])
     assert found.irradiance(np.zeros((1, 3)), up) == pytest.approx(SUN.colour[None] + np.pi, rel=1e-3)
     assert found.cell_sources(support.camera((9, 0, 2), (0, 0, -2))).shape == (0, 4, 3)
+
+
+def random_sheets(seed: int, count: int, side: float) -> tuple[np.ndarray, np.ndarray]:
+    """Level squares (count, 4, 3) at random in the cube of `box`, and the cells (of six) that hold their middles."""
+    rng = np.random.default_rng(seed)
+    cloud = box(1.0, 1)
+    cell = rng.integers(len(cloud), size=count)
+    middle = np.einsum("nk,nkx->nx", rng.dirichlet(np.ones(4), count), cloud.vertices[cell])
+    return middle[:, None] + side / 2 * np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)]), cell
+
+
+def test_sheets_shadow_those_below_and_not_themselves() -> None:
+    """As rays find it: a sheet is lit as far as none lies above its middle."""
+    corners, cell = random_sheets(9, 120, 0.4)
+    sheets = Sheets.of(corners, cell, 6)
+    found = shadow_pass(box(5.0, 1), [SUN], DARK, resolution=128, sheets=sheets)
+    middle, every = corners.mean(axis=1), np.arange(120)
+    light = next(found.direct(middle, cell, every))[1][:, 0] / 3.0
+    away = np.abs(middle[:, None, :2] - middle[None, :, :2]).max(axis=2)
+    covered = ((away < 0.2) & (middle[None, :, 2] > middle[:, None, 2])).any(axis=1)
+    # Not where an edge lies within a pixel or two.
+    clear = (np.abs(away - 0.2) > 0.07).all(axis=1)
+    assert light[clear & ~covered] == pytest.approx(1.0, abs=1e-6)
+    assert (light[clear & covered] < 0.1).all()
+    assert light.mean() == pytest.approx((~covered).mean(), abs=0.05)
+
+
+def test_samples_stand_for_their_key_points() -> None:
+    corners, cell = random_sheets(10, 40, 0.2)
+    cloud = box(1.0, 1)
+    points, cells, sheets, keys = Sheets.of(corners, np.where(cell == 2, 3, cell), 6).samples(cloud)
+    assert (sheets[cells == 2] == -1).all()
+    assert len(points[cells == 2]) == 4
+    assert keys.means(np.ones((len(points), 2))) == pytest.approx(1.0)
+    of_cell = keys.by_cell(keys.means(points))
+    for one in range(6):
+        assert of_cell[one] == pytest.approx(points[cells == one].mean(axis=0))

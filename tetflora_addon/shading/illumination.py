@@ -16,11 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..refinement.camera import Camera
-from ..refinement.light_views import Light, lamp_views, light_views
+from ..refinement.light_views import Light
 from ..tetrahedra.geometry import volume
 from .light_buffers import LightBuffer
 from .light_clouds import Clouds
 from .light_directions import DIRECTIONS, HARMONICS, SOLID_ANGLE, fluence, harmonics, irradiance
+from .light_passes import buffers_of, light_resolution, to_eye
 from .light_scattering import (
     facet_ambient,
     facet_direct,
@@ -31,10 +32,12 @@ from .light_scattering import (
 from .light_sheets import Sheets
 from .light_sources import World, arriving, split_areas
 
+__all__ = ["Illumination", "Lit", "light_resolution", "shadow_pass", "to_eye"]
+
 #: Longer side in pixels of the sky's buffers, for each pixel of a lamp's: what comes from all sides has no edges.
 SKY_SHARE = 0.1
-#: Limits of both, pixels.
-SKY_PIXELS, LAMP_PIXELS = (32, 96), (64, 2048)
+#: Its limits, pixels.
+SKY_PIXELS = (32, 96)
 #: Orders of scattering that are gathered one by one.
 ORDERS = 2
 #: Greatest share of an order that the next one has: 1 would never end.
@@ -369,51 +372,15 @@ def shadow_pass(
     sheets = Sheets.none(len(clouds)) if sheets is None else sheets
     lamps = []
     for light in split_areas(tuple(lights)):
-        views = _views(light, clouds, occluders, resolution) if light.shadow and len(clouds) else []
-        buffers = [_buffer(view, light, clouds, sheets, occluders, resolution) for view in views]
+        buffers = buffers_of(light, clouds, sheets, occluders, resolution) if light.shadow else []
         lamps.append(Lit(light, buffers))
     # Between sheets there are gaps that coarse pixels do not see.
     fine = resolution if len(sheets) else int(np.clip(resolution * SKY_SHARE, *SKY_PIXELS))
     sky: list[LightBuffer | None] = []
     for towards in DIRECTIONS:
         light = Light("SUN", np.zeros(3), -towards)
-        views = _views(light, clouds, occluders, fine) if len(clouds) else []
-        sky.append(_buffer(views[0], light, clouds, sheets, occluders, fine) if views else None)
+        views = buffers_of(light, clouds, sheets, occluders, fine)
+        sky.append(views[0] if views else None)
     found = Illumination(clouds, sheets, lamps, sky, world)
     found.scatter(np.asarray(ground, np.float64), max(orders, 1))
     return found
-
-
-def light_resolution(camera: Camera) -> int:
-    """Longer side in pixels of a lamp's buffer: that of the picture (paper: "of proportional size")."""
-    return int(np.clip(max(camera.width, camera.height), *LAMP_PIXELS))
-
-
-def to_eye(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit vectors (m, 3) from points to the camera."""
-    if camera.kind == "ORTHO":
-        return np.tile(camera.frame[:, 2], (len(points), 1))
-    away = camera.position - points
-    return away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
-
-
-def _views(light: Light, clouds: Clouds, occluders: NDArray[np.float64] | None, resolution: int) -> list[Camera]:
-    corners = clouds.vertices.reshape(-1, 3)
-    if light.kind != "SUN":
-        return lamp_views(light.position, corners, resolution)
-    # Where occluders are decides how far the view reaches, not how wide it is.
-    every = corners if occluders is None or not len(occluders) else np.concatenate([corners, occluders.reshape(-1, 3)])
-    return light_views(light, clouds.vertices, every, resolution)
-
-
-def _buffer(
-    view: Camera,
-    light: Light,
-    clouds: Clouds,
-    sheets: Sheets,
-    occluders: NDArray[np.float64] | None,
-    resolution: int,
-) -> LightBuffer:
-    along = light.direction if light.kind == "SUN" else -to_eye(view, clouds.vertices.mean(axis=1))
-    extinction = np.where(sheets.replaced, 0.0, clouds.extinction(along))
-    return LightBuffer(view, resolution, clouds.vertices, extinction, occluders, sheets.corners)

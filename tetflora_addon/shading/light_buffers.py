@@ -25,7 +25,7 @@ BIAS = 1.5
 #: Points that are looked up together; some 500 bytes each.
 POINTS_AT_ONCE = 1 << 18
 #: Parts along each side of a sheet at most, and the share of a pixel that one covers at most.
-_MOST_CUTS, _MOST_COVERED = 24, 0.98
+_MOST_CUTS, _MOST_COVERED = 64, 0.98
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ class LightBuffer:
             # Beside the middle of a flat view a pixel sees less of the sphere.
             pixel_area = (across * distance) ** 2 * np.abs(away @ self.camera.frame[:, 2] / distance) ** 3
         longest = np.linalg.norm(sheets - np.roll(sheets, 1, axis=1), axis=2).max(axis=1)
-        cuts = np.clip(np.ceil(longest / np.sqrt(np.maximum(pixel_area, 1e-18)) / 0.7), 1, _MOST_CUTS).astype(int)
+        cuts = np.clip(np.ceil(longest / np.sqrt(np.maximum(pixel_area, 1e-18)) / 0.5), 1, _MOST_CUTS).astype(int)
         for count in np.unique(cuts):
             some = np.flatnonzero(cuts == count)
             x = (np.arange(count) + 0.5) / count
