@@ -92,9 +92,11 @@ def test_light_from_behind_passes_through(name):
     import bpy
 
     engine = compat().eevee_engine() if name == "EEVEE" else name
-    small_scene(sky=0.0, samples=4, size=8, sun=180.0, width=0.4, engine=engine)
+    small_scene(sky=0.0, samples=64, size=8, sun=180.0, width=0.4, engine=engine)
     tint = (1.0, 0.5, 0.25, 1.0)
-    place(Transmission=0.4, Roundness=0.0, **{"Through Tint": tint, "Colour": (0.5, 0.5, 0.5, 1.0)})
+    square = place(Transmission=0.4, Roundness=0.0, **{"Through Tint": tint, "Colour": (0.5, 0.5, 0.5, 1.0)})
+    # In EEVEE's shadow map a sheet of no thickness shadows its own far side.
+    square.visible_shadow = False
     assert bpy.context.scene.objects["sun"].rotation_euler[1] > 3.0
     np.testing.assert_allclose(picture().mean(axis=(0, 1)), 0.2 * np.array(tint[:3]), rtol=0.02)
 
