@@ -68,6 +68,7 @@ def run(quick: bool) -> dict[str, float]:
     part = session.part
     job, reader = part("tetflora_addon.blender.job"), part("tetflora_addon.blender.scene_reader")
     emission, meshes = part("tetflora_addon.emission"), part("tetflora_addon.blender.meshes")
+    facet_emission = part("tetflora_addon.facet_emission")
     depsgraph = bpy.context.evaluated_depsgraph_get()
     seeds = reader.read_plants(scene, depsgraph, depsgraph.view_layer)
     lap("read", held(seeds))
@@ -87,7 +88,7 @@ def run(quick: bool) -> dict[str, float]:
         lap("polygons", block.buffers.nbytes)
         meshes.write_mesh("block", block.buffers)
         lap("write", block.buffers.nbytes)
-    for facets in emission.facet_blocks(flora, result, camera):
+    for facets in facet_emission.facet_blocks(flora, result, camera):
         lap("facets", facets.nbytes)
         meshes.write_mesh("facets", facets)
         lap("write", facets.nbytes)

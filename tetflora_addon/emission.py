@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From decisions to buffers: polygons of what is explicit, block by block, and proxies of the rest.
+"""From decisions to buffers: polygons of what is explicit, block by block.
 
 Blocks are runs of tetrahedra in front-to-back order, so that each is one region of space and one block's buffers at a
-time are held in memory.
+time are held in memory. Proxies have files of their own: `facet_emission` and `shell_emission`.
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .buffers import BLOCK_POLYGONS, MeshBuffers, PointBuffers
+from .buffers import BLOCK_POLYGONS, MeshBuffers
 from .plants.compiled import Flora
 from .plants.expansion import chunks, expand
 from .plants.growth import trunks
@@ -24,26 +23,8 @@ from .plants.seeds import Seeds
 from .plants.species import LEAF_KINDS
 from .plants.stems import Stems
 from .plants.tubes import tube_buffers
-from .refinement.camera import Camera
 from .refinement.decisions import Decision
 from .refinement.loop import Refinement
-from .shading.facet_sizes import HIDDEN_LEAVES, piece_facet_sizes, subplant_facet_sizes
-from .shading.microspheres import spheres
-from .shading.microsurfaces import (
-    Facets,
-    concatenate_facets,
-    facet_mesh,
-    kept_out_of_view,
-    piece_facets,
-    subplant_facets,
-)
-from .shading.polygon_facets import polygon_facets
-from .shading.shells import shell_buffers
-from .shading.summaries import extinction_matrices, summarise
-from .tetrahedra.geometry import volume
-
-#: Facets that are made at a time, about; thick wood close to the eye is cut into very many.
-FACETS_AT_ONCE = 200_000
 
 
 @dataclass(frozen=True)
@@ -114,99 +95,3 @@ def _block(flora: Flora, pieces: Pieces, stems: list[Stems], number: int, fracti
         if buffers is not None:
             yield Block(kind, form, s, number, buffers, fraction)
         del buffers
-
-
-def facet_blocks(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.6) -> Iterator[MeshBuffers]:
-    """Proxies as microsurfaces: facets of all that is not explicit, and of no polygon that is kept as it is.
-
-    Meshes have about `BLOCK_POLYGONS` facets each, so that only one of them is held at a time beside Blender's own.
-
-    Parameters
-    ----------
-    flora : Flora
-    result : Refinement
-    camera : Camera
-    facet_pixels : float
-        Side of a facet that is seen, in pixels; see `shading.facet_sizes` for the others.
-    """
-    for parts in _facet_parts(flora, result, camera, facet_pixels):
-        yield facet_mesh(concatenate_facets([facets for facets, _ in parts]))
-
-
-def sphere_blocks(
-    flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.6, disc: float = np.pi
-) -> Iterator[PointBuffers]:
-    """Proxies as microspheres, one for each facet of `facet_blocks`; parameters and size of blocks are the same.
-
-    What is drawn of a sphere of radius 1 has the area ``disc``, see `shading.microspheres`.
-    """
-    for parts in _facet_parts(flora, result, camera, facet_pixels):
-        yield spheres(parts, camera, disc)
-
-
-#: Some facets, and whether the camera sees them: neither hidden nor beside the view.
-_Part = tuple[Facets, bool]
-
-
-def _facet_parts(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float) -> Iterator[list[_Part]]:
-    """Facets in blocks of about `BLOCK_POLYGONS`, none of them empty."""
-    parts: list[_Part] = []
-    for made in _facets(flora, result, camera, facet_pixels):
-        if len(made[0]):
-            parts.append(made)
-        if sum(len(facets) for facets, _ in parts) >= BLOCK_POLYGONS:
-            yield parts
-            parts = []
-    if parts:
-        yield parts
-
-
-def _facets(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float) -> Iterator[_Part]:
-    """Facets in runs of about `FACETS_AT_ONCE`."""
-    contents = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN))
-    hidden = result.chosen(Decision.HIDDEN)
-    for things, cell, make, sizes_of in (
-        (contents.subplants, contents.subplant_cell, subplant_facets, subplant_facet_sizes),
-        (contents.pieces, contents.piece_cell, piece_facets, piece_facet_sizes),
-    ):
-        sizes = sizes_of(flora, contents, camera, hidden)
-        leaf, wood = sizes.sides(facet_pixels)
-        expected = sizes.counts(facet_pixels) + 1
-        inside = result.in_view[cell]
-        for nobody_looks in (False, True):
-            for i in _runs(expected, np.flatnonzero(inside & (sizes.hidden == nobody_looks))):
-                yield make(flora, things.take(i), leaf[i], wood[i]), not nobody_looks
-        # What is beside the view must not reach into the picture.
-        for i in _runs(expected, np.flatnonzero(~inside)):
-            made = make(flora, things.take(i), leaf[i], wood[i])
-            yield kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5), False
-    if len(contents.polygons):
-        yield from polygon_facets(contents, result, camera, facet_pixels)
-
-
-def _runs(expected: NDArray[np.float64], chosen: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
-    """Chosen things (m,) in runs of about `FACETS_AT_ONCE` expected facets."""
-    for run in chunks(expected[chosen], FACETS_AT_ONCE):
-        yield chosen[run]
-
-
-def proxy_shells(flora: Flora, result: Refinement) -> MeshBuffers | None:
-    """Proxies as shells: the tetrahedra themselves, filled with a cloud of their extinction, colour and orientation.
-
-    Tetrahedra that hold nothing but large polygons have an extinction of 0.
-    """
-    proxies = np.isin(result.decision, (Decision.PROXY, Decision.HIDDEN))
-    nodes = result.nodes[proxies]
-    if len(nodes) == 0:
-        return None
-    index = np.full(len(result.tree), -1, dtype=np.int64)
-    index[nodes] = np.arange(len(nodes))
-    contents = result.contents
-    # Large polygons are drawn as they are; a fog in their place would be no wall.
-    fine = np.isfinite(contents.polygon_amounts.width)
-    if not fine.all():
-        contents = contents.take(*(np.ones(len(c), bool) for c in contents.cells[:2]), fine)
-    summaries = summarise(flora, contents, index, len(nodes))
-    vertices = result.tree.vertices(nodes)
-    matrices, normal, plane = extinction_matrices(summaries, volume(vertices))
-    return shell_buffers(vertices, summaries.colour, summaries.transmission, matrices, normal, plane)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tetflora_addon.buffers import MeshBuffers, concatenate_buffers
-from tetflora_addon.emission import facet_blocks
+from tetflora_addon.facet_emission import facet_blocks
 from tetflora_addon.plants.catalogue import builtin_folder, load_species
 from tetflora_addon.plants.compiled import Flora, compile_species
 from tetflora_addon.plants.expansion import expand

@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from tests.engine import support
 from tests.engine.test_emission import scene, with_decision
 from tetflora_addon.budget import BYTES_PER_POLYGON, BYTES_PER_SPHERE, afford, polygons_allowed
-from tetflora_addon.emission import explicit_blocks, sphere_blocks
+from tetflora_addon.emission import explicit_blocks
+from tetflora_addon.facet_emission import sphere_blocks
 from tetflora_addon.refinement.decisions import Decision, contributions
 from tetflora_addon.refinement.settings import RefinementSettings
 

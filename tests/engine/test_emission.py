@@ -13,13 +13,15 @@ import pytest
 from tests.engine import support
 from tests.engine.test_loop import run
 from tests.engine.test_meshing import check_topology
-from tetflora_addon import emission
-from tetflora_addon.emission import expanded_blocks, explicit_blocks, proxy_shells
+from tetflora_addon import emission, facet_emission
+from tetflora_addon.emission import expanded_blocks, explicit_blocks
 from tetflora_addon.plants.compiled import Flora
 from tetflora_addon.plants.seeds import Seeds
 from tetflora_addon.refinement.camera import Camera
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.loop import Refinement
+from tetflora_addon.shading.summaries import summarise
+from tetflora_addon.shell_emission import proxy_shells
 from tetflora_addon.tetrahedra.geometry import volume
 
 
@@ -132,7 +134,7 @@ def test_facets_are_as_large_as_asked_for_and_larger_where_hidden() -> None:
 def test_chunks_of_facets_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     flora, _, camera, result = scene()
     once = support.facet_buffers(flora, result, camera)
-    monkeypatch.setattr(emission, "FACETS_AT_ONCE", 500)
+    monkeypatch.setattr(facet_emission, "FACETS_AT_ONCE", 500)
     chunked = support.facet_buffers(flora, result, camera)
     assert chunked.polygons == once.polygons
     quads = [np.unique(m.positions.reshape(-1, 12), axis=0) for m in (once, chunked)]
@@ -144,15 +146,15 @@ def test_facets_are_made_in_chunks_that_are_bounded(monkeypatch: pytest.MonkeyPa
     flora, _, camera, result = scene()
     made: dict[str, list[int]] = {"piece_facets": [], "subplant_facets": []}
     for name, numbers in made.items():
-        inner = getattr(emission, name)
+        inner = getattr(facet_emission, name)
 
         def counted(*args: object, inner: object = inner, numbers: list[int] = numbers) -> object:
             out = inner(*args)
             numbers.append(len(out))
             return out
 
-        monkeypatch.setattr(emission, name, counted)
-    monkeypatch.setattr(emission, "FACETS_AT_ONCE", 2_000)
+        monkeypatch.setattr(facet_emission, name, counted)
+    monkeypatch.setattr(facet_emission, "FACETS_AT_ONCE", 2_000)
     total = support.facet_buffers(flora, with_decision(result, Decision.PROXY), camera, facet_pixels=0.15)
     assert sum(map(sum, made.values())) == total.polygons
     for numbers in made.values():
@@ -166,9 +168,9 @@ def test_facets_come_in_blocks_of_bounded_size(monkeypatch: pytest.MonkeyPatch) 
     """Together they are all facets; only the last block is small."""
     flora, _, camera, result = scene()
     once = support.facet_buffers(flora, result, camera)
-    monkeypatch.setattr(emission, "FACETS_AT_ONCE", 300)
-    monkeypatch.setattr(emission, "BLOCK_POLYGONS", 700)
-    blocks = [b.polygons for b in emission.facet_blocks(flora, result, camera)]
+    monkeypatch.setattr(facet_emission, "FACETS_AT_ONCE", 300)
+    monkeypatch.setattr(facet_emission, "BLOCK_POLYGONS", 700)
+    blocks = [b.polygons for b in facet_emission.facet_blocks(flora, result, camera)]
     assert sum(blocks) == once.polygons
     assert len(blocks) > 3
     assert min(blocks[:-1]) >= 700
@@ -196,7 +198,9 @@ def test_shells_are_the_cells_of_proxies() -> None:
     check_topology(mesh)
     kappa = mesh.attributes["tf_kappa"][1].reshape(-1, 4)[:, 0]
     volumes = volume(result.tree.vertices(result.nodes[cells]))
-    area = (result.amounts.leaf_area + result.amounts.wood_area / 2)[cells]
+    index = np.full(len(result.tree), -1)
+    index[result.nodes[cells]] = np.arange(cells.sum())
+    area = summarise(flora, result.contents, index, int(cells.sum())).effective_area(volumes)
     # Half of the area as the mean over all directions, whatever the orientation, within what the form of κ allows.
     np.testing.assert_allclose(kappa, area / 2 / volumes, rtol=0.08)
     assert mesh.attributes["tf_colour"][1].min() >= 0
@@ -211,7 +215,7 @@ def test_nothing_to_draw() -> None:
     assert support.facet_buffers(flora, explicit, camera) is None
     assert list(explicit_blocks(flora, with_decision(result, Decision.PROXY))) == []
     # Facets so large that none of what there is makes one.
-    assert list(emission.facet_blocks(flora, with_decision(result, Decision.PROXY), camera, 1e9)) == []
+    assert list(facet_emission.facet_blocks(flora, with_decision(result, Decision.PROXY), camera, 1e9)) == []
 
 
 def test_copies_of_a_seed_are_all_made() -> None:

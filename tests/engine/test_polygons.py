@@ -15,7 +15,6 @@ from tests.engine import support
 from tests.engine.test_meshing import check_topology
 from tetflora_addon.budget import afford
 from tetflora_addon.buffers import MeshBuffers
-from tetflora_addon.emission import proxy_shells
 from tetflora_addon.explicit_emission import mended, polygon_blocks, polygon_buffers
 from tetflora_addon.plants.hashing import mix
 from tetflora_addon.refinement.clipping import cut
@@ -29,6 +28,7 @@ from tetflora_addon.refinement.settings import RefinementSettings
 from tetflora_addon.refinement.views import widened_for
 from tetflora_addon.shading.polygon_facets import polygon_facets
 from tetflora_addon.shading.summaries import summarise
+from tetflora_addon.shell_emission import proxy_shells
 from tetflora_addon.tetrahedra.roots import view_root
 
 #: u, v and a number at a place in the mesh's own space: affine, so that they must be so after any cut.

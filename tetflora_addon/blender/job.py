@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from .. import emission, explicit_emission
+from .. import emission, explicit_emission, facet_emission, shell_emission
 from ..budget import BYTES_PER_POLYGON, BYTES_PER_SPHERE, afford
 from ..plants.compiled import Flora, compile_species
 from ..plants.growth import trunks
@@ -308,15 +308,15 @@ def _write_proxies(
     form = results.scene.tetflora.proxy_form
     add, material = results.add, proxy_material
     if form == 'SHELLS':
-        shells = emission.proxy_shells(flora, refinement)
+        shells = shell_emission.proxy_shells(flora, refinement)
         blocks, material, facet_pixels = iter([] if shells is None else [shells]), shell_material, 0.0
     elif form == 'MICROSPHERES':
-        blocks = emission.sphere_blocks(
+        blocks = facet_emission.sphere_blocks(
             flora, refinement, camera, facet_pixels, drawn_disc(results.scene.render.engine)
         )
         add, material = results.add_points, sphere_material
     else:
-        blocks = emission.facet_blocks(flora, refinement, camera, facet_pixels)
+        blocks = facet_emission.facet_blocks(flora, refinement, camera, facet_pixels)
     statistics.facet_pixels = facet_pixels
     for number, buffers in enumerate(blocks):
         add(f"TetFlora proxies {number:03d}", "proxy", buffers, [material()])

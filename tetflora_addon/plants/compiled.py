@@ -28,7 +28,7 @@ from .samples import Samples, draw_samples
 from .species import LEAF_KINDS, Species
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Flora:
     """The compiled species of a scene; arrays have one entry for each row (species and order).
 

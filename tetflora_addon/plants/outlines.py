@@ -138,6 +138,7 @@ def things_of(
     group: NDArray[np.intp],
     first: int,
     length: NDArray[np.float64],
+    orders: int | None = None,
 ) -> Things:
     """Grow a sub-plant to its last leaf.
 
@@ -155,8 +156,9 @@ def things_of(
         Usual length of a branch of each row at plant scale 1, metres.
     """
     parts, groups, dense = [], [], []
-    while len(subplants):
+    while len(subplants) and orders != 0:
         bodies, lines, subplants = opened(rows, subplants)
+        orders = None if orders is None else orders - 1
         ratio = np.log(np.maximum(bodies.length, 1e-12) / (bodies.scale * length[bodies.row]))
         ratio = np.clip(ratio, -WIDEST, WIDEST)
         for part, owner in (_wood(rows, bodies, lines), *_leaves(rows, forms, bodies, lines)):

@@ -44,6 +44,8 @@ class FacetSizes:
     hidden : (n,) bool
         Where nobody looks.
     amounts : Amounts of n
+    part : (n,) float64
+        Which part of a branch, or of a sub-plant, each is.
     """
 
     extent: NDArray[np.float64]
@@ -51,6 +53,12 @@ class FacetSizes:
     least_wood: NDArray[np.float64]
     hidden: NDArray[np.bool_]
     amounts: Amounts
+    part: NDArray[np.float64]
+
+    @property
+    def whole_optical(self) -> NDArray[np.float64]:
+        """Optical area (n,) of the whole of which each is a part, m²: of closed branches half of the surface."""
+        return (self.amounts.leaf_area + self.amounts.wood_area / 2) / np.maximum(self.part, 1e-12)
 
     def sides(self, pixels: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Sides (n,), (n,) of facets of leaves and of wood, metres, where those that are seen have so many pixels."""
@@ -129,7 +137,7 @@ def subplant_facet_sizes(flora: Flora, contents: Contents, camera: Camera, hidde
     own = contents.subplants
     extent = camera.extent_around(bounding_cylinders(flora, own)[0])
     amounts, faces = contents.subplant_amounts, flora.branch_faces(own)
-    return _sizes(flora, own, extent, faces, hidden[contents.subplant_cell], amounts)
+    return _sizes(flora, own, extent, faces, hidden[contents.subplant_cell], amounts, np.ones(len(own)))
 
 
 def piece_facet_sizes(flora: Flora, contents: Contents, camera: Camera, hidden: NDArray[np.bool_]) -> FacetSizes:
@@ -137,11 +145,12 @@ def piece_facet_sizes(flora: Flora, contents: Contents, camera: Camera, hidden: 
     own = contents.pieces
     extent = camera.extent_around((own.start + own.end) / 2)
     faces = flora.rows["sides"][own.branches.row]
-    return _sizes(flora, own.branches, extent, faces, hidden[contents.piece_cell], contents.piece_amounts)
+    amounts, part = contents.piece_amounts, own.t1 - own.t0
+    return _sizes(flora, own.branches, extent, faces, hidden[contents.piece_cell], amounts, part)
 
 
 def _sizes(
-    flora: Flora, branches: Branches, extent: NDArray, faces: NDArray, hidden: NDArray, amounts: Amounts
+    flora: Flora, branches: Branches, extent: NDArray, faces: NDArray, hidden: NDArray, amounts: Amounts, part: NDArray
 ) -> FacetSizes:
     least = np.sqrt(amounts.wood_area / 2 / np.maximum(faces, 1))
-    return FacetSizes(extent, flora.one_leaf_area(branches), least, hidden, amounts)
+    return FacetSizes(extent, flora.one_leaf_area(branches), least, hidden, amounts, part)

@@ -74,7 +74,11 @@ def concatenate_facets(parts: Sequence[Facets]) -> Facets:
 
 
 def subplant_facets(
-    flora: Flora, subplants: Branches, leaf_side: NDArray[np.float64], wood_side: NDArray[np.float64] | None = None
+    flora: Flora,
+    subplants: Branches,
+    leaf_side: NDArray[np.float64],
+    wood_side: NDArray[np.float64] | None = None,
+    share: NDArray[np.float64] | None = None,
 ) -> Facets:
     """Facets of sub-plants.
 
@@ -85,25 +89,33 @@ def subplant_facets(
     leaf_side, wood_side : (n,) float64
         Wanted side of a facet for leaves and for wood (the same if not given), metres; those for leaves are never
         smaller than the leaves that they stand for.
+    share : (n,) float64, optional
+        Share of their area that facets have, see `facet_shares`.
     """
     amounts = subplant_amounts(flora, subplants)
+    part = np.ones(len(subplants)) if share is None else share
     return concatenate_facets(
         [
-            _leaves_of_subplants(flora, subplants, amounts, leaf_side),
-            _wood_of_subplants(flora, subplants, amounts, leaf_side if wood_side is None else wood_side),
+            _leaves_of_subplants(flora, subplants, amounts, leaf_side, part),
+            _wood_of_subplants(flora, subplants, amounts, leaf_side if wood_side is None else wood_side, part),
         ]
     )
 
 
 def piece_facets(
-    flora: Flora, pieces: Pieces, leaf_side: NDArray[np.float64], wood_side: NDArray[np.float64] | None = None
+    flora: Flora,
+    pieces: Pieces,
+    leaf_side: NDArray[np.float64],
+    wood_side: NDArray[np.float64] | None = None,
+    share: NDArray[np.float64] | None = None,
 ) -> Facets:
     """Facets of pieces of branches; parameters as for `subplant_facets`."""
     amounts = piece_amounts(flora, pieces)
+    part = np.ones(len(pieces)) if share is None else share
     return concatenate_facets(
         [
-            _leaves_of_pieces(flora, pieces, amounts, leaf_side),
-            _wood_of_pieces(flora, pieces, amounts, leaf_side if wood_side is None else wood_side),
+            _leaves_of_pieces(flora, pieces, amounts, leaf_side, part),
+            _wood_of_pieces(flora, pieces, amounts, leaf_side if wood_side is None else wood_side, part),
         ]
     )
 
@@ -125,11 +137,18 @@ def kept_out_of_view(facets: Facets, clearance: Callable[[NDArray], NDArray], sm
     return replace(facets, side=facets.side * share)
 
 
-def _numbers(key: NDArray, area: NDArray, facet: NDArray, path: int, draw: int) -> tuple[NDArray, NDArray, NDArray]:
-    """Owner, index and key of the facets that areas (n,) are cut into; their expected number is area / facet."""
-    counts = np.floor(area / facet + uniform(key, draw)).astype(np.int64)
+def _numbers(
+    key: NDArray, area: NDArray, facet: NDArray, path: int, draw: int
+) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """Owner, index, key and area of the facets that areas (n,) are cut into; their expected number is area / facet.
+
+    Where it is 1 or more they share the area evenly; below, one facet stands for several sub-plants.
+    """
+    expected = area / facet
+    counts = np.floor(expected + uniform(key, draw)).astype(np.int64)
     owner, index = spread(counts)
-    return owner, index, child_key(key[owner], index + path)
+    one = facet * np.where(expected >= 1.0, expected / np.maximum(counts, 1), 1.0)
+    return owner, index, child_key(key[owner], index + path), one[owner]
 
 
 def _facet_colours(flora: Flora, row: NDArray, key: NDArray, leaves: NDArray, outward: NDArray) -> NDArray[np.float64]:
@@ -171,11 +190,11 @@ def _picked(
     return pick, place, base
 
 
-def _leaves_of_subplants(flora: Flora, subplants: Branches, amounts: Amounts, side: NDArray) -> Facets:
+def _leaves_of_subplants(flora: Flora, subplants: Branches, amounts: Amounts, side: NDArray, share: NDArray) -> Facets:
     rows, points = flora.rows, flora.samples.leaves
     one = flora.one_leaf_area(subplants)
     facet = np.maximum(side**2, one)
-    owner, index, key = _numbers(subplants.key, amounts.leaf_area, facet, _FACET_PATH, _LEAF_COUNT)
+    owner, index, key, area = _numbers(subplants.key, amounts.leaf_area, facet, _FACET_PATH, _LEAF_COUNT)
     pick, place, base = _picked(flora, points, subplants, owner, index, key)
     leaf_row = points.row[pick]
     frame = base @ points.frame[pick].astype(np.float64)
@@ -188,13 +207,13 @@ def _leaves_of_subplants(flora: Flora, subplants: Branches, amounts: Amounts, si
         centre,
         frame[:, :, 0],
         frame[:, :, 1],
-        np.sqrt(facet)[owner],
-        _facet_colours(flora, leaf_row, key, (facet / one.clip(1e-300))[owner], outward),
+        np.sqrt(area * share[owner]),
+        _facet_colours(flora, leaf_row, key, area / one.clip(1e-300)[owner], outward),
         flora.leaf.transmission[leaf_row],
     )
 
 
-def _leaves_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDArray) -> Facets:
+def _leaves_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDArray, share: NDArray) -> Facets:
     branches, rows = pieces.branches, flora.rows
     row = branches.row
     size, variation = rows["leaf_size"][row].T
@@ -202,37 +221,39 @@ def _leaves_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDAr
     facet = np.maximum(side**2, one)
     # Pieces of one branch have its key; the end's position tells them apart.
     numbered = mix(branches.key ^ pieces.t1.view(np.uint64))
-    owner, index, key = _numbers(numbered, amounts.leaf_area, facet, _FACET_PATH, _LEAF_COUNT)
+    owner, index, key, area = _numbers(numbered, amounts.leaf_area, facet, _FACET_PATH, _LEAF_COUNT)
     first = np.maximum(pieces.t0, leaf_start(rows, branches))[owner]
-    t = first + (pieces.t1[owner] - first) * uniform(key, _PLACE)
+    number = np.bincount(owner, minlength=len(pieces))[owner]
+    t = first + (pieces.t1[owner] - first) * (index + uniform(key, _PLACE)) / number
     bearers = np.flatnonzero(np.bincount(owner, minlength=len(branches)))  # far from all pieces get a facet
     own = branches.take(bearers)
     leaves = place_leaves(rows, own, axes(rows, own), np.searchsorted(bearers, owner), index, key, t)
     frame = settled(rows, row[owner], leaves.frame, leaves.light, _SKY)
     centre = leaves.position + 0.5 * leaves.size[:, None] * frame[:, :, 1]
     outward = outwardness(rows, branches, owner, t)
-    colour = _facet_colours(flora, row[owner], key, (facet / one.clip(1e-300))[owner], outward)
+    colour = _facet_colours(flora, row[owner], key, area / one.clip(1e-300)[owner], outward)
     transmission = flora.leaf.transmission[row[owner]]
-    return Facets(centre, frame[:, :, 0], frame[:, :, 1], np.sqrt(facet)[owner], colour, transmission)
+    return Facets(centre, frame[:, :, 0], frame[:, :, 1], np.sqrt(area * share[owner]), colour, transmission)
 
 
-def _wood_of_subplants(flora: Flora, subplants: Branches, amounts: Amounts, side: NDArray) -> Facets:
+def _wood_of_subplants(flora: Flora, subplants: Branches, amounts: Amounts, side: NDArray, share: NDArray) -> Facets:
     points = flora.samples.wood
-    owner, index, key = _numbers(subplants.key, amounts.wood_area / 2, side**2, _WOOD_PATH, _WOOD_COUNT)
+    owner, index, key, area = _numbers(subplants.key, amounts.wood_area / 2, side**2, _WOOD_PATH, _WOOD_COUNT)
     pick, centre, base = _picked(flora, points, subplants, owner, index, key)
     axis = np.einsum("nij,nj->ni", base, points.frame[pick, :, 2].astype(np.float64))
     colour = flora.rows["branch_colour"][points.row[pick], 0]
-    return Facets(centre, _across(axis, key), axis, side[owner], colour, np.zeros(len(owner)))
+    return Facets(centre, _across(axis, key), axis, np.sqrt(area * share[owner]), colour, np.zeros(len(owner)))
 
 
-def _wood_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDArray) -> Facets:
+def _wood_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDArray, share: NDArray) -> Facets:
     own = mix(pieces.branches.key ^ pieces.t1.view(np.uint64))
-    owner, _, key = _numbers(own, amounts.wood_area / 2, side**2, _WOOD_PATH, _WOOD_COUNT)
+    owner, index, key, area = _numbers(own, amounts.wood_area / 2, side**2, _WOOD_PATH, _WOOD_COUNT)
     vector = (pieces.end - pieces.start)[owner]
-    centre = pieces.start[owner] + uniform(key, _PLACE)[:, None] * vector
+    number = np.bincount(owner, minlength=len(pieces))[owner]
+    centre = pieces.start[owner] + ((index + uniform(key, _PLACE)) / number)[:, None] * vector
     axis = vector / np.maximum(np.linalg.norm(vector, axis=1, keepdims=True), 1e-300)
     colour = flora.rows["branch_colour"][pieces.branches.row[owner], 0]
-    return Facets(centre, _across(axis, key), axis, side[owner], colour, np.zeros(len(owner)))
+    return Facets(centre, _across(axis, key), axis, np.sqrt(area * share[owner]), colour, np.zeros(len(owner)))
 
 
 def _across(axis: NDArray[np.float64], key: NDArray[np.uint64]) -> NDArray[np.float64]:

@@ -1,0 +1,37 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From decisions to buffers: proxies as shells, the tetrahedra themselves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .buffers import MeshBuffers
+from .plants.compiled import Flora
+from .refinement.decisions import Decision
+from .refinement.loop import Refinement
+from .shading.shells import shell_buffers
+from .shading.summaries import extinction_matrices, summarise
+from .tetrahedra.geometry import volume
+
+
+def proxy_shells(flora: Flora, result: Refinement) -> MeshBuffers | None:
+    """Proxies as shells: the tetrahedra themselves, filled with a cloud of their extinction, colour and orientation.
+
+    Tetrahedra that hold nothing but large polygons have an extinction of 0.
+    """
+    proxies = np.isin(result.decision, (Decision.PROXY, Decision.HIDDEN))
+    nodes = result.nodes[proxies]
+    if len(nodes) == 0:
+        return None
+    index = np.full(len(result.tree), -1, dtype=np.int64)
+    index[nodes] = np.arange(len(nodes))
+    contents = result.contents
+    # Large polygons are drawn as they are; a fog in their place would be no wall.
+    fine = np.isfinite(contents.polygon_amounts.width)
+    if not fine.all():
+        contents = contents.take(*(np.ones(len(c), bool) for c in contents.cells[:2]), fine)
+    summaries = summarise(flora, contents, index, len(nodes))
+    vertices = result.tree.vertices(nodes)
+    matrices, normal, plane = extinction_matrices(summaries, volume(vertices))
+    return shell_buffers(vertices, summaries.colour, summaries.transmission, matrices, normal, plane)
