@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .baked_emission import BakedLight
 from .buffers import MeshBuffers
 from .plants.compiled import Flora
 from .refinement.decisions import Decision
@@ -15,10 +16,11 @@ from .shading.summaries import extinction_matrices, summarise
 from .tetrahedra.geometry import volume
 
 
-def proxy_shells(flora: Flora, result: Refinement) -> MeshBuffers | None:
+def proxy_shells(flora: Flora, result: Refinement, light: BakedLight | None = None) -> MeshBuffers | None:
     """Proxies as shells: the tetrahedra themselves, filled with a cloud of their extinction, colour and orientation.
 
-    Tetrahedra that hold nothing but large polygons have an extinction of 0.
+    They are written back to front, which is how EEVEE blends them. Tetrahedra that hold nothing but large polygons have
+    an extinction of 0. With ``light`` shells carry the radiance of their contents, for the material of baked light.
     """
     proxies = np.isin(result.decision, (Decision.PROXY, Decision.HIDDEN))
     nodes = result.nodes[proxies]
@@ -34,4 +36,7 @@ def proxy_shells(flora: Flora, result: Refinement) -> MeshBuffers | None:
     summaries = summarise(flora, contents, index, len(nodes))
     vertices = result.tree.vertices(nodes)
     matrices, normal, plane = extinction_matrices(summaries, volume(vertices))
-    return shell_buffers(vertices, summaries.colour, summaries.transmission, matrices, normal, plane)
+    rank = result.rank[proxies]
+    baked = None if light is None else light.of_shells()[proxies]
+    colour, transmission = summaries.colour, summaries.transmission
+    return shell_buffers(vertices, colour, transmission, matrices, normal, plane, rank=rank, light=baked)

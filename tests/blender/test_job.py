@@ -156,7 +156,7 @@ def test_an_error_while_writing_leaves_nothing(monkeypatch):
     def broken(*_arguments):
         raise MemoryError
 
-    monkeypatch.setattr(_job(), "_write_proxies", broken)
+    monkeypatch.setattr(_job(), "write_proxies", broken)
     with pytest.raises(MemoryError):
         _refine(scene)
     assert datablocks() == before

@@ -13,12 +13,13 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tetflora_addon.refinement.light_views import Light
-from tetflora_addon.shading.illumination import Illumination, shadow_pass
+from tetflora_addon.shading.illumination import Illumination
 from tetflora_addon.shading.light_clouds import Clouds
 from tetflora_addon.shading.light_directions import DIRECTIONS, SOLID_ANGLE, harmonics, irradiance
 from tetflora_addon.shading.light_scattering import particle_ambient, scattered_shares, sphere_phase
 from tetflora_addon.shading.light_sheets import Sheets
 from tetflora_addon.shading.light_sources import World, arriving, split_areas
+from tetflora_addon.shading.shadow_pass import shadow_pass
 from tetflora_addon.tetrahedra.geometry import signed_volume
 
 DARK = World.plain((0, 0, 0))

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from .. import emission, explicit_emission, facet_emission, shell_emission
+from .. import emission, explicit_emission
+from ..baked_emission import Sources
 from ..budget import BYTES_PER_POLYGON, BYTES_PER_SPHERE, afford
 from ..plants.compiled import Flora, compile_species
 from ..plants.growth import trunks
@@ -25,16 +26,16 @@ from ..refinement.polygons import Polygons
 from ..refinement.settings import RefinementSettings
 from ..refinement.statistics import Statistics, Stopwatch
 from ..refinement.steps import step_of
+from .baked_material import baked_material
+from .baking import Baking, read_sources
 from .camera_reader import read_camera
-from .compat import drawn_disc
 from .emit import Results, has_results, originals_shown, remove_results
 from .explicit_objects import Explicit, read_explicit
 from .leaf_forms import materials_of, resolved_species
 from .light_reader import read_lights
-from .materials import proxy_material, sphere_material
 from .properties import settings_from
+from .proxies import tell_facets, write_proxies
 from .scene_reader import NoPlantsError, read_occluders, read_plants
-from .shell_material import shell_material
 from .species_items import catalogue
 
 __all__ = ["Progress", "clear", "compile_for", "estimate", "has_results", "partition", "refine", "refine_steps"]
@@ -87,12 +88,13 @@ def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statisti
 
 @dataclass(frozen=True)
 class _Given:
-    """What a scene holds; ``explicit`` is None where no mesh takes part."""
+    """What a scene holds; ``explicit`` is None where no mesh takes part, ``sources`` where no light is baked."""
 
     seeds: Seeds
     explicit: Explicit | None
     occluders: np.ndarray
     lights: tuple[Light, ...]
+    sources: Sources | None = None
 
     @property
     def species(self) -> tuple[str, ...]:
@@ -117,7 +119,9 @@ def _read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bp
             frames = none.reshape(0, 3), none.reshape(0, 3, 3)
             seeds = Seeds((), none.astype(np.int32), none.astype(np.int64), *frames, none)
         lights = read_lights(depsgraph, view_layer) if scene.tetflora.shadow_cutoff > 0.0 else ()
-        return _Given(seeds, explicit, read_occluders(scene, depsgraph), lights)
+        baked = scene.tetflora.baked_light != 'OFF' and not scene.tetflora.expand_everything
+        sources = read_sources(scene, depsgraph, view_layer) if baked else None
+        return _Given(seeds, explicit, read_occluders(scene, depsgraph), lights, sources)
 
 
 def _polygons_full(flora: Flora, given: _Given) -> int:
@@ -177,14 +181,22 @@ def refine_steps(
             clock.lap("refine")
             _count(statistics, refinement)
             results.open()
+            baking = None
+            if given.sources is not None:
+                baking = Baking(given.sources, leaves=scene.tetflora.baked_light == 'ALL')
             blocks = emission.explicit_blocks(flora, refinement)
-            yield from _write_blocks(results, flora, blocks, statistics, _LOOP_SHARE)
+            yield from _write_blocks(results, flora, blocks, statistics, _LOOP_SHARE, baking)
             if given.explicit is not None:
                 originals = given.explicit.originals
                 kept = explicit_emission.polygon_blocks(refinement, camera, side if facets else None)
-                yield from _write_polygons(results, given.explicit, kept, statistics)
+                yield from _write_polygons(results, given.explicit, kept, statistics, baking)
+            if baking is not None:
+                clock.lap("emit")
+                yield from _bake(baking, flora, refinement, camera, side if facets else None)
+                clock.lap("light")
             yield Progress(0.95, "Making proxies")
-            yield from _write_proxies(results, flora, refinement, camera, statistics, side)
+            for done in write_proxies(results, flora, refinement, camera, statistics, side, baking):
+                yield Progress(0.95 + 0.05 * done, f"Making proxies: {statistics.polygons_proxy:,}")
         clock.lap("emit")
     except BaseException:  # an error, Esc (GeneratorExit) or Ctrl+C: nothing of ours may stay behind
         results.discard()
@@ -277,49 +289,46 @@ def _count(statistics: Statistics, refinement: Refinement) -> None:
 
 
 def _write_blocks(
-    results: Results, flora: Flora, blocks: object, statistics: Statistics, start: float
+    results: Results, flora: Flora, blocks: object, statistics: Statistics, start: float, baking: Baking | None = None
 ) -> Generator[Progress, None, None]:
     materials: dict[tuple[int, str, int], list[bpy.types.Material]] = {}
     for block in blocks:
         species, what = flora.species[block.species], (block.species, block.kind, block.form)
         if what not in materials:
-            materials[what] = materials_of(results.scene, species, block.kind, block.form)
-        results.add(f"{species.name} {block.kind} {block.number:03d}", block.kind, block.buffers, materials[what])
+            baked = baking is not None and baking.leaves
+            made = [baked_material()] if baked else materials_of(results.scene, species, block.kind, block.form)
+            materials[what] = made
+        name = f"{species.name} {block.kind} {block.number:03d}"
+        obj = results.add(name, block.kind, block.buffers, materials[what])
+        if baking is not None:
+            baking.add(obj, block.buffers, lit=True)
         statistics.polygons_meshed += block.buffers.polygons
         statistics.memory_mb += block.buffers.nbytes / 1e6
         yield Progress(start + (0.95 - start) * block.fraction, f"Making polygons: {statistics.polygons_meshed:,}")
 
 
 def _write_polygons(
-    results: Results, explicit: Explicit, blocks: object, statistics: Statistics
+    results: Results, explicit: Explicit, blocks: object, statistics: Statistics, baking: Baking | None = None
 ) -> Generator[Progress, None, None]:
     for block in blocks:
         name = explicit.meshes.surfaces[block.surface].name
-        results.add(f"{name} {block.number:03d}", "explicit", block.buffers, explicit.materials[block.surface])
+        materials = explicit.materials[block.surface]
+        obj = results.add(f"{name} {block.number:03d}", "explicit", block.buffers, materials)
+        if baking is not None:
+            baking.add(obj, block.buffers, lit=False)
         statistics.polygons_meshed += block.buffers.polygons
         statistics.memory_mb += block.buffers.nbytes / 1e6
         yield Progress(0.95, f"Keeping polygons: {statistics.polygons_meshed:,}")
 
 
-def _write_proxies(
-    results: Results, flora: Flora, refinement: Refinement, camera: Camera, statistics: Statistics, facet_pixels: float
+def _bake(
+    baking: Baking, flora: Flora, refinement: Refinement, camera: Camera, facet_pixels: float | None
 ) -> Generator[Progress, None, None]:
-    """Proxies in the form that the scene asks for; facets and spheres of so many pixels."""
-    form = results.scene.tetflora.proxy_form
-    add, material = results.add, proxy_material
-    if form == 'SHELLS':
-        shells = shell_emission.proxy_shells(flora, refinement)
-        blocks, material, facet_pixels = iter([] if shells is None else [shells]), shell_material, 0.0
-    elif form == 'MICROSPHERES':
-        blocks = facet_emission.sphere_blocks(
-            flora, refinement, camera, facet_pixels, drawn_disc(results.scene.render.engine)
-        )
-        add, material = results.add_points, sphere_material
-    else:
-        blocks = facet_emission.facet_blocks(flora, refinement, camera, facet_pixels)
-    statistics.facet_pixels = facet_pixels
-    for number, buffers in enumerate(blocks):
-        add(f"TetFlora proxies {number:03d}", "proxy", buffers, [material()])
-        statistics.polygons_proxy += buffers.polygons
-        statistics.memory_mb += buffers.nbytes / 1e6
-        yield Progress(0.95 + 0.05 * (1 - 0.9**number), f"Making proxies: {statistics.polygons_proxy:,}")
+    """Find the light of all that is drawn, and give it to meshes; facets of so many pixels, none for shells."""
+    if facet_pixels is not None:
+        for count in tell_facets(baking, flora, refinement, camera, facet_pixels):
+            yield Progress(0.9, f"Baking light: {count:,} facets")
+    for done in baking.look(flora, refinement, camera, facet_pixels is not None):
+        yield Progress(0.9 + 0.03 * done, f"Baking light: {done:.0%} of the shadows")
+    for done in baking.light_meshes():
+        yield Progress(0.93 + 0.02 * done, f"Baking light: {done:.0%} of the leaves")

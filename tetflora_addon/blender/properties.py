@@ -223,6 +223,32 @@ class TetFloraScene(RefinementProperties, bpy.types.PropertyGroup):
         ),
         default='MICROSURFACES',
     )
+    baked_light: EnumProperty(
+        name="Baked Light",
+        description=(
+            "Work out at refinement how plants are lit, and let them show that. Without noise and fast to render, for "
+            "previews and films; but the light stays as it was: refine again after moving a light or changing the world"
+        ),
+        items=(
+            ('OFF', "Lit by the Scene", "The renderer lights everything, as exactly as it can", 'LIGHT_SUN', 0),
+            (
+                'PROXIES',
+                "Baked for Proxies",
+                "Proxies show light that was worked out before; real leaves and bark are lit by the renderer",
+                'LIGHTPROBE_VOLUME' if bpy.app.version >= (4, 1, 0) else 'LIGHTPROBE_GRID',
+                1,
+            ),
+            (
+                'ALL',
+                "Baked for Proxies and Leaves",
+                "All of the plants shows light that was worked out before. What you changed in materials of leaves and "
+                "bark does not show; meshes from elsewhere stay lit by the renderer",
+                'RENDER_STILL',
+                2,
+            ),
+        ),
+        default='OFF',
+    )
     refine_at_render: BoolProperty(
         name="Refine at Render",
         description=(

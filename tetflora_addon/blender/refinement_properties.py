@@ -164,3 +164,44 @@ class RefinementProperties:
         get=quality_number,
         set=set_quality,
     )
+    # How shells look: the user's values of the paper's shading (section 7).
+    shell_diffuse: FloatProperty(
+        name="Diffuse (p)",
+        description="Share of the light that shells scatter evenly: the paper's p. Less is darker",
+        subtype='FACTOR',
+        default=1.0,
+        min=0.0,
+        max=1.0,
+    )
+    shell_gloss: FloatProperty(
+        name="Gloss (s)",
+        description="Share of the light that shells of leaves in one plane mirror: the paper's s",
+        subtype='FACTOR',
+        default=0.04,
+        min=0.0,
+        max=1.0,
+    )
+    shell_spear: FloatProperty(
+        name="Sharpness (spear)",
+        description="Exponent of that highlight: the paper's spear. Larger is smaller and brighter",
+        default=7.5,
+        min=0.0,
+        soft_max=100.0,
+        max=1000.0,
+    )
+    shell_roundness: FloatProperty(
+        name="Roundness",
+        description="1: what shells hold is shaded as spheres; 0: as discs that face the camera, which is flatter",
+        subtype='FACTOR',
+        default=1.0,
+        min=0.0,
+        max=1.0,
+    )
+    shell_variation: FloatProperty(
+        name="Variation",
+        description="By how much single shells are lighter or darker than their plants, as a share",
+        subtype='FACTOR',
+        default=0.05,
+        min=0.0,
+        max=1.0,
+    )

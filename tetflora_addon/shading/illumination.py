@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shadow pass (paper, section 7): light at the key points of tetrahedra, and what facets and clouds make of it.
+"""What the shadow pass finds (paper, section 7): light in tetrahedra, and what facets and clouds make of it.
 
 Every lamp looks at the scene through a buffer. The sky does so from 24 directions, whose samples become harmonics.
 What tetrahedra scatter lights the others: it is gathered in the same 24 buffers, order by order, and what more orders
@@ -9,11 +9,11 @@ would add is the sum of the geometric series that the last ones begin. There is 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ..refinement.camera import Camera
 from ..refinement.light_views import Light
@@ -21,7 +21,7 @@ from ..tetrahedra.geometry import volume
 from .light_buffers import LightBuffer
 from .light_clouds import Clouds
 from .light_directions import DIRECTIONS, HARMONICS, SOLID_ANGLE, fluence, harmonics, irradiance
-from .light_passes import buffers_of, light_resolution, to_eye
+from .light_passes import to_eye
 from .light_scattering import (
     facet_ambient,
     facet_direct,
@@ -30,16 +30,8 @@ from .light_scattering import (
     scattered_shares,
 )
 from .light_sheets import Sheets
-from .light_sources import World, arriving, split_areas
+from .light_sources import World, arriving
 
-__all__ = ["Illumination", "Lit", "light_resolution", "shadow_pass", "to_eye"]
-
-#: Longer side in pixels of the sky's buffers, for each pixel of a lamp's: what comes from all sides has no edges.
-SKY_SHARE = 0.1
-#: Its limits, pixels.
-SKY_PIXELS = (32, 96)
-#: Orders of scattering that are gathered one by one.
-ORDERS = 2
 #: Greatest share of an order that the next one has: 1 would never end.
 _MOST_AGAIN = 0.97
 #: Facets that are shaded together; some 1 kB each.
@@ -69,11 +61,18 @@ class Illumination:
     """
 
     def __init__(
-        self, clouds: Clouds, sheets: Sheets, lamps: list[Lit], sky: list[LightBuffer | None], world: World
+        self,
+        clouds: Clouds,
+        sheets: Sheets,
+        lamps: list[Lit],
+        sky: list[LightBuffer | None],
+        world: World,
+        fewer: tuple[Sheets, NDArray[np.int64]],
     ) -> None:
         self.clouds, self.sheets, self.lamps = clouds, sheets, lamps
-        self._sky, self._world = sky, world
-        self._sources, self._ground = np.zeros((len(clouds), 3)), np.zeros(3)
+        # Of the sky's buffers: their sheets, and the number of each of the others among these.
+        self._sky, self._world, (self._sky_sheets, self._number) = sky, world, fewer
+        self._ground = np.zeros(3)
         self.ambient = np.zeros((len(clouds), 4, HARMONICS, 3), np.float32)
 
     @property
@@ -192,6 +191,7 @@ class Illumination:
         camera: Camera,
         normal: NDArray[np.float64] | None = None,
         plane: NDArray[np.float64] | None = None,
+        sheets: NDArray[np.integer] | None = None,
     ) -> NDArray[np.float32]:
         """Radiance (m, 3) of microspheres or, the same, of thick clouds around points, as the camera sees them.
 
@@ -204,6 +204,8 @@ class Illumination:
             Axis of the plane term; both ways are alike.
         plane : (m,) float64, optional
             Weight of the plane term, by default 0.
+        sheets : (m,) int, optional
+            As for `direct`.
         """
         result = np.zeros((len(points), 3), np.float32)
         for start in range(0, len(points), _AT_ONCE):
@@ -215,7 +217,8 @@ class Illumination:
                 axis = normal[part]
                 axis = axis * np.where(np.sum(axis * view, axis=1) < 0.0, -1.0, 1.0)[:, None]
                 planes = facet_ambient(axis, shares, around, view)[0]
-            for towards, light in self.direct(points[part], cells[part]):
+            on = None if sheets is None else sheets[part]
+            for towards, light in self.direct(points[part], cells[part], on):
                 particles += particle_direct(shares, towards, light, view)
                 if plane is not None:
                     planes = planes + facet_direct(axis, shares, towards, light, view)[0]
@@ -241,7 +244,7 @@ class Illumination:
         )
         return made.reshape(-1, 4, 3)
 
-    def scatter(self, ground: NDArray[np.float64], orders: int) -> None:
+    def scatter(self, ground: NDArray[np.float64], orders: int) -> Iterator[float]:
         """Sample the sky at the key points and let light be scattered; what `shadow_pass` does last.
 
         Parameters
@@ -250,6 +253,11 @@ class Illumination:
             Colour of polygons.
         orders : int
             Gathered one by one; the rest is their geometric series.
+
+        Yields
+        ------
+        float
+            Share that is done.
         """
         count = len(self.clouds)
         points, cells, sheets, keys = self.sheets.samples(self.clouds)
@@ -262,20 +270,22 @@ class Illumination:
         if not count:
             return
         sky = keys.means(self._from_sky(points, cells, sheets))
+        yield 1.0 / (orders + 1)
         first = fluence(sky)
         for _, light in self.direct(points, cells, sheets):
             first += keys.means(light)
         gathered = last = np.zeros_like(sky)
         for order in range(orders):
             passing = keys.by_cell(first + fluence(gathered))
-            self._sources = self.clouds.albedo * passing / (4.0 * np.pi)
+            self._shine(self.clouds.albedo * passing / (4.0 * np.pi))
             before, every = last, keys.means(self._from_clouds(points))
             last, gathered = every - gathered, every
             if order == orders - 1:
                 share = self._again(fluence(before), fluence(last))
                 gathered = gathered + last * (share / (1.0 - share))
+            yield (order + 2.0) / (orders + 1)
         passing = keys.by_cell(first + fluence(gathered))
-        self._sources = self.clouds.albedo * passing / (4.0 * np.pi)
+        self._shine(self.clouds.albedo * passing / (4.0 * np.pi))
         self.ambient[:] = (sky + gathered).reshape(count, 4, HARMONICS, 3)
 
     def _again(self, before: NDArray[np.float64], last: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -313,6 +323,8 @@ class Illumination:
         result = np.zeros((len(points), HARMONICS, 3))
         if self._world.dark:
             return result
+        if sheets is not None:
+            sheets = np.append(self._number, -1)[sheets]
         for part, buffer, towards in zip(self._world.parts, self._sky, DIRECTIONS, strict=True):
             through = np.ones(len(points))
             if buffer is not None:
@@ -320,67 +332,18 @@ class Illumination:
             result += through[:, None, None] * part
         return result
 
+    def _shine(self, sources: NDArray[np.float64]) -> None:
+        """Let tetrahedra and their sheets give off their radiance (n, 3)."""
+        emitted = np.concatenate([sources, sources[self._sky_sheets.cell]])
+        for buffer in self._sky:
+            if buffer is not None:
+                buffer.light_up(emitted, self._ground)
+
     def _from_clouds(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Light (m, 9, 3) that tetrahedra and polygons scatter."""
         result = np.zeros((len(points), HARMONICS, 3))
-        emitted = np.concatenate([self._sources, self._sources[self.sheets.cell]])
         for buffer, towards in zip(self._sky, DIRECTIONS, strict=True):
             if buffer is not None:
-                light = buffer.scattered(points, emitted, self._ground)
+                light = buffer.scattered(points)
                 result += harmonics(towards)[:, None] * light[:, None, :] * SOLID_ANGLE
         return result
-
-
-def shadow_pass(
-    clouds: Clouds,
-    lights: Sequence[Light],
-    world: World,
-    occluders: NDArray[np.float64] | None = None,
-    resolution: int = 512,
-    ground: ArrayLike = (0.0, 0.0, 0.0),
-    orders: int = ORDERS,
-    sheets: Sheets | None = None,
-) -> Illumination:
-    """Look at a scene from all of its lights.
-
-    Parameters
-    ----------
-    clouds : Clouds
-        All tetrahedra that hold something.
-    lights : sequence of Light
-    world : World
-    occluders : (t, 3, 3) float64, optional
-        Triangles of opaque polygons, metres.
-    resolution : int
-        Longer side of a lamp's buffer, pixels; see `light_resolution`. The sky's are `SKY_SHARE` of it.
-    ground : (3,) float
-        Mean colour of the polygons, which lights crowns from below.
-    orders : int
-        Orders of scattering that are gathered one by one, at least 1.
-    sheets : Sheets, optional
-        Facets and leaves as they are drawn. Clumps that are smaller than tetrahedra shadow themselves, which an even
-        cloud does not know of; with sheets the resolution should be such that a pixel is about as large as one.
-
-    Returns
-    -------
-    Illumination
-
-    Notes
-    -----
-    Penumbras of the sun and of lamps that are no areas are as sharp as the buffer.
-    """
-    sheets = Sheets.none(len(clouds)) if sheets is None else sheets
-    lamps = []
-    for light in split_areas(tuple(lights)):
-        buffers = buffers_of(light, clouds, sheets, occluders, resolution) if light.shadow else []
-        lamps.append(Lit(light, buffers))
-    # Between sheets there are gaps that coarse pixels do not see.
-    fine = resolution if len(sheets) else int(np.clip(resolution * SKY_SHARE, *SKY_PIXELS))
-    sky: list[LightBuffer | None] = []
-    for towards in DIRECTIONS:
-        light = Light("SUN", np.zeros(3), -towards)
-        views = buffers_of(light, clouds, sheets, occluders, fine)
-        sky.append(views[0] if views else None)
-    found = Illumination(clouds, sheets, lamps, sky, world)
-    found.scatter(np.asarray(ground, np.float64), max(orders, 1))
-    return found

@@ -68,11 +68,14 @@ class LightBuffer:
     ) -> None:
         self.camera = camera
         self.width, self.height = buffer_size(camera, resolution)
-        found = tetrahedron_fragments(vertices, camera, self.width, self.height)
+        # What throws no shadow need not be drawn.
+        there = np.flatnonzero(extinction > 0.0).astype(np.int32)
+        found = tetrahedron_fragments(vertices[there], camera, self.width, self.height)
+        own = there[found.cell]
         with np.errstate(invalid="ignore"):
-            depth = np.nan_to_num(np.minimum(extinction[found.cell] * found.thickness, OPAQUE))
+            depth = np.nan_to_num(np.minimum(extinction[own] * found.thickness, OPAQUE))
         depth = depth * np.minimum(found.coverage, 1.0)
-        parts = [(found.cell, found.pixel, found.entry, found.thickness, depth)]
+        parts = [(own, found.pixel, found.entry, found.thickness, depth)]
         if occluders is not None and len(occluders):
             end = occluder_depth(occluders, camera, self.width, self.height)
             hit = np.flatnonzero(np.isfinite(end))
@@ -185,25 +188,27 @@ class LightBuffer:
             seen[some] = True
         return result, seen
 
-    def scattered(
-        self, points: NDArray[np.float64], sources: NDArray[np.float64], polygons: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """Radiance (m, 3) that arrives at points along the buffer's rays from tetrahedra and polygons in front.
+    def light_up(self, sources: NDArray[np.float64], polygons: NDArray[np.float64]) -> None:
+        """Let tetrahedra, sheets and polygons shine, for `scattered`.
 
         Parameters
         ----------
-        points : (m, 3) float64
-            Metres.
         sources : (n + m, 3) float64
             Radiance J of each tetrahedron, were it thick, and of each sheet: they give J (1 − e^−τ).
         polygons : (3,) float64
             Radiance of all polygons.
         """
+        if len(self):
+            emitted = np.where((self._cell >= 0)[:, None], sources[np.maximum(self._cell, 0)], polygons)
+            self._emitted = emitted.astype(np.float32)
+            self._arriving = self._gathered(emitted).astype(np.float32)
+
+    def scattered(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Radiance (m, 3) that arrives at points (m, 3) along the buffer's rays from what shines in front of them."""
         result = np.zeros((len(points), 3))
         if not len(self):
             return result
-        emitted = np.where((self._cell >= 0)[:, None], sources[np.maximum(self._cell, 0)], polygons)
-        arriving = self._gathered(emitted)
+        emitted, arriving = self._emitted, self._arriving
         for start in range(0, len(points), POINTS_AT_ONCE):
             taps, inside = self._taps(points[start : start + POINTS_AT_ONCE])
             place, found = self._last_before(taps)

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from .light_clouds import Clouds
 
-#: Sheets of a tetrahedron on which light from all sides is sampled, at most.
-SAMPLES = 8
+#: Sheets of a tetrahedron on which light from all sides is sampled, at most, and of all of them, about.
+SAMPLES, ALL_SAMPLES = 8, 48_000
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,29 @@ class Sheets:
         replaced = np.bincount(cell[cell >= 0], minlength=count) > 0
         return cls(corners, np.maximum(cell, 0).astype(np.int64), replaced)
 
+    def pixels(self, limits: tuple[int, int]) -> int:
+        """Longer side of a buffer that sees all sheets, of which a pixel is about as large as one."""
+        if not len(self):
+            return limits[0]
+        vector = np.cross(self.corners[:, 2] - self.corners[:, 0], self.corners[:, 3] - self.corners[:, 1])
+        side = np.sqrt(np.median(np.linalg.norm(vector, axis=1)) / 2.0)
+        reach = np.ptp(self.corners.reshape(-1, 3), axis=0).max()
+        return int(np.clip(reach / max(side, 1e-9), *limits))
+
+    def thinned(self, most: int) -> tuple[Sheets, NDArray[np.int64]]:
+        """At most so many sheets, larger as they are fewer, and the number (m,) of each of these among them, or −1."""
+        step = -(-len(self) // most)
+        if step <= 1:
+            return self, np.arange(len(self))
+        # Evenly among those of each tetrahedron, whatever their order means.
+        order = np.argsort(self.cell, kind="stable")[step // 2 :: step]
+        number = np.full(len(self), -1)
+        number[order] = np.arange(len(order))
+        corners = self.corners[order]
+        middle = corners.mean(axis=1, keepdims=True)
+        grown = middle + (corners - middle) * np.sqrt(len(self) / len(order))
+        return Sheets(grown, self.cell[order], self.replaced), number
+
     def samples(self, clouds: Clouds) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], KeyMeans]:
         """Where light from all sides is sampled.
 
@@ -70,7 +93,8 @@ class Sheets:
         counts = np.bincount(cell, minlength=len(clouds))
         place = np.arange(len(cell)) - (np.cumsum(counts) - counts)[cell]
         # Evenly among those of a tetrahedron, whatever their order means.
-        step = np.maximum(counts[cell] // SAMPLES, 1)
+        most = int(np.clip(ALL_SAMPLES // max(len(clouds), 1), 1, SAMPLES))
+        step = np.maximum(-(-counts[cell] // most), 1)
         chosen = order[(place % step == 0) & self.replaced[cell]]
         middle = self.corners[chosen].mean(axis=1)
         nearest = np.argmax(clouds.weights(middle, self.cell[chosen]), axis=1)

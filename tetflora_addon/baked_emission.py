@@ -1,0 +1,225 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Baked light: from what refinement made to what the camera sees of it, without a renderer (paper, section 7).
+
+What will be drawn is told first, as sheets (`SheetList`); then `baked_light` looks at the scene from all of its lights,
+and `BakedLight` answers for facets, spheres, shells and faces of meshes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .plants.compiled import Flora
+from .refinement.camera import Camera
+from .refinement.decisions import Decision
+from .refinement.light_views import Light
+from .refinement.loop import Refinement
+from .shading.illumination import Illumination
+from .shading.light_clouds import Clouds, cell_of_node
+from .shading.light_passes import light_resolution
+from .shading.light_sheets import Sheets
+from .shading.light_sources import World
+from .shading.microsurfaces import Facets
+from .shading.shadow_pass import shadow_steps
+
+#: Facets and faces whose light is worked out together; some 2 kB each.
+AT_ONCE = 1 << 16
+#: Longer side in pixels of a lamp's buffer at most, with ground in it and without.
+GROUND_PIXELS, OPEN_PIXELS = 1024, 4096
+
+
+@dataclass(frozen=True)
+class Sources:
+    """What lights a scene, and what of it is opaque.
+
+    Attributes
+    ----------
+    lights : tuple of Light
+    world : World
+    occluders : (t, 3, 3) float64
+        Triangles of ground and buildings, metres.
+    ground : (3,) float64
+        Their mean colour, linear.
+    """
+
+    lights: tuple[Light, ...]
+    world: World
+    occluders: NDArray[np.float64]
+    ground: NDArray[np.float64]
+
+
+class SheetList:
+    """Small opaque surfaces as they are going to be drawn, in the order in which they are told."""
+
+    def __init__(self) -> None:
+        self._parts: list[NDArray[np.float32]] = []
+
+    def __len__(self) -> int:
+        return sum(len(part) for part in self._parts)
+
+    def add_facets(self, facets: Facets) -> None:
+        """Facets, as squares of the same area."""
+        half = 0.5 * facets.side[:, None]
+        a, b, c = half * facets.across, half * facets.along, facets.centre
+        self._parts.append(np.stack([c - a - b, c + a - b, c + a + b, c - a + b], axis=1).astype(np.float32))
+
+    def add_faces(
+        self, positions: NDArray[np.floating], corner_verts: NDArray[np.integer], offsets: NDArray[np.integer]
+    ) -> None:
+        """Faces of a mesh, in the layout of `buffers.MeshBuffers`."""
+        self._parts.append(positions[corner_verts[_four_corners(offsets)]].astype(np.float32))
+
+    def corners(self) -> NDArray[np.float32]:
+        """All of them, (m, 4, 3), metres."""
+        return np.concatenate(self._parts) if self._parts else np.zeros((0, 4, 3), np.float32)
+
+
+def _four_corners(offsets: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Corners (f, 4) of faces: of more than four, four that lie apart; triangles repeat their last."""
+    first, size = offsets[:-1].astype(np.int64), np.diff(offsets)
+    spread = np.where(size[:, None] <= 4, np.arange(4), np.arange(4) * size[:, None] // 4)
+    return first[:, None] + np.minimum(spread, size[:, None] - 1)
+
+
+@dataclass(frozen=True)
+class BakedLight:
+    """Light in a refined scene, as `baked_light` finds it.
+
+    Attributes
+    ----------
+    illumination : Illumination
+    cell : (nodes,) int64
+        Tetrahedron (index into the clouds) of each node of the tree, −1 where it is none.
+    refinement : Refinement
+    camera : Camera
+    """
+
+    illumination: Illumination
+    cell: NDArray[np.int64]
+    refinement: Refinement
+    camera: Camera
+
+    def of_facets(self, facets: Facets, sheets: NDArray[np.integer]) -> tuple[NDArray, NDArray]:
+        """Radiance (n, 3) of the fronts and of the backs of facets, which are these sheets (n,) of the list."""
+        return self.illumination.facet_radiance(
+            facets.centre,
+            facets.normal,
+            facets.colour,
+            facets.transmission,
+            self._cells(facets.centre),
+            self.camera,
+            sheets,
+        )
+
+    def of_spheres(self, facets: Facets, sheets: NDArray[np.integer]) -> NDArray:
+        """Radiance (n, 3) of the spheres in the place of facets, which are these sheets (n,) of the list."""
+        return self.illumination.cloud_radiance(
+            facets.centre,
+            facets.colour,
+            facets.transmission,
+            self._cells(facets.centre),
+            self.camera,
+            sheets=sheets,
+        )
+
+    def of_shells(self) -> NDArray:
+        """Radiance (t, 4, 3) of tetrahedra at their vertices, in the order of ``refinement.nodes``."""
+        return self.illumination.cell_sources(self.camera)
+
+    def of_faces(
+        self,
+        positions: NDArray[np.floating],
+        corner_verts: NDArray[np.integer],
+        offsets: NDArray[np.integer],
+        colour: NDArray[np.floating],
+        transmission: NDArray[np.floating],
+        sheets: NDArray[np.integer],
+    ) -> tuple[NDArray, NDArray]:
+        """Radiance (f, 3) of the fronts and of the backs of a mesh's faces, which are these sheets (f,) of the list.
+
+        Parameters
+        ----------
+        positions, corner_verts, offsets
+            In the layout of `buffers.MeshBuffers`.
+        colour : (f, 3) float
+        transmission : (f,) float
+        sheets : (f,) int
+        """
+        corners = positions[corner_verts[_four_corners(offsets)]].astype(np.float64)
+        normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+        centre = _middles(corners)
+        return self.illumination.facet_radiance(
+            centre,
+            normal,
+            colour.astype(np.float64),
+            transmission.astype(np.float64),
+            self._cells(centre),
+            self.camera,
+            sheets,
+        )
+
+    def _cells(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
+        return self.cell[self.refinement.tree.locate(points)]
+
+
+def at_vertices(values: NDArray[np.floating], corner_verts: NDArray, offsets: NDArray, vertices: int) -> NDArray:
+    """Means (v, 3) at vertices of values (f, 3) of the faces around them, so that what is round looks round."""
+    of_corner = np.repeat(values, np.diff(offsets), axis=0)
+    number = np.maximum(np.bincount(corner_verts, minlength=vertices), 1)
+    return np.stack([np.bincount(corner_verts, column, vertices) / number for column in of_corner.T], axis=1)
+
+
+def _middles(corners: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Centres of area (m, 3) of quadrilaterals and of triangles that repeat their last corner."""
+    triangle = (corners[:, 2] == corners[:, 3]).all(axis=1)[:, None]
+    return np.where(triangle, corners[:, :3].mean(axis=1), corners.mean(axis=1))
+
+
+def baked_light(
+    flora: Flora, refinement: Refinement, camera: Camera, sources: Sources, made: SheetList, facets: bool
+) -> Generator[float, None, BakedLight]:
+    """Look at a refined scene from all of its lights.
+
+    Parameters
+    ----------
+    flora : Flora
+    refinement : Refinement
+    camera : Camera
+    sources : Sources
+    made : SheetList
+        All that is drawn as facets or polygons.
+    facets : bool
+        Whether proxies are drawn so as well; otherwise they stand in the light as clouds.
+
+    Yields
+    ------
+    float
+        Share that is done.
+    """
+    clouds = Clouds.of(flora, refinement)
+    cell = cell_of_node(refinement)
+    corners = made.corners()
+    inside = np.full(len(corners), -1, np.int64)
+    for start in range(0, len(corners), AT_ONCE):
+        part = slice(start, start + AT_ONCE)
+        inside[part] = cell[refinement.tree.locate(_middles(corners[part].astype(np.float64)))]
+    replaced = ~np.isin(refinement.decision, (Decision.PROXY, Decision.HIDDEN))
+    if facets:
+        replaced[:] = True
+    # A leaf that reaches out of all tetrahedra that hold something has no cell; it shadows like the others.
+    sheets = replace(Sheets.of(corners, inside, len(clouds)), replaced=replaced & bool(len(corners)))
+    yield 0.05
+    resolution = light_resolution(camera)
+    if len(corners):
+        # Ground is drawn into each pixel, sheets only where they are.
+        resolution = sheets.pixels((resolution // 2, OPEN_PIXELS if not len(sources.occluders) else GROUND_PIXELS))
+    found = yield from shadow_steps(
+        clouds, (*sources.lights,), sources.world, sources.occluders, resolution, sources.ground, sheets=sheets
+    )
+    return BakedLight(found, cell, refinement, camera)

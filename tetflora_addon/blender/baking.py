@@ -1,0 +1,115 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Baked light in a job: what lights the scene is read, what is drawn is told, and meshes get what the camera sees."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..baked_emission import BakedLight, SheetList, Sources, at_vertices, baked_light
+from ..buffers import MeshBuffers
+from ..plants.compiled import Flora
+from ..refinement.camera import Camera
+from ..refinement.loop import Refinement
+from .baked_material import baked_attributes
+from .light_reader import read_lights
+from .material_means import Looks
+from .scene_reader import read_occluders, renderable_objects
+from .world_reader import read_world
+
+#: Colour of ground that cannot be told.
+_GROUND = (0.2, 0.2, 0.2)
+
+
+def read_sources(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer | None = None
+) -> Sources:
+    """Lights, world, and meshes that are marked as hiding plants, which throw shadows and send light up."""
+    view_layer = view_layer or depsgraph.view_layer
+    world = read_world(scene)
+    colours = [_ground_colour(o) for o in renderable_objects(view_layer) if o.tetflora.is_occluder]
+    ground = np.mean(colours, axis=0) if colours else np.zeros(3)
+    lights = (*read_lights(depsgraph, view_layer), *world.suns)
+    return Sources(lights, world.world, read_occluders(scene, depsgraph, view_layer), ground)
+
+
+def _ground_colour(obj: bpy.types.Object) -> NDArray[np.float64]:
+    """Mean colour of a mesh's first material."""
+    material = obj.active_material
+    if material is None:
+        return np.array(Looks().of(None, {}).colour)
+    tree = material.node_tree if getattr(material, "use_nodes", True) else None
+    nodes = tree.nodes if tree else ()
+    if not any(n.type == 'TEX_IMAGE' and n.image is not None for n in nodes):
+        # What nodes make of noise nobody can tell but by their ramps.
+        stops = [stop.color[:3] for n in nodes if n.type == 'VALTORGB' for stop in n.color_ramp.elements]
+        if stops:
+            return np.mean(stops, axis=0)
+        if any(n.type.startswith(("BSDF", "EMISSION")) and n.inputs[0].is_linked for n in nodes):
+            return np.array(_GROUND)
+    return np.array(Looks().of(material, {}).colour)
+
+
+class Baking:
+    """Baked light of one refinement: first `add` all that is drawn as polygons, then `look`.
+
+    Parameters
+    ----------
+    sources : Sources
+    leaves : bool
+        Whether real leaves, blossoms and bark get baked light as well.
+    """
+
+    def __init__(self, sources: Sources, leaves: bool) -> None:
+        self.sources, self.leaves = sources, leaves
+        self.sheets = SheetList()
+        self.light: BakedLight | None = None
+        self.first_facet = 0  # number of the first sheet that stands for a proxy
+        self._meshes: list[tuple[bpy.types.Object, int]] = []
+
+    def add(self, made: bpy.types.Object, buffers: MeshBuffers, lit: bool) -> None:
+        """A mesh of the results; ``lit`` if it gets baked light when leaves do."""
+        if lit and self.leaves:
+            self._meshes.append((made, len(self.sheets)))
+        self.sheets.add_faces(buffers.positions, buffers.corner_verts, buffers.face_offsets)
+        self.first_facet = len(self.sheets)
+
+    def look(self, flora: Flora, refinement: Refinement, camera: Camera, facets: bool) -> Generator[float, None, None]:
+        """Find the light; the share that is done. ``facets`` says whether proxies were told as well."""
+        self.light = yield from baked_light(flora, refinement, camera, self.sources, self.sheets, facets)
+
+    def light_meshes(self) -> Iterator[float]:
+        """Give meshes their light, each to itself; the share that is done."""
+        for number, (made, first) in enumerate(self._meshes):
+            _light_mesh(made.data, self.light, first, rounded=made["tetflora_kind"] == "bark")
+            yield (number + 1) / len(self._meshes)
+
+
+def _light_mesh(mesh: bpy.types.Mesh, light: BakedLight, first: int, rounded: bool) -> None:
+    """Write the light of a mesh whose faces are the sheets from ``first`` on; at vertices where it is round."""
+    faces = len(mesh.polygons)
+    positions = _values(mesh, "position", "vector", (len(mesh.vertices), 3))
+    corner_verts = _values(mesh, ".corner_vert", "value", (len(mesh.loops),), np.int32)
+    offsets = np.empty(faces + 1, np.int32)
+    starts = np.empty(faces, np.int32)
+    mesh.polygons.foreach_get("loop_start", starts)
+    offsets[:-1], offsets[-1] = starts, len(mesh.loops)
+    colour = _values(mesh, "tf_colour", "vector", (faces, 3))
+    transmission = _values(mesh, "tf_transmission", "value", (faces,))
+    sheets = np.arange(first, first + faces)
+    front, back = light.of_faces(positions, corner_verts, offsets, colour, transmission, sheets)
+    if rounded:
+        front, back = (at_vertices(side, corner_verts, offsets, len(positions)) for side in (front, back))
+    for name, (domain, values) in baked_attributes('POINT' if rounded else 'FACE', front, back).items():
+        layer = mesh.attributes.new(name, 'FLOAT_VECTOR', domain)
+        layer.data.foreach_set("vector", np.ascontiguousarray(values).reshape(-1))
+
+
+def _values(mesh: bpy.types.Mesh, name: str, field: str, shape: tuple[int, ...], dtype: type = np.float32) -> NDArray:
+    values = np.empty(int(np.prod(shape)), dtype)
+    mesh.attributes[name].data.foreach_get(field, values)
+    return values.reshape(shape)

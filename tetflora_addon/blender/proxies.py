@@ -1,0 +1,136 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Proxies of a refinement as objects, in the form and with the light that the scene asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from .. import facet_emission, shell_emission
+from ..buffers import MeshBuffers, PointBuffers
+from ..plants.compiled import Flora
+from ..refinement.camera import Camera
+from ..refinement.loop import Refinement
+from ..refinement.statistics import Statistics
+from ..shading.microspheres import spheres
+from ..shading.microsurfaces import concatenate_facets, facet_mesh
+from .baked_material import baked_attributes, baked_material
+from .baking import Baking
+from .compat import drawn_disc
+from .emit import Results
+from .materials import proxy_material, sphere_material
+from .node_tools import find_socket, is_ours
+from .shell_material import baked_shell_material, shell_material
+
+#: Properties of the scene that the sockets of shells follow, by name of the socket.
+SHADING = {
+    "p": "shell_diffuse",
+    "s": "shell_gloss",
+    "spear": "shell_spear",
+    "Roundness": "shell_roundness",
+    "Variation": "shell_variation",
+}
+
+
+def write_proxies(
+    results: Results,
+    flora: Flora,
+    refinement: Refinement,
+    camera: Camera,
+    statistics: Statistics,
+    facet_pixels: float,
+    baking: Baking | None = None,
+) -> Generator[float, None, None]:
+    """Proxies in the form that the scene asks for; yields the share that is done, about.
+
+    Parameters
+    ----------
+    results : Results
+    flora : Flora
+    refinement : Refinement
+    camera : Camera
+    statistics : Statistics
+        Gets the number of faces or points, and their memory.
+    facet_pixels : float
+        Side of facets and spheres, pixels.
+    baking : Baking, optional
+        Told of all that is drawn; its light is what proxies show. Of them it has been told last, by `tell_facets`.
+    """
+    scene = results.scene
+    form = scene.tetflora.proxy_form
+    baked = baking is not None
+    add = results.add
+    if form == 'SHELLS':
+        shells = shell_emission.proxy_shells(flora, refinement, baking.light if baked else None)
+        blocks, facet_pixels = iter([] if shells is None else [shells]), 0.0
+        material = baked_shell_material if baked else shell_material
+    elif baked:
+        blocks, material = _baked_blocks(results, flora, refinement, camera, facet_pixels, baking), baked_material
+        add = results.add_points if form == 'MICROSPHERES' else add
+    elif form == 'MICROSPHERES':
+        disc = drawn_disc(scene.render.engine)
+        blocks = facet_emission.sphere_blocks(flora, refinement, camera, facet_pixels, disc)
+        add, material = results.add_points, sphere_material
+    else:
+        blocks, material = facet_emission.facet_blocks(flora, refinement, camera, facet_pixels), proxy_material
+    statistics.facet_pixels = facet_pixels
+    for number, buffers in enumerate(blocks):
+        made = material()
+        if form == 'SHELLS' and not baked:
+            shade_shells(made, scene)
+        add(f"TetFlora proxies {number:03d}", "proxy", buffers, [made])
+        statistics.polygons_proxy += buffers.polygons
+        statistics.memory_mb += buffers.nbytes / 1e6
+        yield 1 - 0.9**number
+
+
+def tell_facets(
+    baking: Baking, flora: Flora, refinement: Refinement, camera: Camera, facet_pixels: float
+) -> Iterator[int]:
+    """Tell of the facets that `write_proxies` is going to make; yields how many there are so far.
+
+    They are made twice, and not kept: all of them at once may be more than memory holds.
+    """
+    count = 0
+    for parts in facet_emission.facet_parts(flora, refinement, camera, facet_pixels):
+        for facets, _ in parts:
+            baking.sheets.add_facets(facets)
+            count += len(facets)
+        yield count
+
+
+def shade_shells(material: bpy.types.Material, scene: bpy.types.Scene) -> None:
+    """Set the sockets of the shells' group to the scene's settings; what an artist made of the material stays."""
+    if not is_ours(material) or material.node_tree is None:
+        return
+    for node in material.node_tree.nodes:
+        if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None and is_ours(node.node_tree):
+            for name, identifier in SHADING.items():
+                if name in node.inputs:
+                    find_socket(node.inputs, name).default_value = getattr(scene.tetflora, identifier)
+
+
+def _baked_blocks(
+    results: Results, flora: Flora, refinement: Refinement, camera: Camera, facet_pixels: float, baking: Baking
+) -> Iterator[MeshBuffers | PointBuffers]:
+    """Facets or spheres with their light; they are the last of the sheets."""
+    points = results.scene.tetflora.proxy_form == 'MICROSPHERES'
+    disc = drawn_disc(results.scene.render.engine)
+    first = baking.first_facet
+    for parts in facet_emission.facet_parts(flora, refinement, camera, facet_pixels):
+        facets = concatenate_facets([some for some, _ in parts])
+        sheets = np.arange(first, first + len(facets))
+        first += len(facets)
+        if points:
+            made, light = spheres(parts, camera, disc), (baking.light.of_spheres(facets, sheets), None)
+            domain = 'POINT'
+        else:
+            made, light, domain = facet_mesh(facets), baking.light.of_facets(facets, sheets), 'FACE'
+        values = baked_attributes(domain, *light)
+        if points:
+            values = {name: array for name, (_, array) in values.items()}
+        yield replace(made, attributes={**made.attributes, **values})
