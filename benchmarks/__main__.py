@@ -30,6 +30,7 @@ NAMES = (
     "stages",
     "foreign",
     "closed_form",
+    "fidelity",
 )
 
 

@@ -48,18 +48,34 @@ class Difference:
 
 def difference(reference: Path, test: Path, mask: NDArray[np.bool_] | None = None) -> Difference:
     """Compare two 8-bit pictures of equal size; ``mask`` is (height, width), by default all."""
-    a, b = (np.ascontiguousarray(read_picture(p)[:, :, :3]) for p in (reference, test))
-    error = np.asarray(flip_evaluator.evaluate(a, b, "LDR", inputsRGB=True, applyMagma=False)[0]).reshape(a.shape[:2])
+    a, b = (read_picture(p)[:, :, :3] for p in (reference, test))
+    error = flip_map(a, b)
     mask = np.ones(a.shape[:2], bool) if mask is None else mask
-    linear = [np.where(p <= 0.04045, p / 12.92, ((p + 0.055) / 1.055) ** 2.4)[mask].mean(axis=0) for p in (a, b)]
-    colour = float(np.abs(linear[1] - linear[0]).mean() / linear[0].mean())
-    return Difference(float(error[mask].mean()), float(error.mean()), colour)
+    return Difference(float(error[mask].mean()), float(error.mean()), colour_error(a, b, mask))
 
 
-def render(scene: bpy.types.Scene, path: Path, samples: int, seed: int = 0) -> None:
-    """Render a frame of a scene in Cycles without denoising, as an 8-bit PNG."""
-    scene.render.engine = 'CYCLES'
+def flip_map(reference: NDArray[np.floating], test: NDArray[np.floating]) -> NDArray[np.float32]:
+    """FLIP (height, width) of each pixel of two pictures (height, width, 3) as they are stored (sRGB)."""
+    a, b = (np.ascontiguousarray(p[:, :, :3]) for p in (reference, test))
+    return np.asarray(flip_evaluator.evaluate(a, b, "LDR", inputsRGB=True, applyMagma=False)[0]).reshape(a.shape[:2])
+
+
+def linear_light(stored: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Radiance from what an sRGB picture stores, any shape."""
+    return np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4)
+
+
+def colour_error(reference: NDArray[np.floating], test: NDArray[np.floating], mask: NDArray[np.bool_]) -> float:
+    """Difference of the mean colours (linear light) where the mask is set, relative to the reference's mean."""
+    a, b = (linear_light(p[:, :, :3][mask]).mean(axis=0) for p in (reference, test))
+    return float(np.abs(b - a).mean() / a.mean())
+
+
+def render(scene: bpy.types.Scene, path: Path, samples: int, seed: int = 0, engine: str = 'CYCLES') -> None:
+    """Render a frame of a scene without denoising, as an 8-bit PNG; EEVEE knows no seeds."""
+    scene.render.engine = engine
     scene.cycles.samples, scene.cycles.seed = samples, seed
+    scene.eevee.taa_render_samples = samples
     scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
     scene.render.image_settings.file_format = 'PNG'
     scene.render.filepath = str(path)
@@ -74,17 +90,29 @@ def plant_mask(scene: bpy.types.Scene, path: Path, samples: int = 8, threshold: 
     (height, width) bool
         Pixels that plants cover by more than the threshold.
     """
+    return coverage(scene, path, samples) > threshold
+
+
+def coverage(scene: bpy.types.Scene, path: Path, samples: int, engine: str = 'CYCLES') -> NDArray[np.float32]:
+    """How much of each pixel plants cover, with the objects that the scene holds now: everything else is a hole.
+
+    Returns
+    -------
+    (height, width) float32
+        0 to 1; what is left to 1 is transmittance. Light does not count, so Cycles follows no ray beyond plants.
+    """
     others = [
         o for o in scene.objects if o.type in {'MESH', 'POINTCLOUD'} and "tetflora_kind" not in o and not o.is_holdout
     ]
-    before = scene.render.film_transparent, scene.render.image_settings.color_mode
+    before = scene.render.film_transparent, scene.render.image_settings.color_mode, scene.cycles.max_bounces
     try:
         for o in others:
             o.is_holdout = True
         scene.render.film_transparent, scene.render.image_settings.color_mode = True, 'RGBA'
-        render(scene, path, samples)
+        scene.cycles.max_bounces = 0
+        render(scene, path, samples, engine=engine)
     finally:
         for o in others:
             o.is_holdout = False
-        scene.render.film_transparent, scene.render.image_settings.color_mode = before
-    return read_picture(path)[:, :, 3] > threshold
+        scene.render.film_transparent, scene.render.image_settings.color_mode, scene.cycles.max_bounces = before
+    return read_picture(path)[:, :, 3]

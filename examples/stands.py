@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plants of several species side by side, all of one height in pixels, under one of four lights.
+"""Plants of several species by their height in pixels, under one of four lights: side by side, in rows, as a forest.
 
-Proxies are judged by such pictures: each species has its own columns of the picture.
+Proxies are judged by such pictures. Side by side, each species has its own columns of the picture.
 """
 
 from __future__ import annotations
@@ -61,17 +61,84 @@ def build(scene: bpy.types.Scene, pixels: int, light: str, each: int, species: t
     for s, identifier in enumerate(species):
         scale = HEIGHT / _height(identifier)
         for i in range(each):
-            empty = bpy.data.objects.new(f"{identifier} {i + 1:02d}", None)
-            empty.location = (s * each + i + 0.5) * slot - width / 2, 0.0, 0.0
-            empty.rotation_euler.z = 2.399963 * i
-            empty.scale = (scale,) * 3
-            empty.tetflora.is_plant, empty.tetflora.species, empty.tetflora.seed = True, identifier, 100 * s + i
-            scene.collection.objects.link(empty)
-    _add_ground(scene, width)
-    _add_light(scene, LIGHTS[light])
+            place = (s * each + i + 0.5) * slot - width / 2, 0.0, 0.0
+            _add_plant(scene, f"{identifier} {i + 1:02d}", identifier, 100 * s + i, place, 2.399963 * i, scale)
+    _add_ground(scene, 20.0 * width)
+    set_light(scene, light)
     _add_camera(scene, pixels, width)
     columns = scene.render.resolution_x // len(species)
     return Stand(scene, {name: slice(s * columns, (s + 1) * columns) for s, name in enumerate(species)})
+
+
+def receding(
+    scene: bpy.types.Scene, largest: int, smallest: int, light: str, species: tuple[str, ...] = SPECIES
+) -> None:
+    """Fill an empty scene with plants from left to right, each farther away than the one before, of all `SPECIES` turns about.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    largest, smallest : int
+        Heights of the first and of the last plant in the picture, pixels.
+    light : str
+        One of `LIGHTS`.
+    """
+    step = 0.92
+    heights = largest * step ** np.arange(int(np.log(smallest / largest) / np.log(step)) + 1)
+    centres = 0.4 * (heights.cumsum() - heights / 2) + 0.25 * largest
+    columns = round(centres[-1] + heights[-1])
+    focal = columns / 2 / tan(_FIELD_OF_VIEW / 2)
+    distance = focal * HEIGHT / heights
+    x = (centres - columns / 2) * HEIGHT / heights
+    scales = {identifier: HEIGHT / _height(identifier) for identifier in SPECIES}
+    for i, place in enumerate(zip(x.tolist(), distance.tolist(), strict=True)):
+        identifier = SPECIES[i % len(SPECIES)]
+        _add_plant(scene, f"{identifier} {i + 1:02d}", identifier, i, (*place, 0.0), 2.399963 * i, scales[identifier])
+    _add_ground(scene, 20.0 * float(distance[-1]))
+    set_light(scene, light)
+    _aim(scene, (columns, round(1.3 * largest)), _EYE, float(distance[-1]))
+    # The horizon is at the height of the eyes, a third up the first plant.
+    scene.camera.data.shift_y = 0.2 * largest / columns
+
+
+def forest(scene: bpy.types.Scene, count: int, light: str, columns: int = 512) -> None:
+    """Fill an empty scene with a forest of plants 40 to 12 pixels high, seen from over their tops.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    count : int
+        Plants, of all `SPECIES` turns about.
+    light : str
+        One of `LIGHTS`.
+    columns : int
+        Width of the picture, pixels.
+    """
+    focal = columns / 2 / tan(_FIELD_OF_VIEW / 2)
+    near, far = focal * HEIGHT / 40.0, focal * HEIGHT / 12.0
+    scales = [HEIGHT / _height(identifier) for identifier in SPECIES]
+    # A sequence of low discrepancy (Roberts, 2018), even over the ground that is seen.
+    u, v = np.mod(0.5 + np.arange(1, count + 1)[:, None] * [0.7548776662, 0.5698402910], 1.0).T
+    distance = np.sqrt(near**2 + u * (far**2 - near**2))
+    x = (v - 0.5) * 0.94 * columns / focal * distance
+    for i, place in enumerate(zip(x.tolist(), distance.tolist(), strict=True)):
+        s = i % len(SPECIES)
+        _add_plant(scene, f"{SPECIES[s]} {i + 1:03d}", SPECIES[s], i, (*place, 0.0), 2.399963 * i, scales[s])
+    _add_ground(scene, 20.0 * far)
+    set_light(scene, light)
+    eye = 4.0 * HEIGHT
+    _aim(scene, (columns, columns * 7 // 16), eye, far)
+    middle = focal / 2 * ((eye - HEIGHT) / far + eye / near)
+    scene.camera.data.shift_y = -middle / columns
+
+
+def _add_plant(
+    scene: bpy.types.Scene, name: str, species: str, seed: int, place: tuple, turn: float, scale: float
+) -> None:
+    empty = bpy.data.objects.new(name, None)
+    empty.location, empty.rotation_euler.z, empty.scale = place, turn, (scale,) * 3
+    empty.tetflora.is_plant, empty.tetflora.species, empty.tetflora.seed = True, species, seed
+    scene.collection.objects.link(empty)
 
 
 def _height(identifier: str) -> float:
@@ -85,9 +152,8 @@ def _height(identifier: str) -> float:
     return float(max(block.buffers.positions[:, 2].max() for block in emission.expanded_blocks(flora, one)))
 
 
-def _add_ground(scene: bpy.types.Scene, width: float) -> None:
+def _add_ground(scene: bpy.types.Scene, side: float) -> None:
     ground = bpy.data.meshes.new("Ground")
-    side = 20.0 * width
     ground.from_pydata([(-side, -side, 0), (side, -side, 0), (side, side, 0), (-side, side, 0)], [], [(0, 1, 2, 3)])
     material = bpy.data.materials.new("Ground")
     tree = session.part("tetflora_addon.blender.compat").shader_tree(material)
@@ -99,7 +165,13 @@ def _add_ground(scene: bpy.types.Scene, width: float) -> None:
     scene.collection.objects.link(bpy.data.objects.new("Ground", ground))
 
 
-def _add_light(scene: bpy.types.Scene, azimuth: float | None) -> None:
+def set_light(scene: bpy.types.Scene, light: str) -> None:
+    """Give a scene one of `LIGHTS`; the one that it had from here is replaced."""
+    azimuth = LIGHTS[light]
+    for old in [o for o in scene.collection.objects if o.type == 'LIGHT']:
+        bpy.data.lights.remove(old.data)
+    if scene.world is not None:
+        bpy.data.worlds.remove(scene.world)
     world = bpy.data.worlds.new("Sky")
     scene.world = world
     tree = session.part("tetflora_addon.blender.compat").shader_tree(world)
@@ -116,17 +188,22 @@ def _add_light(scene: bpy.types.Scene, azimuth: float | None) -> None:
 
 def _add_camera(scene: bpy.types.Scene, pixels: int, width: float) -> None:
     """All plants fill the picture's width; the ground before and behind them is seen as well."""
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    distance = width / 2 / tan(_FIELD_OF_VIEW / 2)
-    camera.data.angle, camera.data.clip_end = _FIELD_OF_VIEW, 10.0 * distance + 1000.0
-    camera.location = (0.0, -distance, _EYE)
-    camera.rotation_euler = (pi / 2, 0.0, 0.0)
-    scale = pixels / HEIGHT
-    render = scene.render
-    render.resolution_x, render.resolution_y = round(width * scale), round(1.6 * HEIGHT * scale)
-    render.resolution_percentage = 100
+    distance, scale = width / 2 / tan(_FIELD_OF_VIEW / 2), pixels / HEIGHT
+    _aim(scene, (round(width * scale), round(1.6 * HEIGHT * scale)), _EYE, distance)
+    scene.camera.location.y = -distance
     # The horizon is a third up, where the eye is level.
-    camera.data.shift_y = (0.5 * HEIGHT - _EYE) / width
+    scene.camera.data.shift_y = (0.5 * HEIGHT - _EYE) / width
+
+
+def _aim(scene: bpy.types.Scene, size: tuple[int, int], height: float, distance: float) -> None:
+    """A level camera over the origin that looks along +y, for a picture of a size in pixels."""
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.angle, camera.data.clip_end = _FIELD_OF_VIEW, 10.0 * distance + 1000.0
+    camera.location = (0.0, 0.0, height)
+    camera.rotation_euler = (pi / 2, 0.0, 0.0)
+    render = scene.render
+    render.resolution_x, render.resolution_y = size
+    render.resolution_percentage = 100
     scene.collection.objects.link(camera)
     scene.camera = camera
     scene.view_settings.view_transform = 'Standard'

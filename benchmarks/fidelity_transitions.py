@@ -1,0 +1,71 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What changes in the picture when cutoff and leaf limit change by a tenth: a row of plants that recedes.
+
+The heights of a species' plants in the row differ by two fifths; four steps of a tenth take each species' leaves
+through the limit at one of them.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from examples import stands
+
+from .compare import flip_map, plant_mask, read_picture, render
+from .row80 import timed_refine
+
+SIZES, QUICK_SIZES = (160, 24), (100, 40)
+STEPS, QUICK_STEPS = 4, 1
+SAMPLES, QUICK_SAMPLES = 256, 64
+FACTOR = 1.1
+#: Side of the squares of which the worst is told, pixels.
+_SQUARE = 16
+
+
+def run(folder: Path, quick: bool) -> dict[str, float]:
+    """FLIP between limits that differ by a tenth, same seed: of the worst step, and of its worst square.
+
+    ``transition_noise`` is what other seeds do to the first picture.
+    """
+    scene = bpy.context.scene
+    stands.receding(scene, *(QUICK_SIZES if quick else SIZES), "side")
+    scene.cycles.transparent_max_bounces = 256
+    samples = QUICK_SAMPLES if quick else SAMPLES
+    begin = scene.tetflora.cutoff, scene.tetflora.leaf_limit
+    figures = {"transition_flip": 0.0, "transition_flip_square": 0.0}
+    before = mask = None
+    for step in range((QUICK_STEPS if quick else STEPS) + 1):
+        cutoff, leaf_limit = (limit * FACTOR**step for limit in begin)
+        timed_refine(scene, expand_everything=False, cutoff=cutoff, leaf_limit=leaf_limit)
+        picture = _picture(scene, folder / f"transition-{step}.png", samples, 0)
+        if before is None:
+            mask = plant_mask(scene, folder / "mask.png")
+            error = flip_map(picture, _picture(scene, folder / "transition-noise.png", samples, 1))
+            figures["transition_noise"] = float(error[mask].mean())
+            figures["transition_noise_square"] = worst_square(error, mask)
+        else:
+            error = flip_map(before, picture)
+            print(f"  step {step}: {error[mask].mean():.4f}, worst square {worst_square(error, mask):.4f}", flush=True)
+            figures["transition_flip"] = max(figures["transition_flip"], float(error[mask].mean()))
+            figures["transition_flip_square"] = max(figures["transition_flip_square"], worst_square(error, mask))
+        before = picture
+    return figures
+
+
+def worst_square(error: np.ndarray, mask: np.ndarray) -> float:
+    """Largest mean of an error (height, width) over a square's pixels in the mask, of squares that are half in it."""
+    height, width = (n // _SQUARE * _SQUARE for n in error.shape)
+    shape = height // _SQUARE, _SQUARE, width // _SQUARE, _SQUARE
+    inside = mask[:height, :width].reshape(shape)
+    count = inside.sum(axis=(1, 3))
+    sums = (error[:height, :width].reshape(shape) * inside).sum(axis=(1, 3))
+    return float((sums / np.maximum(count, 1))[count >= _SQUARE**2 / 2].max(initial=0.0))
+
+
+def _picture(scene: bpy.types.Scene, path: Path, samples: int, seed: int) -> np.ndarray:
+    render(scene, path, samples, seed)
+    return read_picture(path)[:, :, :3]
