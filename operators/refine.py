@@ -9,6 +9,8 @@ import bpy
 
 from ..tetflora_addon.blender import job
 from ..tetflora_addon.blender.plant_objects import plants_of, prepare_scene
+from ..tetflora_addon.blender.shell_bounces import few_bounces
+from ..tetflora_addon.blender.world_reader import read_world
 from ..tetflora_addon.errors import TetFloraError
 from ..tetflora_addon.refinement.statistics import Statistics
 from . import ids
@@ -121,9 +123,18 @@ class TETFLORA_OT_refine(Reporting, bpy.types.Operator):
             f"{counted(statistics.plants, 'plant')}: {statistics.polygons_meshed:,} of {statistics.polygons_full:,} "
             f"polygons, {statistics.tetrahedra_proxy:,} proxies in {sum(statistics.seconds.values()):.1f} s",
         )
-        if warning := _cut_off(context.scene):
-            self.report({'WARNING'}, warning)
+        for warning in (_cut_off(context.scene), few_bounces(context.scene), _unread_world(context.scene)):
+            if warning:
+                self.report({'WARNING'}, warning)
         return {'FINISHED'}
+
+
+def _unread_world(scene: bpy.types.Scene) -> str:
+    """What of the world's light could not be read for baked light, else an empty text."""
+    if scene.tetflora.baked_light == 'OFF' or scene.tetflora.expand_everything:
+        return ""
+    note = read_world(scene).note
+    return f"Baked light: {note}" if note else ""
 
 
 def _cut_off(scene: bpy.types.Scene) -> str:

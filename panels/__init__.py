@@ -29,6 +29,7 @@ CLASSES = (
     populate_panel.TETFLORA_PT_populate,
     refinement_panel.TETFLORA_PT_refinement,
     refinement_panel.TETFLORA_PT_limits,
+    refinement_panel.TETFLORA_PT_proxy_shading,
     refinement_panel.TETFLORA_PT_leaf_objects,
     statistics_panel.TETFLORA_PT_statistics,
     statistics_panel.TETFLORA_PT_steps,

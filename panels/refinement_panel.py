@@ -6,6 +6,7 @@ import bpy
 
 from ..operators import ids
 from ..operators.mark_explicit import can_be_explicit
+from ..tetflora_addon.blender.shell_bounces import few_bounces
 from .base import SidebarPanel, split_layout
 from .lists import TETFLORA_UL_leaf_objects, draw_list
 
@@ -25,11 +26,12 @@ class TETFLORA_PT_refinement(SidebarPanel, bpy.types.Panel):
         column.prop(settings, "cutoff")
         column.prop(settings, "shadow_cutoff")
         column.prop(settings, "proxy_form")
+        column.prop(settings, "baked_light")
         column.prop(settings, "max_polygons")
         cycles = getattr(context.scene, "cycles", None)
         if settings.proxy_form == 'SHELLS' and cycles is not None:
             column.prop(cycles, "transparent_max_bounces", text="Transparent")
-            if cycles.transparent_max_bounces < 128:
+            if few_bounces(context.scene):
                 column.label(text="Too few: Cycles draws shells black", icon='ERROR')
         active = context.active_object
         if active is not None and (can_be_explicit(active) or active.tetflora.is_explicit):
@@ -59,6 +61,25 @@ class TETFLORA_PT_limits(SidebarPanel, bpy.types.Panel):
         for name in (*names, "max_memory", "max_tetrahedra", "max_levels", "max_passes", "anchored"):
             column.prop(settings, name)
         layout.prop(settings, "expand_everything")
+
+
+class TETFLORA_PT_proxy_shading(SidebarPanel, bpy.types.Panel):
+    """Proxy shading."""
+
+    bl_label = "Proxy Shading"
+    bl_parent_id = "TETFLORA_PT_refinement"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.scene.tetflora.proxy_form == 'SHELLS'
+
+    def draw(self, context: bpy.types.Context) -> None:
+        settings = context.scene.tetflora
+        column = split_layout(self).column()
+        column.active = not settings.expand_everything and settings.baked_light == 'OFF'
+        for name in ("shell_diffuse", "shell_gloss", "shell_spear", "shell_roundness", "shell_variation"):
+            column.prop(settings, name)
 
 
 class TETFLORA_PT_leaf_objects(SidebarPanel, bpy.types.Panel):

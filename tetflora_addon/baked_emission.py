@@ -21,7 +21,7 @@ from .refinement.light_views import Light
 from .refinement.loop import Refinement
 from .shading.illumination import Illumination
 from .shading.light_clouds import Clouds, cell_of_node
-from .shading.light_passes import light_resolution
+from .shading.light_passes import light_resolution, to_eye
 from .shading.light_sheets import Sheets
 from .shading.light_sources import World
 from .shading.microsurfaces import Facets
@@ -93,15 +93,13 @@ class BakedLight:
     Attributes
     ----------
     illumination : Illumination
-    cell : (nodes,) int64
-        Tetrahedron (index into the clouds) of each node of the tree, −1 where it is none.
-    refinement : Refinement
+    cell : (m,) int64
+        Tetrahedron (index into the clouds) of each sheet, −1 where it lies in none that holds something.
     camera : Camera
     """
 
     illumination: Illumination
     cell: NDArray[np.int64]
-    refinement: Refinement
     camera: Camera
 
     def of_facets(self, facets: Facets, sheets: NDArray[np.integer]) -> tuple[NDArray, NDArray]:
@@ -111,21 +109,19 @@ class BakedLight:
             facets.normal,
             facets.colour,
             facets.transmission,
-            self._cells(facets.centre),
+            self.cell[sheets],
             self.camera,
             sheets,
         )
 
     def of_spheres(self, facets: Facets, sheets: NDArray[np.integer]) -> NDArray:
-        """Radiance (n, 3) of the spheres in the place of facets, which are these sheets (n,) of the list."""
-        return self.illumination.cloud_radiance(
-            facets.centre,
-            facets.colour,
-            facets.transmission,
-            self._cells(facets.centre),
-            self.camera,
-            sheets=sheets,
-        )
+        """Radiance (n, 3) of spheres in the place of facets, which are these sheets (n,) of the list.
+
+        A sphere covers what its facet covers for the camera, and shows what the camera would see of the facet.
+        """
+        front, back = self.of_facets(facets, sheets)
+        towards = np.sum(facets.normal * to_eye(self.camera, facets.centre), axis=1) > 0.0
+        return np.where(towards[:, None], front, back)
 
     def of_shells(self) -> NDArray:
         """Radiance (t, 4, 3) of tetrahedra at their vertices, in the order of ``refinement.nodes``."""
@@ -159,13 +155,10 @@ class BakedLight:
             normal,
             colour.astype(np.float64),
             transmission.astype(np.float64),
-            self._cells(centre),
+            self.cell[sheets],
             self.camera,
             sheets,
         )
-
-    def _cells(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
-        return self.cell[self.refinement.tree.locate(points)]
 
 
 def at_vertices(values: NDArray[np.floating], corner_verts: NDArray, offsets: NDArray, vertices: int) -> NDArray:
@@ -202,18 +195,16 @@ def baked_light(
     float
         Share that is done.
     """
-    clouds = Clouds.of(flora, refinement)
-    cell = cell_of_node(refinement)
-    corners = made.corners()
+    corners, cell = made.corners(), cell_of_node(refinement)
+    replaced = ~np.isin(refinement.decision, (Decision.PROXY, Decision.HIDDEN)) | facets
+    replaced &= len(corners) > 0
+    clouds = Clouds.of(flora, refinement, ~replaced)
     inside = np.full(len(corners), -1, np.int64)
     for start in range(0, len(corners), AT_ONCE):
         part = slice(start, start + AT_ONCE)
         inside[part] = cell[refinement.tree.locate(_middles(corners[part].astype(np.float64)))]
-    replaced = ~np.isin(refinement.decision, (Decision.PROXY, Decision.HIDDEN))
-    if facets:
-        replaced[:] = True
     # A leaf that reaches out of all tetrahedra that hold something has no cell; it shadows like the others.
-    sheets = replace(Sheets.of(corners, inside, len(clouds)), replaced=replaced & bool(len(corners)))
+    sheets = replace(Sheets.of(corners, inside, len(clouds)), replaced=replaced)
     yield 0.05
     resolution = light_resolution(camera)
     if len(corners):
@@ -222,4 +213,4 @@ def baked_light(
     found = yield from shadow_steps(
         clouds, (*sources.lights,), sources.world, sources.occluders, resolution, sources.ground, sheets=sheets
     )
-    return BakedLight(found, cell, refinement, camera)
+    return BakedLight(found, inside, camera)

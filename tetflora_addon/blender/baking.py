@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..baked_emission import BakedLight, SheetList, Sources, at_vertices, baked_light
+from ..baked_emission import AT_ONCE, BakedLight, SheetList, Sources, at_vertices, baked_light
 from ..buffers import MeshBuffers
 from ..plants.compiled import Flora
 from ..refinement.camera import Camera
@@ -85,11 +85,11 @@ class Baking:
     def light_meshes(self) -> Iterator[float]:
         """Give meshes their light, each to itself; the share that is done."""
         for number, (made, first) in enumerate(self._meshes):
-            _light_mesh(made.data, self.light, first, rounded=made["tetflora_kind"] == "bark")
-            yield (number + 1) / len(self._meshes)
+            for part in _light_mesh(made.data, self.light, first, rounded=made["tetflora_kind"] == "bark"):
+                yield (number + part) / len(self._meshes)
 
 
-def _light_mesh(mesh: bpy.types.Mesh, light: BakedLight, first: int, rounded: bool) -> None:
+def _light_mesh(mesh: bpy.types.Mesh, light: BakedLight, first: int, rounded: bool) -> Iterator[float]:
     """Write the light of a mesh whose faces are the sheets from ``first`` on; at vertices where it is round."""
     faces = len(mesh.polygons)
     positions = _values(mesh, "position", "vector", (len(mesh.vertices), 3))
@@ -100,8 +100,13 @@ def _light_mesh(mesh: bpy.types.Mesh, light: BakedLight, first: int, rounded: bo
     offsets[:-1], offsets[-1] = starts, len(mesh.loops)
     colour = _values(mesh, "tf_colour", "vector", (faces, 3))
     transmission = _values(mesh, "tf_transmission", "value", (faces,))
-    sheets = np.arange(first, first + faces)
-    front, back = light.of_faces(positions, corner_verts, offsets, colour, transmission, sheets)
+    front, back = np.zeros((2, faces, 3), np.float32)
+    for start in range(0, faces, AT_ONCE):
+        part = slice(start, min(start + AT_ONCE, faces))
+        sheets = np.arange(first + part.start, first + part.stop)
+        given = offsets[part.start : part.stop + 1], colour[part], transmission[part]
+        front[part], back[part] = light.of_faces(positions, corner_verts, *given, sheets)
+        yield part.stop / faces
     if rounded:
         front, back = (at_vertices(side, corner_verts, offsets, len(positions)) for side in (front, back))
     for name, (domain, values) in baked_attributes('POINT' if rounded else 'FACE', front, back).items():

@@ -78,7 +78,6 @@ def _parser() -> argparse.ArgumentParser:
 
     refine = commands.add_parser("refine", help="turn plants into meshes for the scene's camera")
     refine.add_argument("--cutoff", type=_positive, metavar="PIXELS", help="overrides the scene's cutoff")
-    refine.add_argument("--form", choices=_forms(), help="overrides the form of proxies")
     refine.add_argument("--save", type=Path, metavar="PATH", help="write a copy of the file with the result")
     refine.set_defaults(run=_refine)
 
@@ -94,6 +93,10 @@ def _parser() -> argparse.ArgumentParser:
     stats = commands.add_parser("stats", help="count plants and the polygons that they stand for; changes nothing")
     stats.set_defaults(run=_stats)
 
+    for command in (refine, render):
+        command.add_argument("--form", choices=_choices("proxy_form"), help="overrides the form of proxies")
+        about = "overrides whether plants show light that was worked out at refinement"
+        command.add_argument("--baked-light", choices=_choices("baked_light"), help=about)
     for command in (refine, render, stats):
         command.add_argument("--json", action="store_true", help="print figures as one JSON object, in the last line")
     return parser
@@ -103,8 +106,7 @@ def _refine(options: argparse.Namespace) -> dict:
     scene = bpy.context.scene
     if options.cutoff is not None:
         scene.tetflora.cutoff = options.cutoff
-    if options.form is not None:
-        scene.tetflora.proxy_form = options.form.upper()
+    _set_proxies(scene, options)
     if options.save is not None and not options.save.absolute().parent.is_dir():
         raise SceneError(f"The folder {options.save.absolute().parent} does not exist; make it or choose another")
     statistics = job.refine(scene, bpy.context.evaluated_depsgraph_get(), view_layer=bpy.context.view_layer)
@@ -118,6 +120,7 @@ def _render(options: argparse.Namespace) -> dict | None:
     # Blender's own message about a missing camera comes late and is hard to read.
     read_camera(scene, bpy.context.evaluated_depsgraph_get())
     scene.tetflora.refine_at_render = True
+    _set_proxies(scene, options)
     if options.engine is not None:
         scene.render.engine = 'CYCLES' if options.engine == "cycles" else eevee_engine()
     if options.samples is not None:
@@ -156,8 +159,15 @@ def _still_path(scene: bpy.types.Scene) -> str:
     return re.sub(r"#+", lambda match: f"{frame:0{len(match.group())}d}", bpy.path.abspath(scene.render.filepath))
 
 
-def _forms() -> list[str]:
-    return [item.identifier.lower() for item in TetFloraScene.bl_rna.properties["proxy_form"].enum_items]
+def _set_proxies(scene: bpy.types.Scene, options: argparse.Namespace) -> None:
+    if options.form is not None:
+        scene.tetflora.proxy_form = options.form.upper()
+    if options.baked_light is not None:
+        scene.tetflora.baked_light = options.baked_light.upper()
+
+
+def _choices(name: str) -> list[str]:
+    return [item.identifier.lower() for item in TetFloraScene.bl_rna.properties[name].enum_items]
 
 
 def _positive(text: str) -> float:

@@ -29,6 +29,7 @@ from .emit import (
 )
 from .migration import migrate
 from .scene_reader import NoPlantsError, has_contents, may_take_part, renderable_objects
+from .shell_bounces import raise_bounces
 
 
 @dataclass
@@ -38,14 +39,11 @@ class _Rendering:
     busy: bool = False
     hidden: list[str] = field(default_factory=list)
     lifted: dict[str, str] = field(default_factory=dict)  # marks of originals, while a file is written
-    bounces: int | None = None
+    bounces: dict[str, int] = field(default_factory=dict)  # of Cycles, as they were
     errors: list[str] = field(default_factory=list)
 
 
 _rendering = _Rendering()
-
-#: Transparent bounces for shells: a ray passes each of them twice, and what it cannot follow to its end turns black.
-SHELL_BOUNCES = 256
 
 
 def render_errors() -> list[str]:
@@ -118,7 +116,7 @@ def on_load_post(_path: object, _other: object = None) -> None:
     Meshes that are marked as hidden for a render come from a crash in its middle, and are shown.
     """
     _rendering.busy = False
-    _rendering.bounces = None
+    _rendering.bounces.clear()
     _rendering.hidden.clear()
     _rendering.lifted.clear()
     _rendering.errors.clear()
@@ -136,10 +134,7 @@ def _make(scene: bpy.types.Scene) -> None:
     for made in result_collections(scene, 'RENDER'):
         for datablock in (made, *made.objects, *(obj.data for obj in made.objects)):
             datablock.is_runtime_data = True
-    cycles = getattr(scene, "cycles", None)
-    if scene.tetflora.proxy_form == 'SHELLS' and cycles is not None and cycles.transparent_max_bounces < SHELL_BOUNCES:
-        _rendering.bounces = cycles.transparent_max_bounces
-        cycles.transparent_max_bounces = SHELL_BOUNCES
+    _rendering.bounces = raise_bounces(scene)
     # Hidden only now: if refinement failed, yesterday's trees are better than none.
     _rendering.hidden = [c.name for c in result_collections(scene, 'VIEW') if not c.hide_render]
     for collection in _named(_rendering.hidden):
@@ -149,8 +144,9 @@ def _make(scene: bpy.types.Scene) -> None:
 def _take_back(scene: bpy.types.Scene) -> None:
     _show_hidden()
     _rendering.hidden.clear()
-    if _rendering.bounces is not None:
-        scene.cycles.transparent_max_bounces, _rendering.bounces = _rendering.bounces, None
+    for name, value in _rendering.bounces.items():
+        setattr(scene.cycles, name, value)
+    _rendering.bounces.clear()
     job.clear(scene, for_render=True)
 
 

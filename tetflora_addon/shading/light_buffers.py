@@ -123,7 +123,9 @@ class LightBuffer:
             # Beside the middle of a flat view a pixel sees less of the sphere.
             pixel_area = (across * distance) ** 2 * np.abs(away @ self.camera.frame[:, 2] / distance) ** 3
         longest = np.linalg.norm(sheets - np.roll(sheets, 1, axis=1), axis=2).max(axis=1)
-        cuts = np.clip(np.ceil(longest / np.sqrt(np.maximum(pixel_area, 1e-18)) / 0.5), 1, _MOST_CUTS).astype(int)
+        # Smaller than a pixel, it is where its middle is; larger, no pixel between its parts may go without.
+        pixels = longest / np.sqrt(np.maximum(pixel_area, 1e-18))
+        cuts = np.where(pixels <= 1.0, 1, np.clip(np.ceil(2.0 * pixels), 1, _MOST_CUTS)).astype(int)
         for count in np.unique(cuts):
             some = np.flatnonzero(cuts == count)
             x = (np.arange(count) + 0.5) / count

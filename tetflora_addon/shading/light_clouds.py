@@ -53,8 +53,14 @@ class Clouds:
         return len(self.vertices)
 
     @classmethod
-    def of(cls, flora: Flora, refinement: Refinement) -> Clouds:
-        """Everything that the loop left, in the order of ``refinement.nodes``."""
+    def of(cls, flora: Flora, refinement: Refinement, even: NDArray[np.bool_] | None = None) -> Clouds:
+        """Everything that the loop left, in the order of ``refinement.nodes``.
+
+        Where ``even`` (n,) is set, a cloud is all that stands for its leaves, and dims what they scatter as their
+        clumps do: what leaves one surface meets another of its clump with the probability p = 1 − effective / whole
+        area, so that of the colour ω there comes ω (1 − p) / (1 − p ω) (Smolander and Stenberg, "Simple
+        parameterizations of the radiation budget of uniform broadleaved and coniferous canopies", 2005).
+        """
         nodes, contents = refinement.nodes, refinement.contents
         # Large polygons are walls, not fog: they come as occluders.
         fine = np.isfinite(contents.polygon_amounts.width)
@@ -63,7 +69,15 @@ class Clouds:
         summaries = summarise(flora, contents, cell_of_node(refinement), len(nodes))
         vertices = refinement.tree.vertices(nodes)
         matrices, normal, plane = extinction_matrices(summaries, volume(vertices))
-        return cls(vertices, matrices, summaries.colour, summaries.transmission, normal, plane)
+        colour = summaries.colour
+        if even is not None:
+            volumes = volume(vertices)
+            again = 1.0 - summaries.effective_area(volumes) / np.where(
+                summaries.optical_area > 0.0, summaries.optical_area, np.inf
+            )
+            again = np.where(even & (summaries.optical_area > 0.0), np.clip(again, 0.0, 1.0), 0.0)[:, None]
+            colour = colour * (1.0 - again) / (1.0 - again * colour)
+        return cls(vertices, matrices, colour, summaries.transmission, normal, plane)
 
     @cached_property
     def gradients(self) -> NDArray[np.float64]:

@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 from .light_clouds import Clouds
 
 #: Sheets of a tetrahedron on which light from all sides is sampled, at most, and of all of them, about.
-SAMPLES, ALL_SAMPLES = 8, 48_000
+SAMPLES, ALL_SAMPLES = 8, 32_000
+# Side of a pixel for one sheet: most sheets then lie in one pixel alone.
+_ROOMY = 1.5
 
 
 @dataclass(frozen=True)
@@ -52,13 +54,13 @@ class Sheets:
         return cls(corners, np.maximum(cell, 0).astype(np.int64), replaced)
 
     def pixels(self, limits: tuple[int, int]) -> int:
-        """Longer side of a buffer that sees all sheets, of which a pixel is about as large as one."""
+        """Longer side of a buffer that sees all sheets, of which a pixel is somewhat larger than one."""
         if not len(self):
             return limits[0]
         vector = np.cross(self.corners[:, 2] - self.corners[:, 0], self.corners[:, 3] - self.corners[:, 1])
         side = np.sqrt(np.median(np.linalg.norm(vector, axis=1)) / 2.0)
         reach = np.ptp(self.corners.reshape(-1, 3), axis=0).max()
-        return int(np.clip(reach / max(side, 1e-9), *limits))
+        return int(np.clip(reach / max(_ROOMY * side, 1e-9), *limits))
 
     def thinned(self, most: int) -> tuple[Sheets, NDArray[np.int64]]:
         """At most so many sheets, larger as they are fewer, and the number (m,) of each of these among them, or −1."""

@@ -23,7 +23,7 @@ SKY_SHARE = 0.1
 #: Its limits, pixels, of clouds alone and of sheets.
 SKY_PIXELS, SKY_SHEET_PIXELS = (32, 96), (32, 384)
 #: Sheets that stand in the sky's light at most, each for several: it comes from all sides, and details drown in it.
-SKY_SHEETS = 60_000
+SKY_SHEETS = 40_000
 #: Orders of scattering that are gathered one by one.
 ORDERS = 2
 
