@@ -32,7 +32,7 @@ from .shading.polygon_facets import polygon_facets
 FACETS_AT_ONCE = 200_000
 
 
-def facet_blocks(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.6) -> Iterator[MeshBuffers]:
+def facet_blocks(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.4) -> Iterator[MeshBuffers]:
     """Proxies as microsurfaces: facets of all that is not explicit, and of no polygon that is kept as it is.
 
     Meshes have about `BLOCK_POLYGONS` facets each, so that only one of them is held at a time beside Blender's own.
@@ -50,7 +50,7 @@ def facet_blocks(flora: Flora, result: Refinement, camera: Camera, facet_pixels:
 
 
 def sphere_blocks(
-    flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.6, disc: float = np.pi
+    flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.4, disc: float = np.pi
 ) -> Iterator[PointBuffers]:
     """Proxies as microspheres, one for each facet of `facet_blocks`; parameters and size of blocks are the same.
 

@@ -43,7 +43,7 @@ def become(
     span = np.array([np.sqrt(2) / (0.001 * depth)])  # of the unit corner, 1 mm a pixel at 1 m
     seen = (np.array([v], float) for v in (pixels, opacity))
     cells = Cells(
-        np.array([0]), amounts, *seen, feature_pixels(cell(depth), amounts.width, CAMERA), span, np.array([True])
+        np.array([0]), amounts, *seen, *feature_pixels(cell(depth), amounts.width, CAMERA), span, np.array([True])
     )
     return Decision(decide(cells, np.array([transmittance]), settings)[0])
 
@@ -51,8 +51,8 @@ def become(
 def test_size_of_features() -> None:
     """A pixel is 1 mm at 1 m here; the nearest corner counts, and nothing is nearer than the near plane."""
     near = cell(5.0, 2.0)
-    assert feature_pixels(near, np.array([0.05]), CAMERA) == pytest.approx(0.05 / 0.001 / 5.0)
-    assert feature_pixels(cell(-0.5), np.array([0.05]), CAMERA) == pytest.approx(0.05 / 0.001 / CAMERA.near)
+    assert feature_pixels(near, np.array([0.05]), CAMERA)[0] == pytest.approx(0.05 / 0.001 / 5.0)
+    assert feature_pixels(cell(-0.5), np.array([0.05]), CAMERA)[0] == pytest.approx(0.05 / 0.001 / CAMERA.near)
 
 
 def test_each_outcome() -> None:
@@ -100,7 +100,7 @@ def test_what_can_never_be(case: dict, cutoff: float) -> None:
     never takes detail away."""
     options = replace(SETTINGS, cutoff=cutoff)
     out = become(**case, settings=options)
-    large = feature_pixels(cell(case["depth"]), np.array([case["width"]]), CAMERA)[0] >= options.leaf_limit
+    large = feature_pixels(cell(case["depth"]), np.array([case["width"]]), CAMERA)[0][0] >= options.leaf_limit
     hidden = case["transmittance"] <= options.hidden
     assert (out == Decision.HIDDEN) == hidden
     if large and not hidden:
@@ -118,7 +118,8 @@ def test_a_limit_leaves_what_is_hidden_hidden_and_makes_no_forest_of_leaves() ->
     count = 4
     amounts = Amounts(*(np.array(v, float) for v in ([1] * 4, [0.1] * 4, [1e6, 1e4, 1e6, 1e6], [1] * 4)))
     pixels, feature = np.array([1e6, 1e6, 900.0, 1e6]), np.array([2.0, 2.0, 2.0, 0.1])
-    cells = Cells(np.arange(count), amounts, pixels, np.ones(count), feature, np.ones(count), np.ones(count, bool))
+    one = np.ones(count)
+    cells = Cells(np.arange(count), amounts, pixels, one, feature, feature, one, np.ones(count, bool))
     split = np.full(count, Decision.SPLIT, np.int8)
     seen = without_splits(split, cells, np.ones(count), SETTINGS)
     assert seen.tolist() == [Decision.PROXY, Decision.EXPLICIT, Decision.EXPLICIT, Decision.PROXY]
@@ -127,12 +128,27 @@ def test_a_limit_leaves_what_is_hidden_hidden_and_makes_no_forest_of_leaves() ->
     assert (without_splits(kept, cells, np.zeros(count), SETTINGS) == kept).all()
 
 
+def test_leaves_that_are_large_only_at_the_near_end_are_told_from_the_rest() -> None:
+    """All of a small picture's view may be one block: then it is divided in depth, not made explicit as a whole."""
+    amounts = Amounts(*(np.full(1, v) for v in (100.0, 1.0, 1e6, 0.05)))
+    one = np.ones(1)
+
+    def decided(least: float, polygons: float) -> int:
+        holds = replace(amounts, polygons=np.array([polygons]))
+        cells = Cells(np.arange(1), holds, 900.0 * one, one, 5.0 * one, least * one, one, np.ones(1, bool))
+        return int(decide(cells, one, SETTINGS)[0])
+
+    assert decided(0.1, 1e6) == Decision.SPLIT
+    assert decided(0.9 * SETTINGS.leaf_limit, 1e6) == Decision.EXPLICIT
+    assert decided(0.1, 10.0) == Decision.EXPLICIT
+
+
 def test_the_last_few_cells_are_not_worth_a_pass() -> None:
     """Only if they are few among many, change next to nothing of the picture and hold next to nothing."""
     count = 1000
     amounts = Amounts(*(np.full(count, v) for v in (1.0, 0.1, 1000.0, 0.1)))
     cells = Cells(
-        np.arange(count), amounts, *(np.full(count, v) for v in (1000.0, 1.0, 0.1, 1.0)), np.ones(count, bool)
+        np.arange(count), amounts, *(np.full(count, v) for v in (1000.0, 1.0, 0.1, 0.1, 1.0)), np.ones(count, bool)
     )
     seen, splitting = np.ones(count), np.zeros(count, bool)
     splitting[:2] = True  # 2,000 of a million pixels, 2,000 polygons

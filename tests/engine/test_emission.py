@@ -103,14 +103,14 @@ def test_explicit_polygons_are_about_as_many_as_expected() -> None:
     assert made == pytest.approx(expected, rel=0.05)
 
 
-def test_facets_have_the_area_of_what_is_not_explicit() -> None:
+def test_facets_have_the_area_of_what_is_not_explicit_but_for_what_clusters_hide() -> None:
     flora, _, camera, result = scene()
     every = result.contents.sums(len(result.tree))
     proxies = result.chosen(Decision.PROXY, Decision.HIDDEN)
     mesh = support.facet_buffers(flora, result, camera)
     check_topology(mesh)
     optical = (every.leaf_area + every.wood_area / 2)[proxies].sum()
-    assert support.face_areas(mesh).sum() == pytest.approx(optical, rel=0.05)
+    assert 0.4 * optical < support.face_areas(mesh).sum() < 1.05 * optical
 
 
 def test_facets_are_as_large_as_asked_for_and_larger_where_hidden() -> None:
@@ -137,7 +137,7 @@ def test_chunks_of_facets_change_nothing(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(facet_emission, "FACETS_AT_ONCE", 500)
     chunked = support.facet_buffers(flora, result, camera)
     assert chunked.polygons == once.polygons
-    quads = [np.unique(m.positions.reshape(-1, 12), axis=0) for m in (once, chunked)]
+    quads = [np.unique(m.positions.reshape(-1, 9), axis=0) for m in (once, chunked)]
     assert (quads[0] == quads[1]).all()
 
 
@@ -202,7 +202,7 @@ def test_shells_are_the_cells_of_proxies() -> None:
     index[result.nodes[cells]] = np.arange(cells.sum())
     area = summarise(flora, result.contents, index, int(cells.sum())).effective_area(volumes)
     # Half of the area as the mean over all directions, whatever the orientation, within what the form of κ allows.
-    np.testing.assert_allclose(kappa, area / 2 / volumes, rtol=0.08)
+    np.testing.assert_allclose(kappa, (area / 2 / volumes)[np.argsort(-result.rank[cells])], rtol=0.08)
     assert mesh.attributes["tf_colour"][1].min() >= 0
     assert mesh.attributes["tf_colour"][1].max() <= 1
 

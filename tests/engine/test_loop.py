@@ -112,7 +112,7 @@ def test_an_eye_in_the_crown(sort: str, eye: tuple[float, ...]) -> None:
     assert result.complete
     parts = measures(flora, expanded(flora, result.contents))
     assert parts == pytest.approx(measures(flora, support.grown(flora, seeds)[1]), rel=1e-6)
-    large = feature_pixels(result.tree.vertices(result.nodes), result.amounts.width, camera) >= 0.5
+    large = feature_pixels(result.tree.vertices(result.nodes), result.amounts.width, camera)[0] >= 0.5
     seen = result.transmittance > RefinementSettings().hidden
     assert not (large & seen & (result.decision == Decision.PROXY)).any()
     assert not (seen & (result.decision == Decision.HIDDEN)).any()
@@ -132,7 +132,7 @@ def test_random_views(seed: int, cutoff: float) -> None:
     states, result = run(flora, seeds, camera, cutoff=cutoff)
     check(flora, result)
     assert [s.passes for s in [*states, result]] == list(range(1, len(states) + 2))
-    large = feature_pixels(result.tree.vertices(result.nodes), result.amounts.width, camera) >= 0.5
+    large = feature_pixels(result.tree.vertices(result.nodes), result.amounts.width, camera)[0] >= 0.5
     seen = result.transmittance > RefinementSettings().hidden
     assert not (large & seen & (result.decision == Decision.PROXY)).any()
     assert not (seen & (result.decision == Decision.HIDDEN)).any()

@@ -15,9 +15,8 @@ from tests.engine import support
 from tests.engine.test_meshing import check_topology
 from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.plants.compiled import Flora
-from tetflora_addon.plants.expansion import open_subplants
 from tetflora_addon.plants.growth import Branches, trunks
-from tetflora_addon.refinement.contents import Contents, bounding_cylinders, piece_amounts, subplant_amounts
+from tetflora_addon.refinement.contents import Contents, bounding_cylinders, subplant_amounts
 from tetflora_addon.shading.facet_sizes import piece_facet_sizes, subplant_facet_sizes
 from tetflora_addon.shading.microsurfaces import facet_mesh, piece_facets, subplant_facets
 
@@ -148,65 +147,33 @@ def test_hidden_wood_gets_no_more_facets_than_it_has_faces() -> None:
         assert (seen.sides(3.0)[0] >= np.sqrt(seen.one_leaf)).all()
 
 
-def test_facets_are_squares_no_smaller_than_leaves() -> None:
+def test_facets_are_equilateral_and_share_the_area_of_their_plant() -> None:
+    """As large as asked for or as a leaf, but for what it takes to have exactly the area of each plant."""
     flora = support.small_flora()
     plant = trunks(flora.rows, support.plants(np.arange(5)))
+    amounts = subplant_amounts(flora, plant)
     leaf = flora.area_nodes[0, 0] / flora.leaf_count[0]
-    for side in (1e-2, 0.5):
+    for side in (1e-2, 0.1):
         mesh = facets(flora, plant, side)
-        quads = mesh.positions.reshape(-1, 4, 3).astype(float)
-        edges = np.linalg.norm(quads - np.roll(quads, -1, axis=1), axis=2)
-        expected = np.where(part(mesh, True), max(side, np.sqrt(leaf)), side)
-        np.testing.assert_allclose(edges, np.tile(expected[:, None], 4), rtol=1e-3)
+        corners = mesh.positions.reshape(-1, 3, 3).astype(float)
+        edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
+        np.testing.assert_allclose(edges, np.tile(edges.mean(axis=1)[:, None], 3), rtol=2e-3)
+        areas, leafy = support.face_areas(mesh), part(mesh, True)
+        expected = np.where(leafy, max(side**2, leaf), side**2)
+        assert (np.abs(areas / expected - 1) < 0.5).all()
+        assert areas[leafy].sum() == pytest.approx(amounts.leaf_area.sum(), rel=1e-4)
+        assert areas[~leafy].sum() == pytest.approx(amounts.wood_area.sum() / 2, rel=1e-4)
 
 
-def test_the_same_facets_alone_as_in_company_and_twice() -> None:
+def test_a_share_of_the_area_is_that_and_darkens_as_a_cluster_does() -> None:
+    """Recollision: none where all is seen, all light lost within for black shares; white stays white."""
     flora = support.small_flora()
-    plants = trunks(flora.rows, support.plants(np.arange(6)))
-    together = facets(flora, plants, 0.1)
-    assert (facets(flora, plants, 0.1).positions == together.positions).all()
-    alone = np.concatenate([facets(flora, plants.take(np.array([i])), 0.1).positions for i in range(6)])
-    assert (np.unique(alone.reshape(-1, 12), axis=0) == np.unique(together.positions.reshape(-1, 12), axis=0)).all()
-
-
-def test_pieces_keep_area_place_and_orientation() -> None:
-    """What single branches and clipped pieces bear: facets on them, of their wood and their own leaves."""
-    flora = support.small_flora()
-    _, pieces = support.grown(flora, support.grove(16, 4.0))
-    amounts = piece_amounts(flora, pieces)
-    mesh = facet_mesh(piece_facets(flora, pieces, np.full(len(pieces), 0.05)))
-    check_topology(mesh)
-    areas = support.face_areas(mesh)
-    for leaves, expected in ((True, amounts.leaf_area), (False, amounts.wood_area / 2)):
-        assert areas[part(mesh, leaves)].sum() == pytest.approx(expected.sum(), rel=0.05)
-    tubes, real = support.meshes(flora, pieces)
-    np.testing.assert_allclose(moment_of(mesh, part(mesh, True)), support.moment(real[0]), atol=0.12)
-    np.testing.assert_allclose(moment_of(mesh, part(mesh, False)), support.moment(tubes[0]), atol=0.05)
-    wood = support.face_centres(mesh)[part(mesh, False)]
-    low, high = np.minimum(pieces.start, pieces.end).min(axis=0), np.maximum(pieces.start, pieces.end).max(axis=0)
-    assert ((wood >= low - 1e-5) & (wood <= high + 1e-5)).all()
-
-
-def test_pieces_without_leaves_have_facets_of_wood_only() -> None:
-    flora = support.small_flora()
-    trunk = trunks(flora.rows, support.plants(np.arange(5)))
-    _, _, pieces, _ = open_subplants(flora, trunk)
-    mesh = facet_mesh(piece_facets(flora, pieces, np.full(len(pieces), 0.02)))
-    assert part(mesh, False).all()
-    none = pieces.take(np.zeros(len(pieces), bool))
-    assert len(piece_facets(flora, none, np.zeros(0))) == 0
-    assert len(subplant_facets(flora, trunk.take(np.zeros(5, bool)), np.zeros(0))) == 0
-
-
-@pytest.mark.parametrize("order", [0, 1])
-def test_no_facet_lies_upon_another(order: int) -> None:
-    """Sub-plants with many times more facets than there are samples."""
-    flora = support.flora()
-    species = support.SPECIES.index("broadleaf_tree")
-    subplants = support.trunks(flora.rows, support.plants([5], species))
-    for _ in range(order):
-        subplants, *_ = open_subplants(flora, subplants)
-    subplants = subplants.take(np.array([subplants.length.argmax()]))
-    centres = subplant_facets(flora, subplants, np.full(1, 0.01 if order else 0.03)).centre
-    assert len(centres) > 4000
-    assert len(np.unique(np.round(centres, 5), axis=0)) > 0.95 * len(centres)
+    plant = trunks(flora.rows, support.plants(np.arange(5)))
+    side = np.full(5, 0.05)
+    whole = subplant_facets(flora, plant, side)
+    part_of = subplant_facets(flora, plant, side, share=np.full(5, 0.5))
+    np.testing.assert_allclose(part_of.side**2, 0.5 * whole.side**2)
+    leafy = whole.transmission > 0
+    c = whole.colour[leafy]
+    np.testing.assert_allclose(part_of.colour[leafy], c * 0.5 / (1 - 0.5 * c))
+    assert (part_of.colour <= whole.colour + 1e-12).all()

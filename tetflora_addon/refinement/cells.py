@@ -30,6 +30,8 @@ class Cells:
         As in `visibility.Outline`.
     feature : (n,) float64
         Width in pixels of what they hold, where it is nearest to the eye.
+    least_feature : (n,) float64
+        The same where it is farthest away.
     span : (n,) float64
         Longest edge in pixels at their distance.
     whole : (n,) bool
@@ -41,6 +43,7 @@ class Cells:
     pixels: NDArray[np.float64]
     opacity: NDArray[np.float64]
     feature: NDArray[np.float64]
+    least_feature: NDArray[np.float64]
     span: NDArray[np.float64]
     whole: NDArray[np.bool_]
 
@@ -55,8 +58,8 @@ class Cells:
         vertices = tree.vertices(nodes)
         outline = buffer.add(nodes, vertices, mean_extinction(amounts, volume(vertices)))
         span = np.sqrt(squared_edges(vertices).max(axis=1)) / camera.extent_around(vertices.mean(axis=1))
-        feature = feature_pixels(vertices, amounts.width, camera)
-        return cls(nodes, amounts, outline.pixels, outline.opacity, feature, span, outline.whole)
+        features = feature_pixels(vertices, amounts.width, camera)
+        return cls(nodes, amounts, outline.pixels, outline.opacity, *features, span, outline.whole)
 
     def take(self, index: NDArray) -> Cells:
         """Selection by indices or mask."""
@@ -80,8 +83,10 @@ def mean_extinction(amounts: Amounts, volumes: NDArray[np.float64]) -> NDArray[n
     return (amounts.leaf_area / 2 + amounts.wood_area / 4) / volumes
 
 
-def feature_pixels(vertices: NDArray[np.float64], width: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:
-    """Size on the picture of what tetrahedra hold, where it is nearest to the eye.
+def feature_pixels(
+    vertices: NDArray[np.float64], width: NDArray[np.float64], camera: Camera
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Size on the picture of what tetrahedra hold, where it is nearest to the eye and where it is farthest away.
 
     Parameters
     ----------
@@ -91,7 +96,8 @@ def feature_pixels(vertices: NDArray[np.float64], width: NDArray[np.float64], ca
 
     Returns
     -------
-    (n,) float64
+    (n,), (n,) float64
         Pixels.
     """
-    return width / camera.pixel_extent(vertices).min(axis=1)
+    extent = camera.pixel_extent(vertices)
+    return width / extent.min(axis=1), width / extent.max(axis=1)

@@ -24,6 +24,10 @@ FEW, NO_GAIN, NO_POLYGONS = 0.005, 0.002, 20_000
 UNKNOWN = 4.0
 
 
+#: How much smaller than the limit leaves are at the far end of a tetrahedron that is divided for it.
+DEEP = 1.5
+
+
 class Decision(IntEnum):
     """What is done with a terminal tetrahedron."""
 
@@ -63,13 +67,15 @@ def decide(cells: Cells, transmittance: NDArray[np.float64], settings: Refinemen
     hidden = transmittance <= settings.hidden  # out of view: transmittance is 0
     large_leaves = cells.feature >= settings.leaf_limit
     few = amounts.polygons <= settings.few_polygons
+    # Leaves that are large at the near end may be tiny at the far end, as in all of a small picture's view.
+    deep = large_leaves & (cells.least_feature < settings.leaf_limit / DEEP) & ~few
     crossing = ~cells.whole & ~few & (cells.span > ACROSS_THE_BORDER * settings.block)
     no_gain = few | ((cells.pixels <= settings.block**2) & ~crossing)
     small = (contributions(cells, transmittance) <= settings.cutoff**2) & ~crossing
     out = np.full(len(holds), Decision.SPLIT, dtype=np.int8)
     # Large leaves never become a proxy: a block of them that is hardly seen is divided until its hidden parts show.
     out[small & ~large_leaves] = Decision.PROXY
-    out[large_leaves & no_gain] = Decision.EXPLICIT
+    out[large_leaves & no_gain & (~deep | small)] = Decision.EXPLICIT
     out[hidden] = Decision.HIDDEN
     out[hidden & (cells.span > settings.hidden_block)] = Decision.SPLIT
     out[~holds] = Decision.EMPTY

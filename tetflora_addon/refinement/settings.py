@@ -64,7 +64,7 @@ class RefinementSettings:
     max_tetrahedra: int = 400_000
     max_levels: int = 60
     max_passes: int = 0
-    facet: float = 0.6
+    facet: float = 0.4
     max_polygons: int = 0
     max_memory: float = 0.0
     anchored: bool = False
@@ -73,7 +73,7 @@ class RefinementSettings:
 
 #: What the qualities of the panel stand for.
 QUALITIES: dict[str, dict[str, float]] = {
-    "DRAFT": {"cutoff": 6.0, "leaf_limit": 2.0, "facet": 1.5, "visibility_resolution": 128},
-    "PREVIEW": {"cutoff": 3.0, "leaf_limit": 1.0, "facet": 1.0, "visibility_resolution": 192},
-    "FINAL": {"cutoff": 2.0, "leaf_limit": 0.5, "facet": 0.6, "visibility_resolution": 256},
+    "DRAFT": {"cutoff": 6.0, "leaf_limit": 2.0, "facet": 1.2, "visibility_resolution": 128},
+    "PREVIEW": {"cutoff": 3.0, "leaf_limit": 1.0, "facet": 0.7, "visibility_resolution": 192},
+    "FINAL": {"cutoff": 2.0, "leaf_limit": 0.5, "facet": 0.4, "visibility_resolution": 256},
 }

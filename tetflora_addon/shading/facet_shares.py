@@ -7,14 +7,17 @@ the full area they would be up to three times as opaque. Rays are cast through g
 and through their facets, at several numbers of them; the share is the one with which as many rays are held up. So it is
 for facets what `plants.clumping` is for cells that are filled evenly.
 
-Sub-plants are looked at together with their next siblings: facets that are larger than a sub-plant spill over. Facets
-of pieces are compared in the same way with what branches themselves bear.
+Sub-plants are looked at together with their next siblings, because facets that are larger than a sub-plant spill over.
+Facets of pieces are compared in the same way with what branches themselves bear.
 """
 
 from __future__ import annotations
 
+import hashlib
+import json
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,19 +27,26 @@ from ..plants.compiled import Flora
 from ..plants.expansion import open_subplants
 from ..plants.growth import Branches, spread, trunks
 from ..plants.hashing import mix
-from ..plants.outlines import things_of
+from ..plants.outlines import Things, things_of
+from ..plants.pieces import Pieces
 from ..plants.seeds import Seeds
-from ..refinement.amounts import piece_amounts, subplant_amounts
-from .microsurfaces import Facets, piece_facets, subplant_facets
+from ..refinement.amounts import Amounts, piece_amounts, subplant_amounts
+from .microsurfaces import CIRCUMRADIUS, SIN_60, Facets, piece_facets, subplant_facets
 
+#: Shares of the shipped species, made by ``python -m devtools.facet_tables``. Raise the number when facets or shares
+#: are made in another way.
+TABLE = Path(__file__).resolve().parent.parent / "catalogue" / "tables" / "facet_shares.json"
+_METHOD = 1
 #: Facets of a sub-plant for which shares are known; between them they follow the logarithm.
 COUNTS = 4.0 ** np.arange(-2, 6)
-#: Families of siblings of a row that are looked at, members of one at most, and the polygons that all may have.
-_FAMILIES, _MEMBERS, _POLYGONS = 3, 16, 40_000.0
-#: Facets that stand for each number, over all families, at least and at most, about.
-_LEAST, _MOST = 300.0, 6_000.0
+#: Families of siblings of a row that are looked at, members of one at most, and polygons that all may have.
+_FAMILIES, _MEMBERS, _POLYGONS = 6, 12, 50_000.0
+#: Facets that stand for each number, over all families: as many copies are made as it takes for the first, if that is
+#: possible at all for the second; numbers that would need more than the third are not tried.
+_WANTED, _NEEDED, _MOST = 250.0, 60.0, 5_000.0
+_COPIES = 16
 #: Rays across a family, and directions of rays.
-_RAYS, _DIRECTIONS = 40, 3
+_RAYS, _DIRECTIONS = 36, 4
 #: Shares are never more than this.
 _LARGEST_SHARE = 1.6
 
@@ -74,17 +84,51 @@ def _between(table: NDArray[np.float64], row: NDArray[np.integer], count: NDArra
 
 @lru_cache(maxsize=8)
 def facet_shares(flora: Flora) -> FacetShares:
-    """Shares for a flora; found when first asked for, and kept as long as the flora may be asked for again."""
+    """Shares for a flora; found when first asked for, and kept as long as the flora may be asked for again.
+
+    Those of the species that come with TetFlora are read from `TABLE`; it takes a second or two to find those of one.
+    """
     whole, own = np.ones((2, len(flora.rows), len(COUNTS)))
-    for row, families in _families(flora).items():
-        whole[row], own[row] = _fitted(flora, families)
+    unknown = []
+    for number, first in enumerate(flora.first_row):
+        known = _table().get(digest(flora, number))
+        if known is None:
+            unknown.append(number)
+        else:
+            every = slice(int(first), int(first) + len(known["whole"]))
+            whole[every], own[every] = known["whole"], known["own"]
+    for row, families in _families(flora, np.array(unknown, np.int32)).items():
+        apart = _apart(flora, families)
+        whole[row], own[row] = _fitted(_Sight.of_subplants(flora, *apart)), _fitted(_Sight.of_branches(flora, *apart))
     return FacetShares(whole, own)
 
 
-def _families(flora: Flora) -> dict[int, list[Branches]]:
-    """Some siblings of each row as they grow together, for a few parents."""
-    species = len(flora.first_row)
-    which = np.repeat(np.arange(species, dtype=np.int32), _FAMILIES)
+def digest(flora: Flora, number: int) -> str:
+    """What tells a species of a flora from all others: its parameters and the forms of its leaves."""
+    content = hashlib.sha256(f"{_METHOD}".encode())
+    rows = flora.rows[flora.rows["species"] == number]
+    for name in sorted(set(rows.dtype.names) - {"species", "next", "drawn_rows"}):
+        # Rounded, because versions of numpy may differ in the last digit.
+        value = np.round(rows[name].astype(np.float64), 6) + 0.0
+        content.update(name.encode() + np.ascontiguousarray(value).tobytes())
+    for form in (model for forms in flora.forms[number] for model in forms):
+        content.update(
+            np.ascontiguousarray(form.positions).tobytes() + np.ascontiguousarray(form.corner_verts).tobytes()
+        )
+    return content.hexdigest()[:16]
+
+
+@cache
+def _table() -> dict[str, dict[str, list[list[float]]]]:
+    try:
+        return json.loads(TABLE.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return {}
+
+
+def _families(flora: Flora, species: NDArray[np.int32]) -> dict[int, list[Branches]]:
+    """Some siblings of each row of some species as they grow together, for a few parents."""
+    which = np.repeat(species, _FAMILIES)
     n = len(which)
     names = tuple(s.identifier for s in flora.species)
     seeds = Seeds(names, which, np.arange(n), np.zeros((n, 3)), np.tile(np.eye(3), (n, 1, 1)), np.ones(n))
@@ -95,53 +139,56 @@ def _families(flora: Flora) -> dict[int, list[Branches]]:
             own = np.flatnonzero(level.row == row)
             members = int(np.clip(_POLYGONS / _FAMILIES / max(flora.polygons[row], 1.0), 1, _MEMBERS))
             parents = np.unique(parent[own])
-            parents = parents[np.argsort(mix(parents.astype(np.uint64)))[:_FAMILIES]]
-            for p in parents:
+            for p in parents[np.argsort(mix(parents.astype(np.uint64)))[:_FAMILIES]]:
                 siblings = own[parent[own] == p]
                 first = (len(siblings) - min(members, len(siblings))) // 2
-                chosen = siblings[first : first + members]
-                found.setdefault(int(row), []).append(level.take(chosen))
-                some.append(chosen)
+                some.append(siblings[first : first + members])
+                found.setdefault(int(row), []).append(level.take(some[-1]))
         level, parent, _, _ = open_subplants(flora, level.take(np.concatenate(some)))
     return {row: _affordable(flora, families) for row, families in found.items()}
 
 
 def _affordable(flora: Flora, families: list[Branches]) -> list[Branches]:
-    """As many of the families as their polygons allow, one at least; parents of several orders take turns."""
+    """As many of the families as their polygons allow, and at least one."""
     families = [families[i] for i in np.argsort(mix(np.arange(len(families)).astype(np.uint64)))][:_FAMILIES]
-    total = np.cumsum([flora.face_counts(f).sum() for f in families])
-    return [f for f, t in zip(families, total, strict=True) if t <= _POLYGONS] or families[:1]
+    total = np.cumsum([flora.face_counts(family).sum() for family in families])
+    return [family for family, sum_ in zip(families, total, strict=True) if sum_ <= _POLYGONS] or families[:1]
 
 
-def _fitted(flora: Flora, families: list[Branches]) -> NDArray[np.float64]:
-    """Shares (2, k) for one row: of sub-plants, and of what their branches themselves bear."""
-    out = np.ones((2, len(COUNTS)))
-    for kind, look in enumerate((_Whole, _Own)):
-        looks = [look(flora, family) for family in families]
-        area = np.concatenate([one.area for one in looks])
-        if area.mean() <= 0.0:
+def _apart(flora: Flora, families: list[Branches]) -> tuple[Branches, NDArray[np.float64]]:
+    """All families, so far from each other that no ray meets two of them, and the way (3,) beyond the last."""
+    reach = np.hypot(flora.bound[:, 0], np.maximum(-flora.bound[:, 1], flora.bound[:, 2]))
+    extent = max(float(np.ptp(f.position, axis=0).max() + 2 * (reach[f.row] * f.length).max()) for f in families)
+    # Level, and longer than the least that a view from a sixth above the horizon makes of it.
+    step = 8.0 * extent * np.array([0.8, 0.6, 0.0])
+    moved = [replace(f, position=f.position - f.position.mean(axis=0) + n * step) for n, f in enumerate(families)]
+    return Branches.concatenate(moved), len(families) * step
+
+
+def _fitted(sight: _Sight) -> NDArray[np.float64]:
+    """Shares (k,) for one row."""
+    out = np.full(len(COUNTS), np.nan)
+    if sight.area.mean() <= 0.0:
+        return np.ones(len(COUNTS))
+    views = sight.views()
+    met = sum(sight.met(view) for view in views)
+    for k, count in enumerate(COUNTS):
+        expected = count * len(sight.area)
+        copies = int(np.clip(np.ceil(_WANTED / expected), 1, _COPIES))
+        if expected * copies < _NEEDED or met == 0:
             continue
-        views = [(one, view) for one in looks for view in one.views(_DIRECTIONS)]
-        met = sum(one.met(view) for one, view in views)
-        for k, count in enumerate(COUNTS):
-            # Facets of too many members would take long, of too few the mean would not settle.
-            copies = int(np.clip(np.ceil(_LEAST / (count * len(area))), 1, 12))
-            side = np.sqrt(area.mean() / count)
-            least = [one.least_shares(view, side, copy) for one, view in views for copy in range(copies)]
-            out[kind, k] = _share(np.concatenate(least), met * copies)
-            if count * len(area) > _MOST or all((one.leaf > side**2).all() for one in looks):
-                out[kind, k + 1 :] = out[kind, k]
-                break
-    return out
+        side = np.sqrt(sight.area.mean() / count)
+        facets = sight.facets(side, copies)
+        out[k] = _share(np.concatenate([sight.least_shares(view, facets) for view in views]), met * copies)
+        if expected > _MOST or (sight.leaf > side**2).all():
+            break
+    known = np.flatnonzero(np.isfinite(out))
+    return np.interp(np.arange(len(out)), known, out[known]) if len(known) else np.ones(len(out))
 
 
 def _share(least: NDArray[np.float64], met: int) -> float:
     """Share with which so many rays are held up, from the least share (n,) with which each ray is."""
-    if met == 0:
-        return 1.0
-    if met > len(least):
-        return _LARGEST_SHARE
-    return float(np.partition(least, met - 1)[met - 1])
+    return float(np.partition(least, met - 1)[met - 1]) if met <= len(least) else _LARGEST_SHARE
 
 
 @dataclass(frozen=True)
@@ -152,97 +199,134 @@ class _View:
     v: NDArray[np.float64]
     spacing: float
 
+    def flat(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Vectors (n, 3) on the plane (n, 2), in units of the lattice."""
+        return vectors @ np.stack([self.u, self.v], axis=1) / self.spacing
 
-class _Whole:
-    """A family of sub-plants, to the last leaf."""
 
-    def __init__(self, flora: Flora, family: Branches) -> None:
-        self.flora, self.family = flora, replace(family, position=family.position - family.position.mean(axis=0))
-        self._measure()
-        first = int(flora.first_row[flora.rows["species"][family.row[0]]])
-        rows = flora.rows
-        group = np.zeros(len(rows), np.intp)
-        forms = flora.forms[rows["species"][first]]
-        self.things = self._grown(rows, forms, group)
-        self.leaf = flora.one_leaf_area(family)
+@dataclass(frozen=True)
+class _Sight:
+    """Families of sub-plants, or what their branches themselves bear, as rays see it.
 
-    def _measure(self) -> None:
-        amounts = subplant_amounts(self.flora, self.family)
-        self.area = amounts.leaf_area + amounts.wood_area / 2
+    Attributes
+    ----------
+    flora : Flora
+    some : Branches of n
+    beyond : (3,) float64
+        Where there is room for others of the same size, metres.
+    things : Things
+        Leaves and wood in truth.
+    area, leaf : (n,) float64
+        Optical area of each, and area of one of its leaves, m².
+    pieces : Pieces or None
+        Of the branches, where only these count.
+    """
 
-    def _grown(self, rows, forms, group):
-        return things_of(rows, forms, self.family, group, 0, np.ones(len(rows)))
+    flora: Flora
+    some: Branches
+    beyond: NDArray[np.float64]
+    things: Things
+    area: NDArray[np.float64]
+    leaf: NDArray[np.float64]
+    pieces: Pieces | None
 
-    def views(self, number: int) -> list[_View]:
-        middle = self.things.middle
-        extent = float(np.max(middle.max(axis=1) - middle.min(axis=1)) + 2 * self.things.radius.max())
-        out = []
-        for i in range(number):
-            z = (i + 0.5) / number
-            turn = np.pi * (1 + np.sqrt(5)) * (i + 0.5)
-            direction = np.array([np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z])
-            out.append(_View(*basis(direction), extent / _RAYS))
-        return out
+    @classmethod
+    def of_subplants(cls, flora: Flora, some: Branches, beyond: NDArray[np.float64]) -> _Sight:
+        """To the last leaf."""
+        area = _optical(subplant_amounts(flora, some))
+        return cls(flora, some, beyond, _grown(flora, some), area, flora.one_leaf_area(some), None)
+
+    @classmethod
+    def of_branches(cls, flora: Flora, some: Branches, beyond: NDArray[np.float64]) -> _Sight:
+        """Without what grows on the branches but leaves."""
+        pieces, owner = open_subplants(flora, some)[2:]
+        area = np.bincount(owner, _optical(piece_amounts(flora, pieces)), len(some))
+        return cls(flora, some, beyond, _grown(flora, some, orders=1), area, flora.one_leaf_area(some), pieces)
+
+    def views(self) -> list[_View]:
+        """Directions spread over the half sphere, with a lattice that is as fine for all of them."""
+        place = self.things.middle.T @ self.beyond
+        along = np.floor(place / (self.beyond @ self.beyond) * _FAMILIES + 0.5)
+        extent = 2.0 * float(self.things.radius.max())  # one straight branch has no extent but its own
+        for family in np.unique(along):
+            middle = self.things.middle[:, along == family]
+            extent = max(extent, float(np.ptp(middle, axis=1).max()))
+        z = (np.arange(_DIRECTIONS) + 0.5) / _DIRECTIONS
+        turn = np.pi * (1 + np.sqrt(5)) * (np.arange(_DIRECTIONS) + 0.5)
+        directions = np.stack([np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z], axis=1)
+        return [_View(*basis(direction), extent / _RAYS) for direction in directions]
 
     def met(self, view: _View) -> int:
         """How many rays meet anything."""
-        flat = np.stack([sum(axis[k] * self.things.middle[k] for k in range(3)) for axis in (view.u, view.v)])
-        place = flat / view.spacing
-        near = (np.abs(place - np.rint(place)) <= self.things.radius / view.spacing).all(axis=0)
+        place = view.flat(self.things.middle.T)
+        near = (np.abs(place - np.rint(place)) <= (self.things.radius / view.spacing)[:, None]).all(axis=1)
         begin, rays = 0, []
         for part in self.things.parts:
             end = begin + len(part)
             corners, first, number = part.outlines(np.flatnonzero(near[begin:end]), view.u, view.v)
-            begin = end
             rays.append(covered(corners / view.spacing, first, number)[1])
-        return len(np.unique(_ray_number(np.concatenate(rays))))
+            begin = end
+        return len(np.unique(_ray_numbers(np.concatenate(rays))))
 
-    def least_shares(self, view: _View, side: float, copy: int) -> NDArray[np.float64]:
-        """For each ray that facets of this side can hold up, the least share of their area with which they do."""
-        facets = self.facets(side, copy)
-        centre = np.stack([facets.centre @ view.u, facets.centre @ view.v], axis=1) / view.spacing
-        half = facets.side[:, None] * np.sqrt(_LARGEST_SHARE) / 2 / view.spacing
-        a = np.stack([facets.across @ view.u, facets.across @ view.v], axis=1) * half
-        b = np.stack([facets.along @ view.u, facets.along @ view.v], axis=1) * half
-        reach = np.abs(a) + np.abs(b)
-        low = np.ceil(centre - reach).astype(np.int64)
-        sizes = np.maximum(np.floor(centre + reach).astype(np.int64) - low + 1, 0)
+    def facets(self, side: float, copies: int) -> Facets:
+        """Facets of a side, metres; others for each of some copies of all, which stand beside each other."""
+        if self.pieces is None:
+            several = Branches.concatenate([self._copy(self.some, n) for n in range(copies)])
+            return subplant_facets(self.flora, several, np.full(len(several), side))
+        beyond = [n * self.beyond for n in range(copies)]
+        several = Pieces.concatenate(
+            [
+                replace(
+                    self.pieces,
+                    branches=self._copy(self.pieces.branches, n),
+                    start=self.pieces.start + way,
+                    end=self.pieces.end + way,
+                )
+                for n, way in enumerate(beyond)
+            ]
+        )
+        return piece_facets(self.flora, several, np.full(len(several), side))
+
+    def _copy(self, branches: Branches, number: int) -> Branches:
+        key = mix(branches.key + np.uint64(number + 1))
+        return replace(branches, key=key, position=branches.position + number * self.beyond)
+
+    @staticmethod
+    def least_shares(view: _View, facets: Facets) -> NDArray[np.float64]:
+        """For each ray that any of the facets can hold up, the least share of their area with which one does."""
+        reach = CIRCUMRADIUS * facets.side[:, None]
+        centre, a, b = view.flat(facets.centre), view.flat(facets.across * reach), view.flat(facets.along * reach)
+        largest = np.sqrt(_LARGEST_SHARE)
+        across = SIN_60 * np.abs(a)
+        low = np.ceil(centre - largest * np.maximum(across + np.abs(b) / 2, np.abs(b))).astype(np.int64)
+        high = np.floor(centre + largest * np.maximum(across + np.abs(b) / 2, np.abs(b))).astype(np.int64)
+        sizes = np.maximum(high - low + 1, 0)
         facet, step = spread(sizes[:, 0] * sizes[:, 1])
-        across = sizes[facet, 1]
-        point = low[facet] + np.stack([step // across, step % across], axis=1)
+        columns = sizes[facet, 1]
+        point = low[facet] + np.stack([step // columns, step % columns], axis=1)
         x, y = (point - centre[facet]).T
         (ax, ay), (bx, by) = a[facet].T, b[facet].T
-        area = ax * by - ay * bx
         with np.errstate(divide="ignore", invalid="ignore"):
-            place = np.maximum(np.abs(x * by - y * bx), np.abs(ax * y - ay * x)) / np.abs(area)
-        inside = np.flatnonzero(place <= 1.0)
-        ray, which = np.unique(_ray_number(point[inside]), return_inverse=True)
+            aside, up = (x * by - y * bx) / (ax * by - ay * bx), (ax * y - ay * x) / (ax * by - ay * bx)
+        # How many times as large the triangle has to be to reach the point: its sides are half a circumradius away.
+        scale = 2.0 * np.maximum(-up, SIN_60 * np.abs(aside) + up / 2)
+        inside = np.flatnonzero(scale <= largest)
+        ray, which = np.unique(_ray_numbers(point[inside]), return_inverse=True)
         least = np.full(len(ray), np.inf)
-        np.minimum.at(least, which.reshape(-1), place[inside] ** 2 * _LARGEST_SHARE)
+        np.minimum.at(least, which.reshape(-1), scale[inside] ** 2)
         return least
 
-    def facets(self, side: float, copy: int) -> Facets:
-        some = replace(self.family, key=mix(self.family.key + np.uint64(copy + 1)))
-        return subplant_facets(self.flora, some, np.full(len(some), side))
+
+def _grown(flora: Flora, some: Branches, orders: int | None = None) -> Things:
+    """Leaves and wood of sub-plants of one species, to the last twig or so many orders only."""
+    rows = len(flora.rows)
+    forms = flora.forms[int(flora.species_of(some.row[:1])[0])]
+    return things_of(flora.rows, forms, some, np.zeros(rows, np.intp), 0, np.ones(rows), orders)
 
 
-class _Own(_Whole):
-    """What the branches of a family themselves bear."""
-
-    def _measure(self) -> None:
-        self.pieces, self.owner = open_subplants(self.flora, self.family)[2:]
-        amounts = piece_amounts(self.flora, self.pieces)
-        area = amounts.leaf_area + amounts.wood_area / 2
-        self.area = np.bincount(self.owner, area, len(self.family))
-
-    def _grown(self, rows, forms, group):
-        return things_of(rows, forms, self.family, group, 0, np.ones(len(rows)), orders=1)
-
-    def facets(self, side: float, copy: int) -> Facets:
-        branches = self.pieces.branches
-        some = replace(self.pieces, branches=replace(branches, key=mix(branches.key + np.uint64(copy + 1))))
-        return piece_facets(self.flora, some, np.full(len(some), side))
+def _optical(amounts: Amounts) -> NDArray[np.float64]:
+    return amounts.leaf_area + amounts.wood_area / 2
 
 
-def _ray_number(point: NDArray[np.int64]) -> NDArray[np.int64]:
+def _ray_numbers(point: NDArray[np.int64]) -> NDArray[np.int64]:
     return (point[:, 0] << 32) + point[:, 1]

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How large the facets are that stand for sub-plants, pieces and polygons, and how many that will make.
 
-About as large as a pixel is wide there; twice that where nobody looks, and there one stands for several leaves, for
+Less than a pixel is wide there; three times that where nobody looks, and there one stands for several leaves, for
 hidden plants only cast shadows and light up others.
 """
 
@@ -20,12 +20,10 @@ from ..refinement.camera import Camera
 from ..refinement.contents import Contents, bounding_cylinders
 
 #: How much larger facets of hidden tetrahedra are.
-COARSE = 2.0
+COARSE = 3.0
 #: Leaves that one of them stands for at least.
 HIDDEN_LEAVES = 8
-#: Facets of explicit polygons in relation to those of plants, and leaves' faces that a hidden one stands for. They are
-#: squares for narrow, clustered cards: in the benchmark of foreign trees twice as many halve the error of the picture.
-FINER = 2 / 3
+#: Leaves' faces of explicit polygons that a hidden facet stands for.
 HIDDEN_FACES = 4
 
 
@@ -104,7 +102,7 @@ class PolygonFacetSizes:
 
     def sides(self, pixels: float) -> NDArray[np.float64]:
         """Sides (n,) of facets, metres, where those of plants that are seen have so many pixels."""
-        fine = FINER * pixels * self.extent
+        fine = pixels * self.extent
         coarse = COARSE * fine
         coarse = np.where(self.leaf, np.maximum(coarse, np.sqrt(HIDDEN_FACES * self.face)), coarse)
         return np.where(self.hidden, coarse, fine)

@@ -1,0 +1,33 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Make the table of facets' shares for the shipped species: ``python -m devtools.facet_tables``."""
+
+from __future__ import annotations
+
+import json
+
+from tetflora_addon.plants.catalogue import list_species, load_species
+from tetflora_addon.plants.compiled import compile_species
+from tetflora_addon.shading import facet_shares
+
+
+def main() -> None:
+    """Fit all species and write them in the order of the catalogue."""
+    facet_shares.TABLE.parent.mkdir(exist_ok=True)
+    facet_shares.TABLE.unlink(missing_ok=True)
+    facet_shares._table.cache_clear()
+    table = {}
+    for identifier in sorted(list_species()):
+        flora = compile_species([load_species(identifier)])
+        found = facet_shares.facet_shares(flora)
+        table[facet_shares.digest(flora, 0)] = {
+            "species": identifier,
+            "whole": found.whole.round(3).tolist(),
+            "own": found.own.round(3).tolist(),
+        }
+        print(identifier, flush=True)
+    facet_shares.TABLE.write_text(json.dumps(table, separators=(",", ":")).replace('},"', '},\n"') + "\n")
+
+
+if __name__ == "__main__":
+    main()
