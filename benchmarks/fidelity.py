@@ -29,7 +29,7 @@ from .report import ROOT, Targets
 #: Left by a run: pictures and records.
 FOLDER = ROOT / "out" / "fidelity"
 PARTS = ("formulas", "frames", "transitions", "time")
-EEVEE_SAMPLES = 8
+EEVEE_SAMPLES = 16
 #: Plants of each species and samples in Cycles by height.
 CYCLES = {12: (4, 256), 50: (2, 384), 200: (1, 96)}
 LIGHTS = ("front", "side", "back", "overcast")

@@ -18,9 +18,9 @@ from examples import stands
 from .compare import flip_map, plant_mask, read_picture, render
 from .row80 import timed_refine
 
-SIZES, QUICK_SIZES = (160, 24), (100, 40)
+SIZES, QUICK_SIZES = (110, 24), (80, 40)
 STEPS, QUICK_STEPS = 4, 1
-SAMPLES, QUICK_SAMPLES = 256, 64
+SAMPLES, QUICK_SAMPLES = 192, 64
 FACTOR = 1.1
 #: Side of the squares of which the worst is told, pixels.
 _SQUARE = 16

@@ -70,10 +70,8 @@ def build(scene: bpy.types.Scene, pixels: int, light: str, each: int, species: t
     return Stand(scene, {name: slice(s * columns, (s + 1) * columns) for s, name in enumerate(species)})
 
 
-def receding(
-    scene: bpy.types.Scene, largest: int, smallest: int, light: str, species: tuple[str, ...] = SPECIES
-) -> None:
-    """Fill an empty scene with plants from left to right, each farther away than the one before, of all `SPECIES` turns about.
+def receding(scene: bpy.types.Scene, largest: int, smallest: int, light: str) -> None:
+    """Fill an empty scene with plants from left to right, each farther away than the one before.
 
     Parameters
     ----------
