@@ -31,7 +31,7 @@ FOLDER = ROOT / "out" / "fidelity"
 PARTS = ("formulas", "frames", "transitions", "time")
 EEVEE_SAMPLES = 16
 #: Plants of each species and samples in Cycles by height.
-CYCLES = {12: (4, 256), 50: (2, 384), 200: (1, 96)}
+CYCLES = {12: (4, 256), 50: (1, 384), 200: (1, 96)}
 LIGHTS = ("front", "side", "back", "overcast")
 EEVEE_LIGHTS = {12: ("side",), 50: ("side", "overcast"), 200: ("side",)}
 

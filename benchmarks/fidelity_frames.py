@@ -26,6 +26,8 @@ from .row80 import timed_refine
 COVERAGE_SAMPLES = 64
 #: Pixels that plants cover by less are not compared.
 LEAST_COVERAGE = 0.05
+#: From this height on the noise of expanded plants is measured in the first light only, which saves minutes.
+LARGE = 200
 EXPANDED, AGAIN = "EXPANDED", "AGAIN"
 
 
@@ -62,7 +64,8 @@ class Frame:
     pixels, each, light, engine, form, species
         Which frame this is.
     flip, noise : float
-        Mean FLIP of the form; of the expanded plants with another seed (NaN in EEVEE, which has no seeds).
+        Mean FLIP of the form, and of the expanded plants with another seed; NaN where that was not rendered (EEVEE has
+        no seeds).
     dT : float
         Mean difference of transmittance, form less expanded.
     colour, brightness : float
@@ -146,9 +149,9 @@ class _Stand:
         covered = coverage(self.scene, self.folder / "coverage.png", COVERAGE_SAMPLES)
         self.mask = covered > LEAST_COVERAGE
         for one in series:
-            for light in one.lights:
+            for number, light in enumerate(one.lights):
                 self._render(one, light, EXPANDED, 0)
-                if one.engine == "cycles":
+                if one.engine == "cycles" and (number == 0 or self.pixels < LARGE):
                     self._render(one, light, AGAIN, 1)
         for form in chosen:
             bare: dict[str, NDArray] = {}
