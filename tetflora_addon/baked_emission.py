@@ -21,7 +21,7 @@ from .refinement.light_views import Light
 from .refinement.loop import Refinement
 from .shading.illumination import Illumination
 from .shading.light_clouds import Clouds, cell_of_node
-from .shading.light_passes import light_resolution, to_eye
+from .shading.light_passes import Near, light_resolution, to_eye
 from .shading.light_sheets import Sheets
 from .shading.light_sources import World
 from .shading.microsurfaces import Facets
@@ -31,6 +31,9 @@ from .shading.shadow_pass import shadow_steps
 AT_ONCE = 1 << 16
 #: Longer side in pixels of a lamp's buffer at most, with ground in it and without.
 GROUND_PIXELS, OPEN_PIXELS = 1024, 4096
+#: What is nearer to the camera than these shares of the farthest leaf is seen by suns in views of its own, if so many
+#: sheets are there.
+NEAR_SHARES, NEAR_SHEETS = (1 / 32, 1 / 8), 1000
 
 
 @dataclass(frozen=True)
@@ -206,11 +209,15 @@ def baked_light(
     # A leaf that reaches out of all tetrahedra that hold something has no cell; it shadows like the others.
     sheets = replace(Sheets.of(corners, inside, len(clouds)), replaced=replaced)
     yield 0.05
-    resolution = light_resolution(camera)
+    resolution, near = light_resolution(camera), None
     if len(corners):
         # Ground is drawn into each pixel, sheets only where they are.
-        resolution = sheets.pixels((resolution // 2, OPEN_PIXELS if not len(sources.occluders) else GROUND_PIXELS))
-    found = yield from shadow_steps(
-        clouds, (*sources.lights,), sources.world, sources.occluders, resolution, sources.ground, sheets=sheets
-    )
+        most = GROUND_PIXELS if len(sources.occluders) else OPEN_PIXELS
+        resolution = sheets.pixels((resolution // 2, most))
+        if resolution == most and camera.kind != "ORTHO":
+            away = np.linalg.norm(corners[:, 0] - camera.position, axis=1)
+            radii = (share * away.max() for share in NEAR_SHARES)
+            near = Near(camera.position, tuple(r for r in radii if (away < r).sum() >= NEAR_SHEETS))
+    scene = sources.lights, sources.world, sources.occluders
+    found = yield from shadow_steps(clouds, *scene, resolution, sources.ground, sheets=sheets, near=near)
     return BakedLight(found, inside, camera)

@@ -11,7 +11,7 @@ import pytest
 
 from devtools import session
 from tests.blender.renders import compat, picture, small_scene
-from tests.blender.scenes import add_mesh, depsgraph, part
+from tests.blender.scenes import add_mesh, add_plant, datablocks, depsgraph, part
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 UP = np.array([[0.0, 0.0, 1.0]])
@@ -190,3 +190,164 @@ def test_it_throws_a_shadow_and_lights_nothing():
     assert picture().mean() == pytest.approx(1.0, rel=0.02)
     baked_square((50.0, 50.0, 50.0), (50.0, 50.0, 50.0), colour=0.0)
     assert picture().mean() < 0.02
+
+
+FORMS = ['MICROSURFACES', 'SHELLS', 'MICROSPHERES']
+
+
+def bush_before_the_sky(engine='CYCLES', samples=16):
+    """A bush that is proxies for the most part, in sun and skylight, 48 pixels wide; gives the scene."""
+    import bpy
+
+    small_scene(sky=0.4, samples=samples, sun=40.0, size=48, width=3.6)
+    scene = bpy.context.scene
+    scene.render.engine = engine if engine == 'CYCLES' else compat().eevee_engine()
+    scene.cycles.transparent_max_bounces = scene.cycles.min_transparent_bounces = 256
+    scene.camera.location, scene.camera.rotation_euler = (0.0, -50.0, 1.3), (pi / 2, 0.0, 0.0)
+    add_plant("bush", "bush")
+    scene.tetflora.refine_at_render = False
+    scene.tetflora.leaf_limit = 2.5
+    return scene
+
+
+def refined(scene, **settings):
+    for name, value in settings.items():
+        setattr(scene.tetflora, name, value)
+    return part("job").refine(scene, depsgraph())
+
+
+def results(scene, *kinds):
+    return [o for o in scene.objects if o.get("tetflora_kind") in kinds]
+
+
+@pytest.mark.parametrize("engine", ['CYCLES', 'EEVEE'])
+@pytest.mark.parametrize(("form", "bound"), [('MICROSURFACES', 0.2), ('MICROSPHERES', 0.25), ('SHELLS', 0.35)])
+def test_baked_proxies_are_as_bright_as_lit_ones(form, bound, engine):
+    """Mean over the plant, told by what its darkness leaves of the sky; EEVEE lights shells and spheres its own way."""
+    scene = bush_before_the_sky(engine)
+    lit = refined(scene, proxy_form=form)
+    assert lit.polygons_proxy > 200
+    one = picture()
+    baked = refined(scene, baked_light='PROXIES')
+    other = picture()
+    assert baked.polygons_proxy == lit.polygons_proxy
+    assert "light" in baked.seconds
+    plant = one.mean(axis=2) < 0.36  # the sky is .4
+    assert plant.mean() > 0.1
+    assert other[plant].mean() == pytest.approx(one[plant].mean(), rel=bound if engine == 'CYCLES' else 2 * bound)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_baked_pictures_have_next_to_no_noise(form):
+    """Two seeds: what a pixel of the plant differs by, in the median, as edges of facets are noise by themselves.
+
+    For the same reason all samples are taken in the middle of their pixel.
+    """
+    scene = bush_before_the_sky(samples=16)
+    scene.cycles.pixel_filter_type, scene.cycles.filter_width = 'BLACKMAN_HARRIS', 0.01
+
+    def noise():
+        pictures = []
+        for seed in (1, 2):
+            scene.cycles.seed = seed
+            pictures.append(picture())
+        return np.median(np.abs(pictures[1] - pictures[0])[pictures[0].mean(axis=2) < 0.35])
+
+    refined(scene, proxy_form=form)
+    lit = noise()
+    refined(scene, baked_light='ALL')
+    assert noise() < 0.1 * lit
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("baked", ['PROXIES', 'ALL'])
+def test_clear_and_esc_leave_nothing_of_baked_light(form, baked):
+    scene = bush_before_the_sky()
+    scene.tetflora.proxy_form, scene.tetflora.baked_light = form, baked
+    before = datablocks()
+    refined(scene)
+    assert results(scene, "proxy")
+    part("job").clear(scene)
+    assert datablocks() == before
+    job = part("job").refine_steps(scene, depsgraph())
+    for progress in job:
+        if "shadows" in progress.message:
+            break
+    job.close()
+    assert datablocks() == before
+
+
+def test_real_leaves_show_baked_light_only_if_asked_for_and_materials_stay():
+    scene = bush_before_the_sky()
+    scene.tetflora.leaf_limit = 0.5
+    refined(scene)
+    assert len(results(scene, "leaf", "bark")) > 1
+    lit = [m.name for o in results(scene, "leaf", "bark") for m in o.data.materials]
+    assert part("baked_material").BAKED not in lit
+    refined(scene, baked_light='PROXIES')
+    assert [m.name for o in results(scene, "leaf", "bark") for m in o.data.materials] == lit
+    assert all("tf_light_front" not in o.data.attributes for o in results(scene, "leaf", "bark"))
+    refined(scene, baked_light='ALL')
+    real = results(scene, "leaf", "bark")
+    assert {m.name for o in real for m in o.data.materials} == {part("baked_material").BAKED}
+    for made in real:
+        layer = made.data.attributes["tf_light_front"]
+        assert layer.domain == ('POINT' if made["tetflora_kind"] == "bark" else 'FACE')
+        values = np.zeros(3 * len(layer.data), np.float32)
+        layer.data.foreach_get("vector", values)
+        assert np.isfinite(values).all()
+        assert values.min() >= 0.0
+        assert values.max() > 0.01
+
+
+def test_meshes_that_hide_plants_throw_shadows_and_light():
+    """A roof takes the sun away; black ground takes what white ground gives."""
+    import bpy
+
+    scene = bush_before_the_sky()
+    scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.0, 0.0, 0.0, 1.0)
+
+    def mean():
+        refined(scene, baked_light='PROXIES')
+        layer = results(scene, "proxy")[0].data.attributes["tf_light_front"]
+        values = np.zeros(3 * len(layer.data), np.float32)
+        layer.data.foreach_get("vector", values)
+        return values.mean()
+
+    free = mean()
+    ground = add_mesh(size=8.0, z=-0.05)
+    ground.tetflora.is_occluder = True
+    material = bpy.data.materials.new("ground")
+    tree = compat().shader_tree(material)
+    principled = next(n for n in tree.nodes if n.type == 'BSDF_PRINCIPLED')
+    ground.data.materials.append(material)
+    colours = {}
+    for value in (0.0, 0.8):
+        principled.inputs["Base Color"].default_value = (value, value, value, 1.0)
+        colours[value] = mean()
+    assert colours[0.0] == pytest.approx(free, rel=0.05)
+    assert colours[0.8] > 1.1 * free
+    ground.location.z = 4.0
+    principled.inputs["Base Color"].default_value = (0.0, 0.0, 0.0, 1.0)
+    assert mean() < 0.02 * free
+
+
+def test_shells_follow_the_scene_and_old_groups_give_way():
+    scene = bush_before_the_sky()
+    refined(scene, proxy_form='SHELLS', shell_diffuse=0.5, shell_spear=20.0, shell_roundness=0.25)
+
+    def group():
+        material = results(scene, "proxy")[0].data.materials[0]
+        return next(n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeGroup")
+
+    found = {name: group().inputs[name].default_value for name in ("p", "s", "spear", "Roundness", "Variation")}
+    assert found == pytest.approx({"p": 0.5, "s": 0.04, "spear": 20.0, "Roundness": 0.25, "Variation": 0.05})
+    refined(scene, shell_diffuse=1.0)
+    assert group().inputs["p"].default_value == 1.0
+    version = part("node_tools").VERSION
+    old, material = group().node_tree, results(scene, "proxy")[0].data.materials[0]
+    old[version] -= 1
+    material[version] -= 1
+    refined(scene)
+    assert group().node_tree != old
+    assert "(version " in old.name

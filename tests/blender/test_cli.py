@@ -56,6 +56,15 @@ def test_refine_saves_a_copy_with_the_result(forest, tmp_path, capfd):
     assert part("job").clear(bpy.context.scene) > 0
 
 
+def test_light_is_baked_on_demand(forest, tmp_path, capfd):
+    assert _run("refine", "--baked-light", "all", "--json") == 0
+    assert "light" in _figures(capfd)["seconds"]
+    assert forest.tetflora.baked_light == 'ALL'
+    assert _run("render", "--baked-light", "off", "--form", "shells", "--output", tmp_path / "lit.png", "--json") == 0
+    assert "light" not in _figures(capfd)["seconds"]
+    assert (forest.tetflora.baked_light, forest.tetflora.proxy_form) == ('OFF', 'SHELLS')
+
+
 def test_render_writes_the_files_that_it_names(forest, tmp_path, capfd):
     before = datablocks()
     assert _run("render", "--frame", 7, "--output", tmp_path / "still_###", "--samples", 2, "--json") == 0

@@ -267,19 +267,41 @@ def test_the_real_job_puts_plants_into_the_picture_and_leaves_none_behind(stage,
     assert part("handlers").render_errors() == []
 
 
-def test_shells_are_rendered_with_enough_transparent_bounces_and_the_setting_comes_back(stage, tmp_path):
+@pytest.mark.parametrize("baked", ['OFF', 'PROXIES'])
+def test_shells_are_rendered_with_enough_transparent_bounces_and_the_settings_come_back(stage, tmp_path, baked):
+    """Baked shells need as many as others do."""
     import bpy
 
     scene = bpy.context.scene
-    scene.cycles.transparent_max_bounces = 8
-    scene.tetflora.proxy_form = 'SHELLS'
+    scene.cycles.transparent_max_bounces, scene.cycles.min_transparent_bounces = 8, 2
+    scene.tetflora.proxy_form, scene.tetflora.baked_light = 'SHELLS', baked
+    assert "too few" in part("shell_bounces").few_bounces(scene)
     seen = []
-    read = lambda *_: seen.append(scene.cycles.transparent_max_bounces)  # noqa: E731
+
+    def read(*_):
+        seen.append((scene.cycles.transparent_max_bounces, scene.cycles.min_transparent_bounces))
+
     bpy.app.handlers.render_post.append(read)
     try:
         scene.render.filepath = str(tmp_path / "shells.png")
         bpy.ops.render.render(write_still=True)
     finally:
         bpy.app.handlers.render_post.remove(read)
-    assert seen == [256]
-    assert scene.cycles.transparent_max_bounces == 8
+    assert seen == [(256, 256)]
+    assert (scene.cycles.transparent_max_bounces, scene.cycles.min_transparent_bounces) == (8, 2)
+    scene.cycles.transparent_max_bounces = 128
+    assert not part("shell_bounces").few_bounces(scene)
+
+
+def test_baked_light_is_made_for_each_render_and_outlives_the_file(stage, tmp_path):
+    import bpy
+
+    scene = bpy.context.scene
+    scene.tetflora.baked_light = 'ALL'
+    before = datablocks()
+    _still(scene, tmp_path / "baked.png")
+    assert "light" in json.loads(scene.tetflora.statistics)["seconds"]
+    assert datablocks() == before
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "baked.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "baked.blend"))
+    assert bpy.context.scene.tetflora.baked_light == 'ALL'

@@ -112,6 +112,10 @@ class LightBuffer:
         A sheet that covers the share c of a pixel lets 1 − c through: its optical depth is −ln (1 − c).
         """
         across = self.camera.pixel_size * self.camera.width / self.width
+        seen = np.flatnonzero(self._near_view(sheets, 2.0 * across))
+        numbers, sheets = seen, sheets[seen]
+        if not len(sheets):
+            return
         centre = sheets.mean(axis=1)
         vector = np.cross(sheets[:, 2] - sheets[:, 0], sheets[:, 3] - sheets[:, 1]) / 2.0
         if self.camera.kind == "ORTHO":
@@ -141,7 +145,24 @@ class LightBuffer:
             share = np.bincount(own.ravel(), (seen / pixel_area)[owner] / count**2, len(key))
             metres = np.bincount(own.ravel(), taps.metres, len(key)) / np.maximum(np.bincount(own.ravel()), 1)
             depth = -np.log1p(-np.minimum(share, _MOST_COVERED))
-            yield owner[first].astype(np.int32), nearest[first].astype(np.int32), metres, np.zeros(len(key)), depth
+            yield (
+                numbers[owner[first]].astype(np.int32),
+                nearest[first].astype(np.int32),
+                metres,
+                np.zeros(len(key)),
+                depth,
+            )
+
+    def _near_view(self, sheets: NDArray[np.floating], margin: float) -> NDArray[np.bool_]:
+        """Which sheets (m,) may reach into a sun's view, which may be a part of the scene; of other lights all."""
+        if self.camera.kind != "ORTHO":
+            return np.ones(len(sheets), bool)
+        left, right, bottom, top = self.camera.window
+        inside = np.ones(len(sheets), bool)
+        for axis, low, high in ((0, left, right), (1, bottom, top)):
+            place = (sheets - self.camera.position) @ self.camera.frame[:, axis]
+            inside &= (place.max(axis=1) >= low - margin) & (place.min(axis=1) <= high + margin)
+        return inside
 
     def __len__(self) -> int:
         return len(self._pixel)

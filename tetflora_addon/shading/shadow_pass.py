@@ -14,7 +14,7 @@ from .illumination import Illumination, Lit
 from .light_buffers import LightBuffer
 from .light_clouds import Clouds
 from .light_directions import DIRECTIONS
-from .light_passes import buffers_of
+from .light_passes import Near, buffers_of
 from .light_sheets import Sheets
 from .light_sources import World, split_areas
 
@@ -83,13 +83,14 @@ def shadow_steps(
     ground: ArrayLike = (0.0, 0.0, 0.0),
     orders: int = ORDERS,
     sheets: Sheets | None = None,
+    near: Near | None = None,
 ) -> Generator[float, None, Illumination]:
-    """`shadow_pass` step by step: the share that is done."""
+    """`shadow_pass` step by step: the share that is done; what is ``near`` gets buffers of its own from suns."""
     sheets = Sheets.none(len(clouds)) if sheets is None else sheets
     lamps = []
     split = split_areas(tuple(lights))
     for number, light in enumerate(split):
-        buffers = buffers_of(light, clouds, sheets, occluders, resolution) if light.shadow else []
+        buffers = buffers_of(light, clouds, sheets, occluders, resolution, near) if light.shadow else []
         lamps.append(Lit(light, buffers))
         yield 0.3 * (number + 1) / len(split)
     fewer, number = sheets.thinned(SKY_SHEETS)
