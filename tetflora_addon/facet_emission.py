@@ -5,16 +5,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .buffers import BLOCK_POLYGONS, MeshBuffers, PointBuffers
 from .plants.compiled import Flora
-from .plants.expansion import chunks
+from .plants.expansion import chunks, open_subplants
+from .plants.growth import Branches
+from .plants.pieces import Pieces
 from .refinement.camera import Camera
+from .refinement.contents import Contents
 from .refinement.decisions import Decision
 from .refinement.loop import Refinement
+from .refinement.transition import Transition
 from .shading.facet_shares import facet_shares
 from .shading.facet_sizes import HIDDEN_LEAVES, piece_facet_sizes, subplant_facet_sizes
 from .shading.microspheres import spheres
@@ -31,8 +37,13 @@ from .shading.polygon_facets import polygon_facets
 #: Facets that are made at a time, about; thick wood close to the eye is cut into very many.
 FACETS_AT_ONCE = 200_000
 
+#: Pixels down to which sub-plants are opened that are real only in part.
+DETAIL = 2.0
 
-def facet_blocks(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.4) -> Iterator[MeshBuffers]:
+
+def facet_blocks(
+    flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.33, transition: Transition | None = None
+) -> Iterator[MeshBuffers]:
     """Proxies as microsurfaces: facets of all that is not explicit, and of no polygon that is kept as it is.
 
     Meshes have about `BLOCK_POLYGONS` facets each, so that only one of them is held at a time beside Blender's own.
@@ -44,19 +55,27 @@ def facet_blocks(flora: Flora, result: Refinement, camera: Camera, facet_pixels:
     camera : Camera
     facet_pixels : float
         Side of a facet that is seen, in pixels; see `shading.facet_sizes` for the others.
+    transition : Transition, optional
+        With it, what is too small in explicit tetrahedra gets facets too, and thick wood elsewhere gets none; as
+        `emission.explicit_blocks` with the same makes the rest.
     """
-    for parts in facet_parts(flora, result, camera, facet_pixels):
+    for parts in facet_parts(flora, result, camera, facet_pixels, transition):
         yield facet_mesh(concatenate_facets([facets for facets, _ in parts]))
 
 
 def sphere_blocks(
-    flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.4, disc: float = np.pi
+    flora: Flora,
+    result: Refinement,
+    camera: Camera,
+    facet_pixels: float = 0.33,
+    disc: float = np.pi,
+    transition: Transition | None = None,
 ) -> Iterator[PointBuffers]:
     """Proxies as microspheres, one for each facet of `facet_blocks`; parameters and size of blocks are the same.
 
     What is drawn of a sphere of radius 1 has the area ``disc``, see `shading.microspheres`.
     """
-    for parts in facet_parts(flora, result, camera, facet_pixels):
+    for parts in facet_parts(flora, result, camera, facet_pixels, transition):
         yield spheres(parts, camera, disc)
 
 
@@ -64,10 +83,12 @@ def sphere_blocks(
 Part = tuple[Facets, bool]
 
 
-def facet_parts(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float) -> Iterator[list[Part]]:
+def facet_parts(
+    flora: Flora, result: Refinement, camera: Camera, facet_pixels: float, transition: Transition | None = None
+) -> Iterator[list[Part]]:
     """Facets in blocks of about `BLOCK_POLYGONS`, none of them empty."""
     parts: list[Part] = []
-    for made in _facets(flora, result, camera, facet_pixels):
+    for made in _facets(flora, result, camera, facet_pixels, transition):
         if len(made[0]):
             parts.append(made)
         if sum(len(facets) for facets, _ in parts) >= BLOCK_POLYGONS:
@@ -77,42 +98,119 @@ def facet_parts(flora: Flora, result: Refinement, camera: Camera, facet_pixels: 
         yield parts
 
 
-def _facets(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float) -> Iterator[Part]:
+def _facets(
+    flora: Flora, result: Refinement, camera: Camera, facet_pixels: float, transition: Transition | None
+) -> Iterator[Part]:
     """Facets in runs of about `FACETS_AT_ONCE`."""
-    contents = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN))
+    explicit = result.chosen(Decision.EXPLICIT) if transition else np.zeros(len(result.tree), bool)
+    contents = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN) | explicit)
+    if transition is not None:
+        contents = _in_detail(contents, explicit, transition)
     hidden, shares = result.chosen(Decision.HIDDEN), facet_shares(flora)
-    subplants, pieces = contents.subplants, contents.pieces
-    for things, row, cell, sizes, make, share_of in (
+    for things, cell, sizes, share_of, make in (
         (
-            subplants,
-            subplants.row,
+            contents.subplants,
             contents.subplant_cell,
             subplant_facet_sizes(flora, contents, camera, hidden),
-            subplant_facets,
             shares.of_subplants,
+            partial(_of_subplants, flora, transition),
         ),
         (
-            pieces,
-            pieces.branches.row,
+            contents.pieces,
             contents.piece_cell,
             piece_facet_sizes(flora, contents, camera, hidden),
-            piece_facets,
             shares.of_pieces,
+            partial(_of_pieces, flora, transition),
         ),
     ):
         leaf, wood = sizes.sides(facet_pixels)
+        row = things.row if isinstance(things, Branches) else things.branches.row
         share = share_of(row, sizes.whole_optical / np.maximum(leaf, 1e-12) ** 2)
         expected = sizes.counts(facet_pixels) + 1
-        inside = result.in_view[cell]
+        inside, real = result.in_view[cell], explicit[cell]
         for nobody_looks in (False, True):
             for i in _runs(expected, np.flatnonzero(inside & (sizes.hidden == nobody_looks))):
-                yield make(flora, things.take(i), leaf[i], wood[i], share[i]), not nobody_looks
+                yield make(things.take(i), leaf[i], wood[i], share[i], real[i], ~sizes.hidden[i]), not nobody_looks
         # What is beside the view must not reach into the picture.
         for i in _runs(expected, np.flatnonzero(~inside)):
-            made = make(flora, things.take(i), leaf[i], wood[i], share[i])
+            made = make(things.take(i), leaf[i], wood[i], share[i], real[i], np.zeros(len(i), bool))
             yield kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5), False
-    if len(contents.polygons):
-        yield from polygon_facets(contents, result, camera, facet_pixels)
+    proxies = contents.within(~explicit)
+    if len(proxies.polygons):
+        yield from polygon_facets(proxies, result, camera, facet_pixels)
+
+
+def _in_detail(contents: Contents, explicit: NDArray[np.bool_], transition: Transition) -> Contents:
+    """Contents without what is real altogether, and with small sub-plants only of what is partly so.
+
+    Explicit tetrahedra are not divided as far as others: their sub-plants may be dozens of pixels large.
+    """
+    flora, camera = transition.flora, transition.camera
+    some, cell = contents.subplants, contents.subplant_cell
+    pieces, piece_cell = [contents.pieces], [contents.piece_cell]
+    placed, placed_cell = [], []
+    while len(some):
+        inside = explicit[cell]
+        left = np.flatnonzero(~inside | (transition.of_branches(some) < 1.0))
+        some, cell, inside = some.take(left), cell[left], inside[left]
+        bound = flora.sampled_bound[some.row]
+        extent = np.maximum(2.0 * bound[:, 0], bound[:, 2] - bound[:, 1]) * some.length
+        large = inside & (extent > DETAIL * camera.extent_around(some.position))
+        placed.append(some.take(~large))
+        placed_cell.append(cell[~large])
+        some, cell = some.take(large), cell[large]
+        if len(some):
+            grown, owner, own, own_owner = open_subplants(flora, some)
+            pieces.append(own)
+            piece_cell.append(cell[own_owner])
+            some, cell = grown, cell[owner]
+    made = Contents.of(
+        flora,
+        Branches.concatenate(placed or [Branches.empty()]),
+        np.concatenate(placed_cell or [contents.subplant_cell]),
+        Pieces.concatenate(pieces),
+        np.concatenate(piece_cell),
+    )
+    polygons = {name: getattr(contents, name) for name in ("polygons", "polygon_cell", "polygon_amounts")}
+    return replace(made, **polygons)
+
+
+def _of_subplants(
+    flora: Flora,
+    transition: Transition | None,
+    subplants: Branches,
+    leaf: NDArray[np.float64],
+    wood: NDArray[np.float64],
+    share: NDArray[np.float64],
+    explicit: NDArray[np.bool_],
+    seen: NDArray[np.bool_],
+) -> Facets:
+    """Facets of sub-plants; of those in explicit tetrahedra, what is too small to be real."""
+    if not explicit.any():
+        return subplant_facets(flora, subplants, leaf, wood, share)
+    real = np.where(explicit, transition.of_branches(subplants), 0.0)
+    some = np.flatnonzero(real < 1.0)
+    return subplant_facets(flora, subplants.take(some), leaf[some], wood[some], share[some], real[some])
+
+
+def _of_pieces(
+    flora: Flora,
+    transition: Transition | None,
+    pieces: Pieces,
+    leaf: NDArray[np.float64],
+    wood: NDArray[np.float64],
+    share: NDArray[np.float64],
+    explicit: NDArray[np.bool_],
+    seen: NDArray[np.bool_],
+) -> Facets:
+    """Facets of pieces; without thick wood, which is real wherever it is seen."""
+    if transition is None:
+        return piece_facets(flora, pieces, leaf, wood, share)
+    real = np.where(explicit, transition.of_branches(pieces.branches), 0.0)
+    tubes = np.where(explicit, transition.of_wood(pieces), seen & transition.of_wood(pieces, leaves_too=False))
+    some = np.flatnonzero(~tubes | (real < 1.0))
+    sides = leaf[some], wood[some], share[some]
+    return piece_facets(flora, pieces.take(some), *sides, real[some], tubes[some])
 
 
 def _runs(expected: NDArray[np.float64], chosen: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:

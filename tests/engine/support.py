@@ -235,6 +235,6 @@ def moment(*meshes: MeshBuffers) -> NDArray[np.float64]:
     return scaled.T @ scaled / areas.sum()
 
 
-def facet_buffers(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.4) -> MeshBuffers | None:
+def facet_buffers(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.33) -> MeshBuffers | None:
     """All facets of proxies in one mesh; None where there are none."""
     return concatenate_buffers(list(facet_blocks(flora, result, camera, facet_pixels)))

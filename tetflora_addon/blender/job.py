@@ -26,6 +26,7 @@ from ..refinement.polygons import Polygons
 from ..refinement.settings import RefinementSettings
 from ..refinement.statistics import Statistics, Stopwatch
 from ..refinement.steps import step_of
+from ..refinement.transition import Transition
 from .baked_material import baked_material
 from .baking import Baking, read_sources
 from .camera_reader import read_camera
@@ -184,7 +185,8 @@ def refine_steps(
             baking = None
             if given.sources is not None:
                 baking = Baking(given.sources, leaves=scene.tetflora.baked_light == 'ALL')
-            blocks = emission.explicit_blocks(flora, refinement)
+            transition = Transition(flora, camera, settings.leaf_limit) if facets else None
+            blocks = emission.explicit_blocks(flora, refinement, transition)
             yield from _write_blocks(results, flora, blocks, statistics, _LOOP_SHARE, baking)
             if given.explicit is not None:
                 originals = given.explicit.originals
@@ -192,10 +194,10 @@ def refine_steps(
                 yield from _write_polygons(results, given.explicit, kept, statistics, baking)
             if baking is not None:
                 clock.lap("emit")
-                yield from _bake(baking, flora, refinement, camera, side if facets else None)
+                yield from _bake(baking, flora, refinement, camera, side if facets else None, transition)
                 clock.lap("light")
             yield Progress(0.95, "Making proxies")
-            for done in write_proxies(results, flora, refinement, camera, statistics, side, baking):
+            for done in write_proxies(results, flora, refinement, camera, statistics, side, transition, baking):
                 yield Progress(0.95 + 0.05 * done, f"Making proxies: {statistics.polygons_proxy:,}")
         clock.lap("emit")
     except BaseException:  # an error, Esc (GeneratorExit) or Ctrl+C: nothing of ours may stay behind
@@ -322,11 +324,16 @@ def _write_polygons(
 
 
 def _bake(
-    baking: Baking, flora: Flora, refinement: Refinement, camera: Camera, facet_pixels: float | None
+    baking: Baking,
+    flora: Flora,
+    refinement: Refinement,
+    camera: Camera,
+    facet_pixels: float | None,
+    transition: Transition | None,
 ) -> Generator[Progress, None, None]:
     """Find the light of all that is drawn, and give it to meshes; facets of so many pixels, none for shells."""
     if facet_pixels is not None:
-        for count in tell_facets(baking, flora, refinement, camera, facet_pixels):
+        for count in tell_facets(baking, flora, refinement, camera, facet_pixels, transition):
             yield Progress(0.9, f"Baking light: {count:,} facets")
     for done in baking.look(flora, refinement, camera, facet_pixels is not None):
         yield Progress(0.9 + 0.03 * done, f"Baking light: {done:.0%} of the shadows")

@@ -235,7 +235,7 @@ class TetFloraScene(RefinementProperties, bpy.types.PropertyGroup):
                 'PROXIES',
                 "Baked for Proxies",
                 "Proxies show light that was worked out before; real leaves and bark are lit by the renderer",
-                'LIGHTPROBE_VOLUME' if bpy.app.version >= (4, 1, 0) else 'LIGHTPROBE_GRID',
+                'LIGHT_SUN',
                 1,
             ),
             (

@@ -16,6 +16,7 @@ from ..plants.compiled import Flora
 from ..refinement.camera import Camera
 from ..refinement.loop import Refinement
 from ..refinement.statistics import Statistics
+from ..refinement.transition import Transition
 from ..shading.microspheres import spheres
 from ..shading.microsurfaces import concatenate_facets, facet_mesh
 from .baked_material import baked_attributes, baked_material
@@ -43,6 +44,7 @@ def write_proxies(
     camera: Camera,
     statistics: Statistics,
     facet_pixels: float,
+    transition: Transition | None,
     baking: Baking | None = None,
 ) -> Generator[float, None, None]:
     """Proxies in the form that the scene asks for; yields the share that is done, about.
@@ -57,6 +59,8 @@ def write_proxies(
         Gets the number of faces or points, and their memory.
     facet_pixels : float
         Side of facets and spheres, pixels.
+    transition : Transition or None
+        As for `emission.explicit_blocks`.
     baking : Baking, optional
         Told of all that is drawn; its light is what proxies show. Of them it has been told last, by `tell_facets`.
     """
@@ -69,14 +73,18 @@ def write_proxies(
         blocks, facet_pixels = iter([] if shells is None else [shells]), 0.0
         material = baked_shell_material if baked else shell_material
     elif baked:
-        blocks, material = _baked_blocks(results, flora, refinement, camera, facet_pixels, baking), baked_material
+        blocks, material = (
+            _baked_blocks(results, flora, refinement, camera, facet_pixels, transition, baking),
+            baked_material,
+        )
         add = results.add_points if form == 'MICROSPHERES' else add
     elif form == 'MICROSPHERES':
         disc = drawn_disc(scene.render.engine)
-        blocks = facet_emission.sphere_blocks(flora, refinement, camera, facet_pixels, disc)
+        blocks = facet_emission.sphere_blocks(flora, refinement, camera, facet_pixels, disc, transition)
         add, material = results.add_points, sphere_material
     else:
-        blocks, material = facet_emission.facet_blocks(flora, refinement, camera, facet_pixels), proxy_material
+        blocks = facet_emission.facet_blocks(flora, refinement, camera, facet_pixels, transition)
+        material = proxy_material
     statistics.facet_pixels = facet_pixels
     for number, buffers in enumerate(blocks):
         made = material()
@@ -89,14 +97,19 @@ def write_proxies(
 
 
 def tell_facets(
-    baking: Baking, flora: Flora, refinement: Refinement, camera: Camera, facet_pixels: float
+    baking: Baking,
+    flora: Flora,
+    refinement: Refinement,
+    camera: Camera,
+    facet_pixels: float,
+    transition: Transition | None,
 ) -> Iterator[int]:
     """Tell of the facets that `write_proxies` is going to make; yields how many there are so far.
 
     They are made twice, and not kept: all of them at once may be more than memory holds.
     """
     count = 0
-    for parts in facet_emission.facet_parts(flora, refinement, camera, facet_pixels):
+    for parts in facet_emission.facet_parts(flora, refinement, camera, facet_pixels, transition):
         for facets, _ in parts:
             baking.sheets.add_facets(facets)
             count += len(facets)
@@ -115,13 +128,19 @@ def shade_shells(material: bpy.types.Material, scene: bpy.types.Scene) -> None:
 
 
 def _baked_blocks(
-    results: Results, flora: Flora, refinement: Refinement, camera: Camera, facet_pixels: float, baking: Baking
+    results: Results,
+    flora: Flora,
+    refinement: Refinement,
+    camera: Camera,
+    facet_pixels: float,
+    transition: Transition | None,
+    baking: Baking,
 ) -> Iterator[MeshBuffers | PointBuffers]:
     """Facets or spheres with their light; they are the last of the sheets."""
     points = results.scene.tetflora.proxy_form == 'MICROSPHERES'
     disc = drawn_disc(results.scene.render.engine)
     first = baking.first_facet
-    for parts in facet_emission.facet_parts(flora, refinement, camera, facet_pixels):
+    for parts in facet_emission.facet_parts(flora, refinement, camera, facet_pixels, transition):
         facets = concatenate_facets([some for some, _ in parts])
         sheets = np.arange(first, first + len(facets))
         first += len(facets)

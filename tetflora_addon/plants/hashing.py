@@ -48,6 +48,7 @@ class Draw(IntEnum):
     SPURS_ROUND = 22
     SPUR_START = 23
     LEAF_FORM = 24
+    TRANSITION = 25
     BEND = 32  # one for each segment and axis from here on
 
 

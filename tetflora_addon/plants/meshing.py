@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -25,7 +25,8 @@ from .foliage import (
     place_leaves,
     settled,
 )
-from .growth import axes, leaf_counts, spread
+from .growth import Branches, axes, leaf_counts, spread
+from .hashing import Draw, uniform
 from .pieces import Pieces
 from .stems import Stems
 
@@ -53,7 +54,13 @@ class LeafMesh:
     buffers: MeshBuffers
 
 
-def leaf_meshes(flora: Flora, pieces: Pieces, species: int, stems: Sequence[Stems] = ()) -> Iterator[LeafMesh]:
+def leaf_meshes(
+    flora: Flora,
+    pieces: Pieces,
+    species: int,
+    stems: Sequence[Stems] = (),
+    share_of: Callable[[Branches], NDArray[np.float64]] | None = None,
+) -> Iterator[LeafMesh]:
     """Copies of the leaf models for the leaves on branches of one species, form by form.
 
     Parameters
@@ -65,8 +72,13 @@ def leaf_meshes(flora: Flora, pieces: Pieces, species: int, stems: Sequence[Stem
         Index into the flora's species.
     stems : sequence of Stems
         Whole branches.
+    share_of : callable, optional
+        Share (n,) of the leaves of branches that are wanted; numbers of the leaves' own say which.
     """
     groups = [*_of_pieces(flora, pieces), *(group for some in stems for group in _of_stems(flora, some))]
+    if share_of is not None:
+        for group in groups:
+            group.share = share_of(group.stems.branches)
     for kind in sorted({group.kind for group in groups}):
         own = [group for group in groups if group.kind == kind]
         forms = flora.forms[species][kind]
@@ -130,16 +142,17 @@ class _Bearers:
         self, flora: Flora, row: int, stems: Stems, counts: NDArray, low: NDArray, number: NDArray[np.int64]
     ) -> None:
         self.flora, self.stems, self.counts, self.low, self.number = flora, stems, counts, low, number
+        self.share: NDArray[np.float64] | None = None
         self.row = np.array([row])
         self.kind = int(flora.rows["leaf_kind"][row])
 
     def numbers(self, forms: int) -> NDArray[np.int64]:
         """How many leaves there are of each form."""
-        if forms == 1:
+        if forms == 1 and self.share is None:
             return np.array([self.number.sum()])
         out = np.zeros(forms, np.int64)
         for part in self._chunks(1):
-            key = leaf_keys(self.stems.branches.take(part), *self._leaves(part))
+            key = self._leaves(part)[2]
             out += np.bincount(leaf_forms(forms, key), minlength=forms)
         return out
 
@@ -148,8 +161,7 @@ class _Bearers:
         rows = self.flora.rows
         for part in self._chunks(len(copies.model.positions)):
             bearers = self.stems.take(part)
-            owner, index = self._leaves(part)
-            key = leaf_keys(bearers.branches, owner, index)
+            owner, index, key = self._leaves(part)
             if forms > 1:
                 chosen = np.flatnonzero(leaf_forms(forms, key) == form)
                 owner, index, key = owner[chosen], index[chosen], key[chosen]
@@ -166,8 +178,12 @@ class _Bearers:
             if self.number[run].any():
                 yield run
 
-    def _leaves(self, part: slice) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Branch within the run, and number on it, of each wanted leaf."""
+    def _leaves(self, part: slice) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.uint64]]:
+        """Branch within the run, number on it, and key of each wanted leaf."""
         owner, index = spread(self.number[part])
         index += np.take(self.low[part], owner)
-        return owner, index
+        key = leaf_keys(self.stems.branches.take(part), owner, index)
+        if self.share is None or (self.share[part] >= 1.0).all():
+            return owner, index, key
+        kept = np.flatnonzero(uniform(key, Draw.TRANSITION) < np.take(self.share[part], owner))
+        return owner[kept], index[kept], key[kept]

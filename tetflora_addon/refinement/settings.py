@@ -64,7 +64,7 @@ class RefinementSettings:
     max_tetrahedra: int = 400_000
     max_levels: int = 60
     max_passes: int = 0
-    facet: float = 0.4
+    facet: float = 0.33
     max_polygons: int = 0
     max_memory: float = 0.0
     anchored: bool = False
@@ -75,5 +75,5 @@ class RefinementSettings:
 QUALITIES: dict[str, dict[str, float]] = {
     "DRAFT": {"cutoff": 6.0, "leaf_limit": 2.0, "facet": 1.2, "visibility_resolution": 128},
     "PREVIEW": {"cutoff": 3.0, "leaf_limit": 1.0, "facet": 0.7, "visibility_resolution": 192},
-    "FINAL": {"cutoff": 2.0, "leaf_limit": 0.5, "facet": 0.4, "visibility_resolution": 256},
+    "FINAL": {"cutoff": 2.0, "leaf_limit": 0.5, "facet": 0.33, "visibility_resolution": 256},
 }

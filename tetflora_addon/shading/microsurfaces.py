@@ -82,6 +82,7 @@ def subplant_facets(
     leaf_side: NDArray[np.float64],
     wood_side: NDArray[np.float64] | None = None,
     share: NDArray[np.float64] | None = None,
+    real: NDArray[np.float64] | None = None,
 ) -> Facets:
     """Facets of sub-plants.
 
@@ -94,13 +95,16 @@ def subplant_facets(
         smaller than the leaves that they stand for.
     share : (n,) float64, optional
         Share of their area that facets have, see `facet_shares`.
+    real : (n,) float64, optional
+        Share of each sub-plant that is drawn as it is; so many of its facets are left out, by numbers of their own.
     """
     amounts = subplant_amounts(flora, subplants)
     part = np.ones(len(subplants)) if share is None else share
+    wood_side = leaf_side if wood_side is None else wood_side
     return concatenate_facets(
         [
-            _leaves_of_subplants(flora, subplants, amounts, leaf_side, part),
-            _wood_of_subplants(flora, subplants, amounts, leaf_side if wood_side is None else wood_side, part),
+            _leaves_of_subplants(flora, subplants, amounts, leaf_side, part, real),
+            _wood_of_subplants(flora, subplants, amounts, wood_side, part, real),
         ]
     )
 
@@ -111,13 +115,20 @@ def piece_facets(
     leaf_side: NDArray[np.float64],
     wood_side: NDArray[np.float64] | None = None,
     share: NDArray[np.float64] | None = None,
+    real: NDArray[np.float64] | None = None,
+    real_wood: NDArray[np.bool_] | None = None,
 ) -> Facets:
-    """Facets of pieces of branches; parameters as for `subplant_facets`."""
+    """Facets of pieces of branches; parameters as for `subplant_facets`.
+
+    Here ``real`` is the share of the leaves, and ``real_wood`` (n,) says whose wood is drawn as it is.
+    """
     amounts = piece_amounts(flora, pieces)
+    if real_wood is not None:
+        amounts = replace(amounts, wood_area=np.where(real_wood, 0.0, amounts.wood_area))
     part = np.ones(len(pieces)) if share is None else share
     return concatenate_facets(
         [
-            _leaves_of_pieces(flora, pieces, amounts, leaf_side, part),
+            _leaves_of_pieces(flora, pieces, amounts, leaf_side, part, real),
             _wood_of_pieces(flora, pieces, amounts, leaf_side if wood_side is None else wood_side, part),
         ]
     )
@@ -152,17 +163,22 @@ def _trapped(colour: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray
 
 
 def _numbers(
-    key: NDArray, area: NDArray, facet: NDArray, path: int, draw: int
+    key: NDArray, area: NDArray, facet: NDArray, path: int, draw: int, real: NDArray | None = None
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """Owner, index, key and area of the facets that areas (n,) are cut into; their expected number is area / facet.
 
-    Where it is 1 or more they share the area evenly; below, one facet stands for several sub-plants.
+    Where it is 1 or more they share the area evenly; below, one facet stands for several sub-plants. Of owners of which
+    a share (n,) is real so many facets are left out.
     """
     expected = area / facet
     counts = np.floor(expected + uniform(key, draw)).astype(np.int64)
     owner, index = spread(counts)
     one = facet * np.where(expected >= 1.0, expected / np.maximum(counts, 1), 1.0)
-    return owner, index, child_key(key[owner], index + path), one[owner]
+    own = child_key(key[owner], index + path)
+    if real is None or not real.any():
+        return owner, index, own, one[owner]
+    kept = np.flatnonzero(uniform(own, Draw.TRANSITION) >= real[owner])
+    return owner[kept], index[kept], own[kept], one[owner[kept]]
 
 
 def _facet_colours(flora: Flora, row: NDArray, key: NDArray, leaves: NDArray, outward: NDArray) -> NDArray[np.float64]:
@@ -204,11 +220,13 @@ def _picked(
     return pick, place, base
 
 
-def _leaves_of_subplants(flora: Flora, subplants: Branches, amounts: Amounts, side: NDArray, share: NDArray) -> Facets:
+def _leaves_of_subplants(
+    flora: Flora, subplants: Branches, amounts: Amounts, side: NDArray, share: NDArray, real: NDArray | None
+) -> Facets:
     rows, points = flora.rows, flora.samples.leaves
     one = flora.one_leaf_area(subplants)
     facet = np.maximum(side**2, one)
-    owner, index, key, area = _numbers(subplants.key, amounts.leaf_area, facet, _FACET_PATH, _LEAF_COUNT)
+    owner, index, key, area = _numbers(subplants.key, amounts.leaf_area, facet, _FACET_PATH, _LEAF_COUNT, real)
     pick, place, base = _picked(flora, points, subplants, owner, index, key)
     leaf_row = points.row[pick]
     frame = base @ points.frame[pick].astype(np.float64)
@@ -227,7 +245,9 @@ def _leaves_of_subplants(flora: Flora, subplants: Branches, amounts: Amounts, si
     )
 
 
-def _leaves_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDArray, share: NDArray) -> Facets:
+def _leaves_of_pieces(
+    flora: Flora, pieces: Pieces, amounts: Amounts, side: NDArray, share: NDArray, real: NDArray | None
+) -> Facets:
     branches, rows = pieces.branches, flora.rows
     row = branches.row
     size, variation = rows["leaf_size"][row].T
@@ -235,7 +255,7 @@ def _leaves_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDAr
     facet = np.maximum(side**2, one)
     # Pieces of one branch have its key; the end's position tells them apart.
     numbered = mix(branches.key ^ pieces.t1.view(np.uint64))
-    owner, index, key, area = _numbers(numbered, amounts.leaf_area, facet, _FACET_PATH, _LEAF_COUNT)
+    owner, index, key, area = _numbers(numbered, amounts.leaf_area, facet, _FACET_PATH, _LEAF_COUNT, real)
     first = np.maximum(pieces.t0, leaf_start(rows, branches))[owner]
     number = np.bincount(owner, minlength=len(pieces))[owner]
     t = first + (pieces.t1[owner] - first) * (index + uniform(key, _PLACE)) / number
@@ -251,9 +271,12 @@ def _leaves_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDAr
     return Facets(centre, frame[:, :, 0], frame[:, :, 1], np.sqrt(area * share[owner]), colour, transmission)
 
 
-def _wood_of_subplants(flora: Flora, subplants: Branches, amounts: Amounts, side: NDArray, share: NDArray) -> Facets:
+def _wood_of_subplants(
+    flora: Flora, subplants: Branches, amounts: Amounts, side: NDArray, share: NDArray, real: NDArray | None
+) -> Facets:
     points = flora.samples.wood
-    owner, index, key, area = _numbers(subplants.key, amounts.wood_area / 2, side**2, _WOOD_PATH, _WOOD_COUNT)
+    wood = amounts.wood_area / 2
+    owner, index, key, area = _numbers(subplants.key, wood, side**2, _WOOD_PATH, _WOOD_COUNT, real)
     pick, centre, base = _picked(flora, points, subplants, owner, index, key)
     axis = np.einsum("nij,nj->ni", base, points.frame[pick, :, 2].astype(np.float64))
     colour = flora.rows["branch_colour"][points.row[pick], 0]
