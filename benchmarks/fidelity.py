@@ -5,6 +5,7 @@
     python -m benchmarks fidelity [--quick]                   # everything, with targets
     python -m benchmarks.fidelity --heights 50 --lights side --engines cycles --forms MICROSURFACES
     python -m benchmarks.fidelity --parts time                # of formulas, frames, transitions, time
+    python -m benchmarks.fidelity --keep --heights 200        # beside what earlier runs left, figures of all together
     python -m benchmarks.fidelity --sheet                     # docs/images/fidelity.jpg of the last run
 
 Pictures, ``frames.json`` (written as it goes) and ``figures.json`` are left in ``out/fidelity``. Nothing is denoised.
@@ -12,7 +13,8 @@ Targets are those of the form that the extension takes by itself; figures of all
 
 Reduced, since EEVEE on a processor takes seconds for each sample of expanded plants: EEVEE is compared in one light
 (two at 50 pixels), one plant of each species, with `EEVEE_SAMPLES`; Cycles renders the same stands for the gap between
-both. At 200 pixels Cycles takes 96 samples, where a pixel holds few leaves and is less noisy.
+both. At 200 pixels Cycles takes 96 samples, where a pixel holds few leaves and is less noisy. From 50 pixels on, other
+forms than the default are rendered in two lights; name a form alone to see it in all.
 """
 
 from __future__ import annotations
@@ -94,8 +96,9 @@ def measure(
     default: str,
     parts: tuple[str, ...],
     quick: bool = False,
+    keep: bool = False,
 ) -> dict[str, float]:
-    """Figures of the named parts, in the order of `PARTS`."""
+    """Figures of the named parts, in the order of `PARTS`; keep: together with those that earlier runs left."""
     from examples import stands
 
     from . import closed_form, fidelity_time, fidelity_transitions
@@ -103,16 +106,22 @@ def measure(
     from .fidelity_sums import sums
 
     FOLDER.mkdir(parents=True, exist_ok=True)
-    figures: dict[str, float] = {}
+    record, written = FOLDER / "figures.json", FOLDER / "frames.json"
+    figures: dict[str, float] = json.loads(record.read_text()) if keep and record.exists() else {}
     if "formulas" in parts:
         figures |= closed_form.run(quick)
     if "frames" in parts:
-        done: list[Frame] = []
-        for frame in frames(series, chosen, species or stands.SPECIES, FOLDER):
-            done.append(frame)
+        done = (
+            {_key(f): f for f in (Frame(**f) for f in json.loads(written.read_text()))}
+            if keep and written.exists()
+            else {}
+        )
+        brief = tuple(form for form in chosen if form != default and len(chosen) > 1)
+        for frame in frames(series, chosen, species or stands.SPECIES, FOLDER, brief):
+            done[_key(frame)] = frame
             print(line(frame), flush=True)
-            (FOLDER / "frames.json").write_text(json.dumps([asdict(f) for f in done], indent=1) + "\n")
-        figures = sums(done, default) | figures
+            written.write_text(json.dumps([asdict(f) for f in done.values()], indent=1) + "\n")
+        figures |= sums(tuple(done.values()), default)
     if "transitions" in parts:
         session.clean_file()
         figures |= fidelity_transitions.run(FOLDER, quick)
@@ -123,8 +132,12 @@ def measure(
             if f"{name}_{default.lower()}" in costs:
                 figures[name] = costs[f"{name}_{default.lower()}"]
         figures |= costs
-    (FOLDER / "figures.json").write_text(json.dumps(figures, indent=1) + "\n")
+    record.write_text(json.dumps(figures, indent=1) + "\n")
     return figures
+
+
+def _key(frame: object) -> tuple:
+    return frame.pixels, frame.each, frame.light, frame.engine, frame.form, frame.species
 
 
 def line(frame: object) -> str:
@@ -141,6 +154,7 @@ def main() -> int:
     """Run parts of the bench, or make the contact sheet."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.fidelity", description=__doc__)
     parser.add_argument("--sheet", action="store_true", help="make the contact sheet from pictures that are there")
+    parser.add_argument("--keep", action="store_true", help="add to what earlier runs left instead of beginning anew")
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=["frames"])
     parser.add_argument("--heights", nargs="+", type=int, choices=sorted(CYCLES), default=sorted(CYCLES))
     parser.add_argument("--lights", nargs="+", choices=LIGHTS, default=LIGHTS)
@@ -161,7 +175,7 @@ def main() -> int:
     series = series_of(tuple(arguments.heights), tuple(arguments.lights), tuple(arguments.engines))
     chosen = tuple(arguments.forms or every)
     species = tuple(arguments.species) if arguments.species else None
-    figures = measure(series, chosen, species, default, tuple(arguments.parts))
+    figures = measure(series, chosen, species, default, tuple(arguments.parts), keep=arguments.keep)
     for name, value in figures.items():
         print(f"  {name:40s} {value:.4g}")
     return 0

@@ -28,6 +28,8 @@ COVERAGE_SAMPLES = 64
 LEAST_COVERAGE = 0.05
 #: From this height on the noise of expanded plants is measured in the first light only, which saves minutes.
 LARGE = 200
+#: Where forms that are only compared with the default one are rendered in fewer lights.
+BRIEF, BRIEF_LIGHTS = 50, ("side", "overcast")
 EXPANDED, AGAIN = "EXPANDED", "AGAIN"
 
 
@@ -110,7 +112,11 @@ def picture_path(folder: Path, pixels: int, each: int, light: str, engine: str, 
 
 
 def frames(
-    series: tuple[Series, ...], chosen: tuple[str, ...], species: tuple[str, ...], folder: Path
+    series: tuple[Series, ...],
+    chosen: tuple[str, ...],
+    species: tuple[str, ...],
+    folder: Path,
+    brief: tuple[str, ...] = (),
 ) -> Iterator[Frame]:
     """Render and compare, stand by stand; what was compared comes at once.
 
@@ -123,11 +129,13 @@ def frames(
     species : tuple of str
     folder : Path
         Pictures are left here.
+    brief : tuple of str
+        Forms that are rendered in the `BRIEF_LIGHTS` only, from `BRIEF` pixels on.
     """
     folder.mkdir(parents=True, exist_ok=True)
     for pixels, each in dict.fromkeys((s.pixels, s.each) for s in series):
         yield from _Stand(pixels, each, species, folder).compare(
-            [s for s in series if (s.pixels, s.each) == (pixels, each)], chosen
+            [s for s in series if (s.pixels, s.each) == (pixels, each)], chosen, brief
         )
 
 
@@ -142,7 +150,7 @@ class _Stand:
         self.scene.cycles.transparent_max_bounces = 256  # two hits a shell
         self.seconds: dict[tuple[str, str, str], float] = {}
 
-    def compare(self, series: list[Series], chosen: tuple[str, ...]) -> Iterator[Frame]:
+    def compare(self, series: list[Series], chosen: tuple[str, ...], brief: tuple[str, ...]) -> Iterator[Frame]:
         """All frames of the stand; the expanded plants are there only until their pictures are."""
         statistics, _ = timed_refine(self.scene, expand_everything=True)
         self.expanded_mb, self.memory_mb = statistics.memory_mb, {}
@@ -153,6 +161,12 @@ class _Stand:
                 self._render(one, light, EXPANDED, 0)
                 if one.engine == "cycles" and (number == 0 or self.pixels < LARGE):
                     self._render(one, light, AGAIN, 1)
+        few = brief if self.pixels >= BRIEF else ()
+        lights = {
+            (one, form): [light for light in one.lights if form not in few or light in BRIEF_LIGHTS]
+            for one in series
+            for form in chosen
+        }
         for form in chosen:
             bare: dict[str, NDArray] = {}
             for number, one in enumerate(series):
@@ -164,10 +178,10 @@ class _Stand:
                 samples = min(one.samples, COVERAGE_SAMPLES) if one.engine == "eevee" else COVERAGE_SAMPLES
                 alpha = coverage(self.scene, self.folder / "coverage.png", samples, _identifier(one.engine))
                 bare[one.engine] = covered - alpha
-                for light in one.lights:
+                for light in lights[one, form]:
                     self._render(one, light, form, 2)
             for one in series:
-                for light in one.lights:
+                for light in lights[one, form]:
                     yield from self._frames(one, light, form, bare[one.engine])
 
     def _path(self, light: str, engine: str, form: str) -> Path:

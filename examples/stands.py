@@ -207,3 +207,5 @@ def _aim(scene: bpy.types.Scene, size: tuple[int, int], height: float, distance:
     scene.view_settings.view_transform = 'Standard'
     scene.view_settings.look = 'None'
     scene.tetflora.refine_at_render = False
+    scene.eevee.use_raytracing = True  # or the sky would shine through crowns
+    scene.eevee.fast_gi_thickness_near = 3.0
