@@ -16,10 +16,12 @@ from tetflora_addon.refinement.light_views import Light
 from tetflora_addon.shading.illumination import Illumination
 from tetflora_addon.shading.light_clouds import Clouds
 from tetflora_addon.shading.light_directions import DIRECTIONS, SOLID_ANGLE, harmonics, irradiance
+from tetflora_addon.shading.light_passes import Near, buffers_of
 from tetflora_addon.shading.light_scattering import particle_ambient, scattered_shares, sphere_phase
 from tetflora_addon.shading.light_sheets import Sheets
 from tetflora_addon.shading.light_sources import World, arriving, split_areas
 from tetflora_addon.shading.shadow_pass import shadow_pass
+from tetflora_addon.shell_emission import set_apart
 from tetflora_addon.tetrahedra.geometry import signed_volume
 
 DARK = World.plain((0, 0, 0))
@@ -306,3 +308,50 @@ def test_samples_stand_for_their_key_points() -> None:
     of_cell = keys.by_cell(keys.means(points))
     for one in range(6):
         assert of_cell[one] == pytest.approx(points[cells == one].mean(axis=0))
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 300), st.integers(1, 200))
+@settings(max_examples=25, deadline=None)
+def test_fewer_sheets_have_the_area_of_all(seed, count, most):
+    rng = np.random.default_rng(seed)
+    corners = rng.normal(size=(count, 1, 3)) + rng.normal(scale=0.1, size=(1, 4, 3))
+    cells = rng.integers(0, 5, count)
+    fewer, number = Sheets.of(corners, cells, 5).thinned(most)
+    assert len(fewer) <= max(most, 1)
+    assert sorted(number[number >= 0]) == list(range(len(fewer)))
+    if len(fewer):
+        chosen = np.flatnonzero(number >= 0)
+        assert (fewer.cell[number[chosen]] == cells[chosen]).all()
+        assert fewer.corners[number[chosen]].mean(axis=1) == pytest.approx(corners[chosen].mean(axis=1))
+
+        def area(c):
+            return np.linalg.norm(np.cross(c[:, 2] - c[:, 0], c[:, 3] - c[:, 1]), axis=1).sum()
+
+        assert area(fewer.corners) == pytest.approx(area(corners), rel=1e-6)
+
+
+def test_a_view_of_what_is_near_gives_the_light_of_the_whole():
+    """Cells, and ground beneath: the shadow at points that both views see is the same, but for the pixels' size."""
+    cloud = box(0.3)
+    points, cells = inside(3, 200, cloud)
+    whole = buffers_of(SUN, cloud, Sheets.none(len(cloud)), None, 256)
+    both = buffers_of(SUN, cloud, Sheets.none(len(cloud)), None, 256, Near(np.array([1.0, 1.0, 0.0]), (0.8,)))
+    assert len(whole) == 1
+    assert len(both) == 2
+    own = cloud.own_depth(points, cells, np.array([0.0, 0.0, 1.0]))
+    everywhere, _ = whole[0].transmittance(points, cells, own)
+    near, seen = both[0].transmittance(points, cells, own)
+    assert 0 < seen.sum() < len(points)
+    assert near[seen] == pytest.approx(everywhere[seen], abs=0.03)
+
+
+def test_shells_stand_apart_and_are_as_dark_as_before():
+    cloud = box(2.0)
+    for offset in (0.0, 5000.0):
+        vertices, matrices = set_apart(cloud.vertices + offset, cloud.matrices)
+        stored = vertices.astype(np.float32).reshape(-1, 3)
+        assert len(np.unique(stored, axis=0)) == len(stored)
+        size = np.linalg.norm(vertices[:, 1] - vertices[:, 0], axis=1)
+        before = np.linalg.norm(cloud.vertices[:, 1] - cloud.vertices[:, 0], axis=1)
+        assert size * np.sqrt(matrices[:, 0]) == pytest.approx(before * 2.0)
+        assert (size > 0.949 * before).all()
