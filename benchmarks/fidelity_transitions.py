@@ -20,7 +20,7 @@ from .row80 import timed_refine
 
 SIZES, QUICK_SIZES = (110, 24), (80, 40)
 STEPS, QUICK_STEPS = 4, 1
-SAMPLES, QUICK_SAMPLES = 192, 64
+SAMPLES, QUICK_SAMPLES = 512, 64
 FACTOR = 1.1
 #: Side of the squares of which the worst is told, pixels.
 _SQUARE = 16
@@ -46,6 +46,7 @@ def run(folder: Path, quick: bool) -> dict[str, float]:
             mask = plant_mask(scene, folder / "mask.png")
             error = flip_map(picture, _picture(scene, folder / "transition-noise.png", samples, 1))
             figures["transition_noise"] = float(error[mask].mean())
+            print(f"  noise: {figures['transition_noise']:.4f}", flush=True)
             figures["transition_noise_square"] = worst_square(error, mask)
         else:
             error = flip_map(before, picture)

@@ -124,8 +124,8 @@ def forest(scene: bpy.types.Scene, count: int, light: str, columns: int = 512) -
         _add_plant(scene, f"{SPECIES[s]} {i + 1:03d}", SPECIES[s], i, (*place, 0.0), 2.399963 * i, scales[s])
     _add_ground(scene, 20.0 * far)
     set_light(scene, light)
-    eye = 4.0 * HEIGHT
-    _aim(scene, (columns, columns * 7 // 16), eye, far)
+    eye = 1.6 * HEIGHT
+    _aim(scene, (columns, columns // 4), eye, far)
     middle = focal / 2 * ((eye - HEIGHT) / far + eye / near)
     scene.camera.data.shift_y = -middle / columns
 
