@@ -19,8 +19,8 @@ from examples import stands
 from .compare import plant_mask, read_picture, render
 from .row80 import timed_refine
 
-#: Fully expanded, the larger forest takes some 3 GB of meshes, and 10 GB in Cycles.
-PLANTS, QUICK_PLANTS = 48, 12
+#: Fully expanded, the larger forest takes 13 GB, most of it in Cycles.
+PLANTS, QUICK_PLANTS = 40, 12
 SAMPLES, QUICK_SAMPLES = 64, 16
 
 
