@@ -19,7 +19,7 @@ from .plants.pieces import Pieces
 from .refinement.camera import Camera
 from .refinement.contents import Contents
 from .refinement.decisions import Decision
-from .refinement.loop import Refinement
+from .refinement.loop import SLACK, Refinement
 from .refinement.transition import Transition
 from .shading.facet_shares import facet_shares
 from .shading.facet_sizes import HIDDEN_LEAVES, piece_facet_sizes, subplant_facet_sizes
@@ -37,8 +37,8 @@ from .shading.polygon_facets import polygon_facets
 #: Facets that are made at a time, about; thick wood close to the eye is cut into very many.
 FACETS_AT_ONCE = 200_000
 
-#: Pixels down to which sub-plants are opened that are real only in part.
-DETAIL = 2.0
+#: Pixels down to which sub-plants are opened that are seen. What is smaller, the loop does not open either.
+DETAIL = SLACK
 
 
 def facet_blocks(
@@ -102,11 +102,12 @@ def _facets(
     flora: Flora, result: Refinement, camera: Camera, facet_pixels: float, transition: Transition | None
 ) -> Iterator[Part]:
     """Facets in runs of about `FACETS_AT_ONCE`."""
+    hidden = result.chosen(Decision.HIDDEN)
     explicit = result.chosen(Decision.EXPLICIT) if transition else np.zeros(len(result.tree), bool)
     contents = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN) | explicit)
     if transition is not None:
-        contents = _in_detail(contents, explicit, transition)
-    hidden, shares = result.chosen(Decision.HIDDEN), facet_shares(flora)
+        contents = _in_detail(contents, explicit, result.in_view & ~hidden, transition)
+    shares = facet_shares(flora)
     for things, cell, sizes, share_of, make in (
         (
             contents.subplants,
@@ -140,10 +141,13 @@ def _facets(
         yield from polygon_facets(proxies, result, camera, facet_pixels)
 
 
-def _in_detail(contents: Contents, explicit: NDArray[np.bool_], transition: Transition) -> Contents:
-    """Contents without what is real altogether, and with small sub-plants only of what is partly so.
+def _in_detail(
+    contents: Contents, explicit: NDArray[np.bool_], seen: NDArray[np.bool_], transition: Transition
+) -> Contents:
+    """Contents without what is real altogether, and with small sub-plants only of what is seen.
 
-    Explicit tetrahedra are not divided as far as others: their sub-plants may be dozens of pixels large.
+    How far sub-plants are opened follows from their own size here, not from the tetrahedra that they are in: facets
+    stay the same while the division of space changes. Explicit tetrahedra are not divided as far as others anyway.
     """
     flora, camera = transition.flora, transition.camera
     some, cell = contents.subplants, contents.subplant_cell
@@ -152,10 +156,10 @@ def _in_detail(contents: Contents, explicit: NDArray[np.bool_], transition: Tran
     while len(some):
         inside = explicit[cell]
         left = np.flatnonzero(~inside | (transition.of_branches(some) < 1.0))
-        some, cell, inside = some.take(left), cell[left], inside[left]
+        some, cell = some.take(left), cell[left]
         bound = flora.sampled_bound[some.row]
         extent = np.maximum(2.0 * bound[:, 0], bound[:, 2] - bound[:, 1]) * some.length
-        large = inside & (extent > DETAIL * camera.extent_around(some.position))
+        large = seen[cell] & (extent > DETAIL * camera.extent_around(some.position))
         placed.append(some.take(~large))
         placed_cell.append(cell[~large])
         some, cell = some.take(large), cell[large]

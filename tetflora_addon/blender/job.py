@@ -43,6 +43,8 @@ __all__ = ["Progress", "clear", "compile_for", "estimate", "has_results", "parti
 
 #: Shells fill their tetrahedra, so that even hidden ones must not be larger than this many pixels.
 SHELL_BLOCK = 16.0
+#: And those that are seen no larger than this many: an even fog has no shape but that of its tetrahedron.
+SEEN_SHELL_BLOCK = 4.0
 #: Share of the progress bar that the loop takes; the rest is for writing meshes.
 _LOOP_SHARE = 0.6
 
@@ -258,7 +260,9 @@ def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:
 
 def _settings(scene: bpy.types.Scene) -> RefinementSettings:
     settings = settings_from(scene)
-    return replace(settings, hidden_block=SHELL_BLOCK) if scene.tetflora.proxy_form == 'SHELLS' else settings
+    if scene.tetflora.proxy_form != 'SHELLS':
+        return settings
+    return replace(settings, hidden_block=SHELL_BLOCK, proxy_block=SEEN_SHELL_BLOCK)
 
 
 def _run_loop(

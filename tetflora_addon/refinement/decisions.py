@@ -74,7 +74,7 @@ def decide(cells: Cells, transmittance: NDArray[np.float64], settings: Refinemen
     small = (contributions(cells, transmittance) <= settings.cutoff**2) & ~crossing
     out = np.full(len(holds), Decision.SPLIT, dtype=np.int8)
     # Large leaves never become a proxy: a block of them that is hardly seen is divided until its hidden parts show.
-    out[small & ~large_leaves] = Decision.PROXY
+    out[small & ~large_leaves & (cells.span <= settings.proxy_block)] = Decision.PROXY
     out[large_leaves & no_gain & (~deep | small)] = Decision.EXPLICIT
     out[hidden] = Decision.HIDDEN
     out[hidden & (cells.span > settings.hidden_block)] = Decision.SPLIT

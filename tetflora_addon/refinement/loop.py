@@ -32,6 +32,8 @@ from .visibility import AlphaBuffer, Buffers
 
 #: Bisections between two visibility steps; three together divide a tetrahedron into eight parts.
 GENERATIONS = 3
+#: Pixels of the picture by which things may reach beyond a plane at least. Smaller sub-plants thus stay whole.
+SLACK = 2.0
 #: Share of their pixels that counts for what is divided for its shadow: as often as can be, where it is in view.
 ALWAYS = 1e30
 
@@ -235,7 +237,7 @@ def _drawn(
 
 def _slack(camera: Camera, resolution: int) -> Slack:
     """A pixel of the alpha buffer, in metres: nothing smaller can be told apart by what is decided from it."""
-    pixels = pixels_of_buffer(camera, resolution)
+    pixels = max(pixels_of_buffer(camera, resolution), SLACK)
 
     def slack(points: NDArray[np.float64]) -> NDArray[np.float64]:
         return pixels * camera.extent_around(points)

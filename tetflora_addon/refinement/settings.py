@@ -28,6 +28,8 @@ class RefinementSettings:
     hidden_block : float
         Longest edge, in pixels at its depth, down to which hidden tetrahedra are divided. Facets take their places from
         the plants, so that they need no such limit; a shell fills its whole tetrahedron and does.
+    proxy_block : float
+        The same for proxies that are seen.
     margin : float
         Share of the picture's width and height by which the view is widened on each side: leaves that grow outside but
         reach in are real leaves.
@@ -54,11 +56,12 @@ class RefinementSettings:
     """
 
     cutoff: float = 2.0
-    leaf_limit: float = 0.5
+    leaf_limit: float = 0.4
     block: float = 32.0
     few_polygons: int = 200
     hidden: float = 0.02
     hidden_block: float = math.inf
+    proxy_block: float = math.inf
     margin: float = 0.04
     visibility_resolution: int = 256
     max_tetrahedra: int = 400_000
@@ -73,7 +76,7 @@ class RefinementSettings:
 
 #: What the qualities of the panel stand for.
 QUALITIES: dict[str, dict[str, float]] = {
-    "DRAFT": {"cutoff": 6.0, "leaf_limit": 2.0, "facet": 1.2, "visibility_resolution": 128},
-    "PREVIEW": {"cutoff": 3.0, "leaf_limit": 1.0, "facet": 0.7, "visibility_resolution": 192},
-    "FINAL": {"cutoff": 2.0, "leaf_limit": 0.5, "facet": 0.33, "visibility_resolution": 256},
+    "DRAFT": {"cutoff": 6.0, "leaf_limit": 1.6, "facet": 1.2, "visibility_resolution": 128},
+    "PREVIEW": {"cutoff": 3.0, "leaf_limit": 0.8, "facet": 0.7, "visibility_resolution": 192},
+    "FINAL": {"cutoff": 2.0, "leaf_limit": 0.4, "facet": 0.33, "visibility_resolution": 256},
 }

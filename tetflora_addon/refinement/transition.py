@@ -24,7 +24,7 @@ from ..plants.pieces import Pieces
 from .camera import Camera
 
 #: Width of the leaves that are all real over that of the leaves of which none is.
-BAND = 1.6
+BAND = 2.5
 
 
 @dataclass(frozen=True)

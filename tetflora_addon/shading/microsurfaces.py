@@ -31,6 +31,7 @@ _WOOD_PATH = 1 << 41
 _LEAF_COUNT, _WOOD_COUNT, _TURN, _START, _PLACE = 201, 202, 203, 204, 205
 _MOVE = 211  # three draws from here on
 _GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
+_GOLDEN = (np.sqrt(5) - 1) / 2
 _MOVED = 0.04  # of the length of a sub-plant's branch
 _SKY = np.array([0.0, 0.0, 1.0])
 SIN_60 = np.sqrt(3) / 2
@@ -253,12 +254,8 @@ def _leaves_of_pieces(
     size, variation = rows["leaf_size"][row].T
     one = (size**2 + variation**2 / 3) * flora.leaf.area[row] * branches.scale**2
     facet = np.maximum(side**2, one)
-    # Pieces of one branch have its key; the end's position tells them apart.
-    numbered = mix(branches.key ^ pieces.t1.view(np.uint64))
-    owner, index, key, area = _numbers(numbered, amounts.leaf_area, facet, _FACET_PATH, _LEAF_COUNT, real)
-    first = np.maximum(pieces.t0, leaf_start(rows, branches))[owner]
-    number = np.bincount(owner, minlength=len(pieces))[owner]
-    t = first + (pieces.t1[owner] - first) * (index + uniform(key, _PLACE)) / number
+    start = leaf_start(rows, branches)
+    owner, index, key, area, t = _along(flora, pieces, amounts.leaf_area, facet, start, _FACET_PATH, _LEAF_COUNT, real)
     bearers = np.flatnonzero(np.bincount(owner, minlength=len(branches)))  # far from all pieces get a facet
     own = branches.take(bearers)
     leaves = place_leaves(rows, own, axes(rows, own), np.searchsorted(bearers, owner), index, key, t)
@@ -284,14 +281,43 @@ def _wood_of_subplants(
 
 
 def _wood_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDArray, share: NDArray) -> Facets:
-    own = mix(pieces.branches.key ^ pieces.t1.view(np.uint64))
-    owner, index, key, area = _numbers(own, amounts.wood_area / 2, side**2, _WOOD_PATH, _WOOD_COUNT)
+    none, wood = np.zeros(len(pieces)), amounts.wood_area / 2
+    owner, _, key, area, t = _along(flora, pieces, wood, side**2, none, _WOOD_PATH, _WOOD_COUNT)
     vector = (pieces.end - pieces.start)[owner]
-    number = np.bincount(owner, minlength=len(pieces))[owner]
-    centre = pieces.start[owner] + ((index + uniform(key, _PLACE)) / number)[:, None] * vector
+    place = (t - pieces.t0[owner]) / np.maximum(pieces.t1 - pieces.t0, 1e-12)[owner]
+    centre = pieces.start[owner] + place[:, None] * vector
     axis = vector / np.maximum(np.linalg.norm(vector, axis=1, keepdims=True), 1e-300)
     colour = flora.rows["branch_colour"][pieces.branches.row[owner], 0]
     return Facets(centre, _across(axis, key), axis, np.sqrt(area * share[owner]), colour, np.zeros(len(owner)))
+
+
+def _along(
+    flora: Flora,
+    pieces: Pieces,
+    area: NDArray[np.float64],
+    facet: NDArray[np.float64],
+    start: NDArray[np.float64],
+    path: int,
+    draw: int,
+    real: NDArray[np.float64] | None = None,
+) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
+    """Owner, index, key, area and place along the branch of the facets of pieces, see `_numbers`.
+
+    They are those of whole segments of branches, of which a piece has what lies on it: so they do not depend on where
+    a branch is cut. What they stand for begins at fractions ``start`` (n,) of the branches. Along a segment they follow
+    the golden section, and stay when others are added.
+    """
+    segments = flora.rows["segments"][pieces.branches.row]
+    number = np.minimum(np.floor((pieces.t0 + pieces.t1) / 2 * segments), segments - 1)
+    low, high = np.maximum(number / segments, start), (number + 1) / segments
+    first = np.maximum(pieces.t0, start)
+    length = np.maximum(pieces.t1 - first, 0.0)
+    part = np.where(length > 0, np.maximum(high - low, length) / np.maximum(length, 1e-12), 0.0)
+    numbered = mix(pieces.branches.key ^ (number.astype(np.uint64) + np.uint64(path)))
+    owner, index, key, one = _numbers(numbered, area * part, facet, path, draw, real)
+    t = low[owner] + (high - low)[owner] * ((uniform(numbered, _PLACE)[owner] + index * _GOLDEN) % 1.0)
+    on = np.flatnonzero((t >= first[owner]) & (t < pieces.t1[owner]))
+    return owner[on], index[on], key[on], one[on], t[on]
 
 
 def _across(axis: NDArray[np.float64], key: NDArray[np.uint64]) -> NDArray[np.float64]:
