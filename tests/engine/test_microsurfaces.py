@@ -138,7 +138,7 @@ def test_hidden_wood_gets_no_more_facets_than_it_has_faces() -> None:
     ):
         sizes = sizes_of(flora, contents, camera, np.ones(1, bool))
         made = facet_mesh(make(flora, things, *sizes.sides(1.0)))
-        assert made.polygons == pytest.approx(sizes.counts(1.0).sum(), rel=0.02)
+        assert made.polygons == pytest.approx(sizes.counts(1.0).sum(), rel=0.04)
         wood = part(made, False)
         assert wood.sum() <= faces * 1.01
         assert support.face_areas(made)[wood].sum() == pytest.approx(amounts.wood_area.sum() / 2, rel=0.1)

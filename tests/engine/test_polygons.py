@@ -255,11 +255,11 @@ def test_near_polygons_stay_and_far_ones_become_facets_of_the_same_area(anchored
     whole = Polygons.everything(meshes)
     assert result.contents.polygons.areas().sum() == pytest.approx(whole.areas().sum(), rel=1e-9)
     assert {Decision.PROXY, Decision.EXPLICIT} <= set(result.decision.tolist())
-    blocks = [b.buffers for b in polygon_blocks(result, camera)]
+    blocks = [b.buffers for b in polygon_blocks(result, camera, 0.4)]
     kept = sum(support.face_areas(b).sum() for b in blocks)
     proxies = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN))
     beside = ~result.in_view[proxies.polygon_cell]
-    facets = np.concatenate([f.side**2 for f, _ in polygon_facets(proxies, result, camera, 0.6)])
+    facets = np.concatenate([f.side**2 for f, _ in polygon_facets(proxies, result, camera, 0.4)])
     drawn = facets.sum()
     chance = 2 * np.sqrt((facets**2).sum())  # facets are there or not; of a mesh, not independently
     assert chance < 0.1 * drawn
