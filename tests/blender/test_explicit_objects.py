@@ -149,7 +149,7 @@ def test_a_job_that_is_closed_or_fails_leaves_originals_visible(monkeypatch):
         raise MemoryError
 
     _refine(scene)
-    monkeypatch.setattr(part("job"), "_write_proxies", broken)
+    monkeypatch.setattr(part("job"), "write_proxies", broken)
     with pytest.raises(MemoryError):
         _refine(scene)
     assert leaves.hide_render  # earlier results are still there
@@ -323,7 +323,7 @@ def test_the_refined_picture_is_that_of_the_mesh():
 
     truth = blocks()
     statistics = _refine(scene, leaf_limit=4.0)
-    assert statistics.polygons_meshed < 0.2 * statistics.polygons_full
+    assert statistics.polygons_meshed < 0.35 * statistics.polygons_full
     assert 5_000 < statistics.polygons_proxy < 0.5 * statistics.polygons_full
     refined = blocks()
     assert np.ptp(truth) > 0.2

@@ -44,7 +44,7 @@ def test_spheres_take_the_places_of_facets_and_clear_removes_them():
     mesh = _proxies(scene)[0].data
     places = np.zeros((len(mesh.vertices), 3), np.float32)
     mesh.attributes["position"].data.foreach_get("vector", places.reshape(-1))
-    places = places.reshape(-1, 4, 3).mean(axis=1)
+    places = places.reshape(-1, 3, 3).mean(axis=1)
     spheres = _refine(scene, proxy_form='MICROSPHERES')
     assert spheres.polygons_proxy == facets.polygons_proxy == len(places)
     assert spheres.facet_pixels == facets.facet_pixels

@@ -29,8 +29,8 @@ class RefinementProperties:
     leaf_limit: FloatProperty(
         name="Leaf Limit",
         description=(
-            "Width in pixels from which on leaves stay real leaves. Larger saves polygons; "
-            "above about half a pixel the loss shows"
+            "Leaves that look narrower than this are drawn as proxies; from here to 2.5 times as wide a growing share of "
+            "them is real. Larger saves polygons; above about half a pixel the loss shows"
         ),
         subtype='PIXEL',
         default=_SETTINGS.leaf_limit,
@@ -158,7 +158,7 @@ class RefinementProperties:
         items=(
             ('DRAFT', "Draft", "For setting up a scene: quick and coarse"),
             ('PREVIEW', "Preview", "For judging light and composition"),
-            ('FINAL', "Final", "For the picture: no leaf of half a pixel is missing"),
+            ('FINAL', "Final", "For the picture: what is drawn as proxies cannot be told from the plants"),
             ('CUSTOM', "Custom", "Values of your own"),
         ),
         get=quality_number,

@@ -17,7 +17,7 @@ class RefinementSettings:
     cutoff : float
         Side, in pixels of the final picture, under which a tetrahedron gains nothing from being split (section 6.4).
     leaf_limit : float
-        Width in pixels from which on leaves are kept as real leaves.
+        Width in pixels from which on some leaves are real; from 2.5 times that on all are, see `transition`.
     block : float
         Side, in pixels, from which on a visible tetrahedron is split further although all in it will become polygons,
         so that hidden parts can be told from visible ones.
