@@ -29,8 +29,8 @@ class RefinementProperties:
     leaf_limit: FloatProperty(
         name="Leaf Limit",
         description=(
-            "Leaves that look narrower than this are drawn as proxies; from here to 2.5 times as wide a growing share of "
-            "them is real. Larger saves polygons; above about half a pixel the loss shows"
+            "Leaves that look narrower than this are drawn as proxies; from here to 2.5 times as wide a growing share "
+            "of them is real. Larger saves polygons; above about half a pixel the loss shows"
         ),
         subtype='PIXEL',
         default=_SETTINGS.leaf_limit,
