@@ -220,8 +220,15 @@ class TetFloraScene(RefinementProperties, bpy.types.PropertyGroup):
                 'POINTCLOUD_DATA',
                 2,
             ),
+            (
+                'AUTOMATIC',
+                "Automatic",
+                "Microsurfaces where they are seen, which come closest to the plants; elsewhere microspheres",
+                'SHADERFX',
+                3,
+            ),
         ),
-        default='MICROSURFACES',
+        default='AUTOMATIC',
     )
     baked_light: EnumProperty(
         name="Baked Light",

@@ -67,27 +67,25 @@ def write_proxies(
     scene = results.scene
     form = scene.tetflora.proxy_form
     baked = baking is not None
-    add = results.add
     if form == 'SHELLS':
         shells = shell_emission.proxy_shells(flora, refinement, baking.light if baked else None)
         blocks, facet_pixels = iter([] if shells is None else [shells]), 0.0
         material = baked_shell_material if baked else shell_material
     elif baked:
-        blocks, material = (
-            _baked_blocks(results, flora, refinement, camera, facet_pixels, transition, baking),
-            baked_material,
-        )
-        add = results.add_points if form == 'MICROSPHERES' else add
-    elif form == 'MICROSPHERES':
-        disc = drawn_disc(scene.render.engine)
-        blocks = facet_emission.sphere_blocks(flora, refinement, camera, facet_pixels, disc, transition)
-        add, material = results.add_points, sphere_material
-    else:
+        blocks = _baked_blocks(results, flora, refinement, camera, facet_pixels, transition, baking)
+        material = baked_material
+    elif form == 'MICROSURFACES':
         blocks = facet_emission.facet_blocks(flora, refinement, camera, facet_pixels, transition)
         material = proxy_material
+    else:
+        disc = drawn_disc(scene.render.engine)
+        blocks_of = facet_emission.sphere_blocks if form == 'MICROSPHERES' else facet_emission.mixed_blocks
+        blocks, material = blocks_of(flora, refinement, camera, facet_pixels, disc, transition), proxy_material
     statistics.facet_pixels = facet_pixels
     for number, buffers in enumerate(blocks):
-        made = material()
+        points = isinstance(buffers, PointBuffers)
+        made = sphere_material() if points and not baked else material()
+        add = results.add_points if points else results.add
         if form == 'SHELLS' and not baked:
             shade_shells(made, scene)
         add(f"TetFlora proxies {number:03d}", "proxy", buffers, [made])
