@@ -191,7 +191,8 @@ def state():
             [name, bpy.data.objects[name].tetflora.species, bpy.data.objects[name].tetflora.seed] for name in plants()
         ],
         "objects": sorted(
-            [obj.name, len(obj.data.polygons) if obj.type == 'MESH' else 0] for obj in bpy.context.scene.objects
+            [obj.name, len(getattr(obj.data, {'MESH': "polygons", 'POINTCLOUD': "points"}.get(obj.type, ""), ()))]
+            for obj in bpy.context.scene.objects
         ),
         "materials": sorted(material.name for material in bpy.data.materials),
         "collections": sorted(collection.name for collection in bpy.context.scene.collection.children_recursive),
