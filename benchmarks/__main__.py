@@ -17,7 +17,6 @@ from devtools import session
 #: Benchmarks by name, in the order of ``all``.
 NAMES = (
     "row80",
-    "forms",
     "plants",
     "bounds",
     "averages",

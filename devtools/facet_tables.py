@@ -15,7 +15,7 @@ def main() -> None:
     """Fit all species and write them in the order of the catalogue."""
     facet_shares.TABLE.parent.mkdir(exist_ok=True)
     facet_shares.TABLE.unlink(missing_ok=True)
-    facet_shares._table.cache_clear()
+    facet_shares.shipped.cache_clear()
     table = {}
     for identifier in sorted(list_species()):
         flora = compile_species([load_species(identifier)])

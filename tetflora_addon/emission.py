@@ -86,7 +86,7 @@ def _thick_wood(result: Refinement, transition: Transition) -> Contents:
     """Pieces of branches that are wide enough to be seen where all else is drawn as proxies."""
     contents = result.contents.within(result.chosen(Decision.PROXY) & result.in_view)
     none = np.zeros(len(contents.subplants), bool), np.zeros(len(contents.polygons), bool)
-    return contents.take(none[0], transition.of_wood(contents.pieces, leaves_too=False), none[1])
+    return contents.take(none[0], transition.of_wood(contents.pieces, among_leaves=False), none[1])
 
 
 def expanded_blocks(flora: Flora, seeds: Seeds) -> Iterator[Block]:

@@ -5,8 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -130,33 +129,34 @@ def _facets(
     if transition is not None:
         contents = _in_detail(contents, explicit, result.in_view & ~hidden, transition)
     shares = facet_shares(flora)
-    for things, cell, sizes, share_of, make in (
+    for things, cell, row, sizes, share_of, make in (
         (
             contents.subplants,
             contents.subplant_cell,
+            contents.subplants.row,
             subplant_facet_sizes(flora, contents, camera, hidden),
             shares.of_subplants,
-            partial(_of_subplants, flora, transition),
+            _of_subplants,
         ),
         (
             contents.pieces,
             contents.piece_cell,
+            contents.pieces.branches.row,
             piece_facet_sizes(flora, contents, camera, hidden),
             shares.of_pieces,
-            partial(_of_pieces, flora, transition),
+            _of_pieces,
         ),
     ):
-        leaf, wood = sizes.sides(facet_pixels)
-        row = things.row if isinstance(things, Branches) else things.branches.row
-        share = share_of(row, sizes.whole_optical / np.maximum(leaf, 1e-12) ** 2)
+        inside, side = result.in_view[cell], sizes.sides(facet_pixels)
+        share = share_of(row, sizes.whole_optical / np.maximum(side[0], 1e-12) ** 2)
+        wanted = _Wanted(*side, share, explicit[cell], inside & ~sizes.hidden)
         expected = sizes.counts(facet_pixels) + 1
-        inside, real = result.in_view[cell], explicit[cell]
-        for nobody_looks in (False, True):
-            for i in _runs(expected, np.flatnonzero(inside & (sizes.hidden == nobody_looks))):
-                yield make(things.take(i), leaf[i], wood[i], share[i], real[i], ~sizes.hidden[i]), not nobody_looks
+        for seen in (True, False):
+            for i in _runs(expected, np.flatnonzero(inside & (wanted.seen == seen))):
+                yield make(flora, transition, things.take(i), wanted.take(i)), seen
         # What is beside the view must not reach into the picture.
         for i in _runs(expected, np.flatnonzero(~inside)):
-            made = make(things.take(i), leaf[i], wood[i], share[i], real[i], np.zeros(len(i), bool))
+            made = make(flora, transition, things.take(i), wanted.take(i))
             yield kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5), False
     proxies = contents.within(~explicit)
     if len(proxies.polygons):
@@ -201,42 +201,48 @@ def _in_detail(
     return replace(made, **polygons)
 
 
-def _of_subplants(
-    flora: Flora,
-    transition: Transition | None,
-    subplants: Branches,
-    leaf: NDArray[np.float64],
-    wood: NDArray[np.float64],
-    share: NDArray[np.float64],
-    explicit: NDArray[np.bool_],
-    seen: NDArray[np.bool_],
-) -> Facets:
+@dataclass(frozen=True)
+class _Wanted:
+    """What is asked of the facets of sub-plants or pieces (n,).
+
+    ``leaf`` and ``wood`` are the sides of facets, metres; ``share`` is that of the area which they have. ``explicit``
+    says what is in tetrahedra of which polygons are made, and ``seen`` what the camera looks at.
+    """
+
+    leaf: NDArray[np.float64]
+    wood: NDArray[np.float64]
+    share: NDArray[np.float64]
+    explicit: NDArray[np.bool_]
+    seen: NDArray[np.bool_]
+
+    @property
+    def sizes(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Sides of facets of leaves and of wood, and the share of the area."""
+        return self.leaf, self.wood, self.share
+
+    def take(self, index: NDArray[np.integer]) -> _Wanted:
+        """Selection by indices."""
+        return _Wanted(*(getattr(self, field.name)[index] for field in fields(self)))
+
+
+def _of_subplants(flora: Flora, transition: Transition | None, subplants: Branches, wanted: _Wanted) -> Facets:
     """Facets of sub-plants; of those in explicit tetrahedra, what is too small to be real."""
-    if not explicit.any():
-        return subplant_facets(flora, subplants, leaf, wood, share)
-    real = np.where(explicit, transition.of_branches(subplants), 0.0)
+    if not wanted.explicit.any():
+        return subplant_facets(flora, subplants, *wanted.sizes)
+    real = np.where(wanted.explicit, transition.of_branches(subplants), 0.0)
     some = np.flatnonzero(real < 1.0)
-    return subplant_facets(flora, subplants.take(some), leaf[some], wood[some], share[some], real[some])
+    return subplant_facets(flora, subplants.take(some), *wanted.take(some).sizes, real[some])
 
 
-def _of_pieces(
-    flora: Flora,
-    transition: Transition | None,
-    pieces: Pieces,
-    leaf: NDArray[np.float64],
-    wood: NDArray[np.float64],
-    share: NDArray[np.float64],
-    explicit: NDArray[np.bool_],
-    seen: NDArray[np.bool_],
-) -> Facets:
+def _of_pieces(flora: Flora, transition: Transition | None, pieces: Pieces, wanted: _Wanted) -> Facets:
     """Facets of pieces; without thick wood, which is real wherever it is seen."""
     if transition is None:
-        return piece_facets(flora, pieces, leaf, wood, share)
-    real = np.where(explicit, transition.of_branches(pieces.branches), 0.0)
-    tubes = np.where(explicit, transition.of_wood(pieces), seen & transition.of_wood(pieces, leaves_too=False))
+        return piece_facets(flora, pieces, *wanted.sizes)
+    real = np.where(wanted.explicit, transition.of_branches(pieces.branches), 0.0)
+    bare = wanted.seen & transition.of_wood(pieces, among_leaves=False)
+    tubes = np.where(wanted.explicit, transition.of_wood(pieces), bare)
     some = np.flatnonzero(~tubes | (real < 1.0))
-    sides = leaf[some], wood[some], share[some]
-    return piece_facets(flora, pieces.take(some), *sides, real[some], tubes[some])
+    return piece_facets(flora, pieces.take(some), *wanted.take(some).sizes, real[some], tubes[some])
 
 
 def _runs(expected: NDArray[np.float64], chosen: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:

@@ -20,6 +20,7 @@ from tetflora_addon.plants.seeds import Seeds
 from tetflora_addon.refinement.camera import Camera
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.loop import Refinement
+from tetflora_addon.shading.facet_shares import COUNTS, FacetShares
 from tetflora_addon.shading.summaries import summarise
 from tetflora_addon.shell_emission import proxy_shells
 from tetflora_addon.tetrahedra.geometry import volume
@@ -103,7 +104,8 @@ def test_explicit_polygons_are_about_as_many_as_expected() -> None:
     assert made == pytest.approx(expected, rel=0.05)
 
 
-def test_facets_have_the_area_of_what_is_not_explicit_but_for_what_clusters_hide() -> None:
+def test_facets_have_the_area_of_what_is_not_explicit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """But for what leaves of a cluster hide of each other."""
     flora, _, camera, result = scene()
     every = result.contents.sums(len(result.tree))
     proxies = result.chosen(Decision.PROXY, Decision.HIDDEN)
@@ -111,6 +113,10 @@ def test_facets_have_the_area_of_what_is_not_explicit_but_for_what_clusters_hide
     check_topology(mesh)
     optical = (every.leaf_area + every.wood_area / 2)[proxies].sum()
     assert 0.4 * optical < support.face_areas(mesh).sum() < 1.05 * optical
+    ones = np.ones((len(flora.rows), len(COUNTS)))
+    monkeypatch.setattr(facet_emission, "facet_shares", lambda _: FacetShares(ones, ones))
+    mesh = support.facet_buffers(flora, result, camera)
+    assert support.face_areas(mesh).sum() == pytest.approx(optical, rel=0.05)
 
 
 def test_facets_are_as_large_as_asked_for_and_larger_where_hidden() -> None:

@@ -82,7 +82,7 @@ def test_opened_plants_of_other_seeds_are_as_opaque(identifier: str) -> None:
 def test_tables_of_shipped_species_are_those_of_today() -> None:
     """Run ``python -m devtools.facet_tables`` and raise `_METHOD` after changes of species or of facets."""
     flora = compile_species([load_species("flower")])
-    known = subject._table()[subject.digest(flora, 0)]
+    known = subject.shipped()[subject.digest(flora, 0)]
     found = {}
     for row, families in subject._families(flora, np.zeros(1, np.int32)).items():
         apart = subject._apart(flora, families)
@@ -95,7 +95,7 @@ def test_every_shipped_species_has_a_table() -> None:
     from tetflora_addon.plants.catalogue import list_species
 
     for identifier in list_species():
-        assert subject.digest(compile_species([load_species(identifier)]), 0) in subject._table(), identifier
+        assert subject.digest(compile_species([load_species(identifier)]), 0) in subject.shipped(), identifier
 
 
 @given(st.floats(0.05, 1.6), st.floats(1e-3, 1e6))

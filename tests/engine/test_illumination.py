@@ -20,7 +20,7 @@ from tetflora_addon.shading.light_passes import Near, buffers_of
 from tetflora_addon.shading.light_scattering import particle_ambient, scattered_shares, sphere_phase
 from tetflora_addon.shading.light_sheets import Sheets
 from tetflora_addon.shading.light_sources import World, arriving, split_areas
-from tetflora_addon.shading.shadow_pass import shadow_pass
+from tetflora_addon.shading.shadow_pass import shadow_steps
 from tetflora_addon.shell_emission import set_apart
 from tetflora_addon.tetrahedra.geometry import signed_volume
 
@@ -29,6 +29,16 @@ DOWN = np.array([0.0, 0.0, -1.0])
 SUN = Light("SUN", np.zeros(3), DOWN, colour=np.array([3.0, 2.0, 1.0]))
 # Kuhn's division of a cube.
 _KUHN = [(1, 3, 7), (1, 5, 7), (2, 3, 7), (2, 6, 7), (4, 5, 7), (4, 6, 7)]
+
+
+def shadow_pass(*arguments, **options) -> Illumination:
+    """All steps of the pass at once."""
+    steps = shadow_steps(*arguments, **options)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as stop:
+            return stop.value
 
 
 def box(kappa: float, cells: int = 4, size: float = 4.0, colour: float = 0.0, transmission: float = 0.0) -> Clouds:

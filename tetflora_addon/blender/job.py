@@ -27,6 +27,7 @@ from ..refinement.settings import RefinementSettings
 from ..refinement.statistics import Statistics, Stopwatch
 from ..refinement.steps import step_of
 from ..refinement.transition import Transition
+from ..shading.facet_shares import facet_shares
 from .baked_material import baked_material
 from .baking import Baking, read_sources
 from .camera_reader import read_camera
@@ -183,6 +184,9 @@ def refine_steps(
             refinement, side = afford(flora, refinement, camera, settings, facets, facet_bytes)
             clock.lap("refine")
             _count(statistics, refinement)
+            if facets:
+                yield Progress(_LOOP_SHARE, "Looking at how leaves cluster")
+                facet_shares(flora)
             results.open()
             baking = None
             if given.sources is not None:

@@ -56,8 +56,9 @@ def decide(cells: Cells, transmittance: NDArray[np.float64], settings: Refinemen
     Notes
     -----
     A tetrahedron's *contribution* is the number of pixels that its contents change: its pixels × the share of them that
-    is not hidden × its own opacity. Leaves wider than ``leaf_limit`` pixels can only be drawn as leaves; a tetrahedron
-    full of them is divided down to ``block`` pixels so that its hidden parts are found out, and then made explicit.
+    is not hidden × its own opacity. Of leaves wider than ``leaf_limit`` pixels some are drawn as leaves; a tetrahedron
+    full of them is divided down to ``block`` pixels so that its hidden parts are found out, and in depth until they are
+    about as large at its far end; then it is made explicit (`transition` says which leaves are real in it).
 
     What crosses the border of the view counts by its seen part. That may be small while the tetrahedron is not: then it
     is divided until the rest is known to be out of view, or all of it would be made as fine as what is seen.

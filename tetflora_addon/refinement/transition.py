@@ -54,17 +54,18 @@ class Transition:
         """Share (n,) of the leaves of sub-plants, and of their wood; of leafless ones by the base of their branch."""
         return self.share(self._width(branches), branches.position)
 
-    def of_wood(self, pieces: Pieces, leaves_too: bool = True) -> NDArray[np.bool_]:
+    def of_wood(self, pieces: Pieces, among_leaves: bool = True) -> NDArray[np.bool_]:
         """Pieces (n,) whose wood is real; with or without regard to the leaves that grow on their branch."""
-        branches = pieces.branches
-        width = np.maximum(2.0 * branches.radius, self._width(branches)) if leaves_too else 2.0 * branches.radius
-        share = self.share(width, (pieces.start + pieces.end) / 2.0)
-        return uniform(branches.key, Draw.TRANSITION) < share
+        return self._kept(pieces.branches, (pieces.start + pieces.end) / 2.0, among_leaves)
 
     def of_twigs(self, branches: Branches) -> NDArray[np.bool_]:
         """Whole branches (n,) whose wood is real."""
-        share = self.share(np.maximum(2.0 * branches.radius, self._width(branches)), branches.position)
-        return uniform(branches.key, Draw.TRANSITION) < share
+        return self._kept(branches, branches.position, among_leaves=True)
+
+    def _kept(self, branches: Branches, position: NDArray[np.float64], among_leaves: bool) -> NDArray[np.bool_]:
+        own = 2.0 * branches.radius
+        width = np.maximum(own, self._width(branches)) if among_leaves else own
+        return uniform(branches.key, Draw.TRANSITION) < self.share(width, position)
 
     def _width(self, branches: Branches) -> NDArray[np.float64]:
         row = branches.row

@@ -91,7 +91,7 @@ def facet_shares(flora: Flora) -> FacetShares:
     whole, own = np.ones((2, len(flora.rows), len(COUNTS)))
     unknown = []
     for number, first in enumerate(flora.first_row):
-        known = _table().get(digest(flora, number))
+        known = shipped().get(digest(flora, number))
         if known is None:
             unknown.append(number)
         else:
@@ -119,7 +119,8 @@ def digest(flora: Flora, number: int) -> str:
 
 
 @cache
-def _table() -> dict[str, dict[str, list[list[float]]]]:
+def shipped() -> dict[str, dict[str, list[list[float]]]]:
+    """Shares of the shipped species by their `digest`: ``whole`` and ``own`` (r, k) as lists, and their ``species``."""
     try:
         return json.loads(TABLE.read_text(encoding="utf-8"))
     except FileNotFoundError:

@@ -47,7 +47,7 @@ class Lit:
 
 
 class Illumination:
-    """Light in a scene, as `shadow_pass` finds it.
+    """Light in a scene, as `shadow_pass.shadow_steps` finds it.
 
     Attributes
     ----------
@@ -245,7 +245,7 @@ class Illumination:
         return made.reshape(-1, 4, 3)
 
     def scatter(self, ground: NDArray[np.float64], orders: int) -> Iterator[float]:
-        """Sample the sky at the key points and let light be scattered; what `shadow_pass` does last.
+        """Sample the sky at the key points and let light be scattered; what `shadow_pass.shadow_steps` does last.
 
         Parameters
         ----------

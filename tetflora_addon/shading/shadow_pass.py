@@ -28,7 +28,7 @@ SKY_SHEETS = 40_000
 ORDERS = 2
 
 
-def shadow_pass(
+def shadow_steps(
     clouds: Clouds,
     lights: Sequence[Light],
     world: World,
@@ -37,7 +37,8 @@ def shadow_pass(
     ground: ArrayLike = (0.0, 0.0, 0.0),
     orders: int = ORDERS,
     sheets: Sheets | None = None,
-) -> Illumination:
+    near: Near | None = None,
+) -> Generator[float, None, Illumination]:
     """Look at a scene from all of its lights.
 
     Parameters
@@ -58,6 +59,14 @@ def shadow_pass(
         Facets and leaves as they are drawn. Clumps that are smaller than tetrahedra shadow themselves, which an even
         cloud does not know of; with sheets the resolution should be such that a pixel is about as large as one.
 
+    near : Near, optional
+        Part of the scene that gets buffers of its own from suns.
+
+    Yields
+    ------
+    float
+        Share that is done.
+
     Returns
     -------
     Illumination
@@ -66,26 +75,6 @@ def shadow_pass(
     -----
     Penumbras of the sun and of lamps that are no areas are as sharp as the buffer.
     """
-    steps = shadow_steps(clouds, lights, world, occluders, resolution, ground, orders, sheets)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as stop:
-            return stop.value
-
-
-def shadow_steps(
-    clouds: Clouds,
-    lights: Sequence[Light],
-    world: World,
-    occluders: NDArray[np.float64] | None = None,
-    resolution: int = 512,
-    ground: ArrayLike = (0.0, 0.0, 0.0),
-    orders: int = ORDERS,
-    sheets: Sheets | None = None,
-    near: Near | None = None,
-) -> Generator[float, None, Illumination]:
-    """`shadow_pass` step by step: the share that is done; what is ``near`` gets buffers of its own from suns."""
     sheets = Sheets.none(len(clouds)) if sheets is None else sheets
     lamps = []
     split = split_areas(tuple(lights))
