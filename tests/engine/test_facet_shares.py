@@ -83,12 +83,9 @@ def test_tables_of_shipped_species_are_those_of_today() -> None:
     """Run ``python -m devtools.facet_tables`` and raise `_METHOD` after changes of species or of facets."""
     flora = compile_species([load_species("flower")])
     known = subject.shipped()[subject.digest(flora, 0)]
-    found = {}
-    for row, families in subject._families(flora, np.zeros(1, np.int32)).items():
-        apart = subject._apart(flora, families)
-        found[row] = subject._fitted(subject._Sight.of_subplants(flora, *apart))
-    for row, shares in found.items():
-        np.testing.assert_allclose(shares, known["whole"][row], atol=0.05)
+    for row, (whole, own) in subject.fitted_shares(flora, np.zeros(1, np.int32)).items():
+        np.testing.assert_allclose(whole, known["whole"][row], atol=0.05)
+        np.testing.assert_allclose(own, known["own"][row], atol=0.05)
 
 
 def test_every_shipped_species_has_a_table() -> None:

@@ -7,14 +7,16 @@ the full area they would be up to three times as opaque. Rays are cast through g
 and through their facets, at several numbers of them; the share is the one with which as many rays are held up. So it is
 for facets what `plants.clumping` is for cells that are filled evenly.
 
-Sub-plants are looked at together with their next siblings, because facets that are larger than a sub-plant spill over.
-Facets of pieces are compared in the same way with what branches themselves bear.
+Sub-plants are looked at together with their next siblings, because facets spill over; where few facets stand for one,
+with all that grow around them, because then facets reach across the gaps between neighbours of any parent. Facets of
+pieces are compared in the same way with what branches themselves bear.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from pathlib import Path
@@ -36,11 +38,14 @@ from .microsurfaces import CIRCUMRADIUS, SIN_60, Facets, piece_facets, subplant_
 #: Shares of the shipped species, made by ``python -m devtools.facet_tables``. Raise the number when facets or shares
 #: are made in another way.
 TABLE = Path(__file__).resolve().parent.parent / "catalogue" / "tables" / "facet_shares.json"
-_METHOD = 1
+_METHOD = 2
 #: Facets of a sub-plant for which shares are known; between them they follow the logarithm.
 COUNTS = 4.0 ** np.arange(-2, 6)
-#: Families of siblings of a row that are looked at, members of one at most, and polygons that all may have.
-_FAMILIES, _MEMBERS, _POLYGONS = 6, 12, 50_000.0
+#: Under so many facets of a sub-plant its neighbours count, and not only its siblings.
+_FEW = 4.0
+#: Families of a row that are looked at, and polygons that all may have; members of one at most, siblings or neighbours.
+_FAMILIES, _POLYGONS = 6, 50_000.0
+_SIBLINGS, _NEIGHBOURS = 12, 60
 #: Facets that stand for each number, over all families: as many copies are made as it takes for the first, if that is
 #: possible at all for the second; numbers that would need more than the third are not tried.
 _WANTED, _NEEDED, _MOST = 250.0, 60.0, 5_000.0
@@ -97,9 +102,8 @@ def facet_shares(flora: Flora) -> FacetShares:
         else:
             every = slice(int(first), int(first) + len(known["whole"]))
             whole[every], own[every] = known["whole"], known["own"]
-    for row, families in _families(flora, np.array(unknown, np.int32)).items():
-        apart = _apart(flora, families)
-        whole[row], own[row] = _fitted(_Sight.of_subplants(flora, *apart)), _fitted(_Sight.of_branches(flora, *apart))
+    for row, (these, those) in fitted_shares(flora, np.array(unknown, np.int32)).items():
+        whole[row], own[row] = these, those
     return FacetShares(whole, own)
 
 
@@ -127,26 +131,64 @@ def shipped() -> dict[str, dict[str, list[list[float]]]]:
         return {}
 
 
-def _families(flora: Flora, species: NDArray[np.int32]) -> dict[int, list[Branches]]:
-    """Some siblings of each row of some species as they grow together, for a few parents."""
+def fitted_shares(
+    flora: Flora, species: NDArray[np.int32]
+) -> dict[int, tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Shares (k,), (k,) by row of some species, of sub-plants and of what branches themselves bear."""
+    few, out = COUNTS < _FEW, {}
+    for siblings, counts in ((False, few), (True, ~few)):
+        for row, families in _families(flora, species, siblings).items():
+            apart = _apart(flora, families)
+            sights = _Sight.of_subplants(flora, *apart), _Sight.of_branches(flora, *apart)
+            for shares, sight in zip(out.setdefault(row, np.ones((2, len(COUNTS)))), sights, strict=True):
+                shares[counts] = _fitted(sight)[counts]
+    return out
+
+
+def _families(flora: Flora, species: NDArray[np.int32], siblings: bool) -> dict[int, list[Branches]]:
+    """Sub-plants of each row of some species as they grow together, in a few plants or on a few parents of each row."""
     which = np.repeat(species, _FAMILIES)
     n = len(which)
     names = tuple(s.identifier for s in flora.species)
     seeds = Seeds(names, which, np.arange(n), np.zeros((n, 3)), np.tile(np.eye(3), (n, 1, 1)), np.ones(n))
-    level, parent, found = trunks(flora.rows, seeds), np.arange(n), {}
+    level, plant, found = trunks(flora.rows, seeds), np.arange(n), {}
+    parent = plant
     while len(level):
         some = []
         for row in np.unique(level.row):
-            own = np.flatnonzero(level.row == row)
-            members = int(np.clip(_POLYGONS / _FAMILIES / max(flora.polygons[row], 1.0), 1, _MEMBERS))
-            parents = np.unique(parent[own])
-            for p in parents[np.argsort(mix(parents.astype(np.uint64)))[:_FAMILIES]]:
-                siblings = own[parent[own] == p]
-                first = (len(siblings) - min(members, len(siblings))) // 2
-                some.append(siblings[first : first + members])
-                found.setdefault(int(row), []).append(level.take(some[-1]))
-        level, parent, _, _ = open_subplants(flora, level.take(np.concatenate(some)))
+            own, most = np.flatnonzero(level.row == row), _POLYGONS / _FAMILIES / max(flora.polygons[row], 1.0)
+            choose = _siblings if siblings else _neighbours
+            for members in choose(level, own, parent if siblings else plant, most):
+                some.append(members)
+                found.setdefault(int(row), []).append(level.take(members))
+        chosen = np.concatenate(some)
+        level, parent, _, _ = open_subplants(flora, level.take(chosen))
+        plant = plant[chosen][parent]
     return {row: _affordable(flora, families) for row, families in found.items()}
+
+
+def _siblings(
+    level: Branches, own: NDArray[np.int64], parent: NDArray[np.int64], most: float
+) -> Iterator[NDArray[np.int64]]:
+    """Those in the middle of some parents."""
+    members = int(np.clip(most, 1, _SIBLINGS))
+    parents = np.unique(parent[own])
+    for p in parents[np.argsort(mix(parents.astype(np.uint64)))[:_FAMILIES]]:
+        born = own[parent[own] == p]
+        first = (len(born) - min(members, len(born))) // 2
+        yield born[first : first + members]
+
+
+def _neighbours(
+    level: Branches, own: NDArray[np.int64], plant: NDArray[np.int64], most: float
+) -> Iterator[NDArray[np.int64]]:
+    """Those that are next to one of each plant."""
+    members = int(np.clip(most, 1, _NEIGHBOURS))
+    for p in np.unique(plant[own]):
+        kin = own[plant[own] == p]
+        first = kin[np.argmin(mix(level.key[kin]))]
+        away = np.linalg.norm(level.position[kin] - level.position[first], axis=1)
+        yield kin[np.argsort(away, kind="stable")[:members]]
 
 
 def _affordable(flora: Flora, families: list[Branches]) -> list[Branches]:
