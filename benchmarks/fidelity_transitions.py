@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What changes in the picture when cutoff and leaf limit change by a tenth: a row of plants that recedes.
+"""What changes in the picture when a limit changes by a tenth: a row of plants that recedes.
 
-The heights of a species' plants in the row differ by two fifths; four steps of a tenth take each species' leaves
-through the limit at one of them.
+``transition_flip`` is of the cutoff, ``transition_flip_leaf`` of the leaf limit, which turns real leaves into facets
+wherever they are near it. The heights of a species' plants in the row differ by two fifths; four steps of a tenth take
+each species' leaves through the limit at one of them.
 """
 
 from __future__ import annotations
@@ -34,26 +35,25 @@ def run(folder: Path, quick: bool) -> dict[str, float]:
     scene = bpy.context.scene
     stands.receding(scene, *(QUICK_SIZES if quick else SIZES), "side")
     scene.cycles.transparent_max_bounces = 256
-    samples = QUICK_SAMPLES if quick else SAMPLES
-    begin = scene.tetflora.cutoff, scene.tetflora.leaf_limit
-    figures = {"transition_flip": 0.0, "transition_flip_square": 0.0}
-    before = mask = None
-    for step in range((QUICK_STEPS if quick else STEPS) + 1):
-        cutoff, leaf_limit = (limit * FACTOR**step for limit in begin)
-        timed_refine(scene, expand_everything=False, cutoff=cutoff, leaf_limit=leaf_limit)
-        picture = _picture(scene, folder / f"transition-{step}.png", samples, 0)
-        if before is None:
-            mask = plant_mask(scene, folder / "mask.png")
-            error = flip_map(picture, _picture(scene, folder / "transition-noise.png", samples, 1))
-            figures["transition_noise"] = float(error[mask].mean())
-            print(f"  noise: {figures['transition_noise']:.4f}", flush=True)
-            figures["transition_noise_square"] = worst_square(error, mask)
-        else:
+    samples, steps = (QUICK_SAMPLES, QUICK_STEPS) if quick else (SAMPLES, STEPS)
+    begin = {"cutoff": scene.tetflora.cutoff, "leaf_limit": scene.tetflora.leaf_limit}
+    timed_refine(scene, expand_everything=False)
+    first = _picture(scene, folder / "transition-0.png", samples, 0)
+    mask = plant_mask(scene, folder / "mask.png")
+    error = flip_map(first, _picture(scene, folder / "transition-noise.png", samples, 1))
+    figures = {"transition_noise": float(error[mask].mean()), "transition_noise_square": worst_square(error, mask)}
+    print(f"  noise: {figures['transition_noise']:.4f}", flush=True)
+    for limit, suffix in (("cutoff", ""), ("leaf_limit", "_leaf")):
+        means, squares, before = [], [], first
+        for step in range(1, steps + 1):
+            timed_refine(scene, expand_everything=False, **{**begin, limit: begin[limit] * FACTOR**step})
+            picture = _picture(scene, folder / f"transition-{limit}-{step}.png", samples, 0)
             error = flip_map(before, picture)
-            print(f"  step {step}: {error[mask].mean():.4f}, worst square {worst_square(error, mask):.4f}", flush=True)
-            figures["transition_flip"] = max(figures["transition_flip"], float(error[mask].mean()))
-            figures["transition_flip_square"] = max(figures["transition_flip_square"], worst_square(error, mask))
-        before = picture
+            means.append(float(error[mask].mean()))
+            squares.append(worst_square(error, mask))
+            print(f"  {limit} {step}: {means[-1]:.4f}, worst square {squares[-1]:.4f}", flush=True)
+            before = picture
+        figures |= {f"transition_flip{suffix}": max(means), f"transition_flip_square{suffix}": max(squares)}
     return figures
 
 
