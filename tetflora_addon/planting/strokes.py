@@ -1,0 +1,271 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a dab of the brush adds and takes: a circle on the map, plants that stand there, and a key in; places out.
+
+The map is divided into square cells, each as large as one plant has at the density that is asked for. Paint plants the
+cells that are empty, Thin leaves one plant in each, so that going over a place again changes nothing, and that what a
+stroke does hardly depends on how fast the mouse was. A cell is planted whole or not at all: a dab decides about the
+cells whose candidate falls into the circle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..plants.hashing import child_key, key_of_seed, uniform
+
+#: Cells that one dab looks at; a wider circle, or a higher density, is refused by `cells_of`.
+MOST_CELLS = 200_000
+_TRIES = 6  # places in a cell that are tried before it stays empty
+_TINY = 1e-9
+
+
+class _Draw(IntEnum):
+    X = 1
+    Y = 2
+    CHANCE = 3
+    AZIMUTH = 4
+    SCALE = 5
+    SPECIES = 6
+    SEED = 7
+    RANK = 8
+
+
+@dataclass(frozen=True)
+class Brush:
+    """What the brush is like.
+
+    Attributes
+    ----------
+    radius : float
+        Metres on the map.
+    density : float
+        Plants for each square metre of the map.
+    strength : float
+        0 to 1: share of what is to be done that one dab does.
+    min_distance : float
+        Least distance of two trunks on the map, metres; 0 for none.
+    scale_min, scale_max : float
+    shares : tuple of float
+        Relative frequency of each species.
+    """
+
+    radius: float
+    density: float
+    strength: float = 1.0
+    min_distance: float = 0.0
+    scale_min: float = 1.0
+    scale_max: float = 1.0
+    shares: tuple[float, ...] = (1.0,)
+
+
+def stroke_key(seed: int, stroke: int) -> NDArray[np.uint64]:
+    """Key of the n-th stroke with a seed, () uint64."""
+    return child_key(key_of_seed(seed), stroke)
+
+
+def within(places: NDArray[np.float64], centre: Sequence[float], radius: float) -> NDArray[np.bool_]:
+    """Which places, (n, 2) or more columns, lie in a circle on the map."""
+    gap = places[:, :2] - np.asarray(centre, float)[:2]
+    return np.einsum("ij,ij->i", gap, gap) <= radius * radius
+
+
+def cell_size(density: float) -> float:
+    """Side in metres of the square that one plant has at a density in plants per square metre."""
+    return 1.0 / sqrt(density)
+
+
+def too_many(brush: Brush) -> bool:
+    """Whether a dab of this brush would have to look at more than `MOST_CELLS` cells."""
+    return (2.0 * brush.radius / cell_size(brush.density) + 1.0) ** 2 > MOST_CELLS
+
+
+def paint(
+    brush: Brush, centre: Sequence[float], standing: NDArray[np.float64], key: NDArray[np.uint64], dab: int
+) -> tuple[NDArray[np.float64], NDArray[np.uint64]]:
+    """Where one dab sets new plants.
+
+    Parameters
+    ----------
+    brush : Brush
+    centre : sequence of float
+        Middle of the circle; what is beyond x and y does not count.
+    standing : (m, 2) or (m, 3) float64
+        Plants that are there, those that the same stroke has set among them. Those far away may be left out.
+    key : () uint64
+        Of the stroke, see `stroke_key`.
+    dab : int
+        Number of the dab in its stroke.
+
+    Returns
+    -------
+    places : (n, 2) float64
+    keys : (n,) uint64
+        One for each place; `individuals` makes plants of them.
+
+    Raises
+    ------
+    ValueError
+        `too_many` cells.
+    """
+    if too_many(brush):
+        raise ValueError(f"more than {MOST_CELLS} cells under the brush")
+    side = cell_size(brush.density)
+    middle = np.asarray(centre, float)[:2]
+    first, last = (np.floor((middle + sign * brush.radius) / side).astype(np.int64) for sign in (-1.0, 1.0))
+    grid = np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(first, last, strict=True)), indexing="ij")
+    cells = np.stack(grid, axis=-1).reshape(-1, 2)
+    reach = brush.radius + max(brush.min_distance, side * sqrt(2.0))
+    standing = standing[within(standing, middle, reach), :2]
+    cells = cells[~np.isin(_packed(cells), _packed(np.floor(standing / side).astype(np.int64)))]
+    cell_keys = child_key(child_key(key, cells[:, 0]), cells[:, 1])
+    if brush.strength < 1.0:
+        lucky = uniform(child_key(cell_keys, dab), _Draw.CHANCE) < brush.strength
+        cells, cell_keys = cells[lucky], cell_keys[lucky]
+    found, keys = [np.zeros((0, 2))], [np.zeros(0, np.uint64)]
+    for attempt in range(_TRIES):
+        tried = child_key(cell_keys, attempt)
+        places = (cells + np.stack([uniform(tried, _Draw.X), uniform(tried, _Draw.Y)], axis=1)) * side
+        # A first choice outside of the circle is the business of the dab that comes there.
+        inside = within(places, middle, brush.radius)
+        if attempt == 0:
+            cells, cell_keys, tried, places = cells[inside], cell_keys[inside], tried[inside], places[inside]
+            inside = inside[inside]
+        chosen = np.flatnonzero(inside)
+        chosen = chosen[admitted(places[chosen], np.concatenate([standing, *found]), brush.min_distance)]
+        found.append(places[chosen])
+        keys.append(tried[chosen])
+        left = np.ones(len(cells), bool)
+        left[chosen] = False
+        cells, cell_keys = cells[left], cell_keys[left]
+        if brush.min_distance <= _TINY or not len(cells):
+            break
+    return np.concatenate(found), np.concatenate(keys)
+
+
+def erase(
+    brush: Brush, centre: Sequence[float], standing: NDArray[np.float64], key: NDArray[np.uint64], dab: int
+) -> NDArray[np.int64]:
+    """Which plants, as numbers of places (m, 2) or (m, 3), one dab removes: a share of all in the circle."""
+    inside = np.flatnonzero(within(standing, centre, brush.radius))
+    return inside[_drawn(brush, inside, key, dab)]
+
+
+def thin(
+    brush: Brush, centre: Sequence[float], standing: NDArray[np.float64], key: NDArray[np.uint64], dab: int
+) -> NDArray[np.int64]:
+    """Which plants one dab removes where they are denser than the brush, as numbers of places (m, 2) or (m, 3).
+
+    Of each cell one plant stays, a random one, or one outside of the circle. Of plants that are closer than the least
+    distance the earlier one in this order stays.
+    """
+    inside = within(standing, centre, brush.radius)
+    near = np.flatnonzero(
+        within(standing, centre, brush.radius + max(brush.min_distance, 2.0 * cell_size(brush.density)))
+    )
+    # Plants that cannot be removed come first, then the others by chance.
+    rank = uniform(child_key(key, near), _Draw.RANK) - ~inside[near]
+    near = near[np.argsort(rank, kind="stable")]
+    cells = _packed(np.floor(standing[near, :2] / cell_size(brush.density)).astype(np.int64))
+    _, first = np.unique(cells, return_index=True)
+    single = np.zeros(len(near), bool)
+    single[first] = True
+    kept, fixed = near[single & inside[near]], near[~inside[near]]
+    kept = kept[admitted(standing[kept, :2], standing[fixed, :2], brush.min_distance)]
+    stays = np.isin(near, kept)
+    gone = np.sort(near[~stays & inside[near]])
+    return gone[_drawn(brush, gone, key, dab)]
+
+
+def individuals(brush: Brush, keys: NDArray[np.uint64]) -> dict[str, NDArray]:
+    """Azimuth (radians), scale, species (index of the shares) and seed (from 0 on) of plants with keys, (n,) each."""
+    weights = np.maximum(np.asarray(brush.shares, dtype=np.float64), 0.0)
+    limits = np.cumsum(weights) / weights.sum()
+    low, high = sorted((brush.scale_min, brush.scale_max))
+    # Rounding may leave the last limit below a draw that is just under 1.
+    species = np.minimum(np.searchsorted(limits, uniform(keys, _Draw.SPECIES), side="right"), len(weights) - 1)
+    return {
+        "azimuth": 2.0 * np.pi * uniform(keys, _Draw.AZIMUTH),
+        "scale": low + (high - low) * uniform(keys, _Draw.SCALE),
+        "species": species.astype(np.int32),
+        "seed": (uniform(keys, _Draw.SEED) * 2**31).astype(np.int32),
+    }
+
+
+def dabs_along(last: Sequence[float], to: Sequence[float], spacing: float, most: int = 64) -> NDArray[np.float64]:
+    """Places of dabs from one to another place of the mouse, the first left out and the last kept, (n, 3).
+
+    Parameters
+    ----------
+    last, to : sequence of 3 floats
+    spacing : float
+        Metres between dabs.
+    most : int
+        Dabs at most; the distance between them grows then.
+    """
+    a, b = np.asarray(last, float), np.asarray(to, float)
+    number = int(np.clip(np.ceil(np.linalg.norm(b - a) / max(spacing, _TINY)), 1, most))
+    return a + (b - a) * (np.arange(1, number + 1) / number)[:, None]
+
+
+def admitted(places: NDArray[np.float64], standing: NDArray[np.float64], distance: float) -> NDArray[np.int64]:
+    """Numbers of places, (n, 2), that keep a distance to those that stand, (m, 2), and among each other.
+
+    The earlier of two places goes first, as if they were set one after the other.
+    """
+    free = np.ones(len(places), bool)
+    if distance <= _TINY or not len(places):
+        return np.flatnonzero(free)
+    free[_close(places, standing, distance)[0]] = False
+    undecided = np.flatnonzero(free)
+    first, second = _close(places[undecided], places[undecided], distance)
+    early = first < second
+    first, second = first[early], second[early]
+    state = np.zeros(len(undecided), np.int8)  # 0 undecided, 1 in, -1 out
+    while (open_ := state == 0).any():
+        # Whoever has no earlier neighbour that may yet come in is in; its later neighbours are out.
+        waits = np.zeros(len(state), bool)
+        waits[second[state[first] == 0]] = True
+        state[open_ & ~waits] = 1
+        state[second[state[first] == 1]] = -1
+    return undecided[state == 1]
+
+
+def _close(
+    a: NDArray[np.float64], b: NDArray[np.float64], distance: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of numbers of places, (n, 2) and (m, 2), that are closer than a distance."""
+    if not len(a) or not len(b):
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    cells_b = _packed(np.floor(b / distance).astype(np.int64))
+    order = np.argsort(cells_b, kind="stable")
+    sorted_b, home = cells_b[order], np.floor(a / distance).astype(np.int64)
+    firsts, seconds = [], []
+    for step in np.ndindex(3, 3):
+        wanted = _packed(home + (np.array(step) - 1))
+        begin, end = np.searchsorted(sorted_b, wanted), np.searchsorted(sorted_b, wanted, side="right")
+        counts = end - begin
+        i = np.repeat(np.arange(len(a)), counts)
+        j = order[np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts - begin, counts)]
+        gap = a[i] - b[j]
+        near = np.einsum("ij,ij->i", gap, gap) < distance * distance
+        firsts.append(i[near])
+        seconds.append(j[near])
+    return np.concatenate(firsts), np.concatenate(seconds)
+
+
+def _packed(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    return cells[..., 0] * np.int64(2**32) + cells[..., 1]
+
+
+def _drawn(brush: Brush, numbers: NDArray[np.int64], key: NDArray[np.uint64], dab: int) -> NDArray[np.bool_]:
+    """Which of some plants a dab of this strength reaches."""
+    if brush.strength >= 1.0:
+        return np.ones(len(numbers), bool)
+    return uniform(child_key(child_key(key, dab), numbers), _Draw.CHANCE) < brush.strength
