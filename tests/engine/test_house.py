@@ -24,6 +24,7 @@ ROOMS = {
     "tetrahedra": set(),
     "refinement": {"plants", "tetrahedra"},
     "shading": {"plants", "tetrahedra", "refinement"},
+    "preview": {"plants", "tetrahedra", "refinement"},
 }
 SHARED = {"buffers", "errors"}
 # Files beside the rooms that put decisions into buffers may use each other.

@@ -1,0 +1,202 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The states of the loop, one after the other, as small as a preview needs them (paper, figure 8).
+
+What plants and pieces the tetrahedra hold is gone; how many, how dark and of which colour they are stays. Corners and
+the order of drawing come from the last state's tree: nodes keep their numbers, and a tetrahedron that is divided later
+stands in the tree's order where its parts stand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..plants.compiled import Flora
+from ..plants.pieces import piece_leaf_colours
+from ..refinement.camera import Camera
+from ..refinement.cells import mean_extinction
+from ..refinement.contents import Contents
+from ..refinement.decisions import contributions
+from ..refinement.loop import Refinement
+from ..refinement.statistics import Step
+from ..refinement.steps import step_of
+from ..tetrahedra.geometry import volume
+from ..tetrahedra.tree import TetrahedralTree
+
+#: Bytes that all levels may take together, beside the tree; levels in between are left out beyond.
+MOST_BYTES = 256_000_000
+
+
+@dataclass(frozen=True)
+class Level:
+    """The tetrahedra that hold something after one pass.
+
+    Attributes
+    ----------
+    nodes : (t,) int32
+        Their nodes in the tree.
+    depth : (t,) int16
+        How many planes lie between the root and each.
+    decision : (t,) int8
+        `Decision`; in all levels but the last some are still to be divided.
+    visibility : (t,) float32
+        Share of each one's light that nothing in front holds up; 0 out of view.
+    contribution : (t,) float32
+        Pixels of the picture that its contents change.
+    extinction : (t,) float32
+        κ of its contents spread evenly, 1/m; optical depth is κ times the way through it.
+    colour : (t, 3) float32
+        Mean colour of its contents, linear RGB.
+    figures : Step
+        Counts for the overlay.
+    number : int
+        Pass of the loop, from 0.
+    """
+
+    nodes: NDArray[np.int32]
+    depth: NDArray[np.int16]
+    decision: NDArray[np.int8]
+    visibility: NDArray[np.float32]
+    contribution: NDArray[np.float32]
+    extinction: NDArray[np.float32]
+    colour: NDArray[np.float32]
+    figures: Step
+    number: int
+
+    def __len__(self) -> int:
+        return len(self.nodes)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the arrays."""
+        values = (getattr(self, f.name) for f in fields(self))
+        return sum(v.nbytes for v in values if isinstance(v, np.ndarray))
+
+
+class Levels:
+    """All levels of a refinement, and the tree in which they stand.
+
+    Parameters
+    ----------
+    levels : list of Level
+        From coarse to fine, at least one.
+    tree : TetrahedralTree
+        Of the last state.
+    camera : Camera
+        For which it was refined.
+    """
+
+    def __init__(self, levels: list[Level], tree: TetrahedralTree, camera: Camera) -> None:
+        self.levels, self.tree, self.camera = levels, tree, camera
+        # A terminal below each node: its place in the tree's order is where the node itself would stand.
+        below, children = np.arange(len(tree)), tree.children[:, 0]
+        while (inner := np.flatnonzero(children[below] >= 0)).size:
+            below[inner] = children[below[inner]]
+        self._below = below
+
+    def __len__(self) -> int:
+        return len(self.levels)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of levels and tree."""
+        return sum(level.nbytes for level in self.levels) + self.tree.nbytes + self._below.nbytes
+
+    def at(self, number: int) -> Level:
+        """A level, 0 for the root; beyond the last one, the last."""
+        return self.levels[min(max(number, 0), len(self.levels) - 1)]
+
+    def vertices(self, level: Level, chosen: NDArray | slice = slice(None)) -> NDArray[np.float32]:
+        """Corners (t, 4, 3) float32 of a level's tetrahedra, or of some of them, metres."""
+        return self.tree.vertices(level.nodes[chosen]).astype(np.float32)
+
+    def back_to_front(self, level: Level, camera: Camera, chosen: NDArray | None = None) -> NDArray[np.intp]:
+        """Places (t,) in a level in the order in which a painter draws them for any camera; exact.
+
+        Parameters
+        ----------
+        chosen : (k,) int, optional
+            Only these places.
+        """
+        some = np.arange(len(level)) if chosen is None else chosen
+        rank = self.tree.order(**camera.line_of_sight, back_to_front=True)
+        return some[np.argsort(rank[self._below[level.nodes[some]]], kind="stable")]
+
+
+def gather(
+    loop: Generator[Refinement, None, Refinement], flora: Flora, camera: Camera
+) -> Generator[Level, None, Levels]:
+    """Run the loop to its end and keep a level of each state; yields each level, returns all.
+
+    Parameters
+    ----------
+    loop : generator of Refinement
+        As `refinement.loop.refine` gives it.
+    flora : Flora
+    camera : Camera
+        The loop's.
+    """
+    levels: list[Level] = []
+    while True:
+        try:
+            state, last = next(loop), False
+        except StopIteration as stop:
+            state, last = stop.value, True
+        levels.append(_level(flora, state))
+        if sum(level.nbytes for level in levels) > MOST_BYTES:
+            levels = thinned(levels)
+        yield levels[-1]
+        if last:
+            return Levels(levels, state.tree, camera)
+
+
+def thinned(levels: list[Level]) -> list[Level]:
+    """Every second level, and in any case the first and the last."""
+    return levels[:-1:2] + levels[-1:]
+
+
+def _level(flora: Flora, state: Refinement) -> Level:
+    tree, nodes = state.tree, state.nodes
+    extinction = mean_extinction(state.amounts, volume(tree.vertices(nodes)))
+    return Level(
+        nodes=nodes.astype(np.int32),
+        depth=tree.level[nodes].copy(),
+        decision=state.decision.copy(),
+        visibility=state.transmittance.astype(np.float32),
+        contribution=contributions(state.cells, state.transmittance).astype(np.float32),
+        extinction=extinction.astype(np.float32),
+        colour=mean_colours(flora, state.contents, nodes, len(tree)).astype(np.float32),
+        figures=step_of(state),
+        number=state.passes - 1,
+    )
+
+
+def mean_colours(flora: Flora, contents: Contents, nodes: NDArray[np.integer], size: int) -> NDArray[np.float64]:
+    """Mean colours (t, 3) of what nodes (t,) hold, weighted by what shows: leaves once, closed surfaces half.
+
+    Unlike `shading.summaries` without orientation and clumping, which a preview does not show.
+    """
+    row, piece_row = contents.subplants.row, contents.pieces.branches.row
+    parts = []
+    for cells, amounts, leaf, wood in (
+        (contents.subplant_cell, contents.subplant_amounts, flora.leaf_colours, flora.wood_colour[row]),
+        (contents.piece_cell, contents.piece_amounts, None, flora.rows["branch_colour"][piece_row, 0]),
+    ):
+        if len(cells) == 0:
+            continue
+        leaves = leaf(contents.subplants) if leaf else piece_leaf_colours(flora, contents.pieces)
+        parts += [(cells, amounts.leaf_area, leaves), (cells, amounts.wood_area / 2, wood)]
+    if len(contents.polygon_cell):
+        polygons, amounts = contents.polygons, contents.polygon_amounts
+        colours = polygons.meshes.colours[polygons.meshes.slot[polygons.face]]
+        parts.append((contents.polygon_cell, amounts.leaf_area + amounts.wood_area / 2, colours))
+    sums, area = np.zeros((size, 3)), np.zeros(size)
+    for cells, weight, colours in parts:
+        area += np.bincount(cells, weight, size)
+        for k in range(3):
+            sums[:, k] += np.bincount(cells, weight * colours[:, k], size)
+    return sums[nodes] / np.where(area > 0.0, area, 1.0)[nodes, None]

@@ -1,0 +1,168 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Plants of few faces, or as the bounds of what was compiled: all plants of a forest as two arrays for the viewport.
+
+Nothing is grown. A crown is two rings of corners between its lowest and its highest leaves, as wide as the samples of
+its species; a trunk is two crossed triangles. Every plant has its own length, as its seed says.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..plants.compiled import Flora
+from ..plants.growth import trunks
+from ..plants.samples import Points
+from ..plants.seeds import Seeds
+from .colours import as_shown
+
+#: Plants that a preview shows; of more, every second, third and so on.
+MOST_PLANTS = 50_000
+#: Corners of each of a crown's rings.
+SIDES = 4
+#: Heights of the rings, and of the band around each whose leaves say how wide it is, as shares of the crown's height.
+_RINGS, _BAND = (0.25, 0.65), 0.2
+#: Share of the leaves that lie below a crown, and above it, and within its rings.
+_BELOW, _ABOVE, _WITHIN = 0.03, 0.995, 0.85
+#: Where light comes from, and what share of it is there without.
+_SUN, _SHADE = np.array([-0.45, -0.35, 0.82]), 0.45
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """Many plants in one mesh.
+
+    Attributes
+    ----------
+    positions : (v, 3) float32
+        Metres, world space.
+    colours : (v, 3) float32
+        As a screen shows them, shaded by a fixed light.
+    indices : (m, 3) int32 for faces, or (m, 2) int32 for edges
+    plants : int
+        Plants that are shown.
+    of : int
+        Plants that there are.
+    """
+
+    positions: NDArray[np.float32]
+    colours: NDArray[np.float32]
+    indices: NDArray[np.int32]
+    plants: int
+    of: int
+
+
+def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
+    """Plants as crowns and trunks of some twenty triangles each, in the mean colours of their species.
+
+    Parameters
+    ----------
+    flora : Flora
+        Compiled species, in the order of ``seeds.identifiers``.
+    seeds : Seeds
+    most : int
+        Plants that are shown at most.
+    """
+    seeds, of = _some(seeds, most)
+    stems = trunks(flora.rows, seeds)
+    profile = np.stack([_profile(flora, int(row)) for row in flora.first_row])[seeds.species]  # (n, 6)
+    angle = np.arange(SIDES) * 2.0 * np.pi / SIDES
+    around = np.stack([np.cos(angle), np.sin(angle), np.zeros(SIDES)], axis=1)
+    low, high, *radii = profile.T
+    crown = [np.stack([0 * low, 0 * low, low], axis=1)[:, None]]
+    outward = [np.broadcast_to([0.0, 0.0, -1.0], (len(seeds), 1, 3))]
+    for share, radius, up in zip(_RINGS, radii[:2], (-0.1, 0.5), strict=True):
+        height = (low + share * (high - low))[:, None, None] * [0.0, 0.0, 1.0]
+        crown.append(radius[:, None, None] * around + height)
+        outward.append(np.broadcast_to((around + [0.0, 0.0, up]) / np.hypot(1.0, up), (len(seeds), SIDES, 3)))
+    crown.append(np.stack([0 * high, 0 * high, high], axis=1)[:, None])
+    outward.append(np.broadcast_to([0.0, 0.0, 1.0], (len(seeds), 1, 3)))
+    # The wood's own radius would be less than a pixel from where a forest is looked at.
+    radius = np.maximum(stems.radius / stems.length, 0.012)[:, None, None]
+    foot = radius * around
+    middle = (low + 0.5 * (high - low))[:, None, None] * np.array([[0.0, 0.0, 1.0]])
+    local = np.concatenate([*crown, foot, middle], axis=1) * stems.length[:, None, None]
+    normals = np.concatenate([*outward, np.broadcast_to(around, foot.shape), 0 * middle], axis=1)
+    positions = np.einsum("nij,nvj->nvi", stems.frame, local) + stems.position[:, None]
+    light = np.clip(np.einsum("nij,nvj->nvi", stems.frame, normals) @ (_SUN / np.linalg.norm(_SUN)), 0.0, 1.0)
+    light = _SHADE + (1.0 - _SHADE) * light
+    leafy = flora.leaf_count[stems.row] > 0
+    leaves = np.where(leafy[:, None], flora.leaf_colours(stems), flora.wood_colour[stems.row])
+    corners = 2 * SIDES + 2
+    base = np.repeat(np.stack([leaves, flora.wood_colour[stems.row]], axis=1), (corners, SIDES + 1), axis=1)
+    return Shapes(
+        positions.reshape(-1, 3).astype(np.float32),
+        as_shown(base * light[:, :, None]).reshape(-1, 3),
+        _repeated(_faces(), positions.shape[1], len(seeds)),
+        len(seeds),
+        of,
+    )
+
+
+def bounds_of_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
+    """Compiled bounds of plants as edges of boxes: what their samples reach, in the direction of their trunks."""
+    seeds, of = _some(seeds, most)
+    stems = trunks(flora.rows, seeds)
+    radius, low, high = flora.sampled_bound[stems.row].T * stems.length
+    corner = np.array([(x, y, z) for z in (0, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))], float)
+    local = corner * [1.0, 1.0, 0.0] * radius[:, None, None]
+    local[:, :, 2] = np.where(corner[:, 2] > 0.0, high[:, None], low[:, None])
+    positions = np.einsum("nij,nvj->nvi", stems.frame, local) + stems.position[:, None]
+    edges = [(i, (i + 1) % 4) for i in range(4)]
+    edges += [(a + 4, b + 4) for a, b in edges] + [(i, i + 4) for i in range(4)]
+    colours = np.repeat(as_shown(np.maximum(flora.leaf_colours(stems), flora.wood_colour[stems.row])), 8, axis=0)
+    indices = _repeated(np.array(edges), 8, len(seeds))
+    return Shapes(positions.reshape(-1, 3).astype(np.float32), colours, indices, len(seeds), of)
+
+
+def _profile(flora: Flora, row: int) -> NDArray[np.float64]:
+    """Lowest and highest leaves of a species, and radii of its crown's rings, for a trunk of length 1."""
+    points = flora.samples.leaves if flora.leaf_count[row] > 0 else flora.samples.wood
+    position = _upright(points, row)
+    across, along = np.hypot(position[:, 0], position[:, 1]), position[:, 2]
+    low, high = np.quantile(along, [_BELOW, _ABOVE])
+    high = max(high, low + 0.05)
+    radii = []
+    for share in _RINGS:
+        band = np.abs((along - low) / (high - low) - share) <= _BAND
+        radii.append(np.quantile(across[band] if band.any() else across, _WITHIN))
+    return np.array([low, high, *radii])
+
+
+def _upright(points: Points, row: int) -> NDArray[np.float64]:
+    """Samples (k, 3) of an upright trunk, in units of its length."""
+    first, number = int(points.first[row, -1]), int(points.number[row, -1])
+    return points.position[first : first + number].astype(np.float64)
+
+
+def _faces() -> NDArray[np.int64]:
+    """Triangles of one plant: crown from its lowest corner over two rings to the highest, then the trunk."""
+    i = np.arange(SIDES)
+    j = (i + 1) % SIDES
+    lower, upper, top, foot = 1 + i, 1 + SIDES + i, 2 * SIDES + 1, 2 * SIDES + 2
+    parts = [
+        (0 * i, 1 + j, lower),
+        (lower, 1 + j, upper),
+        (1 + j, 1 + SIDES + j, upper),
+        (upper, 1 + SIDES + j, np.full(SIDES, top)),
+        (foot + i, foot + j, np.full(SIDES, foot + SIDES)),
+    ]
+    return np.concatenate([np.stack(part, axis=1) for part in parts])
+
+
+def _repeated(indices: NDArray[np.integer], corners: int, times: int) -> NDArray[np.int32]:
+    """The same faces or edges for each of many plants of so many corners."""
+    every = indices[None] + corners * np.arange(times)[:, None, None]
+    return every.reshape(-1, indices.shape[1]).astype(np.int32)
+
+
+def _some(seeds: Seeds, most: int) -> tuple[Seeds, int]:
+    """Plants that are shown, evenly taken from all, and how many there are."""
+    step = -(-len(seeds) // most)
+    if step <= 1:
+        return seeds, len(seeds)
+    names = ("species", "seed", "position", "frame", "scale")
+    return Seeds(seeds.identifiers, *(getattr(seeds, name)[::step] for name in names)), len(seeds)
