@@ -23,6 +23,7 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
         items=(
             ('MIX', "Species", "The species to populate with"),
             ('LEAVES', "Leaf Objects", "The meshes that replace leaves"),
+            ('OUTPUT', "Output", "Species with a pass index, light group or materials of their own"),
             ('FIELD', "Field Species", "The species of the active field of plants"),
         ),
     )
@@ -65,4 +66,6 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
             active = context.active_object
             return (active.tetflora if active is not None and active.tetflora.is_field else None), "field_species"
         settings = context.scene.tetflora
+        if self.which == 'OUTPUT':
+            return settings.output, "species"
         return (settings.populate, "mix") if self.which == 'MIX' else (settings, "leaf_objects")

@@ -36,6 +36,15 @@ class TETFLORA_UL_field_species(bpy.types.UIList):
         row.prop(item, "species_choice", text="", emboss=False)
 
 
+class TETFLORA_UL_output_species(bpy.types.UIList):
+    """A species with output settings of its own."""
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, _index, _flag) -> None:
+        row = layout.split(factor=0.7, align=True)
+        row.prop(item, "species_choice", text="", emboss=False)
+        row.prop(item, "pass_index", text="")
+
+
 def draw_list(
     layout: bpy.types.UILayout,
     cls: type[bpy.types.UIList],
@@ -49,7 +58,7 @@ def draw_list(
     ----------
     names : iterable of str
         The owner's collection and its active index.
-    which : {'MIX', 'LEAVES', 'FIELD'}
+    which : {'MIX', 'LEAVES', 'FIELD', 'OUTPUT'}
         As in the operator.
     """
     entries, index = names

@@ -33,6 +33,8 @@ class MeshBuffers:
         or ``(n,)`` int32.
     smooth : bool
         Whether faces are shaded smooth.
+    species : int or None
+        The species all of it is of, if that is known.
     """
 
     positions: NDArray[np.float32]
@@ -42,6 +44,7 @@ class MeshBuffers:
     face_offsets: NDArray[np.int32]
     attributes: Mapping[str, tuple[str, NDArray]] = field(default_factory=dict)
     smooth: bool = False
+    species: int | None = None
 
     @property
     def polygons(self) -> int:
@@ -67,11 +70,14 @@ class PointBuffers:
         Metres.
     attributes : mapping of str to ndarray
         Name to values of the points: ``(n,)`` or ``(n, 3)`` float32.
+    species : int or None
+        As of meshes.
     """
 
     positions: NDArray[np.float32]
     radius: NDArray[np.float32]
     attributes: Mapping[str, NDArray] = field(default_factory=dict)
+    species: int | None = None
 
     @property
     def polygons(self) -> int:

@@ -46,6 +46,7 @@ def facet_blocks(
     """Proxies as microsurfaces: facets of all that is not explicit, and of no polygon that is kept as it is.
 
     Meshes have about `BLOCK_POLYGONS` facets each, so that only one of them is held at a time beside Blender's own.
+    Each is of one species, or of meshes.
 
     Parameters
     ----------
@@ -59,7 +60,7 @@ def facet_blocks(
         `emission.explicit_blocks` with the same makes the rest.
     """
     for parts in facet_parts(flora, result, camera, facet_pixels, transition):
-        yield facet_mesh(concatenate_facets([facets for facets, _ in parts]))
+        yield replace(facet_mesh(concatenate_facets([facets for facets, _ in parts])), species=parts.species)
 
 
 def sphere_blocks(
@@ -75,7 +76,7 @@ def sphere_blocks(
     What is drawn of a sphere of radius 1 has the area ``disc``, see `shading.microspheres`.
     """
     for parts in facet_parts(flora, result, camera, facet_pixels, transition):
-        yield spheres(parts, camera, disc)
+        yield replace(spheres(parts, camera, disc), species=parts.species)
 
 
 def mixed_blocks(
@@ -95,40 +96,55 @@ def mixed_blocks(
     for parts in facet_parts(flora, result, camera, facet_pixels, transition):
         facets, hidden = [some for some, seen in parts if seen], [part for part in parts if not part[1]]
         if facets:
-            yield facet_mesh(concatenate_facets(facets))
+            yield replace(facet_mesh(concatenate_facets(facets)), species=parts.species)
         if hidden:
-            yield spheres(hidden, camera, disc)
+            yield replace(spheres(hidden, camera, disc), species=parts.species)
 
 
 #: Some facets, and whether the camera sees them: neither hidden nor beside the view.
 Part = tuple[Facets, bool]
 
 
+@dataclass(frozen=True)
+class Parts:
+    """Facets of one species, or of meshes where that is None."""
+
+    species: int | None
+    facets: tuple[Part, ...]
+
+    def __iter__(self) -> Iterator[Part]:
+        return iter(self.facets)
+
+
 def facet_parts(
     flora: Flora, result: Refinement, camera: Camera, facet_pixels: float, transition: Transition | None = None
-) -> Iterator[list[Part]]:
+) -> Iterator[Parts]:
     """Facets in blocks of about `BLOCK_POLYGONS`, none of them empty."""
     parts: list[Part] = []
-    for made in _facets(flora, result, camera, facet_pixels, transition):
-        if len(made[0]):
-            parts.append(made)
-        if sum(len(facets) for facets, _ in parts) >= BLOCK_POLYGONS:
-            yield parts
+    current = None
+    for species, *made in _facets(flora, result, camera, facet_pixels, transition):
+        full = sum(len(facets) for facets, _ in parts) >= BLOCK_POLYGONS
+        if parts and (full or species != current):
+            yield Parts(current, tuple(parts))
             parts = []
+        current = species
+        if len(made[0]):
+            parts.append(tuple(made))
     if parts:
-        yield parts
+        yield Parts(current, tuple(parts))
 
 
 def _facets(
     flora: Flora, result: Refinement, camera: Camera, facet_pixels: float, transition: Transition | None
-) -> Iterator[Part]:
-    """Facets in runs of about `FACETS_AT_ONCE`."""
+) -> Iterator[tuple[int | None, Facets, bool]]:
+    """Facets in runs of about `FACETS_AT_ONCE`, species by species."""
     hidden = result.chosen(Decision.HIDDEN)
     explicit = result.chosen(Decision.EXPLICIT) if transition else np.zeros(len(result.tree), bool)
     contents = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN) | explicit)
     if transition is not None:
         contents = _in_detail(contents, explicit, result.in_view & ~hidden, transition)
     shares = facet_shares(flora)
+    every = []
     for things, cell, row, sizes, share_of, make in (
         (
             contents.subplants,
@@ -150,17 +166,21 @@ def _facets(
         inside, side = result.in_view[cell], sizes.sides(facet_pixels)
         share = share_of(row, sizes.whole_optical / np.maximum(side[0], 1e-12) ** 2)
         wanted = _Wanted(*side, share, explicit[cell], inside & ~sizes.hidden)
-        expected = sizes.counts(facet_pixels) + 1
-        for seen in (True, False):
-            for i in _runs(expected, np.flatnonzero(inside & (wanted.seen == seen))):
-                yield make(flora, transition, things.take(i), wanted.take(i)), seen
-        # What is beside the view must not reach into the picture.
-        for i in _runs(expected, np.flatnonzero(~inside)):
-            made = make(flora, transition, things.take(i), wanted.take(i))
-            yield kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5), False
+        every.append((things, wanted, inside, sizes.counts(facet_pixels) + 1, flora.rows["species"][row], make))
+    for species in range(len(flora.species)):
+        for things, wanted, inside, expected, of_species, make in every:
+            own = of_species == species
+            for seen in (True, False):
+                for i in _runs(expected, np.flatnonzero(own & inside & (wanted.seen == seen))):
+                    yield species, make(flora, transition, things.take(i), wanted.take(i)), seen
+            # What is beside the view must not reach into the picture.
+            for i in _runs(expected, np.flatnonzero(own & ~inside)):
+                made = make(flora, transition, things.take(i), wanted.take(i))
+                yield species, kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5), False
     proxies = contents.within(~explicit)
     if len(proxies.polygons):
-        yield from polygon_facets(proxies, result, camera, facet_pixels)
+        for facets, seen in polygon_facets(proxies, result, camera, facet_pixels):
+            yield None, facets, seen
 
 
 def _in_detail(

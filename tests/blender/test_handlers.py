@@ -188,6 +188,7 @@ def test_a_file_saved_in_the_middle_of_a_render_holds_nothing_of_it(stage, stub,
     import bpy
 
     hand = _refined_by_hand(stage)
+    stage.tetflora.output.save_results = True
     path = str(tmp_path / "middle.blend")
     seen = []
 
@@ -243,6 +244,7 @@ def test_a_library_override_comes_back_after_its_file_was_saved_and_read(stage, 
         wanted.objects = ["rock"]
     override = wanted.objects[0].override_create(remap_local_usages=True)
     stage.collection.objects.link(override)
+    stage.tetflora.output.save_results = True
     part("job").refine(stage, depsgraph())
     assert override.hide_render
     bpy.ops.wm.save_as_mainfile(filepath=path)

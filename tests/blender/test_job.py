@@ -39,7 +39,7 @@ def _refine(scene, **settings):
 
 
 def _made(scene):
-    return [o for o in scene.objects if "tetflora_kind" in o]
+    return [o for o in scene.objects if o.get("tetflora_kind", "species") != "species"]
 
 
 def test_clear_removes_all_that_was_made_and_nothing_else():

@@ -55,9 +55,7 @@ def test_qualities_set_what_they_say_and_are_recognised():
 def test_everything_the_artist_sees_is_explained():
     import bpy
 
-    groups = {
-        name: getattr(part("properties"), name).bl_rna for name in (c.__name__ for c in part("properties").CLASSES)
-    }
+    groups = {cls.__name__: cls.bl_rna for cls in part("properties").CLASSES}
     operators = {name: getattr(bpy.types, name).bl_rna for name in dir(bpy.types) if name.startswith("TETFLORA_OT_")}
     assert len(operators) >= 9
     unexplained = [

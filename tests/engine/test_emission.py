@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -171,16 +172,19 @@ def test_facets_are_made_in_chunks_that_are_bounded(monkeypatch: pytest.MonkeyPa
 
 
 def test_facets_come_in_blocks_of_bounded_size(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Together they are all facets; only the last block is small."""
+    """Together they are all facets; each is of one species, of which only the last block is small."""
     flora, _, camera, result = scene()
     once = support.facet_buffers(flora, result, camera)
     monkeypatch.setattr(facet_emission, "FACETS_AT_ONCE", 300)
     monkeypatch.setattr(facet_emission, "BLOCK_POLYGONS", 700)
-    blocks = [b.polygons for b in facet_emission.facet_blocks(flora, result, camera)]
-    assert sum(blocks) == once.polygons
+    blocks = list(facet_emission.facet_blocks(flora, result, camera))
+    sizes = [b.polygons for b in blocks]
+    assert sum(sizes) == once.polygons
     assert len(blocks) > 3
-    assert min(blocks[:-1]) >= 700
-    assert max(blocks) < 2 * 700
+    assert min(a.polygons for a, b in pairwise(blocks) if a.species == b.species) >= 700
+    assert max(sizes) < 2 * 700
+    assert sorted({b.species for b in blocks}) == list(range(len(flora.species)))
+    assert [b.species for b in blocks] == sorted(b.species for b in blocks)
 
 
 def test_what_was_off_screen_comes_back_identical() -> None:

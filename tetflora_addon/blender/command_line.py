@@ -111,6 +111,7 @@ def _refine(options: argparse.Namespace) -> dict:
         raise SceneError(f"The folder {options.save.absolute().parent} does not exist; make it or choose another")
     statistics = job.refine(scene, bpy.context.evaluated_depsgraph_get(), view_layer=bpy.context.view_layer)
     if options.save is not None:
+        scene.tetflora.output.save_results = True  # that is what was asked for
         bpy.ops.wm.save_as_mainfile(filepath=str(options.save.absolute()), copy=True)
     return asdict(statistics)
 

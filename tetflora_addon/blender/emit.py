@@ -17,15 +17,15 @@ from contextlib import contextmanager
 import bpy
 
 from ..buffers import MeshBuffers, PointBuffers
+from ..plants.species import Species
 from .meshes import write_mesh
-from .node_tools import is_ours, tag
+from .node_tools import is_ours, tag, untag
+from .output import KIND, PARENT, dress, dress_collection, keep_materials, mark_runtime, parent_of
 from .point_clouds import point_object
 
 #: Custom property of a result collection: 'VIEW' for what the artist keeps, 'RENDER' for what lives while rendering.
 PURPOSE = "tetflora_purpose"
 NAMES = {'VIEW': "TetFlora", 'RENDER': "TetFlora render"}
-#: Custom property of a result object: 'leaf', 'blossom', 'bark', 'explicit' or 'proxy'.
-KIND = "tetflora_kind"
 #: Custom properties of objects that results stand for, as JSON: hide_render and hide_viewport as they were before
 #: ("flags"), and the names of the scenes whose results they are ("scenes"). Results of a render come last and go first.
 HIDDEN = {'VIEW': "tetflora_hidden", 'RENDER': "tetflora_hidden_for_render"}
@@ -57,23 +57,45 @@ class Results:
         tag(self.collection)
         self.scene.collection.children.link(self.collection)
 
-    def add(self, name: str, kind: str, buffers: MeshBuffers, materials: list[bpy.types.Material]) -> bpy.types.Object:
-        """Write one mesh as an object of the collection."""
-        return self._link(bpy.data.objects.new(name, write_mesh(name, buffers, materials)), kind)
+    def add(
+        self,
+        name: str,
+        kind: str,
+        buffers: MeshBuffers,
+        materials: list[bpy.types.Material],
+        species: Species | None = None,
+    ) -> bpy.types.Object:
+        """Write one mesh as an object of the collection; of one species, or of None."""
+        return self._link(bpy.data.objects.new(name, write_mesh(name, buffers, materials)), kind, species)
 
     def add_points(
-        self, name: str, kind: str, buffers: PointBuffers, materials: list[bpy.types.Material]
+        self,
+        name: str,
+        kind: str,
+        buffers: PointBuffers,
+        materials: list[bpy.types.Material],
+        species: Species | None = None,
     ) -> bpy.types.Object:
         """Write one cloud of points, which has one material, as an object of the collection."""
-        return self._link(point_object(name, buffers, *materials), kind)
+        return self._link(point_object(name, buffers, *materials), kind, species)
 
-    def _link(self, made: bpy.types.Object, kind: str) -> bpy.types.Object:
+    def _link(self, made: bpy.types.Object, kind: str, species: Species | None) -> bpy.types.Object:
         tag(made.data)
+        if species is not None:
+            made.parent = parent_of(self.collection, species.identifier, species.name)
         made[KIND] = kind
         made.hide_select = True  # millions of polygons under the cursor; the plants are what is edited
         tag(made)
+        dress(self.scene, made, "" if species is None else species.identifier)
         self.collection.objects.link(made)
         return made
+
+    def finish(self) -> None:
+        """All is made: results of a render are no part of files, those of the artist are what the scene says."""
+        if self.collection is not None and self.purpose == 'VIEW':
+            dress_collection(self.scene, self.collection)
+        elif self.collection is not None:
+            mark_runtime(self.collection, True)
 
     def hide(self, originals: Sequence[bpy.types.Object]) -> None:
         """Hide objects whose place the results take, in viewports too unless they are made for a render alone."""
@@ -95,6 +117,36 @@ def result_collections(scene: bpy.types.Scene, purpose: str | None = None) -> li
     """Result collections of a scene, of one purpose or of all."""
     made = [c for c in scene.collection.children if is_ours(c) and PURPOSE in c]
     return [c for c in made if purpose is None or c[PURPOSE] == purpose]
+
+
+def dress_results(scene: bpy.types.Scene) -> None:
+    """Bring the artist's results of a scene in step with its output settings."""
+    for collection in result_collections(scene, 'VIEW'):
+        dress_collection(scene, collection)
+
+
+def keep_results(scene: bpy.types.Scene) -> int:
+    """Make the artist's results of a scene the artist's own; of how many objects.
+
+    Explicit objects in whose place they are stay hidden.
+    """
+    for original in _marked('VIEW'):
+        if _concerns(scene, original, 'VIEW') and not _others(scene, original, 'VIEW'):
+            del original[HIDDEN['VIEW']]
+    kept = 0
+    for collection in result_collections(scene, 'VIEW'):
+        mark_runtime(collection, False)
+        for obj in collection.objects:
+            if is_ours(obj):
+                kept += obj.get(KIND) != PARENT
+                obj.hide_select = False
+                for datablock in (obj, obj.data):
+                    if datablock is not None:
+                        untag(datablock)
+        del collection[PURPOSE]
+        untag(collection)
+        collection.name = "TetFlora kept"
+    return kept
 
 
 def has_results(scene: bpy.types.Scene) -> bool:
@@ -174,22 +226,57 @@ def _others(scene: bpy.types.Scene, original: bpy.types.Object, purpose: str) ->
     ]
 
 
-def lift_render_marks() -> dict[str, str]:
-    """Show everything that is hidden for a render; returns the marks by object, for `restore_render_marks`."""
+def lift_marks() -> dict[tuple[str, str], str]:
+    """Show everything that is hidden for results that files do not hold: of renders, and of the artist unless asked.
+
+    Returns
+    -------
+    dict
+        The marks by purpose and name of the object, for `restore_marks`.
+    """
+    saving = {scene.name for scene in bpy.data.scenes if scene.tetflora.output.save_results}
     lifted = {}
-    for original in _marked('RENDER'):
-        lifted[original.name] = original[HIDDEN['RENDER']]
-        _show(original, 'RENDER')
+    for purpose in ('RENDER', 'VIEW'):
+        for original in _marked(purpose):
+            if purpose == 'RENDER' or not saving.intersection(_marker(original, purpose)[1]):
+                lifted[purpose, original.name] = original[HIDDEN[purpose]]
+                _show(original, purpose)
     return lifted
 
 
-def restore_render_marks(lifted: dict[str, str]) -> None:
-    """Hide again what `lift_render_marks` showed."""
-    for name, mark in lifted.items():
+def restore_marks(lifted: dict[tuple[str, str], str]) -> None:
+    """Hide again what `lift_marks` showed."""
+    for (purpose, name), mark in reversed(lifted.items()):
         original = bpy.data.objects.get((name, None))
         if original is not None:
-            original[HIDDEN['RENDER']] = mark
+            original[HIDDEN[purpose]] = mark
             original.hide_render = True
+            original.hide_viewport = original.hide_viewport or purpose == 'VIEW'
+
+
+def show_left_over() -> None:
+    """Show what is hidden for results that are not there: a file was read, which does not hold them."""
+    for original in _marked('RENDER'):
+        _show(original, 'RENDER')
+    for original in _marked('VIEW'):
+        names = _marker(original, 'VIEW')[1]
+        homes = [s for s in bpy.data.scenes if s.name in names or s.objects.get(original.name) == original]
+        if not any(result_collections(scene, 'VIEW') for scene in homes):
+            _show(original, 'VIEW')
+
+
+def leave_out_of_file() -> None:
+    """Before a file is written: results that it shall not hold are marked as such, and their materials kept.
+
+    Here and not only when they are made, because undo brings datablocks back without the mark.
+    """
+    for scene in bpy.data.scenes:
+        saved = scene.tetflora.output.save_results
+        for collection in result_collections(scene) if scene.library is None else ():
+            runtime = collection[PURPOSE] == 'RENDER' or not saved
+            mark_runtime(collection, runtime)
+            if runtime and collection[PURPOSE] == 'VIEW':
+                keep_materials(collection)
 
 
 def pack_override_marks() -> None:
@@ -235,6 +322,8 @@ def originals_shown(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> I
 def _remove_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) -> int:
     data, objects, groups = [], [], set()
     for held in list(collection.objects):
+        if is_ours(held) and held.get(KIND) == PARENT and len(held.users_collection) > 1:
+            continue  # other results have it too
         if is_ours(held):
             objects.append(held)
             if held.data is not None and is_ours(held.data):

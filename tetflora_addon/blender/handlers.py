@@ -21,13 +21,17 @@ from bpy.app.handlers import persistent
 from ..errors import TetFloraError
 from . import job
 from .emit import (
-    lift_render_marks,
+    has_results,
+    leave_out_of_file,
+    lift_marks,
     pack_override_marks,
-    restore_render_marks,
+    restore_marks,
     result_collections,
+    show_left_over,
     unpack_override_marks,
 )
 from .migration import migrate
+from .output import release_materials
 from .scene_reader import NoPlantsError, has_contents, may_take_part, renderable_objects
 from .shell_bounces import raise_bounces
 
@@ -38,7 +42,7 @@ class _Rendering:
 
     busy: bool = False
     hidden: list[str] = field(default_factory=list)
-    lifted: dict[str, str] = field(default_factory=dict)  # marks of originals, while a file is written
+    lifted: dict[tuple[str, str], str] = field(default_factory=dict)  # marks of originals, while a file is written
     bounces: dict[str, int] = field(default_factory=dict)  # of Cycles, as they were
     errors: list[str] = field(default_factory=list)
 
@@ -65,7 +69,8 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     _rendering.busy = True
     try:
         _take_back(scene)
-        if scene.tetflora.refine_at_render and has_contents(scene):
+        wanted = scene.tetflora.refine_at_render and scene.tetflora.output.show_render
+        if wanted and has_contents(scene):
             _make(scene)
     except NoPlantsError:
         pass  # all of them are disabled or hidden: the artist wants no forest
@@ -95,7 +100,8 @@ def on_render_end(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
 def on_save_pre(_path: object, _other: object = None) -> None:
     """Before a file is written: meshes that are only hidden for a render are stored as shown."""
     _show_hidden()
-    _rendering.lifted = lift_render_marks()
+    leave_out_of_file()
+    _rendering.lifted = lift_marks()
     pack_override_marks()
 
 
@@ -105,23 +111,27 @@ def on_save_post(_path: object, _other: object = None) -> None:
     for collection in _named(_rendering.hidden):
         collection.hide_render = True
     unpack_override_marks()
-    restore_render_marks(_rendering.lifted)
+    restore_marks(_rendering.lifted)
     _rendering.lifted.clear()
+    release_materials()
 
 
 @persistent
 def on_load_post(_path: object, _other: object = None) -> None:
     """After a file was read: nothing of an earlier render counts any more; bring old properties up to date.
 
-    Meshes that are marked as hidden for a render come from a crash in its middle, and are shown.
+    Meshes that are hidden for results which the file does not hold are shown.
     """
     _rendering.busy = False
     _rendering.bounces.clear()
     _rendering.hidden.clear()
     _rendering.lifted.clear()
     _rendering.errors.clear()
-    lift_render_marks()
     unpack_override_marks()
+    show_left_over()
+    for scene in bpy.data.scenes:
+        if scene.library is None and scene.tetflora.statistics and not has_results(scene):
+            scene.tetflora.statistics = ""
     migrate()
 
 
@@ -131,9 +141,6 @@ def _make(scene: bpy.types.Scene) -> None:
     scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
     layer = _view_layer(scene)
     job.refine(scene, layer.depsgraph, view_layer=layer, for_render=True)
-    for made in result_collections(scene, 'RENDER'):
-        for datablock in (made, *made.objects, *(obj.data for obj in made.objects)):
-            datablock.is_runtime_data = True
     _rendering.bounces = raise_bounces(scene)
     # Hidden only now: if refinement failed, yesterday's trees are better than none.
     _rendering.hidden = [c.name for c in result_collections(scene, 'VIEW') if not c.hide_render]

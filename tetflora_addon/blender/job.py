@@ -31,10 +31,11 @@ from ..shading.facet_shares import facet_shares
 from .baked_material import baked_material
 from .baking import Baking, read_sources
 from .camera_reader import read_camera
-from .emit import Results, has_results, originals_shown, remove_results
+from .emit import Results, has_results, originals_shown, remove_results, result_collections
 from .explicit_objects import Explicit, read_explicit
 from .leaf_forms import materials_of, resolved_species
 from .light_reader import read_lights
+from .output import adopt_materials, release_materials
 from .properties import settings_from
 from .proxies import tell_facets, write_proxies
 from .scene_reader import NoPlantsError, read_occluders, read_plants
@@ -172,6 +173,8 @@ def refine_steps(
     statistics = Statistics(plants=len(given.seeds), polygons_full=full, seconds=clock.seconds)
     originals = []
     results = Results(scene, 'RENDER' if for_render else 'VIEW')
+    for earlier in result_collections(scene, 'VIEW'):
+        adopt_materials(scene, earlier)
     try:
         if scene.tetflora.expand_everything:
             results.open()
@@ -210,7 +213,9 @@ def refine_steps(
         results.discard()
         raise
     remove_results(scene, results.purpose, keep=results.collection)
+    release_materials()
     results.hide(originals)
+    results.finish()
     statistics.seconds = dict(clock.seconds)
     scene.tetflora.statistics = json.dumps(statistics.as_dict())
     return statistics
@@ -309,7 +314,7 @@ def _write_blocks(
             made = [baked_material()] if baked else materials_of(results.scene, species, block.kind, block.form)
             materials[what] = made
         name = f"{species.name} {block.kind} {block.number:03d}"
-        obj = results.add(name, block.kind, block.buffers, materials[what])
+        obj = results.add(name, block.kind, block.buffers, materials[what], species)
         if baking is not None:
             baking.add(obj, block.buffers, lit=True)
         statistics.polygons_meshed += block.buffers.polygons

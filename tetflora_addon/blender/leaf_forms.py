@@ -14,6 +14,7 @@ from ..plants.leaf_models import LeafModel, leaf_model
 from ..plants.species import LEAF_KINDS, Species
 from .materials import bark_material, leaf_material
 from .meshes import UV_MAP, read_mesh_arrays
+from .output import replaced_material
 from .plant_form import read_skeleton
 from .plant_kinds import form_of, species_of
 from .properties import leaf_objects
@@ -84,7 +85,9 @@ def _model_of(species: Species, source: bpy.types.Object, depsgraph: bpy.types.D
 
 
 def materials_of(scene: bpy.types.Scene, species: Species, kind: str, form: int) -> list[bpy.types.Material]:
-    """Materials for polygons of a kind: an object's own where leaves are copies of one that has any, else the species'.
+    """Materials for polygons of a kind: the artist's for the species; an object's own where leaves are copies of it.
+
+    Else the species' own, as TetFlora makes them.
 
     Parameters
     ----------
@@ -96,6 +99,9 @@ def materials_of(scene: bpy.types.Scene, species: Species, kind: str, form: int)
     form : int
         Which form of leaf.
     """
+    replaced = replaced_material(scene, species.identifier, kind)
+    if replaced is not None:
+        return [replaced]
     if kind == "bark":
         return [bark_material(species.name, species.bark)]
     source = leaf_objects(scene).get(species.identifier) if kind == "leaf" else None

@@ -22,6 +22,12 @@ def tag(datablock: bpy.types.ID) -> None:
     datablock[MADE] = datablock.name
 
 
+def untag(datablock: bpy.types.ID) -> None:
+    """Hand a datablock over to the artist."""
+    if MADE in datablock:
+        del datablock[MADE]
+
+
 def is_ours(datablock: bpy.types.ID) -> bool:
     """Whether TetFlora made a datablock and nobody took it over.
 

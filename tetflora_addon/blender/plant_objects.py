@@ -29,6 +29,11 @@ def plants_of(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
     return [o for o in objects if o.tetflora.is_plant]
 
 
+def plant_collections(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
+    """The scene's collections for plants that are there."""
+    return [c for c in scene.collection.children_recursive if c.get(_MARK) and c.library is None]
+
+
 def plant_collection(scene: bpy.types.Scene) -> bpy.types.Collection:
     """The scene's collection for plants; made if there is none."""
     for collection in scene.collection.children_recursive:

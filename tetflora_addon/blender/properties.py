@@ -17,6 +17,7 @@ from bpy.props import (
 )
 
 from ..refinement.settings import RefinementSettings
+from . import output_properties
 from .explicit_objects import PROPERTY as EXPLICIT
 from .plant_form import FORM_TYPES
 from .refinement_properties import RefinementProperties
@@ -274,6 +275,7 @@ class TetFloraScene(RefinementProperties, bpy.types.PropertyGroup):
     )
 
     populate: PointerProperty(type=TetFloraPopulate)
+    output: PointerProperty(type=output_properties.TetFloraOutput)
     leaf_objects: CollectionProperty(
         name="Leaf Objects",
         description="Meshes of your own in place of a species' leaf",
@@ -302,6 +304,7 @@ CLASSES = (
     TetFloraPopulate,
     TetFloraSpeciesEdit,
     TetFloraSpeciesEditor,
+    *output_properties.CLASSES,
     TetFloraScene,
 )
 

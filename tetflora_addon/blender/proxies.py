@@ -88,7 +88,9 @@ def write_proxies(
         add = results.add_points if points else results.add
         if form == 'SHELLS' and not baked:
             shade_shells(made, scene)
-        add(f"TetFlora proxies {number:03d}", "proxy", buffers, [made])
+        species = None if buffers.species is None else flora.species[buffers.species]
+        name = f"{'TetFlora' if species is None else species.name} proxies {number:03d}"
+        add(name, "proxy", buffers, [made], species)
         statistics.polygons_proxy += buffers.polygons
         statistics.memory_mb += buffers.nbytes / 1e6
         yield 1 - 0.9**number
@@ -150,4 +152,4 @@ def _baked_blocks(
         values = baked_attributes(domain, *light)
         if points:
             values = {name: array for name, (_, array) in values.items()}
-        yield replace(made, attributes={**made.attributes, **values})
+        yield replace(made, attributes={**made.attributes, **values}, species=parts.species)

@@ -1,0 +1,39 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Turn results into ordinary meshes of the artist's."""
+
+import bpy
+
+from ..tetflora_addon.blender.emit import keep_results, result_collections
+from . import ids
+from .base import Reporting, counted
+
+
+class TETFLORA_OT_keep_results(Reporting, bpy.types.Operator):
+    """Make ordinary meshes of what Refine made."""
+
+    bl_idname = ids.KEEP_RESULTS
+    bl_label = "Keep Results as Meshes"
+    bl_description = (
+        "Make what Refine made your own: ordinary meshes that are saved in the file and that you can edit. Refine and "
+        "Clear leave them alone. Refine at Render is switched off, so that renders do not show the plants twice"
+    )
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.mode != 'OBJECT':
+            cls.poll_message_set("Works in Object Mode")
+            return False
+        if not result_collections(context.scene, 'VIEW'):
+            cls.poll_message_set("There are no results yet; press Refine first")
+            return False
+        return True
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        scene = context.scene
+        kept = keep_results(scene)
+        scene.tetflora.refine_at_render = False
+        scene.tetflora.statistics = ""
+        self.report({'INFO'}, f"{counted(kept, 'object')} kept as meshes; Refine at Render is off")
+        return {'FINISHED'}
