@@ -6,9 +6,9 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty
 
-from ..tetflora_addon.blender.placement import Placement, new_seeds
 from ..tetflora_addon.blender.plant_objects import add_plants, plants_of
 from ..tetflora_addon.blender.species_items import NO_SPECIES, default_species, operator_items
+from ..tetflora_addon.planting.places import Placement, new_seeds
 from . import ids
 from .base import Reporting, in_object_mode, select_only
 

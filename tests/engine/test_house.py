@@ -24,6 +24,7 @@ ROOMS = {
     "tetrahedra": set(),
     "refinement": {"plants", "tetrahedra"},
     "shading": {"plants", "tetrahedra", "refinement"},
+    "planting": {"plants"},
     "preview": {"plants", "tetrahedra", "refinement"},
 }
 SHARED = {"buffers", "errors"}

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
+from ..planting.places import new_seeds
 from ..plants.hashing import child_key, key_of_seed
-from .placement import new_seeds
 from .plant_copies import geometry_of
 from .plant_kinds import kind_of, kind_of_choice
 from .transforms import frames_of

@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Species that seek or shun each other: in which order they are placed, and where each may stand."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..plants.hashing import uniform
+from .rules import Companion, Rules
+from .site import Draw
+from .spacing import NO_DISTANCE, Neighbours, Spacing
+
+_FOUNDERS = 0.1  # of the plants that seek each other
+
+
+class Company:
+    """What stands already, by species, and who may join.
+
+    A rule is taken to heart by a share of the plants, chosen by their hashes, which is its strength without the sign.
+    Where plants shun others, it does not matter who came first: an oak that shuns birches keeps new birches away too.
+    """
+
+    def __init__(self, rules: Rules, position: NDArray[np.float64], species: NDArray[np.int32]) -> None:
+        """Begin with older plants: places on the map (m, 2), and indices into the shares or -1 (m,)."""
+        self.rules = [(n, r) for n, r in enumerate(rules.companions) if r.strength and r.distance >= NO_DISTANCE]
+        self.place = {s: [position[species == s]] for s in range(len(rules.shares))}
+
+    def order(self, wanted: list[int]) -> list[int]:
+        """Species in the order in which they are placed: those that are sought before those that seek them."""
+        order, rest = [], list(wanted)
+        while rest:
+            free = [s for s in rest if not any(self._seeks(s, other) for other in rest if other != s)]
+            # In a circle of species that seek each other, the first of the list begins.
+            order.append(free[0] if free else rest[0])
+            rest.remove(order[-1])
+        return order
+
+    def admit(self, species: int, points: NDArray[np.float64], keys: NDArray[np.uint64]) -> NDArray[np.bool_]:
+        """Which places, (n, 2), candidates of a species may take beside what stands, and beside each other, (n,)."""
+        fine = np.ones(len(points), bool)
+        for number, rule in self.rules:
+            if species not in (rule.species, rule.other):
+                continue
+            asks = fine & _takes_to_heart(keys, number, rule)
+            if rule.strength < 0.0 and rule.species == rule.other:
+                asked = np.flatnonzero(asks)
+                fine[asked] = False
+                fine[asked[Spacing(rule.distance, self._standing(species)).admit(points[asked], len(asked))]] = True
+            elif rule.strength < 0.0:
+                others = self._standing(rule.other if species == rule.species else rule.species)
+                fine[asks] = ~Neighbours(others, rule.distance).near(points[asks])
+            elif species == rule.species:
+                # Who seeks its own kind, or what comes later, needs founders; those left alone go in the end.
+                others = self._standing(rule.other)
+                founds = np.zeros(len(points), bool)
+                if self._awaited(rule):
+                    founds = asks & (uniform(keys, Draw.FOUNDER) < _FOUNDERS)
+                    others = np.concatenate([others, points[founds]]) if rule.other == species else others
+                fine[asks] = founds[asks] | Neighbours(others, rule.distance).near(points[asks])
+        return fine
+
+    def add(self, species: int, points: NDArray[np.float64]) -> None:
+        """Plants of a species stand now at places (n, 2)."""
+        self.place.setdefault(species, []).append(points)
+
+    def lonely(
+        self, points: NDArray[np.float64], species: NDArray[np.int32], keys: NDArray[np.uint64], older: Company
+    ) -> NDArray[np.bool_]:
+        """Plants that have not what they seek near, (n,), when those that these need in turn are gone as well."""
+        gone = np.zeros(len(points), bool)
+        seeking = [(n, r) for n, r in self.rules if r.strength > 0.0]
+        changed = bool(seeking)
+        while changed:
+            changed = False
+            for number, rule in seeking:
+                asked = np.flatnonzero(~gone & (species == rule.species) & _takes_to_heart(keys, number, rule))
+                there = points[~gone & (species == rule.other)]
+                alone = ~Neighbours(older._standing(rule.other), rule.distance).near(points[asked])
+                # Among their own kind they meet themselves as well.
+                least = 2 if rule.other == rule.species else 1
+                alone[alone] = ~Neighbours(there, rule.distance).near(points[asked[alone]], least)
+                gone[asked[alone]] = True
+                changed |= bool(alone.any())
+        return gone
+
+    def _standing(self, species: int) -> NDArray[np.float64]:
+        return np.concatenate(self.place[species])
+
+    def _seeks(self, species: int, other: int) -> bool:
+        return any(r.species == species and r.other == other and r.strength > 0.0 for _, r in self.rules)
+
+    def _awaited(self, rule: Companion) -> bool:
+        """Whether the others come later because both seek each other; `lonely` then decides in the end."""
+        return self._reaches(rule.other, rule.species, set())
+
+    def _reaches(self, start: int, goal: int, seen: set[int]) -> bool:
+        if start == goal:
+            return True
+        seen.add(start)
+        ahead = {r.other for _, r in self.rules if r.species == start and r.strength > 0.0} - seen
+        return any(self._reaches(s, goal, seen) for s in sorted(ahead))
+
+
+def _takes_to_heart(keys: NDArray[np.uint64], number: int, rule: Companion) -> NDArray[np.bool_]:
+    return uniform(keys, Draw.COMPANION + number) < abs(rule.strength)

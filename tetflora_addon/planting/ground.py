@@ -1,0 +1,110 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What plants may stand on: triangles, masks on them, and areas, paths and borders on the map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+
+
+@dataclass(frozen=True)
+class Path:
+    """A line on the map to keep free.
+
+    Attributes
+    ----------
+    points : (k, 2) float64
+        Metres, k at least 1; a cyclic line repeats its first point.
+    half_width : float
+        Metres to either side in which nothing grows; 0 keeps nothing free.
+    """
+
+    points: NDArray[np.float64]
+    half_width: float
+
+
+@dataclass(frozen=True)
+class Ground:
+    """A terrain with everything that is drawn on it. Only the triangles are needed.
+
+    Attributes
+    ----------
+    triangles : (t, 3, 3) float64
+        Corners, metres in world space; either side may be up.
+    weight : (t, 3) float, optional
+        How suitable the corners are, 0 to 1 (vertex groups); linear between.
+    uv : (t, 3, 2) float, optional
+        Where the corners are in the image; it repeats beyond 0 and 1.
+    image : (h, w) float, optional
+        How suitable texels are, 0 to 1; the first row is at the bottom. Read between texels (bilinear).
+    areas : tuple of (k, 2) float64
+        Closed polygons on the map. If there are any, plants grow in at least one of them.
+    paths : tuple of Path
+    border : (e, 2, 3) float64, optional
+        Edges where the ground ends; found from the triangles if they are asked for and not given.
+    """
+
+    triangles: NDArray[np.float64]
+    weight: NDArray[np.float64] | None = None
+    uv: NDArray[np.float64] | None = None
+    image: NDArray[np.float32] | None = None
+    areas: tuple[NDArray[np.float64], ...] = ()
+    paths: tuple[Path, ...] = ()
+    border: NDArray[np.float64] | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be stood on.
+
+        Raises
+        ------
+        SceneError
+            No triangles, or some with places that are no numbers.
+        ValueError
+            Arrays that do not fit each other: a mistake of the caller, not of the artist.
+        """
+        count = len(self.triangles)
+        if not count:
+            raise SceneError("The ground has no faces; select a mesh with faces")
+        broken = int((~np.isfinite(self.triangles).all(axis=(1, 2))).sum())
+        if broken:
+            raise SceneError(
+                f"{broken:,} of {count:,} triangles of the ground have corners that are no finite numbers; "
+                "check its transform, modifiers and drivers, or run Mesh > Clean Up > Degenerate Dissolve"
+            )
+        if self.weight is not None and np.shape(self.weight) != (count, 3):
+            raise ValueError(f"weight of shape {np.shape(self.weight)} for {count} triangles")
+        if (self.uv is None) != (self.image is None):
+            raise ValueError("an image needs uv, and uv an image")
+        if self.uv is not None and np.shape(self.uv) != (count, 3, 2):
+            raise ValueError(f"uv of shape {np.shape(self.uv)} for {count} triangles")
+
+
+def border_of(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Edges of only one triangle, (e, 2, 3); corners at exactly the same place are one."""
+    # Adding 0 makes -0.0 and 0.0 the same bytes.
+    rows = np.ascontiguousarray(triangles.reshape(-1, 3) + 0.0).view(np.dtype((np.void, 24)))[:, 0]
+    _, corner = np.unique(rows, return_inverse=True)
+    corner = corner.reshape(-1, 3)
+    ends = np.stack([corner, np.roll(corner, -1, axis=1)], axis=2).reshape(-1, 2)
+    places = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2, 3)
+    key = ends.min(axis=1) * np.int64(len(rows)) + ends.max(axis=1)
+    _, first, count = np.unique(key, return_index=True, return_counts=True)
+    return places[first[(count == 1)]]
+
+
+def sampled(image: NDArray[np.float32], uv: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values of an image (h, w) at places (n, 2), linear between the middles of texels; it repeats. (n,)."""
+    height, width = image.shape
+    place = uv * (width, height) - 0.5
+    low = np.floor(place)
+    part = place - low
+    x, y = (low.astype(np.int64) % (width, height)).T
+    right, above = (x + 1) % width, (y + 1) % height
+    bottom = image[y, x] * (1.0 - part[:, 0]) + image[y, right] * part[:, 0]
+    top = image[above, x] * (1.0 - part[:, 0]) + image[above, right] * part[:, 0]
+    return bottom * (1.0 - part[:, 1]) + top * part[:, 1]

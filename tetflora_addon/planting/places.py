@@ -1,0 +1,315 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where plants go: on ground that suits them, at a distance from each other, near what they seek.
+
+Arrays only; `blender.plant_objects` makes objects of them. Chance comes from the same hash as in the plants themselves,
+so that a seed means the same arrangement in every version of Blender.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from ..plants.hashing import child_key, key_of_seed, uniform
+from .checks import check_rules
+from .companions import Company
+from .ground import Ground
+from .rules import Rules
+from .site import REMEDIES, Draw, Sample, Site
+from .spacing import Spacing
+
+MOST = 10_000_000  # plants of one population
+_ROUNDS = 24
+_SMALLEST_ROUND = 512
+_LARGEST_ROUND = 2_000_000
+_MOST_DRAWN = 16_000_000  # and a few dozen for each plant; what is rarer than that takes too long
+_HOPELESS = 1_000_000  # places without a suitable one
+_FULL = 5_000  # places of which not one is far enough from others: the ground is full
+_SPECIES = 2**32  # keys of species that are placed one after the other, away from those of plants
+
+
+@dataclass(frozen=True)
+class Occupied:
+    """Plants that stand already.
+
+    Attributes
+    ----------
+    position : (m, 2) or (m, 3) float64
+        Metres, world space.
+    species : (m,) int32, optional
+        Index into the shares of the rules, -1 for other species and where nothing is known.
+    """
+
+    position: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
+    species: NDArray[np.int32] | None = None
+
+    def __post_init__(self) -> None:
+        """Plants whose species nobody named are of other species."""
+        if self.species is None:
+            object.__setattr__(self, "species", np.full(len(self.position), -1, np.int32))
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Plants to make.
+
+    Attributes
+    ----------
+    position : (n, 3) float64
+        Metres, world space.
+    azimuth : (n,) float64
+        Rotation about the vertical, radians; comes before the tilt.
+    scale : (n,) float64
+    species : (n,) int32
+        Index into the shares that were asked for.
+    seed : (n,) int32
+        Zero or positive.
+    wanted : int
+        How many were asked for, by number or by density.
+    reason : str
+        Why there are fewer, and what to do; empty if there are not.
+    up : (n, 3) float64, optional
+        Unit vectors along the trunks; upright if not given.
+    """
+
+    position: NDArray[np.float64]
+    azimuth: NDArray[np.float64]
+    scale: NDArray[np.float64]
+    species: NDArray[np.int32]
+    seed: NDArray[np.int32]
+    wanted: int
+    reason: str = ""
+    up: NDArray[np.float64] | None = None
+
+    def __post_init__(self) -> None:
+        """Plants that nobody tilted are upright."""
+        if self.up is None:
+            object.__setattr__(self, "up", np.tile([0.0, 0.0, 1.0], (len(self.seed), 1)))
+
+    def __len__(self) -> int:
+        return len(self.seed)
+
+    @property
+    def rotation(self) -> NDArray[np.float64]:
+        """Unit quaternions (n, 4), w first: the turn about the vertical, then the shortest one to ``up``."""
+        cos, sin = np.cos(0.5 * self.azimuth), np.sin(0.5 * self.azimuth)
+        x, y, z = self.up.T
+        # The shortest turn from (0, 0, 1) to (x, y, z) is (1 + z, -y, x, 0), normalised; trunks never point down.
+        length = np.sqrt(np.maximum(2.0 * (1.0 + z), 1e-12))
+        w, i, j = (1.0 + z) / length, -y / length, x / length
+        return np.stack([w * cos, i * cos + j * sin, j * cos - i * sin, w * sin], axis=1)
+
+
+def place(ground: Ground, rules: Rules, occupied: Occupied | None = None) -> Placement:
+    """Scatter plants over the ground as the rules ask, evenly as seen on a map.
+
+    Parameters
+    ----------
+    ground : Ground
+    rules : Rules
+    occupied : Occupied, optional
+        Plants that stand already; new ones keep their distance from them, and may seek or shun them.
+
+    Raises
+    ------
+    SceneError
+        No ground is suitable, or the rules contradict themselves; names the setting and what to do.
+
+    Notes
+    -----
+    Places are drawn by hashes of the seed and of their number, and kept as often as they are suitable (rejection
+    sampling); those that are kept first come first (dart throwing: R. Cook, "Stochastic sampling in computer graphics",
+    1986). By density, as many places are drawn as would stand on wholly suitable ground. By count, more are drawn, in a
+    bounded number of rounds, until there are enough. Where species seek or shun each other, they are placed one after
+    the other, each with its share of the count.
+    """
+    check_rules(rules)
+    occupied = occupied or Occupied()
+    older = np.asarray(occupied.position, dtype=np.float64)[:, :2]
+    site = Site(ground, rules)
+    key = key_of_seed(rules.seed)
+    spacing = Spacing(rules.min_distance, older)
+    company = Company(rules, older, occupied.species)
+    sowing = _Sowing(site, rules, spacing, company)
+    if not company.rules:
+        sowing.sow(key, None, 1.0)
+    else:
+        weights = np.maximum(rules.shares, 0.0)
+        for species in company.order(np.flatnonzero(weights > 0.0).tolist()):
+            sowing.sow(child_key(key, _SPECIES + species), species, _part(weights, species, rules))
+    position, up, keys, species = sowing.result()
+    reason = sowing.reason(len(position))
+    if company.rules:
+        stay = ~company.lonely(position[:, :2], species, keys, Company(rules, older, occupied.species))
+        sowing.refused["companions"] += int((~stay).sum())
+        position, up, keys, species = position[stay], up[stay], keys[stay], species[stay]
+        reason = sowing.reason(len(position))
+    return Placement(
+        position=position,
+        azimuth=2.0 * np.pi * uniform(keys, Draw.AZIMUTH),
+        scale=_scales(position[:, 2], keys, site, rules),
+        species=species,
+        seed=_positive(keys),
+        wanted=sowing.wanted,
+        reason=reason,
+        up=_tilted(up, rules.tilt),
+    )
+
+
+def new_seeds(seeds: NDArray[np.int64], roll: int = 0) -> NDArray[np.int32]:
+    """Other seeds for plants with the given ones, (n,), zero or positive; another ``roll`` gives yet others."""
+    return _positive(child_key(key_of_seed(seeds), roll & 0xFFFFFFFF))
+
+
+class _Sowing:
+    """Plants so far, and what became of the places that were drawn."""
+
+    def __init__(self, site: Site, rules: Rules, spacing: Spacing, company: Company) -> None:
+        self.site, self.rules, self.spacing, self.company = site, rules, spacing, company
+        self.wanted = 0
+        self.drawn, self.suitable = 0, 0
+        self.lost = dict.fromkeys(REMEDIES, 0)
+        self.refused = {"companions": 0, "distance": 0}
+        self._parts: list[tuple[NDArray, ...]] = []
+
+    def sow(self, key: NDArray[np.uint64], species: int | None, part: float) -> None:
+        """Place plants of one species, or of all by their shares, and ``part`` of the number asked for."""
+        if self.rules.by_density:
+            expected = self.rules.density * self.site.area * part
+            # What is left of a whole plant comes by chance.
+            places = int(expected + uniform(key, Draw.SUITABLE))
+            for first in range(0, places, _LARGEST_ROUND):
+                sample = self.site.draw(key, first, min(places - first, _LARGEST_ROUND))
+                self.wanted += len(sample.key)
+                self._admit(sample, species, len(sample.key))
+            return
+        wanted = round(self.rules.count * part) if species is None else int(part)
+        self.wanted += wanted
+        kept = drawn = beside = suitable = 0
+        free = self.spacing.free and not self.company.rules
+        for _ in range(_ROUNDS):
+            missing = wanted - kept
+            rate = max(beside / drawn, 1.0 / 64.0) if drawn else 1.0
+            batch = min(max(int(2 * missing / rate), _SMALLEST_ROUND), _LARGEST_ROUND)
+            sample = self.site.draw(key, drawn, batch, missing if free else None)
+            drawn += sample.drawn
+            suitable += len(sample.key)
+            came, stayed = self._admit(sample, species, missing)
+            beside += came
+            kept += stayed
+            full = came >= _FULL and stayed * _FULL < came
+            hopeless = not suitable and drawn >= _HOPELESS
+            if kept >= wanted or full or hopeless or drawn > _MOST_DRAWN + 48 * wanted:
+                break
+
+    def _admit(self, sample: Sample, species: int | None, most: int) -> tuple[int, int]:
+        """Keep what has company and distance; how many had company, and how many stay."""
+        self.drawn += sample.drawn
+        self.suitable += len(sample.key)
+        for name, number in sample.lost.items():
+            self.lost[name] += number
+        position, up, keys = sample.position, sample.up, sample.key
+        if species is None:
+            kinds = _mixed(keys, self.rules.shares)
+        else:
+            kinds = np.full(len(keys), species, np.int32)
+            fine = self.company.admit(species, position[:, :2], keys)
+            self.refused["companions"] += int((~fine).sum())
+            position, up, keys, kinds = position[fine], up[fine], keys[fine], kinds[fine]
+        chosen = self.spacing.admit(position[:, :2], most)
+        if len(chosen) < most:
+            self.refused["distance"] += len(keys) - len(chosen)
+        self._parts.append((position[chosen], up[chosen], keys[chosen], kinds[chosen]))
+        if species is not None:
+            self.company.add(species, position[chosen, :2])
+        return len(keys), len(chosen)
+
+    def result(self) -> tuple[NDArray, NDArray, NDArray[np.uint64], NDArray[np.int32]]:
+        """Places, normals, keys and species of all plants."""
+        none = np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.uint64), np.zeros(0, np.int32)
+        return tuple(np.concatenate(column) for column in zip(none, *self._parts, strict=True))
+
+    def reason(self, kept: int) -> str:
+        """Why there are fewer plants than wanted.
+
+        Raises
+        ------
+        SceneError
+            No place was suitable, and many were tried.
+        """
+        rules = self.rules
+        if not self.drawn:
+            return (
+                f"{rules.density:.3g} plants for each square metre are less than one on {self.site.area:.3g} m²; "
+                "raise the density or take a larger surface"
+            )
+        if kept and kept >= self.wanted:
+            return ""
+        worst = max(self.lost, key=self.lost.__getitem__)
+        if not self.suitable and self.drawn > 10_000:
+            raise SceneError(f"No plant finds a place: {REMEDIES[worst]}")
+        shares = {
+            "suitable": self.suitable / self.drawn,
+            "companions": 1.0 - self.refused["companions"] / max(self.suitable, 1),
+            "distance": 1.0 - self.refused["distance"] / max(self.suitable - self.refused["companions"], 1),
+        }
+        if rules.by_density and self.suitable:
+            del shares["suitable"]  # these were never wanted
+        least = min(shares, key=shares.__getitem__)
+        if least == "distance":
+            return (
+                f"no room for more at a distance of {rules.min_distance:.3g} m; "
+                "lower the distance or take a larger surface"
+            )
+        if least == "companions":
+            return (
+                "companions leave no room for more; soften their strength, or change their distance: "
+                "longer where species seek others, shorter where they shun them"
+            )
+        return REMEDIES[worst]
+
+
+def _part(weights: NDArray[np.float64], species: int, rules: Rules) -> float:
+    """Share of a species by density; by count its number of plants, the rest going to the largest fractions."""
+    shares = weights / weights.sum()
+    if rules.by_density:
+        return float(shares[species])
+    exact = shares * rules.count
+    whole = np.floor(exact)
+    order = np.argsort(-(exact - whole), kind="stable")
+    whole[order[: round(rules.count - whole.sum())]] += 1.0
+    return float(whole[species])
+
+
+def _mixed(keys: NDArray[np.uint64], shares: tuple[float, ...]) -> NDArray[np.int32]:
+    """Species by chance, as often as their shares ask."""
+    weights = np.maximum(np.asarray(shares, dtype=np.float64), 0.0)
+    limits = np.cumsum(weights) / weights.sum()
+    # Rounding may leave the last limit below a draw that is just under 1.
+    species = np.minimum(np.searchsorted(limits, uniform(keys, Draw.SPECIES), side="right"), len(weights) - 1)
+    return species.astype(np.int32)
+
+
+def _scales(z: NDArray[np.float64], keys: NDArray[np.uint64], site: Site, rules: Rules) -> NDArray[np.float64]:
+    low, high = sorted((rules.scale_min, rules.scale_max))
+    scale = low + (high - low) * uniform(keys, Draw.SCALE)
+    if rules.scale_at_top != 1.0 and site.highest > site.lowest:
+        height = np.clip((z - site.lowest) / (site.highest - site.lowest), 0.0, 1.0)
+        scale *= 1.0 + (rules.scale_at_top - 1.0) * height
+    return scale
+
+
+def _tilted(normal: NDArray[np.float64], tilt: float) -> NDArray[np.float64] | None:
+    if not tilt:
+        return None
+    up = tilt * normal
+    up[:, 2] += 1.0 - tilt
+    return up / np.linalg.norm(up, axis=1, keepdims=True)
+
+
+def _positive(keys: NDArray[np.uint64]) -> NDArray[np.int32]:
+    return (uniform(keys, Draw.SEED) * 2**31).astype(np.int32)

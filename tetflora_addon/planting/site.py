@@ -1,0 +1,291 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which ground suits a population: places are drawn evenly on the map, and kept as often as they are suitable."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from ..plants.hashing import child_key, key_of_seed, uniform
+from .ground import Ground, border_of, sampled
+from .noise import clumps
+from .regions import Lines, inside_any
+from .rules import Rules
+
+CHUNK = 131_072  # places looked at together: what fits into a cache
+_CLUMPS = 2**33  # the key of clumps, away from those of plants
+_MOST_TRIANGLES = 300_000  # when ground is divided near areas
+_DIVISIONS = 16
+_ROUNDING = 1e-6  # a hair of tolerance: level ground passes a slope limit of 0 although positions are single precision
+
+
+class Draw(IntEnum):
+    """What a number is drawn for; of the first ones, arrangements of earlier versions are made."""
+
+    TRIANGLE = 1
+    SIDE = 2
+    ALONG = 3
+    AZIMUTH = 4
+    SCALE = 5
+    SPECIES = 6
+    SEED = 7
+    SUITABLE = 8
+    FOUNDER = 9
+    COMPANION = 16  # one for each rule from here on
+
+
+#: Why a place was not suitable, and what to do, in the order in which rules are asked.
+REMEDIES = {
+    "weight": "the vertex group leaves hardly any of the ground; paint more weight, or invert or clear the group",
+    "image": "the image is black on nearly all of the ground; paint it brighter, or invert or clear it",
+    "altitude": "hardly any ground lies between the lowest and the highest altitude; widen them or lower their falloff",
+    "areas": "the curves of the areas hold hardly any suitable ground; draw them larger, or clear the areas",
+    "paths": "the paths leave hardly any ground free; lower their distance, or clear the paths",
+    "edge": "all ground is near its border; lower the edge falloff",
+    "clumping": "clumping leaves too little ground; lower it, or take larger or smaller clumps",
+}
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Suitable places among those that were drawn.
+
+    Attributes
+    ----------
+    position : (n, 3) float64
+    up : (n, 3) float64
+        Normals of the ground, upwards.
+    key : (n,) uint64
+    drawn : int
+        Places looked at.
+    lost : dict
+        How many of them each of `REMEDIES` refused.
+    """
+
+    position: NDArray[np.float64]
+    up: NDArray[np.float64]
+    key: NDArray[np.uint64]
+    drawn: int
+    lost: dict[str, int]
+
+
+class Site:
+    """Ground that suits the rules, ready to draw places on."""
+
+    def __init__(self, ground: Ground, rules: Rules) -> None:
+        """Leave out triangles where nothing can grow.
+
+        Raises
+        ------
+        SceneError
+            Nothing is left; names the setting that leaves nothing.
+        """
+        self.ground, self.rules = ground, rules
+        self._key = child_key(key_of_seed(rules.seed), _CLUMPS)
+        triangles, normal, chosen = _by_inclination(ground.triangles, rules)
+        weight = None
+        if ground.weight is not None:
+            weight = np.clip(np.nan_to_num(np.asarray(ground.weight, dtype=np.float64)[chosen]), 0.0, 1.0)
+            triangles, normal, chosen, weight = _kept(weight.max(axis=1) > 0.0, triangles, normal, chosen, weight)
+            if not len(chosen):
+                raise SceneError(
+                    "The vertex group has no weight on ground of the right slope; paint some, invert it or clear it"
+                )
+        low, high = triangles[..., 2].min(axis=1), triangles[..., 2].max(axis=1)
+        at_altitude = (high >= rules.altitude_min) & (low <= rules.altitude_max)
+        if not at_altitude.any():
+            raise SceneError(
+                f"No suitable ground lies between the altitudes {rules.altitude_min:.5g} and "
+                f"{rules.altitude_max:.5g} m: it reaches from {low.min():.5g} to {high.max():.5g} m; widen the lowest "
+                "and the highest altitude"
+            )
+        self.lowest = max(float(low[at_altitude].min()), rules.altitude_min)
+        self.highest = min(float(high[at_altitude].max()), rules.altitude_max)
+        triangles, normal, chosen, weight = _kept(at_altitude, triangles, normal, chosen, weight)
+        uv = None if ground.uv is None else np.asarray(ground.uv, dtype=np.float64)[chosen]
+        if ground.areas:
+            source, triangles, weight, uv = _near_areas(ground.areas, triangles, weight, uv)
+            normal = normal[source]
+            if not len(source):
+                raise SceneError(
+                    "No suitable ground lies inside of the areas' curves; draw them over it, or clear the areas"
+                )
+        self.triangles, self.weight, self.uv = triangles, weight, uv
+        self.normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+        self.most = np.ones(len(triangles)) if weight is None else weight.max(axis=1)
+        area = 0.5 * np.linalg.norm(_map_cross(triangles), axis=1) if ground.areas else 0.5 * np.abs(normal[:, 2])
+        self.cumulative = np.cumsum(area * self.most if weight is not None else area)
+        if not self.cumulative[-1] > 0.0:
+            raise SceneError("The suitable ground has no area on the map; take ground that does not stand upright")
+        self.border = self.paths = None
+        if rules.edge_falloff > 0.0:
+            border = (border_of(ground.triangles) if ground.border is None else ground.border)[..., :2]
+            if len(border):
+                self.border = Lines(border[:, 0], border[:, 1], np.full(len(border), float(rules.edge_falloff)))
+        kept_free = [p for p in ground.paths if p.half_width > 0.0 and len(p.points)]
+        if kept_free:
+            # A line of one point is a place of its own.
+            ends = [np.repeat(p.points, 2, axis=0) if len(p.points) == 1 else p.points for p in kept_free]
+            reach = np.concatenate(
+                [np.full(len(e) - 1, float(p.half_width)) for e, p in zip(ends, kept_free, strict=True)]
+            )
+            self.paths = Lines(np.concatenate([e[:-1] for e in ends]), np.concatenate([e[1:] for e in ends]), reach)
+
+    @property
+    def area(self) -> float:
+        """Square metres of the map on which places are drawn; each counts as much as it is suitable at most."""
+        return float(self.cumulative[-1])
+
+    def draw(self, key: NDArray[np.uint64], first: int, count: int, enough: int | None = None) -> Sample:
+        """Suitable ones among the places of children ``first`` to ``first + count - 1`` of a key, in their order.
+
+        Stops when ``enough`` are found, with at least as many.
+        """
+        parts, drawn, found = [], 0, 0
+        lost = dict.fromkeys(REMEDIES, 0)
+        while drawn < count and (enough is None or found < enough):
+            chunk = min(count - drawn, CHUNK)
+            keys = child_key(key, np.arange(first + drawn, first + drawn + chunk))
+            parts.append(self._suitable(keys, lost))
+            drawn += chunk
+            found += len(parts[-1][2])
+        position, up, keys = (np.concatenate(column) for column in zip(*parts, strict=True))
+        return Sample(position, up, keys, drawn, lost)
+
+    def _suitable(self, keys: NDArray[np.uint64], lost: dict[str, int]) -> tuple[NDArray, NDArray, NDArray[np.uint64]]:
+        index = np.searchsorted(self.cumulative, uniform(keys, Draw.TRIANGLE) * self.cumulative[-1], side="right")
+        index = np.minimum(index, len(self.cumulative) - 1)
+        a, b, c = (self.triangles[index, corner] for corner in range(3))
+        root = np.sqrt(uniform(keys, Draw.SIDE))[:, None]
+        along = uniform(keys, Draw.ALONG)[:, None]
+        shares = 1.0 - root, root * (1.0 - along), root * along
+        points = shares[0] * a + shares[1] * b + shares[2] * c
+        left = np.arange(len(keys))
+        wanted = uniform(keys, Draw.SUITABLE) * self.most[index]
+        suitable = np.ones(len(keys))
+        for name, factor in self._factors(index, np.concatenate(shares, axis=1), points):
+            suitable[left] *= factor(left)
+            stay = wanted[left] < suitable[left]
+            lost[name] += len(left) - int(stay.sum())
+            left = left[stay]
+        return points[left], self.normal[index[left]], keys[left]
+
+    def _factors(self, index: NDArray[np.int64], shares: NDArray, points: NDArray) -> Iterator[tuple[str, object]]:
+        """Rules by name, each a function from indices of places to how suitable they are; cheap ones first."""
+        rules, ground = self.rules, self.ground
+        if self.weight is not None:
+            yield "weight", lambda i: (self.weight[index[i]] * shares[i]).sum(axis=1)
+        limits = rules.altitude_min, rules.altitude_max
+        if np.isfinite(limits).any():
+            yield "altitude", lambda i: _between(points[i, 2], *limits, rules.altitude_falloff)
+        if self.uv is not None:
+            yield (
+                "image",
+                lambda i: np.clip(
+                    np.nan_to_num(sampled(ground.image, (self.uv[index[i]] * shares[i, :, None]).sum(axis=1))), 0.0, 1.0
+                ),
+            )
+        if ground.areas:
+            yield "areas", lambda i: inside_any(points[i, :2], ground.areas)
+        if self.paths is not None:
+            yield "paths", lambda i: self.paths.nearness(points[i, :2]) >= 1.0
+        if self.border is not None:
+            yield "edge", lambda i: self.border.nearness(points[i, :2])
+        if rules.clumping > 0.0:
+            yield "clumping", lambda i: clumps(points[i, :2], rules.clump_size, rules.clumping, self._key)
+
+
+def _between(z: NDArray[np.float64], low: float, high: float, falloff: float) -> NDArray[np.float64]:
+    """1 well between the limits, 0 beyond them, linear over the falloff inside of each."""
+    inside = ((z >= low) & (z <= high)).astype(np.float64)
+    if falloff > 0.0:
+        inside *= np.clip(np.minimum(z - low, high - z) / falloff, 0.0, 1.0)
+    return inside
+
+
+def _by_inclination(triangles: NDArray[np.float64], rules: Rules) -> tuple[NDArray, NDArray, NDArray[np.int64]]:
+    """Triangles of the right slope and aspect, their normals (upwards, twice as long as they are large), and which."""
+    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normal *= np.where(normal[:, 2:] < 0.0, -1.0, 1.0)
+    upright, length = normal[:, 2], np.linalg.norm(normal, axis=1)
+    flat = (length > 0.0) & (upright > 0.0) & (upright >= length * (np.cos(rules.slope_max) - _ROUNDING))
+    if not flat.any():
+        raise SceneError(
+            f"The surface has no face flatter than the slope limit of {np.degrees(rules.slope_max):.0f}°; raise the "
+            "limit or select another mesh"
+        )
+    if rules.slope_min > 0.0:
+        flat &= upright <= length * (np.cos(rules.slope_min) + _ROUNDING)
+        if not flat.any():
+            raise SceneError(
+                f"The surface has no face between the slopes {np.degrees(rules.slope_min):.0f}° and "
+                f"{np.degrees(rules.slope_max):.0f}°; lower the least slope or raise the largest"
+            )
+    if rules.aspect_spread < np.pi:
+        away = np.abs((np.arctan2(normal[:, 0], normal[:, 1]) - rules.aspect + np.pi) % (2.0 * np.pi) - np.pi)
+        level = np.hypot(normal[:, 0], normal[:, 1]) <= _ROUNDING * length
+        flat &= level | (away <= rules.aspect_spread + _ROUNDING)
+        if not flat.any():
+            raise SceneError(
+                f"No slope faces within {np.degrees(rules.aspect_spread):.0f}° of {np.degrees(rules.aspect):.0f}° "
+                "(clockwise from north, +Y); widen the spread of the aspect or turn it"
+            )
+    chosen = np.flatnonzero(flat)
+    return triangles[chosen], normal[chosen], chosen
+
+
+def _kept(mask: NDArray[np.bool_], *arrays: NDArray | None) -> tuple:
+    if mask.all():
+        return arrays
+    return tuple(None if array is None else array[mask] for array in arrays)
+
+
+def _map_cross(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    first, second = triangles[:, 1, :2] - triangles[:, 0, :2], triangles[:, 2, :2] - triangles[:, 0, :2]
+    return (first[:, :1] * second[:, 1:]) - (first[:, 1:] * second[:, :1])
+
+
+def _near_areas(
+    areas: tuple[NDArray[np.float64], ...],
+    triangles: NDArray[np.float64],
+    weight: NDArray[np.float64] | None,
+    uv: NDArray[np.float64] | None,
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.float64] | None]:
+    """Parts of triangles near areas: large ones are divided, so that few places are drawn in vain.
+
+    Returns
+    -------
+    source : (n,) int64
+        Triangle of each part.
+    triangles, weight, uv
+        Of the parts.
+    """
+    boxes = [(area.min(axis=0), area.max(axis=0)) for area in areas]
+    columns = [triangles, *([] if weight is None else [weight[..., None]]), *([] if uv is None else [uv])]
+    corners, source = np.concatenate(columns, axis=2), np.arange(len(triangles))
+    for _ in range(_DIVISIONS):
+        low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
+        allowed = np.full(len(corners), -np.inf)  # size that needs no division, metres
+        for box_low, box_high in boxes:
+            touched = ((low <= box_high) & (high >= box_low)).all(axis=1)
+            size = float((box_high - box_low).max()) / 8.0
+            allowed[touched] = np.where(np.isneginf(allowed[touched]), size, np.minimum(allowed[touched], size))
+        near = ~np.isneginf(allowed)
+        large = near & ((high - low).max(axis=1) > allowed)
+        if not large.any() or near.sum() + 3 * large.sum() > _MOST_TRIANGLES:
+            corners, source = corners[near], source[near]
+            break
+        small = near & ~large
+        a, b, c = (corners[large, corner] for corner in range(3))
+        ab, bc, ca = (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0
+        quarters = [np.stack(q, axis=1) for q in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+        corners = np.concatenate([corners[small], *quarters])
+        source = np.concatenate([source[small], *[source[large]] * 4])
+    weighted = None if weight is None else corners[..., 3]
+    return source, corners[..., :3], weighted, None if uv is None else corners[..., -2:]
