@@ -27,6 +27,7 @@ _ROUNDS = 24
 _SMALLEST_ROUND = 512
 _LARGEST_ROUND = 2_000_000
 _MOST_DRAWN = 16_000_000  # and a few dozen for each plant; what is rarer than that takes too long
+_RAREST = 1.0 / 256.0  # share of suitable places that a round counts on at least
 _HOPELESS = 1_000_000  # places without a suitable one
 _FULL = 5_000  # places of which not one is far enough from others: the ground is full
 _SPECIES = 2**32  # keys of species that are placed one after the other, away from those of plants
@@ -193,8 +194,9 @@ class _Sowing:
         free = self.spacing.free and not self.company.rules
         for _ in range(_ROUNDS):
             missing = wanted - kept
-            rate = max(beside / drawn, 1.0 / 64.0) if drawn else 1.0
-            batch = min(max(int(2 * missing / rate), _SMALLEST_ROUND), _LARGEST_ROUND)
+            # Twice as many as are missing, for distances take some; where little is suitable, just more than needed.
+            rate = max(beside / drawn, _RAREST) if drawn else 1.0
+            batch = min(max(2 * missing, int(1.1 * missing / rate), _SMALLEST_ROUND), _LARGEST_ROUND)
             sample = self.site.draw(key, drawn, batch, missing if free else None)
             drawn += sample.drawn
             suitable += len(sample.key)

@@ -161,15 +161,16 @@ class Site:
     def _suitable(self, keys: NDArray[np.uint64], lost: dict[str, int]) -> tuple[NDArray, NDArray, NDArray[np.uint64]]:
         index = np.searchsorted(self.cumulative, uniform(keys, Draw.TRIANGLE) * self.cumulative[-1], side="right")
         index = np.minimum(index, len(self.cumulative) - 1)
-        a, b, c = (self.triangles[index, corner] for corner in range(3))
-        root = np.sqrt(uniform(keys, Draw.SIDE))[:, None]
-        along = uniform(keys, Draw.ALONG)[:, None]
-        shares = 1.0 - root, root * (1.0 - along), root * along
-        points = shares[0] * a + shares[1] * b + shares[2] * c
+        # One row of nine numbers at a time: places are in no order, and each row is a wait for memory.
+        corners = np.take(self.triangles.reshape(-1, 9), index, axis=0)
+        root = np.sqrt(uniform(keys, Draw.SIDE))
+        along = uniform(keys, Draw.ALONG)
+        shares = np.stack([1.0 - root, root * (1.0 - along), root * along], axis=1)
+        points = _mean(corners, shares)
         left = np.arange(len(keys))
         wanted = uniform(keys, Draw.SUITABLE) * self.most[index]
         suitable = np.ones(len(keys))
-        for name, factor in self._factors(index, np.concatenate(shares, axis=1), points):
+        for name, factor in self._factors(index, shares, points):
             suitable[left] *= factor(left)
             stay = wanted[left] < suitable[left]
             lost[name] += len(left) - int(stay.sum())
@@ -180,17 +181,12 @@ class Site:
         """Rules by name, each a function from indices of places to how suitable they are; cheap ones first."""
         rules, ground = self.rules, self.ground
         if self.weight is not None:
-            yield "weight", lambda i: (self.weight[index[i]] * shares[i]).sum(axis=1)
+            yield "weight", lambda i: np.einsum("ij,ij->i", np.take(self.weight, index[i], axis=0), shares[i])
         limits = rules.altitude_min, rules.altitude_max
         if np.isfinite(limits).any():
             yield "altitude", lambda i: _between(points[i, 2], *limits, rules.altitude_falloff)
         if self.uv is not None:
-            yield (
-                "image",
-                lambda i: np.clip(
-                    np.nan_to_num(sampled(ground.image, (self.uv[index[i]] * shares[i, :, None]).sum(axis=1))), 0.0, 1.0
-                ),
-            )
+            yield "image", lambda i: self._pictured(index[i], shares[i])
         if ground.areas:
             yield "areas", lambda i: inside_any(points[i, :2], ground.areas)
         if self.paths is not None:
@@ -199,6 +195,16 @@ class Site:
             yield "edge", lambda i: self.border.nearness(points[i, :2])
         if rules.clumping > 0.0:
             yield "clumping", lambda i: clumps(points[i, :2], rules.clump_size, rules.clumping, self._key)
+
+    def _pictured(self, index: NDArray[np.int64], shares: NDArray[np.float64]) -> NDArray[np.float64]:
+        uv = _mean(np.take(self.uv.reshape(-1, 6), index, axis=0), shares)
+        return np.clip(np.nan_to_num(sampled(self.ground.image, uv)), 0.0, 1.0)
+
+
+def _mean(corners: NDArray[np.float64], shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values between three corners, (n, 3 k) one after the other, by the shares of each, (n, 3): (n, k)."""
+    a, b, c = np.split(corners, 3, axis=1)
+    return shares[:, :1] * a + shares[:, 1:2] * b + shares[:, 2:] * c
 
 
 def _between(z: NDArray[np.float64], low: float, high: float, falloff: float) -> NDArray[np.float64]:
