@@ -5,6 +5,7 @@
 import bpy
 from bpy.props import EnumProperty
 
+from ..tetflora_addon.blender.population_rules import shown_population
 from ..tetflora_addon.blender.species_items import catalogue, default_species
 from . import ids
 from .base import Reporting
@@ -65,7 +66,8 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
         if self.which == 'FIELD':
             active = context.active_object
             return (active.tetflora if active is not None and active.tetflora.is_field else None), "field_species"
-        settings = context.scene.tetflora
         if self.which == 'OUTPUT':
-            return settings.output, "species"
-        return (settings.populate, "mix") if self.which == 'MIX' else (settings, "leaf_objects")
+            return context.scene.tetflora.output, "species"
+        if self.which == 'MIX':
+            return shown_population(context.scene), "mix"
+        return context.scene.tetflora, "leaf_objects"

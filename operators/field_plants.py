@@ -6,7 +6,7 @@ import bpy
 
 from ..tetflora_addon.blender.plant_fields import FIELD_TYPES, fields_of
 from ..tetflora_addon.blender.plant_objects import field_from_plants, plants_from_field, prepare_scene
-from ..tetflora_addon.blender.properties import MOST_EMPTIES
+from ..tetflora_addon.blender.population_properties import MOST_EMPTIES
 from ..tetflora_addon.blender.species_items import default_species
 from . import ids
 from .base import Reporting, counted, in_object_mode, plants_selected, select_only, selected_plants

@@ -1,21 +1,20 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Populate a terrain with plants."""
+"""Populate a terrain with plants: a new population, and its plants, in one step."""
 
 from math import pi
 
 import bpy
-import numpy as np
 from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ..tetflora_addon.blender.placement import place
-from ..tetflora_addon.blender.plant_objects import add_field, add_plants, trunks
-from ..tetflora_addon.blender.properties import EMPTIES_UNASKED, MOST_EMPTIES, MOST_PLANTS, STORAGE_ITEMS
+from ..tetflora_addon.blender.population_properties import MOST_EMPTIES, MOST_PLANTS, STORAGE_ITEMS
+from ..tetflora_addon.blender.population_rules import copy_companion
+from ..tetflora_addon.blender.populations import add_population, make_plants, remove_population
 from ..tetflora_addon.blender.species_items import catalogue, default_species
-from ..tetflora_addon.blender.surfaces import mesh_triangles
-from ..tetflora_addon.errors import SceneError
+from ..tetflora_addon.errors import SceneError, TetFloraError
 from . import ids
-from .base import Reporting, counted, in_object_mode, select_only
+from .base import Reporting, in_object_mode, select_only
+from .populations import ground_selected, report_made, selected_grounds
 
 # Names that the operator shares with the scene's settings for populating.
 _SHARED = ("count", "as_field", "seed", "slope_limit", "min_distance", "scale_min", "scale_max")
@@ -27,8 +26,8 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
     bl_idname = ids.POPULATE
     bl_label = "Populate"
     bl_description = (
-        "Scatter plants over the selected meshes. What is not given is taken from the panel. "
-        "Each plant is an empty, or a vertex of one mesh where there are too many for that"
+        "Scatter plants over the selected meshes, as a new population that can be changed afterwards. Each plant is an "
+        "empty, or a vertex of one mesh where there are too many for that"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
@@ -86,10 +85,7 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not in_object_mode(cls, context):
             return False
-        if not _grounds(context):
-            cls.poll_message_set("Select the mesh on which plants shall grow")
-            return False
-        return True
+        return ground_selected(cls, context)
 
     def run(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
@@ -100,49 +96,45 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
                 f"{self.count:,} plants are too many for objects of their own, at most {MOST_EMPTIES:,}; "
                 "make a Field, or fewer plants"
             )
-        depsgraph = context.evaluated_depsgraph_get()
-        grounds = _grounds(context)
-        placement = place(
-            np.concatenate([mesh_triangles(obj, depsgraph, "select a mesh with faces") for obj in grounds]),
-            count=self.count,
-            seed=self.seed,
-            slope_limit=self.slope_limit,
-            min_distance=self.min_distance,
-            scale_range=(self.scale_min, self.scale_max),
-            shares=tuple(shares.values()),
-            occupied=trunks(scene, depsgraph),
-        )
-        in_field = self.as_field == 'FIELD' or (self.as_field == 'AUTOMATIC' and len(placement) > EMPTIES_UNASKED)
-        if in_field and len(placement):
-            made = [add_field(scene, placement, tuple(shares))]
-        else:
-            made = add_plants(scene, placement, tuple(shares))
-        where = f' in the field "{made[0].name}"' if in_field and made else ""
-        select_only(context, [*made, *grounds])
+        grounds = selected_grounds(context)
+        population = self._population(scene, grounds, shares)
+        try:
+            made = make_plants(scene, context.evaluated_depsgraph_get(), population)
+        except TetFloraError:
+            remove_population(scene, scene.tetflora.populations_index)
+            raise
+        select_only(context, [*made.objects, *grounds])
         # The terrain stays selected and active, so that Populate can follow Populate.
         context.view_layer.objects.active = grounds[0]
-        if placement.reason:
-            self.report(
-                {'WARNING'}, f"{counted(len(placement), 'plant')} of {self.count:,} placed{where}: {placement.reason}"
-            )
-        else:
-            self.report({'INFO'}, f"{counted(len(placement), 'plant')} placed{where}")
+        report_made(self, made)
         return {'FINISHED'}
+
+    def _population(
+        self, scene: bpy.types.Scene, grounds: list[bpy.types.Object], shares: dict[str, float]
+    ) -> bpy.types.PropertyGroup:
+        """A new population with the settings for new ones, and over them what was given."""
+        population = add_population(scene, grounds)
+        for name in _SHARED:
+            setattr(population, "slope_max" if name == "slope_limit" else name, getattr(self, name))
+        population.by_density = False
+        population.mix.clear()
+        given = {entry.species: entry for entry in scene.tetflora.populate.mix}
+        for identifier, share in shares.items():
+            entry = population.mix.add()
+            entry.species, entry.weight = identifier, share
+            if identifier in given:
+                copy_companion(given[identifier], entry)
+        return population
 
     def _complete_from(self, scene: bpy.types.Scene) -> None:
         """Take what was not given from the panel; the redo panel then shows what was really used."""
         settings = scene.tetflora.populate
         for name in _SHARED:
             if not self.properties.is_property_set(name):
-                setattr(self, name, getattr(settings, name))
+                setattr(self, name, getattr(settings, "slope_max" if name == "slope_limit" else name))
         if not self.species:
             mix = [(entry.species, entry.weight) for entry in settings.mix if entry.species]
             self.species = ", ".join(f"{name}:{share:g}" for name, share in mix) or default_species()
-
-
-def _grounds(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """Selected meshes; those of fields are plants, not ground."""
-    return [obj for obj in context.selected_objects if obj.type == 'MESH' and not obj.tetflora.is_field]
 
 
 def _parse_shares(text: str) -> dict[str, float]:

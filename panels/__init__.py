@@ -28,7 +28,7 @@ CLASSES = (
     species_panel.TETFLORA_PT_species_orders,
     species_panel.TETFLORA_PT_species_leaves,
     species_panel.TETFLORA_PT_species_whole,
-    populate_panel.TETFLORA_PT_populate,
+    *populate_panel.CLASSES,
     refinement_panel.TETFLORA_PT_refinement,
     refinement_panel.TETFLORA_PT_limits,
     refinement_panel.TETFLORA_PT_proxy_shading,

@@ -1,12 +1,36 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Populate: scatter plants over terrain, and say what hides them."""
+"""Populate: populations of plants and the rules by which they are placed, and what hides plants."""
 
 import bpy
 
 from ..operators import ids
+from ..tetflora_addon.blender import point_preview
+from ..tetflora_addon.blender.population_rules import shown_population
 from .base import SidebarPanel, split_layout
 from .lists import TETFLORA_UL_mix, draw_list
+
+
+class TETFLORA_UL_populations(bpy.types.UIList):
+    """A population's name, how many plants it has, and whether it is frozen."""
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, _index, _flag) -> None:
+        row = layout.row(align=True)
+        row.prop(item, "name", text="", emboss=False, icon='OUTLINER_OB_POINTCLOUD')
+        right = row.row()
+        right.alignment = 'RIGHT'
+        right.label(text=f"{item.made:,}", icon='FREEZE' if item.frozen else 'NONE')
+
+
+class TETFLORA_MT_populations(bpy.types.Menu):
+    """Rarer things to do with populations."""
+
+    bl_label = "Populations"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.operator(ids.SELECT_POPULATION, icon='RESTRICT_SELECT_OFF')
+        layout.operator(ids.REMOVE_POPULATION, text="Remove, and Keep Plants", icon='REMOVE').keep_plants = True
 
 
 class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
@@ -17,20 +41,25 @@ class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = split_layout(self)
-        settings = context.scene.tetflora.populate
-        draw_list(layout, TETFLORA_UL_mix, settings, ("mix", "mix_index"), 'MIX')
-        if not settings.mix:
-            layout.label(text="First species of the catalogue", icon='INFO')
-        column = layout.column(align=True)
-        column.prop(settings, "count")
+        group, settings = context.scene.tetflora, shown_population(context.scene)
+        _draw_populations(layout, group)
+        if settings.uid:
+            row = layout.row(align=True)
+            row.operator(ids.UPDATE_POPULATION, text="Update", icon='FILE_REFRESH')
+            row.operator(ids.REROLL_POPULATION, text="Re-roll", icon='MOD_NOISE')
+            row.operator(ids.FREEZE_POPULATION, text="Freeze", icon='FREEZE', depress=settings.frozen)
+        else:
+            layout.operator(ids.POPULATE, text="Populate Selected Meshes", icon='OUTLINER_OB_POINTCLOUD')
+        _draw_status(layout, context.scene, settings)
+        column = layout.column()
+        column.active = not settings.frozen
+        if settings.uid:
+            _draw_grounds(column, settings)
+        row = column.row(heading="Amount")
+        row.prop(settings, "by_density")
+        column.prop(settings, "density" if settings.by_density else "count")
         column.prop(settings, "as_field")
-        column.prop(settings, "min_distance")
-        column.prop(settings, "slope_limit")
-        column = layout.column(align=True)
-        column.prop(settings, "scale_min")
-        column.prop(settings, "scale_max")
-        layout.prop(settings, "seed")
-        layout.operator(ids.POPULATE, text="Populate Selected Meshes", icon='OUTLINER_OB_POINTCLOUD')
+        column.prop(settings, "seed")
         active = context.active_object
         marked = active is not None and active.tetflora.is_occluder
         layout.operator(
@@ -39,3 +68,150 @@ class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
             icon='CHECKMARK' if marked else 'MOD_MASK',
             depress=marked,
         )
+
+
+class _PartOfPopulate(SidebarPanel):
+    """Mix-in for panels within Populate, closed at first."""
+
+    bl_parent_id = "TETFLORA_PT_populate"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = split_layout(self)
+        settings = shown_population(context.scene)
+        layout.active = not settings.frozen
+        self.draw_settings(layout, settings)
+
+
+class TETFLORA_PT_populate_species(_PartOfPopulate, bpy.types.Panel):
+    """Which species, and how they stand to each other."""
+
+    bl_label = "Species"
+
+    def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+        draw_list(layout, TETFLORA_UL_mix, settings, ("mix", "mix_index"), 'MIX')
+        if not settings.mix:
+            layout.label(text="First species of the catalogue", icon='INFO')
+        elif 0 <= settings.mix_index < len(settings.mix):
+            entry = settings.mix[settings.mix_index]
+            layout.prop(entry, "companion_choice")
+            if entry.companion:
+                column = layout.column(align=True)
+                column.prop(entry, "companion_strength")
+                column.prop(entry, "companion_distance")
+
+
+class TETFLORA_PT_populate_where(_PartOfPopulate, bpy.types.Panel):
+    """On which ground."""
+
+    bl_label = "Where"
+
+    def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+        column = layout.column(align=True)
+        column.prop(settings, "slope_min")
+        column.prop(settings, "slope_max", text="To")
+        column = layout.column(align=True)
+        column.prop(settings, "aspect")
+        column.prop(settings, "aspect_spread", text="Spread")
+        layout.prop(settings, "use_altitude")
+        if settings.use_altitude:
+            column = layout.column(align=True)
+            column.prop(settings, "altitude_min", text="From")
+            column.prop(settings, "altitude_max", text="To")
+            column.prop(settings, "altitude_falloff", text="Falloff")
+        layout.prop(settings, "edge_falloff")
+        ground = next((entry.object for entry in settings.grounds if entry.object is not None), None)
+        row = layout.row(align=True)
+        if ground is not None:
+            row.prop_search(settings, "vertex_group", ground, "vertex_groups")
+        else:
+            row.prop(settings, "vertex_group")
+        row.prop(settings, "invert_group", text="", icon='ARROW_LEFTRIGHT')
+        row = layout.row(align=True)
+        row.prop(settings, "image")
+        row.prop(settings, "invert_image", text="", icon='ARROW_LEFTRIGHT')
+        if settings.image is not None:
+            if ground is not None and ground.type == 'MESH':
+                layout.prop_search(settings, "uv_layer", ground.data, "uv_layers")
+            else:
+                layout.prop(settings, "uv_layer")
+        layout.prop(settings, "areas")
+        layout.prop(settings, "paths")
+        if settings.paths is not None:
+            layout.prop(settings, "path_distance")
+
+
+class TETFLORA_PT_populate_arrangement(_PartOfPopulate, bpy.types.Panel):
+    """How far from each other."""
+
+    bl_label = "Arrangement"
+
+    def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+        layout.prop(settings, "min_distance")
+        layout.prop(settings, "clumping")
+        if settings.clumping:
+            layout.prop(settings, "clump_size")
+
+
+class TETFLORA_PT_populate_size(_PartOfPopulate, bpy.types.Panel):
+    """How large, and how upright."""
+
+    bl_label = "Size"
+
+    def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+        column = layout.column(align=True)
+        column.prop(settings, "scale_min")
+        column.prop(settings, "scale_max")
+        layout.prop(settings, "scale_at_top")
+        layout.prop(settings, "tilt")
+
+
+def _draw_populations(layout: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
+    row = layout.row()
+    row.template_list(
+        TETFLORA_UL_populations.__name__,
+        "",
+        group,
+        "populations",
+        group,
+        "populations_index",
+        rows=3 if group.populations else 1,
+    )
+    column = row.column(align=True)
+    column.operator(ids.ADD_POPULATION, text="", icon='ADD')
+    if group.populations:
+        column.operator(ids.REMOVE_POPULATION, text="", icon='REMOVE')
+    column.menu(TETFLORA_MT_populations.__name__, text="", icon='DOWNARROW_HLT')
+
+
+def _draw_status(layout: bpy.types.UILayout, scene: bpy.types.Scene, settings: bpy.types.PropertyGroup) -> None:
+    """How many plants as what, and why not more; the switch of the preview."""
+    shown = point_preview.shown_in(scene)
+    row = layout.row(align=True)
+    row.label(text=point_preview.status(settings), icon='INFO')
+    row.operator(ids.PREVIEW_POPULATION, text="", icon='HIDE_OFF' if shown else 'HIDE_ON', depress=shown)
+    for text in point_preview.complaints(settings):
+        layout.label(text=text, icon='ERROR')
+
+
+def _draw_grounds(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    names = [entry.object.name for entry in settings.grounds[:3] if entry.object is not None]
+    more = len(settings.grounds) - 3
+    row = layout.split(factor=0.4)
+    left = row.row()
+    left.alignment = 'RIGHT'
+    left.label(text="Ground")
+    row.label(text=", ".join(names) + (f" and {more:,} more" if more > 0 else "") or "None")
+    layout.operator(ids.SET_POPULATION_GROUND, icon='MESH_GRID')
+    layout.prop(settings, "ground_collection")
+
+
+CLASSES = (
+    TETFLORA_UL_populations,
+    TETFLORA_MT_populations,
+    TETFLORA_PT_populate,
+    TETFLORA_PT_populate_species,
+    TETFLORA_PT_populate_where,
+    TETFLORA_PT_populate_arrangement,
+    TETFLORA_PT_populate_size,
+)

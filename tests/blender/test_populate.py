@@ -140,7 +140,9 @@ def test_the_operator_makes_upright_empties_of_the_chosen_species():
     plants = [o for o in bpy.data.objects if o.tetflora.is_plant]
     assert len(plants) == 300
     assert {o.tetflora.species for o in plants} == {"bush", "conifer"}
-    assert {c.name for o in plants for c in o.users_collection} == {"TetFlora plants"}
+    parent = bpy.data.collections["TetFlora plants"]
+    assert {c.name for o in plants for c in o.users_collection} == {c.name for c in parent.children}
+    assert len(parent.children) == 1
     places = np.array([o.location for o in plants])
     assert np.allclose(places[:, 2], 3.0)
     assert np.abs(places[:, :2]).max() <= 50.0

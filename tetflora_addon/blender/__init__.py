@@ -2,10 +2,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Everything below the operators that touches bpy: what the scene stores, reading it, writing results, rendering."""
 
-from . import asset_library, command_line, handlers, preferences, properties, species_preview, thumbnails
+from . import (
+    asset_library,
+    command_line,
+    handlers,
+    point_preview,
+    preferences,
+    properties,
+    species_preview,
+    thumbnails,
+)
 
 # Handlers and commands read properties, so those come first.
-_PARTS = (preferences, thumbnails, properties, handlers, species_preview, asset_library, command_line)
+_PARTS = (
+    preferences,
+    thumbnails,
+    properties,
+    handlers,
+    species_preview,
+    point_preview,
+    asset_library,
+    command_line,
+)
 
 
 def register() -> None:

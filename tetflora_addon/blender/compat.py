@@ -69,3 +69,14 @@ def drawn_disc(engine: str) -> float:
     EEVEE draws a square that stands on its corner, within the circle that Cycles draws.
     """
     return 2.0 if engine in EEVEE_ENGINES else pi
+
+
+def dot_shader() -> str:
+    """Built-in shader for coloured points: before 5.0, the one for everything of flat colours draws them as well."""
+    import gpu
+
+    try:
+        gpu.shader.from_builtin('POINT_FLAT_COLOR')
+    except ValueError:
+        return 'FLAT_COLOR'
+    return 'POINT_FLAT_COLOR'

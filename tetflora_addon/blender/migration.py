@@ -7,18 +7,26 @@ from collections.abc import Callable
 
 import bpy
 
-VERSION = 1
+VERSION = 2
 
 Step = Callable[[bpy.types.Object | bpy.types.Scene], None]
 
 
 def _stamp_only(_owner: bpy.types.Object | bpy.types.Scene) -> None:
-    """Version 1 stores what was there before there were numbers."""
+    """Version 1 stores what was there before there were numbers; version 2 changes only scenes."""
+
+
+def _slope_as_range(scene: bpy.types.Scene) -> None:
+    """Version 2 has a flattest slope beside the steepest, among the settings for new populations."""
+    settings = scene.tetflora.populate
+    if settings.is_property_set("slope_limit"):
+        settings.slope_max = settings.slope_limit
+        settings.property_unset("slope_limit")
 
 
 # Step n turns properties of version n into those of version n + 1.
-OBJECT_STEPS: list[Step] = [_stamp_only]
-SCENE_STEPS: list[Step] = [_stamp_only]
+OBJECT_STEPS: list[Step] = [_stamp_only, _stamp_only]
+SCENE_STEPS: list[Step] = [_stamp_only, _slope_as_range]
 
 
 def _migrate(owner: bpy.types.Object | bpy.types.Scene, steps: list[Step]) -> bool:

@@ -7,12 +7,12 @@ from functools import lru_cache
 
 import bpy
 import numpy as np
-from mathutils import Matrix
+from mathutils import Matrix, Quaternion
 
 from ..errors import SceneError
+from ..planting.places import Placement, new_seeds
 from .migration import VERSION
-from .placement import Placement, new_seeds
-from .plant_fields import fields_of, quaternions, read_field, stored_size, upright, write_field
+from .plant_fields import fields_of, quaternions, read_field, stored_size, write_field
 from .plant_kinds import form_of, species_of
 from .scene_reader import single_plants
 from .species_items import catalogue, display_height
@@ -20,8 +20,10 @@ from .transforms import world_matrix
 
 COLLECTION = "TetFlora plants"
 FIELD = "Field of plants"
+POPULATION_MARK = "tetflora_population"  # on the collection of a population's plants
 _FIELD_MARK = "tetflora_field"  # on the objects of fields that TetFlora made and may remove
 _MARK = "tetflora_plants"  # on the collection, so that it may be renamed
+_FEW = 1000  # plants that may get their names the way Blender does it
 
 
 def plants_of(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
@@ -45,24 +47,29 @@ def plant_collection(scene: bpy.types.Scene) -> bpy.types.Collection:
     return collection
 
 
-def add_plants(scene: bpy.types.Scene, placement: Placement, species: Sequence[str]) -> list[bpy.types.Object]:
-    """Make the empties of a placement, upright, in the scene's collection for plants.
+def add_plants(
+    scene: bpy.types.Scene,
+    placement: Placement,
+    species: Sequence[str],
+    collection: bpy.types.Collection | None = None,
+) -> list[bpy.types.Object]:
+    """Make the empties of a placement.
 
     Parameters
     ----------
     placement : Placement
     species : sequence of str
         Identifiers that ``placement.species`` counts through.
+    collection : bpy.types.Collection, optional
+        Where they go; the scene's collection for plants if not given.
 
     Returns
     -------
     list of bpy.types.Object
         In the placement's order.
     """
-    angles = np.zeros((len(placement), 3))
-    angles[:, 2] = placement.azimuth
-    rows = (placement.position, angles, placement.scale, placement.species, placement.seed)
-    return _empties(scene, rows, species, [None] * len(species))
+    rows = (placement.position, _eulers(placement), placement.scale, placement.species, placement.seed)
+    return _empties(scene, rows, species, [None] * len(species), collection)
 
 
 def _empties(
@@ -70,16 +77,17 @@ def _empties(
     rows: Sequence[np.ndarray],
     species: Sequence[str],
     forms: Sequence[bpy.types.Object | None],
+    collection: bpy.types.Collection | None = None,
 ) -> list[bpy.types.Object]:
     """One empty for each row of places, XYZ Euler angles, scales, numbers of kinds and seeds."""
     known = catalogue()
-    names = [known[s].name if s in known else s for s in species]
+    names = _numbered([known[s].name if s in known else s for s in species], rows[3])
     heights = [display_height(s) for s in species]
-    link = plant_collection(scene).objects.link
+    link = (collection or plant_collection(scene)).objects.link
     new = bpy.data.objects.new
     made = []
-    for position, angles, scale, kind, seed in zip(*(row.tolist() for row in rows), strict=True):
-        obj = new(names[kind], None)
+    for name, position, angles, scale, kind, seed in zip(names, *(row.tolist() for row in rows), strict=True):
+        obj = new(name, None)
         obj.empty_display_type = 'SINGLE_ARROW'
         obj.empty_display_size = heights[kind]
         obj.location = position
@@ -95,18 +103,48 @@ def _empties(
     return made
 
 
-def add_field(scene: bpy.types.Scene, placement: Placement, species: Sequence[str]) -> bpy.types.Object:
-    """Make one field of the plants of a placement, upright, in the scene's collection for plants.
+def _eulers(placement: Placement) -> np.ndarray:
+    """XYZ Euler angles, (n, 3); those of plants that are upright turn about the vertical and nothing else."""
+    angles = np.zeros((len(placement), 3))
+    angles[:, 2] = placement.azimuth
+    tilted = np.flatnonzero(placement.up[:, 2] < 1.0)
+    if len(tilted):
+        angles[tilted] = [Quaternion(q).to_euler() for q in placement.rotation[tilted].tolist()]
+    return angles
+
+
+def _numbered(names: Sequence[str], kinds: np.ndarray) -> list[str]:
+    """Name of each new plant, by its kind.
+
+    Blender finds numbers for equal names by itself, and is slow at it: of many plants, 30,000 take it twice as long as
+    with numbers beyond all that are there.
+    """
+    if len(kinds) < _FEW:
+        return [names[kind] for kind in kinds.tolist()]
+    used = [int(end) for _, dot, end in (o.name.rpartition(".") for o in bpy.data.objects) if dot and end.isdecimal()]
+    first = max(used, default=0) + 1
+    width = max(3, len(str(first + len(kinds))))
+    return [f"{names[kind]}.{number:0{width}d}" for number, kind in enumerate(kinds.tolist(), first)]
+
+
+def add_field(
+    scene: bpy.types.Scene,
+    placement: Placement,
+    species: Sequence[str],
+    collection: bpy.types.Collection | None = None,
+) -> bpy.types.Object:
+    """Make one field of the plants of a placement.
 
     Parameters
     ----------
     placement : Placement
     species : sequence of str
         Identifiers that ``placement.species`` counts through.
+    collection : bpy.types.Collection, optional
+        Where it goes; the scene's collection for plants if not given.
     """
-    turned = upright(placement.azimuth)
-    rows = (placement.position, turned, placement.scale, placement.species, placement.seed)
-    return _link_field(scene, write_field(FIELD, *rows, species))
+    rows = (placement.position, placement.rotation, placement.scale, placement.species, placement.seed)
+    return _link_field(scene, write_field(FIELD, *rows, species), collection)
 
 
 def field_from_plants(
@@ -156,8 +194,14 @@ def plants_from_field(
     return made
 
 
-def remove_fields(objects: Iterable[bpy.types.Object]) -> int:
-    """Delete fields that TetFlora made; others keep their object and lose the mark. How many plants they stored."""
+def remove_fields(objects: Iterable[bpy.types.Object], tidy: bool = True) -> int:
+    """Delete fields that TetFlora made; others keep their object and lose the mark. How many plants they stored.
+
+    Parameters
+    ----------
+    tidy : bool
+        Remove collections that this leaves empty.
+    """
     fields = [o for o in fields_of(objects) if o.library is None]
     number = sum(stored_size(field) for field in fields)
     for field in fields:
@@ -166,20 +210,16 @@ def remove_fields(objects: Iterable[bpy.types.Object]) -> int:
     meshes = {field.data for field in ours}
     bpy.data.batch_remove(ours)
     bpy.data.batch_remove([mesh for mesh in meshes if not mesh.users])
-    _remove_empty_collections()
+    if tidy:
+        remove_empty_collections()
     return number
 
 
-def trunks(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
-    """Where plants of a scene stand on the map, (n, 2) float64: those that are objects, and those of fields."""
-    single = np.array([o.matrix_world.translation[:2] for o in plants_of(scene.objects)]).reshape(-1, 2)
-    fields = [read_field(o, depsgraph, world_matrix(o, depsgraph)[None]) for o in fields_of(scene.objects)]
-    return np.concatenate([single, *(field.position[:, :2] for field in fields)])
-
-
-def _link_field(scene: bpy.types.Scene, field: bpy.types.Object) -> bpy.types.Object:
+def _link_field(
+    scene: bpy.types.Scene, field: bpy.types.Object, collection: bpy.types.Collection | None = None
+) -> bpy.types.Object:
     field.tetflora.version, field[_FIELD_MARK] = VERSION, True
-    plant_collection(scene).objects.link(field)
+    (collection or plant_collection(scene)).objects.link(field)
     prepare_scene(scene)
     return field
 
@@ -223,11 +263,13 @@ def remove_plants(objects: Iterable[bpy.types.Object]) -> int:
     """Delete plants from the file, and the collection for plants if that leaves it empty; how many there were."""
     plants = [o for o in plants_of(objects) if o.library is None]
     bpy.data.batch_remove(plants)
-    _remove_empty_collections()
+    remove_empty_collections()
     return len(plants)
 
 
-def _remove_empty_collections() -> None:
-    for collection in [c for c in bpy.data.collections if c.get(_MARK) and c.library is None]:
-        if not collection.all_objects and not collection.children:
-            bpy.data.collections.remove(collection)
+def remove_empty_collections() -> None:
+    """Remove collections for plants and for populations that hold nothing."""
+    for mark in (POPULATION_MARK, _MARK):  # populations lie within
+        for collection in [c for c in bpy.data.collections if c.get(mark) and c.library is None]:
+            if not collection.all_objects and not collection.children:
+                bpy.data.collections.remove(collection)

@@ -3,14 +3,12 @@
 """What TetFlora stores in a file: ``Object.tetflora`` on plants, fields and occluders, ``Scene.tetflora`` otherwise."""
 
 from dataclasses import fields
-from math import pi, radians
 
 import bpy
 from bpy.props import (
     BoolProperty,
     CollectionProperty,
     EnumProperty,
-    FloatProperty,
     IntProperty,
     PointerProperty,
     StringProperty,
@@ -20,22 +18,12 @@ from ..refinement.settings import RefinementSettings
 from . import output_properties
 from .explicit_objects import PROPERTY as EXPLICIT
 from .plant_form import FORM_TYPES
+from .population_properties import CLASSES as POPULATION_CLASSES
+from .population_properties import TetFloraPopulation
 from .refinement_properties import RefinementProperties
 from .species_choice import SpeciesChoice
 from .species_editor import TetFloraSpeciesEditor
 from .species_edits import TetFloraSpeciesEdit
-
-#: Most plants that Populate places at once, and most that it makes as objects.
-MOST_PLANTS = 10_000_000
-MOST_EMPTIES = 100_000
-#: Up to this many become empties if nobody says otherwise; beyond, Blender becomes slow.
-EMPTIES_UNASKED = 10_000
-STORAGE_ITEMS = (
-    ('AUTOMATIC', "Automatic", f"Empties up to {EMPTIES_UNASKED:,} plants, a field for more", 0),
-    ('EMPTIES', "Empties", "An object for each plant: each can be moved by itself, many make Blender slow", 1),
-    ('FIELD', "Field", "One object whose vertices are the plants: room for millions", 2),
-)
-
 
 _FORM = {
     "name": "Form",
@@ -99,18 +87,11 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
         options=set(),
     )
     is_explicit: BoolProperty(**EXPLICIT)
-
-
-class TetFloraMixEntry(bpy.types.PropertyGroup, SpeciesChoice):
-    """One species of a mixture to populate with."""
-
-    weight: FloatProperty(
-        name="Share",
-        description="Share of this species among the plants, relative to the other shares",
-        default=1.0,
-        min=0.0,
-        soft_max=10.0,
-        options=set(),
+    population: StringProperty(
+        name="Population", description="Identity of the population that made this", options={'HIDDEN'}
+    )
+    population_number: IntProperty(
+        name="Number in the Population", description="Copies made by hand share it", options={'HIDDEN'}
     )
 
 
@@ -126,69 +107,6 @@ class TetFloraLeafObject(bpy.types.PropertyGroup, SpeciesChoice):
         type=bpy.types.Object,
         poll=lambda _group, candidate: candidate.type == 'MESH',
     )
-
-
-class TetFloraPopulate(bpy.types.PropertyGroup):
-    """How Populate places plants; the operator starts from these."""
-
-    count: IntProperty(
-        name="Plants",
-        description="Plants to place. Fewer are placed where no more fit, and the report says so",
-        default=100,
-        min=1,
-        soft_max=10_000,
-        max=MOST_PLANTS,
-        options=set(),
-    )
-    as_field: EnumProperty(
-        name="Make",
-        description="What the plants are made as",
-        items=STORAGE_ITEMS,
-        default='AUTOMATIC',
-        options=set(),
-    )
-    seed: IntProperty(name="Seed", description="Another seed is another arrangement and other plants", options=set())
-    slope_limit: FloatProperty(
-        name="Slope Limit",
-        description="Ground steeper than this stays bare",
-        subtype='ANGLE',
-        default=radians(40.0),
-        min=0.0,
-        max=pi / 2,
-        options=set(),
-    )
-    min_distance: FloatProperty(
-        name="Distance",
-        description="Least distance between two trunks, measured on the map; plants that are there already count",
-        subtype='DISTANCE',
-        unit='LENGTH',
-        default=2.0,
-        min=0.0,
-        soft_max=50.0,
-        options=set(),
-    )
-    scale_min: FloatProperty(
-        name="Scale From",
-        description="Size of the smallest plants; 1 is the size that the species file gives",
-        default=0.8,
-        min=0.01,
-        soft_max=4.0,
-        options=set(),
-    )
-    scale_max: FloatProperty(
-        name="To",
-        description="Size of the largest plants; 1 is the size that the species file gives",
-        default=1.2,
-        min=0.01,
-        soft_max=4.0,
-        options=set(),
-    )
-    mix: CollectionProperty(
-        name="Species",
-        description="Species to choose from; without any, the first of the catalogue is taken",
-        type=TetFloraMixEntry,
-    )
-    mix_index: IntProperty(name="Active Species", options={'HIDDEN', 'SKIP_SAVE'})
 
 
 class TetFloraScene(RefinementProperties, bpy.types.PropertyGroup):
@@ -274,7 +192,13 @@ class TetFloraScene(RefinementProperties, bpy.types.PropertyGroup):
         ),
     )
 
-    populate: PointerProperty(type=TetFloraPopulate)
+    populate: PointerProperty(type=TetFloraPopulation)
+    populations: CollectionProperty(
+        name="Populations",
+        description="Plants that were placed together, with the rules by which they can be placed anew",
+        type=TetFloraPopulation,
+    )
+    populations_index: IntProperty(name="Active Population", options={'HIDDEN', 'SKIP_SAVE'})
     output: PointerProperty(type=output_properties.TetFloraOutput)
     leaf_objects: CollectionProperty(
         name="Leaf Objects",
@@ -299,9 +223,8 @@ class TetFloraScene(RefinementProperties, bpy.types.PropertyGroup):
 CLASSES = (
     TetFloraFieldEntry,
     TetFloraObject,
-    TetFloraMixEntry,
+    *POPULATION_CLASSES,
     TetFloraLeafObject,
-    TetFloraPopulate,
     TetFloraSpeciesEdit,
     TetFloraSpeciesEditor,
     *output_properties.CLASSES,

@@ -1,0 +1,251 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Dots where the plants of the shown population would stand, in the viewport while its settings are edited.
+
+Nothing is made: dots are drawn by the gpu module, belong to the session and are forgotten when a file is loaded. What
+is shown is remembered by names and arrays, for references do not outlive undo.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+from bpy.app.handlers import persistent
+from numpy.typing import NDArray
+
+from ..errors import TetFloraError
+from . import compat, population_properties, species_edits
+from .population_ground import place_population
+from .population_rules import makes_field, shown_population
+from .populations import own_objects
+
+#: Dots that are drawn at most, evenly chosen among the plants.
+MOST_DOTS = 20_000
+#: Plants that are placed at most for a preview; of more, it says so.
+MOST_PLACED = 200_000
+#: One after the other for the species of the mixture; linear RGB, told apart by colour-blind eyes as well
+#: (the palette of Okabe and Ito, "Color Universal Design", 2008).
+PALETTE = np.array(
+    [[0.0, 0.62, 0.45], [0.9, 0.62, 0.0], [0.34, 0.71, 0.91], [0.94, 0.89, 0.26], [0.84, 0.37, 0.0], [0.8, 0.47, 0.65]]
+)
+_SIZE = 6.0  # pixels
+_LIFT = 0.1  # metres above the ground, which would hide half of each dot
+_SOON = 0.08  # seconds from a change to new dots
+
+
+@dataclass(frozen=True)
+class Dots:
+    """What a preview shows.
+
+    Attributes
+    ----------
+    position : (n, 3) float32
+        Metres, world space.
+    colour : (n, 4) float32
+    plants : int
+        Plants that would be placed; at least, where ``more``.
+    more : bool
+    message : str
+        Why there are fewer than asked for, empty if there are not.
+    """
+
+    position: NDArray[np.float32]
+    colour: NDArray[np.float32]
+    plants: int
+    more: bool
+    message: str
+
+
+@dataclass
+class _State:
+    """The scene that shows a preview, and how the last placing went."""
+
+    scene: str | None = None
+    uid: str = ""
+    dots: Dots | None = None
+    error: str = ""
+    seconds: float = 0.0
+    handle: object = None
+    batch: object = field(default=None, repr=False)
+
+
+_state = _State()
+
+
+def shown_in(scene: bpy.types.Scene) -> bool:
+    """Whether the preview is switched on in a scene."""
+    return _state.scene == scene.name
+
+
+def show(scene: bpy.types.Scene, on: bool) -> None:
+    """Switch the preview of a scene on or off; in the window it appears a moment later, in the background never."""
+    _state.scene = scene.name if on else None
+    if on:
+        schedule()
+    else:
+        _clear()
+
+
+def found_for(population: bpy.types.PropertyGroup) -> Dots | None:
+    """What the preview found for a population by its present settings, if it is shown."""
+    return _state.dots if _state.scene is not None and population.uid == _state.uid else None
+
+
+def error() -> str:
+    """Why there are no dots, empty if there are some."""
+    return _state.error
+
+
+def schedule() -> None:
+    """Place dots anew soon; many changes in a row are one placing."""
+    if _state.scene is None or bpy.app.background or bpy.app.timers.is_registered(_on_timer):
+        return
+    # What takes long to place must not keep the window busy while a slider is dragged.
+    bpy.app.timers.register(_on_timer, first_interval=max(_SOON, _state.seconds))
+
+
+def dots_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Dots:
+    """Dots for the population that the panel shows, without a change to anything.
+
+    Raises
+    ------
+    TetFloraError
+        Its settings leave no place, as the message says.
+    """
+    population = shown_population(scene)
+    if population.frozen:
+        raise TetFloraError(f'"{population.name}" is frozen; its plants stay where they are')
+    grounds = None
+    if not population.uid:  # settings for a new population, which would grow on what is selected
+        chosen = [o for o in view_layer.objects if o.select_get(view_layer=view_layer)]
+        grounds = [o for o in chosen if o.type == 'MESH' and not o.tetflora.is_field]
+    own = set(own_objects(scene, population))
+    placement, _ = place_population(scene, depsgraph, population, own, grounds, MOST_PLACED)
+    number = len(placement)
+    drawn = np.linspace(0, number - 1, min(number, MOST_DOTS)).astype(np.int64) if number else np.zeros(0, np.int64)
+    position = placement.position[drawn].astype(np.float32)
+    position[:, 2] += _LIFT
+    colour = np.ones((len(drawn), 4), np.float32)
+    colour[:, :3] = PALETTE[placement.species[drawn] % len(PALETTE)]
+    return Dots(position, colour, number, number >= MOST_PLACED, placement.reason)
+
+
+def status(population: bpy.types.PropertyGroup) -> str:
+    """How many plants there are or will be, and as what; reads no geometry, so that panels may call it."""
+    dots = found_for(population)
+    if dots is not None:
+        number, known = dots.plants, not dots.more or population.by_density
+    elif population.by_density:
+        number, known = population.made, population.made > 0
+    else:
+        number, known = population.count, True
+    if dots is not None and dots.more and not population.by_density:
+        number, known = population.count, True
+    if not known:
+        return "As many plants as the ground takes"
+    made_as = "one field" if makes_field(population, number) else "empties"
+    more = "more than " if dots is not None and dots.more and population.by_density else ""
+    return f"{more}{number:,} plant{'' if number == 1 else 's'}: {made_as}"
+
+
+def complaints(population: bpy.types.PropertyGroup) -> list[str]:
+    """What is wrong with a population, for the panel; reads no geometry."""
+    if _state.scene is not None and population.uid == _state.uid:
+        told = _state.error or (_state.dots.message if _state.dots is not None else "")
+    else:
+        told = population.message
+    return [told] if told else []
+
+
+def _on_timer() -> None:
+    scene = bpy.data.scenes.get((_state.scene, None)) if _state.scene is not None else None
+    if scene is None or scene != bpy.context.scene:
+        _clear()
+        return
+    begin = time.perf_counter()
+    try:
+        dots = dots_of(scene, bpy.context.evaluated_depsgraph_get(), bpy.context.view_layer)
+        _state.error = ""
+    except TetFloraError as wrong:
+        dots, _state.error = None, str(wrong)
+    _state.seconds = time.perf_counter() - begin
+    _clear()
+    _state.dots, _state.uid = dots, shown_population(scene).uid
+    if dots is not None and len(dots.position):
+        _state.handle = bpy.types.SpaceView3D.draw_handler_add(_draw, (), 'WINDOW', 'POST_VIEW')
+    _redraw()
+
+
+def _draw() -> None:
+    import gpu  # not there in a Blender without a window
+    from gpu_extras.batch import batch_for_shader
+
+    context = bpy.context
+    if _state.dots is None or context.scene.name != _state.scene or not context.space_data.overlay.show_overlays:
+        return
+    shader = gpu.shader.from_builtin(compat.dot_shader())
+    if _state.batch is None:
+        _state.batch = batch_for_shader(shader, 'POINTS', {"pos": _state.dots.position, "color": _state.dots.colour})
+    gpu.state.depth_test_set('LESS_EQUAL')
+    gpu.state.point_size_set(_SIZE * context.preferences.system.ui_scale)
+    _state.batch.draw(shader)
+    gpu.state.point_size_set(1.0)
+    gpu.state.depth_test_set('NONE')
+
+
+def _clear() -> None:
+    """Take the dots and their handler away."""
+    if _state.handle is not None:
+        bpy.types.SpaceView3D.draw_handler_remove(_state.handle, 'WINDOW')
+    _state.handle = _state.batch = _state.dots = None
+    _redraw()
+
+
+def _redraw() -> None:
+    for window in getattr(bpy.context.window_manager, "windows", ()):
+        for area in window.screen.areas:
+            if area.type == 'VIEW_3D':
+                area.tag_redraw()
+
+
+def _call_off() -> None:
+    # Also before a file is loaded: 4.5's wheel hangs at exit if Blender itself has dropped a waiting timer.
+    if bpy.app.timers.is_registered(_on_timer):
+        bpy.app.timers.unregister(_on_timer)
+
+
+@persistent
+def _on_undo(_scene: bpy.types.Scene, _other: object = None) -> None:
+    schedule()
+
+
+@persistent
+def _on_load_pre(_path: object, _other: object = None) -> None:
+    _state.scene = None
+    _call_off()
+    _clear()
+
+
+_HANDLERS = {"undo_post": _on_undo, "redo_post": _on_undo, "load_pre": _on_load_pre}
+
+
+def register() -> None:
+    """Listen to changes of populations and species, undo and loading."""
+    population_properties.listeners.append(schedule)
+    species_edits.listeners.append(schedule)
+    for name, handler in _HANDLERS.items():
+        getattr(bpy.app.handlers, name).append(handler)
+
+
+def unregister() -> None:
+    """Take the dots and all that listens away."""
+    _state.scene = None
+    _call_off()
+    _clear()
+    for name, handler in _HANDLERS.items():
+        getattr(bpy.app.handlers, name).remove(handler)
+    species_edits.listeners.remove(schedule)
+    population_properties.listeners.remove(schedule)

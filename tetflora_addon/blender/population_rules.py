@@ -1,0 +1,93 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From what a population stores to the engine's rules, and settings that pass from one population to another."""
+
+from __future__ import annotations
+
+from math import inf
+
+import bpy
+
+from ..planting.rules import Companion, Rules
+from .population_properties import EMPTIES_UNASKED, TetFloraMixEntry, TetFloraPopulation
+from .species_items import catalogue, default_species
+
+#: Square metres of the area that densities are counted on: foresters count trees by the hectare.
+HECTARE = 10_000.0
+#: What a population is and what became of it; all else are settings, which can be copied and written to files.
+IDENTITY = {"rna_type", "name", "uid", "frozen", "collection", "made", "message", "slope_limit", "mix_index"}
+
+
+def settings_of(group: type[bpy.types.PropertyGroup] | bpy.types.PropertyGroup) -> list[bpy.types.Property]:
+    """Properties of a population that say how plants are placed."""
+    return [p for p in group.bl_rna.properties if p.identifier not in IDENTITY]
+
+
+def copy_settings(source: TetFloraPopulation, target: TetFloraPopulation) -> None:
+    """Give a population the settings of another; identity, grounds and plants stay its own."""
+    for prop in settings_of(source):
+        if prop.type != 'COLLECTION':
+            setattr(target, prop.identifier, getattr(source, prop.identifier))
+    target.mix.clear()
+    for entry in source.mix:
+        new = target.mix.add()
+        new.species, new.weight = entry.species, entry.weight
+        copy_companion(entry, new)
+
+
+def copy_companion(source: TetFloraMixEntry, target: TetFloraMixEntry) -> None:
+    """Let one species stand to others as another entry says."""
+    for name in ("companion", "companion_strength", "companion_distance"):
+        setattr(target, name, getattr(source, name))
+
+
+def shown_population(scene: bpy.types.Scene) -> TetFloraPopulation:
+    """What the panel shows: the active population, or the settings for new ones where there is none."""
+    settings = scene.tetflora
+    number = settings.populations_index
+    return settings.populations[number] if 0 <= number < len(settings.populations) else settings.populate
+
+
+def rules_from(population: TetFloraPopulation) -> tuple[Rules, tuple[str, ...]]:
+    """A population's settings as the engine takes them, and the species that its shares count through.
+
+    Companions that are none of the mixture's species follow it with a share of 0.
+    """
+    mix = [(e.species or default_species(), e) for e in population.mix]
+    shares: dict[str, float] = {}
+    for identifier, entry in mix:
+        shares[identifier] = shares.get(identifier, 0.0) + entry.weight
+    if not mix:
+        shares[default_species()] = 1.0
+    for _, entry in mix:
+        if entry.companion:
+            shares.setdefault(entry.companion, 0.0)
+    species = tuple(shares)
+    companions = tuple(
+        Companion(species.index(identifier), species.index(e.companion), e.companion_strength, e.companion_distance)
+        for identifier, e in mix
+        if e.companion and e.companion_strength
+    )
+    free = ("altitude_min", "altitude_max", "density", "shares", "companions")
+    given = {name: getattr(population, name) for name in Rules.__dataclass_fields__ if name not in free}
+    low, high = (population.altitude_min, population.altitude_max) if population.use_altitude else (-inf, inf)
+    rules = Rules(
+        **given,
+        altitude_min=low,
+        altitude_max=high,
+        density=population.density / HECTARE,
+        shares=tuple(shares.values()),
+        companions=companions,
+    )
+    return rules, species
+
+
+def makes_field(population: TetFloraPopulation, number: int) -> bool:
+    """Whether so many plants of a population are made as one field."""
+    return population.as_field == 'FIELD' or (population.as_field == 'AUTOMATIC' and number > EMPTIES_UNASKED)
+
+
+def unknown_species(population: TetFloraPopulation) -> list[str]:
+    """Species of a population that the catalogue does not have."""
+    known = catalogue()
+    return [e.species for e in population.mix if e.species and e.species not in known]
