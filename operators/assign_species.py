@@ -5,30 +5,38 @@
 import bpy
 from bpy.props import EnumProperty
 
+from ..tetflora_addon.blender.field_edits import assign_field_species
+from ..tetflora_addon.blender.plant_fields import fields_of, stored_size
 from ..tetflora_addon.blender.plant_objects import assign_species
 from ..tetflora_addon.blender.species_items import NO_SPECIES, operator_items
 from . import ids
-from .base import Reporting, counted, plants_selected, selected_plants
+from .base import Reporting, counted, plants_or_fields_selected, selected_plants
 
 
 class TETFLORA_OT_assign_species(Reporting, bpy.types.Operator):
-    """Give the selected plants another species."""
+    """Give the selected plants, and those of selected fields, another species."""
 
     bl_idname = ids.ASSIGN_SPECIES
     bl_label = "Change Species"
-    bl_description = "Make all selected plants belong to this species. Their seeds and places stay"
+    bl_description = (
+        "Make all selected plants, and all plants of selected fields, belong to this species. Their seeds, sizes and "
+        "places stay"
+    )
     bl_options = {'REGISTER', 'UNDO'}
 
     species: EnumProperty(name="Species", description="Species of the catalogue", items=operator_items)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return plants_selected(cls, context)
+        return plants_or_fields_selected(cls, context)
 
     def run(self, context: bpy.types.Context) -> set[str]:
         if self.species in {"", NO_SPECIES}:
             self.report({'ERROR'}, "Choose a species")
             return {'CANCELLED'}
         changed = assign_species(selected_plants(context), self.species)
+        for field in fields_of(context.selected_objects):
+            if assign_field_species(field, self.species):
+                changed += stored_size(field)
         self.report({'INFO'}, f"{counted(changed, 'plant')} changed")
         return {'FINISHED'}

@@ -42,6 +42,14 @@ def plants_selected(cls: type[bpy.types.Operator], context: bpy.types.Context) -
     return False
 
 
+def plants_or_fields_selected(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """Poll: at least one plant or field of plants is selected."""
+    if any(obj.tetflora.is_plant or obj.tetflora.is_field for obj in context.selected_objects):
+        return True
+    cls.poll_message_set("Select plants, or a field of plants, first")
+    return False
+
+
 def selected_plants(context: bpy.types.Context) -> list[bpy.types.Object]:
     """Selected plants."""
     return plants_of(context.selected_objects)

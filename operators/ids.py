@@ -4,6 +4,9 @@
 
 ADD_PLANT = "tetflora.add_plant"
 POPULATE = "tetflora.populate"
+PAINT_PLANTS = "tetflora.paint_plants"
+PLACE_PLANT = "tetflora.place_plant"
+DROP_TO_GROUND = "tetflora.drop_to_ground"
 USE_AS_FORM = "tetflora.use_as_form"
 ASSIGN_SPECIES = "tetflora.assign_species"
 RESEED = "tetflora.reseed"

@@ -5,9 +5,11 @@
 import bpy
 from bpy.props import IntProperty
 
+from ..tetflora_addon.blender.field_edits import reseed_field
+from ..tetflora_addon.blender.plant_fields import fields_of, stored_size
 from ..tetflora_addon.blender.plant_objects import reseed
 from . import ids
-from .base import Reporting, counted, plants_selected, selected_plants
+from .base import Reporting, counted, plants_or_fields_selected, selected_plants
 
 
 class TETFLORA_OT_reseed(Reporting, bpy.types.Operator):
@@ -16,7 +18,8 @@ class TETFLORA_OT_reseed(Reporting, bpy.types.Operator):
     bl_idname = ids.RESEED
     bl_label = "Re-roll Seeds"
     bl_description = (
-        "Turn each selected plant into another individual of its species. Copies that share a seed become different"
+        "Turn each selected plant, and each plant of selected fields, into another individual of its species. Copies "
+        "that share a seed become different"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
@@ -26,9 +29,13 @@ class TETFLORA_OT_reseed(Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return plants_selected(cls, context)
+        return plants_or_fields_selected(cls, context)
 
     def run(self, context: bpy.types.Context) -> set[str]:
         number = reseed(selected_plants(context), self.roll)
+        fields = sorted((o for o in fields_of(context.selected_objects) if o.library is None), key=lambda o: o.name)
+        for place, field in enumerate(fields):
+            reseed_field(field, place, self.roll)
+            number += stored_size(field)
         self.report({'INFO'}, f"{counted(number, 'plant')} re-rolled")
         return {'FINISHED'}

@@ -6,6 +6,7 @@ import bpy
 
 from . import (
     add_menu,
+    brush_panel,
     lists,
     object_menu,
     output_panel,
@@ -29,6 +30,7 @@ CLASSES = (
     species_panel.TETFLORA_PT_species_leaves,
     species_panel.TETFLORA_PT_species_whole,
     *populate_panel.CLASSES,
+    brush_panel.TETFLORA_PT_brush,
     refinement_panel.TETFLORA_PT_refinement,
     refinement_panel.TETFLORA_PT_limits,
     refinement_panel.TETFLORA_PT_proxy_shading,

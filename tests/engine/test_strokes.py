@@ -109,7 +109,12 @@ def test_erase_and_thin_take_nothing_outside_of_the_circle(brush, centre, seed):
 
 
 @settings(max_examples=40, deadline=None)
-@given(density=st.floats(0.02, 2.0), distance=st.floats(0.0, 2.0), seed=st.integers(0, 99), radius=st.floats(3.0, 15.0))
+@given(
+    density=st.floats(0.02, 2.0),
+    distance=st.one_of(st.just(0.0), st.floats(0.0, 2.0)),
+    seed=st.integers(0, 99),
+    radius=st.floats(3.0, 15.0),
+)
 def test_thinned_plants_are_as_sparse_as_asked_and_no_cell_is_emptied(density, distance, seed, radius):
     standing = np.random.default_rng(seed).uniform(-20.0, 20.0, (600, 2))
     brush = Brush(radius=radius, density=density, min_distance=distance)
@@ -120,15 +125,26 @@ def test_thinned_plants_are_as_sparse_as_asked_and_no_cell_is_emptied(density, d
     inside = strokes.within(left, (1.0, 2.0), radius)
     cells = np.floor(left / side).astype(int)
     _, place, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
-    outside = np.bincount(place.ravel(), ~inside, minlength=len(count))
-    assert (count - outside <= np.where(outside > 0, 0, 1)).all()
+    own = np.bincount(place.ravel(), inside, minlength=len(count))
+    assert own.max(initial=0.0) <= 1.0
     if distance == 0.0:
-        before = {tuple(c) for c in np.floor(standing / side).astype(int).tolist()}
-        assert before == {tuple(c) for c in cells.tolist()}
+        assert {tuple(c) for c in np.floor(standing / side).astype(int).tolist()} == {tuple(c) for c in cells.tolist()}
+        # Again changes nothing, whatever the stroke.
+        assert len(strokes.thin(brush, (1.0, 2.0), left, strokes.stroke_key(seed + 1, 0), 1)) == 0
     elif inside.sum() > 1:
         assert _gaps(left[inside]).min() >= distance * (1 - 1e-9)
-    # Again changes nothing.
-    assert len(strokes.thin(brush, (1.0, 2.0), left, key, 1)) == 0
+
+
+@pytest.mark.parametrize("radius", [1.0, 4.0, 12.0])
+def test_thinned_places_have_the_density_that_was_asked_for_whatever_the_brush(radius):
+    standing = np.random.default_rng(2).uniform(-40.0, 40.0, (12_000, 2))
+    brush = Brush(radius=radius, density=0.1)
+    key = strokes.stroke_key(0, 0)
+    for dab, x in enumerate(np.arange(-30.0, 30.1, 0.5)):
+        for y in np.arange(-1.0, 1.1, 0.5) * max(radius, 3.0):
+            standing = np.delete(standing, strokes.thin(brush, (x, y), standing, key, dab), axis=0)
+    strip = (np.abs(standing[:, 0]) < 28.0) & (np.abs(standing[:, 1]) < 3.0)
+    assert strip.sum() == pytest.approx(0.1 * 56.0 * 6.0, rel=0.3)
 
 
 def test_species_come_in_their_shares_and_sizes_in_their_range():

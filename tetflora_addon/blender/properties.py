@@ -16,6 +16,7 @@ from bpy.props import (
 
 from ..refinement.settings import RefinementSettings
 from . import output_properties
+from .brush_properties import TetFloraBrush
 from .explicit_objects import PROPERTY as EXPLICIT
 from .plant_form import FORM_TYPES
 from .population_properties import CLASSES as POPULATION_CLASSES
@@ -200,6 +201,7 @@ class TetFloraScene(RefinementProperties, bpy.types.PropertyGroup):
     )
     populations_index: IntProperty(name="Active Population", options={'HIDDEN', 'SKIP_SAVE'})
     output: PointerProperty(type=output_properties.TetFloraOutput)
+    brush: PointerProperty(type=TetFloraBrush)
     leaf_objects: CollectionProperty(
         name="Leaf Objects",
         description="Meshes of your own in place of a species' leaf",
@@ -224,6 +226,7 @@ CLASSES = (
     TetFloraFieldEntry,
     TetFloraObject,
     *POPULATION_CLASSES,
+    TetFloraBrush,
     TetFloraLeafObject,
     TetFloraSpeciesEdit,
     TetFloraSpeciesEditor,

@@ -162,25 +162,25 @@ def thin(
 ) -> NDArray[np.int64]:
     """Which plants one dab removes where they are denser than the brush, as numbers of places (m, 2) or (m, 3).
 
-    Of each cell one plant stays, a random one, or one outside of the circle. Of plants that are closer than the least
-    distance the earlier one in this order stays.
+    Of each cell one plant stays, and of two that are closer than the least distance one. Which, is a matter of chance
+    that the place itself decides: so plants outside of the circle can win too, and doing it again changes nothing.
     """
-    inside = within(standing, centre, brush.radius)
-    near = np.flatnonzero(
-        within(standing, centre, brush.radius + max(brush.min_distance, 2.0 * cell_size(brush.density)))
-    )
-    # Plants that cannot be removed come first, then the others by chance.
-    rank = uniform(child_key(key, near), _Draw.RANK) - ~inside[near]
-    near = near[np.argsort(rank, kind="stable")]
+    reach = brush.radius + max(brush.min_distance, cell_size(brush.density) * sqrt(2.0))
+    near = np.flatnonzero(within(standing, centre, reach))
+    near = near[np.argsort(_ranks(standing[near, :2]), kind="stable")]
     cells = _packed(np.floor(standing[near, :2] / cell_size(brush.density)).astype(np.int64))
     _, first = np.unique(cells, return_index=True)
-    single = np.zeros(len(near), bool)
-    single[first] = True
-    kept, fixed = near[single & inside[near]], near[~inside[near]]
-    kept = kept[admitted(standing[kept, :2], standing[fixed, :2], brush.min_distance)]
-    stays = np.isin(near, kept)
-    gone = np.sort(near[~stays & inside[near]])
+    winners = near[np.sort(first)]
+    winners = winners[admitted(standing[winners, :2], np.zeros((0, 2)), brush.min_distance)]
+    gone = np.sort(near[~np.isin(near, winners)])
+    gone = gone[within(standing[gone], centre, brush.radius)]
     return gone[_drawn(brush, gone, key, dab)]
+
+
+def _ranks(places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Numbers in [0, 1) that places (n, 2) have by themselves, in the precision in which Blender stores them."""
+    bits = np.ascontiguousarray(places, np.float32).view(np.uint32)
+    return uniform(child_key(key_of_seed(bits[:, 0]), bits[:, 1]), _Draw.RANK)
 
 
 def individuals(brush: Brush, keys: NDArray[np.uint64]) -> dict[str, NDArray]:
