@@ -98,13 +98,16 @@ def border_of(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def sampled(image: NDArray[np.float32], uv: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values of an image (h, w) at places (n, 2), linear between the middles of texels; it repeats. (n,)."""
+    """Values of an image (h, w) at places (n, 2), linear between the middles of texels, (n,).
+
+    It repeats, but opposite borders do not mix: a mask that is black on one side would let plants stray to the other.
+    """
     height, width = image.shape
-    place = uv * (width, height) - 0.5
-    low = np.floor(place)
+    place = np.clip((uv - np.floor(uv)) * (width, height) - 0.5, 0.0, (width - 1, height - 1))
+    low = place.astype(np.int64)
     part = place - low
-    x, y = (low.astype(np.int64) % (width, height)).T
-    right, above = (x + 1) % width, (y + 1) % height
+    x, y = low.T
+    right, above = np.minimum(x + 1, width - 1), np.minimum(y + 1, height - 1)
     bottom = image[y, x] * (1.0 - part[:, 0]) + image[y, right] * part[:, 0]
     top = image[above, x] * (1.0 - part[:, 0]) + image[above, right] * part[:, 0]
     return bottom * (1.0 - part[:, 1]) + top * part[:, 1]

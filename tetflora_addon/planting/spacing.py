@@ -23,10 +23,10 @@ class Neighbours:
         self.distance = distance
         self.cell = distance / np.sqrt(2.0)
         cells = _cells(points, self.cell)
-        order = np.argsort(cells, kind="stable")
-        self.points = points[order]
-        self.cells, first = np.unique(cells[order], return_index=True)
-        self.first = np.append(first, len(points))
+        order = np.argsort(cells)
+        self.points, cells = points[order], cells[order]
+        first = np.flatnonzero(np.diff(cells, prepend=cells[:1] - 1))
+        self.cells, self.first = cells[first], np.append(first, len(points))
 
     def near(self, points: NDArray[np.float64], least: int = 1) -> NDArray[np.bool_]:
         """Which points, (n, 2), are closer than the distance to at least so many of the others, (n,)."""

@@ -1,0 +1,187 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Read the ground that plants shall grow on: meshes, vertex groups, an image, and curves for areas and paths."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from ..planting.ground import Ground, Path
+from .ground_curves import Line, lines_of
+from .transforms import world_matrix
+
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec. 709
+
+
+def read_ground(
+    objects: Iterable[bpy.types.Object],
+    depsgraph: bpy.types.Depsgraph,
+    *,
+    vertex_group: str = "",
+    image: bpy.types.Image | None = None,
+    uv_layer: str = "",
+    invert_group: bool = False,
+    invert_image: bool = False,
+    areas: bpy.types.Collection | None = None,
+    paths: bpy.types.Collection | None = None,
+    path_distance: float = 0.0,
+) -> Ground:
+    """The ground as the engine takes it, modifiers applied, in world space.
+
+    Parameters
+    ----------
+    objects : iterable of bpy.types.Object
+        Meshes.
+    depsgraph : bpy.types.Depsgraph
+    vertex_group : str
+        Group whose weights say how suitable the ground is; every mesh needs it. A float attribute of that name serves
+        as well.
+    image : bpy.types.Image, optional
+        Its luminance says how suitable the ground is, as the values are stored: a picture of 50 % grey halves the
+        number of plants. Alpha does not count.
+    uv_layer : str
+        UV map for the image; the one that renders if empty.
+    invert_group, invert_image : bool
+        Plants grow where weight or luminance are low.
+    areas : bpy.types.Collection, optional
+        Plants grow inside of its cyclic curves only; open curves do not count.
+    paths : bpy.types.Collection, optional
+        All of its curves are kept free.
+    path_distance : float
+        Metres to either side of the paths, beyond the depth of their bevel.
+
+    Raises
+    ------
+    SceneError
+        Something is missing or cannot be used; names the object and the setting.
+    """
+    parts = [_read_mesh(obj, depsgraph, vertex_group, uv_layer, image is not None) for obj in objects]
+    if not parts:
+        raise SceneError("There is no ground to populate; select a mesh with faces")
+    triangles, weight, uv, border = zip(*parts, strict=True)
+    weights = np.concatenate(weight) if vertex_group else None
+    if weights is not None and invert_group:
+        weights = 1.0 - weights
+    grey = None
+    if image is not None:
+        grey = _luminance(image)
+        grey = 1.0 - grey if invert_image else grey
+    return Ground(
+        triangles=np.concatenate(triangles),
+        weight=weights,
+        uv=None if image is None else np.concatenate(uv),
+        image=grey,
+        areas=() if areas is None else tuple(line.points for line in _lines(areas, depsgraph, "areas", closed=True)),
+        paths=() if paths is None else tuple(_path(line, path_distance) for line in _lines(paths, depsgraph, "paths")),
+        border=np.concatenate(border),
+    )
+
+
+def _path(line: Line, distance: float) -> Path:
+    points = np.concatenate([line.points, line.points[:1]]) if line.cyclic else line.points
+    return Path(points, distance + line.half_width)
+
+
+def _lines(
+    collection: bpy.types.Collection, depsgraph: bpy.types.Depsgraph, setting: str, closed: bool = False
+) -> list[Line]:
+    """Curves of a collection, those that are closed or all of them; there is at least one."""
+    found = [line for obj in collection.all_objects for line in lines_of(obj, depsgraph)]
+    if not found:
+        raise SceneError(
+            f'The collection "{collection.name}" for {setting} has no curves; draw one, or clear the setting'
+        )
+    if not closed:
+        return found
+    cyclic = [line for line in found if line.cyclic and len(line.points) > 2]
+    if not cyclic:
+        raise SceneError(
+            f'No curve of the collection "{collection.name}" for {setting} is closed; in Edit Mode, choose '
+            "Curve > Toggle Cyclic"
+        )
+    return cyclic
+
+
+def _read_mesh(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, group: str, uv_layer: str, with_uv: bool
+) -> tuple[NDArray[np.float64], NDArray[np.float32] | None, NDArray[np.float64] | None, NDArray[np.float64]]:
+    """Triangles in world space, weights and UV at their corners where asked for, and the border."""
+    if obj.type != 'MESH':
+        raise SceneError(f'"{obj.name}" is not a mesh; select a mesh with faces')
+    evaluated = obj.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        if not len(mesh.polygons):
+            raise SceneError(f'"{obj.name}" has no faces; select a mesh with faces')
+        mesh.calc_loop_triangles()
+        vertices = _integers(mesh.loop_triangles, "vertices", 3).reshape(-1, 3)
+        matrix = world_matrix(obj, depsgraph)
+        positions = _attribute(mesh.attributes["position"], "vector", 3) @ matrix[:3, :3].T + matrix[:3, 3]
+        weight = _weights(evaluated, mesh, group, obj.name)[vertices] if group else None
+        uv = None
+        if with_uv:
+            uv = _uv(mesh, uv_layer, obj.name)[_integers(mesh.loop_triangles, "loops", 3)].reshape(-1, 3, 2)
+        ends = _integers(mesh.edges, "vertices", 2).reshape(-1, 2)
+        faces = np.bincount(_integers(mesh.loops, "edge_index", 1), minlength=len(ends))
+    finally:
+        evaluated.to_mesh_clear()
+    return positions[vertices], weight, uv, positions[ends[faces == 1]]
+
+
+def _integers(rows: bpy.types.bpy_prop_collection, name: str, width: int) -> NDArray[np.int32]:
+    values = np.zeros(width * len(rows), np.int32)
+    rows.foreach_get(name, values)
+    return values
+
+
+def _attribute(attribute: bpy.types.Attribute, name: str, width: int) -> NDArray[np.float64]:
+    values = np.zeros(width * len(attribute.data), np.float32)
+    attribute.data.foreach_get(name, values)
+    return (values.reshape(-1, width) if width > 1 else values).astype(np.float64)
+
+
+def _weights(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, group: str, name: str) -> NDArray[np.float64]:
+    """Weight of each vertex, (v,)."""
+    attribute = mesh.attributes.get(group)
+    # Geometry nodes turn vertex groups into attributes.
+    if attribute is not None and (attribute.domain, attribute.data_type) == ('POINT', 'FLOAT'):
+        return _attribute(attribute, "value", 1)
+    found = evaluated.vertex_groups.get(group)
+    if found is None:
+        raise SceneError(f'"{name}" has no vertex group "{group}"; make one of that name, or clear the Vertex Group')
+    index = found.index
+    # Weights are lists within lists, which no foreach_get reads.
+    each = (next((g.weight for g in v.groups if g.group == index), 0.0) for v in mesh.vertices)
+    return np.fromiter(each, np.float64, len(mesh.vertices))
+
+
+def _uv(mesh: bpy.types.Mesh, layer: str, name: str) -> NDArray[np.float64]:
+    """UV of each corner, (c, 2)."""
+    if layer and layer not in mesh.uv_layers:
+        raise SceneError(f'"{name}" has no UV map "{layer}"; make one of that name, or clear the UV Map')
+    found = mesh.uv_layers[layer] if layer else next((u for u in mesh.uv_layers if u.active_render), None)
+    if found is None:
+        raise SceneError(f'"{name}" has no UV map for the image; unwrap it, or clear the Image')
+    return _attribute(mesh.attributes[found.name], "vector", 2)
+
+
+def _luminance(image: bpy.types.Image) -> NDArray[np.float32]:
+    """Grey values of an image, (h, w), the first row at the bottom."""
+    if image.source == 'TILED':
+        raise SceneError(f'The image "{image.name}" has tiles (UDIM), which Populate cannot read; use a single image')
+    width, height = image.size
+    channels = image.channels
+    if not width or not height or not channels:
+        raise SceneError(
+            f'The image "{image.name}" cannot be loaded from "{image.filepath}"; find the file with '
+            "File > External Data > Find Missing Files, or clear the Image"
+        )
+    pixels = np.zeros(width * height * channels, np.float32)
+    image.pixels.foreach_get(pixels)
+    pixels = pixels.reshape(height, width, channels)
+    return pixels[..., :3] @ _LUMINANCE if channels >= 3 else pixels[..., 0].copy()
