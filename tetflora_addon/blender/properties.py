@@ -21,6 +21,7 @@ from .explicit_objects import PROPERTY as EXPLICIT
 from .plant_form import FORM_TYPES
 from .population_properties import CLASSES as POPULATION_CLASSES
 from .population_properties import TetFloraPopulation
+from .preview_properties import TetFloraPreview
 from .refinement_properties import RefinementProperties
 from .species_choice import SpeciesChoice
 from .species_editor import TetFloraSpeciesEditor
@@ -202,6 +203,7 @@ class TetFloraScene(RefinementProperties, bpy.types.PropertyGroup):
     populations_index: IntProperty(name="Active Population", options={'HIDDEN', 'SKIP_SAVE'})
     output: PointerProperty(type=output_properties.TetFloraOutput)
     brush: PointerProperty(type=TetFloraBrush)
+    preview: PointerProperty(type=TetFloraPreview)
     leaf_objects: CollectionProperty(
         name="Leaf Objects",
         description="Meshes of your own in place of a species' leaf",
@@ -228,6 +230,7 @@ CLASSES = (
     *POPULATION_CLASSES,
     TetFloraBrush,
     TetFloraLeafObject,
+    TetFloraPreview,
     TetFloraSpeciesEdit,
     TetFloraSpeciesEditor,
     *output_properties.CLASSES,

@@ -15,12 +15,12 @@ FORMS: dict[Decision, tuple[float, float, float]] = {
     Decision.SPLIT: (0.95, 0.95, 0.95),
     Decision.EXPLICIT: (0.35, 0.85, 0.25),
     Decision.PROXY: (1.0, 0.6, 0.1),
-    Decision.HIDDEN: (0.25, 0.45, 1.0),
+    Decision.HIDDEN: (0.4, 0.6, 1.0),
 }
 #: From little to much, evenly apart in lightness.
 _RAMP = np.array([(0.25, 0.1, 0.45), (0.2, 0.35, 0.75), (0.1, 0.65, 0.65), (0.5, 0.85, 0.35), (1.0, 0.92, 0.3)])
 #: Contributions are shown by their logarithm between these, pixels.
-_LEAST, _MOST = 0.25, 16_384.0
+_LEAST, _MOST = 0.25, 1_024.0
 
 
 def ramp(share: NDArray[np.floating]) -> NDArray[np.float32]:

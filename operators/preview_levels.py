@@ -1,0 +1,187 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Compute the levels that viewports preview, forget them, and look at them from where they were refined for."""
+
+import time
+from collections.abc import Generator
+
+import bpy
+from mathutils import Matrix
+
+from ..tetflora_addon.blender import job, preview_job, preview_state
+from ..tetflora_addon.errors import TetFloraError
+from ..tetflora_addon.preview.levels import Levels
+from ..tetflora_addon.refinement.camera import Camera
+from . import ids
+from .base import Reporting, counted
+
+# Seconds of work between two looks at the keyboard.
+_SLICE = 0.05
+#: Extent of a viewport's longer side at distance 1, times its focal length in millimetres.
+_VIEWPORT = 72.0
+
+
+def _camera_is_there(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    preview = preview_state.find(context.scene)
+    if context.scene.camera is not None or (preview is not None and preview.frozen is not None):
+        return True
+    cls.poll_message_set("The scene has no active camera; add one (Add > Camera)")
+    return False
+
+
+class TETFLORA_OT_preview_levels(Reporting, bpy.types.Operator):
+    """Refine without making anything."""
+
+    bl_idname = ids.PREVIEW_LEVELS
+    bl_label = "Compute Levels"
+    bl_description = (
+        "Refine for the scene's camera, or for the frozen one, without making any mesh, and keep every level to step "
+        "through in viewports. Takes as long as the first part of Refine; Esc cancels and keeps the levels of before"
+    )
+    bl_options = {'REGISTER'}  # nothing in the file changes but the level that is shown
+
+    _steps: Generator[job.Progress, None, Levels] | None = None
+    _timer: bpy.types.Timer | None = None
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _camera_is_there(cls, context)
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        steps = self._begun(context)
+        while True:
+            try:
+                next(steps)
+            except StopIteration as stop:
+                return self._finish(context, stop.value)
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        if bpy.app.background or context.window is None:
+            return self.execute(context)
+        self._steps = self._begun(context)
+        try:
+            # The scene is read in the second step: what is wrong with it is said while the artist still looks here.
+            for _ in range(2):
+                progress = next(self._steps)
+        except TetFloraError as error:
+            self.report({'ERROR'}, str(error))
+            return {'CANCELLED'}
+        context.window_manager.progress_begin(0.0, 1.0)
+        self._show(context, progress)
+        self._timer = context.window_manager.event_timer_add(_SLICE / 5.0, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        return {'RUNNING_MODAL'}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if event.type == 'ESC' and event.value == 'PRESS':
+            self.cancel(context)
+            self.report({'INFO'}, "Cancelled; levels are as they were")
+            return {'CANCELLED'}
+        if event.type != 'TIMER':
+            return {'RUNNING_MODAL'}
+        end = time.monotonic() + _SLICE
+        try:
+            progress = next(self._steps)
+            while time.monotonic() < end:
+                progress = next(self._steps)
+        except StopIteration as stop:
+            self._leave(context)
+            return self._finish(context, stop.value)
+        except TetFloraError as error:
+            self.cancel(context)
+            self.report({'ERROR'}, str(error))
+            return {'CANCELLED'}
+        except BaseException:
+            self.cancel(context)
+            raise
+        self._show(context, progress)
+        return {'RUNNING_MODAL'}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Esc, or Blender ends the operator."""
+        if self._steps is not None:
+            self._steps.close()
+        self._leave(context)
+
+    def _begun(self, context: bpy.types.Context) -> Generator[job.Progress, None, Levels]:
+        return preview_job.level_steps(context.scene, context.evaluated_depsgraph_get(), context.view_layer)
+
+    def _show(self, context: bpy.types.Context, progress: job.Progress) -> None:
+        context.window_manager.progress_update(progress.fraction)
+        context.workspace.status_text_set(f"TetFlora {progress.fraction:4.0%}   {progress.message}   |   Esc: cancel")
+
+    def _leave(self, context: bpy.types.Context) -> None:
+        self._steps = None
+        if self._timer is not None:
+            context.window_manager.event_timer_remove(self._timer)
+            self._timer = None
+            context.window_manager.progress_end()
+            context.workspace.status_text_set(None)
+
+    def _finish(self, context: bpy.types.Context, levels: Levels) -> set[str]:
+        context.scene.tetflora.preview.level = levels.levels[-1].number
+        last = levels.levels[-1]
+        self.report(
+            {'INFO'},
+            f"{counted(len(levels), 'level')}, {len(last):,} tetrahedra that hold plants, {levels.nbytes / 1e6:.0f} MB",
+        )
+        return {'FINISHED'}
+
+
+class TETFLORA_OT_forget_levels(bpy.types.Operator):
+    """Take the levels out of viewports and memory."""
+
+    bl_idname = ids.FORGET_LEVELS
+    bl_label = "Forget Levels"
+    bl_description = "Take the levels out of the viewports and out of memory. Nothing in the file changes"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        preview = preview_state.find(context.scene)
+        if preview is not None and preview.levels is not None:
+            return True
+        cls.poll_message_set("No levels are there; press Compute Levels")
+        return False
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        preview_state.forget(context.scene)
+        return {'FINISHED'}
+
+
+class TETFLORA_OT_look_through(bpy.types.Operator):
+    """Look at the preview from where it was made for."""
+
+    bl_idname = ids.LOOK_THROUGH
+    bl_label = "Look Through the Camera"
+    bl_description = (
+        "Look through the scene's camera or, where it is frozen, from the place of the frozen one, in its direction"
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.space_data is None or context.space_data.type != 'VIEW_3D':
+            cls.poll_message_set("Works in a 3D viewport")
+            return False
+        return _camera_is_there(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene, space = context.scene, context.space_data
+        preview = preview_state.find(scene)
+        frozen = None if preview is None else preview.frozen
+        if frozen is None:
+            space.region_3d.view_perspective = 'CAMERA'
+        else:
+            look_from(space, frozen)
+        return {'FINISHED'}
+
+
+def look_from(space: bpy.types.SpaceView3D, camera: Camera) -> None:
+    """Turn a viewport to where a camera looks; the picture is as wide as the viewport."""
+    region = space.region_3d
+    region.view_perspective = 'ORTHO' if camera.kind == "ORTHO" else 'PERSP'
+    matrix = Matrix(camera.frame.tolist()).to_4x4()
+    matrix.translation = camera.position.tolist()
+    left, right, bottom, top = camera.window
+    if camera.kind == "PERSP":
+        space.lens = min(max(_VIEWPORT / max(right - left, top - bottom), 1.0), 250.0)
+    region.view_matrix = matrix.inverted()

@@ -1,0 +1,47 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Preview: levels of refinement and plants in the viewport, without making anything."""
+
+import bpy
+
+from ..operators import ids
+from ..tetflora_addon.blender import preview_state
+from .base import SidebarPanel, split_layout
+
+
+class TETFLORA_PT_preview(SidebarPanel, bpy.types.Panel):
+    """Preview."""
+
+    bl_label = "Preview"
+    bl_order = 2
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = split_layout(self)
+        settings = context.scene.tetflora.preview
+        preview = preview_state.find(context.scene)
+        column = layout.column()
+        column.prop(settings, "plants")
+        if settings.plants != 'NONE':
+            # Blender's own setting of this viewport: thousands of empties cost more than the plants that are drawn.
+            column.prop(context.space_data, "show_object_viewport_empty", text="Empties")
+            if preview is not None and preview.message:
+                column.label(text=preview.message, icon='ERROR')
+        row = layout.row(align=True)
+        row.operator(ids.PREVIEW_LEVELS, icon='MOD_REMESH')
+        row.operator(ids.FORGET_LEVELS, text="", icon='X')
+        layout.prop(settings, "freeze")
+        layout.operator(ids.LOOK_THROUGH, icon='VIEW_CAMERA')
+        if preview is None or preview.levels is None:
+            return
+        column = layout.column()
+        column.prop(settings, "level", slider=True)
+        column.prop(settings, "wires")
+        row = column.row()
+        row.active = settings.wires
+        row.prop(settings, "colour")
+        column.prop(settings, "projected")
+        column.column(align=True).prop(settings, "forms")
+        column.prop(settings, "statistics")
+        if preview_state.is_outdated(context.scene):
+            layout.label(text="The camera has changed", icon='ERROR')

@@ -1,0 +1,182 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An artist looks at levels and plants in the viewport; tests/window/test_preview.py judges it by its pictures."""
+
+import importlib
+import sys
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+STEP = 10  # pixels between two looks for a button
+SPECIES = ("broadleaf_tree", "conifer", "bush")
+
+
+def steps(ui):
+    """See devtools/window_driver.py."""
+    scene = bpy.context.scene
+    build(scene)
+    settings = scene.tetflora.preview
+    space = ui.area().spaces.active
+    space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = False
+    space.overlay.show_cursor = False
+    space.show_object_viewport_empty = False
+    only_panel()
+    yield from ui.show_sidebar("TetFlora")
+    region = next(r for r in ui.area().regions if r.type == 'WINDOW')
+    ui.values["view"] = [region.x, region.y, region.width, region.height]
+    yield from ui.picture("panel")
+    ui.values["before"] = names()
+
+    yield from press_button(ui, "tetflora.look_through")
+    ui.values["through"] = space.region_3d.view_perspective
+    yield from ui.picture("bare")
+
+    settings.plants = 'LIGHT'
+    yield from ui.until(lambda: shapes(scene) is not None, 20, "plants")
+    ui.values["plants"] = shapes(scene).plants
+    yield from ui.picture("light")
+    settings.plants = 'BOUNDS'
+    yield from ui.until(lambda: shapes(scene).indices.shape[1] == 2, 20, "bounds")
+    yield from ui.picture("bounds")
+    # A plant is moved, another is deleted: they are read again by themselves.
+    plants = [obj for obj in scene.objects if obj.tetflora.is_plant]
+    height = shapes(scene).positions[:, 2].max()
+    plants[0].location.z += 30.0
+    yield from ui.until(lambda: shapes(scene).positions[:, 2].max() > height + 20.0, 20, "moved plant")
+    plants[0].location.z -= 30.0
+    bpy.data.objects.remove(plants[-1])
+    yield from ui.until(lambda: shapes(scene).plants == len(plants) - 1, 20, "deleted plant")
+    settings.plants = 'NONE'
+    yield 0.5
+    ui.values["after_none"] = shapes(scene) is None
+
+    yield from press_button(ui, "tetflora.preview_levels")
+    ui.values["running"] = running(ui)
+    yield from ui.until(lambda: not running(ui), 90, "levels")
+    levels = state().find(scene).levels
+    ui.values["levels"] = [[level.number, len(level)] for level in levels.levels]
+    ui.values["forms"] = np.bincount(levels.levels[-1].decision, minlength=5).tolist()
+    settings.projected = False
+    last = settings.level
+    ui.values["last"] = last
+    for mode in ("FORM", "LEVEL", "VISIBILITY", "CONTRIBUTION"):
+        settings.colour = mode
+        yield from ui.picture(f"wires_{mode.lower()}")
+    settings.colour = 'FORM'
+    for number in (0, last // 2):
+        settings.level = number
+        yield from ui.picture(f"level_{number}")
+    ui.values["middle"] = last // 2
+    settings.level, settings.wires, settings.projected = last, False, True
+    yield from ui.picture("translucent")
+    settings.wires, settings.forms = True, {'HIDDEN'}
+    settings.projected = False
+    yield from ui.picture("hidden")
+    settings.forms = {'EXPLICIT', 'PROXY', 'HIDDEN', 'SPLIT'}
+
+    # Stopped in the middle: what was there stays.
+    scene.tetflora.cutoff, scene.tetflora.leaf_limit = 0.4, 0.1
+    yield from press_button(ui, "tetflora.preview_levels")
+    ui.values["running_before_esc"] = running(ui)
+    ui.press('ESC')
+    yield from ui.until(lambda: not running(ui), 30, "end after Esc")
+    ui.values["kept"] = state().find(scene).levels is levels
+
+    # Frozen, and seen from above (figure 5).
+    settings.freeze = True
+    space.region_3d.view_perspective = 'ORTHO'
+    space.region_3d.view_rotation = (1.0, 0.0, 0.0, 0.0)
+    space.region_3d.view_location = (0.0, 5.0, 0.0)
+    space.region_3d.view_distance = 160.0
+    settings.projected = True
+    yield from ui.picture("frozen")
+    scene.camera.location = (60.0, 0.0, 3.0)
+    yield 0.5
+    ui.values["outdated_frozen"] = state().is_outdated(scene)
+    yield from press_button(ui, "tetflora.look_through")
+    eye = space.region_3d.view_matrix.inverted().translation
+    ui.values["looks_from"] = [round(value, 3) for value in eye]
+    yield from ui.picture("frozen_view")
+    settings.freeze = False
+    yield 0.5
+    ui.values["outdated"] = state().is_outdated(scene)
+    yield from ui.picture("outdated")
+    yield from press_button(ui, "tetflora.forget_levels")
+    yield 0.5
+    ui.values["forgotten"] = state().find(scene).levels is None
+    yield from ui.picture("forgotten")
+    ui.values["after"] = names()
+    ui.values["broken"] = "broken" in state().find(scene).cache
+
+
+def build(scene):
+    """Three rows of plants; the camera looks along them."""
+    for name in ("Cube", "Light"):
+        bpy.data.objects.remove(bpy.data.objects[name])
+    for i in range(24):
+        plant = bpy.data.objects.new(f"plant {i}", None)
+        plant.location = (6.0 * (i % 3) - 6.0, 6.0 * (i // 3) - 15.0, 0.0)
+        plant.tetflora.is_plant, plant.tetflora.species, plant.tetflora.seed = True, SPECIES[i % 3], i
+        scene.collection.objects.link(plant)
+    camera = scene.camera
+    camera.location = (14.0, -34.0, 7.0)
+    camera.rotation_euler = (Vector((0.0, 0.0, 4.0)) - camera.location).to_track_quat('-Z', 'Y').to_euler()
+    scene.render.resolution_x, scene.render.resolution_y = 320, 200
+    scene.tetflora.quality = 'DRAFT'
+    scene.view_layers[0].update()
+
+
+def only_panel():
+    """Show the panel Preview alone, open: a copy under another name, because Blender remembers which were closed."""
+    shown = [getattr(bpy.types, name) for name in dir(bpy.types) if name.startswith("TETFLORA_PT_")]
+    ours = next(cls for cls in shown if cls.__name__ == "TETFLORA_PT_preview")
+    for cls in sorted(shown, key=lambda cls: not hasattr(cls, "bl_parent_id")):
+        bpy.utils.unregister_class(cls)
+    members = {"bl_options": set(), "bl_idname": "TETFLORA_PT_preview_open"}
+    bpy.utils.register_class(type("TETFLORA_PT_preview_open", (ours,), members))
+
+
+def press_button(ui, operator):
+    """Find an operator's button in the sidebar and click on it; Ctrl C over a button copies its Python command."""
+    manager = bpy.context.window_manager
+    region = next(r for r in ui.area().regions if r.type == 'UI')
+    x = region.x + region.width // 3
+    for column in (x, region.x + region.width - 56):
+        for y in range(region.y + region.height - STEP, region.y, -STEP):
+            manager.clipboard = ""
+            ui.move(column, y)
+            yield 0.03
+            ui.press('C', ctrl=True)
+            yield 0.03
+            if manager.clipboard.startswith(f"bpy.ops.{operator}("):
+                ui.press('LEFTMOUSE')
+                yield 0.2
+                ui.move(*ui.centre())
+                yield 0.1
+                return
+    raise LookupError(f"the sidebar shows no button for {operator}")
+
+
+def state():
+    """TetFlora's own module of what is previewed."""
+    name = next(n for n in sys.modules if n.endswith("tetflora_addon.blender.preview_state"))
+    return importlib.import_module(name)
+
+
+def shapes(scene):
+    """The plants that are shown."""
+    preview = state().find(scene)
+    return None if preview is None else preview.shapes
+
+
+def running(ui):
+    """Whether levels are being computed."""
+    return any(operator.bl_idname == "TETFLORA_OT_preview_levels" for operator in ui.window.modal_operators)
+
+
+def names():
+    """All datablocks that a preview could have made."""
+    kinds = ("objects", "meshes", "collections", "materials", "node_groups", "cameras")
+    return {kind: sorted(d.name for d in getattr(bpy.data, kind)) for kind in kinds}

@@ -1,0 +1,209 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Find out what viewports preview: levels of refinement when asked to, plants of few faces whenever they change.
+
+Without a window nobody looks: then nothing is read unasked, and nothing listens but to the loading of files.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator
+from dataclasses import replace
+
+import bpy
+import numpy as np
+from bpy.app.handlers import persistent
+
+from ..errors import TetFloraError
+from ..plants.seeds import Seeds
+from ..preview.levels import Levels, gather
+from ..preview.light_plants import Shapes, bounds_of_plants, light_plants
+from ..refinement.loop import refine as refine_loop
+from ..refinement.polygons import Polygons
+from . import job, preview_state, species_edits
+from .camera_reader import read_camera
+from .emit import originals_shown
+from .explicit_objects import read_explicit
+from .light_reader import read_lights
+from .preview_state import camera_now, find, of, redraw
+from .properties import settings_from
+from .scene_reader import NoPlantsError, read_occluders, read_plants
+from .species_items import catalogue
+
+_SOON = 0.2  # seconds from a change of plants to reading them again
+
+
+def level_steps(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer | None = None
+) -> Generator[job.Progress, None, Levels]:
+    """Refine a scene without making anything, and keep all levels for viewports; closing it changes nothing.
+
+    Raises
+    ------
+    TetFloraError
+        As `job.refine_steps`.
+    """
+    yield job.Progress(0.0, "Reading the scene")
+    layer = view_layer or depsgraph.view_layer
+    looked = camera_now(scene)
+    before = find(scene)
+    camera = before.frozen if before is not None and before.frozen is not None else read_camera(scene, depsgraph)
+    settings = settings_from(scene)
+    if scene.tetflora.proxy_form == 'SHELLS':
+        settings = replace(settings, hidden_block=job.SHELL_BLOCK, proxy_block=job.SEEN_SHELL_BLOCK)
+    with originals_shown(scene, depsgraph):
+        explicit = read_explicit(depsgraph, layer)
+        try:
+            seeds = read_plants(scene, depsgraph, layer)
+        except NoPlantsError:
+            if explicit is None:
+                raise
+            seeds = _no_seeds()
+        occluders = read_occluders(scene, depsgraph, layer)
+        lights = read_lights(depsgraph, layer) if settings.shadow_cutoff > 0.0 else ()
+    yield job.Progress(0.02, "Compiling species")
+    flora = job.compile_for(seeds.identifiers or (min(catalogue()),), scene, depsgraph)
+    polygons = None if explicit is None else Polygons.everything(explicit.meshes)
+    loop = gather(refine_loop(flora, seeds, camera, settings, occluders, polygons, lights), flora, camera)
+    fraction = 0.05
+    while True:
+        try:
+            level = next(loop)
+        except StopIteration as stop:
+            levels = stop.value
+            break
+        fraction += 0.15 * (1.0 - fraction)  # nobody knows how many passes will follow
+        yield job.Progress(fraction, f"Level {level.number}: {len(level):,} tetrahedra")
+    preview = of(scene)
+    preview.levels, preview.looked = levels, looked
+    preview.made += 1
+    if scene.tetflora.preview.freeze:
+        preview.frozen = camera
+    redraw()
+    return levels
+
+
+def _no_seeds() -> Seeds:
+    none = np.zeros(0)
+    frames = none.reshape(0, 3), none.reshape(0, 3, 3)
+    return Seeds((), none.astype(np.int32), none.astype(np.int64), *frames, none)
+
+
+def read_shapes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Shapes | None:
+    """Make the plants of a scene anew in the form that its settings say; None where they are not to be shown.
+
+    What is wrong with a plant is told by `Preview.message`, for the panel, and the plants of before stay.
+    """
+    begin, preview, form = time.perf_counter(), of(scene), scene.tetflora.preview.plants
+    preview.message, preview.objects = "", len(scene.objects)
+    try:
+        if form == 'NONE':
+            preview.shapes = None
+        else:
+            seeds = read_plants(scene, depsgraph, depsgraph.view_layer)
+            make = light_plants if form == 'LIGHT' else bounds_of_plants
+            preview.shapes = make(job.compile_for(seeds.identifiers, scene, depsgraph), seeds)
+    except NoPlantsError as error:
+        preview.shapes, preview.message = None, str(error)
+    except TetFloraError as error:
+        preview.message = str(error)
+    preview.made += 1
+    preview.seconds = time.perf_counter() - begin
+    redraw()
+    return preview.shapes
+
+
+def schedule() -> None:
+    """Read the plants of what is open soon; many changes in a row are one reading."""
+    if bpy.app.background or bpy.app.timers.is_registered(_on_timer):
+        return
+    # A forest of many plants must not keep the window busy while one of them is moved.
+    bpy.app.timers.register(_on_timer, first_interval=max(_SOON, preview_state.longest_reading()))
+
+
+def _on_timer() -> None:
+    for window in bpy.context.window_manager.windows:
+        scene = window.scene
+        if scene.tetflora.preview.plants != 'NONE':
+            depsgraph = window.view_layer.depsgraph
+            if depsgraph is not None:
+                read_shapes(scene, depsgraph)
+
+
+def _call_off() -> None:
+    # Also before a file is loaded: 4.5's wheel hangs at exit if Blender itself has dropped a waiting timer.
+    if bpy.app.timers.is_registered(_on_timer):
+        bpy.app.timers.unregister(_on_timer)
+
+
+@persistent
+def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    if scene.tetflora.preview.plants == 'NONE':
+        return
+    preview = find(scene)
+    for update in depsgraph.updates:
+        datablock = update.id
+        if isinstance(datablock, bpy.types.Object):
+            own = datablock.original.tetflora
+            if (own.is_plant or own.is_field) and (update.is_updated_transform or update.is_updated_geometry):
+                schedule()
+                return
+        # Deleted objects are told only by what they were in.
+        elif isinstance(datablock, (bpy.types.Scene, bpy.types.Collection)) and (
+            preview is None or len(scene.objects) != preview.objects
+        ):
+            schedule()
+            return
+
+
+@persistent
+def _on_undo(scene: bpy.types.Scene, _other: object = None) -> None:
+    if scene.tetflora.preview.plants != 'NONE':
+        schedule()
+
+
+@persistent
+def _on_load_pre(_path: object, _other: object = None) -> None:
+    preview_state.forget_all()
+    _call_off()
+
+
+@persistent
+def _on_load_post(_path: object, _other: object = None) -> None:
+    for scene in bpy.data.scenes:
+        settings = scene.tetflora.preview
+        if settings.freeze:  # the camera that was frozen is gone
+            settings.freeze = False
+        if settings.plants != 'NONE':
+            schedule()
+
+
+_HANDLERS = {
+    "depsgraph_update_post": _on_update,
+    "undo_post": _on_undo,
+    "redo_post": _on_undo,
+    "load_pre": _on_load_pre,
+    "load_post": _on_load_post,
+}
+
+
+def register() -> None:
+    """Listen to changes of plants where there is a window, and to loading in any case."""
+    for name, handler in _HANDLERS.items():
+        if name.startswith("load") or not bpy.app.background:
+            getattr(bpy.app.handlers, name).append(handler)
+    for listeners in (species_edits.listeners, preview_state.listeners):
+        listeners.append(schedule)
+
+
+def unregister() -> None:
+    """Forget everything and stop listening."""
+    for listeners in (species_edits.listeners, preview_state.listeners):
+        listeners.remove(schedule)
+    preview_state.forget_all()
+    _call_off()
+    for name, handler in _HANDLERS.items():
+        handlers = getattr(bpy.app.handlers, name)
+        if handler in handlers:
+            handlers.remove(handler)

@@ -1,0 +1,222 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Draw previews over 3D viewports: plants, tetrahedra, the frozen camera, figures. Nothing is drawn without a window.
+
+What does not depend on the view is handed to the graphics card once and kept. Translucent tetrahedra are made anew when
+the view changes, as many of them as the last view could be made of in a moment.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+import traceback
+from collections.abc import Callable
+
+import blf
+import bpy
+import gpu
+import numpy as np
+
+from ..preview.colours import FORMS
+from ..preview.levels import Level
+from ..refinement.camera import Camera
+from ..refinement.decisions import Decision
+from . import preview_batches, preview_state
+from .preview_properties import TetFloraPreview
+from .preview_state import Preview
+
+#: Seconds that making translucent tetrahedra of a view may take, and how many they are at least and at most.
+_MOMENT = 0.03
+_LEAST, _MOST = 500, 20_000
+_FROZEN = (1.0, 0.75, 0.2, 1.0)
+_TEXT, _COMPLAINT = (0.95, 0.95, 0.95, 1.0), (1.0, 0.7, 0.3, 1.0)
+_handles: list[object] = []
+
+
+def view_camera(region: bpy.types.RegionView3D, near: float) -> Camera:
+    """A viewport's view as the engine takes it; the size of its picture does not matter here."""
+    matrix = np.array(region.view_matrix.inverted(), np.float64)
+    kind = "PERSP" if region.is_perspective else "ORTHO"
+    # From an orthographic view everything is in front: its eye is as far back as one likes.
+    near = near if kind == "PERSP" else -np.inf
+    return Camera(kind, matrix[:3, 3], matrix[:3, :3], (-1.0, 1.0, -1.0, 1.0), near, np.inf, 1, 1)
+
+
+def _kept(preview: Preview, name: str, key: tuple, make: Callable[[], object]) -> object:
+    """What was made for a key, or made now if it has changed."""
+    if preview.cache.get(name, (None,))[0] != key:
+        preview.cache[name] = (key, make())
+    return preview.cache[name][1]
+
+
+def _draw_plants(preview: Preview) -> None:
+    shapes = preview.shapes
+    made = _kept(preview, "plants", (preview.made,), lambda: preview_batches.plants(shapes))
+    if made is None:
+        return
+    gpu.state.depth_test_set('LESS_EQUAL')
+    gpu.state.depth_mask_set(True)
+    made.draw(gpu.shader.from_builtin('SMOOTH_COLOR'))
+    gpu.state.depth_mask_set(False)
+
+
+def _draw_levels(preview: Preview, settings: TetFloraPreview, space: bpy.types.SpaceView3D) -> None:
+    levels, level = preview.levels, preview.levels.at(settings.level)
+    forms = frozenset(settings.forms)
+    shown = (preview.made, level.number, forms)
+    shader = gpu.shader.from_builtin('SMOOTH_COLOR')
+    gpu.state.blend_set('ALPHA')
+    gpu.state.depth_test_set('LESS_EQUAL')
+    gpu.state.depth_mask_set(False)  # clouds hide nothing
+    if settings.projected:
+        view = tuple(np.array(space.region_3d.view_matrix).ravel().round(7)), space.region_3d.is_perspective
+        made = _kept(
+            preview,
+            f"projected {space.as_pointer()}",
+            (*shown, *view),
+            lambda: _made_in_time(preview, level, forms, view_camera(space.region_3d, space.clip_start)),
+        )
+        if made is not None:
+            made.draw(shader)
+    if settings.wires:
+        made = _kept(
+            preview,
+            "wires",
+            (*shown, settings.colour),
+            lambda: preview_batches.wires(levels, level, settings.colour, forms),
+        )
+        if made is not None:
+            made.draw(shader)
+    gpu.state.blend_set('NONE')
+
+
+def _made_in_time(preview: Preview, level: Level, forms: frozenset[str], camera: Camera) -> gpu.types.GPUBatch | None:
+    """Translucent tetrahedra of a view; how long it takes decides how many the next view has."""
+    most = preview.cache.get("most", _MOST)
+    begin = time.perf_counter()
+    made, number = preview_batches.translucent(preview.levels, level, forms, camera, most)
+    seconds = max(time.perf_counter() - begin, 1e-4)
+    if number >= most // 2:
+        most = int(most * np.clip(_MOMENT / seconds, 0.5, 2.0))
+        preview.cache["most"] = int(np.clip(most, _LEAST, _MOST))
+    return made
+
+
+def _draw_frozen(preview: Preview) -> None:
+    camera = preview.frozen
+    far = _reach(preview, camera)
+    made = _kept(preview, "frozen", (*_place(camera), far), lambda: preview_batches.pyramid(camera, far, _FROZEN))
+    gpu.state.depth_test_set('LESS_EQUAL')
+    made.draw(gpu.shader.from_builtin('SMOOTH_COLOR'))
+
+
+def _reach(preview: Preview, camera: Camera) -> float:
+    """How far a frozen camera's pyramid is drawn: to the farthest that it sees of plants, metres."""
+    if preview.levels is None:
+        return min(camera.far, 100.0)
+
+    def farthest() -> float:
+        level = preview.levels.levels[-1]
+        middles = preview.levels.vertices(level).mean(axis=1)[level.visibility > 0.0]
+        depth = camera.to_camera_space(middles)[:, 2]
+        return float(min(max(depth.max(initial=1.0), 1.0), camera.far))
+
+    return _kept(preview, "reach", (preview.made, *_place(camera)), farthest)
+
+
+def _place(camera: Camera) -> tuple[float, ...]:
+    return (*camera.position.tolist(), *camera.frame.ravel().tolist(), *camera.window)
+
+
+def lines_of(scene: bpy.types.Scene, preview: Preview) -> list[tuple[str, tuple[float, float, float, float]]]:
+    """Lines of the figures in the corner of a viewport, from top to bottom, and their colours."""
+    settings, lines = scene.tetflora.preview, []
+    if preview.levels is not None:
+        level = preview.levels.at(settings.level)
+        figures, last = level.figures, preview.levels.levels[-1].number
+        lines.append((f"Level {level.number} of {last}   {len(level):,} tetrahedra hold plants", _TEXT))
+        parts = (
+            (Decision.EXPLICIT, "explicit", figures.explicit),
+            (Decision.PROXY, "proxies", figures.proxy),
+            (Decision.HIDDEN, "hidden", figures.hidden),
+            (Decision.SPLIT, "to divide", figures.split),
+        )
+        for decision, name, number in parts:
+            colour = (*FORMS[decision], 1.0) if settings.colour == 'FORM' else _TEXT
+            lines.append((f"    {number:,} {name}", colour))
+        lines.append((f"    {figures.polygons:,} polygons in explicit ones", _TEXT))
+        if settings.colour != 'FORM' and settings.wires:
+            lines.append(("    dark: little    bright: much", _TEXT))
+    if preview.shapes is not None:
+        shapes = preview.shapes
+        of = f" of {shapes.of:,}" if shapes.of > shapes.plants else ""
+        lines.append((f"{shapes.plants:,}{of} plants previewed", _TEXT))
+    if preview.frozen is not None:
+        lines.append(("The camera is frozen", _FROZEN))
+    elif preview_state.is_outdated(scene):
+        lines.append(("The camera has changed: compute the levels again, or freeze it", _COMPLAINT))
+    return lines
+
+
+def _draw_figures(scene: bpy.types.Scene, preview: Preview, area: bpy.types.Area) -> None:
+    lines = lines_of(scene, preview)
+    scale = bpy.context.preferences.system.ui_scale
+    left = next((r.width for r in area.regions if r.type == 'TOOLS' and r.alignment == 'LEFT'), 0)
+    step = 18.0 * scale
+    blf.size(0, 12.0 * scale)
+    blf.enable(0, blf.SHADOW)
+    blf.shadow(0, 3, 0.0, 0.0, 0.0, 0.9)
+    for n, (text, colour) in enumerate(reversed(lines)):
+        blf.color(0, *colour)
+        blf.position(0, left + 16.0 * scale, 16.0 * scale + n * step, 0.0)
+        blf.draw(0, text)
+    blf.disable(0, blf.SHADOW)
+
+
+def _guarded(draw: Callable[[bpy.types.Context, Preview], None]) -> None:
+    """Draw what a viewport shows; an error is told once and not at every redraw."""
+    context = bpy.context
+    preview = preview_state.find(context.scene)
+    if preview is None or not context.space_data.overlay.show_overlays:
+        return
+    if preview.cache.get("broken") == preview.made:
+        return
+    try:
+        draw(context, preview)
+    except Exception:
+        preview.cache["broken"] = preview.made
+        print("TetFlora: the preview cannot be drawn; please report this:", file=sys.stderr)
+        traceback.print_exc()
+    finally:
+        gpu.state.blend_set('NONE')
+        gpu.state.depth_mask_set(False)
+        gpu.state.depth_test_set('NONE')
+
+
+def _in_space(context: bpy.types.Context, preview: Preview) -> None:
+    if preview.shapes is not None:
+        _draw_plants(preview)
+    if preview.levels is not None:
+        _draw_levels(preview, context.scene.tetflora.preview, context.space_data)
+    if preview.frozen is not None:
+        _draw_frozen(preview)
+
+
+def _on_screen(context: bpy.types.Context, preview: Preview) -> None:
+    if context.scene.tetflora.preview.statistics:
+        _draw_figures(context.scene, preview, context.area)
+
+
+def register() -> None:
+    """Draw over all 3D viewports from now on; in the background there are none."""
+    if bpy.app.background:
+        return
+    for draw, kind in ((_in_space, 'POST_VIEW'), (_on_screen, 'POST_PIXEL')):
+        _handles.append(bpy.types.SpaceView3D.draw_handler_add(_guarded, (draw,), 'WINDOW', kind))
+
+
+def unregister() -> None:
+    """Draw no more."""
+    while _handles:
+        bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), 'WINDOW')
