@@ -14,7 +14,7 @@ from tests.blender.scenes import part
 MANUAL = (build.ROOT / "docs" / "manual.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("group", ["TetFloraScene", "TetFloraPopulate", "TetFloraMixEntry", "TetFloraLeafObject"])
+@pytest.mark.parametrize("group", ["TetFloraScene", "TetFloraPopulation", "TetFloraMixEntry", "TetFloraLeafObject"])
 def test_every_setting_is_explained(clean_file, group):
     properties = getattr(part("properties"), group).bl_rna.properties
     shown = {p.name for p in properties if not p.is_hidden and p.identifier != "rna_type" and p.name != "Name"}

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import SceneError
 from ..planting.places import Occupied, Placement, place
+from .ground_reader import read_ground
 from .plant_fields import fields_of, read_field
 from .plant_kinds import species_of
 from .plant_objects import plants_of
@@ -19,15 +20,6 @@ from .population_properties import TetFloraPopulation
 from .population_rules import rules_from, unknown_species
 from .species_items import catalogue
 from .transforms import world_matrix
-
-try:
-    from .ground_reader import read_ground
-except ImportError:  # on its way
-    from ..planting.ground import Ground
-    from .surfaces import mesh_triangles
-
-    def read_ground(objects, depsgraph, **_masks):
-        return Ground(np.concatenate([mesh_triangles(o, depsgraph, 'select a mesh with faces') for o in objects]))
 
 
 def grounds_of(scene: bpy.types.Scene, population: TetFloraPopulation) -> list[bpy.types.Object]:

@@ -212,8 +212,9 @@ def _release(objects: Iterable[bpy.types.Object]) -> None:
 
 def _remove(objects: Iterable[bpy.types.Object]) -> None:
     objects = list(objects)
-    remove_fields(fields_of(objects), tidy=False)  # the collection keeps what the artist set for it
-    bpy.data.batch_remove(plants_of(objects))
+    plants, fields = plants_of(objects), fields_of(objects)
+    remove_fields(fields, tidy=False)  # the collection keeps what the artist set for it
+    bpy.data.batch_remove(plants)
 
 
 def _collection(scene: bpy.types.Scene, population: TetFloraPopulation) -> bpy.types.Collection:
