@@ -181,6 +181,11 @@ class _Sowing:
         """Place plants of one species, or of all by their shares, and ``part`` of the number asked for."""
         if self.rules.by_density:
             expected = self.rules.density * self.site.area * part
+            if expected > MOST:
+                raise SceneError(
+                    f"{self.rules.density:.3g} plants for each square metre are {expected:,.0f} on this ground, and "
+                    f"{MOST:,} are the most; lower the density"
+                )
             # What is left of a whole plant comes by chance.
             places = int(expected + uniform(key, Draw.SUITABLE))
             for first in range(0, places, _LARGEST_ROUND):
