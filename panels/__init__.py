@@ -7,6 +7,7 @@ import bpy
 from . import (
     add_menu,
     brush_panel,
+    first_panel,
     lists,
     object_menu,
     output_panel,
@@ -23,6 +24,7 @@ CLASSES = (
     lists.TETFLORA_UL_leaf_objects,
     lists.TETFLORA_UL_field_species,
     lists.TETFLORA_UL_output_species,
+    first_panel.TETFLORA_PT_first,
     plants_panel.TETFLORA_PT_plants,
     plants_panel.TETFLORA_PT_selected_plants,
     species_panel.TETFLORA_MT_species_files,

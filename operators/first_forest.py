@@ -1,0 +1,39 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A small complete forest to begin with."""
+
+import bpy
+from bpy.props import IntProperty
+
+from ..tetflora_addon.blender.first_forest import build
+from . import ids
+from .base import Reporting, in_object_mode
+
+
+class TETFLORA_OT_first_forest(Reporting, bpy.types.Operator):
+    """Make a small complete forest."""
+
+    bl_idname = ids.FIRST_FOREST
+    bl_label = "First Forest"
+    bl_description = (
+        "Make a small complete scene: ground, some ninety plants of four species, camera, sun and sky, ready for "
+        "Refine and F12. Nothing of yours is removed: a scene that is not empty gets a new scene beside it"
+    )
+    bl_options = {'REGISTER', 'UNDO'}
+
+    seed: IntProperty(name="Seed", description="Another seed is another forest", options={'SKIP_SAVE'})
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return in_object_mode(cls, context)
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        scene, said = build(context, self.seed)
+        plants = sum(o.tetflora.is_plant for o in scene.objects)
+        screen = context.screen
+        for area in screen.areas if screen and not bpy.app.background else ():
+            if area.type == 'VIEW_3D':
+                area.spaces.active.region_3d.view_perspective = 'CAMERA'
+        said = f" ({said})" if said else ""
+        self.report({'INFO'}, f"A forest of {plants} plants is planted{said}. Refine shows it, F12 renders it")
+        return {'FINISHED'}

@@ -1,0 +1,29 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""First Forest: where the tab begins as long as the scene has no plants."""
+
+import bpy
+
+from ..operators import ids
+from ..tetflora_addon.blender.scene_reader import has_contents
+from .base import SidebarPanel
+
+_FEW = 200  # objects that are looked through at every movement of the mouse; who has more has begun
+
+
+class TETFLORA_PT_first(SidebarPanel, bpy.types.Panel):
+    """First forest."""
+
+    bl_label = "Begin"
+    bl_order = -1
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return len(context.scene.objects) <= _FEW and not has_contents(context.scene)
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        column = self.layout.column()
+        row = column.row()
+        row.scale_y = 1.6
+        row.operator(ids.FIRST_FOREST, icon='WORLD')
+        column.label(text="Then Refine below, then F12")
