@@ -31,6 +31,9 @@ class TETFLORA_MT_populations(bpy.types.Menu):
         layout = self.layout
         layout.operator(ids.SELECT_POPULATION, icon='RESTRICT_SELECT_OFF')
         layout.operator(ids.REMOVE_POPULATION, text="Remove, and Keep Plants", icon='REMOVE').keep_plants = True
+        layout.separator()
+        layout.operator(ids.IMPORT_POPULATIONS, text="Import...", icon='IMPORT')
+        layout.operator(ids.EXPORT_POPULATIONS, text="Export...", icon='EXPORT')
 
 
 class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
