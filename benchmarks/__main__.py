@@ -30,6 +30,7 @@ NAMES = (
     "foreign",
     "closed_form",
     "fidelity",
+    "populate",
     "viewport",
 )
 

@@ -29,7 +29,7 @@ _LARGEST_ROUND = 2_000_000
 _MOST_DRAWN = 16_000_000  # and a few dozen for each plant; what is rarer than that takes too long
 _RAREST = 1.0 / 256.0  # share of suitable places that a round counts on at least
 _HOPELESS = 1_000_000  # places without a suitable one
-_FULL = 5_000  # places of which not one is far enough from others: the ground is full
+_FULL = 5_000  # suitable places of which not one can be taken: the ground is full
 _SPECIES = 2**32  # keys of species that are placed one after the other, away from those of plants
 
 
@@ -208,7 +208,7 @@ class _Sowing:
             came, stayed = self._admit(sample, species, missing)
             beside += came
             kept += stayed
-            full = came >= _FULL and stayed * _FULL < came
+            full = len(sample.key) >= _FULL and stayed * _FULL < len(sample.key)
             hopeless = not suitable and drawn >= _HOPELESS
             if kept >= wanted or full or hopeless or drawn > _MOST_DRAWN + 48 * wanted:
                 break

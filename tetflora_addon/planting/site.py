@@ -17,6 +17,7 @@ from .ground import Ground, border_of, sampled
 from .noise import clumps
 from .regions import Lines, inside_any
 from .rules import Rules
+from .spacing import NO_DISTANCE
 
 CHUNK = 131_072  # places looked at together: what fits into a cache
 _CLUMPS = 2**33  # the key of clumps, away from those of plants
@@ -124,11 +125,11 @@ class Site:
         if not self.cumulative[-1] > 0.0:
             raise SceneError("The suitable ground has no area on the map; take ground that does not stand upright")
         self.border = self.paths = None
-        if rules.edge_falloff > 0.0:
+        if rules.edge_falloff > NO_DISTANCE:
             border = (border_of(ground.triangles) if ground.border is None else ground.border)[..., :2]
             if len(border):
                 self.border = Lines(border[:, 0], border[:, 1], np.full(len(border), float(rules.edge_falloff)))
-        kept_free = [p for p in ground.paths if p.half_width > 0.0 and len(p.points)]
+        kept_free = [p for p in ground.paths if p.half_width > NO_DISTANCE and len(p.points)]
         if kept_free:
             # A line of one point is a place of its own.
             ends = [np.repeat(p.points, 2, axis=0) if len(p.points) == 1 else p.points for p in kept_free]
@@ -210,7 +211,7 @@ def _mean(corners: NDArray[np.float64], shares: NDArray[np.float64]) -> NDArray[
 def _between(z: NDArray[np.float64], low: float, high: float, falloff: float) -> NDArray[np.float64]:
     """1 well between the limits, 0 beyond them, linear over the falloff inside of each."""
     inside = ((z >= low) & (z <= high)).astype(np.float64)
-    if falloff > 0.0:
+    if falloff > NO_DISTANCE:
         inside *= np.clip(np.minimum(z - low, high - z) / falloff, 0.0, 1.0)
     return inside
 
