@@ -96,15 +96,16 @@ def render_landscape(path: Path, width: int = 960, samples: int = 64) -> None:
 def plant(scene: bpy.types.Scene, surface: bpy.types.Object, plants: int) -> bpy.types.Object:
     """Scatter plants over a surface, as one object of points."""
     part = session.part
-    placement, surfaces = part("tetflora_addon.blender.placement"), part("tetflora_addon.blender.surfaces")
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    found = placement.place(
-        surfaces.mesh_triangles(surface, depsgraph, "the ground has faces"),
+    rules = part("tetflora_addon.planting.rules").Rules(
         count=plants,
         seed=7,
-        slope_limit=np.radians(60.0),
+        slope_max=np.radians(60.0),
         min_distance=0.9,
-        scale_range=(0.8, 1.35),
+        scale_min=0.8,
+        scale_max=1.35,
         shares=tuple(SPECIES.values()),
     )
+    ground = part("tetflora_addon.blender.ground_reader").read_ground([surface], depsgraph)
+    found = part("tetflora_addon.planting.places").place(ground, rules)
     return part("tetflora_addon.blender.plant_objects").add_field(scene, found, tuple(SPECIES))

@@ -11,7 +11,6 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from ..tetflora_addon.blender.ground_cursor import circle
-from ..tetflora_addon.blender.placement import Placement, new_seeds
 from ..tetflora_addon.blender.plant_objects import add_plants, plants_of
 from ..tetflora_addon.blender.species_items import (
     NO_SPECIES,
@@ -21,6 +20,7 @@ from ..tetflora_addon.blender.species_items import (
     operator_items,
 )
 from ..tetflora_addon.errors import TetFloraError
+from ..tetflora_addon.planting.places import Placement, new_seeds
 from . import ids
 from .base import select_only
 from .ground_tool import NAVIGATION, GroundTool, redraw

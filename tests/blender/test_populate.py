@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from devtools import session
 from tests.blender.scenes import add_mesh, add_plant, errors, part, select
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -27,7 +28,13 @@ def _hills(seed: int, n: int = 12) -> np.ndarray:
 
 def _place(triangles=SQUARE, **changes):
     options = dict(count=50, seed=1, slope_limit=1.0, min_distance=0.0, scale_range=(0.5, 2.0))
-    return part("placement").place(triangles, **{**options, **changes})
+    given = {**options, **changes}
+    low, high = given.pop("scale_range")
+    occupied = given.pop("occupied", None)
+    planting = {name: session.part(f"tetflora_addon.planting.{name}") for name in ("ground", "places", "rules")}
+    rules = planting["rules"].Rules(slope_max=given.pop("slope_limit"), scale_min=low, scale_max=high, **given)
+    older = None if occupied is None else planting["places"].Occupied(occupied)
+    return planting["places"].place(planting["ground"].Ground(triangles), rules, older)
 
 
 def _distances(points: np.ndarray) -> np.ndarray:

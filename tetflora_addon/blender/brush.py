@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from ..planting import strokes
+from ..planting.places import Placement
 from ..planting.strokes import Brush
 from .brush_properties import MOST_PAINTED_EMPTIES
 from .field_edits import add_points, editable, take_points
 from .ground import Ground
-from .placement import Placement
 from .plant_fields import fields_of, read_field
 from .plant_objects import add_field, add_plants, plants_of
 from .species_items import default_species

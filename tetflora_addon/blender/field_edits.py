@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from .placement import new_seeds
+from ..planting.places import new_seeds
 from .plant_fields import field_kinds, quaternions
 from .plant_kinds import kind_of_choice
 

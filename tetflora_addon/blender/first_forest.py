@@ -16,10 +16,10 @@ import numpy as np
 from mathutils import Vector
 from numpy.typing import NDArray
 
+from ..planting.places import Placement
 from ..planting.strokes import admitted
 from ..plants.hashing import child_key, key_of_seed, uniform
 from .first_materials import meadow, sky
-from .placement import Placement
 from .plant_objects import add_plants
 from .species_items import catalogue, default_species
 
