@@ -27,11 +27,12 @@ class TETFLORA_OT_refine(Reporting, bpy.types.Operator):
     bl_label = "Refine"
     bl_description = (
         "Make meshes of the plants near the scene's camera and proxies of the others, in place of earlier ones. "
-        "Esc cancels and leaves the scene as it was"
+        "Esc cancels and leaves the scene as it was; Return stops refining and makes what has been decided so far"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
-    _steps: Generator[job.Progress, None, Statistics] | None = None
+    _steps: Generator[job.Progress, bool | None, Statistics] | None = None
+    _enough = False
     _timer: bpy.types.Timer | None = None
 
     @classmethod
@@ -75,14 +76,16 @@ class TETFLORA_OT_refine(Reporting, bpy.types.Operator):
             self.cancel(context)
             self.report({'INFO'}, "Cancelled; the scene is as it was")
             return {'CANCELLED'}
+        if event.type in {'RET', 'NUMPAD_ENTER'} and event.value == 'PRESS':
+            self._enough = True
         if event.type != 'TIMER':
             # Everything else waits: the scene must not change under the job.
             return {'RUNNING_MODAL'}
         end = time.monotonic() + _SLICE
         try:
-            progress = next(self._steps)
+            progress = self._next()
             while time.monotonic() < end:
-                progress = next(self._steps)
+                progress = self._next()
         except StopIteration as stop:
             self._leave(context)
             return self._finish(context, stop.value)
@@ -96,6 +99,10 @@ class TETFLORA_OT_refine(Reporting, bpy.types.Operator):
         self._show(context, progress)
         return {'RUNNING_MODAL'}
 
+    def _next(self) -> job.Progress:
+        enough, self._enough = self._enough, False
+        return self._steps.send(enough)
+
     def cancel(self, context: bpy.types.Context) -> None:
         """Esc, or Blender ends the operator: what was half made goes."""
         if self._steps is not None:
@@ -104,7 +111,8 @@ class TETFLORA_OT_refine(Reporting, bpy.types.Operator):
 
     def _show(self, context: bpy.types.Context, progress: job.Progress) -> None:
         context.window_manager.progress_update(progress.fraction)
-        context.workspace.status_text_set(f"TetFlora {progress.fraction:4.0%}   {progress.message}   |   Esc: cancel")
+        keys = "Esc: cancel   |   Return: stop refining, keep what there is"
+        context.workspace.status_text_set(f"TetFlora {progress.fraction:4.0%}   {progress.message}   |   {keys}")
 
     def _leave(self, context: bpy.types.Context) -> None:
         self._steps = None
@@ -123,6 +131,8 @@ class TETFLORA_OT_refine(Reporting, bpy.types.Operator):
             f"{counted(statistics.plants, 'plant')}: {statistics.polygons_meshed:,} of {statistics.polygons_full:,} "
             f"polygons, {statistics.tetrahedra_proxy:,} proxies in {sum(statistics.seconds.values()):.1f} s",
         )
+        if not statistics.complete and statistics.levels:
+            self.report({'INFO'}, "Stopped before all was refined; Refine again for the rest")
         for warning in (_cut_off(context.scene), few_bounces(context.scene), _unread_world(context.scene)):
             if warning:
                 self.report({'WARNING'}, warning)

@@ -36,7 +36,7 @@ class _Stub:
     def __init__(self):
         self.cameras, self.plants, self.error = [], [], None
 
-    def __call__(self, scene, depsgraph, *, view_layer=None, for_render=False):
+    def __call__(self, scene, depsgraph, *, view_layer=None, for_render=False, beside=()):
         import bpy
 
         assert for_render

@@ -242,3 +242,24 @@ def test_the_refined_picture_is_that_of_the_plants(form, bound):
     refined = blocks()
     assert np.ptp(truth) > 0.2  # the plants are seen at all
     assert np.sqrt(((refined - truth) ** 2).mean()) < bound
+
+
+def test_a_job_that_is_told_to_stop_refining_makes_what_it_has():
+    import bpy
+
+    scene = _forest()
+    scene.tetflora.cutoff = 0.5
+    steps = part("job").refine_steps(scene, bpy.context.evaluated_depsgraph_get())
+    while not (progress := next(steps)).message.startswith("Refining"):
+        pass
+    with pytest.raises(StopIteration) as stop:
+        progress = steps.send(True)
+        while True:
+            assert not progress.message.startswith("Refining")
+            progress = next(steps)
+    statistics = stop.value.value
+    assert not statistics.complete
+    assert part("job").has_results(scene)
+    whole = _refine(scene)
+    assert whole.complete
+    assert whole.levels > statistics.levels

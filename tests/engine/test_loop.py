@@ -272,3 +272,24 @@ def test_mean_extinction() -> None:
     volumes = volume(result.tree.vertices(result.nodes))
     expected = (amounts.leaf_area / 2 + amounts.wood_area / 4) / volumes
     np.testing.assert_allclose(mean_extinction(amounts, volumes), expected)
+
+
+def test_a_loop_that_is_told_to_stop_returns_what_it_has() -> None:
+    """Everything is decided, nothing is left to divide, and all plants are still there."""
+    flora = support.small_flora()
+    camera = support.camera((0, -30, 6), (0, 0, 1.5), pixels=128, view=0.4)
+    seeds = support.grove(9, 2.5)
+    steps = refine(flora, seeds, camera, RefinementSettings(cutoff=1.0))
+    next(steps)
+    state = next(steps)
+    assert (state.decision == Decision.SPLIT).any()
+    with pytest.raises(StopIteration) as stop:
+        steps.send(True)
+    result = stop.value.value
+    assert not result.complete
+    assert not (result.decision == Decision.SPLIT).any()
+    assert result.passes == state.passes
+    held = np.flatnonzero(result.contents.sums(len(result.tree)).area > 0)
+    assert set(held) == set(result.nodes)
+    whole = Contents.of_plants(flora, seeds).sums(1)
+    assert result.contents.sums(len(result.tree)).leaf_area.sum() == pytest.approx(whole.leaf_area.sum(), rel=0.1)

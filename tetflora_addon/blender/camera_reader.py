@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from ..refinement.camera import Camera
+from .stereo import stereo_views
 from .transforms import frames_of, world_matrix
 
 #: Paths of animation that place an object, and how many values each has.
@@ -24,12 +25,17 @@ _CHANNELS = {
 }
 
 
-def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Camera:
+def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, region_only: bool = False) -> Camera:
     """The active camera as it is evaluated now.
 
     ``camera.view_frame`` already knows about lens shift, sensor fit and pixel aspect. A scaled or sheared camera is
     taken without scale and shear, as renderers do. Panoramas other than equirectangular ones count as pictures of the
-    whole sphere with as many pixels for an angle.
+    whole sphere with as many pixels for an angle. Stereo counts as movement: the view is as wide as both eyes need.
+
+    Parameters
+    ----------
+    region_only : bool
+        Of the render region, where there is one, and not of the whole picture. Panoramas are taken as a whole.
 
     Raises
     ------
@@ -64,6 +70,8 @@ def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Camer
         picture = corners[:, :2] / -corners[:, 2:] if data.type == 'PERSP' else corners[:, :2]
         (left, bottom), (right, top) = picture.min(axis=0).tolist(), picture.max(axis=0).tolist()
         window = (left, right, bottom, top)
+        if region_only and scene.render.use_border:
+            window, width, height = _region(scene.render, window, width, height)
     matrix = world_matrix(scene.camera, depsgraph).astype(np.float64)  # some versions give single precision
     radius, focus = _lens(data, matrix, depsgraph)
     camera = _placed(
@@ -83,7 +91,23 @@ def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Camer
     )
     if camera is None:
         raise SceneError(f'The camera "{name}" has scale 0 or no valid position; press Alt S and Alt G on it')
-    return replace(camera, shutter=_while_open(scene, camera, window, matrix))
+    others = (*_while_open(scene, camera, window, matrix), *stereo_views(scene, camera, depsgraph))
+    return replace(camera, shutter=others)
+
+
+def _region(
+    render: bpy.types.RenderSettings, window: tuple[float, float, float, float], width: int, height: int
+) -> tuple[tuple[float, float, float, float], int, int]:
+    """The window of the render region, in whole pixels, and its size."""
+    first_x, last_x = math.floor(render.border_min_x * width), math.ceil(render.border_max_x * width)
+    first_y, last_y = math.floor(render.border_min_y * height), math.ceil(render.border_max_y * height)
+    if not (0 <= first_x < last_x <= width and 0 <= first_y < last_y <= height):
+        return window, width, height  # Blender renders all of it then
+    left, right, bottom, top = window
+    step_x, step_y = (right - left) / width, (top - bottom) / height
+    across = left + first_x * step_x, left + last_x * step_x
+    up = bottom + first_y * step_y, bottom + last_y * step_y
+    return (*across, *up), last_x - first_x, last_y - first_y
 
 
 def _placed(

@@ -154,7 +154,9 @@ def has_results(scene: bpy.types.Scene) -> bool:
     return bool(result_collections(scene, 'VIEW'))
 
 
-def remove_results(scene: bpy.types.Scene, purpose: str | None = None, keep: bpy.types.Collection | None = None) -> int:
+def remove_results(
+    scene: bpy.types.Scene, purpose: str | None = None, keep: Sequence[bpy.types.Collection] = ()
+) -> int:
     """Remove result collections with what was made for them; returns the number of datablocks removed.
 
     What was hidden for their sake is shown again as it was.
@@ -162,7 +164,7 @@ def remove_results(scene: bpy.types.Scene, purpose: str | None = None, keep: bpy
     for which in ('RENDER', 'VIEW'):
         if purpose in {None, which}:
             _show_originals(scene, which)
-    return sum(_remove_collection(scene, c) for c in result_collections(scene, purpose) if c != keep)
+    return sum(_remove_collection(scene, c) for c in result_collections(scene, purpose) if c not in keep)
 
 
 def hidden_originals(scene: bpy.types.Scene, purpose: str | None = None) -> list[bpy.types.Object]:

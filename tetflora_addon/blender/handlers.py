@@ -32,8 +32,9 @@ from .emit import (
 )
 from .migration import migrate
 from .output import release_materials
-from .scene_reader import NoPlantsError, has_contents, may_take_part, renderable_objects
+from .scene_reader import NoPlantsError, has_contents
 from .shell_bounces import raise_bounces
+from .view_layers import show_in, view_layer_groups
 
 
 @dataclass
@@ -139,8 +140,18 @@ def _make(scene: bpy.types.Scene) -> None:
     """Refine for the frame that is about to be rendered, and hide results that the artist made for another view."""
     # Also where nothing is animated: it is what the renderer does next, and the only way to a depsgraph of this frame.
     scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
-    layer = _view_layer(scene)
-    job.refine(scene, layer.depsgraph, view_layer=layer, for_render=True)
+    made: list[bpy.types.Collection] = []
+    for layers in view_layer_groups(scene):
+        layer = layers[0]
+        layer.update()  # going to the frame brings only the active layer's depsgraph up to date, if others have any
+        job.refine(scene, layer.depsgraph, view_layer=layer, for_render=True, beside=made)
+        new = [c for c in result_collections(scene, 'RENDER') if c not in made]
+        show_in(scene, new, layers)
+        made += new
+    if len(scene.view_layers) > 1:
+        # Without, Blender crashes when it renders a layer that is not the window's and objects are new in it.
+        for layer in scene.view_layers:
+            layer.update()
     _rendering.bounces = raise_bounces(scene)
     # Hidden only now: if refinement failed, yesterday's trees are better than none.
     _rendering.hidden = [c.name for c in result_collections(scene, 'VIEW') if not c.hide_render]
@@ -164,15 +175,6 @@ def _show_hidden() -> None:
 
 def _named(names: list[str]) -> list[bpy.types.Collection]:
     return [found for name in names if (found := bpy.data.collections.get((name, None))) is not None]
-
-
-def _view_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
-    """The first rendered view layer with something to refine; one refinement has to serve all layers."""
-    layers = [layer for layer in scene.view_layers if layer.use] or list(scene.view_layers)
-    for layer in layers:
-        if any(may_take_part(obj) for obj in renderable_objects(layer)):
-            return layer
-    return layers[0]
 
 
 def _complain(scene: bpy.types.Scene, message: str) -> None:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
 import bpy
@@ -140,10 +140,12 @@ def refine_steps(
     *,
     view_layer: bpy.types.ViewLayer | None = None,
     for_render: bool = False,
-) -> Generator[Progress, None, Statistics]:
+    beside: Sequence[bpy.types.Collection] = (),
+) -> Generator[Progress, bool | None, Statistics]:
     """Refine a scene step by step.
 
     Closing the generator, or an error, leaves the scene as it was. Earlier results are replaced when all is done.
+    Sending it True while it refines makes it go on with what there is; the statistics say that it is not complete.
 
     Parameters
     ----------
@@ -153,7 +155,9 @@ def refine_steps(
     view_layer : bpy.types.ViewLayer, optional
         Whose plants count; by default the dependency graph's.
     for_render : bool
-        Results live beside those of the artist, in a collection of their own.
+        Results live beside those of the artist, in a collection of their own, and are refined for the render region.
+    beside : sequence of bpy.types.Collection
+        Earlier results that stay: those of other view layers.
 
     Raises
     ------
@@ -162,7 +166,7 @@ def refine_steps(
     """
     clock = Stopwatch()
     yield Progress(0.0, "Reading the scene")
-    camera = read_camera(scene, depsgraph)
+    camera = read_camera(scene, depsgraph, region_only=for_render)
     given = _read(scene, depsgraph, view_layer or depsgraph.view_layer)
     settings = _settings(scene)
     clock.lap("read")
@@ -212,7 +216,7 @@ def refine_steps(
     except BaseException:  # an error, Esc (GeneratorExit) or Ctrl+C: nothing of ours may stay behind
         results.discard()
         raise
-    remove_results(scene, results.purpose, keep=results.collection)
+    remove_results(scene, results.purpose, keep=(results.collection, *beside))
     release_materials()
     results.hide(originals)
     results.finish()
@@ -276,13 +280,13 @@ def _settings(scene: bpy.types.Scene) -> RefinementSettings:
 
 def _run_loop(
     flora: Flora, given: _Given, camera: Camera, settings: RefinementSettings, statistics: Statistics
-) -> Generator[Progress, None, Refinement]:
+) -> Generator[Progress, bool | None, Refinement]:
     """Refine; the statistics get a step for each pass."""
     loop = refine_loop(flora, given.seeds, camera, settings, given.occluders, given.polygons, given.lights)
-    fraction = 0.05
+    fraction, enough = 0.05, None
     while True:
         try:
-            state, last = next(loop), False
+            state, last = loop.send(enough), False
         except StopIteration as stop:
             state, last = stop.value, True
         statistics.steps.append(step_of(state))
@@ -290,7 +294,7 @@ def _run_loop(
             return state
         waiting = int((state.decision == Decision.SPLIT).sum())
         fraction += 0.15 * (_LOOP_SHARE - fraction)  # nobody knows how many passes will follow
-        yield Progress(
+        enough = yield Progress(
             fraction, f"Refining, pass {state.passes}: {state.tree.tetrahedra_made:,} tetrahedra, {waiting:,} to divide"
         )
 

@@ -8,7 +8,7 @@ A pass costs what it changes: only divided tetrahedra give their contents away, 
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,8 +115,10 @@ def refine(
     occluders: NDArray[np.float64] | None = None,
     polygons: Polygons | None = None,
     lights: Sequence[Light] = (),
-) -> Generator[Refinement, None, Refinement]:
+) -> Generator[Refinement, bool | None, Refinement]:
     """Run the loop; yields the state after the decisions of each pass and returns the last.
+
+    Sending it True ends it there: what was to be divided is taken as it is, and the result is not complete.
 
     Parameters
     ----------
@@ -172,8 +174,8 @@ def refine(
         last = passes == settings.max_passes
         barred = splitting & (full | last | (tree.level[cells.nodes] >= deepest))
         limited = bool(barred.any())
+        instead = Decision.HIDDEN if by_shadow else without_splits(decision, cells, transmittance, settings)
         if limited:
-            instead = Decision.HIDDEN if by_shadow else without_splits(decision, cells, transmittance, settings)
             decision = np.where(barred, instead, decision).astype(np.int8)
             splitting &= ~barred
         clock.lap("refinement")
@@ -190,7 +192,9 @@ def refine(
         )
         if not splitting.any():
             return state
-        yield state
+        if (yield state):
+            as_it_is = np.where(splitting, instead, decision).astype(np.int8)
+            return replace(state, decision=as_it_is, complete=False)
         dividing = np.zeros(len(tree), bool)
         dividing[cells.nodes[splitting]] = True
         shares = np.where(by_shadow, ALWAYS, transmittance * cells.opacity)[splitting]
