@@ -55,9 +55,11 @@ def run(quick: bool) -> dict[str, float]:
     seen = result["values"]
     panels = seen["panels_ms"]
     slowest = max(panels, key=panels.get)
-    print(f"slowest panel: {slowest}", file=sys.stderr)
+    for name, spent in sorted(panels.items(), key=lambda item: -item[1]):
+        print(f"  {name:32s} {spent:8.3f} ms", file=sys.stderr)
     return {
         "plants": seen["plants"],
+        "nothing_ms": 1e3 * seen["nothing_s"],
         "empties_ms": 1e3 * seen["empties_s"],
         "with_empties_ms": 1e3 * seen["both_s"],
         "plants_alone_ms": 1e3 * seen["plants_alone_s"],

@@ -186,6 +186,27 @@ def test_figures_say_what_is_shown():
     assert {colour for _, colour in overlay.lines_of(scene, preview)} < colours
 
 
+def test_undo_keeps_levels_and_lets_go_of_what_was_frozen():
+    import bpy
+
+    scene, _, _ = scene_of_plants()
+    levels = compute().levels
+    bpy.ops.ed.undo_push(message="before")
+    scene.tetflora.preview.plants = 'LIGHT'
+    part("preview_job").read_shapes(scene, depsgraph())
+    scene.tetflora.preview.freeze = True
+    bpy.ops.ed.undo_push(message="frozen")
+    bpy.ops.ed.undo()
+    scene = bpy.context.scene
+    state().bring_in_step(scene)  # as the handler does where there is a window
+    preview = state().find(scene)
+    assert preview.levels is levels
+    assert (preview.frozen, preview.shapes) == (None, None)
+    bpy.ops.ed.redo()
+    state().bring_in_step(bpy.context.scene)
+    assert preview.frozen is levels.camera
+
+
 def test_settings_survive_the_file_and_what_is_shown_does_not(tmp_path):
     import bpy
 

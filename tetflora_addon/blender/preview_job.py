@@ -159,8 +159,7 @@ def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
 @persistent
 def _on_undo(scene: bpy.types.Scene, _other: object = None) -> None:
-    if scene.tetflora.preview.plants != 'NONE':
-        schedule()
+    preview_state.bring_in_step(scene)
 
 
 @persistent

@@ -57,7 +57,9 @@ def _draw_plants(preview: Preview) -> None:
         return
     gpu.state.depth_test_set('LESS_EQUAL')
     gpu.state.depth_mask_set(True)
+    gpu.state.face_culling_set('BACK')  # crowns and trunks are closed
     made.draw(gpu.shader.from_builtin('SMOOTH_COLOR'))
+    gpu.state.face_culling_set('NONE')
     gpu.state.depth_mask_set(False)
 
 
@@ -190,6 +192,7 @@ def _guarded(draw: Callable[[bpy.types.Context, Preview], None]) -> None:
         traceback.print_exc()
     finally:
         gpu.state.blend_set('NONE')
+        gpu.state.face_culling_set('NONE')
         gpu.state.depth_mask_set(False)
         gpu.state.depth_test_set('NONE')
 

@@ -119,6 +119,18 @@ def freeze(scene: bpy.types.Scene, on: bool, depsgraph: Callable[[], bpy.types.D
     redraw()
 
 
+def bring_in_step(scene: bpy.types.Scene) -> None:
+    """After undo, which changes settings without a word: what is frozen, and shown of plants, follows them."""
+    preview, settings = find(scene), scene.tetflora.preview
+    if preview is not None:
+        if not settings.freeze:
+            preview.frozen = None
+        elif preview.frozen is None and preview.levels is not None:
+            preview.frozen = preview.levels.camera
+    if preview is not None or settings.plants != 'NONE':
+        plants_wanted(scene)
+
+
 def plants_wanted(scene: bpy.types.Scene) -> None:
     """The form of plants was chosen: show them soon, or take them away at once."""
     if scene.tetflora.preview.plants == 'NONE':
