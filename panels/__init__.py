@@ -10,6 +10,7 @@ from . import (
     first_panel,
     lists,
     object_menu,
+    pie_menu,
     output_panel,
     plants_panel,
     populate_panel,
@@ -45,8 +46,10 @@ CLASSES = (
     statistics_panel.TETFLORA_PT_statistics,
     statistics_panel.TETFLORA_PT_steps,
     add_menu.TETFLORA_MT_add_plant,
+    add_menu.TETFLORA_MT_place_plant,
     plants_panel.TETFLORA_MT_species,
     object_menu.TETFLORA_MT_object,
+    pie_menu.TETFLORA_MT_pie,
 )
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Add > TetFlora Plant: one entry for each species of the catalogue."""
+"""Add > TetFlora Plant, > Place Plants by Clicking, with an entry for each species, and > First Forest."""
 
 import bpy
 
@@ -23,7 +23,22 @@ class TETFLORA_MT_add_plant(bpy.types.Menu):
             self.layout.label(text="The catalogue has no species", icon='ERROR')
 
 
+class TETFLORA_MT_place_plant(bpy.types.Menu):
+    """Species to set by clicking on the ground."""
+
+    bl_label = "Place Plants by Clicking"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        # Buttons of a menu are executed by default, and this tool needs the mouse.
+        self.layout.operator_context = 'INVOKE_DEFAULT'
+        for info in catalogue().values():
+            icon = picture(info.identifier)
+            self.layout.operator(ids.PLACE_PLANT, text=info.name, **icon).species = info.identifier
+
+
 def draw_in_add_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     """The entry in Blender's Add menu."""
     menu.layout.separator()
+    menu.layout.operator(ids.FIRST_FOREST, icon='WORLD')
+    menu.layout.menu(TETFLORA_MT_place_plant.__name__, icon='RESTRICT_SELECT_OFF')
     menu.layout.menu(TETFLORA_MT_add_plant.__name__, icon='OUTLINER_OB_FORCE_FIELD')

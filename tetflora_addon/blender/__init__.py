@@ -6,6 +6,7 @@ from . import (
     asset_library,
     command_line,
     handlers,
+    keymaps,
     point_preview,
     preferences,
     preview_job,
@@ -13,6 +14,7 @@ from . import (
     properties,
     species_preview,
     thumbnails,
+    translations,
 )
 
 # Handlers and commands read properties, so those come first.
@@ -27,6 +29,8 @@ _PARTS = (
     point_preview,
     asset_library,
     command_line,
+    keymaps,
+    translations,
 )
 
 

@@ -63,9 +63,9 @@ class Layer:
 
 LAYERS = (
     Layer("birch", 24, 3.2, 8.0, 62.0, 1.2, 0.8, 1.15),
-    Layer("spruce", 16, 3.6, 17.0, 85.0, 3.2, 0.65, 1.15),
+    Layer("spruce", 22, 3.6, 20.0, 104.0, 3.2, 0.65, 1.15),
     Layer("rowan", 8, 2.2, 7.0, 32.0, 0.9, 0.55, 0.9),
-    Layer("fern", 46, 0.7, 2.6, 16.0, 0.1, 0.8, 1.5),
+    Layer("fern", 42, 0.7, 2.6, 16.0, 0.1, 0.8, 1.5),
 )
 
 
@@ -224,4 +224,4 @@ def _settings(scene: bpy.types.Scene) -> None:
         scene.cycles.use_adaptive_sampling, scene.cycles.adaptive_threshold = True, 0.1
         scene.cycles.max_bounces = 4
     render.resolution_x, render.resolution_y, render.resolution_percentage = 1280, 720, 50
-    scene.view_settings.exposure = 0.6
+    scene.view_settings.exposure = 0.9

@@ -11,6 +11,7 @@ from mathutils import Matrix, Quaternion
 
 from ..errors import SceneError
 from ..planting.places import Placement, new_seeds
+from . import new_scenes
 from .migration import VERSION
 from .plant_fields import fields_of, quaternions, read_field, stored_size, write_field
 from .plant_kinds import form_of, species_of
@@ -43,6 +44,7 @@ def plant_collection(scene: bpy.types.Scene) -> bpy.types.Collection:
             return collection
     collection = bpy.data.collections.new(COLLECTION)
     collection[_MARK] = True
+    new_scenes.begin(scene)
     scene.collection.children.link(collection)
     return collection
 

@@ -1,13 +1,14 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The add-on's preferences: where the user's own species are."""
+"""The add-on's preferences: where the user's own species are, what new scenes begin with, and the keys."""
 
 from pathlib import Path
 
 import bpy
-from bpy.props import StringProperty
+from bpy.props import EnumProperty, FloatProperty, StringProperty
 
 from ..errors import SpeciesError
+from . import keymaps
 
 # Blender files preferences under the name of the extension's root package, two levels above this one. Only the name
 # is needed; nothing in tetflora_addon imports what lies above it.
@@ -29,14 +30,56 @@ class TetFloraPreferences(bpy.types.AddonPreferences):
         subtype='DIR_PATH',
         default="",
     )
+    new_quality: EnumProperty(
+        name="Quality of New Scenes",
+        description="Quality of refinement that a scene gets with its first plant; the Refinement panel changes it",
+        items=(
+            ('DRAFT', "Draft", "Seconds, for placing plants; some 30 times fewer polygons than Final"),
+            ('PREVIEW', "Preview", "For judging light and colours"),
+            ('FINAL', "Final", "For the picture: what is left out cannot be seen"),
+        ),
+        default='FINAL',
+    )
+    new_memory: FloatProperty(
+        name="Memory of New Scenes",
+        description=(
+            "Gigabytes that refined plants may take in a scene that is new, in Blender and the renderer together: its "
+            "Most Memory. 0 for no limit; with one, plants become coarser where they would not fit"
+        ),
+        default=0.0,
+        min=0.0,
+        soft_max=64.0,
+        precision=1,
+    )
 
-    def draw(self, _context: bpy.types.Context) -> None:
+    def draw(self, context: bpy.types.Context) -> None:
         """The page in Preferences > Add-ons."""
         layout = self.layout
         layout.use_property_split = True
         layout.prop(self, "species_folder")
         if self.species_folder and not species_folders():
             layout.label(text="This folder does not exist", icon='ERROR')
+        layout.prop(self, "new_quality")
+        layout.prop(self, "new_memory")
+        _draw_keys(layout, context)
+
+
+def _draw_keys(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Our keys as in Preferences > Keymap, to be changed here."""
+    import rna_keymap_ui  # Blender's own; only there while its interface is
+
+    column = layout.column()
+    column.label(text=f"Keys in {keymaps.KEYMAP}")
+    config = context.window_manager.keyconfigs.user
+    for keymap, item in keymaps.items():
+        column.context_pointer_set("keymap", keymap)
+        rna_keymap_ui.draw_kmi([], config, keymap, item, column, 0)
+
+
+def preferences() -> TetFloraPreferences | None:
+    """The user's preferences; None outside of an extension."""
+    addon = bpy.context.preferences.addons.get(ROOT_PACKAGE)
+    return None if addon is None else addon.preferences
 
 
 def species_folders() -> tuple[Path, ...]:

@@ -1,0 +1,145 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Keys that are free in Blender's own keymap, names that search finds, texts that translations really meet."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from pathlib import Path
+
+import pytest
+
+from devtools import build, session
+from tests.blender.scenes import part
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+# Keymaps that hear keys over a 3D view in Object Mode.
+HEARD = {
+    "Object Mode",
+    "Object Non-modal",
+    "3D View",
+    "3D View Generic",
+    "Window",
+    "Screen",
+    "Screen Editing",
+    "Frames",
+}
+# Operators that need an argument, so that they stand in menus under other names or once for each argument.
+BY_ARGUMENT = {"tetflora.edit_list", "tetflora.edit_orders"}
+
+
+def _ids():
+    ids = session.part("operators.ids")
+    return {name: value for name, value in vars(ids).items() if name.isupper()}
+
+
+def _default_keys():
+    """Blender's own keys as its preset makes them: (keymap, key, ctrl, alt, shift)."""
+    import bpy
+
+    path = Path(bpy.utils.system_resource('SCRIPTS')) / "presets/keyconfig/keymap_data/blender_default.py"
+    spec = importlib.util.spec_from_file_location("blender_default", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    for name, _, content in module.generate_keymaps(module.Params()):
+        for _, event, _ in content["items"]:
+            yield name, event["type"], *(bool(event.get(m)) or bool(event.get("any")) for m in ("ctrl", "alt", "shift"))
+
+
+def test_keys_are_free_in_blenders_own_keymap():
+    taken = {tuple(key[1:]) for key in _default_keys() if key[0] in HEARD}
+    assert len(taken) > 100
+    keys = part("keymaps").KEYS
+    assert 1 <= len(keys) <= 4
+    assert not [key for key in keys if (key.key, key.ctrl, key.alt, key.shift) in taken]
+
+
+def test_keys_are_registered_once_and_open_what_is_there():
+    import bpy
+
+    keymaps = part("keymaps")
+    config = bpy.context.window_manager.keyconfigs.addon
+    ours = [
+        item
+        for item in config.keymaps[keymaps.KEYMAP].keymap_items
+        if item.idname.startswith("tetflora.") or getattr(item.properties, "name", "").startswith("TETFLORA_")
+    ]
+    assert len(ours) == len(keymaps.KEYS)
+    assert hasattr(bpy.types, keymaps.PIE)
+    known = set(_ids().values()) | {"wm.call_menu_pie"}
+    assert {key.operator for key in keymaps.KEYS} <= known
+
+
+def test_every_operator_is_registered_and_named():
+    import bpy
+
+    names = {}
+    for identifier in _ids().values():
+        group, name = identifier.split(".")
+        rna = getattr(getattr(bpy.ops, group), name).get_rna_type()
+        assert rna.name, identifier
+        assert len(rna.description) > 15, identifier
+        names.setdefault(rna.name, []).append(identifier)
+    assert {name: found for name, found in names.items() if len(found) > 1} == {}
+
+
+def test_new_tools_stand_in_menus_so_that_search_finds_them():
+    source = "".join(
+        (build.ROOT / "panels" / f"{name}.py").read_text(encoding="utf-8") for name in ("add_menu", "object_menu")
+    )
+    for name in ("PAINT_PLANTS", "PLACE_PLANT", "DROP_TO_GROUND", "FIRST_FOREST"):
+        assert f"ids.{name}" in source
+
+
+def _texts():
+    """All texts that the interface shows, as far as they are registered or written out in panels."""
+    import bpy
+
+    found = set()
+    for name in dir(bpy.types):
+        cls = getattr(bpy.types, name)
+        rna = getattr(cls, "bl_rna", None)
+        if name.startswith(("TETFLORA_", "TetFlora")) and rna is not None:
+            found |= {getattr(cls, "bl_label", ""), rna.name}
+            for prop in rna.properties:
+                found.add(prop.name)
+                if prop.type == 'ENUM':
+                    found |= {item.name for item in prop.enum_items}
+    for cls in vars(part("properties")).values():
+        if isinstance(cls, type) and hasattr(cls, "bl_rna"):
+            found |= {p.name for p in cls.bl_rna.properties}
+    for module, name in (("preferences", "TetFloraPreferences"), ("brush_properties", "TetFloraBrush")):
+        properties = getattr(part(module), name).bl_rna.properties
+        found |= {p.name for p in properties}
+        found |= {item.name for p in properties if p.type == 'ENUM' for item in p.enum_items}
+    for identifier in _ids().values():
+        group, name = identifier.split(".")
+        found.add(getattr(getattr(bpy.ops, group), name).get_rna_type().name)
+    for path in (build.ROOT / "panels").glob("*.py"):
+        found |= set(re.findall(r'text="([^"]+)"', path.read_text(encoding="utf-8")))
+    return found
+
+
+def test_every_translated_text_is_in_the_interface():
+    dictionary = part("translations").DICTIONARY
+    texts = _texts()
+    for language, entries in dictionary.items():
+        assert re.fullmatch(r"[a-z]{2}_[A-Z]{2}", language)
+        assert [text for (_, text) in entries if text not in texts] == []
+        assert all(value.strip() for value in entries.values())
+
+
+def test_translations_reach_blender():
+    import bpy
+
+    if "de_DE" not in bpy.app.translations.locales:
+        pytest.skip("this Blender has no languages")
+    view = bpy.context.preferences.view
+    before = view.language, view.use_translate_interface
+    view.language, view.use_translate_interface = "de_DE", True
+    try:
+        assert bpy.app.translations.pgettext("Least Distance") == "Mindestabstand"
+    finally:
+        view.language, view.use_translate_interface = before
