@@ -1,0 +1,67 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What paint_steps.py did in the real window: a forest in three clicks, the brush, plants set by clicking."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from devtools import window
+
+HERE = Path(__file__).parent
+
+
+@pytest.fixture(scope="module")
+def seen(full_blender: str, resources: Path, pictures: Path) -> dict:
+    result = window.run_in_window(full_blender, HERE / "paint_steps.py", pictures / "paint", 420, resources)
+    assert result["ok"], result["error"]
+    return result["values"]
+
+
+def test_three_clicks_make_a_rendered_forest(seen: dict) -> None:
+    assert 60 <= seen["first"] <= 100
+    assert seen["through_camera"]
+    assert seen["startup"] == ["Camera", "Cube", "Light"]
+    assert seen["green"] > 0.1
+
+
+def test_the_brush_paints_where_the_mouse_goes(seen: dict) -> None:
+    assert seen["painting"]
+    painted = seen["painted"]
+    assert len(painted) > 10
+    assert all(abs(y) <= 5.0 + 0.3 and abs(z) < 1e-3 for _, y, z in painted)
+    assert max(x for x, _, _ in painted) - min(x for x, _, _ in painted) > 8.0
+
+
+def test_shift_erases_and_each_stroke_is_an_undo_step(seen: dict) -> None:
+    assert 0 < len(seen["erased"]) < len(seen["painted"])
+    assert all(place in seen["painted"] for place in seen["erased"])
+    assert seen["undone"] == seen["painted"]
+    assert seen["redone"] == seen["erased"]
+
+
+def test_keys_change_the_brush_and_escape_keeps_what_was_painted(seen: dict) -> None:
+    assert seen["wider"] == pytest.approx(5.5)
+    assert seen["widest"] != pytest.approx(5.5)
+    assert seen["mode"] == 'THIN'
+    assert 0 < len(seen["thinned"]) < len(seen["painted"])
+    assert not seen["painting_after"]
+    assert seen["kept"] == seen["thinned"]
+    assert seen["undone_outside"] == seen["painted"]
+
+
+def test_a_click_places_a_plant(seen: dict) -> None:
+    assert seen["placed"] == 1
+    species, azimuth, scale, height = seen["new"]
+    assert species == "conifer"
+    assert azimuth == pytest.approx(30.0, abs=0.1)
+    assert scale == pytest.approx(1.1, abs=0.01)
+    assert height == pytest.approx(0.0, abs=1e-4)
+
+
+@pytest.mark.parametrize("name", ["begin", "first_forest", "refined", "painted", "erased", "thinned", "placing", "pie"])
+def test_the_window_was_drawn(seen: dict, pictures: Path, colours: Callable[[Path], int], name: str) -> None:
+    assert colours(pictures / "paint" / f"{name}.png") > 200
