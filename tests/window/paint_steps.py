@@ -21,7 +21,7 @@ def steps(ui):
     yield from press_button(ui, "tetflora.first_forest")
     yield from ui.until(lambda: plants(), 10, "plants of the first forest")
     ui.values["first"] = len(plants())
-    ui.values["startup"] = sorted(bpy.context.scene.objects.keys() & {"Cube", "Camera", "Light"})
+    ui.values["startup"] = sorted(set(bpy.context.scene.objects.keys()) & {"Cube", "Camera", "Light"})
     ui.values["through_camera"] = ui.area().spaces.active.region_3d.view_perspective == 'CAMERA'
     yield from ui.picture("first_forest")
     bpy.context.scene.render.resolution_percentage = 25  # a slow machine renders it too

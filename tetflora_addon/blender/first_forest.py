@@ -26,6 +26,7 @@ from .species_items import catalogue, default_species
 NAME = "First forest"
 EYE_HEIGHT = 1.7  # metres
 SAMPLES = 24
+_MARK = "tetflora_first_forest"  # on the collection, so that it may be renamed
 _STARTUP = {"Cube": 'MESH', "Camera": 'CAMERA', "Light": 'LIGHT'}
 _WEST, _EAST, _SOUTH, _NORTH = -48.0, 48.0, -14.0, 112.0  # of the ground, metres; the camera looks north
 _STEP = 2.0  # metres between the ground's vertices
@@ -93,6 +94,7 @@ def build(context: bpy.types.Context, seed: int) -> tuple[bpy.types.Scene, str]:
     default_species()
     scene, said = _scene_for(context)
     collection = bpy.data.collections.new(NAME)
+    collection[_MARK] = True
     scene.collection.children.link(collection)
     collection.objects.link(_ground())
     _plant(scene, seed)
@@ -119,6 +121,11 @@ def height(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64
 def path(y: NDArray[np.float64]) -> NDArray[np.float64]:
     """Where the middle of the path is, x by y, metres."""
     return 5.0 * np.sin(np.asarray(y, float) / 21.0)
+
+
+def is_first_forest(scene: bpy.types.Scene) -> bool:
+    """Whether a scene has a first forest; cheap."""
+    return any(_MARK in collection for collection in scene.collection.children)
 
 
 def is_startup(scene: bpy.types.Scene) -> bool:
