@@ -51,8 +51,8 @@ class TETFLORA_OT_import_populations(Reporting, bpy.types.Operator, ImportHelper
     bl_idname = ids.IMPORT_POPULATIONS
     bl_label = "Import Populations"
     bl_description = (
-        "Add the populations of a file to this scene, without plants: press Update for each. They grow on meshes of the "
-        "names that the file says, or else on the selected ones"
+        "Add the populations of a file to this scene, without plants: press Update for each. They grow on meshes of "
+        "the names that the file says, or else on the selected ones"
     )
     bl_options = {'REGISTER', 'UNDO'}
 

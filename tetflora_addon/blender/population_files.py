@@ -9,7 +9,7 @@ named; what another file does not have is left empty and said. Everything else t
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from math import degrees, isfinite, radians
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,7 @@ FORMAT = "TetFlora populations"
 VERSION = 1
 
 _MIX = ("species", "weight", "companion", "companion_strength", "companion_distance")
-_NUMBERS = {'INT': int, 'FLOAT': float}
+_ENDLESS = 1e30  # what Blender has for no bound is larger
 
 
 def as_data(populations: Iterable[TetFloraPopulation]) -> dict[str, Any]:
@@ -187,12 +187,14 @@ def _check_number(where: str, prop: bpy.types.Property, value: Any) -> None:
         raise ValueError(f"{where} is {value!r}; it must be a {'whole ' if whole else ''}number")
     if not whole and not isfinite(value):
         raise ValueError(f"{where} is {value!r}; it must be a finite number")
-    convert: Callable = degrees if prop.subtype == 'ANGLE' else _NUMBERS[prop.type]
-    low, high = convert(prop.hard_min), convert(prop.hard_max)
-    room = 0 if whole else 1e-6 * max(abs(low), abs(high)) if high < 1e30 else 0.0
-    if not low - room <= value <= high + room:
-        upper = f"to {high:g}" if abs(high) < 1e30 else "on"
-        raise ValueError(f"{where} is {value!r}; it must be from {low:g} {upper}")
+    angle = prop.subtype == 'ANGLE'
+    # Bounds are single-precision numbers: 0.1 as a file has it is less than 0.1 as Blender stores it.
+    with np.errstate(over="ignore"):
+        stored = value if whole else float(np.float32(radians(value) if angle else value))
+    if not prop.hard_min <= stored <= prop.hard_max:
+        low, high = (degrees(b) if angle else b for b in (prop.hard_min, prop.hard_max))
+        upper = f"to {high:.6g}" if abs(high) < _ENDLESS else "on"
+        raise ValueError(f"{where} is {value!r}; it must be from {low:.6g} {upper}")
 
 
 def _keys(where: str, data: Any, needed: set[str], known: set[str]) -> None:

@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Dots where the plants of a population would stand, and what the panel says of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.blender.scenes import add_mesh, depsgraph, part, select
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+
+def _ops():
+    import bpy
+
+    return bpy.ops.tetflora
+
+
+def _settings():
+    import bpy
+
+    return bpy.context.scene.tetflora
+
+
+def _populate(count, **options):
+    import bpy
+
+    select(add_mesh("ground", size=20.0))
+    _ops().populate(count=count, **{"min_distance": 1.0, "species": "bush:2, conifer", **options})
+    bpy.context.view_layer.update()
+
+
+def _dots():
+    import bpy
+
+    return part("point_preview").dots_of(bpy.context.scene, depsgraph(), bpy.context.view_layer)
+
+
+def test_dots_stand_where_plants_will():
+    import bpy
+
+    _populate(count=15)
+    _settings().populations[0].seed = 9
+    dots = _dots()
+    assert dots.plants == 15
+    _ops().update_population()
+    own = [o for o in bpy.context.scene.objects if o.tetflora.is_plant]
+    places = np.array([tuple(o.location) for o in own])
+    assert np.allclose(np.sort(dots.position[:, :2], axis=0), np.sort(places[:, :2], axis=0), atol=1e-4)
+    assert len(np.unique(dots.colour, axis=0)) == len({o.tetflora.species for o in own})
+
+
+def test_without_a_population_dots_stand_on_what_is_selected():
+    first, second = add_mesh("first", size=5.0), add_mesh("second", size=5.0, z=7.0)
+    select(second)
+    assert first is not second
+    dots = _dots()
+    assert dots.plants > 0
+    assert (dots.position[:, 2] > 7.0).all()
+
+
+def test_the_preview_shows_few_dots_of_many_and_says_how_many(monkeypatch):
+    _populate(count=500, min_distance=0.0)
+    preview = part("point_preview")
+    monkeypatch.setattr(preview, "MOST_DOTS", 60)
+    dots = _dots()
+    assert (len(dots.position), dots.plants, dots.more) == (60, 500, False)
+    monkeypatch.setattr(preview, "MOST_PLACED", 100)
+    dots = _dots()
+    assert (dots.plants, dots.more) == (100, True)
+
+
+def test_in_the_background_nothing_is_drawn():
+    import bpy
+
+    _populate(count=5)
+    preview = part("point_preview")
+    try:
+        _ops().preview_population()
+        assert preview.shown_in(bpy.context.scene) or not bpy.app.background
+        assert preview._state.handle is None
+        assert not bpy.app.timers.is_registered(preview._on_timer) or not bpy.app.background
+    finally:
+        preview.show(bpy.context.scene, False)
+    assert preview._state.handle is None
+
+
+@pytest.mark.parametrize(
+    ("count", "as_field", "says"),
+    [
+        (1200, 'AUTOMATIC', "1,200 plants: empties"),
+        (40_000, 'AUTOMATIC', "40,000 plants: one field"),
+        (3, 'FIELD', "3 plants: one field"),
+        (1, 'EMPTIES', "1 plant: empties"),
+    ],
+)
+def test_the_panel_says_what_will_be_made(count, as_field, says):
+    draft = _settings().populate
+    draft.count, draft.as_field = count, as_field
+    assert part("point_preview").status(draft) == says
+    draft.by_density = True
+    assert "As many plants" in part("point_preview").status(draft)
