@@ -6,6 +6,7 @@ import bpy
 
 from ..operators import ids
 from ..operators.mark_explicit import can_be_explicit
+from ..tetflora_addon.blender import auto_refresh
 from ..tetflora_addon.blender.shell_bounces import few_bounces
 from .base import SidebarPanel, split_layout
 from .lists import TETFLORA_UL_leaf_objects, draw_list
@@ -37,12 +38,17 @@ class TETFLORA_PT_refinement(SidebarPanel, bpy.types.Panel):
         if active is not None and (can_be_explicit(active) or active.tetflora.is_explicit):
             layout.prop(active.tetflora, "is_explicit")
         layout.prop(settings, "refine_at_render")
+        layout.prop(settings, "auto_refine")
+        if settings.auto_refine and auto_refresh.message():
+            layout.label(text=auto_refresh.message(), icon='SORTTIME')
         row = layout.row(align=True)
         row.scale_y = 1.4
         row.operator(ids.REFINE, icon='MOD_DECIM')
         row.operator(ids.CLEAR, icon='TRASH')
         if context.scene.camera is None:
             layout.label(text="The scene has no camera", icon='ERROR')
+        elif not settings.refine_at_render and not settings.statistics:
+            layout.label(text="Nothing is refined: renders show no plants", icon='INFO')
 
 
 class TETFLORA_PT_limits(SidebarPanel, bpy.types.Panel):

@@ -132,6 +132,20 @@ def test_a_scene_without_the_setting_or_without_plants_is_left_alone(stage, stub
     assert part("handlers").render_errors() == []
 
 
+def test_a_render_that_will_show_no_plants_says_so_once(stage, tmp_path, capfd):
+    """And says nothing where somebody refined, or kept the meshes."""
+    stage.tetflora.refine_at_render = False
+    for _ in range(2):
+        _still(stage, tmp_path / "a.png")
+    assert capfd.readouterr().err.count("nothing is refined") == 2
+    assert part("handlers").render_errors() == []
+    part("job").refine(stage, __import__("bpy").context.evaluated_depsgraph_get())
+    _still(stage, tmp_path / "b.png")
+    part("emit").keep_results(stage)
+    _still(stage, tmp_path / "c.png")
+    assert "nothing is refined" not in capfd.readouterr().err
+
+
 def test_disabled_plants_are_no_error(stage, tmp_path):
     import bpy
 

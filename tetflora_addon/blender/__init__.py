@@ -4,6 +4,7 @@
 
 from . import (
     asset_library,
+    auto_refresh,
     command_line,
     handlers,
     keymaps,
@@ -23,6 +24,7 @@ _PARTS = (
     thumbnails,
     properties,
     handlers,
+    auto_refresh,
     preview_job,
     preview_overlay,
     species_preview,

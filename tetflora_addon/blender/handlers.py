@@ -31,7 +31,7 @@ from .emit import (
     unpack_override_marks,
 )
 from .migration import migrate
-from .output import release_materials
+from .output import KIND, release_materials
 from .scene_reader import NoPlantsError, has_contents
 from .shell_bounces import raise_bounces
 from .view_layers import show_in, view_layer_groups
@@ -46,6 +46,7 @@ class _Rendering:
     lifted: dict[tuple[str, str], str] = field(default_factory=dict)  # marks of originals, while a file is written
     bounces: dict[str, int] = field(default_factory=dict)  # of Cycles, as they were
     errors: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
 
 
 _rendering = _Rendering()
@@ -60,6 +61,7 @@ def render_errors() -> list[str]:
 def on_render_init(_scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     """A render starts: earlier errors are past."""
     _rendering.errors.clear()
+    _rendering.warnings.clear()
 
 
 @persistent
@@ -73,6 +75,8 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
         wanted = scene.tetflora.refine_at_render and scene.tetflora.output.show_render
         if wanted and has_contents(scene):
             _make(scene)
+        elif not scene.tetflora.refine_at_render and has_contents(scene) and not _has_meshes(scene):
+            _warn(scene)
     except NoPlantsError:
         pass  # all of them are disabled or hidden: the artist wants no forest
     except TetFloraError as error:
@@ -177,6 +181,22 @@ def _named(names: list[str]) -> list[bpy.types.Collection]:
     return [found for name in names if (found := bpy.data.collections.get((name, None))) is not None]
 
 
+def _has_meshes(scene: bpy.types.Scene) -> bool:
+    """Whether plants are there as meshes: results, or some that the artist kept."""
+    return any(KIND in obj for obj in scene.objects)
+
+
+def _warn(scene: bpy.types.Scene) -> None:
+    """Say, once a session of renders, that the picture will have no plants; nothing is wrong, but it looks so."""
+    text = "nothing is refined, and Refine at Render is off: the render shows no plants"
+    if text in _rendering.warnings:
+        return
+    _rendering.warnings.append(text)
+    print(f"TetFlora: warning: {text}", file=sys.stderr, flush=True)
+    if not bpy.app.background:
+        bpy.app.timers.register(lambda: _show_message(text, scene.name))
+
+
 def _complain(scene: bpy.types.Scene, message: str) -> None:
     text = f"frame {scene.frame_current} rendered without its plants: {message}"
     _rendering.errors.append(text)
@@ -186,14 +206,24 @@ def _complain(scene: bpy.types.Scene, message: str) -> None:
         bpy.app.timers.register(lambda: _show_message(text))
 
 
-def _show_message(text: str) -> None:
+def _show_message(text: str, scene: str = "") -> None:
+    """A message in the window; with what mends it, if a scene is named that nothing was refined in."""
     windows = bpy.context.window_manager.windows
     if not windows:
         return
     with bpy.context.temp_override(window=windows[0]):
         bpy.context.window_manager.popup_menu(
-            lambda menu, _context: menu.layout.label(text=text), title="TetFlora", icon='ERROR'
+            lambda menu, _context: _draw_message(menu.layout, text, bpy.data.scenes.get((scene, None))),
+            title="TetFlora",
+            icon='ERROR',
         )
+
+
+def _draw_message(layout: bpy.types.UILayout, text: str, scene: bpy.types.Scene | None) -> None:
+    layout.label(text=text)
+    if scene is not None:
+        layout.operator("tetflora.refine", icon='MOD_DECIM')
+        layout.prop(scene.tetflora, "refine_at_render")
 
 
 _HANDLERS = {

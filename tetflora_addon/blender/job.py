@@ -86,13 +86,13 @@ def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statisti
     TetFloraError
         As `refine`.
     """
-    given = _read(scene, depsgraph, depsgraph.view_layer)
+    given = read_scene(scene, depsgraph, depsgraph.view_layer)
     flora = compile_for(given.species, scene, depsgraph)
     return Statistics(plants=len(given.seeds), polygons_full=_polygons_full(flora, given))
 
 
 @dataclass(frozen=True)
-class _Given:
+class Given:
     """What a scene holds; ``explicit`` is None where no mesh takes part, ``sources`` where no light is baked."""
 
     seeds: Seeds
@@ -112,7 +112,14 @@ class _Given:
         return None if self.explicit is None else Polygons.everything(self.explicit.meshes)
 
 
-def _read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> _Given:
+def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Given:
+    """All that takes part in refinement but the camera.
+
+    Raises
+    ------
+    TetFloraError
+        As `refine_steps`.
+    """
     with originals_shown(scene, depsgraph):
         explicit = read_explicit(depsgraph, view_layer)
         try:
@@ -126,10 +133,10 @@ def _read(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bp
         lights = read_lights(depsgraph, view_layer) if scene.tetflora.shadow_cutoff > 0.0 else ()
         baked = scene.tetflora.baked_light != 'OFF' and not scene.tetflora.expand_everything
         sources = read_sources(scene, depsgraph, view_layer) if baked else None
-        return _Given(seeds, explicit, read_occluders(scene, depsgraph), lights, sources)
+        return Given(seeds, explicit, read_occluders(scene, depsgraph), lights, sources)
 
 
-def _polygons_full(flora: Flora, given: _Given) -> int:
+def _polygons_full(flora: Flora, given: Given) -> int:
     plants = round(flora.polygons[trunks(flora.rows, given.seeds).row].sum())
     return plants + (given.explicit.meshes.faces if given.explicit else 0)
 
@@ -167,7 +174,7 @@ def refine_steps(
     clock = Stopwatch()
     yield Progress(0.0, "Reading the scene")
     camera = read_camera(scene, depsgraph, region_only=for_render)
-    given = _read(scene, depsgraph, view_layer or depsgraph.view_layer)
+    given = read_scene(scene, depsgraph, view_layer or depsgraph.view_layer)
     settings = _settings(scene)
     clock.lap("read")
     yield Progress(0.02, "Compiling species")
@@ -243,7 +250,7 @@ def partition(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[C
     TetFloraError
         As `refine_steps`.
     """
-    camera, given = read_camera(scene, depsgraph), _read(scene, depsgraph, depsgraph.view_layer)
+    camera, given = read_camera(scene, depsgraph), read_scene(scene, depsgraph, depsgraph.view_layer)
     loop = _run_loop(compile_for(given.species, scene, depsgraph), given, camera, _settings(scene), Statistics())
     while True:
         try:
@@ -279,7 +286,7 @@ def _settings(scene: bpy.types.Scene) -> RefinementSettings:
 
 
 def _run_loop(
-    flora: Flora, given: _Given, camera: Camera, settings: RefinementSettings, statistics: Statistics
+    flora: Flora, given: Given, camera: Camera, settings: RefinementSettings, statistics: Statistics
 ) -> Generator[Progress, bool | None, Refinement]:
     """Refine; the statistics get a step for each pass."""
     loop = refine_loop(flora, given.seeds, camera, settings, given.occluders, given.polygons, given.lights)

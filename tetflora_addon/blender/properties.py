@@ -111,6 +111,12 @@ class TetFloraLeafObject(bpy.types.PropertyGroup, SpeciesChoice):
     )
 
 
+def _auto_refine_switched(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    from . import auto_refresh  # which reads the properties of this module
+
+    auto_refresh.switched(self.id_data)
+
+
 class TetFloraScene(RefinementProperties, bpy.types.PropertyGroup):
     """Settings of a scene."""
 
@@ -185,6 +191,16 @@ class TetFloraScene(RefinementProperties, bpy.types.PropertyGroup):
             "locked while it renders (Render > Lock Interface), which TetFlora switches on when plants are added"
         ),
         default=True,
+    )
+    auto_refine: BoolProperty(
+        name="Refine Automatically",
+        description=(
+            "Refine a moment after the camera, plants or settings have changed, in the background of the window. Work "
+            "that is overtaken by another change is dropped. Large forests keep the processor busy with it"
+        ),
+        default=False,
+        update=_auto_refine_switched,
+        options=set(),
     )
     expand_everything: BoolProperty(
         name="Expand Everything",

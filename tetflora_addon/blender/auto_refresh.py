@@ -1,0 +1,213 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Refine by itself in the window, a moment after the camera, plants or settings changed; in slices between redraws.
+
+A change while it works stops it, and it begins again when nothing has changed for `QUIET` seconds. What a refinement
+depends on is digested first (`scene_digest`): where that is the same as last time, nothing is done. The results of the
+time before stay until there are new ones.
+
+Undo, loading and rendering stop it too, because it holds on to datablocks that these take away.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator
+from contextlib import suppress
+from dataclasses import dataclass
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ..errors import TetFloraError
+from . import job
+from .emit import has_results
+from .node_tools import is_ours
+from .plant_objects import prepare_scene
+from .properties import settings_from
+from .scene_digest import scene_digest
+
+#: Seconds without a change before it begins, and seconds of work between two redraws.
+QUIET, SLICE = 0.6, 0.03
+_BUSY = 0.5  # seconds until it looks again whether Blender has time
+_CHANGING = (bpy.types.Object, bpy.types.Camera, bpy.types.Light, bpy.types.Mesh, bpy.types.PointCloud, bpy.types.Curve)
+
+
+@dataclass
+class _State:
+    """The job of the session; names instead of datablocks, which do not outlive a load."""
+
+    scene: str = ""
+    steps: Generator[job.Progress, bool | None, object] | None = None
+    digest: str = ""  # of the job
+    due: float = 0.0
+    message: str = ""
+    working: bool = False  # in here right now: what changes is our own doing
+
+
+_state = _State()
+_done: dict[str, str] = {}  # digest of the results that a scene has, by its name
+
+
+def message() -> str:
+    """What a panel says of it; empty where there is nothing to say."""
+    return _state.message
+
+
+def switched(scene: bpy.types.Scene) -> None:
+    """It was switched on or off in a scene."""
+    stop()
+    _state.message = ""
+    if scene.tetflora.auto_refine:
+        schedule(scene)
+
+
+def schedule(scene: bpy.types.Scene) -> None:
+    """Refine a scene when it has been quiet for a moment; stops what was begun before."""
+    stop()
+    _state.scene, _state.due = scene.name, time.monotonic() + QUIET
+    if not bpy.app.background and not bpy.app.timers.is_registered(tick):
+        bpy.app.timers.register(tick, first_interval=QUIET)
+
+
+def stop() -> None:
+    """Stop, and take away what is half made."""
+    if _state.steps is not None:
+        _state.working = True
+        try:
+            _state.steps.close()
+        finally:
+            _state.steps, _state.working, _state.message = None, False, ""
+
+
+def tick() -> float | None:
+    """Do a slice of what there is to do; seconds until the next, or None if nothing is left."""
+    scene = bpy.data.scenes.get((_state.scene, None))
+    if scene is None or not scene.tetflora.auto_refine:
+        stop()
+        return None
+    wait = _state.due - time.monotonic()
+    if _state.steps is None and wait > 0.0:
+        return wait
+    if bpy.app.is_job_running('RENDER') or bpy.context.mode != 'OBJECT':
+        return _BUSY
+    _state.working = True
+    try:
+        more = _begin(scene) if _state.steps is None else _slice(scene)
+    except TetFloraError as error:
+        _state.steps, more = None, False
+        _state.message = str(error)
+        _redraw()
+    finally:
+        _state.working = False
+    return 0.001 if more else None
+
+
+def _begin(scene: bpy.types.Scene) -> bool:
+    """Start the job if what it depends on has changed."""
+    layer = _view_layer(scene)
+    layer.update()
+    digest = scene_digest(scene, layer.depsgraph, layer)
+    if _done.get(scene.name) == digest and has_results(scene):
+        _state.message = ""
+        _redraw()
+        return False
+    _state.digest = digest
+    _state.steps = job.refine_steps(scene, layer.depsgraph, view_layer=layer)
+    return True
+
+
+def _slice(scene: bpy.types.Scene) -> bool:
+    end = time.monotonic() + SLICE
+    try:
+        progress = next(_state.steps)
+        while time.monotonic() < end:
+            progress = next(_state.steps)
+    except StopIteration:
+        _state.steps, _state.message = None, ""
+        _done[scene.name] = _state.digest
+        prepare_scene(scene)
+        _redraw()
+        return False
+    _state.message = f"{progress.fraction:.0%}  {progress.message}"
+    _redraw()
+    return True
+
+
+def _view_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
+    windows = bpy.context.window_manager.windows
+    shown = next((window.view_layer for window in windows if window.scene == scene), None)
+    return shown or scene.view_layers[0]
+
+
+def _redraw() -> None:
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == 'VIEW_3D':
+                area.tag_redraw()
+
+
+_seen: dict[str, str] = {}  # settings of scenes as they were at the last change
+
+
+@persistent
+def on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Something in a scene changed: is it anything of what refinement depends on?"""
+    if _state.working or not scene.tetflora.auto_refine:
+        return
+    settings = f"{settings_from(scene)}{scene.tetflora.proxy_form}{scene.tetflora.baked_light}{scene.camera}"
+    settings += f"{scene.tetflora.expand_everything}{scene.render.resolution_x}{scene.render.resolution_y}"
+    other = _seen.get(scene.name) != settings
+    _seen[scene.name] = settings
+    if other or any(_concerns(update) for update in depsgraph.updates):
+        schedule(scene)
+
+
+def _concerns(update: bpy.types.DepsgraphUpdate) -> bool:
+    changed = update.id.original
+    return isinstance(changed, _CHANGING) and not is_ours(changed)
+
+
+@persistent
+def on_interruption(*_arguments: object) -> None:
+    """Undo, load or render: datablocks that the job holds may go."""
+    scene = bpy.data.scenes.get((_state.scene, None)) if _state.steps is not None else None
+    stop()
+    if scene is not None:
+        schedule(scene)
+
+
+@persistent
+def on_load(*_arguments: object) -> None:
+    """Another file: its results are none of ours."""
+    _done.clear()
+    _seen.clear()
+    _state.message = ""
+    if bpy.app.timers.is_registered(tick):
+        bpy.app.timers.unregister(tick)
+
+
+_HANDLERS = {
+    "depsgraph_update_post": (on_change,),
+    "undo_pre": (on_interruption,),
+    "redo_pre": (on_interruption,),
+    "render_init": (on_interruption,),
+    "load_pre": (on_interruption, on_load),
+}
+
+
+def register() -> None:
+    """Listen."""
+    for name, handlers in _HANDLERS.items():
+        for handler in handlers:
+            getattr(bpy.app.handlers, name).append(handler)
+
+
+def unregister() -> None:
+    """Stop, and listen no more."""
+    stop()
+    on_load()
+    for name, handlers in _HANDLERS.items():
+        for handler in handlers:
+            with suppress(ValueError):
+                getattr(bpy.app.handlers, name).remove(handler)

@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A number for all that a refinement depends on: where two are equal, refining again would make the same."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import fields, is_dataclass
+
+import bpy
+import numpy as np
+
+from .camera_reader import read_camera
+from .job import read_scene
+from .leaf_forms import resolved_species
+from .output import REPLACED
+from .properties import settings_from
+
+_CHOICES = ("proxy_form", "baked_light", "expand_everything")
+
+
+def scene_digest(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> str:
+    """Digest of camera, plants, meshes that take part or hide plants, lamps, settings, species and materials.
+
+    Raises
+    ------
+    TetFloraError
+        The scene cannot be refined as it is.
+    """
+    group = scene.tetflora
+    given = read_scene(scene, depsgraph, view_layer)
+    content = hashlib.sha256()
+    explicit = ()
+    if given.explicit is not None:
+        meshes = given.explicit.meshes
+        explicit = meshes.surfaces, meshes.surface, meshes.linear, meshes.origin
+    species = [resolved_species(scene, identifier, depsgraph) for identifier in given.species]
+    materials = [(e.species, *(getattr(getattr(e, k), "name", "") for k in REPLACED)) for e in group.output.species]
+    for part in (
+        read_camera(scene, depsgraph),
+        given.seeds,
+        given.occluders,
+        given.lights,
+        explicit,
+        settings_from(scene),
+        [getattr(group, name) for name in _CHOICES],
+        species,
+        materials,
+    ):
+        _add(content, part)
+    return content.hexdigest()
+
+
+def _add(content: hashlib._Hash, value: object) -> None:
+    """Add a value of numbers, texts, arrays, sequences or dataclasses of these."""
+    if isinstance(value, np.ndarray):
+        content.update(f"{value.dtype}{value.shape}".encode())
+        content.update(
+            np.ascontiguousarray(value).tobytes() if value.dtype != object else repr(value.tolist()).encode()
+        )
+    elif is_dataclass(value):
+        for field in fields(value):
+            content.update(field.name.encode())
+            _add(content, getattr(value, field.name))
+    elif isinstance(value, list | tuple):
+        content.update(f"{len(value)}".encode())
+        for item in value:
+            _add(content, item)
+    else:
+        content.update(repr(value).encode())  # of one session only
