@@ -14,9 +14,21 @@ from tests.blender.scenes import part
 MANUAL = (build.ROOT / "docs" / "manual.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("group", ["TetFloraScene", "TetFloraPopulation", "TetFloraMixEntry", "TetFloraLeafObject"])
-def test_every_setting_is_explained(clean_file, group):
-    properties = getattr(part("properties"), group).bl_rna.properties
+GROUPS = (
+    ("properties", "TetFloraScene"),
+    ("properties", "TetFloraLeafObject"),
+    ("population_properties", "TetFloraPopulation"),
+    ("population_properties", "TetFloraMixEntry"),
+    ("output_properties", "TetFloraOutput"),
+    ("output_properties", "TetFloraSpeciesOutput"),
+    ("preview_properties", "TetFloraPreview"),
+    ("brush_properties", "TetFloraBrush"),
+)
+
+
+@pytest.mark.parametrize(("module", "group"), GROUPS)
+def test_every_setting_is_explained(clean_file, module, group):
+    properties = getattr(part(module), group).bl_rna.properties
     shown = {p.name for p in properties if not p.is_hidden and p.identifier != "rna_type" and p.name != "Name"}
     internal = {"Populate", "Species"}
     assert [name for name in sorted(shown - internal) if name not in MANUAL] == []
