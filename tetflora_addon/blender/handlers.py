@@ -50,6 +50,8 @@ class _Rendering:
 
 
 _rendering = _Rendering()
+#: Menu that says that a render shows no plants, and has the buttons that mend it.
+NOTHING_REFINED = "TETFLORA_MT_nothing_refined"
 
 
 def render_errors() -> list[str]:
@@ -194,7 +196,7 @@ def _warn(scene: bpy.types.Scene) -> None:
     _rendering.warnings.append(text)
     print(f"TetFlora: warning: {text}", file=sys.stderr, flush=True)
     if not bpy.app.background:
-        bpy.app.timers.register(lambda: _show_message(text, scene.name))
+        bpy.app.timers.register(_show_what_mends_it)
 
 
 def _complain(scene: bpy.types.Scene, message: str) -> None:
@@ -206,24 +208,21 @@ def _complain(scene: bpy.types.Scene, message: str) -> None:
         bpy.app.timers.register(lambda: _show_message(text))
 
 
-def _show_message(text: str, scene: str = "") -> None:
-    """A message in the window; with what mends it, if a scene is named that nothing was refined in."""
+def _show_what_mends_it() -> None:
+    windows = bpy.context.window_manager.windows
+    if windows:
+        with bpy.context.temp_override(window=windows[0]):
+            bpy.ops.wm.call_menu(name=NOTHING_REFINED)
+
+
+def _show_message(text: str) -> None:
     windows = bpy.context.window_manager.windows
     if not windows:
         return
     with bpy.context.temp_override(window=windows[0]):
         bpy.context.window_manager.popup_menu(
-            lambda menu, _context: _draw_message(menu.layout, text, bpy.data.scenes.get((scene, None))),
-            title="TetFlora",
-            icon='ERROR',
+            lambda menu, _context: menu.layout.label(text=text), title="TetFlora", icon='ERROR'
         )
-
-
-def _draw_message(layout: bpy.types.UILayout, text: str, scene: bpy.types.Scene | None) -> None:
-    layout.label(text=text)
-    if scene is not None:
-        layout.operator("tetflora.refine", icon='MOD_DECIM')
-        layout.prop(scene.tetflora, "refine_at_render")
 
 
 _HANDLERS = {

@@ -1,0 +1,20 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What pops up when a render shows no plants, because nothing is refined for it: why, and what mends it."""
+
+import bpy
+
+from ..operators import ids
+from ..tetflora_addon.blender.handlers import NOTHING_REFINED
+
+
+class TETFLORA_MT_nothing_refined(bpy.types.Menu):
+    """Nothing is refined."""
+
+    bl_idname = NOTHING_REFINED
+    bl_label = "The Render Shows No Plants"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.layout.label(text="Nothing is refined, and Refine at Render is off", icon='INFO')
+        self.layout.operator(ids.REFINE, icon='MOD_DECIM')
+        self.layout.prop(context.scene.tetflora, "refine_at_render")
