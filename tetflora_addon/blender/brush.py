@@ -18,7 +18,7 @@ from ..planting import strokes
 from ..planting.places import Placement
 from ..planting.strokes import Brush
 from .brush_properties import MOST_PAINTED_EMPTIES
-from .field_edits import add_points, editable, take_points
+from .field_edits import add_points, editable, positions, take_points
 from .ground import Ground
 from .plant_fields import fields_of, read_field
 from .plant_objects import add_field, add_plants, plants_of
@@ -86,11 +86,15 @@ class Standing:
             np.array([o.library is None and o.override_library is None and o.visible_get() for o in self.objects], bool)
         ]
         for index, field in enumerate(self.fields):
-            found = read_field(field, depsgraph, world_matrix(field, depsgraph)[None]).position
+            own = editable(field)
+            if own:
+                found = positions(field)
+            else:
+                found = read_field(field, depsgraph, world_matrix(field, depsgraph)[None]).position
             places.append(found)
             source.append(np.full(len(found), index))
             number.append(np.arange(len(found)))
-            removable.append(np.full(len(found), editable(field) and field.visible_get()))
+            removable.append(np.full(len(found), own and field.visible_get()))
         self.places = np.concatenate(places)
         self.source, self.number = np.concatenate(source).astype(np.int32), np.concatenate(number).astype(np.int64)
         self.removable = np.concatenate(removable)
@@ -164,8 +168,10 @@ class Stroke:
         return len(chosen)
 
     def _paint(self, brush: Brush, centre: Sequence[float], dab: int) -> int:
-        pending = [places for places, _ in self._new]
-        places, keys = strokes.paint(brush, centre, np.concatenate([self.standing.places, *pending]), self.key, dab)
+        # Of a million plants only those nearby are copied.
+        near = self.standing.places[strokes.within(self.standing.places, centre, strokes.reach_of(brush))]
+        standing = np.concatenate([near, *(places for places, _ in self._new)])
+        places, keys = strokes.paint(brush, centre, standing, self.key, dab)
         reach = max(_REACH * brush.radius, _LEAST_REACH)
         height = self.ground.heights(places, centre[2] + reach, centre[2] - reach)
         on_ground = np.isfinite(height)

@@ -59,6 +59,15 @@ def editable(obj: bpy.types.Object) -> bool:
     )
 
 
+def positions(obj: bpy.types.Object) -> NDArray[np.float64]:
+    """Where the points of an editable field are in world space, (n, 3), without reading what grows there."""
+    stored = np.zeros((len(obj.data.vertices), 3), np.float32)
+    if len(stored):
+        obj.data.attributes["position"].data.foreach_get("vector", stored.reshape(-1))
+    world = np.array(obj.matrix_world, dtype=np.float64)
+    return stored @ world[:3, :3].T + world[:3, 3]
+
+
 def take_points(obj: bpy.types.Object, keep: NDArray[np.bool_]) -> None:
     """Keep some of a field's points, (n,) bool, with all their attributes."""
     points = {name: (kind, values[keep]) for name, (kind, values) in _read(obj.data).items()}

@@ -86,6 +86,11 @@ def too_many(brush: Brush) -> bool:
     return (2.0 * brush.radius / cell_size(brush.density) + 1.0) ** 2 > MOST_CELLS
 
 
+def reach_of(brush: Brush) -> float:
+    """Radius around the middle of the circle within which plants that stand have a say in a dab, metres."""
+    return brush.radius + max(brush.min_distance, cell_size(brush.density) * sqrt(2.0))
+
+
 def paint(
     brush: Brush, centre: Sequence[float], standing: NDArray[np.float64], key: NDArray[np.uint64], dab: int
 ) -> tuple[NDArray[np.float64], NDArray[np.uint64]]:
@@ -121,8 +126,7 @@ def paint(
     first, last = (np.floor((middle + sign * brush.radius) / side).astype(np.int64) for sign in (-1.0, 1.0))
     grid = np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(first, last, strict=True)), indexing="ij")
     cells = np.stack(grid, axis=-1).reshape(-1, 2)
-    reach = brush.radius + max(brush.min_distance, side * sqrt(2.0))
-    standing = standing[within(standing, middle, reach), :2]
+    standing = standing[within(standing, middle, reach_of(brush)), :2]
     cells = cells[~np.isin(_packed(cells), _packed(np.floor(standing / side).astype(np.int64)))]
     cell_keys = child_key(child_key(key, cells[:, 0]), cells[:, 1])
     if brush.strength < 1.0:
@@ -165,8 +169,7 @@ def thin(
     Of each cell one plant stays, and of two that are closer than the least distance one. Which, is a matter of chance
     that the place itself decides: so plants outside of the circle can win too, and doing it again changes nothing.
     """
-    reach = brush.radius + max(brush.min_distance, cell_size(brush.density) * sqrt(2.0))
-    near = np.flatnonzero(within(standing, centre, reach))
+    near = np.flatnonzero(within(standing, centre, reach_of(brush)))
     near = near[np.argsort(_ranks(standing[near, :2]), kind="stable")]
     cells = _packed(np.floor(standing[near, :2] / cell_size(brush.density)).astype(np.int64))
     _, first = np.unique(cells, return_index=True)
