@@ -46,7 +46,7 @@ def plants_or_fields_selected(cls: type[bpy.types.Operator], context: bpy.types.
     """Poll: at least one plant or field of plants is selected."""
     if any(obj.tetflora.is_plant or obj.tetflora.is_field for obj in context.selected_objects):
         return True
-    cls.poll_message_set("Select plants, or a field of plants, first")
+    cls.poll_message_set("Select plants first, or a field of plants")
     return False
 
 
