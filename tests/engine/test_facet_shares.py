@@ -127,3 +127,18 @@ def test_the_least_share_with_which_a_triangle_reaches_a_ray() -> None:
         least = subject._Sight.least_shares(view, far)
         assert len(least) == 1
         assert least[0] == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_species_is_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compiled again, alone or beside others, it has the shares that were found before."""
+    asked = []
+    real = subject.fitted_shares
+    monkeypatch.setattr(subject, "fitted_shares", lambda f, n: asked.append(n.tolist()) or real(f, n))
+    monkeypatch.setattr(subject, "shipped", dict)
+    monkeypatch.setattr(subject, "_found", {})
+    alone = subject.facet_shares(compile_species([load_species("flower")]))
+    again = subject.facet_shares(compile_species([load_species("grass"), load_species("flower")]))
+    assert asked == [[0], [0]]
+    rows = len(alone.whole)
+    np.testing.assert_array_equal(again.whole[-rows:], alone.whole)
+    np.testing.assert_array_equal(again.own[-rows:], alone.own)

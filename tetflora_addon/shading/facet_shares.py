@@ -87,6 +87,11 @@ def _between(table: NDArray[np.float64], row: NDArray[np.integer], count: NDArra
     return table[row, low] + (place - low) * (table[row, low + 1] - table[row, low])
 
 
+#: Shares of species that are not shipped, as in `shipped`: a scene is compiled anew for each refinement.
+_found: dict[str, dict[str, list[list[float]]]] = {}
+_REMEMBERED = 256
+
+
 @lru_cache(maxsize=8)
 def facet_shares(flora: Flora) -> FacetShares:
     """Shares for a flora; found when first asked for, and kept as long as the flora may be asked for again.
@@ -94,16 +99,22 @@ def facet_shares(flora: Flora) -> FacetShares:
     Those of the species that come with TetFlora are read from `TABLE`; it takes a second or two to find those of one.
     """
     whole, own = np.ones((2, len(flora.rows), len(COUNTS)))
-    unknown = []
+    unknown = {}
     for number, first in enumerate(flora.first_row):
-        known = shipped().get(digest(flora, number))
+        name = digest(flora, number)
+        known = shipped().get(name) or _found.get(name)
         if known is None:
-            unknown.append(number)
+            unknown[number] = name
         else:
             every = slice(int(first), int(first) + len(known["whole"]))
             whole[every], own[every] = known["whole"], known["own"]
-    for row, (these, those) in fitted_shares(flora, np.array(unknown, np.int32)).items():
+    for row, (these, those) in fitted_shares(flora, np.array(list(unknown), np.int32)).items():
         whole[row], own[row] = these, those
+    for number, name in unknown.items():
+        if len(_found) >= _REMEMBERED:
+            _found.clear()
+        rows = np.flatnonzero(flora.rows["species"] == number)
+        _found[name] = {"whole": whole[rows].tolist(), "own": own[rows].tolist()}
     return FacetShares(whole, own)
 
 
