@@ -206,7 +206,7 @@ def _draw_grounds(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup)
     left.label(text="Ground")
     row.label(text=", ".join(names) + (f" and {more:,} more" if more > 0 else "") or "None")
     layout.operator(ids.SET_POPULATION_GROUND, icon='MESH_GRID')
-    layout.prop(settings, "ground_collection")
+    layout.prop(settings, "ground_collection", text="Collection")
 
 
 CLASSES = (
