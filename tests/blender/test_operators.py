@@ -283,8 +283,8 @@ class _Operator:
 
     def __init__(self):
         self.reports = []
-        for name in ("_steps", "_timer"):
-            setattr(self, name, None)
+        self._steps = self._timer = None
+        self._enough = False
         self.kind = session.part("operators.refine").TETFLORA_OT_refine
 
     def __getattr__(self, name):
@@ -323,6 +323,22 @@ def test_escape_in_the_middle_leaves_the_scene_as_it_was(clean_file, window):
     assert window.timers == 0
     assert window.status[-1] is None
     assert window.progress == sorted(window.progress)
+
+
+def test_return_stops_refining_and_makes_what_there_is(clean_file, window):
+    scene = _small_forest()
+    scene.tetflora.cutoff = 0.5
+    window.__init__()
+    operator = _Operator()
+    assert operator.invoke(window, None) == {'RUNNING_MODAL'}
+    while "Refining" not in (window.status[-1] or ""):
+        assert _tick(operator, window) == {'RUNNING_MODAL'}
+    assert _tick(operator, window, 'RET', 'PRESS') == {'RUNNING_MODAL'}
+    while _tick(operator, window) == {'RUNNING_MODAL'}:
+        assert "Refining, pass" not in window.status[-1] or window.status.count(window.status[-1]) < 3
+    assert session.part("tetflora_addon.blender.job").has_results(scene)
+    assert any("Stopped before" in message for _, message in operator.reports)
+    assert window.status[-1] is None
 
 
 def test_steps_in_the_window_give_what_the_script_gives(clean_file, window):
