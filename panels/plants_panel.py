@@ -47,10 +47,14 @@ class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
         else:
             column.label(text="The active object is not a plant", icon='INFO')
         layout.menu("TETFLORA_MT_add_plant", text="Add Plant", icon='ADD')
-        if context.active_object is not None and context.active_object.type in FORM_TYPES:
+        if active is None or active.tetflora.is_plant:
+            return
+        # A mesh with faces is ground or something else, as a rule; the Object menu offers these for it too.
+        faces = active.type == 'MESH' and len(active.data.polygons) > 0
+        if active.type in FORM_TYPES and not faces:
             layout.operator(ids.USE_AS_FORM, icon='CURVE_DATA')
-        if active is not None and active.type in FIELD_TYPES and not active.tetflora.is_plant:
-            field = active.tetflora.is_field
+        field = active.tetflora.is_field
+        if active.type in FIELD_TYPES and (field or not faces or has_nodes(active)):
             layout.operator(
                 ids.MARK_FIELD,
                 text="Field of Plants" if field else "Use as Field of Plants",

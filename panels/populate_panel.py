@@ -7,7 +7,7 @@ import bpy
 from ..operators import ids
 from ..tetflora_addon.blender import point_preview
 from ..tetflora_addon.blender.population_rules import shown_population
-from .base import SidebarPanel, split_layout
+from .base import SidebarPanel, draw_message, split_layout
 from .lists import TETFLORA_UL_mix, draw_list
 
 
@@ -53,14 +53,17 @@ class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
             row.operator(ids.FREEZE_POPULATION, text="Freeze", icon='FREEZE', depress=settings.frozen)
         else:
             layout.operator(ids.POPULATE, text="Populate Selected Meshes", icon='OUTLINER_OB_POINTCLOUD')
-        _draw_status(layout, context.scene, settings)
+        _draw_status(context, layout, settings)
         column = layout.column()
         column.active = not settings.frozen
         if settings.uid:
             _draw_grounds(column, settings)
         row = column.row(heading="Amount")
         row.prop(settings, "by_density")
-        column.prop(settings, "density" if settings.by_density else "count")
+        if settings.by_density:
+            column.prop(settings, "density", text="Per Hectare")  # the whole name is wider than labels are
+        else:
+            column.prop(settings, "count")
         column.prop(settings, "as_field")
         column.prop(settings, "seed")
         active = context.active_object
@@ -90,6 +93,7 @@ class TETFLORA_PT_populate_species(_PartOfPopulate, bpy.types.Panel):
     """Which species, and how they stand to each other."""
 
     bl_label = "Species"
+    bl_options = set()  # open: what to plant is the first question
 
     def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
         draw_list(layout, TETFLORA_UL_mix, settings, ("mix", "mix_index"), 'MIX')
@@ -187,14 +191,14 @@ def _draw_populations(layout: bpy.types.UILayout, group: bpy.types.PropertyGroup
     column.menu(TETFLORA_MT_populations.__name__, text="", icon='DOWNARROW_HLT')
 
 
-def _draw_status(layout: bpy.types.UILayout, scene: bpy.types.Scene, settings: bpy.types.PropertyGroup) -> None:
+def _draw_status(context: bpy.types.Context, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
     """How many plants as what, and why not more; the switch of the preview."""
-    shown = point_preview.shown_in(scene)
+    shown = point_preview.shown_in(context.scene)
     row = layout.row(align=True)
     row.label(text=point_preview.status(settings), icon='INFO')
     row.operator(ids.PREVIEW_POPULATION, text="", icon='HIDE_OFF' if shown else 'HIDE_ON', depress=shown)
     for text in point_preview.complaints(settings):
-        layout.label(text=text, icon='ERROR')
+        draw_message(context, layout, text)
 
 
 def _draw_grounds(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:

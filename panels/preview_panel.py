@@ -6,7 +6,7 @@ import bpy
 
 from ..operators import ids
 from ..tetflora_addon.blender import preview_state
-from .base import SidebarPanel, split_layout
+from .base import SidebarPanel, draw_message, split_layout
 
 
 class TETFLORA_PT_preview(SidebarPanel, bpy.types.Panel):
@@ -26,7 +26,7 @@ class TETFLORA_PT_preview(SidebarPanel, bpy.types.Panel):
             # Blender's own setting of this viewport: thousands of empties cost more than the plants that are drawn.
             column.prop(context.space_data, "show_object_viewport_empty", text="Empties")
             if preview is not None and preview.message:
-                column.label(text=preview.message, icon='ERROR')
+                draw_message(context, column, preview.message)
         row = layout.row(align=True)
         row.operator(ids.PREVIEW_LEVELS, icon='MOD_REMESH')
         row.operator(ids.FORGET_LEVELS, text="", icon='X')
@@ -44,4 +44,4 @@ class TETFLORA_PT_preview(SidebarPanel, bpy.types.Panel):
         column.column(align=True).prop(settings, "forms")
         column.prop(settings, "statistics")
         if preview_state.is_outdated(context.scene):
-            layout.label(text="The camera has changed", icon='ERROR')
+            draw_message(context, layout, "The camera has changed: compute again, or freeze it before it moves")

@@ -8,7 +8,7 @@ from ..operators import ids
 from ..operators.mark_explicit import can_be_explicit
 from ..tetflora_addon.blender import auto_refresh
 from ..tetflora_addon.blender.shell_bounces import few_bounces
-from .base import SidebarPanel, split_layout
+from .base import SidebarPanel, draw_message, split_layout
 from .lists import TETFLORA_UL_leaf_objects, draw_list
 
 
@@ -21,6 +21,15 @@ class TETFLORA_PT_refinement(SidebarPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = split_layout(self)
         settings = context.scene.tetflora
+        # First, because the tab is longer than most screens are tall.
+        row = layout.row(align=True)
+        row.scale_y = 1.4
+        row.operator(ids.REFINE, icon='MOD_DECIM')
+        row.operator(ids.CLEAR, icon='TRASH')
+        if context.scene.camera is None:
+            draw_message(context, layout, "The scene has no camera: add one, and make it active with Ctrl Numpad 0")
+        elif not settings.refine_at_render and not settings.statistics:
+            draw_message(context, layout, "Nothing is refined: renders show no plants", 'INFO')
         column = layout.column()
         column.active = not settings.expand_everything
         column.prop(settings, "quality")
@@ -40,15 +49,7 @@ class TETFLORA_PT_refinement(SidebarPanel, bpy.types.Panel):
         layout.prop(settings, "refine_at_render")
         layout.prop(settings, "auto_refine")
         if settings.auto_refine and auto_refresh.message():
-            layout.label(text=auto_refresh.message(), icon='SORTTIME')
-        row = layout.row(align=True)
-        row.scale_y = 1.4
-        row.operator(ids.REFINE, icon='MOD_DECIM')
-        row.operator(ids.CLEAR, icon='TRASH')
-        if context.scene.camera is None:
-            layout.label(text="The scene has no camera", icon='ERROR')
-        elif not settings.refine_at_render and not settings.statistics:
-            layout.label(text="Nothing is refined: renders show no plants", icon='INFO')
+            draw_message(context, layout, auto_refresh.message(), 'SORTTIME')
 
 
 class TETFLORA_PT_limits(SidebarPanel, bpy.types.Panel):

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The species editor: a species, its orders as a list, and a slider for everything that the species file says."""
 
-from textwrap import wrap
-
 import bpy
 
 from ..operators import ids
@@ -14,18 +12,10 @@ from ..tetflora_addon.blender.species_files import own_file
 from ..tetflora_addon.blender.species_values import orders_of, present_order, present_species
 from ..tetflora_addon.blender.species_whole import NO_LEAF, OBJECT_LEAF
 from ..tetflora_addon.plants.species import LEAF_KINDS
-from .base import SidebarPanel, split_layout
+from .base import SidebarPanel, draw_message, split_layout
 
 # Keys of an order that say how its leaves are; the others are about its branches.
 _LEAVES = ("leaf", "leaves")
-
-
-def draw_message(context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str = 'ERROR') -> None:
-    """A text over several lines, as Blender breaks none; a letter is some 7 pixels wide at a scale of 1."""
-    letters = context.region.width / (7.0 * context.preferences.system.ui_scale)
-    column = layout.column(align=True)
-    for n, line in enumerate(wrap(text, max(int(letters) - 4, 16))):
-        column.label(text=line, icon='BLANK1' if n else icon)
 
 
 class TETFLORA_MT_species_files(bpy.types.Menu):
@@ -48,7 +38,7 @@ class TETFLORA_MT_species_files(bpy.types.Menu):
 class TETFLORA_PT_species(SidebarPanel, bpy.types.Panel):
     """Species."""
 
-    bl_label = "Species"
+    bl_label = "Species Editor"  # Populate has a panel Species, which chooses them
     bl_parent_id = "TETFLORA_PT_plants"
     bl_options = {'DEFAULT_CLOSED'}
 

@@ -4,12 +4,11 @@
 
 import json
 from functools import lru_cache
-from textwrap import wrap
 
 import bpy
 
 from ..tetflora_addon.blender.handlers import render_errors
-from .base import SidebarPanel
+from .base import SidebarPanel, draw_message
 
 
 @lru_cache(maxsize=8)
@@ -49,11 +48,7 @@ class TETFLORA_PT_statistics(SidebarPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         for error in render_errors()[-1:]:
-            # Blender does not break lines; a letter is some 7 pixels wide at a scale of 1.
-            letters = context.region.width / (7.0 * context.preferences.system.ui_scale)
-            column = layout.column(align=True)
-            for n, line in enumerate(wrap(error, max(int(letters) - 4, 16))):
-                column.label(text=line, icon='BLANK1' if n else 'ERROR')
+            draw_message(context, layout, error)
         rows = rows_of(context.scene.tetflora.statistics)
         if not rows:
             layout.label(text="Nothing refined yet", icon='INFO')

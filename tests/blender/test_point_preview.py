@@ -90,10 +90,10 @@ def test_in_the_background_nothing_is_drawn():
 @pytest.mark.parametrize(
     ("count", "as_field", "says"),
     [
-        (1200, 'AUTOMATIC', "1,200 plants: empties"),
-        (40_000, 'AUTOMATIC', "40,000 plants: one field"),
-        (3, 'FIELD', "3 plants: one field"),
-        (1, 'EMPTIES', "1 plant: empties"),
+        (1200, 'AUTOMATIC', "1,200 plants, as empties"),
+        (40_000, 'AUTOMATIC', "40,000 plants, as one field"),
+        (3, 'FIELD', "3 plants, as one field"),
+        (1, 'EMPTIES', "1 plant, as empties"),
     ],
 )
 def test_the_panel_says_what_will_be_made(count, as_field, says):

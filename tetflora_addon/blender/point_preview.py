@@ -148,7 +148,7 @@ def status(population: bpy.types.PropertyGroup) -> str:
         return "As many plants as the ground takes"
     made_as = "one field" if makes_field(population, number) else "empties"
     more = "more than " if dots is not None and dots.more and population.by_density else ""
-    return f"{more}{number:,} plant{'' if number == 1 else 's'}: {made_as}"
+    return f"{more}{number:,} plant{'' if number == 1 else 's'}, as {made_as}"
 
 
 def complaints(population: bpy.types.PropertyGroup) -> list[str]:
