@@ -29,6 +29,7 @@ class TETFLORA_OT_first_forest(Reporting, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> set[str]:
         scene, said = build(context, self.seed)
+        _activate_ground(scene)
         plants = sum(o.tetflora.is_plant for o in scene.objects)
         screen = context.screen
         for area in screen.areas if screen and not bpy.app.background else ():
@@ -37,3 +38,15 @@ class TETFLORA_OT_first_forest(Reporting, bpy.types.Operator):
         said = f" ({said})" if said else ""
         self.report({'INFO'}, f"A forest of {plants} plants is planted{said}. Refine shows it, F12 renders it")
         return {'FINISHED'}
+
+
+def _activate_ground(scene: bpy.types.Scene) -> None:
+    """Select the ground, so that Populate and the brush go on from there, and not the startup's hidden cube."""
+    layer = scene.view_layers[0]
+    layer.update()  # what was just linked is not in it before
+    ground = next((obj for obj in layer.objects if obj.tetflora.is_occluder), None)
+    if ground is not None:
+        for obj in layer.objects.selected:
+            obj.select_set(False, view_layer=layer)
+        ground.select_set(True, view_layer=layer)
+        layer.objects.active = ground

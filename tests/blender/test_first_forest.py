@@ -151,3 +151,16 @@ def test_quality_and_memory_of_new_scenes_come_from_the_preferences():
         assert other.tetflora.leaf_limit != group.leaf_limit
     finally:
         chosen.new_quality, chosen.new_memory = 'FINAL', 0.0
+
+
+def test_its_ground_is_selected_so_that_populate_goes_on_from_there():
+    import bpy
+
+    _startup()
+    bpy.context.view_layer.objects.active = bpy.data.objects["Cube"]
+    bpy.data.objects["Cube"].select_set(True)
+    scene = _plant()
+    active = scene.view_layers[0].objects.active
+    assert active.type == 'MESH' and active.tetflora.is_occluder
+    assert [o.name for o in scene.view_layers[0].objects.selected] == [active.name]
+    assert bpy.ops.tetflora.populate.poll()
