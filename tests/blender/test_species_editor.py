@@ -320,3 +320,23 @@ def test_undo_takes_an_edit_back():
     assert _edited() == _shipped()
     bpy.ops.ed.redo()
     assert _edited().orders[0].length.mean == pytest.approx(0.3)
+
+
+def test_panels_look_at_folders_once_in_a_while_and_see_own_changes_at_once(monkeypatch, tmp_path):
+    """In the window: what TetFlora writes is there at once, what others write a moment later."""
+    edits, looked = part("species_edits"), []
+    real = edits.list_species
+    monkeypatch.setattr(edits, "list_species", lambda folders: looked.append(1) or real(folders))
+    monkeypatch.setattr(edits, "_TRUSTED", 1000.0)
+    edits.look_again()
+    for _ in range(50):
+        part("species_items").catalogue()
+        edits.species_data(None, "oak")
+    assert len(looked) == 1
+    edits.tell_listeners()
+    part("species_items").catalogue()
+    assert len(looked) == 2
+    monkeypatch.setattr(edits, "_TRUSTED", 0.0)
+    part("species_items").catalogue()
+    part("species_items").catalogue()
+    assert len(looked) == 4

@@ -9,6 +9,7 @@ format needs no migration of its own. `species_for` is the one door: refinement,
 import copy
 import json
 import re
+import time
 from collections.abc import Callable, Iterator
 from functools import lru_cache
 from pathlib import Path
@@ -26,6 +27,12 @@ from .preferences import species_folders
 #: Called after every change of a species, without arguments; the preview listens.
 listeners: list[Callable[[], None]] = []
 
+# In the background nothing is drawn, and scripts expect to find what they have just written.
+_TRUSTED = 0.0 if bpy.app.background else 0.3
+_seen: dict[str, SpeciesInfo] | None = None
+_seen_at = 0.0
+_read: dict[str, dict[str, Any]] = {}  # decoded files, as long as what was seen is trusted
+
 
 class TetFloraSpeciesEdit(bpy.types.PropertyGroup):
     """A species as this file has it."""
@@ -34,6 +41,26 @@ class TetFloraSpeciesEdit(bpy.types.PropertyGroup):
         name="Identifier", description="Species of the catalogue that the text replaces in this file, or a new one"
     )
     text: StringProperty(name="Text", description="The species as JSON, as in a species file")
+
+
+def listed() -> dict[str, SpeciesInfo]:
+    """Species that files hold, edits aside.
+
+    A panel asks for them hundreds of times while it is drawn, so in the window folders are looked at every `_TRUSTED`
+    seconds only, and when TetFlora itself has changed a file.
+    """
+    global _seen, _seen_at
+    now = time.monotonic()
+    if _seen is None or now - _seen_at >= _TRUSTED:
+        _seen, _seen_at = list_species(species_folders()), now
+        _read.clear()
+    return _seen
+
+
+def look_again() -> None:
+    """A species file has changed."""
+    global _seen
+    _seen = None
 
 
 def find_edit(scene: bpy.types.Scene | None, identifier: str) -> TetFloraSpeciesEdit | None:
@@ -64,7 +91,7 @@ def species_for(scene: bpy.types.Scene | None, identifier: str) -> Species:
         Unknown, or broken; the message names the key and what is allowed.
     """
     edit = find_edit(scene, identifier)
-    return load_species(identifier, species_folders()) if edit is None else _species(edit.text, identifier)
+    return load_species(identifier, known=listed()) if edit is None else _species(edit.text, identifier)
 
 
 @lru_cache(maxsize=64)
@@ -83,7 +110,7 @@ def problem_of(scene: bpy.types.Scene | None, identifier: str) -> str:
     if edit is not None:
         return _problem(edit.text, identifier)
     try:
-        load_species(identifier, species_folders())
+        load_species(identifier, known=listed())
     except SpeciesError as error:
         return str(error)
     return ""
@@ -114,12 +141,14 @@ def species_data(scene: bpy.types.Scene | None, identifier: str) -> dict[str, An
     edit = find_edit(scene, identifier)
     if edit is not None:
         return _decoded(edit.text, identifier)
-    known = list_species(species_folders())
+    known = listed()
     if identifier not in known:
         raise SpeciesError(f'Unknown species "{identifier}"; the catalogue has {", ".join(known) or "none"}')
-    path = known[identifier].path
-    status = path.stat()
-    return _decoded_file(path, status.st_mtime_ns, status.st_size)
+    if identifier not in _read:
+        path = known[identifier].path
+        status = path.stat()
+        _read[identifier] = _decoded_file(path, status.st_mtime_ns, status.st_size)
+    return _read[identifier]
 
 
 @lru_cache(maxsize=64)
@@ -189,6 +218,7 @@ def revert_species(identifier: str) -> int:
 
 def tell_listeners() -> None:
     """Some species has changed."""
+    look_again()
     for listener in listeners:
         listener()
 

@@ -8,9 +8,8 @@ from zlib import crc32
 import bpy
 
 from ..errors import SpeciesError
-from ..plants.catalogue import SpeciesInfo, list_species
-from .preferences import species_folders
-from .species_edits import edited_infos, species_for
+from ..plants.catalogue import SpeciesInfo
+from .species_edits import edited_infos, listed, species_for
 from .thumbnails import FALLBACK_ICON, icon_of
 
 # What an enumeration says when there is nothing to choose.
@@ -25,7 +24,7 @@ _kept: dict[tuple, list[Item]] = {}
 
 def catalogue() -> dict[str, SpeciesInfo]:
     """All species that this user or this file has, by identifier, sorted by name."""
-    known = list_species(species_folders())
+    known = listed()
     edited = edited_infos()
     return dict(sorted((known | edited).items(), key=lambda item: item[1].name.lower())) if edited else known
 

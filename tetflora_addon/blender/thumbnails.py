@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
+import bpy
 from bpy.utils import previews
 
 from ..plants.catalogue import builtin_folder
@@ -28,8 +30,22 @@ def thumbnail_file(identifier: str) -> Path | None:
     return None
 
 
+# Seconds for which a picture is not looked for again: menus and panels ask for all of them at each redraw.
+_TRUSTED = 0.0 if bpy.app.background else 1.0
+_icons: dict[str, tuple[float, int]] = {}
+
+
 def icon_of(identifier: str) -> int:
     """Number of a species' picture for items and layouts, loaded at first use; 0 where it has none."""
+    now = time.monotonic()
+    seen, icon = _icons.get(identifier, (-_TRUSTED, 0))
+    if now - seen >= _TRUSTED:
+        icon = _icon_of(identifier)
+        _icons[identifier] = now, icon
+    return icon
+
+
+def _icon_of(identifier: str) -> int:
     path = thumbnail_file(identifier)
     if path is None or _pictures is None:
         return 0
@@ -50,3 +66,4 @@ def unregister() -> None:
     if _pictures is not None:
         previews.remove(_pictures)
     _pictures = None
+    _icons.clear()

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -70,15 +70,25 @@ def list_species(folders: Sequence[Path] = ()) -> dict[str, SpeciesInfo]:
     return dict(sorted(found.items(), key=lambda item: item[1].name.lower()))
 
 
-def load_species(identifier: str, folders: Sequence[Path] = ()) -> Species:
+def load_species(
+    identifier: str, folders: Sequence[Path] = (), known: Mapping[str, SpeciesInfo] | None = None
+) -> Species:
     """Read a species; unchanged files are read once.
+
+    Parameters
+    ----------
+    identifier : str
+    folders : sequence of Path
+        As of `list_species`.
+    known : mapping, optional
+        What `list_species` said a moment ago.
 
     Raises
     ------
     SpeciesError
         Unknown identifier (the message lists the known ones), or a broken file.
     """
-    known = list_species(folders)
+    known = list_species(folders) if known is None else known
     if identifier not in known:
         raise SpeciesError(f"Unknown species \"{identifier}\"; the catalogue has {', '.join(known) or 'none'}")
     path = known[identifier].path
