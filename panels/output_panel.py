@@ -21,13 +21,13 @@ class TETFLORA_PT_output(SidebarPanel, bpy.types.Panel):
         layout = split_layout(self)
         output = context.scene.tetflora.output
         layout.prop(output, "save_results")
-        row = layout.row(heading="Results")
-        row.prop(output, "show_viewport", text="Viewports")
-        row.prop(output, "show_render", text="Renders")
+        column = layout.column(heading="Results")  # one below the other: two in a row are cut off
+        column.prop(output, "show_viewport", text="Viewports")
+        column.prop(output, "show_render", text="Renders")
         for collection in plant_collections(context.scene):
-            row = layout.row(heading=collection.name)
-            row.prop(collection, "hide_viewport", text="Viewports", toggle=False, invert_checkbox=True)
-            row.prop(collection, "hide_render", text="Renders", toggle=False, invert_checkbox=True)
+            column = layout.column(heading=collection.name)
+            column.prop(collection, "hide_viewport", text="Viewports", toggle=False, invert_checkbox=True)
+            column.prop(collection, "hide_render", text="Renders", toggle=False, invert_checkbox=True)
         layout.operator(ids.KEEP_RESULTS, icon='MESH_DATA')
 
 

@@ -35,7 +35,8 @@ class TETFLORA_PT_preview(SidebarPanel, bpy.types.Panel):
         if preview is None or preview.levels is None:
             return
         column = layout.column()
-        column.prop(settings, "level", slider=True)
+        last = preview.levels.levels[-1].number
+        column.prop(settings, "level", text=f"Level of {last}", slider=True)
         column.prop(settings, "wires")
         row = column.row()
         row.active = settings.wires
