@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph, part
@@ -140,3 +142,45 @@ def test_what_cannot_be_refined_is_said(scene, monkeypatch):
     settle(monkeypatch)
     assert auto().message() == ""
     assert results(scene)
+
+
+@pytest.mark.parametrize("moved", [False, True])
+def test_only_a_change_of_plants_stops_the_job_not_the_flags_that_results_update(scene, monkeypatch, moved):
+    import bpy
+
+    scene.tetflora.auto_refine = True
+    auto().on_change(scene, SimpleNamespace(updates=[]))  # settings as they are
+    monkeypatch.setattr(auto(), "SLICE", 0.0)
+    auto()._state.due = 0.0
+    for _ in range(5):
+        auto().tick()
+    job = auto()._state.steps
+    assert job is not None
+    # What Blender tells of every object when a collection of results is linked.
+    update = SimpleNamespace(
+        id=SimpleNamespace(original=bpy.data.objects["tree 1"]),
+        is_updated_transform=moved,
+        is_updated_geometry=False,
+        is_updated_shading=True,
+    )
+    auto().on_change(scene, SimpleNamespace(updates=[update]))
+    assert (auto()._state.steps is job) == (not moved)
+    settle(monkeypatch)
+    assert len(results(scene)) == 1
+
+
+def test_a_plant_hidden_while_it_works_is_heard_afterwards(scene, monkeypatch):
+    import bpy
+
+    scene.tetflora.auto_refine = True
+    auto().on_change(scene, SimpleNamespace(updates=[]))
+    monkeypatch.setattr(auto(), "SLICE", 0.0)
+    auto()._state.due = 0.0
+    for _ in range(5):
+        auto().tick()
+    plant = bpy.data.objects["tree 1"]
+    plant.hide_render = True
+    flags = {"is_updated_transform": False, "is_updated_geometry": False}
+    auto().on_change(scene, SimpleNamespace(updates=[SimpleNamespace(id=SimpleNamespace(original=plant), **flags)]))
+    settle(monkeypatch)
+    assert '"plants": 2' in scene.tetflora.statistics or '"plants":2' in scene.tetflora.statistics

@@ -43,6 +43,7 @@ class _State:
     due: float = 0.0
     message: str = ""
     working: bool = False  # in here right now: what changes is our own doing
+    again: bool = False  # look once more when the job is done
 
 
 _state = _State()
@@ -112,7 +113,7 @@ def _begin(scene: bpy.types.Scene) -> bool:
         _state.message = ""
         _redraw()
         return False
-    _state.digest = digest
+    _state.digest, _state.again = digest, False
     _state.steps = job.refine_steps(scene, layer.depsgraph, view_layer=layer)
     return True
 
@@ -128,9 +129,12 @@ def _slice(scene: bpy.types.Scene) -> bool:
         _done[scene.name] = _state.digest
         prepare_scene(scene)
         _redraw()
-        return False
-    _state.message = f"{progress.fraction:.0%}  {progress.message}"
-    _redraw()
+        _state.due = time.monotonic() + QUIET
+        return _state.again
+    text = f"{progress.fraction:.0%}  {progress.message}"
+    if text != _state.message:  # a redraw of the viewport may take longer than the slice
+        _state.message = text
+        _redraw()
     return True
 
 
@@ -159,13 +163,25 @@ def on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     settings += f"{scene.tetflora.expand_everything}{scene.render.resolution_x}{scene.render.resolution_y}"
     other = _seen.get(scene.name) != settings
     _seen[scene.name] = settings
-    if other or any(_concerns(update) for update in depsgraph.updates):
+    concerns = [update for update in depsgraph.updates if _concerns(update)]
+    at_it = _state.steps is not None and scene.name == _state.scene
+    if at_it and not other and all(_only_flags(update) for update in concerns):
+        # Results that are linked have the flags of all other objects updated, and that when we are no longer at work:
+        # the job would stop itself for ever. Whoever hid an object meanwhile is heard when it is done.
+        _state.again = _state.again or bool(concerns)
+    elif other or concerns:
         schedule(scene)
 
 
 def _concerns(update: bpy.types.DepsgraphUpdate) -> bool:
     changed = update.id.original
     return isinstance(changed, _CHANGING) and not is_ours(changed)
+
+
+def _only_flags(update: bpy.types.DepsgraphUpdate) -> bool:
+    """Whether an object has neither moved nor another form nor other settings; it may have been hidden."""
+    moved = update.is_updated_transform or update.is_updated_geometry
+    return isinstance(update.id.original, bpy.types.Object) and not moved
 
 
 @persistent
