@@ -62,4 +62,4 @@ class TETFLORA_PT_passes(SidebarPanel, bpy.types.Panel):
             layout.prop(entry, "pass_index")
             layout.prop_search(entry, "light_group", layer, "lightgroups")
             for name in ("leaf", "blossom", "bark"):
-                layout.prop(entry, name)
+                layout.prop(entry, name, text=name.capitalize())  # the field itself says Material

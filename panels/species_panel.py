@@ -98,7 +98,7 @@ class TETFLORA_PT_species_whole(_SpeciesPart, bpy.types.Panel):
             if form == OBJECT_LEAF:
                 column.prop_search(editor, f"{kind}_object", bpy.data, "objects")
             if form != NO_LEAF:
-                column.prop(editor, f"{kind}_transmission")
+                column.prop(editor, f"{kind}_transmission", text="Translucency")
         column.prop(editor, "bark")
         column.prop(editor, "quality")
         column.prop(editor, "exact")
