@@ -21,11 +21,17 @@ from typing import Any
 LARGEST = 300_000  # bytes
 TABS = 24  # pixels at the sidebar's right edge with the names of its tabs
 
-# Panels by picture: those that are shown, sub-panels opened.
+WINDOWS = ("first-forest", "populated", "add-menu", "progress", "refined", "previewed")  # pictures of all of it
+
+# Panels by picture: those that are shown, opened; a sub-panel without its parent stands alone.
 PANELS = {
     "plants": ("TETFLORA_PT_plants", "TETFLORA_PT_selected_plants"),
-    "populate": ("TETFLORA_PT_populate",),
+    "populate": ("TETFLORA_PT_populate", "TETFLORA_PT_populate_species"),
+    "populate-where": ("TETFLORA_PT_populate_where", "TETFLORA_PT_populate_arrangement", "TETFLORA_PT_populate_size"),
+    "brush": ("TETFLORA_PT_brush",),
     "refinement": ("TETFLORA_PT_refinement", "TETFLORA_PT_limits", "TETFLORA_PT_leaf_objects"),
+    "output": ("TETFLORA_PT_output", "TETFLORA_PT_ray_visibility", "TETFLORA_PT_passes"),
+    "preview": ("TETFLORA_PT_preview",),
     "statistics": ("TETFLORA_PT_statistics",),
     "species": ("TETFLORA_PT_plants", "TETFLORA_PT_species", "TETFLORA_PT_species_whole"),
 }
@@ -35,6 +41,14 @@ def steps(ui: Any) -> Iterator[float | None]:
     """Inside Blender: populate, refine, and show the panels one after the other."""
     import bpy
 
+    yield from ui.show_sidebar("TetFlora")
+    with ui.override():
+        bpy.ops.tetflora.first_forest('INVOKE_DEFAULT')
+    bpy.context.scene.tetflora.preview.plants = 'LIGHT'
+    yield 2.0
+    yield from ui.picture("first-forest")
+    bpy.ops.wm.read_homefile(use_empty=False)
+    yield 1.0
     scene = bpy.context.scene
     bpy.context.preferences.system.use_region_overlap = False  # an even background, so that panels can be cut out
     _hill(scene)
@@ -63,12 +77,15 @@ def steps(ui: Any) -> Iterator[float | None]:
     for obj in bpy.context.selected_objects:
         obj.select_set(False)
     yield from ui.picture("refined")
+    yield from _preview(ui, scene)
 
     plant = next(obj for obj in scene.objects if obj.tetflora.is_plant)
     plant.select_set(True)
     bpy.context.view_layer.objects.active = plant
     leaf = scene.tetflora.leaf_objects.add()
     leaf.species = "broadleaf_tree"
+    own = scene.tetflora.output.species.add()
+    own.species = "conifer"
     registered = [getattr(bpy.types, name) for name in dir(bpy.types) if name.startswith("TETFLORA_PT_")]
     for cls in sorted(registered, key=lambda cls: not hasattr(cls, "bl_parent_id")):
         bpy.utils.unregister_class(cls)
@@ -80,6 +97,27 @@ def steps(ui: Any) -> Iterator[float | None]:
             bpy.utils.unregister_class(cls)
     region = next(r for r in ui.area().regions if r.type == 'UI')
     ui.values["sidebar"] = [region.x, region.y, region.width, region.height]
+
+
+def _preview(ui: Any, scene: Any) -> Iterator[float | None]:
+    """Levels as clouds in the middle of the picture, and the plants as light proxies."""
+    import bpy
+
+    settings, output = scene.tetflora.preview, scene.tetflora.output
+    output.show_viewport = False
+    with ui.override():
+        bpy.ops.tetflora.preview_levels('INVOKE_DEFAULT')
+    yield 1.0
+
+    def done() -> bool:
+        return not any(op.bl_idname == "TETFLORA_OT_preview_levels" for op in ui.window.modal_operators)
+
+    yield from ui.until(done, 120, "levels")
+    settings.plants = 'LIGHT'
+    settings.level, settings.projected = min(settings.level, 4), False
+    yield 2.0
+    yield from ui.picture("previewed")
+    settings.plants, output.show_viewport = 'NONE', True
 
 
 def _hill(scene: Any) -> None:
@@ -126,7 +164,8 @@ def _register_open(panels: list[Any]) -> list[Any]:
     for cls in panels:
         members = {"bl_options": set(), "bl_idname": f"{cls.__name__}_open"}
         if hasattr(cls, "bl_parent_id"):
-            members["bl_parent_id"] = f"{cls.bl_parent_id}_open"
+            shown = any(cls.bl_parent_id == other.__name__ for other in panels)
+            members["bl_parent_id"] = f"{cls.bl_parent_id}_open" if shown else ""
         made.append(type(f"{cls.__name__}_open", (cls,), members))
         bpy.utils.register_class(made[-1])
     return made
@@ -144,7 +183,7 @@ def _store(out: Path, sidebar: list[int], images: Path, height: int) -> None:
         source, target = out / f"panel-{name}.png", images / f"panel-{name}.png"
         trimmed = ("-crop", cut, "+repage", "-shave", "4x4", "-fuzz", "2%", "-trim", "+repage")
         _convert(source, *trimmed, "-strip", "+dither", "-colors", "200", target)
-    for name in ("populated", "add-menu", "progress", "refined"):
+    for name in WINDOWS:
         _convert(out / f"{name}.png", "-resize", "1280x", "-strip", "-quality", "84", images / f"panel-{name}.jpg")
 
 
