@@ -1,0 +1,217 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a file holds, datablock by datablock, as values that can be compared: to tell that undo restored all of it.
+
+Every list of `bpy.data` is visited, and of every datablock all properties that RNA has, its groups, lists and arrays
+included, and its custom properties. Other datablocks count by type and name. Meshes and point clouds count by their
+attributes. Left out is what is no part of the file: see `PASSING`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import warnings
+from typing import Any
+
+import numpy as np
+
+#: Properties that are not what a file says: where things lie in memory, what is evaluated, what is drawn.
+PASSING = frozenset(
+    {
+        "rna_type",
+        "session_uid",
+        "original",
+        "is_evaluated",
+        "is_updated",
+        "is_updated_data",
+        "id_data",
+        "tag",
+        "preview",
+        "users",
+        "is_embedded_data",
+        "is_library_indirect",
+        "depsgraph",
+        "view_layer_hash",
+        # Blender's memory of undo does not hold this mark; TetFlora sets it again before it writes a file.
+        "is_runtime_data",
+        "bl_rna",
+        "internal_links",
+        # A cache of what `objects` and `children` say. After undo of deleted objects Blender can leave it stale:
+        # reading it then gives None or ends in a crash (5.2 and 4.5).
+        "all_objects",
+        "particle_edit",  # its object follows the mouse
+    }
+)
+#: Lists of `bpy.data` that belong to the window or the session and not to what the artist makes.
+LEFT_OUT = frozenset({"all_ids", "window_managers", "screens", "workspaces", "libraries"})
+#: Properties that hold the bulk of a datablock, which `_bulk` reads at once.
+_BULK = {
+    "Mesh": frozenset(
+        {
+            "vertices",
+            "edges",
+            "loops",
+            "polygons",
+            "attributes",
+            "color_attributes",
+            "uv_layers",
+            "loop_triangles",
+            "loop_triangle_polygons",
+            "vertex_normals",
+            "polygon_normals",
+            "corner_normals",
+            "vertex_colors",
+            "uv_layer_clone",
+            "uv_layer_stencil",
+        }
+    ),
+    "PointCloud": frozenset({"points", "attributes", "color_attributes"}),
+}
+_FIELDS = ("value", "vector", "color")
+
+
+def everything() -> dict[str, dict[str, Any]]:
+    """All datablocks of the file by kind and name: nested tuples and dictionaries of plain values."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of what Blender means to drop, as long as it has it
+        return _everything()
+
+
+def _everything() -> dict[str, dict[str, Any]]:
+    import bpy
+
+    bpy.context.view_layer.update()
+    found: dict[str, dict[str, Any]] = {}
+    for prop in bpy.data.bl_rna.properties:
+        if prop.type != 'COLLECTION' or prop.identifier in LEFT_OUT:
+            continue
+        found[prop.identifier] = {d.name_full: _struct(d, 0) for d in getattr(bpy.data, prop.identifier)}
+    found["images"].pop("Render Result", None)
+    found["selection"] = {
+        layer.name: (
+            sorted(o.name for o in layer.objects if o.select_get(view_layer=layer)),
+            layer.objects.active.name if layer.objects.active is not None else None,
+        )
+        for scene in bpy.data.scenes
+        for layer in scene.view_layers
+    }
+    return found
+
+
+def difference(before: dict[str, dict[str, Any]], after: dict[str, dict[str, Any]]) -> list[str]:
+    """Paths at which two of these differ; empty where nothing does."""
+    return _difference(before, after, "")
+
+
+def _difference(before: Any, after: Any, path: str) -> list[str]:
+    if isinstance(before, dict) and isinstance(after, dict):
+        keys = sorted(set(before) | set(after), key=str)
+        gone = [f"{path}/{k}: gone" for k in keys if k not in after]
+        new = [f"{path}/{k}: new" for k in keys if k not in before]
+        return (
+            gone
+            + new
+            + [
+                line
+                for k in keys
+                if k in before and k in after
+                for line in _difference(before[k], after[k], f"{path}/{k}")
+            ]
+        )
+    return [] if before == after else [f"{path}: {before!r} became {after!r}"[:300]]
+
+
+def _struct(value: Any, depth: int) -> dict[str, Any]:
+    """All properties of a datablock, or of a group within one."""
+    import bpy
+
+    bulk = _BULK.get(type(value).__name__, frozenset())
+    found = {}
+    for prop in value.bl_rna.properties:
+        name = prop.identifier
+        if name in PASSING or name in bulk:
+            continue
+        try:
+            held = getattr(value, name)
+        except (AttributeError, TypeError, RuntimeError):
+            continue  # what this Blender does not tell here
+        found[name] = _plain(held, prop, depth)
+    if bulk:
+        found["attributes"] = _bulk(value)
+    if isinstance(value, (bpy.types.ID, bpy.types.PropertyGroup)):
+        found["custom"] = _custom(value)
+    return found
+
+
+def _plain(held: Any, prop: Any, depth: int) -> Any:
+    import bpy
+
+    if prop.identifier == "species_editor":
+        # Its sliders show what is stored elsewhere, in the list of the file's own species: reading them takes long.
+        return held.species, held.order_index
+    if held is None:
+        return None
+    if prop.type == 'POINTER':
+        embedded = isinstance(held, bpy.types.ID) and held.is_embedded_data
+        if isinstance(held, bpy.types.ID) and not embedded:
+            return (type(held).__name__, held.name_full)
+        if isinstance(held, (bpy.types.Node, bpy.types.NodeSocket, bpy.types.NodeTreeInterfaceItem)):
+            return held.name  # where links lead; the node itself is told in its tree
+        return _struct(held, depth + 1) if depth < 6 else None
+    if prop.type == 'COLLECTION':
+        if depth >= 6:
+            return len(held)
+        return {n: _item(item, depth) for n, item in enumerate(held)}
+    if prop.type in {'FLOAT', 'INT', 'BOOLEAN'} and prop.is_array:
+        return tuple(np.array(held, dtype=float).reshape(-1).round(6).tolist())
+    if prop.type == 'ENUM' and prop.is_enum_flag:
+        return tuple(sorted(held))
+    if prop.type == 'FLOAT':
+        return round(held, 6)
+    return held
+
+
+def _item(item: Any, depth: int) -> Any:
+    import bpy
+
+    if item is None:
+        return None  # an empty slot of materials
+    if isinstance(item, bpy.types.ID) and not item.is_embedded_data:
+        return (type(item).__name__, item.name_full)
+    return _struct(item, depth + 1)
+
+
+def _custom(value: Any) -> dict[str, str]:
+    """Custom properties, those of add-ons excepted where they are properties of RNA as well."""
+    try:
+        names = [k for k in value.keys() if k not in value.bl_rna.properties]  # noqa: SIM118 (no mapping)
+    except TypeError:
+        return {}
+    return {k: repr(value[k].to_dict() if hasattr(value[k], "to_dict") else value[k]) for k in names}
+
+
+def _bulk(data: Any) -> dict[str, tuple[int, str, str, str]]:
+    """Attributes: how many values, on what, of which type, and a hash of them; the topology of faces among them."""
+    import bpy
+
+    found = {}
+    for layer in data.attributes:
+        if not len(layer.data) or layer.name.startswith(".select") or layer.name.startswith(".hide"):
+            continue
+        field = next((f for f in _FIELDS if hasattr(layer.data[0], f)), None)
+        if field is None:
+            found[layer.name] = (len(layer.data), layer.domain, layer.data_type, "")
+            continue
+        width = np.size(np.array(getattr(layer.data[0], field)))
+        values = np.empty(width * len(layer.data), np.float64)
+        layer.data.foreach_get(field, values)
+        found[layer.name] = (len(layer.data), layer.domain, layer.data_type, _hashed(values))
+    if isinstance(data, bpy.types.Mesh):
+        starts = np.empty(len(data.polygons), np.int32)
+        data.polygons.foreach_get("loop_start", starts)
+        found["faces"] = (len(starts), 'FACE', 'INT', _hashed(starts))
+    return found
+
+
+def _hashed(values: np.ndarray) -> str:
+    return hashlib.sha1(values.tobytes()).hexdigest()
