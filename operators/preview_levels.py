@@ -2,21 +2,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compute the levels that viewports preview, forget them, and look at them from where they were refined for."""
 
-import time
 from collections.abc import Generator
 
 import bpy
 from mathutils import Matrix
 
 from ..tetflora_addon.blender import job, preview_job, preview_state
-from ..tetflora_addon.errors import TetFloraError
 from ..tetflora_addon.preview.levels import Levels
 from ..tetflora_addon.refinement.camera import Camera
 from . import ids
-from .base import Reporting, counted
+from .base import counted
+from .modal_job import ModalJob
 
-# Seconds of work between two looks at the keyboard.
-_SLICE = 0.05
 #: Extent of a viewport's longer side at distance 1, times its focal length in millimetres.
 _VIEWPORT = 72.0
 
@@ -29,7 +26,7 @@ def _camera_is_there(cls: type[bpy.types.Operator], context: bpy.types.Context) 
     return False
 
 
-class TETFLORA_OT_preview_levels(Reporting, bpy.types.Operator):
+class TETFLORA_OT_preview_levels(ModalJob, bpy.types.Operator):
     """Refine without making anything."""
 
     bl_idname = ids.PREVIEW_LEVELS
@@ -40,85 +37,16 @@ class TETFLORA_OT_preview_levels(Reporting, bpy.types.Operator):
     )
     bl_options = {'REGISTER'}  # nothing in the file changes but the level that is shown
 
-    _steps: Generator[job.Progress, None, Levels] | None = None
-    _timer: bpy.types.Timer | None = None
+    cancelled = "Cancelled; levels are as they were"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return _camera_is_there(cls, context)
 
-    def run(self, context: bpy.types.Context) -> set[str]:
-        steps = self._begun(context)
-        while True:
-            try:
-                next(steps)
-            except StopIteration as stop:
-                return self._finish(context, stop.value)
-
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        if bpy.app.background or context.window is None:
-            return self.execute(context)
-        self._steps = self._begun(context)
-        try:
-            # The scene is read in the second step: what is wrong with it is said while the artist still looks here.
-            for _ in range(2):
-                progress = next(self._steps)
-        except TetFloraError as error:
-            self.report({'ERROR'}, str(error))
-            return {'CANCELLED'}
-        context.window_manager.progress_begin(0.0, 1.0)
-        self._show(context, progress)
-        self._timer = context.window_manager.event_timer_add(_SLICE / 5.0, window=context.window)
-        context.window_manager.modal_handler_add(self)
-        return {'RUNNING_MODAL'}
-
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if event.type == 'ESC' and event.value == 'PRESS':
-            self.cancel(context)
-            self.report({'INFO'}, "Cancelled; levels are as they were")
-            return {'CANCELLED'}
-        if event.type != 'TIMER':
-            return {'RUNNING_MODAL'}
-        end = time.monotonic() + _SLICE
-        try:
-            progress = next(self._steps)
-            while time.monotonic() < end:
-                progress = next(self._steps)
-        except StopIteration as stop:
-            self._leave(context)
-            return self._finish(context, stop.value)
-        except TetFloraError as error:
-            self.cancel(context)
-            self.report({'ERROR'}, str(error))
-            return {'CANCELLED'}
-        except BaseException:
-            self.cancel(context)
-            raise
-        self._show(context, progress)
-        return {'RUNNING_MODAL'}
-
-    def cancel(self, context: bpy.types.Context) -> None:
-        """Esc, or Blender ends the operator."""
-        if self._steps is not None:
-            self._steps.close()
-        self._leave(context)
-
-    def _begun(self, context: bpy.types.Context) -> Generator[job.Progress, None, Levels]:
+    def steps(self, context: bpy.types.Context) -> Generator[job.Progress, bool | None, Levels]:
         return preview_job.level_steps(context.scene, context.evaluated_depsgraph_get(), context.view_layer)
 
-    def _show(self, context: bpy.types.Context, progress: job.Progress) -> None:
-        context.window_manager.progress_update(progress.fraction)
-        context.workspace.status_text_set(f"TetFlora {progress.fraction:4.0%}   {progress.message}   |   Esc: cancel")
-
-    def _leave(self, context: bpy.types.Context) -> None:
-        self._steps = None
-        if self._timer is not None:
-            context.window_manager.event_timer_remove(self._timer)
-            self._timer = None
-            context.window_manager.progress_end()
-            context.workspace.status_text_set(None)
-
-    def _finish(self, context: bpy.types.Context, levels: Levels) -> set[str]:
+    def finish(self, context: bpy.types.Context, levels: Levels) -> set[str]:
         context.scene.tetflora.preview.level = levels.levels[-1].number
         last = levels.levels[-1]
         self.report(

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Refine the scene: at once in scripts, step by step with progress and Esc in the window."""
 
-import time
 from collections.abc import Generator
 
 import bpy
@@ -11,16 +10,13 @@ from ..tetflora_addon.blender import job
 from ..tetflora_addon.blender.plant_objects import plants_of, prepare_scene
 from ..tetflora_addon.blender.shell_bounces import few_bounces
 from ..tetflora_addon.blender.world_reader import read_world
-from ..tetflora_addon.errors import TetFloraError
 from ..tetflora_addon.refinement.statistics import Statistics
 from . import ids
-from .base import Reporting, counted
-
-# Seconds of work between two looks at the keyboard.
-_SLICE = 0.05
+from .base import counted
+from .modal_job import ModalJob
 
 
-class TETFLORA_OT_refine(Reporting, bpy.types.Operator):
+class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
     """Make meshes and proxies of all plants, as fine as the scene's camera sees them."""
 
     bl_idname = ids.REFINE
@@ -31,9 +27,7 @@ class TETFLORA_OT_refine(Reporting, bpy.types.Operator):
     )
     bl_options = {'REGISTER', 'UNDO'}
 
-    _steps: Generator[job.Progress, bool | None, Statistics] | None = None
-    _enough = False
-    _timer: bpy.types.Timer | None = None
+    keys = "Esc: cancel   |   Return: stop refining, keep what there is"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -45,84 +39,12 @@ class TETFLORA_OT_refine(Reporting, bpy.types.Operator):
             return False
         return True
 
-    def run(self, context: bpy.types.Context) -> set[str]:
-        statistics = job.refine(
+    def steps(self, context: bpy.types.Context) -> Generator[job.Progress, bool | None, Statistics]:
+        return job.refine_steps(
             context.scene, context.evaluated_depsgraph_get(), view_layer=context.view_layer, for_render=False
         )
-        return self._finish(context, statistics)
 
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        if bpy.app.background or context.window is None:
-            return self.execute(context)
-        self._steps = job.refine_steps(
-            context.scene, context.evaluated_depsgraph_get(), view_layer=context.view_layer, for_render=False
-        )
-        try:
-            # The scene is read in the second step: what is wrong with it is said while the artist still looks here.
-            for _ in range(2):
-                progress = next(self._steps)
-        except TetFloraError as error:
-            self.report({'ERROR'}, str(error))
-            return {'CANCELLED'}
-        manager = context.window_manager
-        manager.progress_begin(0.0, 1.0)
-        self._show(context, progress)
-        self._timer = manager.event_timer_add(_SLICE / 5.0, window=context.window)
-        manager.modal_handler_add(self)
-        return {'RUNNING_MODAL'}
-
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if event.type == 'ESC' and event.value == 'PRESS':
-            self.cancel(context)
-            self.report({'INFO'}, "Cancelled; the scene is as it was")
-            return {'CANCELLED'}
-        if event.type in {'RET', 'NUMPAD_ENTER'} and event.value == 'PRESS':
-            self._enough = True
-        if event.type != 'TIMER':
-            # Everything else waits: the scene must not change under the job.
-            return {'RUNNING_MODAL'}
-        end = time.monotonic() + _SLICE
-        try:
-            progress = self._next()
-            while time.monotonic() < end:
-                progress = self._next()
-        except StopIteration as stop:
-            self._leave(context)
-            return self._finish(context, stop.value)
-        except TetFloraError as error:
-            self.cancel(context)
-            self.report({'ERROR'}, str(error))
-            return {'CANCELLED'}
-        except BaseException:
-            self.cancel(context)
-            raise
-        self._show(context, progress)
-        return {'RUNNING_MODAL'}
-
-    def _next(self) -> job.Progress:
-        enough, self._enough = self._enough, False
-        return self._steps.send(enough)
-
-    def cancel(self, context: bpy.types.Context) -> None:
-        """Esc, or Blender ends the operator: what was half made goes."""
-        if self._steps is not None:
-            self._steps.close()
-        self._leave(context)
-
-    def _show(self, context: bpy.types.Context, progress: job.Progress) -> None:
-        context.window_manager.progress_update(progress.fraction)
-        keys = "Esc: cancel   |   Return: stop refining, keep what there is"
-        context.workspace.status_text_set(f"TetFlora {progress.fraction:4.0%}   {progress.message}   |   {keys}")
-
-    def _leave(self, context: bpy.types.Context) -> None:
-        self._steps = None
-        if self._timer is not None:
-            context.window_manager.event_timer_remove(self._timer)
-            self._timer = None
-            context.window_manager.progress_end()
-            context.workspace.status_text_set(None)
-
-    def _finish(self, context: bpy.types.Context, statistics: Statistics) -> set[str]:
+    def finish(self, context: bpy.types.Context, statistics: Statistics) -> set[str]:
         prepare_scene(context.scene)
         for area in context.screen.areas if context.screen else ():
             area.tag_redraw()

@@ -288,7 +288,8 @@ class _Operator:
         self.kind = session.part("operators.refine").TETFLORA_OT_refine
 
     def __getattr__(self, name):
-        return getattr(self.kind, name).__get__(self)
+        found = getattr(self.kind, name)
+        return found.__get__(self) if callable(found) else found
 
     def report(self, level, message):
         self.reports.append((level, message))
@@ -296,7 +297,7 @@ class _Operator:
 
 @pytest.fixture
 def window(blender, monkeypatch):
-    refine = session.part("operators.refine")
+    refine = session.part("operators.modal_job")
     # Not in the background as far as the operator can tell; a slice of no time is one step a tick.
     monkeypatch.setattr(refine, "bpy", SimpleNamespace(app=SimpleNamespace(background=False)))
     monkeypatch.setattr(refine, "_SLICE", 1e-9)
