@@ -64,7 +64,7 @@ class TetFloraPreview(bpy.types.PropertyGroup):
             "Draw tetrahedra as clouds of the colour and density of what they hold, made anew for each view from at "
             "most four triangles each. Those that matter most are drawn first, as many as keep the viewport quick"
         ),
-        default=True,
+        default=False,
         options=set(),
         update=_redraw,
     )
