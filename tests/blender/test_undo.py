@@ -301,3 +301,30 @@ def test_a_chain_of_operators_is_undone_step_by_step(history):
     for state in states[1:]:
         bpy.ops.ed.redo()
         assert difference(state, everything()) == []
+
+
+def test_a_population_on_a_collection_goes_on_after_undo(history):
+    """Grounds within a collection are read again after each undo; Blender's own cache of them does not outlive one."""
+    import bpy
+
+    ground_active()
+    grounds = bpy.data.collections.new("grounds")
+    inner = bpy.data.collections.new("inner")
+    scene().collection.children.link(grounds)
+    grounds.children.link(inner)
+    inner.objects.link(bpy.data.objects["ground"])
+    populated_on = {"count": 12, "species": MIX}
+    assert ops().populate('EXEC_DEFAULT', True, **populated_on) == {'FINISHED'}
+    scene().tetflora.populations[0].grounds.clear()
+    scene().tetflora.populations[0].ground_collection = grounds
+    bpy.ops.ed.undo_push(message="On a collection")
+    for _ in range(3):
+        assert ops().reroll_population('EXEC_DEFAULT', True) == {'FINISHED'}
+        assert ops().refine('EXEC_DEFAULT', True) == {'FINISHED'}
+        before = everything()
+        assert ops().update_population('EXEC_DEFAULT', True) == {'FINISHED'}
+        bpy.ops.ed.undo()
+        assert difference(before, everything()) == []
+        for _step in range(2):
+            bpy.ops.ed.undo()
+        assert scene().tetflora.populations[0].made == 12

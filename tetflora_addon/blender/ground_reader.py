@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from ..planting.ground import Ground, Path
 from .ground_curves import Line, lines_of
+from .plant_objects import objects_within
 from .transforms import world_matrix
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec. 709
@@ -91,7 +92,7 @@ def _lines(
     collection: bpy.types.Collection, depsgraph: bpy.types.Depsgraph, setting: str, closed: bool = False
 ) -> list[Line]:
     """Curves of a collection, those that are closed or all of them; there is at least one."""
-    found = [line for obj in collection.all_objects for line in lines_of(obj, depsgraph)]
+    found = [line for obj in objects_within(collection) for line in lines_of(obj, depsgraph)]
     if not found:
         raise SceneError(
             f'The collection "{collection.name}" for {setting} has no curves; draw one, or clear the setting'

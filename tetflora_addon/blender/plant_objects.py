@@ -279,6 +279,16 @@ def reseed(objects: Iterable[bpy.types.Object], roll: int = 0) -> int:
     return len(plants)
 
 
+def objects_within(collection: bpy.types.Collection) -> list[bpy.types.Object]:
+    """Objects of a collection and of those within it, each once.
+
+    What ``Collection.all_objects`` says; but that fills a cache which Blender 4.5 to 5.2 leaves stale at undo, and the
+    next undo, or reading it, may then end in a crash.
+    """
+    homes = [collection, *collection.children_recursive]
+    return list(dict.fromkeys(obj for home in homes for obj in home.objects))
+
+
 def remove_plants(objects: Iterable[bpy.types.Object]) -> int:
     """Delete plants from the file, and the collection for plants if that leaves it empty; how many there were."""
     plants = [o for o in plants_of(objects) if o.library is None]
@@ -291,5 +301,5 @@ def remove_empty_collections() -> None:
     """Remove collections for plants and for populations that hold nothing."""
     for mark in (POPULATION_MARK, _MARK):  # populations lie within
         for collection in [c for c in bpy.data.collections if c.get(mark) and c.library is None]:
-            if not collection.all_objects and not collection.children:
+            if not collection.objects and not collection.children:
                 bpy.data.collections.remove(collection)

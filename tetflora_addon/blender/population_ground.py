@@ -15,7 +15,7 @@ from ..planting.places import Occupied, Placement, place
 from .ground_reader import read_ground
 from .plant_fields import fields_of, read_field
 from .plant_kinds import species_of
-from .plant_objects import plants_of
+from .plant_objects import objects_within, plants_of
 from .population_properties import TetFloraPopulation
 from .population_rules import rules_from, unknown_species
 from .species_items import catalogue
@@ -29,7 +29,7 @@ def grounds_of(scene: bpy.types.Scene, population: TetFloraPopulation) -> list[b
     """
     named = [entry.object for entry in population.grounds]
     if population.ground_collection is not None:
-        named += population.ground_collection.all_objects
+        named += objects_within(population.ground_collection)
     meshes = dict.fromkeys(o for o in named if o is not None and o.type == 'MESH' and not o.tetflora.is_field)
     return [o for o in meshes if scene in o.users_scene]
 
