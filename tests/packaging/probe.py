@@ -39,7 +39,10 @@ def visible_state() -> set[str]:
     for keymap in (
         bpy.context.window_manager.keyconfigs.addon.keymaps if bpy.context.window_manager.keyconfigs.addon else ()
     ):
-        state |= {f"key {keymap.name} {item.idname}" for item in keymap.keymap_items}
+        # Of what opens a menu, the menu tells whose it is.
+        state |= {
+            f"key {keymap.name} {item.idname} {getattr(item.properties, 'name', '')}" for item in keymap.keymap_items
+        }
     return state | {f"path {path}" for path in sys.path}
 
 
