@@ -263,3 +263,23 @@ def test_a_job_that_is_told_to_stop_refining_makes_what_it_has():
     whole = _refine(scene)
     assert whole.complete
     assert whole.levels > statistics.levels
+
+
+def test_materials_show_the_colours_of_their_species_in_solid_viewports():
+    """Once: a colour that an artist gives stays."""
+    import bpy
+
+    add_camera(location=(0.0, -20.0, 4.0))
+    for i, species in enumerate(("cherry_blossom", "cypress")):
+        add_plant(species, seed=i, location=(6.0 * i - 3.0, 0.0, 0.0), species=species)
+    scene = bpy.context.scene
+    _refine(scene, expand_everything=True)
+    shown = {o.data.materials[0].name: tuple(o.data.materials[0].diffuse_color) for o in _made(scene)}
+    leaves = [colour for name, colour in shown.items() if name.endswith("leaf")]
+    assert len(leaves) == len(set(leaves)) == 3
+    blossom = next(colour for name, colour in shown.items() if "blossom" in name)
+    assert blossom[0] > blossom[1]  # pink
+    material = next(o.data.materials[0] for o in _made(scene) if o["tetflora_kind"] == "bark")
+    material.diffuse_color = (0.0, 0.0, 1.0, 1.0)
+    _refine(scene)
+    assert tuple(material.diffuse_color) == (0.0, 0.0, 1.0, 1.0)

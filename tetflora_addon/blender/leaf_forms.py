@@ -14,6 +14,7 @@ from ..plants.leaf_models import LeafModel, leaf_model
 from ..plants.species import LEAF_KINDS, Species
 from .materials import bark_material, leaf_material
 from .meshes import UV_MAP, read_mesh_arrays
+from .node_tools import is_ours
 from .output import replaced_material
 from .plant_form import read_skeleton
 from .plant_kinds import form_of, species_of
@@ -21,6 +22,7 @@ from .properties import leaf_objects
 from .species_edits import species_for
 
 _INDEX = "material_index"
+_COLOURED = "tetflora_coloured"  # on materials that have got their viewport colour; another is the artist's choice
 
 
 def resolved_species(scene: bpy.types.Scene, kind_of_plant: str, depsgraph: bpy.types.Depsgraph) -> Species:
@@ -103,10 +105,26 @@ def materials_of(scene: bpy.types.Scene, species: Species, kind: str, form: int)
     if replaced is not None:
         return [replaced]
     if kind == "bark":
-        return [bark_material(species.name, species.bark)]
+        return [_in_viewports(bark_material(species.name, species.bark), species, kind)]
     source = leaf_objects(scene).get(species.identifier) if kind == "leaf" else None
     if source is None:
         named = species_for(scene, species.identifier).forms(LEAF_KINDS.index(kind))[form]
         source = bpy.data.objects.get(named) if isinstance(named, str) else None
     own = [slot.material for slot in source.material_slots] if source is not None else []
-    return own if any(own) else [leaf_material(species.name if kind == "leaf" else f"{species.name} {kind}")]
+    if any(own):
+        return own
+    return [_in_viewports(leaf_material(species.name if kind == "leaf" else f"{species.name} {kind}"), species, kind)]
+
+
+def _in_viewports(material: bpy.types.Material, species: Species, kind: str) -> bpy.types.Material:
+    """The material, with the mean colour of the species in solid viewports and exports that know no nodes."""
+    if is_ours(material) and material.get(_COLOURED) is None:
+        material[_COLOURED] = True
+        every = [*species.orders, *([] if species.spur is None else [species.spur])]
+        orders = [order for order in every if kind == "bark" or order.leaf_kind == kind]
+        if orders and kind == "bark":
+            material.diffuse_color = (*orders[0].branch_colour.mean, 1.0)
+        elif orders:
+            inside, outside = orders[-1].leaf_colour.mean, orders[-1].leaf_colour_tip
+            material.diffuse_color = (*((a + b) / 2.0 for a, b in zip(inside, outside, strict=True)), 1.0)
+    return material
