@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``blender scene.blend --command tetflora refine|render|stats``: TetFlora for scripts and render farms.
+"""``blender scene.blend --command tetflora refine|render|stats|farm``: TetFlora for scripts and render farms.
 
 Exit codes: 0 done, 1 the scene or a file cannot be used, 2 wrong arguments. An error is one line on stderr. With
 ``--json`` the last line on stdout is one JSON object; Blender's own chatter comes before it.
@@ -18,9 +18,10 @@ from typing import Any
 import bpy
 
 from ..errors import SceneError, TetFloraError
-from . import handlers, job
+from . import farm_bundle, handlers, job
 from .camera_reader import read_camera
 from .compat import EEVEE_ENGINES, eevee_engine
+from .farm_template import Run, frame_numbers, frame_runs
 from .properties import TetFloraScene
 
 NAME = "tetflora"
@@ -74,7 +75,7 @@ def _parser() -> argparse.ArgumentParser:
         prog=f"blender FILE --command {NAME}",
         description="Refine and render the plants of a scene. Works on the file that Blender has opened.",
     )
-    commands = parser.add_subparsers(title="commands", required=True, metavar="refine|render|stats")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="refine|render|stats|farm")
 
     refine = commands.add_parser("refine", help="turn plants into meshes for the scene's camera")
     refine.add_argument("--cutoff", type=_positive, metavar="PIXELS", help="overrides the scene's cutoff")
@@ -84,20 +85,29 @@ def _parser() -> argparse.ArgumentParser:
     render = commands.add_parser("render", help="refine and render frames")
     which = render.add_mutually_exclusive_group()
     which.add_argument("--frame", type=int, metavar="N", help="frame to render; the scene's current one if not given")
-    which.add_argument("--frames", type=_frames, metavar="A-B", help="frames to render, first and last")
+    which.add_argument("--frames", type=_frames, metavar="A-B", help="frames to render, such as 1-24, 1-99:2 or 3,7-9")
     render.add_argument("--engine", choices=("cycles", "eevee"), help="overrides the scene's render engine")
     render.add_argument("--samples", type=_whole, metavar="N", help="overrides the samples of a pixel")
     render.add_argument("--output", type=Path, metavar="PATH", help="where pictures go; #### stands for the frame")
+    about = "render pictures that are there already, even if the scene's Overwrite is off"
+    render.add_argument("--overwrite", action="store_true", help=about)
     render.set_defaults(run=_render)
 
     stats = commands.add_parser("stats", help="count plants and the polygons that they stand for; changes nothing")
     stats.set_defaults(run=_stats)
 
+    farm = commands.add_parser("farm", help="write a job for a render farm (Open Job Description); changes nothing")
+    farm.add_argument("folder", type=Path, metavar="OUT_DIR", help="folder of the job; new or empty")
+    farm.add_argument("--chunk", type=_whole, default=1, metavar="N", help="frames that a worker renders in one go")
+    farm.add_argument("--frames", type=_frames, metavar="A-B", help="frames of the job; the scene's own if not given")
+    farm.add_argument("--copy", action="store_true", help="copy the file and what it uses into the job")
+    farm.set_defaults(run=_farm)
+
     for command in (refine, render):
         command.add_argument("--form", choices=_choices("proxy_form"), help="overrides the form of proxies")
         about = "overrides whether plants show light that was worked out at refinement"
         command.add_argument("--baked-light", choices=_choices("baked_light"), help=about)
-    for command in (refine, render, stats):
+    for command in (refine, render, stats, farm):
         command.add_argument("--json", action="store_true", help="print figures as one JSON object, in the last line")
     return parser
 
@@ -133,11 +143,14 @@ def _render(options: argparse.Namespace) -> dict | None:
             raise SceneError(f"The engine {scene.render.engine} has no samples; choose one with --engine")
     if options.output is not None:
         scene.render.filepath = str(options.output.absolute())
+    if options.overwrite:
+        scene.render.use_overwrite = True
+    failed = False
     if options.frames is not None:
-        scene.frame_start, scene.frame_end = options.frames
-        scene.frame_step = 1
-        bpy.ops.render.render(animation=True)
-        files = [scene.render.frame_path(frame=n) for n in range(options.frames[0], options.frames[1] + 1)]
+        for scene.frame_start, scene.frame_end, scene.frame_step in options.frames:
+            bpy.ops.render.render(animation=True)
+            failed = failed or bool(handlers.render_errors())  # each render forgets those before
+        files = [scene.render.frame_path(frame=n) for n in frame_numbers(options.frames)]
     else:
         if options.frame is not None:
             scene.frame_set(options.frame)
@@ -145,7 +158,7 @@ def _render(options: argparse.Namespace) -> dict | None:
         scene.render.filepath = _still_path(scene)
         bpy.ops.render.render(write_still=True)
         files = [bpy.path.ensure_ext(scene.render.filepath, scene.render.file_extension)]
-    if handlers.render_errors():
+    if failed or handlers.render_errors():
         return None  # said on stderr when it happened
     return {"files": [str(Path(bpy.path.abspath(f))) for f in files], **json.loads(scene.tetflora.statistics or "{}")}
 
@@ -153,6 +166,16 @@ def _render(options: argparse.Namespace) -> dict | None:
 def _stats(_options: argparse.Namespace) -> dict:
     statistics = job.estimate(bpy.context.scene, bpy.context.evaluated_depsgraph_get())
     return {"plants": statistics.plants, "polygons_full": statistics.polygons_full}
+
+
+def _farm(options: argparse.Namespace) -> dict:
+    written = farm_bundle.write_bundle(bpy.context.scene, options.folder, options.chunk, options.frames, options.copy)
+    for path in written["missing"]:
+        print(f"tetflora: warning: the file uses {path}, which is not there", file=sys.stderr, flush=True)
+    for path in written["absolute_paths"]:
+        about = "other machines may not have it there; File > External Data > Make Paths Relative"
+        print(f"tetflora: warning: the file names {path} from the root: {about}", file=sys.stderr, flush=True)
+    return written
 
 
 def _still_path(scene: bpy.types.Scene) -> str:
@@ -185,11 +208,11 @@ def _whole(text: str) -> int:
     return value
 
 
-def _frames(text: str) -> tuple[int, int]:
-    match = re.fullmatch(r"(-?\d+)-(-?\d+)", text)
-    if not match or int(match[1]) > int(match[2]):
-        raise argparse.ArgumentTypeError(f"{text} is not a range of frames such as 1-24")
-    return int(match[1]), int(match[2])
+def _frames(text: str) -> list[Run]:
+    try:
+        return frame_runs(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def _readable(value: object) -> str:

@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Installs TetFlora on a worker of a farm; `farm_bundle` copies this file into each job beside the extension's zip.
+
+    BLENDER_USER_RESOURCES=/new/folder blender --background --python-exit-code 1 --python install_tetflora.py
+
+Nothing of the extension is imported: it is not installed yet. The folder named by the variable belongs to the job, so
+that a worker's own add-ons and preferences are neither used nor changed.
+"""
+
+import os
+import shutil
+import sys
+from pathlib import Path
+
+import bpy
+
+REPOSITORY = "user_default"
+PACKAGE = f"bl_ext.{REPOSITORY}.tetflora"
+
+
+def install(folder: Path) -> None:
+    """Install the zip of a folder, and the species beside it; exits with a message if that is not possible."""
+    home = os.environ.get("BLENDER_USER_RESOURCES")
+    if not home:
+        sys.exit("tetflora: error: set BLENDER_USER_RESOURCES to a folder of this job, then run this again")
+    zips = sorted(folder.glob("tetflora-*.zip"))
+    if len(zips) != 1:
+        sys.exit(f"tetflora: error: {folder} holds {len(zips)} files tetflora-*.zip, not one; write the job again")
+    # Without the folder Blender falls back to the user's own.
+    for name in ("config", "extensions", "scripts", "datafiles"):
+        Path(home, name).mkdir(parents=True, exist_ok=True)
+    bpy.ops.extensions.package_install_files(filepath=str(zips[0]), repo=REPOSITORY, enable_on_install=True)
+    if PACKAGE not in bpy.context.preferences.addons:
+        sys.exit(f"tetflora: error: {zips[0].name} could not be installed; Blender's reason is above")
+    bpy.ops.wm.save_userpref()
+    species = Path(bpy.utils.extension_path_user(PACKAGE, path="species", create=True))
+    for path in sorted(folder.glob("species/*.json")):
+        shutil.copyfile(path, species / path.name)
+    print(f"tetflora: {zips[0].name} installed in {home}", flush=True)
+
+
+if __name__ == "__main__":
+    install(Path(__file__).resolve().parent)
