@@ -57,6 +57,10 @@ def steps(ui):
     yield from ui.picture("rendered")
     bpy.context.scene.tetflora.refine_at_render = False
     ui.values["green_without"] = yield from render(ui, "render_without")
+    yield 1.0
+    yield from ui.picture("nothing_refined")  # a menu says so, with what mends it
+    ui.press('ESC')
+    yield 1.0
 
     # Without the sidebar: search, type, Return.
     yield from press_key(ui, 'Z', ctrl=True)

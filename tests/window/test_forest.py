@@ -75,6 +75,8 @@ def test_populate_can_be_adjusted_afterwards(seen: dict) -> None:
     assert [species for _, species, _ in seen["adjusted"]] == ["bush"] * 5
 
 
-@pytest.mark.parametrize("name", ["populated", "progress", "refined", "escaped", "rendered", "search"])
+@pytest.mark.parametrize(
+    "name", ["populated", "progress", "refined", "escaped", "rendered", "nothing_refined", "search"]
+)
 def test_the_window_was_drawn(seen: dict, pictures: Path, colours: Callable[[Path], int], name: str) -> None:
     assert colours(pictures / "forest" / f"{name}.png") > 200
