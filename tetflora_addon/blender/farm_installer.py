@@ -17,6 +17,8 @@ import bpy
 
 REPOSITORY = "user_default"
 PACKAGE = f"bl_ext.{REPOSITORY}.tetflora"
+#: Ways to a graphics card, the fastest first.
+GRAPHICS = ('OPTIX', 'CUDA', 'HIP', 'ONEAPI', 'METAL')
 
 
 def install(folder: Path) -> None:
@@ -33,11 +35,32 @@ def install(folder: Path) -> None:
     bpy.ops.extensions.package_install_files(filepath=str(zips[0]), repo=REPOSITORY, enable_on_install=True)
     if PACKAGE not in bpy.context.preferences.addons:
         sys.exit(f"tetflora: error: {zips[0].name} could not be installed; Blender's reason is above")
+    _choose_graphics_cards()
     bpy.ops.wm.save_userpref()
     species = Path(bpy.utils.extension_path_user(PACKAGE, path="species", create=True))
     for path in sorted(folder.glob("species/*.json")):
         shutil.copyfile(path, species / path.name)
     print(f"tetflora: {zips[0].name} installed in {home}", flush=True)
+
+
+def _choose_graphics_cards() -> None:
+    """Let Cycles use them in scenes that ask for them: in new settings no device is chosen, and it would use none."""
+    cycles = bpy.context.preferences.addons.get("cycles")
+    if cycles is None:
+        return
+    for kind in GRAPHICS:
+        try:
+            cycles.preferences.compute_device_type = kind
+        except TypeError:  # not in this build of Blender
+            continue
+        cycles.preferences.refresh_devices()
+        found = [device for device in cycles.preferences.devices if device.type == kind]
+        if found:
+            for device in found:
+                device.use = True
+            print(f"tetflora: {kind}: {', '.join(device.name for device in found)}", flush=True)
+            return
+    cycles.preferences.compute_device_type = 'NONE'
 
 
 if __name__ == "__main__":
