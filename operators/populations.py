@@ -6,7 +6,7 @@ import bpy
 from bpy.props import BoolProperty
 
 from ..tetflora_addon.blender import point_preview
-from ..tetflora_addon.blender.population_rules import copy_settings
+from ..tetflora_addon.blender.population_rules import active_population, copy_settings
 from ..tetflora_addon.blender.populations import (
     Made,
     add_population,
@@ -45,12 +45,6 @@ def report_made(operator: bpy.types.Operator, made: Made) -> None:
     operator.report({'INFO'}, f"{counted(made.number, 'plant')} placed{where}{returned}")
 
 
-def _active(context: bpy.types.Context) -> bpy.types.PropertyGroup | None:
-    settings = context.scene.tetflora
-    number = settings.populations_index
-    return settings.populations[number] if 0 <= number < len(settings.populations) else None
-
-
 class _OfPopulation(Reporting):
     """Mix-in for operators on the active population."""
 
@@ -58,10 +52,10 @@ class _OfPopulation(Reporting):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not in_object_mode(cls, context):
             return False
-        if _active(context) is None:
+        if active_population(context.scene) is None:
             cls.poll_message_set("Add a population first")
             return False
-        return cls.poll_population(context, _active(context))
+        return cls.poll_population(context, active_population(context.scene))
 
     @classmethod
     def poll_population(cls, _context: bpy.types.Context, _population: bpy.types.PropertyGroup) -> bool:
@@ -96,7 +90,7 @@ class TETFLORA_OT_add_population(Reporting, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.tetflora
-        number = settings.populations_index if _active(context) else None
+        number = settings.populations_index if active_population(context.scene) else None
         population = add_population(context.scene, selected_grounds(context))
         if number is not None:
             # Fetched again: adding to a list moves what is in it.
@@ -117,7 +111,9 @@ class TETFLORA_OT_update_population(_Replacing, bpy.types.Operator):
     bl_options = {'REGISTER', 'UNDO'}
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        report_made(self, make_plants(context.scene, context.evaluated_depsgraph_get(), _active(context)))
+        report_made(
+            self, make_plants(context.scene, context.evaluated_depsgraph_get(), active_population(context.scene))
+        )
         return {'FINISHED'}
 
 
@@ -130,7 +126,7 @@ class TETFLORA_OT_reroll_population(_Replacing, bpy.types.Operator):
     bl_options = {'REGISTER', 'UNDO'}
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        report_made(self, reroll(context.scene, context.evaluated_depsgraph_get(), _active(context)))
+        report_made(self, reroll(context.scene, context.evaluated_depsgraph_get(), active_population(context.scene)))
         return {'FINISHED'}
 
 
@@ -146,7 +142,7 @@ class TETFLORA_OT_freeze_population(_OfPopulation, bpy.types.Operator):
     bl_options = {'REGISTER', 'UNDO'}
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        population = _active(context)
+        population = active_population(context.scene)
         population.frozen = not population.frozen
         state = "frozen: its plants are yours" if population.frozen else "no longer frozen: Update replaces its plants"
         self.report({'INFO'}, f'"{population.name}" is {state}')
@@ -169,7 +165,7 @@ class TETFLORA_OT_remove_population(_OfPopulation, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> set[str]:
         index = context.scene.tetflora.populations_index
-        name = _active(context).name
+        name = active_population(context.scene).name
         number = remove_population(context.scene, index, self.keep_plants)
         self.report({'INFO'}, f'"{name}" removed with {counted(number, "plant")}')
         point_preview.schedule()
@@ -185,7 +181,7 @@ class TETFLORA_OT_select_population(_OfPopulation, bpy.types.Operator):
     bl_options = {'REGISTER', 'UNDO'}
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        own = own_objects(context.scene, _active(context))
+        own = own_objects(context.scene, active_population(context.scene))
         if not own:
             self.report({'WARNING'}, "The population has no plants; press Update")
             return {'CANCELLED'}
@@ -206,7 +202,7 @@ class TETFLORA_OT_set_population_ground(_OfPopulation, bpy.types.Operator):
         return ground_selected(cls, context)
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        set_grounds(_active(context), selected_grounds(context))
+        set_grounds(active_population(context.scene), selected_grounds(context))
         point_preview.schedule()
         return {'FINISHED'}
 

@@ -166,15 +166,18 @@ def _facets(
         inside, side = result.in_view[cell], sizes.sides(facet_pixels)
         share = share_of(row, sizes.whole_optical / np.maximum(side[0], 1e-12) ** 2)
         wanted = _Wanted(*side, share, explicit[cell], inside & ~sizes.hidden)
-        every.append((things, wanted, inside, sizes.counts(facet_pixels) + 1, flora.rows["species"][row], make))
+        of_species = flora.rows["species"][row]
+        order = np.argsort(of_species, kind="stable")
+        first = np.searchsorted(of_species[order], np.arange(len(flora.species) + 1))
+        every.append((things, wanted, inside, sizes.counts(facet_pixels) + 1, order, first, make))
     for species in range(len(flora.species)):
-        for things, wanted, inside, expected, of_species, make in every:
-            own = of_species == species
+        for things, wanted, inside, expected, order, first, make in every:
+            own = order[first[species] : first[species + 1]]
             for seen in (True, False):
-                for i in _runs(expected, np.flatnonzero(own & inside & (wanted.seen == seen))):
+                for i in _runs(expected, own[inside[own] & (wanted.seen[own] == seen)]):
                     yield species, make(flora, transition, things.take(i), wanted.take(i)), seen
             # What is beside the view must not reach into the picture.
-            for i in _runs(expected, np.flatnonzero(own & ~inside)):
+            for i in _runs(expected, own[~inside[own]]):
                 made = make(flora, transition, things.take(i), wanted.take(i))
                 yield species, kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5), False
     proxies = contents.within(~explicit)

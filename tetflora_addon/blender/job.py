@@ -133,7 +133,7 @@ def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_laye
         lights = read_lights(depsgraph, view_layer) if scene.tetflora.shadow_cutoff > 0.0 else ()
         baked = scene.tetflora.baked_light != 'OFF' and not scene.tetflora.expand_everything
         sources = read_sources(scene, depsgraph, view_layer) if baked else None
-        return Given(seeds, explicit, read_occluders(scene, depsgraph), lights, sources)
+        return Given(seeds, explicit, read_occluders(scene, depsgraph, view_layer), lights, sources)
 
 
 def _polygons_full(flora: Flora, given: Given) -> int:
@@ -175,7 +175,7 @@ def refine_steps(
     yield Progress(0.0, "Reading the scene")
     camera = read_camera(scene, depsgraph, region_only=for_render)
     given = read_scene(scene, depsgraph, view_layer or depsgraph.view_layer)
-    settings = _settings(scene)
+    settings = refinement_settings(scene)
     clock.lap("read")
     yield Progress(0.02, "Compiling species")
     flora = compile_for(given.species, scene, depsgraph)
@@ -251,7 +251,9 @@ def partition(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[C
         As `refine_steps`.
     """
     camera, given = read_camera(scene, depsgraph), read_scene(scene, depsgraph, depsgraph.view_layer)
-    loop = _run_loop(compile_for(given.species, scene, depsgraph), given, camera, _settings(scene), Statistics())
+    loop = _run_loop(
+        compile_for(given.species, scene, depsgraph), given, camera, refinement_settings(scene), Statistics()
+    )
     while True:
         try:
             next(loop)
@@ -278,7 +280,8 @@ def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:
     return removed
 
 
-def _settings(scene: bpy.types.Scene) -> RefinementSettings:
+def refinement_settings(scene: bpy.types.Scene) -> RefinementSettings:
+    """The scene's settings, as fine as its form of proxies needs them."""
     settings = settings_from(scene)
     if scene.tetflora.proxy_form != 'SHELLS':
         return settings

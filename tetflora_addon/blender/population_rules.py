@@ -41,11 +41,16 @@ def copy_companion(source: TetFloraMixEntry, target: TetFloraMixEntry) -> None:
         setattr(target, name, getattr(source, name))
 
 
-def shown_population(scene: bpy.types.Scene) -> TetFloraPopulation:
-    """What the panel shows: the active population, or the settings for new ones where there is none."""
+def active_population(scene: bpy.types.Scene) -> TetFloraPopulation | None:
+    """The population that buttons act on; None where there is none."""
     settings = scene.tetflora
     number = settings.populations_index
-    return settings.populations[number] if 0 <= number < len(settings.populations) else settings.populate
+    return settings.populations[number] if 0 <= number < len(settings.populations) else None
+
+
+def shown_population(scene: bpy.types.Scene) -> TetFloraPopulation:
+    """What the panel shows: the active population, or the settings for new ones where there is none."""
+    return active_population(scene) or scene.tetflora.populate
 
 
 def rules_from(population: TetFloraPopulation) -> tuple[Rules, tuple[str, ...]]:

@@ -9,27 +9,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Generator
-from dataclasses import replace
 
 import bpy
-import numpy as np
 from bpy.app.handlers import persistent
 
 from ..errors import TetFloraError
-from ..plants.seeds import Seeds
 from ..preview.levels import Levels, gather
 from ..preview.light_plants import Shapes, bounds_of_plants, light_plants
 from ..refinement.loop import refine as refine_loop
-from ..refinement.polygons import Polygons
 from . import job, preview_state, species_edits
 from .camera_reader import read_camera
-from .emit import originals_shown
-from .explicit_objects import read_explicit
-from .light_reader import read_lights
 from .preview_state import camera_now, find, of, redraw
-from .properties import settings_from
-from .scene_reader import NoPlantsError, read_occluders, read_plants
-from .species_items import catalogue
+from .scene_reader import NoPlantsError, read_plants
 
 _SOON = 0.2  # seconds from a change of plants to reading them again
 
@@ -45,27 +36,15 @@ def level_steps(
         As `job.refine_steps`.
     """
     yield job.Progress(0.0, "Reading the scene")
-    layer = view_layer or depsgraph.view_layer
     looked = camera_now(scene)
     before = find(scene)
     camera = before.frozen if before is not None and before.frozen is not None else read_camera(scene, depsgraph)
-    settings = settings_from(scene)
-    if scene.tetflora.proxy_form == 'SHELLS':
-        settings = replace(settings, hidden_block=job.SHELL_BLOCK, proxy_block=job.SEEN_SHELL_BLOCK)
-    with originals_shown(scene, depsgraph):
-        explicit = read_explicit(depsgraph, layer)
-        try:
-            seeds = read_plants(scene, depsgraph, layer)
-        except NoPlantsError:
-            if explicit is None:
-                raise
-            seeds = _no_seeds()
-        occluders = read_occluders(scene, depsgraph, layer)
-        lights = read_lights(depsgraph, layer) if settings.shadow_cutoff > 0.0 else ()
+    given = job.read_scene(scene, depsgraph, view_layer or depsgraph.view_layer)
     yield job.Progress(0.02, "Compiling species")
-    flora = job.compile_for(seeds.identifiers or (min(catalogue()),), scene, depsgraph)
-    polygons = None if explicit is None else Polygons.everything(explicit.meshes)
-    loop = gather(refine_loop(flora, seeds, camera, settings, occluders, polygons, lights), flora, camera)
+    flora = job.compile_for(given.species, scene, depsgraph)
+    settings = job.refinement_settings(scene)
+    states = refine_loop(flora, given.seeds, camera, settings, given.occluders, given.polygons, given.lights)
+    loop = gather(states, flora, camera)
     fraction = 0.05
     while True:
         try:
@@ -82,12 +61,6 @@ def level_steps(
         preview.frozen = camera
     redraw()
     return levels
-
-
-def _no_seeds() -> Seeds:
-    none = np.zeros(0)
-    frames = none.reshape(0, 3), none.reshape(0, 3, 3)
-    return Seeds((), none.astype(np.int32), none.astype(np.int64), *frames, none)
 
 
 def read_shapes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Shapes | None:

@@ -42,7 +42,7 @@ class Camera:
     focus : float
         Depth that is sharp, metres.
     shutter : tuple of Camera
-        The camera at other times while the shutter is open; empty where it does not move.
+        The camera at other times while the shutter is open, and the other eyes of a stereoscopic picture; often empty.
     """
 
     kind: Literal["PERSP", "ORTHO", "PANO"]
