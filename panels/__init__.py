@@ -19,6 +19,7 @@ from . import (
     refinement_panel,
     species_panel,
     statistics_panel,
+    wind_panel,
 )
 
 CLASSES = (
@@ -36,6 +37,7 @@ CLASSES = (
     species_panel.TETFLORA_PT_species_whole,
     *populate_panel.CLASSES,
     brush_panel.TETFLORA_PT_brush,
+    wind_panel.TETFLORA_PT_wind,
     refinement_panel.TETFLORA_PT_refinement,
     refinement_panel.TETFLORA_PT_limits,
     refinement_panel.TETFLORA_PT_proxy_shading,

@@ -23,6 +23,7 @@ GROUPS = (
     ("output_properties", "TetFloraSpeciesOutput"),
     ("preview_properties", "TetFloraPreview"),
     ("brush_properties", "TetFloraBrush"),
+    ("wind_properties", "TetFloraWind"),
 )
 
 

@@ -26,6 +26,7 @@ from .node_tools import is_ours
 from .plant_objects import prepare_scene
 from .properties import settings_from
 from .scene_digest import scene_digest
+from .wind_properties import wind_of
 
 #: Seconds without a change before it begins, and seconds of work between two redraws.
 QUIET, SLICE = 0.6, 0.03
@@ -160,7 +161,9 @@ def on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if _state.working or not scene.tetflora.auto_refine:
         return
     settings = f"{settings_from(scene)}{scene.tetflora.proxy_form}{scene.tetflora.baked_light}{scene.camera}"
-    settings += f"{scene.tetflora.expand_everything}{scene.render.resolution_x}{scene.render.resolution_y}"
+    settings += (
+        f"{scene.tetflora.expand_everything}{scene.render.resolution_x}{scene.render.resolution_y}{wind_of(scene)}"
+    )
     other = _seen.get(scene.name) != settings
     _seen[scene.name] = settings
     concerns = [update for update in depsgraph.updates if _concerns(update)]
@@ -170,6 +173,13 @@ def on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         # the job would stop itself for ever. Whoever hid an object meanwhile is heard when it is done.
         _state.again = _state.again or bool(concerns)
     elif other or concerns:
+        schedule(scene)
+
+
+@persistent
+def on_frame(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
+    """Another frame: in the wind all plants have moved."""
+    if not _state.working and scene.tetflora.auto_refine and wind_of(scene) is not None:
         schedule(scene)
 
 
@@ -205,6 +215,7 @@ def on_load(*_arguments: object) -> None:
 
 _HANDLERS = {
     "depsgraph_update_post": (on_change,),
+    "frame_change_post": (on_frame,),
     "undo_pre": (on_interruption,),
     "redo_pre": (on_interruption,),
     "render_init": (on_interruption,),

@@ -40,6 +40,7 @@ from .properties import settings_from
 from .proxies import tell_facets, write_proxies
 from .scene_reader import NoPlantsError, read_occluders, read_plants
 from .species_items import catalogue
+from .wind_properties import wind_of
 
 __all__ = ["Progress", "clear", "compile_for", "estimate", "has_results", "partition", "refine", "refine_steps"]
 
@@ -76,6 +77,12 @@ def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph:
         Unknown or broken species, or a leaf object that is missing or not a mesh with faces.
     """
     return compile_species([resolved_species(scene, identifier, depsgraph) for identifier in identifiers])
+
+
+def blown(scene: bpy.types.Scene, flora: Flora) -> Flora:
+    """A flora in the scene's wind at its frame."""
+    wind = wind_of(scene)
+    return flora if wind is None else flora.in_wind(wind)
 
 
 def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statistics:
@@ -178,7 +185,7 @@ def refine_steps(
     settings = refinement_settings(scene)
     clock.lap("read")
     yield Progress(0.02, "Compiling species")
-    flora = compile_for(given.species, scene, depsgraph)
+    flora = blown(scene, compile_for(given.species, scene, depsgraph))
     clock.lap("compile")
     full = _polygons_full(flora, given)
     statistics = Statistics(plants=len(given.seeds), polygons_full=full, seconds=clock.seconds)
@@ -251,9 +258,8 @@ def partition(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[C
         As `refine_steps`.
     """
     camera, given = read_camera(scene, depsgraph), read_scene(scene, depsgraph, depsgraph.view_layer)
-    loop = _run_loop(
-        compile_for(given.species, scene, depsgraph), given, camera, refinement_settings(scene), Statistics()
-    )
+    flora = blown(scene, compile_for(given.species, scene, depsgraph))
+    loop = _run_loop(flora, given, camera, refinement_settings(scene), Statistics())
     while True:
         try:
             next(loop)

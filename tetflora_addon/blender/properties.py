@@ -26,6 +26,7 @@ from .refinement_properties import RefinementProperties
 from .species_choice import SpeciesChoice
 from .species_editor import TetFloraSpeciesEditor
 from .species_edits import TetFloraSpeciesEdit
+from .wind_properties import TetFloraWind
 
 _FORM = {
     "name": "Form",
@@ -219,6 +220,7 @@ class TetFloraScene(RefinementProperties, bpy.types.PropertyGroup):
     populations_index: IntProperty(name="Active Population", options={'HIDDEN', 'SKIP_SAVE'})
     output: PointerProperty(type=output_properties.TetFloraOutput)
     brush: PointerProperty(type=TetFloraBrush)
+    wind: PointerProperty(type=TetFloraWind)
     preview: PointerProperty(type=TetFloraPreview)
     leaf_objects: CollectionProperty(
         name="Leaf Objects",
@@ -249,6 +251,7 @@ CLASSES = (
     TetFloraPreview,
     TetFloraSpeciesEdit,
     TetFloraSpeciesEditor,
+    TetFloraWind,
     *output_properties.CLASSES,
     TetFloraScene,
 )

@@ -15,12 +15,15 @@ from .job import read_scene
 from .leaf_forms import resolved_species
 from .output import REPLACED
 from .properties import settings_from
+from .wind_properties import wind_of
 
 _CHOICES = ("proxy_form", "baked_light", "expand_everything")
 
 
 def scene_digest(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> str:
-    """Digest of camera, plants, meshes that take part or hide plants, lamps, settings, species and materials.
+    """Digest of camera, plants, meshes that take part or hide plants, lamps, settings, species, materials and wind.
+
+    In the wind it is another at each frame.
 
     Raises
     ------
@@ -46,6 +49,7 @@ def scene_digest(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_la
         [getattr(group, name) for name in _CHOICES],
         species,
         materials,
+        wind_of(scene),
     ):
         _add(content, part)
     return content.hexdigest()

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Centre lines of branches: straight segments that bend at joints, and turn to the sky or the ground."""
+"""Centre lines of branches: straight segments that bend at joints, turn to the sky or the ground, and sway."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from .branches import Branches
 from .hashing import Draw, signed
 from .rows import varied
 from .vectors import by_component, columns, gathered
+from .wind import axis_and_angle, is_windy, leant, sway, turned_by
 
 
 @dataclass(frozen=True)
@@ -95,6 +96,9 @@ def axes(rows: NDArray[np.void], branches: Branches) -> Axes:
     pull = varied(attraction[attracted], branches.key[attracted], Draw.ATTRACTION) / segments[attracted]
     frame, knot = by_component(branches.frame), by_component(branches.position)
     knots[:, 0] = knot
+    windy = is_windy(rows)
+    if windy:
+        axis, angle = axis_and_angle(sway(rows, branches) / segments[:, None])
     for s in range(most):
         if s:
             # The joint in the middle of an even number of segments belongs to the outer half.
@@ -107,8 +111,10 @@ def axes(rows: NDArray[np.void], branches: Branches) -> Axes:
                 frame = _pulled(frame, pull)
             elif len(attracted):
                 frame[attracted] = _pulled(gathered(frame, attracted), pull)
-        knot = np.where((s < segments)[:, None], knot + step * frame[:, :, 2], knot)
-        frames[:, s], knots[:, s + 1] = frame, knot
+        # What the wind does is not passed on to the next joint, or it would change how the branch grows.
+        shown = turned_by(frame, axis, (s + 1) * angle) if windy else frame
+        knot = np.where((s < segments)[:, None], knot + step * shown[:, :, 2], knot)
+        frames[:, s], knots[:, s + 1] = shown, knot
     by_hand = np.flatnonzero(rows["drawn"][branches.row])
     if len(by_hand):
         knots[by_hand], frames[by_hand] = _drawn_axes(rows, branches.take(by_hand), most)
@@ -121,7 +127,26 @@ def _drawn_axes(rows: NDArray[np.void], branches: Branches, most: int) -> tuple[
     turn = branches.frame @ local[:, 0].transpose(0, 2, 1)
     scale = branches.length / rows["size"][branches.row, 0]
     knots = np.einsum("nij,nsj->nsi", turn * scale[:, None, None], line - line[:, :1]) + branches.position[:, None]
-    return knots[:, : most + 1], (turn[:, None] @ local)[:, :most]
+    knots, frames = knots[:, : most + 1], (turn[:, None] @ local)[:, :most]
+    return _leant(rows, branches, turn, knots, frames) if is_windy(rows) else (knots, frames)
+
+
+def _leant(
+    rows: NDArray[np.void], branches: Branches, turn: NDArray, knots: NDArray, frames: NDArray
+) -> tuple[NDArray, NDArray]:
+    """Branches drawn by hand in the wind, whose plants have the axes ``turn`` (n, 3, 3)."""
+    line = rows["knots"][branches.row, 0]
+    ground = branches.position - np.einsum("nij,nj->ni", turn, line) * branches.scale[:, None]
+    up = turn[:, :, 2]
+    whole = replace(branches, position=ground, frame=turn)
+    rate = sway(rows, whole) / branches.scale[:, None]
+    bent = leant(knots - ground[:, None], up, rate) + ground[:, None]
+    axis, rate = axis_and_angle(rate)
+    middle = (knots[:, 1:] + knots[:, :-1]) / 2 - ground[:, None]
+    height = np.maximum(np.einsum("nsi,ni->ns", middle, up), 0.0)
+    segments = height.shape[1]
+    axis, angle = np.repeat(axis, segments, axis=0), (rate[:, None] * height).ravel()
+    return bent, turned_by(frames.reshape(-1, 3, 3), axis, angle).reshape(frames.shape)
 
 
 def _bent(frame: NDArray[np.float64], pitch: NDArray[np.float64], yaw: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -18,6 +18,7 @@ from .crown_shapes import crown_ratio
 from .leaf_models import LeafModel
 from .rows import FORK, LATERAL, SPUR
 from .samples import Points
+from .wind import widest_sway
 
 _SLABS = 48
 _ANGLES = 33
@@ -29,7 +30,7 @@ def _axis_envelope(row: NDArray[np.void]) -> tuple[NDArray, NDArray, NDArray, ND
     segments = int(row["segments"])
     # Turns of joints add up at most. The joint in the middle of an even number belongs to the outer half.
     joint = np.repeat(_joint_turns(row), [(segments + 1) // 2, segments // 2])
-    joint[0] = 0  # the first segment sets out straight
+    joint[0] = widest_sway(row) / segments  # the first segment sets out straight, but for the wind
     turn = np.minimum(np.cumsum(joint), np.pi)
     sideways = np.sin(np.minimum(turn, np.pi / 2)) / segments
     radius = np.concatenate([[0], np.cumsum(sideways)])
@@ -44,7 +45,7 @@ def _joint_turns(row: NDArray[np.void]) -> NDArray[np.float64]:
     variation = row["curvature"][..., 1, None]
     # A joint bends back by a, then aside by b: cos c = cos a cos b, and c² ≤ a² + b².
     pulled = np.abs(row["attraction"]).sum(axis=-1)[..., None]
-    return (np.hypot(back + variation, variation) + pulled) / row["segments"][..., None]
+    return (np.hypot(back + variation, variation) + pulled + widest_sway(row)[..., None]) / row["segments"][..., None]
 
 
 def ring_stretch(rows: NDArray[np.void]) -> NDArray[np.float64]:

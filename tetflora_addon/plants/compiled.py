@@ -9,7 +9,7 @@ sub-plant are kept as a few hundred sample points, drawn by following random pat
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -26,6 +26,7 @@ from .quality import with_quality
 from .rows import LATERAL, build_rows
 from .samples import Samples, draw_samples
 from .species import LEAF_KINDS, Species
+from .wind import Wind, is_windy, widest_sway, windy_rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +77,8 @@ class Flora:
         Expected one-sided area of leaves at `averages.NODES`, m² at plant scale 1.
     colour_nodes : (r, 3, 3) float64
         Area times mean colour at the same places.
+    calm : Flora or None
+        The same without the wind that this one is in.
     """
 
     species: tuple[Species, ...]
@@ -100,28 +103,51 @@ class Flora:
     averages: Averages
     area_nodes: NDArray[np.float64]
     colour_nodes: NDArray[np.float64]
+    calm: Flora | None = None
+
+    @property
+    def at_rest(self) -> Flora:
+        """The flora without wind: what is inside of sub-plants is known of plants that do not move."""
+        return self.calm or self
+
+    def in_wind(self, wind: Wind) -> Flora:
+        """The flora in a wind; bounds hold at all times."""
+        if wind.speed == 0:
+            return self.at_rest
+        windy = _windy(self.at_rest, replace(wind, time=0.0))
+        rows = windy.rows.copy()
+        rows["air"]["time"] = wind.time
+        return replace(windy, rows=rows)
 
     @cached_property
     def samples(self) -> Samples:
         """Points on the leaves and wood of sub-plants; drawn when first asked for, as only proxies need them."""
+        if self.calm is not None:
+            return self.calm.samples
         amounts = self.averages
         return draw_samples(self.rows, amounts.leaf_area[:, 1], _wood_shares(amounts), amounts.length)
 
     @cached_property
     def sampled_bound(self) -> NDArray[np.float64]:
         """Radius, and lowest and highest place along the branch (r, 3), of all samples; unit is the branch's length."""
+        if self.calm is not None:
+            return self.calm.sampled_bound
         parts = (self.samples.leaves, self.samples.wood)
         return sampled_bounds(parts, len(self.rows))
 
     @cached_property
     def orientation(self) -> Orientation:
         """How the surfaces of sub-plants are turned; likewise."""
+        if self.calm is not None:
+            return self.calm.orientation
         amounts = self.averages
         return orientation_of(self.rows, self.forms, amounts.leaf_area[:, 1], _wood_shares(amounts), amounts.length)
 
     @cached_property
     def clumping(self) -> Clumping:
         """How much lighter sub-plants are than even fogs of their area; fitted when first asked for, as above."""
+        if self.calm is not None:
+            return self.calm.clumping
         amounts = self.averages
         wood = _wood_shares(amounts) * (amounts.length * amounts.radius)[:, None]
         area = amounts.leaf_area[:, 1] + wood / 2
@@ -222,6 +248,22 @@ def _compiled(species: tuple[Species, ...]) -> Flora:
     )
 
 
+@lru_cache(maxsize=8)
+def _windy(flora: Flora, wind: Wind) -> Flora:
+    """A flora at rest in a wind at one time."""
+    amounts = flora.averages
+    rows = windy_rows(flora.rows, amounts.length, amounts.radius, wind)
+    bound = _with_drawn(rows, unit_bounds(rows))
+    return replace(
+        flora,
+        rows=rows,
+        bound=bound,
+        widest=widest_radii(rows),
+        leaf_reach=leaf_reaches(rows, bound, flora.leaf.reach),
+        calm=flora,
+    )
+
+
 def _with_drawn(rows: NDArray[np.void], bound: NDArray[np.float64]) -> NDArray[np.float64]:
     """Bounds in which plants drawn by hand have theirs: the drawing, and what grows on it in any direction."""
     bound = bound.copy()
@@ -231,6 +273,9 @@ def _with_drawn(rows: NDArray[np.void], bound: NDArray[np.float64]) -> NDArray[n
         farthest = np.hypot(bound[child, 0], np.maximum(bound[child, 2], -bound[child, 1]))
         reach = np.where(child >= 0, own["size"][:, 0] * rows["length"][child].sum(axis=1) * farthest, 0.0)
         across, height = np.hypot(own["knots"][..., 0], own["knots"][..., 1]), own["knots"][..., 2]
+        if is_windy(rows):  # no point moves farther than an arc that turns as its height does
+            above = np.maximum(height.max(), 0.0)
+            reach = reach + widest_sway(own[0]) * above * (above / 2 + across.max())
         low, high = (height - reach[:, None]).min(), (height + reach[:, None]).max()
         bound[i] = np.array([(across + reach[:, None]).max(), min(low, 0.0), max(high, 0.0)]) / rows["length"][i, 0]
     return bound

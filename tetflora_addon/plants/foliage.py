@@ -13,6 +13,7 @@ from .growth import Axes, Branches, level_azimuth
 from .hashing import Draw, child_key, signed, uniform
 from .rows import ranged
 from .vectors import cross, dot, gathered
+from .wind import fluttered, gusts, is_windy
 
 _LEAF_PATH = 1 << 32  # child indices of leaves start here, so that they never meet those of branches
 _PLACE_JITTER = 0.4  # below a half, so that leaves keep their order along the branch
@@ -287,6 +288,16 @@ def settled(
     frame = face_light(frame, light, sky)
     droop = rows["leaf_droop"][row]
     return hanging(frame, droop, sky) if droop.any() else frame
+
+
+def in_wind(
+    rows: NDArray[np.void], branches: Branches, leaves: Leaves, frame: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """`settled` frames (m, 3, 3) of leaves (m) of branches as the wind turns them; as they are where there is none."""
+    if not is_windy(rows):
+        return frame
+    gust = np.take(gusts(rows, branches.position), leaves.branch)
+    return fluttered(rows, _rows_of(branches, leaves.branch), frame, leaves.key, gust)
 
 
 def hanging(frame: NDArray[np.floating], droop: NDArray[np.float64], sky: NDArray[np.float64]) -> NDArray:

@@ -49,6 +49,9 @@ class Draw(IntEnum):
     SPUR_START = 23
     LEAF_FORM = 24
     TRANSITION = 25
+    SWAY_ALONG = 26
+    SWAY_ACROSS = 27
+    SWAY_UP = 28
     BEND = 32  # one for each segment and axis from here on
 
 

@@ -16,6 +16,7 @@ from .compiled import Flora
 from .copies import Copies
 from .expansion import chunks
 from .foliage import (
+    in_wind,
     leaf_colours,
     leaf_forms,
     leaf_keys,
@@ -167,7 +168,7 @@ class _Bearers:
                 owner, index, key = owner[chosen], index[chosen], key[chosen]
             t = leaf_places(rows, bearers.branches, owner, index, self.counts[part], key)
             leaves = place_leaves(rows, bearers.branches, bearers.lines, owner, index, key, t)
-            frame = settled(rows, self.row, leaves.frame, leaves.light, _SKY)
+            frame = in_wind(rows, bearers.branches, leaves, settled(rows, self.row, leaves.frame, leaves.light, _SKY))
             gradient = rows["gradient"][self.row[0]]
             outward = outwardness(rows, bearers.branches, owner, t) if gradient else None
             copies.add(leaves.position, frame, leaves.size, leaf_colours(rows, self.row, key, outward))

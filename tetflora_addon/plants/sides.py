@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .bounds import own_leaf_reaches, ring_stretch
 from .compiled import Flora
-from .foliage import leaf_keys, leaf_places, leaf_start, place_leaves, settled
+from .foliage import in_wind, leaf_keys, leaf_places, leaf_start, place_leaves, settled
 from .growth import Axes, Branches, axes, branch_counts, chosen_children, leaf_counts, radius_at, sorts_of, spread
 from .hashing import Draw
 from .rows import FORK, LATERAL, SPUR, varied
@@ -179,7 +179,7 @@ def _leaves_cross(
         some = np.flatnonzero(chosen & near & ~np.take(out, owner))
         of = np.take(owner, some)
         leaves = place_leaves(rows, branches, lines, of, index[some], key[some], t[some])
-        frame = settled(rows, branches.row[:1], leaves.frame, leaves.light, _SKY)
+        frame = in_wind(rows, branches, leaves, settled(rows, branches.row[:1], leaves.frame, leaves.light, _SKY))
         normal = np.take(normals, of, axis=1)
         low = np.zeros(len(some), np.float32)
         for axis in range(3):

@@ -92,12 +92,16 @@ _found: dict[str, dict[str, list[list[float]]]] = {}
 _REMEMBERED = 256
 
 
-@lru_cache(maxsize=8)
 def facet_shares(flora: Flora) -> FacetShares:
     """Shares for a flora; found when first asked for, and kept as long as the flora may be asked for again.
 
     Those of the species that come with TetFlora are read from `TABLE`; it takes a second or two to find those of one.
     """
+    return _shares(flora.at_rest)
+
+
+@lru_cache(maxsize=8)
+def _shares(flora: Flora) -> FacetShares:
     whole, own = np.ones((2, len(flora.rows), len(COUNTS)))
     unknown = {}
     for number, first in enumerate(flora.first_row):
