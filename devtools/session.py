@@ -65,6 +65,8 @@ def start() -> ModuleType:
     if addon_utils.enable(PACKAGE, default_set=True, handle_error=failures.append) is None:
         raise RuntimeError(f"Blender could not enable {PACKAGE} from {ROOT}") from next(iter(failures), None)
     _home = home
+    # Inside a full Blender it would be the user's own.
+    part("tetflora_addon.cache_folder").use(home / "cache")
     # Blender 4.5's wheel hangs at exit while a callback of an add-on is registered.
     atexit.register(stop)
     return sys.modules[PACKAGE]

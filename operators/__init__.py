@@ -8,6 +8,7 @@ from . import (
     add_plant,
     assign_species,
     clear,
+    clear_cache,
     drop_to_ground,
     edit_list,
     field_plants,
@@ -69,6 +70,7 @@ CLASSES = (
     species_files.TETFLORA_OT_export_species,
     species_files.TETFLORA_OT_delete_species,
     species_assets.TETFLORA_OT_create_asset_library,
+    clear_cache.TETFLORA_OT_clear_cache,
 )
 
 

@@ -24,13 +24,15 @@ GROUPS = (
     ("preview_properties", "TetFloraPreview"),
     ("brush_properties", "TetFloraBrush"),
     ("wind_properties", "TetFloraWind"),
+    ("preferences", "TetFloraPreferences"),
 )
 
 
 @pytest.mark.parametrize(("module", "group"), GROUPS)
 def test_every_setting_is_explained(clean_file, module, group):
     properties = getattr(part(module), group).bl_rna.properties
-    shown = {p.name for p in properties if not p.is_hidden and p.identifier != "rna_type" and p.name != "Name"}
+    hidden = {"rna_type", "bl_idname"}
+    shown = {p.name for p in properties if not p.is_hidden and p.identifier not in hidden and p.name != "Name"}
     internal = {"Populate", "Species"}
     assert [name for name in sorted(shown - internal) if name not in MANUAL] == []
 

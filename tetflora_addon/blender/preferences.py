@@ -1,18 +1,28 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The add-on's preferences: where the user's own species are, what new scenes begin with, and the keys."""
+"""The add-on's preferences: where the user's own species are, what new scenes begin with, the cache, and the keys."""
 
+import os
 from pathlib import Path
 
 import bpy
-from bpy.props import EnumProperty, FloatProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
+from .. import cache_folder
 from ..errors import SpeciesError
 from . import keymaps
 
 # Blender files preferences under the name of the extension's root package, two levels above this one. Only the name
 # is needed; nothing in tetflora_addon imports what lies above it.
 ROOT_PACKAGE = __package__.rsplit(".", 2)[0]
+#: Variable of the environment that names the cache folder for farms, whatever the preferences say; "off" for none.
+CACHE_VARIABLE = "TETFLORA_CACHE"
+#: Operator that empties the cache folder; defined above this package, which knows no operators.
+CLEAR_CACHE = "tetflora.clear_cache"
+
+
+def _use_cache(_preferences: object = None, _context: object = None) -> None:
+    cache_folder.use(_cache_folder())
 
 
 class TetFloraPreferences(bpy.types.AddonPreferences):
@@ -51,6 +61,25 @@ class TetFloraPreferences(bpy.types.AddonPreferences):
         soft_max=64.0,
         precision=1,
     )
+    use_cache: BoolProperty(
+        name="Keep What Is Found Out",
+        description=(
+            "Keep on disk what takes seconds to find out about a species of your own, so that it is found out once and "
+            "not in every session. Pictures are the same without"
+        ),
+        default=True,
+        update=_use_cache,
+    )
+    cache_folder: StringProperty(
+        name="Cache Folder",
+        description=(
+            "Folder for that, 64 megabytes at most; without one, a folder beside your Blender settings. Several "
+            "Blenders may share it"
+        ),
+        subtype='DIR_PATH',
+        default="",
+        update=_use_cache,
+    )
 
     def draw(self, context: bpy.types.Context) -> None:
         """The page in Preferences > Add-ons."""
@@ -61,7 +90,21 @@ class TetFloraPreferences(bpy.types.AddonPreferences):
             layout.label(text="This folder does not exist", icon='ERROR')
         layout.prop(self, "new_quality")
         layout.prop(self, "new_memory")
+        _draw_cache(layout, self)
         _draw_keys(layout, context)
+
+
+def _draw_cache(layout: bpy.types.UILayout, own: TetFloraPreferences) -> None:
+    column = layout.column()
+    if CACHE_VARIABLE in os.environ:
+        column.label(text=f"{CACHE_VARIABLE} is set: {os.environ[CACHE_VARIABLE]}", icon='INFO')
+    column.prop(own, "use_cache")
+    row = column.row()
+    row.active = own.use_cache
+    row.prop(own, "cache_folder")
+    column.operator(CLEAR_CACHE)
+    if cache_folder.trouble():
+        column.label(text=cache_folder.trouble(), icon='ERROR')
 
 
 def _draw_keys(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -108,22 +151,42 @@ def own_species_folder() -> Path:
 
 
 def _species_folder(create: bool) -> Path | None:
-    addon = bpy.context.preferences.addons.get(ROOT_PACKAGE)
-    if addon is None or addon.preferences is None:
+    own = preferences()
+    if own is None:
         return None
-    if addon.preferences.species_folder:
-        return Path(bpy.path.abspath(addon.preferences.species_folder))
+    if own.species_folder:
+        return Path(bpy.path.abspath(own.species_folder))
+    return _user_folder("species", create)
+
+
+def _cache_folder() -> Path | None:
+    """Where results are kept: what the environment says, or the preferences; None for nowhere."""
+    chosen = os.environ.get(CACHE_VARIABLE, "")
+    if chosen:
+        return None if chosen.lower() == "off" else Path(chosen).absolute()
+    own = preferences()
+    if own is None or not own.use_cache:
+        return None
+    if own.cache_folder:
+        return Path(bpy.path.abspath(own.cache_folder))
+    return _user_folder("cache")
+
+
+def _user_folder(name: str, create: bool = False) -> Path | None:
+    """A folder that Blender keeps for this extension, also when it is updated."""
     try:
-        return Path(bpy.utils.extension_path_user(ROOT_PACKAGE, path="species", create=create))
+        return Path(bpy.utils.extension_path_user(ROOT_PACKAGE, path=name, create=create))
     except ValueError:  # an add-on of the old kind has no such folder
         return None
 
 
 def register() -> None:
-    """Register the preferences."""
+    """Register the preferences, and keep results where they say."""
     bpy.utils.register_class(TetFloraPreferences)
+    _use_cache()
 
 
 def unregister() -> None:
     """Unregister the preferences."""
+    cache_folder.use(None)
     bpy.utils.unregister_class(TetFloraPreferences)

@@ -19,6 +19,7 @@ _OPERATORS = {
     "Select Species": "Art auswählen",
     "Refine": "Verfeinern",
     "Clear": "Leeren",
+    "Clear Cache": "Zwischenspeicher leeren",
 }
 _LABELS = {
     "Plants": "Pflanzen",
@@ -52,6 +53,8 @@ _LABELS = {
     "Species Folder": "Artenordner",
     "Quality of New Scenes": "Qualität neuer Szenen",
     "Memory of New Scenes": "Speicher neuer Szenen",
+    "Keep What Is Found Out": "Gefundenes behalten",
+    "Cache Folder": "Zwischenspeicherordner",
 }
 
 #: Texts by language, each with its context, as Blender takes them.

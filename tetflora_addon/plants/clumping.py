@@ -18,18 +18,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cache_folder import remembered
 from .branches import Branches
 from .cells import basis, cell_numbers, covered, path_lengths
+from .fingerprints import fingerprint
 from .growth import trunks
 from .hashing import key_of_seed, mix, uniform
 from .leaf_models import LeafModel
 from .outlines import WIDEST, Things, opened, things_of
 from .seeds import Seeds
 
+#: Raise it when factors are found in another way.
+_METHOD = 1
 #: Polygons that are grown of each species, if two plants have no more than a number, and plants at most; of plants that
 #: are still larger than the last number some sub-plants are taken.
 _POLYGONS, _PAIR, _PLANTS, _LARGEST = 200_000, 500_000, 6, 400_000
@@ -109,20 +114,32 @@ def fit_clumping(
     usual = np.where(length > 0, length, 1.0)
     trunk = np.flatnonzero(np.diff(rows["species"], prepend=-1))
     for first, end in zip(trunk, [*trunk[1:], len(rows)], strict=True):
-        every = slice(int(first), int(end))
-        orders, group = np.unique(rows["order"][every], return_inverse=True)
-        things = [
-            things_of(rows, forms[rows["species"][first]], one, group.reshape(-1), every.start, usual)
-            for one in _plants(rows, every.start, polygons)
-        ]
-        finest = _FINEST * (width[first] if width[first] > 0 else 0.0)
-        parts = [seen for n, one in enumerate(things) for seen in _rays(one, len(orders), finest, n, len(things))]
-        unit = np.sqrt(finest / _FINEST) if finest > 0 else np.sqrt(usual[first] / 100)
-        found = _solved(*(np.concatenate(values) for values in zip(*parts, strict=True)), unit)
-        root[every], density[every] = found[0] * unit, found[1]
-        own[every] = np.clip(found[2] + found[3:][group.reshape(-1)], *_OFFSETS)
+        every, leaves = slice(int(first), int(end)), forms[rows["species"][first]]
+        fit = partial(_fitted, rows, leaves, every, polygons, width[first], usual)
+        name = fingerprint(rows[every], leaves, _METHOD)
+        root[every], density[every], own[every] = remembered("clumping", name, (3, int(end - first)), fit)
     total = area.sum(axis=1)
     return Clumping(np.where(total > 0, area @ own / np.where(total > 0, total, 1), own), own, root, density, usual)
+
+
+def _fitted(
+    rows: NDArray[np.void],
+    forms: Sequence[Sequence[LeafModel]],
+    every: slice,
+    polygons: NDArray[np.float64],
+    width: float,
+    usual: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Roots, densities and own offsets (3, r) of the rows of one species."""
+    orders, group = np.unique(rows["order"][every], return_inverse=True)
+    group = group.reshape(-1)
+    things = [things_of(rows, forms, one, group, every.start, usual) for one in _plants(rows, every.start, polygons)]
+    finest = _FINEST * max(width, 0.0)
+    parts = [seen for n, one in enumerate(things) for seen in _rays(one, len(orders), finest, n, len(things))]
+    unit = np.sqrt(finest / _FINEST) if finest > 0 else np.sqrt(usual[every.start] / 100)
+    found = _solved(*(np.concatenate(values) for values in zip(*parts, strict=True)), unit)
+    own = np.clip(found[2] + found[3:][group], *_OFFSETS)
+    return np.stack([np.full(len(own), found[0] * unit), np.full(len(own), found[1]), own])
 
 
 def _plants(rows: NDArray[np.void], first: int, polygons: NDArray[np.float64]) -> list[Branches]:

@@ -14,7 +14,6 @@ pieces are compared in the same way with what branches themselves bear.
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -24,9 +23,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cache_folder import remembered
 from ..plants.cells import basis, covered
 from ..plants.compiled import Flora
 from ..plants.expansion import open_subplants
+from ..plants.fingerprints import fingerprint
 from ..plants.growth import Branches, spread, trunks
 from ..plants.hashing import mix
 from ..plants.outlines import Things, things_of
@@ -87,54 +88,50 @@ def _between(table: NDArray[np.float64], row: NDArray[np.integer], count: NDArra
     return table[row, low] + (place - low) * (table[row, low + 1] - table[row, low])
 
 
-#: Shares of species that are not shipped, as in `shipped`: a scene is compiled anew for each refinement.
-_found: dict[str, dict[str, list[list[float]]]] = {}
+#: Shares (2, r, k) of species that are not shipped: a scene is compiled anew for each refinement.
+_found: dict[str, NDArray[np.float64]] = {}
 _REMEMBERED = 256
 
 
 def facet_shares(flora: Flora) -> FacetShares:
     """Shares for a flora; found when first asked for, and kept as long as the flora may be asked for again.
 
-    Those of the species that come with TetFlora are read from `TABLE`; it takes a second or two to find those of one.
+    Those of the species that come with TetFlora are read from `TABLE`; it takes some seconds to find those of one, so
+    that these are kept on disk as well.
     """
     return _shares(flora.at_rest)
 
 
 @lru_cache(maxsize=8)
 def _shares(flora: Flora) -> FacetShares:
-    whole, own = np.ones((2, len(flora.rows), len(COUNTS)))
-    unknown = {}
+    shares = np.ones((2, len(flora.rows), len(COUNTS)))
     for number, first in enumerate(flora.first_row):
         name = digest(flora, number)
-        known = shipped().get(name) or _found.get(name)
-        if known is None:
-            unknown[number] = name
-        else:
-            every = slice(int(first), int(first) + len(known["whole"]))
-            whole[every], own[every] = known["whole"], known["own"]
-    for row, (these, those) in fitted_shares(flora, np.array(list(unknown), np.int32)).items():
-        whole[row], own[row] = these, those
-    for number, name in unknown.items():
+        known = shipped().get(name)
+        found = _of_species(flora, number, name) if known is None else np.array([known["whole"], known["own"]])
+        shares[:, first : first + found.shape[1]] = found
+    return FacetShares(*shares)
+
+
+def _of_species(flora: Flora, number: int, name: str) -> NDArray[np.float64]:
+    """Shares (2, r, k) of one species: the same whatever other species the flora has, and wherever they were found."""
+    if name not in _found:
+        rows = np.flatnonzero(flora.rows["species"] == number)
+
+        def find_out() -> NDArray[np.float64]:
+            fitted = fitted_shares(flora, np.array([number], np.int32))
+            return np.stack([fitted.get(int(row), np.ones((2, len(COUNTS)))) for row in rows], axis=1)
+
+        found = remembered("facet_shares", name, (2, len(rows), len(COUNTS)), find_out)
         if len(_found) >= _REMEMBERED:
             _found.clear()
-        rows = np.flatnonzero(flora.rows["species"] == number)
-        _found[name] = {"whole": whole[rows].tolist(), "own": own[rows].tolist()}
-    return FacetShares(whole, own)
+        _found[name] = found
+    return _found[name]
 
 
 def digest(flora: Flora, number: int) -> str:
     """What tells a species of a flora from all others: its parameters and the forms of its leaves."""
-    content = hashlib.sha256(f"{_METHOD}".encode())
-    rows = flora.rows[flora.rows["species"] == number]
-    for name in sorted(set(rows.dtype.names) - {"species", "next", "drawn_rows"}):
-        # Rounded, because versions of numpy may differ in the last digit.
-        value = np.round(rows[name].astype(np.float64), 6) + 0.0
-        content.update(name.encode() + np.ascontiguousarray(value).tobytes())
-    for form in (model for forms in flora.forms[number] for model in forms):
-        content.update(
-            np.ascontiguousarray(form.positions).tobytes() + np.ascontiguousarray(form.corner_verts).tobytes()
-        )
-    return content.hexdigest()[:16]
+    return fingerprint(flora.rows[flora.rows["species"] == number], flora.forms[number], _METHOD)
 
 
 @cache

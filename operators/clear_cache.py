@@ -1,0 +1,31 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Empty the cache folder."""
+
+import bpy
+
+from ..tetflora_addon import cache_folder
+from . import ids
+from .base import Reporting, counted
+
+
+class TETFLORA_OT_clear_cache(Reporting, bpy.types.Operator):
+    """Delete what was kept about species."""
+
+    bl_idname = ids.CLEAR_CACHE
+    bl_label = "Clear Cache"
+    bl_description = (
+        "Delete what the cache folder keeps about species, and nothing else in it. It is found out anew when needed"
+    )
+    bl_options = {'REGISTER'}
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        if cache_folder.used() is None:
+            cls.poll_message_set("There is no cache folder")
+            return False
+        return True
+
+    def run(self, _context: bpy.types.Context) -> set[str]:
+        self.report({'INFO'}, f"{counted(cache_folder.clear(), 'file')} deleted from {cache_folder.used()}")
+        return {'FINISHED'}

@@ -1,0 +1,168 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A folder that keeps what takes seconds to find out about a species and always comes out the same.
+
+Each result is an array in a file of its own, named after its kind and the content that it follows from; so nothing in
+the folder is ever wrong, only unused. Several processes may share it: files are written whole, and what one deletes the
+others find out anew. Whatever is damaged, foreign or cannot be read counts as absent. The folder never stops anybody:
+what goes wrong with it is said once on stderr.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import TetFloraError
+from .whole_files import PART, write_whole
+
+#: Raise it when files are written in another way.
+_FORMAT = 1
+#: All files together take no more than so many bytes; those that were not used for longest go first. Each has a few
+#: kilobytes.
+MOST_BYTES = 64 << 20
+#: Seconds after which a file that was begun and not ended is taken for one of a process that was killed.
+_ABANDONED = 3600.0
+
+_OURS = re.compile(r"tetflora-[a-z_]+-\d+-[0-9a-f]+\.npz")
+_BEGUN = re.compile("[0-9a-f]+".join(map(re.escape, PART)))
+
+_folder: Path | None = None
+_trouble = ""
+
+
+def use(folder: Path | None) -> None:
+    """Keep results in a folder from now on, which is made when there is a first one; None for nowhere."""
+    global _folder, _trouble
+    if folder != _folder:
+        _folder, _trouble = folder, ""
+
+
+def used() -> Path | None:
+    """The folder that results are kept in."""
+    return _folder
+
+
+def trouble() -> str:
+    """What went wrong with the folder since it is used; empty if nothing did."""
+    return _trouble
+
+
+def remembered(
+    kind: str, content: str, shape: tuple[int, ...], find_out: Callable[[], NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """What was found out before, or is found out now and kept.
+
+    Parameters
+    ----------
+    kind : str
+        What it is; small letters and underscores.
+    content : str
+        Hash, in hexadecimal, of everything that the result follows from, the method included.
+    shape : tuple of int
+        Of the result; a file with another one does not count.
+    find_out : callable
+        Returns the result: finite numbers, always the same ones to the last bit.
+    """
+    if _folder is None:
+        return find_out()
+    path = _folder / f"tetflora-{kind}-{_FORMAT}-{content}.npz"
+    values = _read(path, shape)
+    if values is None:
+        values = find_out()
+        _write(path, values)
+    return values
+
+
+def clear() -> int:
+    """Delete all results in the folder, and nothing else that lies there; returns how many there were.
+
+    Raises
+    ------
+    TetFloraError
+        Some cannot be deleted.
+    """
+    number = 0
+    try:
+        for entry in _entries(_OURS):
+            Path(entry).unlink(missing_ok=True)
+            number += 1
+    except OSError as error:
+        raise TetFloraError(f"The cache folder {_folder} cannot be emptied: {error.strerror}") from None
+    return number
+
+
+def _read(path: Path, shape: tuple[int, ...]) -> NDArray[np.float64] | None:
+    try:
+        # Read first: numpy leaves damaged files open.
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as stored:
+            values, name = stored["values"], str(stored["name"])
+    except FileNotFoundError:
+        return None
+    except Exception:  # there is no end to what zipfile and numpy raise for what is not theirs
+        return _damaged(path)
+    if name != path.name or values.dtype != np.float64 or values.shape != shape or not np.isfinite(values).all():
+        return _damaged(path)
+    with suppress(OSError):  # a folder of somebody else's, to be read only
+        os.utime(path)
+    return values
+
+
+def _damaged(path: Path) -> None:
+    _warn(f"{path} is damaged or cannot be read; it is made anew")
+
+
+def _write(path: Path, values: NDArray[np.float64]) -> None:
+    content = io.BytesIO()
+    np.savez(content, values=values, name=np.array(path.name))
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, content.getvalue())
+        _make_room()
+    except OSError as error:
+        _warn(f"the cache folder {path.parent} cannot be written to: {error.strerror}")
+
+
+def _make_room() -> None:
+    """Delete files that were not used for longest, as long as all are too large, and those that nobody will end.
+
+    Any of them may be gone already: other processes tidy up as well.
+    """
+    now, files = time.time(), []
+    for entry in _entries(_BEGUN):
+        with suppress(FileNotFoundError):
+            if now - entry.stat().st_mtime > _ABANDONED:
+                os.unlink(entry)
+    for entry in _entries(_OURS):
+        with suppress(FileNotFoundError):
+            status = entry.stat()
+            files.append((status.st_mtime_ns, status.st_size, entry.path))
+    total = sum(size for _, size, _ in files)
+    for _, size, path in sorted(files):
+        if total <= MOST_BYTES:
+            break
+        Path(path).unlink(missing_ok=True)
+        total -= size
+
+
+def _entries(pattern: re.Pattern[str]) -> Iterator[os.DirEntry[str]]:
+    """Files of the folder by name; none if there is no folder."""
+    if _folder is not None and _folder.is_dir():
+        with os.scandir(_folder) as entries:
+            yield from (e for e in entries if pattern.fullmatch(e.name) and e.is_file(follow_symlinks=False))
+
+
+def _warn(text: str) -> None:
+    global _trouble
+    if not _trouble:
+        print(f"TetFlora: warning: {text}", file=sys.stderr, flush=True)
+        _trouble = text
