@@ -32,6 +32,7 @@ NAMES = (
     "fidelity",
     "populate",
     "viewport",
+    "animation",
     "wind",
 )
 

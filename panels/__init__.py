@@ -39,6 +39,7 @@ CLASSES = (
     brush_panel.TETFLORA_PT_brush,
     wind_panel.TETFLORA_PT_wind,
     refinement_panel.TETFLORA_PT_refinement,
+    refinement_panel.TETFLORA_PT_films,
     refinement_panel.TETFLORA_PT_limits,
     refinement_panel.TETFLORA_PT_proxy_shading,
     refinement_panel.TETFLORA_PT_leaf_objects,

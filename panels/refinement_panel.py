@@ -52,6 +52,26 @@ class TETFLORA_PT_refinement(SidebarPanel, bpy.types.Panel):
             draw_message(context, layout, auto_refresh.message(), 'SORTTIME')
 
 
+class TETFLORA_PT_films(SidebarPanel, bpy.types.Panel):
+    """Films."""
+
+    bl_label = "Films"
+    bl_parent_id = "TETFLORA_PT_refinement"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        self.layout.prop(context.scene.tetflora, "share_frames", text="")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = split_layout(self)
+        settings = context.scene.tetflora
+        column = layout.column()
+        column.active = settings.share_frames and settings.refine_at_render
+        column.prop(settings, "cell_length")
+        column.prop(settings, "cell_turn")
+        layout.prop(settings, "kept_memory")
+
+
 class TETFLORA_PT_limits(SidebarPanel, bpy.types.Panel):
     """Limits."""
 

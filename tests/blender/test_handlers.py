@@ -36,7 +36,7 @@ class _Stub:
     def __init__(self):
         self.cameras, self.plants, self.error = [], [], None
 
-    def __call__(self, scene, depsgraph, *, view_layer=None, for_render=False, beside=()):
+    def __call__(self, scene, depsgraph, *, view_layer=None, for_render=False, **_options):
         import bpy
 
         assert for_render
@@ -64,6 +64,7 @@ class _Stub:
         for datablock in (mesh, made, black):
             part("node_tools").tag(datablock)
         results.collection.objects.link(made)
+        return part("job").Statistics()
 
 
 @pytest.fixture

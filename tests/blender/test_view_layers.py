@@ -158,19 +158,19 @@ def test_markers_switch_the_camera_that_is_refined_for(scene, tmp_path):
     for frame, camera in ((1, scene.camera), (2, other)):
         scene.timeline_markers.new(camera.name, frame=frame).camera = camera
     seen = []
-    real = part("job").read_camera
+    real = part("kept_results").read_camera
 
     def look(scene, *arguments, **options):
         camera = real(scene, *arguments, **options)
         seen.append((scene.frame_current, round(float(camera.position[1]))))
         return camera
 
-    part("job").read_camera = look
+    part("kept_results").read_camera = look
     scene.frame_start, scene.frame_end = 1, 2
     scene.render.filepath = str(tmp_path / "frame")
     try:
         bpy.ops.render.render(animation=True)
     finally:
-        part("job").read_camera = real
+        part("kept_results").read_camera = real
     assert seen == [(1, -14), (2, 14)]
     assert part("handlers").render_errors() == []

@@ -43,16 +43,19 @@ class Results:
     ----------
     scene : bpy.types.Scene
     purpose : {'VIEW', 'RENDER'}
+    mark : str
+        Comes after the names of all that is made, where results of several cameras are there at the same time.
     """
 
-    def __init__(self, scene: bpy.types.Scene, purpose: str) -> None:
+    def __init__(self, scene: bpy.types.Scene, purpose: str, mark: str = "") -> None:
         self.scene = scene
         self.purpose = purpose
+        self.mark = f" {mark}" if mark else ""
         self.collection: bpy.types.Collection | None = None
 
     def open(self) -> None:
         """Make the collection and link it to the scene."""
-        self.collection = bpy.data.collections.new(NAMES[self.purpose])
+        self.collection = bpy.data.collections.new(NAMES[self.purpose] + self.mark)
         self.collection[PURPOSE] = self.purpose
         tag(self.collection)
         self.scene.collection.children.link(self.collection)
@@ -66,6 +69,7 @@ class Results:
         species: Species | None = None,
     ) -> bpy.types.Object:
         """Write one mesh as an object of the collection; of one species, or of None."""
+        name += self.mark
         return self._link(bpy.data.objects.new(name, write_mesh(name, buffers, materials)), kind, species)
 
     def add_points(
@@ -77,7 +81,7 @@ class Results:
         species: Species | None = None,
     ) -> bpy.types.Object:
         """Write one cloud of points, which has one material, as an object of the collection."""
-        return self._link(point_object(name, buffers, *materials), kind, species)
+        return self._link(point_object(name + self.mark, buffers, *materials), kind, species)
 
     def _link(self, made: bpy.types.Object, kind: str, species: Species | None) -> bpy.types.Object:
         tag(made.data)
@@ -97,20 +101,21 @@ class Results:
         elif self.collection is not None:
             mark_runtime(self.collection, True)
 
-    def hide(self, originals: Sequence[bpy.types.Object]) -> None:
-        """Hide objects whose place the results take, in viewports too unless they are made for a render alone."""
-        for original in originals:
-            # Hidden for another scene already: how it looks now is not how the artist left it.
-            flags, scenes = _marker(original, self.purpose) or ([original.hide_render, original.hide_viewport], [])
-            _mark(original, self.purpose, flags, sorted({*scenes, self.scene.name}))
-            original.hide_render = True
-            original.hide_viewport = original.hide_viewport or self.purpose == 'VIEW'
-
     def discard(self) -> None:
         """Remove all that was made."""
         if self.collection is not None:
-            _remove_collection(self.scene, self.collection)
+            remove_collection(self.scene, self.collection)
             self.collection = None
+
+
+def hide_originals(scene: bpy.types.Scene, purpose: str, originals: Sequence[bpy.types.Object]) -> None:
+    """Hide objects whose place results take, in viewports too unless they are made for a render alone."""
+    for original in originals:
+        # Hidden for another scene already: how it looks now is not how the artist left it.
+        flags, scenes = _marker(original, purpose) or ([original.hide_render, original.hide_viewport], [])
+        _mark(original, purpose, flags, sorted({*scenes, scene.name}))
+        original.hide_render = True
+        original.hide_viewport = original.hide_viewport or purpose == 'VIEW'
 
 
 def result_collections(scene: bpy.types.Scene, purpose: str | None = None) -> list[bpy.types.Collection]:
@@ -163,8 +168,8 @@ def remove_results(
     """
     for which in ('RENDER', 'VIEW'):
         if purpose in {None, which}:
-            _show_originals(scene, which)
-    return sum(_remove_collection(scene, c) for c in result_collections(scene, purpose) if c not in keep)
+            show_originals(scene, which)
+    return sum(remove_collection(scene, c) for c in result_collections(scene, purpose) if c not in keep)
 
 
 def hidden_originals(scene: bpy.types.Scene, purpose: str | None = None) -> list[bpy.types.Object]:
@@ -176,7 +181,8 @@ def hidden_originals(scene: bpy.types.Scene, purpose: str | None = None) -> list
     return [o for which in purposes for o in _marked(which) if _concerns(scene, o, which)]
 
 
-def _show_originals(scene: bpy.types.Scene, purpose: str) -> None:
+def show_originals(scene: bpy.types.Scene, purpose: str) -> None:
+    """Show what is hidden for a scene's results of one purpose as it was."""
     for original in hidden_originals(scene, purpose):
         flags, _ = _marker(original, purpose)
         others = _others(scene, original, purpose)
@@ -321,7 +327,8 @@ def originals_shown(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> I
             o.hide_render, o.hide_viewport = flags
 
 
-def _remove_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) -> int:
+def remove_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) -> int:
+    """Remove results, be they linked to the scene or not; returns the number of datablocks removed."""
     data, objects, groups = [], [], set()
     for held in list(collection.objects):
         if is_ours(held) and held.get(KIND) == PARENT and len(held.users_collection) > 1:

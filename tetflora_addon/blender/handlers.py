@@ -19,7 +19,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..errors import TetFloraError
-from . import job
+from . import job, kept_results
 from .emit import (
     has_results,
     leave_out_of_file,
@@ -68,15 +68,16 @@ def on_render_init(_scene: bpy.types.Scene, _depsgraph: object = None) -> None:
 
 @persistent
 def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
-    """Before a frame: refine for its camera, in place of what the frame before left."""
+    """Before a frame: refine for its camera, unless what an earlier frame left serves it as well."""
     if _rendering.busy:
         return
     _rendering.busy = True
+    made = False
     try:
-        _take_back(scene)
         wanted = scene.tetflora.refine_at_render and scene.tetflora.output.show_render
         if wanted and has_contents(scene):
             _make(scene)
+            made = True
         elif not scene.tetflora.refine_at_render and has_contents(scene) and not _has_meshes(scene):
             _warn(scene)
     except NoPlantsError:
@@ -88,6 +89,8 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
         traceback.print_exc()
         _complain(scene, f"unexpected error, please report it: {error!r}")
     finally:
+        if not made:
+            _take_back(scene)
         _rendering.busy = False
 
 
@@ -134,6 +137,7 @@ def on_load_post(_path: object, _other: object = None) -> None:
     _rendering.hidden.clear()
     _rendering.lifted.clear()
     _rendering.errors.clear()
+    kept_results.forget_names()
     unpack_override_marks()
     show_left_over()
     for scene in bpy.data.scenes:
@@ -143,24 +147,34 @@ def on_load_post(_path: object, _other: object = None) -> None:
 
 
 def _make(scene: bpy.types.Scene) -> None:
-    """Refine for the frame that is about to be rendered, and hide results that the artist made for another view."""
+    """Results for the frame that is about to be rendered; those that the artist made for another view are hidden."""
     # Also where nothing is animated: it is what the renderer does next, and the only way to a depsgraph of this frame.
     scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
-    made: list[bpy.types.Collection] = []
+    wanted = []
     for layers in view_layer_groups(scene):
-        layer = layers[0]
-        layer.update()  # going to the frame brings only the active layer's depsgraph up to date, if others have any
-        job.refine(scene, layer.depsgraph, view_layer=layer, for_render=True, beside=made)
-        new = [c for c in result_collections(scene, 'RENDER') if c not in made]
+        layers[0].update()  # going to the frame brings only the active layer's depsgraph up to date, if others have any
+        camera = kept_results.shared_camera(scene, layers[0].depsgraph)
+        wanted.append((kept_results.key_of(scene, layers[0].depsgraph, layers, camera), layers, camera))
+    kept_results.stow(scene, [key for key, *_ in wanted])
+    for key, layers, camera in wanted:
+        layer, there = layers[0], kept_results.recall(scene, key)
+        new = [] if there is None else [there]
+        if there is None:
+            options = {"view_layer": layer, "for_render": True, "camera": camera, "mark": key[:8]}
+            before = result_collections(scene, 'RENDER')
+            statistics = job.refine(scene, layer.depsgraph, beside=before, **options)
+            new = [c for c in result_collections(scene, 'RENDER') if c not in before]
+            for collection in new:
+                kept_results.keep(scene, key, collection, statistics.memory_mb)
         show_in(scene, new, layers)
-        made += new
+    kept_results.hide_for(scene, [key for key, *_ in wanted])
     if len(scene.view_layers) > 1:
         # Without, Blender crashes when it renders a layer that is not the window's and objects are new in it.
         for layer in scene.view_layers:
             layer.update()
-    _rendering.bounces = raise_bounces(scene)
+    _rendering.bounces |= raise_bounces(scene)
     # Hidden only now: if refinement failed, yesterday's trees are better than none.
-    _rendering.hidden = [c.name for c in result_collections(scene, 'VIEW') if not c.hide_render]
+    _rendering.hidden += [c.name for c in result_collections(scene, 'VIEW') if not c.hide_render]
     for collection in _named(_rendering.hidden):
         collection.hide_render = True
 
@@ -171,6 +185,7 @@ def _take_back(scene: bpy.types.Scene) -> None:
     for name, value in _rendering.bounces.items():
         setattr(scene.cycles, name, value)
     _rendering.bounces.clear()
+    kept_results.forget_all(scene)
     job.clear(scene, for_render=True)
 
 

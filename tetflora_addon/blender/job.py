@@ -31,7 +31,7 @@ from ..shading.facet_shares import facet_shares
 from .baked_material import baked_material
 from .baking import Baking, read_sources
 from .camera_reader import read_camera
-from .emit import Results, has_results, originals_shown, remove_results, result_collections
+from .emit import Results, has_results, hide_originals, originals_shown, remove_results, result_collections
 from .explicit_objects import Explicit, read_explicit
 from .leaf_forms import materials_of, resolved_species
 from .light_reader import read_lights
@@ -155,6 +155,8 @@ def refine_steps(
     view_layer: bpy.types.ViewLayer | None = None,
     for_render: bool = False,
     beside: Sequence[bpy.types.Collection] = (),
+    camera: Camera | None = None,
+    mark: str = "",
 ) -> Generator[Progress, bool | None, Statistics]:
     """Refine a scene step by step.
 
@@ -172,6 +174,10 @@ def refine_steps(
         Results live beside those of the artist, in a collection of their own, and are refined for the render region.
     beside : sequence of bpy.types.Collection
         Earlier results that stay: those of other view layers.
+    camera : Camera, optional
+        In place of the scene's as it stands.
+    mark : str
+        Comes after the names of results.
 
     Raises
     ------
@@ -180,7 +186,8 @@ def refine_steps(
     """
     clock = Stopwatch()
     yield Progress(0.0, "Reading the scene")
-    camera = read_camera(scene, depsgraph, region_only=for_render)
+    if camera is None:
+        camera = read_camera(scene, depsgraph, region_only=for_render)
     given = read_scene(scene, depsgraph, view_layer or depsgraph.view_layer)
     settings = refinement_settings(scene)
     clock.lap("read")
@@ -190,7 +197,7 @@ def refine_steps(
     full = _polygons_full(flora, given)
     statistics = Statistics(plants=len(given.seeds), polygons_full=full, seconds=clock.seconds)
     originals = []
-    results = Results(scene, 'RENDER' if for_render else 'VIEW')
+    results = Results(scene, 'RENDER' if for_render else 'VIEW', mark)
     for earlier in result_collections(scene, 'VIEW'):
         adopt_materials(scene, earlier)
     try:
@@ -232,7 +239,7 @@ def refine_steps(
         raise
     remove_results(scene, results.purpose, keep=(results.collection, *beside))
     release_materials()
-    results.hide(originals)
+    hide_originals(scene, results.purpose, originals)
     results.finish()
     statistics.seconds = dict(clock.seconds)
     scene.tetflora.statistics = json.dumps(statistics.as_dict())

@@ -18,6 +18,7 @@ from ..refinement.settings import RefinementSettings
 from . import output_properties
 from .brush_properties import TetFloraBrush
 from .explicit_objects import PROPERTY as EXPLICIT
+from .film_properties import FilmProperties
 from .plant_form import FORM_TYPES
 from .population_properties import CLASSES as POPULATION_CLASSES
 from .population_properties import TetFloraPopulation
@@ -118,7 +119,7 @@ def _auto_refine_switched(self: bpy.types.PropertyGroup, _context: bpy.types.Con
     auto_refresh.switched(self.id_data)
 
 
-class TetFloraScene(RefinementProperties, bpy.types.PropertyGroup):
+class TetFloraScene(RefinementProperties, FilmProperties, bpy.types.PropertyGroup):
     """Settings of a scene."""
 
     version: IntProperty(name="Version", description="Layout of these properties", options={'HIDDEN'})

@@ -10,6 +10,7 @@ from dataclasses import fields, is_dataclass
 import bpy
 import numpy as np
 
+from ..refinement.camera import Camera
 from .camera_reader import read_camera
 from .job import read_scene
 from .leaf_forms import resolved_species
@@ -20,10 +21,20 @@ from .wind_properties import wind_of
 _CHOICES = ("proxy_form", "baked_light", "expand_everything")
 
 
-def scene_digest(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> str:
+def scene_digest(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    view_layer: bpy.types.ViewLayer,
+    camera: Camera | None = None,
+) -> str:
     """Digest of camera, plants, meshes that take part or hide plants, lamps, settings, species, materials and wind.
 
     In the wind it is another at each frame.
+
+    Parameters
+    ----------
+    camera : Camera, optional
+        Which one counts, if it is not the scene's as it stands.
 
     Raises
     ------
@@ -40,10 +51,11 @@ def scene_digest(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_la
     species = [resolved_species(scene, identifier, depsgraph) for identifier in given.species]
     materials = [(e.species, *(getattr(getattr(e, k), "name", "") for k in REPLACED)) for e in group.output.species]
     for part in (
-        read_camera(scene, depsgraph),
+        camera or read_camera(scene, depsgraph),
         given.seeds,
         given.occluders,
         given.lights,
+        given.sources,
         explicit,
         settings_from(scene),
         [getattr(group, name) for name in _CHOICES],
@@ -51,11 +63,11 @@ def scene_digest(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_la
         materials,
         wind_of(scene),
     ):
-        _add(content, part)
+        digest_of(content, part)
     return content.hexdigest()
 
 
-def _add(content: hashlib._Hash, value: object) -> None:
+def digest_of(content: hashlib._Hash, value: object) -> None:
     """Add a value of numbers, texts, arrays, sequences or dataclasses of these."""
     if isinstance(value, np.ndarray):
         content.update(f"{value.dtype}{value.shape}".encode())
@@ -65,10 +77,10 @@ def _add(content: hashlib._Hash, value: object) -> None:
     elif is_dataclass(value):
         for field in fields(value):
             content.update(field.name.encode())
-            _add(content, getattr(value, field.name))
+            digest_of(content, getattr(value, field.name))
     elif isinstance(value, list | tuple):
         content.update(f"{len(value)}".encode())
         for item in value:
-            _add(content, item)
+            digest_of(content, item)
     else:
         content.update(repr(value).encode())  # of one session only

@@ -66,7 +66,7 @@ def circle_of_confusion(camera: Camera, depth: NDArray[np.float64]) -> NDArray[n
 
 def _depths(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:
     local = camera.to_camera_space(points)
-    return np.linalg.norm(local, axis=-1) if camera.kind == "PANO" else local[..., 2]
+    return np.linalg.norm(local, axis=-1) if camera.kind == "PANO" else local[..., 2] - camera.setback
 
 
 def _movement(camera: Camera, other: Camera, depths: tuple[float, float]) -> NDArray[np.float64]:

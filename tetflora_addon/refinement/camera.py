@@ -43,6 +43,10 @@ class Camera:
         Depth that is sharp, metres.
     shutter : tuple of Camera
         The camera at other times while the shutter is open, and the other eyes of a stereoscopic picture; often empty.
+    setback : float
+        How far, in depth, the position lies behind the eye, metres: not 0 where the camera stands for several.
+    room : float
+        How far from that eye others are for which it stands, metres; see `view_cells`.
     """
 
     kind: Literal["PERSP", "ORTHO", "PANO"]
@@ -56,6 +60,15 @@ class Camera:
     lens_radius: float = 0.0
     focus: float = np.inf
     shutter: tuple[Camera, ...] = ()
+    setback: float = 0.0
+    room: float = 0.0
+
+    @property
+    def eye(self) -> NDArray[np.float64]:
+        """Where the picture is seen from (3,), metres: before the position where the camera stands for several."""
+        left, right, bottom, top = self.window
+        ahead = np.array([(left + right) / 2.0, (bottom + top) / 2.0, -1.0])
+        return self.position + self.setback * (self.frame @ ahead)
 
     @property
     def line_of_sight(self) -> dict[str, NDArray[np.float64]]:
@@ -155,9 +168,26 @@ class Camera:
             distance = np.maximum(np.linalg.norm(local, axis=-1), self.near)
             # Towards the poles a picture has more pixels for each solid angle.
             cosine = np.hypot(local[..., 0], local[..., 2]) / distance
-            return self.pixel_size * distance * np.sqrt(np.clip(cosine, LEAST_COSINE, 1.0))
+            return self.pixel_size * self._nearest(distance) * np.sqrt(np.clip(cosine, LEAST_COSINE, 1.0))
         depth = self.to_camera_space(points)[..., 2]
-        return self.pixel_size * np.maximum(depth, self.near)
+        return self.pixel_size * self._nearest(depth - self.setback)
+
+    def pixel_gain(self, points: NDArray[np.float64]) -> NDArray[np.float64] | float:
+        """Pixels ``(...)`` of what is at points ``(..., 3)`` for each that it has as seen from the position.
+
+        1 but where the camera stands for several, of which the nearest counts.
+        """
+        if self.setback == 0.0:
+            return 1.0
+        depth = np.maximum(self.to_camera_space(points)[..., 2], self.near)
+        return (self.pixel_size * depth / self.pixel_extent(points)) ** 2
+
+    def _nearest(self, distance: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distances from the nearest of the eyes, given those from the one in the middle, metres.
+
+        Within their room nobody knows: half of it is as near as it comes to what is not grazed.
+        """
+        return np.maximum(distance - self.room, max(self.room / 2.0, self.near if self.setback == 0.0 else 0.0))
 
     def extent_around(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Metres (n,) that one pixel spans at points (n, 3), in view or not.
@@ -166,5 +196,6 @@ class Camera:
         """
         extent = self.pixel_extent(points)
         if self.kind == "PERSP":
-            extent = np.maximum(extent, self.pixel_size * np.linalg.norm(points - self.position, axis=-1))
+            away = np.linalg.norm(points - self.eye, axis=-1)
+            extent = np.maximum(extent, self.pixel_size * (away - self.room))
         return extent

@@ -62,7 +62,7 @@ def expected_pixels(vertices: NDArray[np.float64], camera: Camera) -> tuple[NDAr
     left, right, bottom, top = camera.window
     seen = np.clip(np.minimum(high, [right, top]) - np.maximum(low, [left, bottom]), 0.0, None)
     area = np.where(whole, area, np.prod(seen, axis=1) / 2.0)
-    return area / camera.pixel_size**2, whole
+    return area / camera.pixel_size**2 * camera.pixel_gain(vertices.mean(axis=1)), whole
 
 
 def _on_the_sphere(vertices: NDArray[np.float64], camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:

@@ -143,7 +143,8 @@ class AlphaBuffer:
             ("_before", np.ones(len(cell))),
         ):
             setattr(self, name, np.concatenate([getattr(self, name), values[open_ones]]))
-        return Outline(np.where(exact, pixels, weight * final), opacity, nearest, whole)
+        pixels = np.where(exact, pixels, weight * final) * self.camera.pixel_gain(np.asarray(vertices).mean(axis=1))
+        return Outline(pixels, opacity, nearest, whole)
 
     def remove(self, chosen: NDArray[np.bool_]) -> None:
         """Take away tetrahedra; ``chosen`` is a mask by their numbers."""

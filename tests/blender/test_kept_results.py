@@ -1,0 +1,266 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Frames of a film share their results, and each of them is the frame alone."""
+
+from __future__ import annotations
+
+import random
+
+import numpy as np
+import pytest
+
+from tests.blender.digests import everything
+from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph, part
+
+FRAMES = 12
+
+
+@pytest.fixture
+def film(clean_file):
+    """Two bushes and a camera that walks past them, 12 frames in which it goes through several cells."""
+    import bpy
+
+    scene = bpy.context.scene
+    scene.render.resolution_x, scene.render.resolution_y = 64, 36
+    camera = add_camera(location=(-1.5, -9.0, 1.0))
+    camera.keyframe_insert("location", frame=1)
+    camera.location = (1.5, -5.0, 1.3)
+    camera.keyframe_insert("location", frame=FRAMES)
+    add_plant("one", seed=1, location=(-1.0, 0.0, 0.0))
+    add_plant("two", seed=2, location=(1.5, 3.0, 0.0))
+    settings = scene.tetflora
+    settings.leaf_limit, settings.cutoff, settings.visibility_resolution = 1.0, 6.0, 64
+    settings.cell_length = 1.0
+    depsgraph()
+    yield scene
+    part("handlers").on_render_end(scene)
+
+
+@pytest.fixture
+def made(monkeypatch):
+    """Frames for which something was refined."""
+    frames, real = [], part("job").refine
+
+    def refine(scene, *arguments, **options):
+        frames.append(scene.frame_current)
+        return real(scene, *arguments, **options)
+
+    monkeypatch.setattr(part("job"), "refine", refine)
+    return frames
+
+
+def results(scene):
+    """What a frame is rendered with, datablock by datablock."""
+    (collection,) = part("emit").result_collections(scene, 'RENDER')
+    every = everything()
+    kept = {"objects": {o.name for o in collection.objects}}
+    kept["meshes"] = {o.data.name for o in collection.objects if o.type == 'MESH'}
+    kept["pointclouds"] = {o.data.name for o in collection.objects if o.type == 'POINTCLOUD'}
+    kept["materials"] = {m.name for o in collection.objects if o.data for m in o.data.materials if m}
+    found = {kind: {name: every[kind][name] for name in names} for kind, names in kept.items()}
+    assert found["objects"]
+    return collection.name, found
+
+
+def at(scene, frame):
+    """Go to a frame as a render does."""
+    scene.frame_set(frame)
+    part("handlers").on_render_pre(scene)
+    assert part("handlers").render_errors() == []
+    return results(scene)
+
+
+def alone(scene, frame):
+    """A frame of a render of its own."""
+    part("handlers").on_render_end(scene)
+    part("handlers").on_render_init(scene)
+    found = at(scene, frame)
+    part("handlers").on_render_end(scene)
+    return found
+
+
+def test_neighbouring_frames_share_and_each_is_the_frame_alone(film, made):
+    sequence = {n: at(film, n) for n in range(1, FRAMES + 1)}
+    cells = len({name for name, _ in sequence.values()})
+    assert made[0] == 1
+    assert 2 <= cells == len(made) <= FRAMES // 2
+    order = list(range(1, FRAMES + 1))
+    random.Random(5).shuffle(order)
+    again = {n: at(film, n) for n in order}
+    assert again == sequence
+    assert {n: alone(film, n) for n in order} == sequence
+
+
+def test_what_is_seen_again_comes_back_without_being_made_again(film, made):
+    first = at(film, 1)
+    at(film, FRAMES)
+    count = len(made)
+    assert at(film, 1) == first
+    assert len(made) == count
+
+
+def test_without_memory_only_the_frame_itself_is_there_and_comes_back_identical(film, made):
+    film.tetflora.kept_memory = 0.0
+    first = at(film, 1)
+    before = {kind: len(names) for kind, names in datablocks().items()}
+    for n in (FRAMES, 1, FRAMES):
+        at(film, n)
+    assert {kind: len(names) for kind, names in datablocks().items()}["collections"] == before["collections"]
+    assert len(made) == 4
+    assert at(film, 1) == first
+
+
+def test_what_was_not_seen_for_longest_goes_first(film, made):
+    sizes = []
+    for n in (1, FRAMES // 2, FRAMES):
+        at(film, n)
+        sizes.append(sum(entry.megabytes for entry in part("kept_results")._kept.values()))
+    part("handlers").on_render_end(film)
+    made.clear()
+    film.tetflora.kept_memory = (sizes[-1] - sizes[0] / 2.0) / 1e3  # room for two of three
+    for n in (1, FRAMES // 2, 1, FRAMES):  # the one in the middle is the oldest now
+        at(film, n)
+    assert made == [1, FRAMES // 2, FRAMES]
+    at(film, 1)
+    assert made == [1, FRAMES // 2, FRAMES]
+    at(film, FRAMES // 2)
+    assert made[3:] == [FRAMES // 2]
+
+
+def test_nothing_is_left_when_the_render_ends(film):
+    before = datablocks()
+    for n in range(1, FRAMES + 1):
+        at(film, n)
+    part("handlers").on_render_end(film)
+    assert datablocks() == before
+    assert part("kept_results")._kept == {}
+
+
+def test_nothing_that_is_kept_goes_into_a_file(film, tmp_path):
+    import bpy
+
+    at(film, 1)
+    at(film, FRAMES)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "film.blend"), copy=True)
+    with bpy.data.libraries.load(str(tmp_path / "film.blend")) as (inside, _):
+        assert not [name for name in (*inside.collections, *inside.meshes) if "TetFlora" in name or "leaf" in name]
+
+
+@pytest.mark.parametrize(
+    "change",
+    ["plant", "seed", "lens", "settings", "terrain", "camera", "species", "form", "material"],
+)
+def test_what_changes_is_noticed(film, made, change):
+    import bpy
+
+    ground = add_mesh("ground", size=20.0)
+    ground.tetflora.is_occluder = True
+    depsgraph()
+    at(film, 1)
+    at(film, 1)
+    assert made == [1]
+    if change == "plant":
+        bpy.data.objects["one"].location.x += 0.01
+    elif change == "seed":
+        bpy.data.objects["one"].tetflora.seed += 1
+    elif change == "lens":
+        film.camera.data.lens *= 1.5
+    elif change == "settings":
+        film.tetflora.facet *= 2.0
+    elif change == "terrain":
+        ground.data.vertices[0].co.z += 0.5
+        ground.data.update()
+    elif change == "camera":  # a cut
+        other = bpy.data.objects.new("other", film.camera.data)
+        film.collection.objects.link(other)
+        other.location, other.rotation_euler = (0.0, 12.0, 1.0), (np.pi / 2, 0.0, np.pi)
+        film.camera = other
+    elif change == "species":
+        bpy.data.objects["one"].tetflora.species = "fern"
+    elif change == "form":
+        film.tetflora.proxy_form = 'MICROSPHERES'
+    elif change == "material":
+        film.tetflora.output.species.add().species = "bush"
+        film.tetflora.output.species[0].leaf = bpy.data.materials.new("mine")
+    depsgraph()
+    at(film, 1)
+    assert made == [1, 1]
+
+
+def test_animated_lenses_share_while_they_change_little(film, made):
+    film.camera.animation_data_clear()
+    data = film.camera.data
+    for frame, lens in ((1, 50.0), (FRAMES, 56.0)):
+        data.lens = lens
+        data.keyframe_insert("lens", frame=frame)
+    for n in range(1, FRAMES + 1):
+        at(film, n)
+    assert 2 <= len(made) <= 4
+
+
+def test_a_camera_that_stands_still_is_refined_for_exactly(film, made):
+    film.camera.animation_data_clear()
+    film.camera.location = (0.0, -8.0, 1.0)
+    depsgraph()
+    exact = part("camera_reader").read_camera(film, depsgraph(), region_only=True)
+    shared = part("kept_results").shared_camera(film, depsgraph())
+    assert shared.position.tolist() == exact.position.tolist()
+    assert (shared.window, shared.width, shared.setback) == (exact.window, exact.width, 0.0)
+    for n in (1, 2, 3):
+        at(film, n)
+    assert made == [1]  # nothing changes, so nothing is made again
+
+
+@pytest.mark.parametrize("mover", ["parent", "constraint", "driver", "parent's parent"])
+def test_whatever_moves_the_camera_counts_as_animation(film, mover):
+    import bpy
+
+    film.camera.animation_data_clear()
+    moves = part("kept_results").camera_moves
+    assert not moves(film)
+    carrier = bpy.data.objects.new("carrier", None)
+    film.collection.objects.link(carrier)
+    if mover == "constraint":
+        film.camera.constraints.new('COPY_LOCATION').target = carrier
+    elif mover == "driver":
+        film.camera.driver_add("location", 0).driver.expression = "frame * .1"
+    else:
+        film.camera.parent = carrier
+        assert not moves(film)
+        if mover == "parent's parent":
+            carrier.parent = carrier = bpy.data.objects.new("outer", None)
+            film.collection.objects.link(carrier)
+        carrier.keyframe_insert("location", frame=1)
+    assert moves(film)
+
+
+def test_switched_off_each_frame_is_refined_for_its_own_camera(film, made):
+    film.tetflora.share_frames = False
+    names = {at(film, n)[0] for n in (1, 2, 3)}
+    assert made == [1, 2, 3]
+    assert len(names) == 3
+
+
+def test_explicit_objects_are_hidden_for_what_is_shown_and_shown_at_the_end(film, made):
+    import bpy
+
+    bush = add_mesh("foreign", size=0.5, z=0.3)
+    bush.tetflora.is_explicit = True
+    depsgraph()
+    for n in (1, FRAMES, 1, 2):
+        at(film, n)
+        assert bush.hide_render
+    part("handlers").on_render_end(film)
+    assert not bush.hide_render
+    assert "tetflora_hidden_for_render" not in bpy.data.objects["foreign"]
+
+
+def test_a_frame_that_fails_leaves_nothing_and_the_next_one_is_right(film, made):
+    good = at(film, 1)
+    camera, film.camera = film.camera, None
+    part("handlers").on_render_pre(film)
+    assert len(part("handlers").render_errors()) == 1
+    assert part("emit").result_collections(film, 'RENDER') == []
+    film.camera = camera
+    part("handlers").on_render_init(film)
+    assert at(film, 1) == good

@@ -1,0 +1,167 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Results that a render keeps from frame to frame: what is there already is not refined again.
+
+Results are known by a digest of all that they depend on. A frame whose digest is that of an earlier one gets its
+results back, and what nobody has seen for longest goes first when the memory for them is full. The camera counts by the
+cell that it is in (`refinement.view_cells`), so that neighbouring frames have the same digest.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import bpy
+
+from ..refinement.camera import Camera
+from ..refinement.view_cells import ViewCells, cell_camera
+from .camera_reader import read_camera
+from .emit import hidden_originals, hide_originals, remove_collection, result_collections, show_originals
+from .scene_digest import digest_of, scene_digest
+from .wind_properties import wind_of
+
+#: What a scene's settings say that results do not depend on.
+_ASIDE = {"statistics", "share_frames", "cell_length", "cell_turn", "kept_memory", "refine_at_render", "auto_refine"}
+
+
+@dataclass
+class _Kept:
+    """Results of one digest; names, because references do not outlive a load."""
+
+    collection: str
+    originals: list[str]
+    megabytes: float
+    statistics: str
+
+
+#: By digest, least recently seen first.
+_kept: dict[str, _Kept] = {}
+
+
+def shared_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Camera:
+    """The active camera, or the one that stands for all that are nearly alike if it moves and the scene asks for it.
+
+    Raises
+    ------
+    SceneError
+        As `camera_reader.read_camera`.
+    """
+    camera, settings = read_camera(scene, depsgraph, region_only=True), scene.tetflora
+    if not (settings.share_frames and camera_moves(scene)) or wind_of(scene) is not None:
+        return camera  # in the wind, no two frames are alike
+    return cell_camera(camera, ViewCells(settings.cell_length, settings.cell_turn)) or camera
+
+
+def camera_moves(scene: bpy.types.Scene) -> bool:
+    """Whether anything may move a scene's camera or change its lens from frame to frame.
+
+    It depends on the file alone, so that all frames of a film, and each of them alone, are refined in the same way.
+    """
+    carrier = scene.camera
+    if carrier is not None and _is_animated(carrier.data):
+        return True
+    while carrier is not None:
+        if _is_animated(carrier) or any(not constraint.mute for constraint in carrier.constraints):
+            return True
+        carrier = carrier.parent
+    return False
+
+
+def _is_animated(datablock: bpy.types.ID | None) -> bool:
+    animation = getattr(datablock, "animation_data", None)
+    return animation is not None and bool(animation.action or animation.drivers or animation.nla_tracks)
+
+
+def key_of(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, layers: Sequence[bpy.types.ViewLayer], camera: Camera
+) -> str:
+    """Digest of all that results for view layers depend on.
+
+    Raises
+    ------
+    TetFloraError
+        As `scene_digest.scene_digest`.
+    """
+    content = hashlib.sha256(scene_digest(scene, depsgraph, layers[0], camera).encode())
+    digest_of(content, [layer.name for layer in layers])
+    for group in (scene.tetflora, scene.tetflora.output):
+        digest_of(content, _values(group))
+    return content.hexdigest()
+
+
+def _values(group: bpy.types.PropertyGroup) -> list[object]:
+    """Values of a scene's settings; those in groups are told by others or say nothing of results."""
+    found: list[object] = []
+    for prop in group.bl_rna.properties:
+        name = prop.identifier
+        if name not in _ASIDE and prop.type not in {'POINTER', 'COLLECTION'}:
+            value = getattr(group, name)
+            found.append((name, list(value) if getattr(prop, "is_array", False) else value))
+    return found
+
+
+def stow(scene: bpy.types.Scene, wanted: Collection[str]) -> None:
+    """Take results of a render out of a scene unless they are wanted for its frame."""
+    stay = {_kept[key].collection for key in wanted if key in _kept}
+    away = [c for c in result_collections(scene, 'RENDER') if c.name not in stay]
+    if away or len(result_collections(scene, 'RENDER')) < len(wanted):
+        show_originals(scene, 'RENDER')
+    known = {entry.collection for entry in _kept.values()}
+    for collection in away:
+        if collection.name in known:
+            scene.collection.children.unlink(collection)
+        else:
+            remove_collection(scene, collection)
+
+
+def recall(scene: bpy.types.Scene, key: str) -> bpy.types.Collection | None:
+    """Put results of a digest into a scene again; None if there are none."""
+    entry = _kept.pop(key, None)
+    collection = bpy.data.collections.get((entry.collection, None)) if entry is not None else None
+    if collection is None:
+        return None
+    _kept[key] = entry  # most recently seen
+    if collection.name not in scene.collection.children:
+        scene.collection.children.link(collection)
+    scene.tetflora.statistics = entry.statistics
+    return collection
+
+
+def keep(scene: bpy.types.Scene, key: str, collection: bpy.types.Collection, megabytes: float) -> None:
+    """Remember new results of a scene, and let older ones go for which there is no memory."""
+    originals = [o.name for o in hidden_originals(scene, 'RENDER')]
+    _kept[key] = _Kept(collection.name, originals, megabytes, scene.tetflora.statistics)
+    shown = {c.name for c in result_collections(scene, 'RENDER')}
+    limit = scene.tetflora.kept_memory * 1e3
+    for other in [k for k, entry in _kept.items() if entry.collection not in shown]:
+        if sum(entry.megabytes for entry in _kept.values()) <= limit:
+            break
+        _forget(scene, other)
+
+
+def hide_for(scene: bpy.types.Scene, keys: Sequence[str]) -> None:
+    """Hide objects in whose place results of some digests are."""
+    names = dict.fromkeys(name for key in keys if key in _kept for name in _kept[key].originals)
+    hide_originals(scene, 'RENDER', [o for name in names if (o := bpy.data.objects.get((name, None))) is not None])
+
+
+def forget_all(scene: bpy.types.Scene) -> None:
+    """Remove all that was kept for a scene and is not shown in it; what is shown is `job.clear`'s business."""
+    shown = {c.name for c in result_collections(scene, 'RENDER')}
+    for key in list(_kept):
+        if _kept[key].collection not in shown:
+            _forget(scene, key)
+    _kept.clear()
+
+
+def forget_names() -> None:
+    """Another file is open: nothing of what was kept is there any more."""
+    _kept.clear()
+
+
+def _forget(scene: bpy.types.Scene, key: str) -> None:
+    collection = bpy.data.collections.get((_kept.pop(key).collection, None))
+    if collection is not None:
+        remove_collection(scene, collection)

@@ -1,0 +1,227 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""View cells: one refinement for all cameras that are nearly alike, so that the frames of a film share it.
+
+The space of cameras (place, direction, focal length) is divided into cells. Which cell a camera is in follows from that
+camera alone, never from the frames before it: a frame of a film and the same frame alone are refined alike, on whatever
+machine. What is seen from a cell of space instead of from a point goes back to J. M. Airey, J. H. Rohlf and F. P.
+Brooks, "Towards image realism with interactive update rates in complex virtual building environments" (I3D 1990).
+
+All cameras of a cell are replaced by one that sees whatever any of them sees: it stands further back, its window is
+wider, and it takes everything to be as near as it is to the nearest of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .camera import Camera
+
+#: How far beyond a cell, as a share of it, its camera still sees enough: for the eye while the shutter is open.
+BEYOND = 0.25
+#: Cells of focal length, and of the distance that is sharp, in each doubling.
+ZOOMS, FOCI = 16.0, 2.0
+#: Width and height of cells over their length, for a window of which half is as wide as it is far away.
+ACROSS = 2.0
+#: Least share of the view's direction that corners of the window must have when the camera has turned: 84 degrees.
+_AHEAD = 0.1
+#: Where lattices begin, in cells, and a turn that comes before them: what artists type in (0, 90 degrees, whole metres)
+#: then lies on no border, where rounding errors would decide.
+_BEGIN = 0.381966
+_BEFORE = np.array([0.8446, 0.2397, 0.3581, 0.3173])
+#: Fractions of a pixel to which the picture's place on the sensor is rounded, as single precision asks for.
+_FRACTIONS = 64.0
+
+
+@dataclass(frozen=True)
+class ViewCells:
+    """How large the cells are.
+
+    Attributes
+    ----------
+    length : float
+        Along the line of sight, metres. Across it cells are shorter, since there the picture changes faster.
+    turn : float
+        Angle by which a camera turns from one to the next, radians.
+    """
+
+    length: float
+    turn: float
+
+
+@dataclass(frozen=True)
+class _Turns:
+    """A cell of rotations: in the projection of unit quaternions from their centre, coordinates of its middle (3,)."""
+
+    largest: int
+    middle: NDArray[np.float64]
+    step: float
+
+    @classmethod
+    def around(cls, frame: NDArray[np.float64], turn: float) -> _Turns:
+        quaternion = _product(_BEFORE / np.linalg.norm(_BEFORE), _quaternion(frame))
+        largest = int(np.argmax(np.abs(quaternion)))
+        # An angle is twice that between quaternions.
+        step = turn / 2.0
+        place = np.delete(quaternion, largest) / quaternion[largest]
+        return cls(largest, _middle(place, step), step)
+
+    def frame(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Rotation (3, 3) so many steps (3,) away from the middle."""
+        quaternion = np.insert(self.middle + away * self.step, self.largest, 1.0)
+        before = _BEFORE / np.linalg.norm(_BEFORE)
+        return _matrix(_product(before * np.array([1.0, -1.0, -1.0, -1.0]), quaternion / np.linalg.norm(quaternion)))
+
+    def holds(self, frame: NDArray[np.float64], reach: float) -> bool:
+        """Whether a rotation is within so many steps of the middle."""
+        quaternion = _product(_BEFORE / np.linalg.norm(_BEFORE), _quaternion(frame))
+        place = np.delete(quaternion, self.largest) / quaternion[self.largest]
+        return bool((np.abs(place - self.middle) <= reach * self.step).all())
+
+
+def cell_camera(camera: Camera, cells: ViewCells) -> Camera | None:
+    """The camera that stands for all that are in the same cell as a camera: the same numbers for each of them.
+
+    Parameters
+    ----------
+    camera : Camera
+        As it was read, without margins. Its shutter and other eyes need no more than a quarter of a cell.
+    cells : ViewCells
+
+    Returns
+    -------
+    Camera or None
+        None where a camera cannot share its refinement: it moves out of its cell while the shutter is open, its view is
+        wider than any window, or it is a panorama of less than the whole sphere.
+    """
+    if camera.kind == "PANO" and not _is_whole_sphere(camera):
+        return None
+    turns = _Turns.around(camera.frame, cells.turn)
+    frame = turns.frame(np.zeros(3))
+    camera = _zoomed(camera) if camera.kind != "PANO" else camera
+    left, right, bottom, top = camera.window
+    half = np.array([right - left, top - bottom]) / 2.0
+    narrow = np.minimum(ACROSS * half, 1.0) if camera.kind == "PERSP" else np.ones(2)
+    steps = cells.length * np.array([*narrow, 1.0])
+    eye = frame @ _middle(camera.position @ frame, steps)
+    reach = (0.5 + BEYOND) * steps
+    for other in camera.shutter:
+        beyond = np.abs((other.position - eye) @ frame) > reach
+        if beyond.any() or not turns.holds(other.frame, 0.5 + BEYOND):
+            return None
+    room = float(np.linalg.norm(steps) / 2.0)
+    lens, focus = _lens_of_cell(camera)
+    alike = replace(camera, position=eye, frame=frame, room=room, shutter=(), lens_radius=lens, focus=focus)
+    if camera.kind == "PANO":
+        return alike
+    corners = [turns.frame((0.5 + BEYOND) * np.array(away)) for away in product((-1.0, 1.0), repeat=3)]
+    return _standing_back(alike, np.array([frame.T @ corner for corner in corners]), reach)
+
+
+def _standing_back(camera: Camera, turned: NDArray[np.float64], reach: NDArray[np.float64]) -> Camera | None:
+    """A camera that sees what it sees from a box of half sizes (3,) around the eye, turned (n, 3, 3) in each way."""
+    left, right, bottom, top = camera.window
+    middle = np.array([left + right, bottom + top]) / 2.0
+    step = np.array([(right - left) / camera.width, (top - bottom) / camera.height])
+    seen = np.array([(x, y, -1.0) for x in (left, right) for y in (bottom, top)])
+    if camera.kind == "ORTHO":
+        # At the far end of what it sees; the near one is closer to the eye, around which it turns.
+        seen = seen * np.array([1.0, 1.0, camera.far])
+    local = np.einsum("nij,kj->nki", turned, seen).reshape(-1, 3)
+    if camera.kind == "PERSP":
+        if (-local[:, 2] < _AHEAD * np.linalg.norm(local, axis=1)).any():
+            return None
+        local = local / -local[:, 2:]
+    half = np.abs(local[:, :2] - middle).max(axis=0)
+    if camera.kind == "ORTHO":
+        half = half + reach[:2]
+        setback, near = float(reach[2]), camera.near
+        away = np.array([0.0, 0.0, setback])
+    else:
+        # In a frame that is sheared with the window, it is |x| <= half (depth + setback) for all corners of the box.
+        setback = float(((reach[:2] + np.abs(middle) * reach[2]) / half).max() + reach[2])
+        near = max(camera.near, setback - float(reach[2]))
+        away = np.array([*-middle, 1.0]) * setback
+    pixels = np.ceil(2.0 * half / step).astype(int)
+    half = pixels * step / 2.0
+    return replace(
+        camera,
+        position=camera.position + camera.frame @ away,
+        window=(middle[0] - half[0], middle[0] + half[0], middle[1] - half[1], middle[1] + half[1]),
+        near=near,
+        far=camera.far + setback + float(reach[2]),
+        width=int(pixels[0]),
+        height=int(pixels[1]),
+        setback=setback if camera.kind == "PERSP" else 0.0,
+        focus=camera.focus + (setback if camera.kind == "ORTHO" else 0.0),
+    )
+
+
+def _zoomed(camera: Camera) -> Camera:
+    """With the widest window of all in its cell of focal length, in pixels as small as the finest of them."""
+    left, right, bottom, top = camera.window
+    step = np.array([(right - left) / camera.width, (top - bottom) / camera.height])
+    place = np.array([[left, right], [bottom, top]]) / step[:, None]
+    place = np.round(place * _FRACTIONS) / _FRACTIONS
+    aspect = np.round(step[0] / step[1] * 1e4) / 1e4
+    fine = 2.0 ** (_middle(np.log2(camera.pixel_size), 1.0 / ZOOMS) - 0.5 / ZOOMS)
+    finest = fine * np.array([np.sqrt(aspect), 1.0 / np.sqrt(aspect)])
+    widest = 2.0 ** (1.0 / ZOOMS)
+    size = np.ceil(np.array([camera.width, camera.height]) * widest).astype(int)
+    middle = place.mean(axis=1) * finest * np.sqrt(widest)
+    half = size * finest / 2.0
+    window = (middle[0] - half[0], middle[0] + half[0], middle[1] - half[1], middle[1] + half[1])
+    return replace(camera, window=window, width=int(size[0]), height=int(size[1]))
+
+
+def _lens_of_cell(camera: Camera) -> tuple[float, float]:
+    """Radius of the lens and depth that is sharp, as they are for all cameras of a cell."""
+    if camera.lens_radius <= 0.0 or not np.isfinite(camera.focus):
+        return camera.lens_radius, camera.focus
+    radius, focus = (2.0 ** _middle(np.log2(x), 1.0 / FOCI) for x in (camera.lens_radius, camera.focus))
+    return float(radius * 2.0 ** (0.5 / FOCI)), float(focus)
+
+
+def _middle(place: NDArray | float, step: NDArray | float) -> NDArray[np.float64]:
+    """Middle of the cell of a lattice in which a place is."""
+    return (np.floor(place / np.asarray(step) - _BEGIN) + _BEGIN + 0.5) * step
+
+
+def _is_whole_sphere(camera: Camera) -> bool:
+    left, right, bottom, top = camera.window
+    return right - left > 2.0 * np.pi - 1e-3 and top - bottom > np.pi - 1e-3
+
+
+def _quaternion(frame: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit quaternion (w, x, y, z) of a rotation (3, 3), of either sign.
+
+    Notes
+    -----
+    The eigenvector of I. Y. Bar-Itzhack, "New method for extracting the quaternion from a rotation matrix", Journal of
+    Guidance, Control, and Dynamics 23 (6), 2000.
+    """
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = frame
+    k = [
+        [xx + yy + zz, zy - yz, xz - zx, yx - xy],
+        [zy - yz, xx - yy - zz, yx + xy, xz + zx],
+        [xz - zx, yx + xy, yy - xx - zz, zy + yz],
+        [yx - xy, xz + zx, zy + yz, zz - xx - yy],
+    ]
+    return np.linalg.eigh(np.array(k))[1][:, -1]
+
+
+def _product(p: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Hamilton's product of quaternions (4,)."""
+    vector = p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:])
+    return np.array([p[0] * q[0] - p[1:] @ q[1:], *vector])
+
+
+def _matrix(q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotation (3, 3) of a unit quaternion."""
+    w, v = q[0], q[1:]
+    cross = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+    return np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross
