@@ -18,9 +18,11 @@ from bpy.app.handlers import persistent
 
 from ..errors import SceneError
 from ..plants.catalogue import SpeciesInfo, list_species, load_species
+from ..whole_files import write_whole
 from .migration import VERSION
 from .plant_objects import prepare_scene
 from .preferences import species_folders
+from .saved_files import write_blend
 from .thumbnails import thumbnail_file
 
 FILE = "tetflora_plants.blend"
@@ -61,10 +63,10 @@ def write_asset_library(folder: Path) -> tuple[Path, int]:
                 species = load_species(info.identifier, species_folders())
                 plants.append(bpy.data.objects.new(info.name, None))
                 _make_asset(plants[-1], info, species.orders[0].length.mean)
-            bpy.data.libraries.write(str(path), set(plants), fake_user=True, compress=True)
+            write_blend(path, lambda p: bpy.data.libraries.write(p, set(plants), fake_user=True, compress=True))
             _write_catalog(folder / _CATALOGS_FILE)
         except (OSError, RuntimeError) as error:
-            raise SceneError(f"The asset library cannot be written: {error}") from None
+            raise SceneError(f"The asset library cannot be written to {folder}: {error}") from None
         finally:
             bpy.data.batch_remove(plants)
     return path, len(known)
@@ -121,7 +123,7 @@ def _set_preview(obj: bpy.types.Object, picture: Path) -> None:
 def _write_catalog(path: Path) -> None:
     text = path.read_text(encoding="utf-8") if path.exists() else "VERSION 1\n"
     if _CATALOG not in text:
-        path.write_text(f"{text.rstrip()}\n{_CATALOG}:TetFlora:TetFlora\n", encoding="utf-8")
+        write_whole(path, f"{text.rstrip()}\n{_CATALOG}:TetFlora:TetFlora\n")
 
 
 @persistent

@@ -22,7 +22,9 @@ from . import farm_bundle, handlers, job
 from .camera_reader import read_camera
 from .compat import EEVEE_ENGINES, eevee_engine
 from .farm_template import Run, frame_numbers, frame_runs
+from .pictures import damaged
 from .properties import TetFloraScene
+from .saved_files import write_blend
 
 NAME = "tetflora"
 
@@ -62,11 +64,14 @@ def main(arguments: Sequence[str]) -> int:
         return _fail(" ".join(str(error).split()), 1)
     if figures is None:
         return 1
-    if options.json:
-        print(json.dumps(figures), flush=True)
-    else:
-        for key, value in figures.items():
-            print(f"{key.replace('_', ' '):>22}: {_readable(value)}", flush=True)
+    try:
+        if options.json:
+            print(json.dumps(figures), flush=True)
+        else:
+            for key, value in figures.items():
+                print(f"{key.replace('_', ' '):>22}: {_readable(value)}", flush=True)
+    except OSError as error:  # into a file on a full disk, or into a program that has ended
+        return _fail(f"the figures cannot be printed: {error.strerror}", 1)
     return 0
 
 
@@ -122,7 +127,7 @@ def _refine(options: argparse.Namespace) -> dict:
     statistics = job.refine(scene, bpy.context.evaluated_depsgraph_get(), view_layer=bpy.context.view_layer)
     if options.save is not None:
         scene.tetflora.output.save_results = True  # that is what was asked for
-        bpy.ops.wm.save_as_mainfile(filepath=str(options.save.absolute()), copy=True)
+        write_blend(options.save.absolute(), lambda path: bpy.ops.wm.save_as_mainfile(filepath=path, copy=True))
     return asdict(statistics)
 
 
@@ -158,9 +163,12 @@ def _render(options: argparse.Namespace) -> dict | None:
         scene.render.filepath = _still_path(scene)
         bpy.ops.render.render(write_still=True)
         files = [bpy.path.ensure_ext(scene.render.filepath, scene.render.file_extension)]
+    paths = [Path(bpy.path.abspath(f)) for f in files]
+    for path in damaged(scene, paths):
+        raise SceneError(f"{path} was not written to its end; is the disk full?")
     if failed or handlers.render_errors():
         return None  # said on stderr when it happened
-    return {"files": [str(Path(bpy.path.abspath(f))) for f in files], **json.loads(scene.tetflora.statistics or "{}")}
+    return {"files": list(map(str, paths)), **json.loads(scene.tetflora.statistics or "{}")}
 
 
 def _stats(_options: argparse.Namespace) -> dict:

@@ -87,11 +87,10 @@ def write_bundle(
     Raises
     ------
     SceneError
-        The scene cannot be rendered by a farm, or the folder cannot be used.
+        The scene cannot be rendered by a farm, or the folder cannot be used or written; in the latter case what was
+        written is taken away again.
     TetFloraError
         Its plants could not be made.
-    OSError
-        A file cannot be written; what was written is taken away again.
     """
     blend = _saved_file()
     _check_output(scene)
@@ -119,8 +118,10 @@ def write_bundle(
         for title, content in texts.items():
             text = json.dumps(content, indent=2, ensure_ascii=False)
             (folder / f"{title}.json").write_text(text + "\n", encoding="utf-8")
-    except BaseException:
+    except BaseException as error:
         _take_away(folder, made)
+        if isinstance(error, OSError):
+            raise SceneError(f"The job {folder} cannot be written: {_reason(error)}; name another folder") from None
         raise
     numbers = farm_template.frame_numbers(runs)
     return {
@@ -250,6 +251,14 @@ def _empty_folder(folder: Path) -> bool:
     except OSError as error:
         raise SceneError(f"{folder} cannot be written to ({error.strerror}); name another folder") from None
     return made
+
+
+def _reason(error: OSError) -> str:
+    """Why a file could not be written or copied; where many could not, why the first."""
+    if isinstance(error, shutil.Error):
+        source, _, why = error.args[0][0]
+        return f"{source}: {why}"
+    return error.strerror or str(error)
 
 
 def _take_away(folder: Path, made: bool) -> None:

@@ -18,6 +18,7 @@ import bpy
 import numpy as np
 
 from ..errors import SceneError
+from ..whole_files import write_whole
 from .population_properties import TetFloraMixEntry, TetFloraPopulation
 from .population_rules import settings_of
 from .populations import NAME, add_population, set_grounds
@@ -44,12 +45,9 @@ def write_populations(populations: Iterable[TetFloraPopulation], path: Path) -> 
         The file cannot be written.
     """
     text = json.dumps(as_data(populations), indent=2, ensure_ascii=False) + "\n"
-    part = path.with_name(path.name + ".part")
     try:
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
+        write_whole(path, text)
     except OSError as error:
-        part.unlink(missing_ok=True)
         raise SceneError(f"{path.name}: cannot be written: {error.strerror}") from None
     return path
 

@@ -12,6 +12,7 @@ import bpy
 
 from ..errors import SpeciesError
 from ..plants.schema import read_species
+from ..whole_files import write_whole
 from .preferences import own_species_folder, species_folders
 from .species_edits import species_data, species_for, tell_listeners
 
@@ -52,12 +53,9 @@ def write_species(scene: bpy.types.Scene, identifier: str, path: Path) -> Path:
         The species is broken, or the file cannot be written.
     """
     species_for(scene, identifier)
-    part = path.with_name(path.name + ".part")
     try:
-        part.write_text(as_text(species_data(scene, identifier)), encoding="utf-8")
-        part.replace(path)  # whole or not at all: other Blenders may read the folder at this moment
+        write_whole(path, as_text(species_data(scene, identifier)))
     except OSError as error:
-        part.unlink(missing_ok=True)
         raise SpeciesError(f"{path.name}: cannot be written: {error.strerror}") from None
     return path
 
@@ -98,7 +96,7 @@ def load_species_file(path: Path, replace: bool = False) -> str:
             raise SpeciesError(
                 f'You have another species "{path.stem}" already; switch on Replace in the file browser, or rename it'
             )
-        target.write_bytes(content)
+        write_whole(target, content)
     except OSError as error:
         raise SpeciesError(f"{target.name}: cannot be written: {error.strerror}") from None
     tell_listeners()
