@@ -7,7 +7,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.blender.scenes import add_camera, add_plant, depsgraph, part
+from devtools import session
+from tests.blender.scenes import add_camera, add_plant, depsgraph, part, tiny_render
 
 
 @pytest.fixture
@@ -23,13 +24,18 @@ def scene(clean_file):
     return scene
 
 
+def made(scene):
+    """Objects of the last refinement that have vertices or points."""
+    objects = part("emit").result_collections(scene, 'VIEW')[0].all_objects
+    return sorted((obj for obj in objects if obj.data is not None), key=lambda obj: obj.name)
+
+
 def places(scene, frame, subframe=0.0):
     """All vertices of what is refined at a frame."""
     scene.frame_set(frame, subframe=subframe)
     part("job").refine(scene, depsgraph())
-    objects = part("emit").result_collections(scene, 'VIEW')[0].all_objects
     found = []
-    for obj in sorted((o for o in objects if o.type == 'MESH'), key=lambda o: o.name):
+    for obj in (obj for obj in made(scene) if obj.type == 'MESH'):
         flat = np.zeros(3 * len(obj.data.vertices), np.float32)
         obj.data.vertices.foreach_get("co", flat)
         found.append(flat)
@@ -109,3 +115,99 @@ def test_a_plant_is_made_into_a_mesh_at_rest(scene):
     flora = part("job").compile_for(("bush",), scene, depsgraph())
     assert flora.calm is None
     assert part("job").blown(scene, flora).calm is flora
+
+
+def test_velocities_are_there_where_there_is_motion_blur(scene):
+    def kinds(blur):
+        scene.render.use_motion_blur = blur
+        part("job").refine(scene, depsgraph())
+        assert len(made(scene)) > 1
+        return ["velocity" in obj.data.attributes for obj in made(scene)]
+
+    assert not any(kinds(False))
+    assert all(kinds(True))
+    scene.tetflora.wind.enabled = False
+    assert not any(kinds(True))
+
+
+@pytest.mark.parametrize(("position", "middle"), [('START', 0.25), ('CENTER', 0.0), ('END', -0.25)])
+def test_with_motion_blur_plants_stand_as_in_the_middle_of_the_exposure(scene, position, middle):
+    scene.frame_set(13)
+    scene.render.fps, scene.frame_start = 24, 1
+    scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 0.5
+    scene.render.motion_blur_position = position
+    wind = part("wind_properties").wind_of(scene)
+    assert wind.moving
+    assert wind.time == pytest.approx((12 + middle) / 24)
+
+
+def alpha(path):
+    import bpy
+
+    image = bpy.data.images.load(str(path), check_existing=False)
+    width, height = image.size
+    return np.array(image.pixels[:]).reshape(height, width, 4)[:, :, 3]
+
+
+def blurred_render(scene, path, size=128, samples=64):
+    import bpy
+
+    tiny_render(samples=samples, size=size)
+    scene.render.film_transparent = True
+    scene.render.use_motion_blur, scene.render.motion_blur_position = True, 'CENTER'
+    scene.render.motion_blur_shutter = 0.5
+    part("compat").set_still_format(scene.render.image_settings, "PNG")
+    scene.render.image_settings.color_mode = 'RGBA'
+    scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+    return alpha(path)
+
+
+@pytest.mark.parametrize("fps", [24, 48])
+def test_cycles_takes_velocities_for_metres_a_second(clean_file, tmp_path, fps):
+    """A square of a metre at 12 m/s is smeared by the way that it goes while the shutter is open."""
+    import bpy
+
+    buffers = session.part("tetflora_addon.buffers").MeshBuffers(
+        positions=np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]], np.float32),
+        edge_verts=np.array([[0, 1], [1, 2], [2, 3], [3, 0]], np.int32),
+        corner_verts=np.arange(4, dtype=np.int32),
+        corner_edges=np.arange(4, dtype=np.int32),
+        face_offsets=np.array([0, 4], np.int32),
+        attributes={"velocity": ("POINT", np.tile(np.array([12.0, 0, 0], np.float32), (4, 1)))},
+    )
+    scene = bpy.context.scene
+    scene.collection.objects.link(bpy.data.objects.new("square", part("meshes").write_mesh("square", buffers)))
+    camera = add_camera(location=(0, 0, 5), rotation=(0, 0, 0))
+    camera.data.type, camera.data.ortho_scale = 'ORTHO', 4.0
+    scene.render.fps = fps
+    row = blurred_render(scene, tmp_path / "square.png")[64]
+    way = 12.0 / fps * 0.5
+    assert np.count_nonzero(row > 0.02) / 32 == pytest.approx(1 + way, abs=0.08)
+    assert np.count_nonzero(row > 0.98) / 32 == pytest.approx(1 - way, abs=0.08)
+
+
+def test_a_picture_with_motion_blur_is_the_mean_of_pictures_while_the_shutter_is_open(scene, tmp_path):
+    """The same plants refined once with velocities, and many times without; what does not move would be farther off."""
+    scene.tetflora.refine_at_render = False
+    scene.tetflora.wind.speed, scene.render.fps = 20.0, 10
+    scene.render.use_motion_blur, scene.render.motion_blur_position = True, 'CENTER'
+    scene.render.motion_blur_shutter = 0.5
+    scene.camera.data.lens = 80.0
+    scene.render.resolution_x = scene.render.resolution_y = 128
+    scene.frame_set(5)
+    part("job").refine(scene, depsgraph())
+    soft = blurred_render(scene, tmp_path / "soft.png")
+    for obj in made(scene):
+        obj.data.attributes.remove(obj.data.attributes["velocity"])
+    sharp = blurred_render(scene, tmp_path / "sharp.png")
+    exposures = []
+    for number in range(8):
+        at = 5 + ((number + 0.5) / 8 - 0.5) * 0.5
+        scene.frame_set(int(at), subframe=at % 1.0)
+        scene.render.use_motion_blur = False
+        part("job").refine(scene, depsgraph())
+        exposures.append(blurred_render(scene, tmp_path / "one.png", samples=16))
+    truth = np.mean(exposures, axis=0)
+    off, still_off = (np.abs(picture - truth).mean() for picture in (soft, sharp))
+    assert off < 0.75 * still_off  # what is left is noise: leaves turn while they move

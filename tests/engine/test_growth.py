@@ -46,6 +46,8 @@ def by_key(pieces: Pieces) -> Pieces:
 
 def same(a: Any, b: Any) -> bool:
     """Bit for bit, but for the number of the plant."""
+    if a is None:
+        return b is None
     if isinstance(a, np.ndarray):
         return a.shape == b.shape and a.tobytes() == b.tobytes()
     return all(same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a) if f.name != "plant")

@@ -15,14 +15,26 @@ from hypothesis import strategies as st
 from tests.engine import support
 from tests.engine.test_bounds import LEANS, SHAPES, any_species, check_sides, outside
 from tests.engine.test_drawn import flora as drawn_flora
+from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.errors import TetFloraError
 from tetflora_addon.plants.compiled import Flora
 from tetflora_addon.plants.expansion import expand, open_subplants
 from tetflora_addon.plants.growth import axes
+from tetflora_addon.plants.meshing import leaf_meshes
+from tetflora_addon.plants.pieces import Pieces
 from tetflora_addon.plants.rows import ROW_DTYPE
 from tetflora_addon.plants.stems import Stems
+from tetflora_addon.plants.tubes import tube_buffers
 from tetflora_addon.plants.wind import Wind, gusts, leant, sway, widest_sway
 from tetflora_addon.shading.facet_shares import facet_shares
+from tetflora_addon.shading.microspheres import spheres
+from tetflora_addon.shading.microsurfaces import (
+    Facets,
+    concatenate_facets,
+    facet_mesh,
+    piece_facets,
+    subplant_facets,
+)
 
 _FLOAT32 = 1e-6
 WINDS = st.builds(
@@ -213,6 +225,69 @@ def test_one_compile_serves_all_times_and_proxies_keep_their_mean() -> None:
     assert first.orientation is second.orientation is flora.orientation
     assert facet_shares(first) is facet_shares(flora)
     assert first.rows["air"]["time"][0] != second.rows["air"]["time"][0]
+
+
+def meshes_at(flora: Flora, time: float, moving: bool = False, whole: bool = True) -> list[MeshBuffers]:
+    """Wood and leaves of a plant that stands off the origin, of whole branches or of their pieces."""
+    one = flora.in_wind(Wind(9.0, 0.4, 0.5, time, 0.0, moving))
+    trunk = support.trunks(one.rows, support.plants(3, position=(12, -5, 1)))
+    if not whole:
+        return [m for some in support.meshes(one, support.expanded(one, trunk)) for m in some]
+    stems, none = list(expand(one, trunk)), Pieces.empty()
+    return [tube_buffers(one, none, stems), *(leaf.buffers for leaf in leaf_meshes(one, none, 0, stems))]
+
+
+@pytest.mark.parametrize("whole", [True, False], ids=("branches", "pieces"))
+@pytest.mark.parametrize("kind", ["rich", "birch", "drawn"])
+def test_velocities_are_those_of_the_vertices(kind: str, whole: bool) -> None:
+    """The way from a little before to a little after, of wood and leaves; the ways themselves are none else."""
+    flora = {
+        "rich": lambda: support.compiled(support.RICH),
+        "birch": lambda: support.compiled(support.shipped("birch")),
+        "drawn": drawn_flora,
+    }[kind]()
+    step = 4e-3
+    moving, before, after = (
+        meshes_at(flora, time, asked, whole) for time, asked in ((5.0, True), (5.0 - step, False), (5.0 + step, False))
+    )
+    for now, still, low, high in zip(moving, meshes_at(flora, 5.0, False, whole), before, after, strict=True):
+        np.testing.assert_array_equal(now.positions, still.positions)
+        assert "velocity" not in still.attributes
+        domain, velocity = now.attributes["velocity"]
+        assert domain == "POINT"
+        way = (high.positions - low.positions) / (2 * step)
+        assert np.abs(velocity).max() > 0.1
+        error = np.linalg.norm(velocity - way, axis=1)
+        assert error.mean() < 0.02 * np.linalg.norm(way, axis=1).mean()
+        assert np.quantile(error, 0.999) < 0.05 * np.abs(way).max()
+
+
+@pytest.mark.parametrize("kind", ["small", "birch"])
+def test_facets_move_with_what_bears_them(kind: str) -> None:
+    """Facets of sub-plants go with their bases, those of pieces with the branch; so do the spheres in their place."""
+    flora, step = support.compiled(support.SMALL if kind == "small" else support.shipped("birch")), 2e-3
+
+    def facets(time: float, moving: bool = False) -> list[Facets]:
+        one = flora.in_wind(Wind(9.0, 0.4, 0.5, time, 0.0, moving))
+        limbs, _, pieces, _ = open_subplants(one, support.trunks(one.rows, support.plants(3, position=(12, -5, 1))))
+        twigs, _, more, _ = open_subplants(one, limbs)
+        side = [np.full(len(some), 0.05) for some in (limbs, twigs, pieces, more)]
+        make = (subplant_facets, subplant_facets, piece_facets, piece_facets)
+        return [f(one, some, size) for f, some, size in zip(make, (limbs, twigs, pieces, more), side, strict=True)]
+
+    for now, low, high in zip(facets(5.0, True), facets(5.0 - step), facets(5.0 + step), strict=True):
+        assert low.velocity is None
+        way = (high.centre - low.centre) / (2 * step)
+        error = np.linalg.norm(now.velocity - way, axis=1)
+        # Leaves turn to the light as well while their branches turn, by little.
+        assert np.median(error) < 0.03 * np.linalg.norm(way, axis=1).max()
+        assert np.linalg.norm(now.velocity, axis=1).max() > 0.01
+        mesh = facet_mesh(now)
+        np.testing.assert_array_equal(mesh.attributes["velocity"][1][::3], now.velocity.astype(np.float32))
+        points = spheres([(now, False)], support.camera((0, -10, 1), (0, 0, 1)))
+        np.testing.assert_array_equal(points.attributes["velocity"], now.velocity.astype(np.float32))
+        joined = concatenate_facets([low, now])
+        np.testing.assert_array_equal(joined.velocity, np.concatenate([0 * now.velocity[: len(low)], now.velocity]))
 
 
 @pytest.mark.parametrize("height", [0.0, 2.0, 9.0])

@@ -11,6 +11,9 @@ from bpy.props import BoolProperty, FloatProperty, IntProperty
 
 from ..plants.wind import Wind
 
+#: Where the middle of the exposure lies from the frame, in times that the shutter is open.
+_MIDDLE = {'START': 0.5, 'CENTER': 0.0, 'END': -0.5}
+
 
 class TetFloraWind(bpy.types.PropertyGroup):
     """Settings of the wind; all but the switch and the loop can be animated."""
@@ -61,12 +64,18 @@ class TetFloraWind(bpy.types.PropertyGroup):
 
 
 def wind_of(scene: bpy.types.Scene) -> Wind | None:
-    """The wind at the scene's frame, the part of a frame included; None where none blows."""
+    """The wind at the scene's frame, the part of a frame included; None where none blows.
+
+    With motion blur it is that of the middle of the exposure, from which Cycles goes back and forth by velocities.
+    """
     group = scene.tetflora.wind
     if not group.enabled or group.speed == 0.0:
         return None
     rate = scene.render.fps / scene.render.fps_base
     frame = scene.frame_current_final - scene.frame_start
+    blurred = scene.render.use_motion_blur
+    if blurred:
+        frame += _MIDDLE[scene.render.motion_blur_position] * scene.render.motion_blur_shutter
     if group.loop:
         frame %= group.loop  # here, where frames are whole numbers, it is exact
-    return Wind(group.speed, group.direction, group.gusts, frame / rate, group.loop / rate)
+    return Wind(group.speed, group.direction, group.gusts, frame / rate, group.loop / rate, blurred)

@@ -13,7 +13,7 @@ from .branches import Branches
 from .hashing import Draw, signed
 from .rows import varied
 from .vectors import by_component, columns, gathered
-from .wind import axis_and_angle, is_windy, leant, sway, turned_by
+from .wind import axis_and_angle, is_windy, leant, moment, sway, turned_by
 
 
 @dataclass(frozen=True)
@@ -28,15 +28,19 @@ class Axes:
         Local axes along each segment.
     segments : (n,) int64
         Number of segments.
+    later : Axes or None
+        The same lines a moment later, where it is asked how plants move.
     """
 
     knots: NDArray[np.float64]
     frames: NDArray[np.float64]
     segments: NDArray[np.int64]
+    later: Axes | None = None
 
     def take(self, index: NDArray | slice) -> Axes:
         """Selection by indices or slice."""
-        return Axes(_selected(self.knots, index), _selected(self.frames, index), self.segments[index])
+        later = None if self.later is None else self.later.take(index)
+        return Axes(_selected(self.knots, index), _selected(self.frames, index), self.segments[index], later)
 
     def at(self, branch: NDArray[np.integer], t: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
         """Positions (m, 3) and frames (m, 3, 3) at the fractions t (m,) of the axes of branches (m,)."""
@@ -83,6 +87,14 @@ def _to_front(array: NDArray) -> NDArray:
 
 def axes(rows: NDArray[np.void], branches: Branches) -> Axes:
     """Centre lines; each joint bends by its share of the order's curvature, and turns to the sky or the ground."""
+    lines = _axes(rows, branches)
+    if branches.later is None:
+        return lines
+    return replace(lines, later=_axes(rows, branches.moved(), moment(rows)))
+
+
+def _axes(rows: NDArray[np.void], branches: Branches, ahead: float = 0.0) -> Axes:
+    """Centre lines so many seconds after the moment of the rows."""
     segments = rows["segments"][branches.row]
     most = int(segments.max(initial=1))
     n = len(branches)
@@ -98,7 +110,7 @@ def axes(rows: NDArray[np.void], branches: Branches) -> Axes:
     knots[:, 0] = knot
     windy = is_windy(rows)
     if windy:
-        axis, angle = axis_and_angle(sway(rows, branches) / segments[:, None])
+        axis, angle = axis_and_angle(sway(rows, branches, ahead) / segments[:, None])
     for s in range(most):
         if s:
             # The joint in the middle of an even number of segments belongs to the outer half.
@@ -117,29 +129,29 @@ def axes(rows: NDArray[np.void], branches: Branches) -> Axes:
         frames[:, s], knots[:, s + 1] = shown, knot
     by_hand = np.flatnonzero(rows["drawn"][branches.row])
     if len(by_hand):
-        knots[by_hand], frames[by_hand] = _drawn_axes(rows, branches.take(by_hand), most)
+        knots[by_hand], frames[by_hand] = _drawn_axes(rows, branches.take(by_hand), most, ahead)
     return Axes(knots, frames, segments)
 
 
-def _drawn_axes(rows: NDArray[np.void], branches: Branches, most: int) -> tuple[NDArray, NDArray]:
+def _drawn_axes(rows: NDArray[np.void], branches: Branches, most: int, ahead: float) -> tuple[NDArray, NDArray]:
     """Knots (n, most + 1, 3) and frames (n, most, 3, 3) of branches drawn by hand, where their plants stand."""
     local, line = rows["frames"][branches.row], rows["knots"][branches.row]
     turn = branches.frame @ local[:, 0].transpose(0, 2, 1)
     scale = branches.length / rows["size"][branches.row, 0]
     knots = np.einsum("nij,nsj->nsi", turn * scale[:, None, None], line - line[:, :1]) + branches.position[:, None]
     knots, frames = knots[:, : most + 1], (turn[:, None] @ local)[:, :most]
-    return _leant(rows, branches, turn, knots, frames) if is_windy(rows) else (knots, frames)
+    return _leant(rows, branches, turn, knots, frames, ahead) if is_windy(rows) else (knots, frames)
 
 
 def _leant(
-    rows: NDArray[np.void], branches: Branches, turn: NDArray, knots: NDArray, frames: NDArray
+    rows: NDArray[np.void], branches: Branches, turn: NDArray, knots: NDArray, frames: NDArray, ahead: float
 ) -> tuple[NDArray, NDArray]:
     """Branches drawn by hand in the wind, whose plants have the axes ``turn`` (n, 3, 3)."""
     line = rows["knots"][branches.row, 0]
     ground = branches.position - np.einsum("nij,nj->ni", turn, line) * branches.scale[:, None]
     up = turn[:, :, 2]
     whole = replace(branches, position=ground, frame=turn)
-    rate = sway(rows, whole) / branches.scale[:, None]
+    rate = sway(rows, whole, ahead) / branches.scale[:, None]
     bent = leant(knots - ground[:, None], up, rate) + ground[:, None]
     axis, rate = axis_and_angle(rate)
     middle = (knots[:, 1:] + knots[:, :-1]) / 2 - ground[:, None]

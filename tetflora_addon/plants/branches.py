@@ -5,12 +5,30 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .vectors import gathered
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where branches are.
+
+    Attributes
+    ----------
+    position : (n, 3) float64
+    frame : (n, 3, 3) float64
+    """
+
+    position: NDArray[np.float64]
+    frame: NDArray[np.float64]
+
+    def take(self, index: NDArray | slice) -> Pose:
+        """Selection by indices, mask or slice."""
+        return Pose(gathered(self.position, index), gathered(self.frame, index))
 
 
 @dataclass(frozen=True)
@@ -39,6 +57,8 @@ class Branches:
     outward : (n,) float64
         Where it leaves its limb (the branch of order 1), 0 inside the crown to 1 outside; 0 for limbs and trunks
         themselves, along which it grows.
+    later : Pose or None
+        Position and frame a moment later, where it is asked how plants move.
     """
 
     row: NDArray[np.int32]
@@ -51,21 +71,35 @@ class Branches:
     scale: NDArray[np.float64]
     vigour: NDArray[np.float64]
     outward: NDArray[np.float64]
+    later: Pose | None = None
 
     def __len__(self) -> int:
         return len(self.row)
 
     def take(self, index: NDArray | slice) -> Branches:
         """Selection by indices, mask or slice."""
-        return Branches(*(gathered(getattr(self, f.name), index) for f in fields(self)))
+        now = (gathered(getattr(self, name), index) for name in _ARRAYS)
+        return Branches(*now, later=None if self.later is None else self.later.take(index))
+
+    def moved(self) -> Branches:
+        """The same a moment later; only where that is known."""
+        return replace(self, position=self.later.position, frame=self.later.frame, later=None)
 
     @classmethod
     def concatenate(cls, parts: Sequence[Branches]) -> Branches:
         """All branches of several in one."""
-        return cls(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(cls)))
+        now = (np.concatenate([getattr(p, name) for p in parts]) for name in _ARRAYS)
+        moving = [p.later for p in parts if len(p)]  # no branches know nothing of later, and need not
+        if not moving or moving[0] is None:
+            return cls(*now)
+        later = (np.concatenate([getattr(p, f.name) for p in moving]) for f in fields(Pose))
+        return cls(*now, later=Pose(*later))
 
     @classmethod
     def empty(cls) -> Branches:
         """No branches."""
         floats = [np.zeros(s) for s in ((0, 3), (0, 3, 3), 0, 0, 0, 0, 0)]
         return cls(np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros(0, np.uint64), *floats)
+
+
+_ARRAYS = tuple(f.name for f in fields(Branches) if f.name != "later")

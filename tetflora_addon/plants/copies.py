@@ -23,13 +23,16 @@ class Copies:
         Of copies in the end.
     transmission : float
         Share of the light scattered through the leaf, the same for all.
+    moving : bool
+        Whether they have velocities.
     """
 
-    def __init__(self, model: LeafModel, number: int, transmission: float) -> None:
+    def __init__(self, model: LeafModel, number: int, transmission: float, moving: bool = False) -> None:
         self.model = model
         self.done = 0
         self.transmission = transmission
         self.positions = np.zeros((number, 3 * len(model.positions)), np.float32)
+        self.velocity = np.zeros_like(self.positions) if moving else None
         self.colour = np.zeros((number, model.polygons, 3), np.float32)
 
     def add(
@@ -38,6 +41,7 @@ class Copies:
         frame: NDArray[np.float32],
         size: NDArray[np.float64],
         colour: NDArray[np.float64],
+        motion: tuple[NDArray[np.float64], NDArray[np.float32]] | None = None,
     ) -> None:
         """Place the next n copies.
 
@@ -51,9 +55,20 @@ class Copies:
             Metres for one unit of the model.
         colour : (n, 3) float64
             Linear RGB.
+        motion : (n, 3) float64 and (n, 3, 3) float32, optional
+            How fast the origin moves and the columns change, a second.
         """
         new = slice(self.done, self.done + len(size))
         self.done = new.stop
+        self.positions[new] = self._placed(position, frame, size)
+        if motion is not None:
+            self.velocity[new] = self._placed(*motion, size)
+        self.colour[new] = colour[:, None]
+
+    def _placed(
+        self, position: NDArray[np.float64], frame: NDArray[np.float32], size: NDArray[np.float64]
+    ) -> NDArray[np.float32]:
+        """Vertices (n, 3 × vertices) of copies; linear in position and frame, so that it serves velocities as well."""
         shape = self.model.positions.astype(np.float32)
         scaled = frame.transpose(1, 2, 0) * size.astype(np.float32)  # (3, 3, n)
         points = np.zeros((len(shape), 3, len(size)), np.float32)
@@ -63,8 +78,7 @@ class Copies:
             for column in (1, 2):
                 point += shape[:, column, None] * scaled[axis, column]
             point += position[:, axis].astype(np.float32)
-        self.positions[new] = points.reshape(3 * len(shape), len(size)).T
-        self.colour[new] = colour[:, None]
+        return points.reshape(3 * len(shape), len(size)).T
 
     def buffers(self) -> MeshBuffers:
         """The mesh, once all copies are placed."""
@@ -75,6 +89,7 @@ class Copies:
         materials = (
             {} if model.material_index is None else {"material_index": ("FACE", _stepped(model.material_index, 0, n))}
         )
+        motion = {} if self.velocity is None else {"velocity": ("POINT", self.velocity.reshape(-1, 3))}
         return MeshBuffers(
             positions=self.positions.reshape(-1, 3),
             edge_verts=_stepped(edges.reshape(-1), vertices, n).reshape(-1, 2),
@@ -86,6 +101,7 @@ class Copies:
                 "tf_colour": ("FACE", self.colour.reshape(-1, 3)),
                 "tf_transmission": ("FACE", np.full(n * model.polygons, self.transmission, np.float32)),
                 **materials,
+                **motion,
             },
         )
 

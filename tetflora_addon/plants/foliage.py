@@ -291,13 +291,16 @@ def settled(
 
 
 def in_wind(
-    rows: NDArray[np.void], branches: Branches, leaves: Leaves, frame: NDArray[np.float32]
+    rows: NDArray[np.void], branches: Branches, leaves: Leaves, frame: NDArray[np.float32], ahead: float = 0.0
 ) -> NDArray[np.float32]:
-    """`settled` frames (m, 3, 3) of leaves (m) of branches as the wind turns them; as they are where there is none."""
+    """`settled` frames (m, 3, 3) of leaves (m) of branches as the wind turns them; as they are where there is none.
+
+    So many seconds after the moment of the rows; the branches are where they are then.
+    """
     if not is_windy(rows):
         return frame
-    gust = np.take(gusts(rows, branches.position), leaves.branch)
-    return fluttered(rows, _rows_of(branches, leaves.branch), frame, leaves.key, gust)
+    gust = np.take(gusts(rows, branches.position, ahead), leaves.branch)
+    return fluttered(rows, _rows_of(branches, leaves.branch), frame, leaves.key, gust, ahead)
 
 
 def hanging(frame: NDArray[np.floating], droop: NDArray[np.float64], sky: NDArray[np.float64]) -> NDArray:

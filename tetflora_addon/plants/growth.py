@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .axes import Axes, axes
-from .branches import Branches
+from .branches import Branches, Pose
 from .crown_shapes import crown_ratio
 from .hashing import Draw, child_key, key_of_seed, signed, uniform
 from .profiles import profile
 from .rows import FORK, LATERAL, SPUR, ranged, varied
 from .seeds import Seeds
 from .vectors import columns
+from .wind import moment
 
 _PLACE_JITTER = 0.5  # of the distance from one child to the next: together children lie evenly along the whole parent
 # Each sort of children has child indices of its own, below those of leaves.
@@ -65,7 +66,8 @@ def trunks(rows: NDArray[np.void], seeds: Seeds) -> Branches:
     plant = np.arange(len(seeds), dtype=np.int32)
     scale = np.asarray(seeds.scale, dtype=np.float64)
     one, none = np.ones(len(seeds)), np.zeros(len(seeds))
-    return Branches(row, plant, key, seeds.position, frame, length, radius, scale, one, none)
+    later = Pose(seeds.position, frame) if moment(rows) else None  # the foot of a plant stands still
+    return Branches(row, plant, key, seeds.position, frame, length, radius, scale, one, none, later)
 
 
 def drawn_children(rows: NDArray[np.void], plants: Branches) -> tuple[Branches, NDArray[np.int64]]:
@@ -83,17 +85,19 @@ def chosen_drawn(
     row = (rows["drawn_rows"][plant.row, 0] + index).astype(np.int32)
     length, radius, vigour, outward = rows["size"][row].T
     start = np.einsum("nij,nj->ni", plant.frame, rows["knots"][row, 0]) * plant.scale[:, None]
+    position, frame = plant.position + start, plant.frame @ rows["frames"][row, 0]
     return Branches(
         row,
         plant.plant,
         child_key(plant.key, index + _DRAWN_PATH),
-        plant.position + start,
-        plant.frame @ rows["frames"][row, 0],
+        position,
+        frame,
         length * plant.scale,
         radius * plant.scale,
         plant.scale,
         vigour,
         outward,
+        None if plant.later is None else Pose(position, frame),  # the drawing is bent when its lines are asked for
     )
 
 
@@ -212,7 +216,11 @@ def chosen_children(
     thickness = ranged(rows, "thickness", row, key, Draw.THICKNESS)
     radius = (length if sort == SPUR else radius) * thickness
     frame = turned(frame, azimuth, angle)
-    return Branches(row, parent.plant, key, position, frame, length, radius, parent.scale, vigour, around)
+    later = None
+    if lines.later is not None:
+        again = chosen_children(rows, parents.moved(), lines.later, owner, index, counts, sort)
+        later = Pose(again.position, again.frame)
+    return Branches(row, parent.plant, key, position, frame, length, radius, parent.scale, vigour, around, later)
 
 
 def sorts_of(rows: NDArray[np.void], parents: Branches) -> list[int]:

@@ -30,6 +30,7 @@ from .growth import Branches, axes, leaf_counts, spread
 from .hashing import Draw, uniform
 from .pieces import Pieces
 from .stems import Stems
+from .wind import moment
 
 _SKY = np.array([0.0, 0.0, 1.0])
 #: Vertices of leaves that are worked on at a time: some ten megabytes.
@@ -86,7 +87,7 @@ def leaf_meshes(
         numbers = sum(group.numbers(len(forms)) for group in own)
         for form in np.flatnonzero(numbers):
             transmission = float(flora.leaf.transmission[own[0].row[0]])
-            copies = Copies(forms[form], int(numbers[form]), transmission)
+            copies = Copies(forms[form], int(numbers[form]), transmission, moment(flora.rows) > 0)
             for group in own:
                 group.add(copies, int(form), len(forms))
             yield LeafMesh(kind, int(form), copies.buffers())
@@ -171,7 +172,14 @@ class _Bearers:
             frame = in_wind(rows, bearers.branches, leaves, settled(rows, self.row, leaves.frame, leaves.light, _SKY))
             gradient = rows["gradient"][self.row[0]]
             outward = outwardness(rows, bearers.branches, owner, t) if gradient else None
-            copies.add(leaves.position, frame, leaves.size, leaf_colours(rows, self.row, key, outward))
+            motion = None
+            if bearers.lines.later is not None:
+                branches, seconds = bearers.branches.moved(), moment(rows)
+                again = place_leaves(rows, branches, bearers.lines.later, owner, index, key, t)
+                turned = settled(rows, self.row, again.frame, again.light, _SKY)
+                turned = in_wind(rows, branches, again, turned, seconds)
+                motion = (again.position - leaves.position) / seconds, (turned - frame) / np.float32(seconds)
+            copies.add(leaves.position, frame, leaves.size, leaf_colours(rows, self.row, key, outward), motion)
 
     def _chunks(self, vertices: int) -> Iterator[slice]:
         """Runs of branches, for leaves of a number of vertices."""

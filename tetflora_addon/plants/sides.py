@@ -10,6 +10,8 @@ Nothing of what is grown is kept.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -88,6 +90,7 @@ def crossing(
     facing = planes * np.where(base < 0, -1.0, 1.0)[:, None]  # all bases on the positive side
     facing[:, 3] += slack
     crosses = flora.rows["phantom"][subplants.row]
+    subplants = replace(subplants, later=None)  # how they move does not matter here
     for start in range(0, len(subplants), _AT_ONCE):
         part = slice(start, start + _AT_ONCE)
         _look(flora, subplants.take(part), facing[part], crosses[part])

@@ -18,6 +18,7 @@ from .growth import Axes, Branches, axes, radius_at, spread
 from .pieces import Pieces, along_branches
 from .stems import Stems
 from .vectors import gathered, unit
+from .wind import moment
 
 _AT_JOINT = 1e-6  # fractions of a segment closer to a joint than this are at it
 #: Rings that are worked on at a time: some ten megabytes.
@@ -50,7 +51,7 @@ def tube_buffers(flora: Flora, pieces: Pieces, stems: Sequence[Stems] = ()) -> M
     sides, rings = (np.concatenate(a) for a in ([cut_sides, *whole_sides], [cut_rings, *whole_rings]))
     if len(sides) == 0:
         return None
-    tubes = _Tubes(int((sides * rings).sum()), int((sides * (rings - 1)).sum()))
+    tubes = _Tubes(int((sides * rings).sum()), int((sides * (rings - 1)).sum()), moment(rows) > 0)
     for k in np.unique(sides):
         own = np.flatnonzero(cut_sides == k)
         for some in _chunks(cut_rings[own]):
@@ -80,6 +81,8 @@ class _Rings:
     centre : (r, 3) float64
     goes_on : (r,) bool
         Whether a tube leads from a ring to the next.
+    later : (r, 3) float64 or None
+        Centres a moment later, where it is asked how plants move.
     """
 
     branches: Branches
@@ -88,13 +91,17 @@ class _Rings:
     t: NDArray[np.float64]
     centre: NDArray[np.float64]
     goes_on: NDArray[np.bool_]
+    later: NDArray[np.float64] | None = None
 
 
 def _rings_of_stems(flora: Flora, stems: Stems) -> _Rings:
     owner, t, centre = stems.knots(flora.rows)
     goes_on = np.zeros(len(owner), bool)
     goes_on[:-1] = owner[1:] == owner[:-1]
-    return _Rings(stems.branches, stems.lines, owner, t, centre, goes_on)
+    later = None
+    if stems.lines.later is not None:
+        later = Stems(stems.branches, stems.lines.later).knots(flora.rows)[2]
+    return _Rings(stems.branches, stems.lines, owner, t, centre, goes_on, later)
 
 
 def _rings_of_pieces(flora: Flora, pieces: Pieces, first: NDArray[np.int64], last: NDArray[np.int64]) -> _Rings:
@@ -114,7 +121,9 @@ def _rings_of_pieces(flora: Flora, pieces: Pieces, first: NDArray[np.int64], las
     centre[closing] = gathered(pieces.end, last)
     goes_on = np.ones(len(t), bool)
     goes_on[closing] = False
-    return _Rings(branches, axes(flora.rows, branches), branch, t, centre, goes_on)
+    lines = axes(flora.rows, branches)
+    later = None if lines.later is None else lines.later.at(branch, t)[0]
+    return _Rings(branches, lines, branch, t, centre, goes_on, later)
 
 
 class _Tubes:
@@ -124,11 +133,14 @@ class _Tubes:
     ----------
     vertices, faces : int
         How many there will be; there are as many edges as both together.
+    moving : bool
+        Whether vertices have velocities.
     """
 
-    def __init__(self, vertices: int, faces: int) -> None:
+    def __init__(self, vertices: int, faces: int, moving: bool = False) -> None:
         self.vertices = self.edges = self.faces = 0
         self.positions = np.zeros((vertices, 3), np.float32)
+        self.velocity = np.zeros_like(self.positions) if moving else None
         self.edge_verts = np.zeros((vertices + faces, 2), np.int32)
         self.corner_verts, self.corner_edges = np.zeros((2, faces, 4), np.int32)
         self.uv = np.zeros((faces, 8), np.float32)
@@ -137,6 +149,7 @@ class _Tubes:
     def buffers(self) -> MeshBuffers:
         """The mesh."""
         faces = len(self.corner_verts)
+        motion = {} if self.velocity is None else {"velocity": ("POINT", self.velocity)}
         return MeshBuffers(
             positions=self.positions,
             edge_verts=self.edge_verts,
@@ -147,6 +160,7 @@ class _Tubes:
                 "UVMap": ("CORNER", self.uv.reshape(-1, 2)),
                 "tf_colour": ("FACE", self.colour),
                 "tf_transmission": ("FACE", np.zeros(faces, np.float32)),
+                **motion,
             },
             smooth=True,
         )
@@ -158,7 +172,12 @@ class _Tubes:
         across = _ring_axes(rings.lines, rings.branch, rings.t)
         radius = radius_at(flora.rows, _without_places(branches, rings.branch), rings.t)
         reach = radius.astype(np.float32) * across
-        self._add_shape(rings.centre.T.astype(np.float32), reach, sides)
+        self._add_shape(self.positions, rings.centre.T.astype(np.float32), reach, sides)
+        if rings.later is not None:
+            seconds = moment(flora.rows)
+            away = radius.astype(np.float32) * _ring_axes(rings.lines.later, rings.branch, rings.t)
+            centre = ((rings.later - rings.centre) / seconds).T.astype(np.float32)
+            self._add_shape(self.velocity, centre, (away - reach) / np.float32(seconds), sides)
         self._add_topology(lower.astype(np.int32), number, sides)
         # v counts lengths of the perimeter at the branch's base, so that a texture is as wide as it is high.
         v = rings.t * np.take(branches.length / np.maximum(2 * np.pi * branches.radius, 1e-9), rings.branch)
@@ -169,8 +188,10 @@ class _Tubes:
         self.edges += (number + len(lower)) * sides
         self.faces += len(lower) * sides
 
-    def _add_shape(self, centre: NDArray[np.float32], reach: NDArray[np.float32], sides: int) -> None:
-        """Vertices around centres (3, rings), along both axes (2, 3, rings) of each ring."""
+    def _add_shape(
+        self, out: NDArray[np.float32], centre: NDArray[np.float32], reach: NDArray[np.float32], sides: int
+    ) -> None:
+        """Vertices around centres (3, rings), along both axes (2, 3, rings) of each ring; or, as well, velocities."""
         rings = centre.shape[1]
         angle = 2 * np.pi * np.arange(sides) / sides
         points = np.zeros((sides, 3, rings), np.float32)
@@ -178,7 +199,7 @@ class _Tubes:
             np.multiply(reach[0], np.float32(x), out=point)
             point += reach[1] * np.float32(y)
             point += centre
-        new = self.positions[self.vertices : self.vertices + rings * sides]
+        new = out[self.vertices : self.vertices + rings * sides]
         new.reshape(rings, -1)[...] = points.reshape(-1, rings).T
 
     def _add_topology(self, base: NDArray[np.int32], rings: int, sides: int) -> None:

@@ -26,10 +26,11 @@ from .hashing import Draw, uniform
 from .rows import ROW_DTYPE, SPUR_ORDER
 from .vectors import cross, dot
 
-#: Radians by which the tip of a trunk `_SLENDER` times as long as thick leans at `_STRONG` m/s; limbs twice that, their
-#: branches three times, as they carry more leaves for their wood. A cantilever leans by the fourth power of that ratio;
-#: plants' wood is not the same everywhere, and as they stand there they have grown in the wind (1.5 looks right).
-_LEAN, _SLENDER, _POWER, _LEAN_LIMITS, _ORDERS = 0.03, 60.0, 1.5, (0.01, 0.45), 4
+#: Radians by which the tip of a trunk `_SLENDER` times as long as thick leans at `_STRONG` m/s; and over that for limbs,
+#: their branches, and all beyond, as they carry more leaves for their wood. A cantilever leans by the fourth power of
+#: the ratio; plants' wood is not the same everywhere, and has grown in the wind where it stands (1.5 looks right).
+_LEAN, _SLENDER, _POWER, _LEAN_LIMITS = 0.03, 60.0, 1.5, (0.01, 0.45)
+_OVER_TRUNK = np.array([1.0, 3.0, 5.0, 6.0])
 #: Metres a second at which the lean is that. Drag grows no faster than the speed where leaves and twigs give way
 #: (de Langre, "Effects of Wind on Plants", 2008), and slower in a storm.
 _STRONG, _STORM = 10.0, 30.0
@@ -49,11 +50,14 @@ _FLUTTER, _FLUTTER_MOST, _FLUTTER_RATE, _FLUTTER_SIZE = 0.22, 0.45, 3.0, 0.06
 #: Cycles by which plants drawn by hand are apart for each metre between them: their branches have no key in common.
 _APART = np.array([0.37, 0.23, 0.0])
 
+#: Seconds between two looks: the velocity is that of the instant, as near as single precision tells.
+_MOMENT = 1e-3
+
 AIR_DTYPE = np.dtype(
-    [("time", np.float64), ("loop", np.float64), ("speed", np.float64), ("gusts", np.float64)]
-    + [("axes", np.float64, (3, 3))]
+    [(name, np.float64) for name in ("time", "loop", "moment", "speed", "gusts")] + [("axes", np.float64, (3, 3))]
 )
-"""The wind: seconds, period after which all repeats (0: never), metres a second, share by which gusts are stronger or
+"""The wind: seconds, period after which all repeats (0: never), seconds between the two looks that tell how fast
+things move (0: nobody asks), metres a second, share by which gusts are stronger or
 weaker, and as rows where it blows to, across that, and up."""
 
 WIND_COLUMNS = [("lean", np.float64), ("pace", np.float64), ("flutter", np.float64), ("flutter_rate", np.float64)] + [
@@ -80,6 +84,8 @@ class Wind:
         Seconds.
     loop : float
         Seconds after which all movement repeats; 0 for never.
+    moving : bool
+        Whether vertices shall have velocities.
 
     Raises
     ------
@@ -92,6 +98,7 @@ class Wind:
     gusts: float = 0.5
     time: float = 0.0
     loop: float = 0.0
+    moving: bool = False
 
     def __post_init__(self) -> None:
         if not np.isfinite([self.speed, self.direction, self.gusts, self.time, self.loop]).all():
@@ -126,8 +133,8 @@ def windy_rows(
         out[name] = rows[name]
     slender = rows["nominal"] * length / np.maximum(radius, 1e-9)
     # A part of a branch between forks leans by its part.
-    order = np.where(rows["order"] == SPUR_ORDER, 2, rows["order"])
-    lean = _LEAN * np.minimum(order + 1, _ORDERS) * (slender / _SLENDER) ** _POWER
+    order = np.minimum(np.where(rows["order"] == SPUR_ORDER, 2, rows["order"]), len(_OVER_TRUNK) - 1)
+    lean = _LEAN * _OVER_TRUNK[order] * (slender / _SLENDER) ** _POWER
     out["lean"] = np.clip(lean, *_LEAN_LIMITS) * wind.strength / rows["nominal"]
     out["pace"] = _LOADED * _SPEED_OF_BENDING / np.maximum(slender * rows["nominal"], 1e-9)
     for i in np.flatnonzero(rows["phantom"]):  # all branches drawn by hand follow their plant
@@ -141,6 +148,7 @@ def windy_rows(
     c, s = np.cos(wind.direction), np.sin(wind.direction)
     air = out["air"]
     air["time"], air["loop"], air["speed"], air["gusts"] = wind.time, wind.loop, wind.speed, wind.gusts
+    air["moment"] = _MOMENT if wind.moving else 0.0
     air["axes"] = [[c, s, 0], [-s, c, 0], [0, 0, 1]]
     return out
 
@@ -148,6 +156,11 @@ def windy_rows(
 def is_windy(rows: NDArray[np.void]) -> bool:
     """Whether rows are those of a flora in the wind."""
     return "air" in rows.dtype.names
+
+
+def moment(rows: NDArray[np.void]) -> float:
+    """Seconds until the second look at where things are, 0 where velocities are not asked for."""
+    return float(rows["air"]["moment"][0]) if is_windy(rows) else 0.0
 
 
 def widest_sway(rows: NDArray[np.void]) -> NDArray[np.float64]:

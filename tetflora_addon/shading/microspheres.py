@@ -38,7 +38,7 @@ def spheres(parts: Sequence[tuple[Facets, bool]], camera: Camera, disc: float = 
     Returns
     -------
     PointBuffers of n
-        With ``tf_colour`` and ``tf_transmission``.
+        With ``tf_colour`` and ``tf_transmission``, and ``velocity`` where facets have one.
     """
     cover = np.concatenate([cover_of(facets, camera if seen else None) for facets, seen in parts])
     facets = concatenate_facets([facets for facets, _ in parts])
@@ -48,6 +48,7 @@ def spheres(parts: Sequence[tuple[Facets, bool]], camera: Camera, disc: float = 
         attributes={
             "tf_colour": facets.colour.astype(np.float32),
             "tf_transmission": facets.transmission.astype(np.float32),
+            **({} if facets.velocity is None else {"velocity": facets.velocity.astype(np.float32)}),
         },
     )
 

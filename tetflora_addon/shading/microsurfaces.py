@@ -23,6 +23,7 @@ from ..plants.hashing import Draw, child_key, mix, signed, uniform
 from ..plants.pieces import Pieces
 from ..plants.samples import Points
 from ..plants.vectors import perpendicular
+from ..plants.wind import moment
 from ..refinement.amounts import Amounts, piece_amounts, subplant_amounts
 
 _FACET_PATH = 1 << 40  # child indices of facets start here
@@ -52,6 +53,8 @@ class Facets:
         Root of the area, metres.
     colour : (n, 3) float64
     transmission : (n,) float64
+    velocity : (n, 3) float64 or None
+        Metres a second, where it is asked how plants move.
     """
 
     centre: NDArray[np.float64]
@@ -60,6 +63,7 @@ class Facets:
     side: NDArray[np.float64]
     colour: NDArray[np.float64]
     transmission: NDArray[np.float64]
+    velocity: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         return len(self.side)
@@ -74,7 +78,12 @@ def concatenate_facets(parts: Sequence[Facets]) -> Facets:
     """Facets of one or more parts, in their order."""
     if len(parts) == 1:
         return parts[0]
-    return Facets(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Facets)))
+    names = [field.name for field in fields(Facets) if field.name != "velocity"]
+    velocity = None
+    if any(part.velocity is not None for part in parts):  # meshes from elsewhere stand still beside plants that move
+        still = (np.zeros((len(part), 3)) if part.velocity is None else part.velocity for part in parts)
+        velocity = np.concatenate(list(still))
+    return Facets(*(np.concatenate([getattr(part, name) for part in parts]) for name in names), velocity)
 
 
 def subplant_facets(
@@ -243,6 +252,7 @@ def _leaves_of_subplants(
         np.sqrt(area * share[owner]),
         _trapped(_facet_colours(flora, leaf_row, key, area / one.clip(1e-300)[owner], outward), share[owner]),
         flora.leaf.transmission[leaf_row],
+        _carried(flora, subplants, owner, centre),
     )
 
 
@@ -258,14 +268,19 @@ def _leaves_of_pieces(
     owner, index, key, area, t = _along(flora, pieces, amounts.leaf_area, facet, start, _FACET_PATH, _LEAF_COUNT, real)
     bearers = np.flatnonzero(np.bincount(owner, minlength=len(branches)))  # far from all pieces get a facet
     own = branches.take(bearers)
-    leaves = place_leaves(rows, own, axes(rows, own), np.searchsorted(bearers, owner), index, key, t)
+    lines = axes(rows, own)
+    leaves = place_leaves(rows, own, lines, np.searchsorted(bearers, owner), index, key, t)
     frame = settled(rows, row[owner], leaves.frame, leaves.light, _SKY)
     centre = leaves.position + 0.5 * leaves.size[:, None] * frame[:, :, 1]
     outward = outwardness(rows, branches, owner, t)
     colour = _facet_colours(flora, row[owner], key, area / one.clip(1e-300)[owner], outward)
     colour = _trapped(colour, share[owner])
     transmission = flora.leaf.transmission[row[owner]]
-    return Facets(centre, frame[:, :, 0], frame[:, :, 1], np.sqrt(area * share[owner]), colour, transmission)
+    velocity = None
+    if own.later is not None:
+        there = place_leaves(rows, own.moved(), lines.later, leaves.branch, index, key, t)
+        velocity = (there.position - leaves.position) / moment(rows)
+    return Facets(centre, frame[:, :, 0], frame[:, :, 1], np.sqrt(area * share[owner]), colour, transmission, velocity)
 
 
 def _wood_of_subplants(
@@ -277,7 +292,10 @@ def _wood_of_subplants(
     pick, centre, base = _picked(flora, points, subplants, owner, index, key)
     axis = np.einsum("nij,nj->ni", base, points.frame[pick, :, 2].astype(np.float64))
     colour = flora.rows["branch_colour"][points.row[pick], 0]
-    return Facets(centre, _across(axis, key), axis, np.sqrt(area * share[owner]), colour, np.zeros(len(owner)))
+    velocity = _carried(flora, subplants, owner, centre)
+    return Facets(
+        centre, _across(axis, key), axis, np.sqrt(area * share[owner]), colour, np.zeros(len(owner)), velocity
+    )
 
 
 def _wood_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDArray, share: NDArray) -> Facets:
@@ -288,7 +306,25 @@ def _wood_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDArra
     centre = pieces.start[owner] + place[:, None] * vector
     axis = vector / np.maximum(np.linalg.norm(vector, axis=1, keepdims=True), 1e-300)
     colour = flora.rows["branch_colour"][pieces.branches.row[owner], 0]
-    return Facets(centre, _across(axis, key), axis, np.sqrt(area * share[owner]), colour, np.zeros(len(owner)))
+    velocity = None
+    if pieces.branches.later is not None:
+        lines = axes(flora.rows, pieces.branches)
+        velocity = (lines.later.at(owner, t)[0] - lines.at(owner, t)[0]) / moment(flora.rows)
+    return Facets(
+        centre, _across(axis, key), axis, np.sqrt(area * share[owner]), colour, np.zeros(len(owner)), velocity
+    )
+
+
+def _carried(
+    flora: Flora, subplants: Branches, owner: NDArray[np.int64], centre: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
+    """Velocities (m, 3) of points (m, 3) of sub-plants that move with their bases; None where nobody asks."""
+    if subplants.later is None:
+        return None
+    own = subplants.take(owner)
+    local = np.einsum("nji,nj->ni", own.frame, centre - own.position)
+    there = own.later.position + np.einsum("nij,nj->ni", own.later.frame, local)
+    return (there - centre) / moment(flora.rows)
 
 
 def _along(
@@ -337,6 +373,9 @@ def facet_mesh(facets: Facets) -> MeshBuffers:
     a, b = reach * facets.across, reach * facets.along
     corners = np.stack([facets.centre + b, facets.centre - SIN_60 * a - b / 2, facets.centre + SIN_60 * a - b / 2], 1)
     every = np.arange(3 * n, dtype=np.int32).reshape(n, 3)
+    motion = {}
+    if facets.velocity is not None:
+        motion["velocity"] = "POINT", np.repeat(facets.velocity.astype(np.float32), 3, axis=0)
     return MeshBuffers(
         positions=corners.reshape(-1, 3).astype(np.float32),
         edge_verts=np.stack([every, np.roll(every, -1, axis=1)], axis=2).reshape(-1, 2),
@@ -346,5 +385,6 @@ def facet_mesh(facets: Facets) -> MeshBuffers:
         attributes={
             "tf_colour": ("FACE", facets.colour.astype(np.float32)),
             "tf_transmission": ("FACE", facets.transmission.astype(np.float32)),
+            **motion,
         },
     )
