@@ -26,9 +26,9 @@ from .hashing import Draw, uniform
 from .rows import ROW_DTYPE, SPUR_ORDER
 from .vectors import cross, dot
 
-#: Radians by which the tip of a trunk `_SLENDER` times as long as thick leans at `_STRONG` m/s; and over that for limbs,
-#: their branches, and all beyond, as they carry more leaves for their wood. A cantilever leans by the fourth power of
-#: the ratio; plants' wood is not the same everywhere, and has grown in the wind where it stands (1.5 looks right).
+#: Radians by which the tip of a trunk `_SLENDER` times as long as thick leans at `_STRONG` m/s; and over that for
+#: limbs, their branches, and all beyond, as they carry more leaves for their wood. A cantilever leans by the fourth
+#: power of the ratio; plants' wood is not the same everywhere, and has grown in the wind (1.5 looks right).
 _LEAN, _SLENDER, _POWER, _LEAN_LIMITS = 0.03, 60.0, 1.5, (0.01, 0.45)
 _OVER_TRUNK = np.array([1.0, 3.0, 5.0, 6.0])
 #: Metres a second at which the lean is that. Drag grows no faster than the speed where leaves and twigs give way
