@@ -164,6 +164,7 @@ def _refined_by_hand(scene):
     part("node_tools").tag(cover.data)
     results.collection.objects.link(cover)
     scene.collection.objects.unlink(cover)
+    results.finish()
     return results.collection
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 import os
 import subprocess
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -19,7 +20,7 @@ def run(full_blender: str, extension_zip: Path, tmp_path_factory: pytest.TempPat
     """Blender with a home of its own, in which TetFlora was installed by Blender's own command."""
     home = tmp_path_factory.mktemp("home")
 
-    def call(*arguments: str | int | Path) -> subprocess.CompletedProcess:
+    def call(*arguments: str | int | Path, home: Path) -> subprocess.CompletedProcess:
         return subprocess.run(
             [full_blender, *map(str, arguments)],
             env={**os.environ, "BLENDER_USER_RESOURCES": str(home)},
@@ -29,6 +30,8 @@ def run(full_blender: str, extension_zip: Path, tmp_path_factory: pytest.TempPat
             timeout=180,
         )
 
-    done = call("-b", "--command", "extension", "install-file", "-r", "user_default", "-e", extension_zip)
+    # With the home within reach, for tests that start processes by themselves.
+    here = partial(call, home=home)
+    done = here("-b", "--command", "extension", "install-file", "-r", "user_default", "-e", extension_zip)
     assert done.returncode == 0, done.stdout + done.stderr
-    return call
+    return here

@@ -25,6 +25,8 @@ from .point_clouds import point_object
 
 #: Custom property of a result collection: 'VIEW' for what the artist keeps, 'RENDER' for what lives while rendering.
 PURPOSE = "tetflora_purpose"
+#: And on those that are being made.
+UNFINISHED = "tetflora_unfinished"
 NAMES = {'VIEW': "TetFlora", 'RENDER': "TetFlora render"}
 #: Custom properties of objects that results stand for, as JSON: hide_render and hide_viewport as they were before
 #: ("flags"), and the names of the scenes whose results they are ("scenes"). Results of a render come last and go first.
@@ -57,6 +59,7 @@ class Results:
         """Make the collection and link it to the scene."""
         self.collection = bpy.data.collections.new(NAMES[self.purpose] + self.mark)
         self.collection[PURPOSE] = self.purpose
+        self.collection[UNFINISHED] = True
         tag(self.collection)
         self.scene.collection.children.link(self.collection)
 
@@ -96,6 +99,8 @@ class Results:
 
     def finish(self) -> None:
         """All is made: results of a render are no part of files, those of the artist are what the scene says."""
+        if self.collection is not None:
+            del self.collection[UNFINISHED]
         if self.collection is not None and self.purpose == 'VIEW':
             dress_collection(self.scene, self.collection)
         elif self.collection is not None:
@@ -281,7 +286,8 @@ def leave_out_of_file() -> None:
     for scene in bpy.data.scenes:
         saved = scene.tetflora.output.save_results
         for collection in result_collections(scene) if scene.library is None else ():
-            runtime = collection[PURPOSE] == 'RENDER' or not saved
+            # Of a refinement that goes on, the file has what there was before it.
+            runtime = collection[PURPOSE] == 'RENDER' or not saved or UNFINISHED in collection
             mark_runtime(collection, runtime)
             if runtime and collection[PURPOSE] == 'VIEW':
                 keep_materials(collection)

@@ -45,6 +45,7 @@ class _Rendering:
     hidden: list[str] = field(default_factory=list)
     lifted: dict[tuple[str, str], str] = field(default_factory=dict)  # marks of originals, while a file is written
     bounces: dict[str, int] = field(default_factory=dict)  # of Cycles, as they were
+    scene: str = ""  # whose bounces these are
     errors: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
@@ -108,8 +109,9 @@ def on_render_end(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
 
 @persistent
 def on_save_pre(_path: object, _other: object = None) -> None:
-    """Before a file is written: meshes that are only hidden for a render are stored as shown."""
+    """Before a file is written: what is only hidden or raised for a render is stored as it was."""
     _show_hidden()
+    _set_bounces()
     leave_out_of_file()
     _rendering.lifted = lift_marks()
     pack_override_marks()
@@ -117,9 +119,11 @@ def on_save_pre(_path: object, _other: object = None) -> None:
 
 @persistent
 def on_save_post(_path: object, _other: object = None) -> None:
-    """After a file was written, in the middle of a render: hide them again."""
+    """After a file was written, in the middle of a render: hide and raise it again."""
     for collection in _named(_rendering.hidden):
         collection.hide_render = True
+    if _rendering.bounces:
+        raise_bounces(bpy.data.scenes[_rendering.scene, None])
     unpack_override_marks()
     restore_marks(_rendering.lifted)
     _rendering.lifted.clear()
@@ -172,6 +176,7 @@ def _make(scene: bpy.types.Scene) -> None:
         # Without, Blender crashes when it renders a layer that is not the window's and objects are new in it.
         for layer in scene.view_layers:
             layer.update()
+    _rendering.scene = scene.name
     _rendering.bounces |= raise_bounces(scene)
     # Hidden only now: if refinement failed, yesterday's trees are better than none.
     _rendering.hidden += [c.name for c in result_collections(scene, 'VIEW') if not c.hide_render]
@@ -182,11 +187,15 @@ def _make(scene: bpy.types.Scene) -> None:
 def _take_back(scene: bpy.types.Scene) -> None:
     _show_hidden()
     _rendering.hidden.clear()
-    for name, value in _rendering.bounces.items():
-        setattr(scene.cycles, name, value)
+    _set_bounces()
     _rendering.bounces.clear()
     kept_results.forget_all(scene)
     job.clear(scene, for_render=True)
+
+
+def _set_bounces() -> None:
+    for name, value in _rendering.bounces.items():
+        setattr(bpy.data.scenes[_rendering.scene, None].cycles, name, value)
 
 
 def _show_hidden() -> None:

@@ -1,0 +1,52 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a Blender that is about to be killed does: ``blender -b FILE --python kill_steps.py -- WHAT MOMENT``.
+
+It says NOW at the moment, having saved the file there, and goes on until it is killed.
+"""
+
+import importlib
+import sys
+
+import bpy
+
+what, moment = sys.argv[-2:]
+job = importlib.import_module("bl_ext.user_default.tetflora.tetflora_addon.blender.job")
+scene = bpy.context.scene
+
+
+def now() -> None:
+    """The moment has come."""
+    print("NOW", flush=True)
+
+
+def save() -> None:
+    """As the artist, or another add-on, may do at any time."""
+    bpy.ops.wm.save_mainfile(compress=False)
+    now()
+
+
+def refine() -> None:
+    """Save where the message of a step begins with the moment."""
+    for step in job.refine_steps(scene, bpy.context.evaluated_depsgraph_get()):
+        if step.message.startswith(moment):
+            save()
+
+
+def save_again_and_again() -> None:
+    """Files of some megabytes."""
+    job.refine(scene, bpy.context.evaluated_depsgraph_get())
+    bpy.app.handlers.save_pre.append(lambda *_: now())
+    while True:
+        bpy.ops.wm.save_mainfile(compress=moment == "compressed")
+
+
+def render() -> None:
+    """Save before or after a frame is rendered, with what was made for it."""
+    getattr(bpy.app.handlers, moment).append(lambda *_: save())
+    bpy.ops.render.render(animation=True)
+
+
+{"refine": refine, "save": save_again_and_again, "render": render}[what]()
+while True:
+    pass
