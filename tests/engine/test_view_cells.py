@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from tetflora_addon.refinement.camera import Camera
 from tetflora_addon.refinement.silhouette import expected_pixels
 from tetflora_addon.refinement.view_cells import ViewCells, cell_camera
+from tetflora_addon.refinement.visibility import AlphaBuffer, Buffers
 
 CELLS = ViewCells(4.0, np.radians(3.0))
 LEVEL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # looks along +y
@@ -189,3 +190,30 @@ def test_wide_windows_and_parts_of_panoramas_share_nothing_whole_panoramas_do():
     points = points[np.linalg.norm(points, axis=1) > 12.0]
     assert (cell.extent_around(points) <= panorama.extent_around(points) * 1.05).all()
     assert cell_camera(replace(panorama, window=(-1.0, 1.0, -0.5, 0.5)), CELLS) is None
+
+
+@pytest.mark.parametrize("opaque", ["tetrahedron", "polygon"])
+def test_only_what_is_far_enough_hides_others_from_all_cameras_of_a_cell(opaque):
+    camera = Camera("PERSP", np.zeros(3), LEVEL, (-0.36, 0.36, -0.2025, 0.2025), 0.1, 200.0, 640, 360)
+    cell = cell_camera(camera, CELLS)
+    corners = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, -1.0, 1.0], [-1.0, 1.0, -1.0]])
+    ahead = np.array([0.0, 1.0, 0.0])
+    far = 100.0 * ahead + 2.0 * corners
+
+    def seen(distance: float, viewer: Camera) -> float:
+        """Transmittance of what is far behind a screen at a distance, both in the middle of the picture."""
+        screen = distance * (ahead + np.array([[-1.5, 0.0, -1.5], [1.5, 0.0, -1.5], [0.0, 0.0, 2.0]]))
+        solid = np.concatenate([screen, (screen.mean(axis=0) + 0.2 * distance * ahead)[None]])
+        if opaque == "polygon":
+            buffer = Buffers(viewer, 64, screen[None]).fit(None, 1000)
+            buffer.add(np.array([0]), far[None], [1.0])
+            return float(buffer.transmittance(np.array([0]))[0])
+        buffer = AlphaBuffer(viewer, 64)
+        buffer.add(np.array([0, 1]), np.array([far, solid[[0, 2, 1, 3]]]), [1.0, np.inf])
+        return float(buffer.transmittance(np.array([1, 0]))[0])
+
+    near, beyond = cell.room, 4.0 * cell.room + 2.0
+    assert seen(near, camera) == pytest.approx(0.0, abs=1e-20)
+    assert seen(beyond, camera) == pytest.approx(0.0, abs=1e-20)
+    assert seen(near, cell) == pytest.approx(1.0)
+    assert seen(beyond, cell) == pytest.approx(0.0, abs=1e-20)

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 #: Cosine of the latitude from which on panoramas count as if no pixels were added towards the poles: 84 degrees.
 LEAST_COSINE = 0.1
+#: How far from several eyes things are at least to hide others from all of them, in radii of the eyes' room.
+_OPEN = 2.0
 
 
 @dataclass(frozen=True)
@@ -171,6 +173,11 @@ class Camera:
             return self.pixel_size * self._nearest(distance) * np.sqrt(np.clip(cosine, LEAST_COSINE, 1.0))
         depth = self.to_camera_space(points)[..., 2]
         return self.pixel_size * self._nearest(depth - self.setback)
+
+    @property
+    def hides_from(self) -> float:
+        """Depth from which on things hide what is behind them, metres: nearer ones not from all eyes; 0 for one eye."""
+        return self.setback + _OPEN * self.room
 
     def pixel_gain(self, points: NDArray[np.float64]) -> NDArray[np.float64] | float:
         """Pixels ``(...)`` of what is at points ``(..., 3)`` for each that it has as seen from the position.

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .camera import LEAST_COSINE, Camera
 from .rasterise import occluder_depth, pixel_rays
-from .visibility import AlphaBuffer, Outline, fitting
+from .visibility import AlphaBuffer, Outline, fitting, hiding
 
 #: Side of a face for the longer side of a buffer. A face spans a quarter of the way round; in its corners its pixels
 #: are several times as dense as in the middle.
@@ -40,7 +40,8 @@ def face_cameras(camera: Camera, side: int) -> list[Camera]:
     for ahead, up in _FACES:
         turn = np.stack([np.cross(ahead, up), up, np.negative(ahead)], axis=1).astype(np.float64)
         frame, near = camera.frame @ turn, camera.near / np.sqrt(3.0)
-        cameras.append(Camera("PERSP", camera.position, frame, (-1, 1, -1, 1), near, camera.far, side, side))
+        window, room = (-1, 1, -1, 1), camera.room
+        cameras.append(Camera("PERSP", camera.position, frame, window, near, camera.far, side, side, room=room))
     return cameras
 
 
@@ -76,7 +77,8 @@ class PanoramaBuffer:
             solid = (2.0 / side) ** 2 * (directions @ -face.frame[:, 2]) ** 3
             worth = solid * pixels_per_solid_angle(camera, directions)
             if worth.any():
-                end = occluder_depth(occluders, face, side, side) if occluders is not None and len(occluders) else None
+                some = occluders is not None and len(occluders)
+                end = occluder_depth(occluders, hiding(face), side, side) if some else None
                 self.faces.append(AlphaBuffer(face, side, end, worth))
         self._weight = np.zeros((len(self.faces), 0))
 

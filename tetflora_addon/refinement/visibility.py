@@ -10,7 +10,7 @@ divided.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -138,7 +138,7 @@ class AlphaBuffer:
         for name, values in (
             ("_cell", np.asarray(cells, np.int32)[cell]),
             ("_pixel", pixel),
-            ("_depth", own * np.minimum(coverage * share, 1.0)),
+            ("_depth", own * np.minimum(coverage * share, 1.0) * (fragments.entry >= self.camera.hides_from)),
             ("_share", counted * share / np.maximum(weight, 1e-300)[cell]),
             ("_before", np.ones(len(cell))),
         ):
@@ -195,6 +195,11 @@ class AlphaBuffer:
         return before
 
 
+def hiding(camera: Camera) -> Camera:
+    """A camera that sees of opaque polygons those which hide others, be it from all eyes that it stands for."""
+    return replace(camera, near=max(camera.near, camera.hides_from))
+
+
 def fitting(cells: int, finest: int) -> int:
     """Longer side, in pixels, of a buffer for a number of tetrahedra."""
     wanted = COARSEST
@@ -219,7 +224,7 @@ class Buffers:
         self.camera, self.resolution = camera, resolution
         self.size = buffer_size(camera, resolution)
         some = occluders is not None and len(occluders)
-        self.depth = occluder_depth(occluders, camera, *self.size) if some else None
+        self.depth = occluder_depth(occluders, hiding(camera), *self.size) if some else None
 
     def fit(self, buffer: AlphaBuffer | None, cells: int) -> AlphaBuffer:
         """The buffer itself if it is fine enough for a number of tetrahedra, or a finer one that is empty."""
