@@ -69,7 +69,8 @@ class TETFLORA_PT_films(SidebarPanel, bpy.types.Panel):
         column.active = settings.share_frames and settings.refine_at_render
         column.prop(settings, "cell_length")
         column.prop(settings, "cell_turn")
-        layout.prop(settings, "kept_memory")
+        column.prop(settings, "kept_memory")
+        column.prop(context.scene.render, "use_persistent_data")  # Cycles then loads what frames share only once
 
 
 class TETFLORA_PT_limits(SidebarPanel, bpy.types.Panel):

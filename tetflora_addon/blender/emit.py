@@ -118,6 +118,8 @@ def hide_originals(scene: bpy.types.Scene, purpose: str, originals: Sequence[bpy
     for original in originals:
         # Hidden for another scene already: how it looks now is not how the artist left it.
         flags, scenes = _marker(original, purpose) or ([original.hide_render, original.hide_viewport], [])
+        if scene.name in scenes and original.hide_render:
+            continue  # writing the same again would make Blender evaluate it again
         _mark(original, purpose, flags, sorted({*scenes, scene.name}))
         original.hide_render = True
         original.hide_viewport = original.hide_viewport or purpose == 'VIEW'

@@ -125,7 +125,8 @@ def recall(scene: bpy.types.Scene, key: str) -> bpy.types.Collection | None:
     _kept[key] = entry  # most recently seen
     if collection.name not in scene.collection.children:
         scene.collection.children.link(collection)
-    scene.tetflora.statistics = entry.statistics
+    if scene.tetflora.statistics != entry.statistics:  # or the scene would count as changed
+        scene.tetflora.statistics = entry.statistics
     return collection
 
 

@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 
 from .camera import Camera
 
-#: How far beyond a cell, as a share of it, its camera still sees enough: for the eye while the shutter is open.
-BEYOND = 0.25
+#: How far beyond a cell, as shares of it in place and angle, its camera still sees enough: while the shutter is open,
+#: and for the other eye.
+BEYOND, BEYOND_TURN = 0.1, 0.25
 #: Cells of focal length, and of the distance that is sharp, in each doubling.
 ZOOMS, FOCI = 16.0, 2.0
 #: Width and height of cells over their length, for a window of which half is as wide as it is far away.
@@ -89,7 +90,7 @@ def cell_camera(camera: Camera, cells: ViewCells) -> Camera | None:
     Parameters
     ----------
     camera : Camera
-        As it was read, without margins. Its shutter and other eyes need no more than a quarter of a cell.
+        As it was read, without margins. Its shutter and other eyes should stay in the cell or next to it, see `BEYOND`.
     cells : ViewCells
 
     Returns
@@ -111,14 +112,14 @@ def cell_camera(camera: Camera, cells: ViewCells) -> Camera | None:
     reach = (0.5 + BEYOND) * steps
     for other in camera.shutter:
         beyond = np.abs((other.position - eye) @ frame) > reach
-        if beyond.any() or not turns.holds(other.frame, 0.5 + BEYOND):
+        if beyond.any() or not turns.holds(other.frame, 0.5 + BEYOND_TURN):
             return None
     room = float(np.linalg.norm(steps) / 2.0)
     lens, focus = _lens_of_cell(camera)
     alike = replace(camera, position=eye, frame=frame, room=room, shutter=(), lens_radius=lens, focus=focus)
     if camera.kind == "PANO":
         return alike
-    corners = [turns.frame((0.5 + BEYOND) * np.array(away)) for away in product((-1.0, 1.0), repeat=3)]
+    corners = [turns.frame((0.5 + BEYOND_TURN) * np.array(away)) for away in product((-1.0, 1.0), repeat=3)]
     return _standing_back(alike, np.array([frame.T @ corner for corner in corners]), reach)
 
 
