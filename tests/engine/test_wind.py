@@ -19,7 +19,8 @@ from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.errors import TetFloraError
 from tetflora_addon.plants.compiled import Flora
 from tetflora_addon.plants.expansion import expand, open_subplants
-from tetflora_addon.plants.growth import axes
+from tetflora_addon.plants.foliage import leaf_keys, leaf_places, place_leaves, settled
+from tetflora_addon.plants.growth import axes, leaf_counts, spread
 from tetflora_addon.plants.meshing import leaf_meshes
 from tetflora_addon.plants.pieces import Pieces
 from tetflora_addon.plants.rows import ROW_DTYPE
@@ -155,6 +156,44 @@ def test_movement_is_continuous(time: float, speed: float, loop: float) -> None:
     first, second = (vertices(flora.in_wind(Wind(speed, 0.5, 1.0, t, loop))) for t in (time, time + 1e-3))
     for one, other in zip(first, second, strict=True):
         assert 0 < np.abs(one - other).max() < 0.01
+
+
+@pytest.mark.parametrize("species", support.SPECIES)
+def test_nothing_jumps(species: str) -> None:
+    """Leaves that turn to the light and boughs that lie level turn with their branch, not over in an instant."""
+    number = support.SPECIES.index(species)
+    flora = support.flora().in_wind(Wind(8.0, 0.3, 0.5, 4.3, 0.0, moving=True))
+    stems = list(expand(flora, support.trunks(flora.rows, support.plants(3, number))))
+    none = Pieces.empty()
+    found = [tube_buffers(flora, none, stems), *(leaf.buffers for leaf in leaf_meshes(flora, none, number, stems))]
+    for mesh in found:
+        assert np.linalg.norm(mesh.attributes["velocity"][1], axis=1).max() < 10.0
+
+
+@pytest.mark.parametrize(
+    "data", [*ALL, {**support.shipped("beech"), "quality": 0.05}], ids=("rich", "small", "birch", "beech")
+)
+def test_wind_turns_and_changes_nothing_else(data: dict) -> None:
+    """Branches and leaves stand to where up has gone with them as they stand to the sky at rest."""
+    flora = support.compiled(data)
+    windy = flora.in_wind(Wind(20.0, 2.0, 1.0, 5.0))
+    for still, moved in zip(stems_of(flora), stems_of(windy), strict=True):
+        stands = np.einsum("nij,ni->nj", moved.branches.frame, moved.branches.sky)
+        np.testing.assert_allclose(stands, still.branches.frame[:, 2], atol=1e-9)
+        along = np.einsum("nsij,nsi->nsj", moved.lines.frames, moved.lines.skies)
+        np.testing.assert_allclose(along, still.lines.frames[:, :, 2], atol=1e-9)
+        np.testing.assert_array_equal(moved.branches.length, still.branches.length)
+        counts = leaf_counts(flora.rows, still.branches)
+        owner, index = spread(counts)
+        key = leaf_keys(still.branches, owner, index)
+        placed = []
+        for one, some in ((flora, still), (windy, moved)):
+            t = leaf_places(one.rows, some.branches, owner, index, counts, key)
+            leaves = place_leaves(one.rows, some.branches, some.lines, owner, index, key, t)
+            frame = settled(one.rows, some.branches.row[owner], leaves.frame, leaves.light, leaves.sky)
+            placed.append(np.einsum("nij,ni->nj", frame, np.broadcast_to(leaves.sky, leaves.position.shape)))
+        error = np.abs(placed[1] - placed[0]).max(axis=1, initial=0.0)
+        assert np.count_nonzero(error > 1e-3) <= 0.001 * len(error)  # half-way leaves, to single precision
 
 
 def test_it_leans_to_leeward_and_sways_about_that() -> None:

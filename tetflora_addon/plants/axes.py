@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from .branches import Branches
 from .hashing import Draw, signed
 from .rows import varied
-from .vectors import by_component, columns, gathered
-from .wind import axis_and_angle, is_windy, leant, moment, sway, turned_by
+from .vectors import by_component, columns, cross, gathered
+from .wind import axis_and_angle, is_windy, leant, moment, sway, turned_by, turned_vectors
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,8 @@ class Axes:
         Local axes along each segment.
     segments : (n,) int64
         Number of segments.
+    skies : (n, S, 3) float64 or None
+        In the wind: `branches.Branches.sky` along each segment.
     later : Axes or None
         The same lines a moment later, where it is asked how plants move.
     """
@@ -35,12 +37,14 @@ class Axes:
     knots: NDArray[np.float64]
     frames: NDArray[np.float64]
     segments: NDArray[np.int64]
+    skies: NDArray[np.float64] | None = None
     later: Axes | None = None
 
     def take(self, index: NDArray | slice) -> Axes:
         """Selection by indices or slice."""
         later = None if self.later is None else self.later.take(index)
-        return Axes(_selected(self.knots, index), _selected(self.frames, index), self.segments[index], later)
+        skies = None if self.skies is None else _selected(self.skies, index)
+        return Axes(_selected(self.knots, index), _selected(self.frames, index), self.segments[index], skies, later)
 
     def at(self, branch: NDArray[np.integer], t: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
         """Positions (m, 3) and frames (m, 3, 3) at the fractions t (m,) of the axes of branches (m,)."""
@@ -50,6 +54,13 @@ class Axes:
         start = self.knot(branch, segment)
         step = self.knot(branch, segment + 1) - start
         return start + (along - segment)[:, None] * step, self.frame(branch, segment)
+
+    def sky_at(self, branch: NDArray[np.integer], t: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Sky (m, 3) at the fractions t (m,) of the axes of branches (m,); None without wind."""
+        if self.skies is None:
+            return None
+        number = self.segments[branch]
+        return _picked(self.skies, branch, np.minimum((t * number).astype(np.int64), number - 1))
 
     def knot(self, branch: NDArray[np.integer], number: NDArray[np.integer]) -> NDArray[np.float64]:
         """Positions (m, 3) of knots given by branch (m,) and number (m,)."""
@@ -109,6 +120,7 @@ def _axes(rows: NDArray[np.void], branches: Branches, ahead: float = 0.0) -> Axe
     frame, knot = by_component(branches.frame), by_component(branches.position)
     knots[:, 0] = knot
     windy = is_windy(rows)
+    skies = _to_front(np.zeros((3, most, n))) if windy else None
     if windy:
         axis, angle = axis_and_angle(sway(rows, branches, ahead) / segments[:, None])
     for s in range(most):
@@ -120,33 +132,40 @@ def _axes(rows: NDArray[np.void], branches: Branches, ahead: float = 0.0) -> Axe
             aside = bend[:, 1] * signed(branches.key, Draw.BEND + 2 * s + 1)
             frame = _bent(frame, -back, aside)
             if len(attracted) == n:
-                frame = _pulled(frame, pull)
+                frame = _pulled(frame, pull, branches.sky)
             elif len(attracted):
-                frame[attracted] = _pulled(gathered(frame, attracted), pull)
-        # What the wind does is not passed on to the next joint, or it would change how the branch grows.
-        shown = turned_by(frame, axis, (s + 1) * angle) if windy else frame
+                sky = gathered(branches.sky, attracted) if windy else None
+                frame[attracted] = _pulled(gathered(frame, attracted), pull, sky)
+        shown = frame
+        if windy:  # what it does is not passed on to the next joint, or it would change how the branch grows
+            shown = turned_by(frame, axis, (s + 1) * angle)
+            skies[:, s] = turned_vectors(branches.sky, axis, (s + 1) * angle)
         knot = np.where((s < segments)[:, None], knot + step * shown[:, :, 2], knot)
         frames[:, s], knots[:, s + 1] = shown, knot
     by_hand = np.flatnonzero(rows["drawn"][branches.row])
     if len(by_hand):
-        knots[by_hand], frames[by_hand] = _drawn_axes(rows, branches.take(by_hand), most, ahead)
-    return Axes(knots, frames, segments)
+        own = branches.take(by_hand)
+        knots[by_hand], frames[by_hand], turn = _drawn_axes(rows, own, most)
+        if windy:
+            knots[by_hand], frames[by_hand], skies[by_hand] = _leant(
+                rows, own, turn, knots[by_hand], frames[by_hand], ahead
+            )
+    return Axes(knots, frames, segments, skies)
 
 
-def _drawn_axes(rows: NDArray[np.void], branches: Branches, most: int, ahead: float) -> tuple[NDArray, NDArray]:
-    """Knots (n, most + 1, 3) and frames (n, most, 3, 3) of branches drawn by hand, where their plants stand."""
+def _drawn_axes(rows: NDArray[np.void], branches: Branches, most: int) -> tuple[NDArray, NDArray, NDArray]:
+    """Knots (n, most + 1, 3) and frames (n, most, 3, 3) of branches drawn by hand; their plants' frames (n, 3, 3)."""
     local, line = rows["frames"][branches.row], rows["knots"][branches.row]
     turn = branches.frame @ local[:, 0].transpose(0, 2, 1)
     scale = branches.length / rows["size"][branches.row, 0]
     knots = np.einsum("nij,nsj->nsi", turn * scale[:, None, None], line - line[:, :1]) + branches.position[:, None]
-    knots, frames = knots[:, : most + 1], (turn[:, None] @ local)[:, :most]
-    return _leant(rows, branches, turn, knots, frames, ahead) if is_windy(rows) else (knots, frames)
+    return knots[:, : most + 1], (turn[:, None] @ local)[:, :most], turn
 
 
 def _leant(
     rows: NDArray[np.void], branches: Branches, turn: NDArray, knots: NDArray, frames: NDArray, ahead: float
-) -> tuple[NDArray, NDArray]:
-    """Branches drawn by hand in the wind, whose plants have the axes ``turn`` (n, 3, 3)."""
+) -> tuple[NDArray, NDArray, NDArray]:
+    """Knots, frames and skies of branches drawn by hand in the wind, whose plants have the axes ``turn`` (n, 3, 3)."""
     line = rows["knots"][branches.row, 0]
     ground = branches.position - np.einsum("nij,nj->ni", turn, line) * branches.scale[:, None]
     up = turn[:, :, 2]
@@ -158,7 +177,8 @@ def _leant(
     height = np.maximum(np.einsum("nsi,ni->ns", middle, up), 0.0)
     segments = height.shape[1]
     axis, angle = np.repeat(axis, segments, axis=0), (rate[:, None] * height).ravel()
-    return bent, turned_by(frames.reshape(-1, 3, 3), axis, angle).reshape(frames.shape)
+    skies = turned_vectors(np.repeat(branches.sky, segments, axis=0), axis, angle).reshape(-1, segments, 3)
+    return bent, turned_by(frames.reshape(-1, 3, 3), axis, angle).reshape(frames.shape), skies
 
 
 def _bent(frame: NDArray[np.float64], pitch: NDArray[np.float64], yaw: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -169,8 +189,13 @@ def _bent(frame: NDArray[np.float64], pitch: NDArray[np.float64], yaw: NDArray[n
     return columns(cp * x - sp * z, cy * y + sy * forward, cy * forward - sy * y)
 
 
-def _pulled(frame: NDArray[np.float64], pull: NDArray[np.float64]) -> NDArray[np.float64]:
+def _pulled(
+    frame: NDArray[np.float64], pull: NDArray[np.float64], sky: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]:
     """Turn frames to the sky by an angle (n,) times the sine of their tilt, about the level axis (Rodrigues)."""
+    if sky is not None:
+        axis, level = axis_and_angle(cross(frame[:, :, 2], sky))
+        return turned_by(frame, axis, pull * level)
     level = np.hypot(frame[:, 0, 2], frame[:, 1, 2])
     safe = np.maximum(level, 1e-12)
     kx, ky = frame[:, 1, 2] / safe, -frame[:, 0, 2] / safe  # z × sky

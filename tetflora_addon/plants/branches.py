@@ -21,14 +21,16 @@ class Pose:
     ----------
     position : (n, 3) float64
     frame : (n, 3, 3) float64
+    sky : (n, 3) float64
     """
 
     position: NDArray[np.float64]
     frame: NDArray[np.float64]
+    sky: NDArray[np.float64]
 
     def take(self, index: NDArray | slice) -> Pose:
         """Selection by indices, mask or slice."""
-        return Pose(gathered(self.position, index), gathered(self.frame, index))
+        return Pose(*(gathered(getattr(self, f.name), index) for f in fields(self)))
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,9 @@ class Branches:
     outward : (n,) float64
         Where it leaves its limb (the branch of order 1), 0 inside the crown to 1 outside; 0 for limbs and trunks
         themselves, along which it grows.
+    sky : (n, 3) float64 or None
+        In the wind: where the direction that was up without it has turned to. Plants grow towards that, so that wind
+        moves them and does not change how they grow.
     later : Pose or None
         Position and frame a moment later, where it is asked how plants move.
     """
@@ -71,6 +76,7 @@ class Branches:
     scale: NDArray[np.float64]
     vigour: NDArray[np.float64]
     outward: NDArray[np.float64]
+    sky: NDArray[np.float64] | None = None
     later: Pose | None = None
 
     def __len__(self) -> int:
@@ -79,21 +85,24 @@ class Branches:
     def take(self, index: NDArray | slice) -> Branches:
         """Selection by indices, mask or slice."""
         now = (gathered(getattr(self, name), index) for name in _ARRAYS)
-        return Branches(*now, later=None if self.later is None else self.later.take(index))
+        sky = None if self.sky is None else gathered(self.sky, index)
+        return Branches(*now, sky, None if self.later is None else self.later.take(index))
 
     def moved(self) -> Branches:
         """The same a moment later; only where that is known."""
-        return replace(self, position=self.later.position, frame=self.later.frame, later=None)
+        return replace(self, **vars(self.later), later=None)
 
     @classmethod
     def concatenate(cls, parts: Sequence[Branches]) -> Branches:
         """All branches of several in one."""
         now = (np.concatenate([getattr(p, name) for p in parts]) for name in _ARRAYS)
-        moving = [p.later for p in parts if len(p)]  # no branches know nothing of later, and need not
-        if not moving or moving[0] is None:
-            return cls(*now)
-        later = (np.concatenate([getattr(p, f.name) for p in moving]) for f in fields(Pose))
-        return cls(*now, later=Pose(*later))
+        some = [p for p in parts if len(p)]  # no branches know nothing of the wind, and need not
+        sky = later = None
+        if some and some[0].sky is not None:
+            sky = np.concatenate([p.sky for p in some])
+        if some and some[0].later is not None:
+            later = Pose(*(np.concatenate([getattr(p.later, f.name) for p in some]) for f in fields(Pose)))
+        return cls(*now, sky, later)
 
     @classmethod
     def empty(cls) -> Branches:
@@ -102,4 +111,4 @@ class Branches:
         return cls(np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros(0, np.uint64), *floats)
 
 
-_ARRAYS = tuple(f.name for f in fields(Branches) if f.name != "later")
+_ARRAYS = tuple(f.name for f in fields(Branches) if f.name not in ("sky", "later"))

@@ -16,6 +16,7 @@ from .vectors import cross, dot, gathered
 from .wind import fluttered, gusts, is_windy
 
 _LEAF_PATH = 1 << 32  # child indices of leaves start here, so that they never meet those of branches
+_SKY = np.array([0.0, 0.0, 1.0])
 _PLACE_JITTER = 0.4  # below a half, so that leaves keep their order along the branch
 
 
@@ -37,6 +38,8 @@ class Leaves:
         Metres by which the leaf model is scaled.
     light : (n,) float64
         How far it turns to the sky; (1,) where that is the same for all.
+    sky : (3,) or (n, 3) float64
+        Where that is; with the branch in the wind.
     """
 
     branch: NDArray[np.int64]
@@ -45,6 +48,7 @@ class Leaves:
     frame: NDArray[np.float32]
     size: NDArray[np.float64]
     light: NDArray[np.float64]
+    sky: NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.key)
@@ -160,14 +164,16 @@ def place_leaves(
         From `leaf_places`.
     """
     row = _rows_of(branches, owner)
-    light = Axes(lines.knots, lines.frames.astype(np.float32), lines.segments)
+    light = Axes(lines.knots, lines.frames.astype(np.float32), lines.segments, lines.skies)
     position, frame = light.at(owner, t)
-    frame = leaf_frames(rows, row, frame, np.take(uniform(branches.key, Draw.ROLL), owner), index, key)
+    sky = light.sky_at(owner, t)
+    frame = leaf_frames(rows, row, frame, np.take(uniform(branches.key, Draw.ROLL), owner), index, key, sky)
     size = np.take(branches.scale, owner) * ranged(rows, "leaf_size", row, key, Draw.LEAF_SIZE)
     tip = rows["leaf_size_tip"][row]
     if (tip != 1).any():
         size *= 1 + (tip - 1) * outwardness(rows, branches, owner, t)
-    return Leaves(owner, key, position, frame, size, ranged(rows, "leaf_light", row, key, Draw.LEAF_LIGHT))
+    light = ranged(rows, "leaf_light", row, key, Draw.LEAF_LIGHT)
+    return Leaves(owner, key, position, frame, size, light, _SKY if sky is None else sky)
 
 
 def leaf_frames(
@@ -177,6 +183,7 @@ def leaf_frames(
     roll: NDArray[np.float64],
     index: NDArray[np.int64],
     key: NDArray[np.uint64],
+    sky: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float32]:
     """Frames (m, 3, 3) of leaves before they turn to the light.
 
@@ -191,6 +198,8 @@ def leaf_frames(
     index : (m,) int
         Number of the leaf on its branch.
     key : (m,) uint64
+    sky : (m, 3) float64, optional
+        Where up is, if not along z.
     """
     step, jitter = rows["leaf_azimuth"][row].T
     whorl = rows["leaf_whorl"][row]
@@ -198,7 +207,7 @@ def leaf_frames(
     turns = roll + within + (node * step + jitter * signed(key, Draw.AZIMUTH)) / (2 * np.pi)
     spray = rows["leaf_spray"][row]
     if spray.any():
-        level = level_azimuth(frame) / (2 * np.pi) + (1 - spray) * (roll - 0.5) - roll
+        level = level_azimuth(frame, sky) / (2 * np.pi) + (1 - spray) * (roll - 0.5) - roll
         turns += np.where(spray > 0, level, 0.0)
     turns -= np.rint(turns)  # whole turns would cost single precision its last digits
     azimuth = (turns * (2 * np.pi)).astype(np.float32)

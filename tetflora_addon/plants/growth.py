@@ -17,12 +17,13 @@ from .hashing import Draw, child_key, key_of_seed, signed, uniform
 from .profiles import profile
 from .rows import FORK, LATERAL, SPUR, ranged, varied
 from .seeds import Seeds
-from .vectors import columns
-from .wind import moment
+from .vectors import by_component, columns, dot
+from .wind import is_windy, moment
 
 _PLACE_JITTER = 0.5  # of the distance from one child to the next: together children lie evenly along the whole parent
 # Each sort of children has child indices of its own, below those of leaves.
 _PATHS = np.array([0, 1 << 30, 1 << 31])
+_SKY = np.array([0.0, 0.0, 1.0])
 _DRAWN_PATH = 1 << 29
 _COUNT = (Draw.BRANCHES, Draw.FORKS, Draw.SPURS)
 _ROUND = (Draw.BRANCHES_ROUND, Draw.FORKS_ROUND, Draw.SPURS_ROUND)
@@ -49,9 +50,14 @@ def turned(frame: NDArray[np.float64], azimuth: NDArray[np.float64], angle: NDAr
     return columns(cd * radial - sd * z, ca * y - sa * x, sd * radial + cd * z)
 
 
-def level_azimuth(frame: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Azimuth (n,) about the z of frames (n, 3, 3) at which one looks level to the side; any for upright ones."""
-    return np.arctan2(-frame[:, 2, 0], frame[:, 2, 1])
+def level_azimuth(frame: NDArray[np.floating], sky: NDArray[np.floating] | None = None) -> NDArray[np.floating]:
+    """Azimuth (n,) about the z of frames (n, 3, 3) at which one looks level to the side; any for upright ones.
+
+    ``sky`` (n, 3) is where up is, if not along z.
+    """
+    if sky is None:
+        return np.arctan2(-frame[:, 2, 0], frame[:, 2, 1])
+    return np.arctan2(-dot(frame[:, :, 0], sky)[:, 0], dot(frame[:, :, 1], sky)[:, 0])
 
 
 def trunks(rows: NDArray[np.void], seeds: Seeds) -> Branches:
@@ -66,8 +72,9 @@ def trunks(rows: NDArray[np.void], seeds: Seeds) -> Branches:
     plant = np.arange(len(seeds), dtype=np.int32)
     scale = np.asarray(seeds.scale, dtype=np.float64)
     one, none = np.ones(len(seeds)), np.zeros(len(seeds))
-    later = Pose(seeds.position, frame) if moment(rows) else None  # the foot of a plant stands still
-    return Branches(row, plant, key, seeds.position, frame, length, radius, scale, one, none, later)
+    sky = by_component(np.tile(_SKY, (len(seeds), 1))) if is_windy(rows) else None
+    later = Pose(seeds.position, frame, sky) if moment(rows) else None  # the foot of a plant stands still
+    return Branches(row, plant, key, seeds.position, frame, length, radius, scale, one, none, sky, later)
 
 
 def drawn_children(rows: NDArray[np.void], plants: Branches) -> tuple[Branches, NDArray[np.int64]]:
@@ -97,7 +104,9 @@ def chosen_drawn(
         plant.scale,
         vigour,
         outward,
-        None if plant.later is None else Pose(position, frame),  # the drawing is bent when its lines are asked for
+        plant.sky,
+        # The drawing is bent when its lines are asked for.
+        None if plant.later is None else Pose(position, frame, plant.sky),
     )
 
 
@@ -186,6 +195,7 @@ def chosen_children(
         low, high = rows["share"][parent.row, sort].T
         share = low + (high - low) * share
     position, frame = lines.at(owner, t)
+    sky = lines.sky_at(owner, t)
     angle_base, angle_spread = rows["angle"][row].T
     angle = angle_base + (rows["angle_tip"][row] - angle_base) * share + angle_spread * signed(key, Draw.ANGLE)
     step, jitter = rows["azimuth"][row].T
@@ -194,7 +204,7 @@ def chosen_children(
     spray = rows["spray"][row]
     if spray.any():
         # Level to the sides, as far as the order asks for; 0 turns whole parents at random, as ``turn`` does.
-        level = level_azimuth(frame) + 2 * np.pi * ((1 - spray) * (turn - 0.5) - turn)
+        level = level_azimuth(frame, sky) + 2 * np.pi * ((1 - spray) * (turn - 0.5) - turn)
         azimuth += np.where(spray > 0, level, 0.0)
     around = parent.outward
     limb = (rows["order"][parent.row] == 1) & (sort != FORK)
@@ -219,8 +229,8 @@ def chosen_children(
     later = None
     if lines.later is not None:
         again = chosen_children(rows, parents.moved(), lines.later, owner, index, counts, sort)
-        later = Pose(again.position, again.frame)
-    return Branches(row, parent.plant, key, position, frame, length, radius, parent.scale, vigour, around, later)
+        later = Pose(again.position, again.frame, again.sky)
+    return Branches(row, parent.plant, key, position, frame, length, radius, parent.scale, vigour, around, sky, later)
 
 
 def sorts_of(rows: NDArray[np.void], parents: Branches) -> list[int]:

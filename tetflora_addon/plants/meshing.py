@@ -32,7 +32,6 @@ from .pieces import Pieces
 from .stems import Stems
 from .wind import moment
 
-_SKY = np.array([0.0, 0.0, 1.0])
 #: Vertices of leaves that are worked on at a time: some ten megabytes.
 _VERTICES_AT_ONCE = 120_000
 
@@ -169,14 +168,16 @@ class _Bearers:
                 owner, index, key = owner[chosen], index[chosen], key[chosen]
             t = leaf_places(rows, bearers.branches, owner, index, self.counts[part], key)
             leaves = place_leaves(rows, bearers.branches, bearers.lines, owner, index, key, t)
-            frame = in_wind(rows, bearers.branches, leaves, settled(rows, self.row, leaves.frame, leaves.light, _SKY))
+            frame = in_wind(
+                rows, bearers.branches, leaves, settled(rows, self.row, leaves.frame, leaves.light, leaves.sky)
+            )
             gradient = rows["gradient"][self.row[0]]
             outward = outwardness(rows, bearers.branches, owner, t) if gradient else None
             motion = None
             if bearers.lines.later is not None:
                 branches, seconds = bearers.branches.moved(), moment(rows)
                 again = place_leaves(rows, branches, bearers.lines.later, owner, index, key, t)
-                turned = settled(rows, self.row, again.frame, again.light, _SKY)
+                turned = settled(rows, self.row, again.frame, again.light, again.sky)
                 turned = in_wind(rows, branches, again, turned, seconds)
                 motion = (again.position - leaves.position) / seconds, (turned - frame) / np.float32(seconds)
             copies.add(leaves.position, frame, leaves.size, leaf_colours(rows, self.row, key, outward), motion)

@@ -22,7 +22,6 @@ from .growth import Axes, Branches, axes, branch_counts, chosen_children, leaf_c
 from .hashing import Draw
 from .rows import FORK, LATERAL, SPUR, varied
 
-_SKY = np.array([0.0, 0.0, 1.0])
 _START = {LATERAL: Draw.BRANCH_START, SPUR: Draw.SPUR_START}
 #: Sub-plants that are looked at as they grow at a time; bounds the memory that this takes to some ten megabytes.
 _AT_ONCE = 20_000
@@ -182,7 +181,7 @@ def _leaves_cross(
         some = np.flatnonzero(chosen & near & ~np.take(out, owner))
         of = np.take(owner, some)
         leaves = place_leaves(rows, branches, lines, of, index[some], key[some], t[some])
-        frame = in_wind(rows, branches, leaves, settled(rows, branches.row[:1], leaves.frame, leaves.light, _SKY))
+        frame = in_wind(rows, branches, leaves, settled(rows, branches.row[:1], leaves.frame, leaves.light, leaves.sky))
         normal = np.take(normals, of, axis=1)
         low = np.zeros(len(some), np.float32)
         for axis in range(3):

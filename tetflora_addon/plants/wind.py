@@ -233,6 +233,13 @@ def turned_by(frame: NDArray[np.float64], axis: NDArray[np.float64], angle: NDAr
     return np.stack([x.T, cross(z, x).T, z.T], axis=1).transpose(2, 0, 1)
 
 
+def turned_vectors(
+    vector: NDArray[np.float64], axis: NDArray[np.float64], angle: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Vectors (n, 3) turned in the same way."""
+    return _rotated(vector, axis, np.cos(angle)[:, None], np.sin(angle)[:, None])
+
+
 def _rotated(vector: NDArray, axis: NDArray, cos: NDArray, sin: NDArray) -> NDArray[np.float64]:
     return cos * vector + sin * cross(axis, vector) + (1 - cos) * dot(axis, vector) * axis
 

@@ -270,7 +270,7 @@ def _leaves_of_pieces(
     own = branches.take(bearers)
     lines = axes(rows, own)
     leaves = place_leaves(rows, own, lines, np.searchsorted(bearers, owner), index, key, t)
-    frame = settled(rows, row[owner], leaves.frame, leaves.light, _SKY)
+    frame = settled(rows, row[owner], leaves.frame, leaves.light, leaves.sky)
     centre = leaves.position + 0.5 * leaves.size[:, None] * frame[:, :, 1]
     outward = outwardness(rows, branches, owner, t)
     colour = _facet_colours(flora, row[owner], key, area / one.clip(1e-300)[owner], outward)
