@@ -38,7 +38,7 @@ class Leaves:
         Metres by which the leaf model is scaled.
     light : (n,) float64
         How far it turns to the sky; (1,) where that is the same for all.
-    sky : (3,) or (n, 3) float64
+    sky : (3,) float64 or (n, 3) float32
         Where that is; with the branch in the wind.
     """
 
@@ -48,7 +48,7 @@ class Leaves:
     frame: NDArray[np.float32]
     size: NDArray[np.float64]
     light: NDArray[np.float64]
-    sky: NDArray[np.float64]
+    sky: NDArray[np.floating]
 
     def __len__(self) -> int:
         return len(self.key)
@@ -164,7 +164,8 @@ def place_leaves(
         From `leaf_places`.
     """
     row = _rows_of(branches, owner)
-    light = Axes(lines.knots, lines.frames.astype(np.float32), lines.segments, lines.skies)
+    skies = None if lines.skies is None else lines.skies.astype(np.float32)
+    light = Axes(lines.knots, lines.frames.astype(np.float32), lines.segments, skies)
     position, frame = light.at(owner, t)
     sky = light.sky_at(owner, t)
     frame = leaf_frames(rows, row, frame, np.take(uniform(branches.key, Draw.ROLL), owner), index, key, sky)
@@ -183,7 +184,7 @@ def leaf_frames(
     roll: NDArray[np.float64],
     index: NDArray[np.int64],
     key: NDArray[np.uint64],
-    sky: NDArray[np.float64] | None = None,
+    sky: NDArray[np.floating] | None = None,
 ) -> NDArray[np.float32]:
     """Frames (m, 3, 3) of leaves before they turn to the light.
 
@@ -198,7 +199,7 @@ def leaf_frames(
     index : (m,) int
         Number of the leaf on its branch.
     key : (m,) uint64
-    sky : (m, 3) float64, optional
+    sky : (m, 3) float32, optional
         Where up is, if not along z.
     """
     step, jitter = rows["leaf_azimuth"][row].T
