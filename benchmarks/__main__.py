@@ -34,6 +34,7 @@ NAMES = (
     "viewport",
     "animation",
     "wind",
+    "endurance",
 )
 
 
