@@ -14,11 +14,12 @@ LTS_VERSIONS = 3.11
 export PYTHON
 export PYTHONDONTWRITEBYTECODE = 1
 
-.PHONY: help environment demo test test-lts lint build bench docs-images clean
+.PHONY: help environment demo results test test-lts lint build bench docs-images clean
 .DEFAULT_GOAL := help
 
 help:
 	@echo 'make demo         a forest of eighty trees: out/demo/{cycles,eevee,top}.png, demo.blend, stats.json'
+	@echo 'make results      the figures and tables of the paper, made anew: docs/results.md, docs/images, out/paper'
 	@echo 'make test         all tests that need no full Blender, on bpy'
 	@echo 'make test-lts     the same on Blender 4.5 LTS (Python 3.11)'
 	@echo 'make lint         style, and the rules of the house'
@@ -37,6 +38,9 @@ $(VENV)/.ready: pyproject.toml devtools/environment.py
 
 demo: environment
 	$(PY) -m examples.demo --out out/demo
+
+results: environment
+	$(PY) -m examples.paper
 
 # Two runs: the first never has Blender in its process, as the engine should not need it.
 # The second also runs when the first has failed.

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import bpy
@@ -26,8 +26,10 @@ def _points(mesh: bpy.types.Mesh) -> np.ndarray:
     return points.reshape(-1, 3)
 
 
-def species_cell(identifier: str, name: str, seed: int = SEED) -> Callable[[], tuple[np.ndarray, str]]:
-    """Puts one plant of a species into the scene, as a mesh."""
+def species_cell(
+    identifier: str, name: str, polygons: dict[str, int], seed: int = SEED
+) -> Callable[[], tuple[np.ndarray, str]]:
+    """Puts one plant of a species into the scene, as a mesh, and its number of polygons into ``polygons``."""
 
     def build() -> tuple[np.ndarray, str]:
         scene = bpy.context.scene
@@ -37,7 +39,8 @@ def species_cell(identifier: str, name: str, seed: int = SEED) -> Callable[[], t
         bpy.context.view_layer.update()
         make = session.part("tetflora_addon.blender.plant_mesh").make_plant_meshes
         (plant,) = make(scene, bpy.context.evaluated_depsgraph_get(), [empty])
-        return _points(plant.data), name
+        polygons[identifier] = len(plant.data.polygons)
+        return _points(plant.data), f"{name}\n{polygons[identifier]:,} polygons"
 
     return build
 
@@ -76,11 +79,26 @@ def opened_cell(identifier: str, orders: int) -> Callable[[], tuple[np.ndarray, 
     return build
 
 
-def render_sheet(path: Path, samples: int = 96) -> None:
-    """Render one plant of each species of the catalogue, as a JPEG."""
+def render_sheet(path: Path, samples: int = 96, identifiers: Sequence[str] | None = None) -> dict[str, int]:
+    """Render one plant of each species of the catalogue, as a JPEG.
+
+    Parameters
+    ----------
+    path : Path
+    samples : int
+    identifiers : sequence of str, optional
+        Only these species.
+
+    Returns
+    -------
+    dict of str to int
+        Polygons of each plant.
+    """
     known = session.part("tetflora_addon.plants.catalogue").list_species()
-    cells = [species_cell(identifier, info.name) for identifier, info in known.items()]
+    polygons: dict[str, int] = {}
+    cells = [species_cell(one, known[one].name, polygons) for one in (identifiers or known)]
     save_sheet(render_cells(cells, WIDTH, HEIGHT, samples), COLUMNS, path)
+    return polygons
 
 
 def render_opening(path: Path, samples: int = 96) -> None:

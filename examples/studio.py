@@ -23,7 +23,7 @@ _FLOOR = (0.55, 0.57, 0.58, 1.0)
 
 
 def add_studio(points: np.ndarray, title: str, aspect: float) -> None:
-    """Floor, sun, sky and a camera that frames points (n, 3); the title stands under them.
+    """Floor, sun, sky and a camera that frames points (n, 3); the title, of a line or two, stands under them.
 
     Parameters
     ----------
@@ -67,9 +67,10 @@ def add_studio(points: np.ndarray, title: str, aspect: float) -> None:
     scene.collection.objects.link(camera)
     scene.camera = camera
     text = bpy.data.curves.new("Title", 'FONT')
-    text.body, text.size, text.align_x = title, 0.055 * height, 'CENTER'
+    two = "\n" in title
+    text.body, text.size, text.align_x = title, (0.042 if two else 0.055) * height, 'CENTER'
     label = bpy.data.objects.new("Title", text)
-    label.location = (middle - 0.47 * height) * up - 0.8 * distance * forward
+    label.location = (middle - (0.44 if two else 0.47) * height) * up - 0.8 * distance * forward
     label.rotation_euler = camera.rotation_euler
     label.visible_shadow = label.visible_diffuse = False
     ink = bpy.data.materials.new("Ink")

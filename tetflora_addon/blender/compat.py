@@ -38,6 +38,13 @@ def set_still_format(settings: bpy.types.ImageFormatSettings, file_format: str) 
     settings.file_format = file_format
 
 
+def set_film_format(settings: bpy.types.ImageFormatSettings) -> None:
+    """Choose films as output, which FFmpeg writes: from 5.0 on the media type has to allow it first."""
+    if hasattr(settings, "media_type"):
+        settings.media_type = "VIDEO"
+    settings.file_format = 'FFMPEG'
+
+
 def disable_bump_correction(material: bpy.types.Material) -> None:
     """Let a material's custom normals be; Cycles otherwise darkens them as if they were bump maps.
 

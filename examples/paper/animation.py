@@ -1,0 +1,115 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The animation (section 8.2): a film of a walk past the row of eighty, and what a frame costs after the first.
+
+The walk is filmed at walking speed, every other of its frames. How many tetrahedra a frame divides that the frame
+before did not is counted from each frame to the next, with space divided alike in all of them (*Anchored*).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from devtools import session
+
+from .. import fly_through
+from .pictures import save_sheet
+from .scenes import refined, rendered, seconds_of
+
+FRAMES, EVERY, SMALL_FRAMES = 96, 2, 3
+SIZE, SMALL_SIZE = (480, 270), (32, 18)
+#: Frames between which divisions are counted.
+COUNTED, SMALL_COUNTED = 9, 2
+#: Pictures of the contact sheet.
+SHOWN = 8
+
+
+def make(out: Path, images: Path, small: bool) -> dict[str, float]:
+    """Make ``paper-film.mp4`` and its contact sheet ``paper-film.jpg``; returns seconds of frames and divisions."""
+    scene = _walk(SMALL_FRAMES if small else FRAMES, small)
+    folder = out / "film"
+    folder.mkdir(exist_ok=True)
+    pictures, refine_s, render_s = [], [], []
+    for frame in range(1, scene.frame_end + 1, EVERY):
+        scene.frame_set(frame)
+        refine_s.append(seconds_of(refined(scene)))
+        pictures.append(folder / f"{frame:04d}.png")
+        render_s.append(rendered(scene, pictures[-1], 1 if small else 12))
+    anew, divided = divided_anew(small)
+    save_film(pictures, fly_through.RATE // EVERY, images / "paper-film.mp4")
+    shown = np.linspace(0, len(pictures) - 1, min(SHOWN, len(pictures))).round().astype(int)
+    times = [(EVERY * i / fly_through.RATE, pictures[i]) for i in shown.tolist()]
+    save_sheet([(path, f"{time:.1f} s") for time, path in times], 4, images / "paper-film.jpg", width=320)
+    return {
+        "frames": len(pictures),
+        "first_refine_s": refine_s[0],
+        "first_render_s": render_s[0],
+        "later_refine_s": float(np.mean(refine_s[1:])),
+        "later_render_s": float(np.mean(render_s[1:])),
+        "divided": divided,
+        "divided_anew_min": min(anew),
+        "divided_anew_max": max(anew),
+        "divided_anew_mean": float(np.mean(anew)),
+    }
+
+
+def divided_anew(small: bool) -> tuple[list[int], int]:
+    """Tetrahedra that each frame of a walk divides and the one before did not, and all that the first divides."""
+    scene = _walk(SMALL_COUNTED if small else COUNTED, small)
+    scene.tetflora.anchored = True
+    before, anew = None, []
+    for frame in range(1, scene.frame_end + 1):
+        scene.frame_set(frame)
+        now = _divided(scene)
+        if before is None:
+            first = len(now)
+        else:
+            anew.append(len(now - before))
+        before = now
+    return anew, first
+
+
+def _divided(scene: bpy.types.Scene) -> set[tuple[int, ...]]:
+    """Tetrahedra that a frame divides, by centre (tenths of a millimetre) and level."""
+    job = session.part("tetflora_addon.blender.job")
+    tree = job.partition(scene, bpy.context.evaluated_depsgraph_get())[1].tree
+    nodes = np.flatnonzero(tree.children[:, 0] >= 0)
+    centres = tree.vertices(nodes).mean(axis=1)
+    whole = np.isfinite(centres).all(axis=1)
+    keys = np.column_stack([np.round(centres[whole] * 1e4).astype(np.int64), tree.level[nodes[whole]]])
+    return set(map(tuple, keys.tolist()))
+
+
+def _walk(frames: int, small: bool) -> bpy.types.Scene:
+    """A walk past the row in an empty file, at the size of the film."""
+    session.clean_file()
+    scene = bpy.context.scene
+    fly_through.build(scene, frames=frames)
+    scene.tetflora.refine_at_render = False
+    scene.render.resolution_x, scene.render.resolution_y = SMALL_SIZE if small else SIZE
+    return scene
+
+
+def save_film(pictures: list[Path], rate: int, path: Path) -> None:
+    """Store pictures of one size as an MP4 (H.264), by Blender's sequencer."""
+    scene = bpy.data.scenes.new("Film")
+    first = bpy.data.images.load(str(pictures[0]))
+    render = scene.render
+    render.resolution_x, render.resolution_y = first.size
+    bpy.data.images.remove(first)
+    strip = scene.sequence_editor_create().strips.new_image(
+        name="Film", filepath=str(pictures[0]), channel=1, frame_start=1
+    )
+    for picture in pictures[1:]:
+        strip.elements.append(picture.name)
+    scene.frame_start, scene.frame_end = 1, len(pictures)
+    scene.view_settings.view_transform = 'Standard'  # pictures are what they should look like
+    render.fps, render.filepath, render.use_file_extension = rate, str(path), False
+    session.part("tetflora_addon.blender.compat").set_film_format(render.image_settings)
+    render.ffmpeg.format, render.ffmpeg.codec = 'MPEG4', 'H264'
+    render.ffmpeg.constant_rate_factor = 'MEDIUM'
+    bpy.ops.render.render(animation=True, scene=scene.name)
+    bpy.data.scenes.remove(scene)

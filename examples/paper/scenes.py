@@ -1,0 +1,66 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What several figures need: the row of eighty in a new file, refined, rendered."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import bpy
+
+from devtools import session
+
+from .. import row80
+
+#: Of the row, its picture, and one of a test.
+SIZE, SMALL_SIZE = (800, 450), (64, 36)
+SMALL_ROW = 8
+
+
+def row(small: bool, size: tuple[int, int] = SIZE) -> bpy.types.Scene:
+    """The row of eighty in an empty file; it is refined when asked, not at each render."""
+    session.clean_file()
+    scene = bpy.context.scene
+    row80.build(scene, count=SMALL_ROW if small else row80.COUNT)
+    scene.render.resolution_x, scene.render.resolution_y = SMALL_SIZE if small else size
+    scene.tetflora.refine_at_render = False
+    return scene
+
+
+def refined(scene: bpy.types.Scene) -> object:
+    """Refine the scene for its frame; returns the statistics."""
+    bpy.context.view_layer.update()
+    return session.part("tetflora_addon.blender.job").refine(scene, bpy.context.evaluated_depsgraph_get())
+
+
+def rendered(scene: bpy.types.Scene, path: Path, samples: int) -> float:
+    """Render a picture in Cycles, denoised, as an 8-bit PNG; returns seconds."""
+    scene.render.engine = 'CYCLES'
+    scene.cycles.samples, scene.cycles.use_denoising = samples, True
+    scene.cycles.use_adaptive_sampling = False
+    session.part("tetflora_addon.blender.compat").set_still_format(scene.render.image_settings, 'PNG')
+    scene.render.filepath = str(path)
+    start = time.perf_counter()
+    bpy.ops.render.render(write_still=True)
+    return time.perf_counter() - start
+
+
+def seconds_of(statistics: object) -> float:
+    """Seconds of modelling and refining, meshes included."""
+    return sum(statistics.seconds.values())
+
+
+def told_figures(statistics: object) -> dict[str, float]:
+    """What the paper tells about a picture (sections 8.1 and 8.3), from the statistics of its refinement."""
+    return {
+        "plants": statistics.plants,
+        "polygons_full": statistics.polygons_full,
+        "polygons_meshed": statistics.polygons_meshed,
+        "polygons_proxy": statistics.polygons_proxy,
+        "tetrahedra_made": statistics.tetrahedra_made,
+        "tetrahedra_proxy": statistics.tetrahedra_proxy,
+        "refine_s": seconds_of(statistics),
+        "polygons_mb": statistics.memory_mb,
+        "tetrahedra_mb": statistics.steps[-1].memory_mb,
+    }
