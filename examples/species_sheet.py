@@ -79,7 +79,7 @@ def opened_cell(identifier: str, orders: int) -> Callable[[], tuple[np.ndarray, 
     return build
 
 
-def render_sheet(path: Path, samples: int = 96, identifiers: Sequence[str] | None = None) -> dict[str, int]:
+def render_sheet(path: Path, samples: int = 32, identifiers: Sequence[str] | None = None) -> dict[str, int]:
     """Render one plant of each species of the catalogue, as a JPEG.
 
     Parameters
@@ -101,7 +101,7 @@ def render_sheet(path: Path, samples: int = 96, identifiers: Sequence[str] | Non
     return polygons
 
 
-def render_opening(path: Path, samples: int = 96) -> None:
+def render_opening(path: Path, samples: int = 32) -> None:
     """Render one plant with none of its orders opened, one, and so on to all, as a JPEG."""
     catalogue = session.part("tetflora_addon.plants.catalogue")
     orders = len(catalogue.load_species(OPENED).orders)

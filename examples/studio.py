@@ -115,7 +115,7 @@ def render_cells(
             add_studio(*cell(), width / height)
             scene.tetflora.refine_at_render = False
             scene.render.engine = 'CYCLES'
-            scene.cycles.samples, scene.cycles.use_denoising = samples, False
+            scene.cycles.samples, scene.cycles.use_denoising = samples, True
             scene.render.resolution_x, scene.render.resolution_y = width, height
             session.part("tetflora_addon.blender.compat").set_still_format(scene.render.image_settings, 'PNG')
             scene.render.filepath = str(Path(folder) / f"{number}.png")

@@ -77,10 +77,12 @@ def main() -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="\n".join(f"{name:10s} {what}" for name, what in FIGURES.items()) + "\ntables     docs/results.md",
     )
-    parser.add_argument("names", nargs="*", metavar="FIGURE", choices=[*FIGURES, "figure7", "tables"])
+    parser.add_argument("names", nargs="*", metavar="FIGURE", help="by default all that are missing")
     parser.add_argument("--here", action="store_true", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     names = ["figure6" if name == "figure7" else name for name in arguments.names]
+    for name in set(names) - {*FIGURES, "tables"}:
+        parser.error(f"there is no {name!r}; known are {', '.join(FIGURES)} and tables")
     if arguments.here:
         make(*names)
         session.stop()

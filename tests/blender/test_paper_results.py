@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-# The ground comes with matplotlib, the sheets are made by Pillow; tests inside of a full Blender do without both.
+# The ground comes with matplotlib, the sheets are made by Pillow; tests inside of a full Blender do without.
 pytest.importorskip("matplotlib")
+pytest.importorskip("flip_evaluator")
 image = pytest.importorskip("PIL.Image")
 
 
