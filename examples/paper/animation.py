@@ -2,12 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The animation (section 8.2): a film of a walk past the row of eighty, and what a frame costs after the first.
 
-The walk is filmed at walking speed, every other of its frames. How many tetrahedra a frame divides that the frame
-before did not is counted from each frame to the next, with space divided alike in all of them (*Anchored*).
+The walk is filmed at walking speed, every other of its frames, as any film is rendered: plants are refined before a
+frame if what the frames before it left does not serve it as well (*Share Between Frames*). How many tetrahedra a frame
+divides that the frame before did not is counted from each frame to the next, with space divided alike in all of them
+(*Anchored*).
 """
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import bpy
@@ -17,7 +20,7 @@ from devtools import session
 
 from .. import fly_through
 from .pictures import save_sheet
-from .scenes import refined, rendered, seconds_of
+from .scenes import choose_cycles
 
 FRAMES, EVERY, SMALL_FRAMES = 96, 2, 3
 SIZE, SMALL_SIZE = (480, 270), (32, 18)
@@ -30,14 +33,15 @@ SHOWN = 8
 def make(out: Path, images: Path, small: bool) -> dict[str, float]:
     """Make ``paper-film.mp4`` and its contact sheet ``paper-film.jpg``; returns seconds of frames and divisions."""
     scene = _walk(SMALL_FRAMES if small else FRAMES, small)
+    scene.tetflora.refine_at_render = True
+    scene.frame_step = EVERY
+    choose_cycles(scene, 1 if small else 12)
     folder = out / "film"
-    folder.mkdir(exist_ok=True)
-    pictures, refine_s, render_s = [], [], []
-    for frame in range(1, scene.frame_end + 1, EVERY):
-        scene.frame_set(frame)
-        refine_s.append(seconds_of(refined(scene)))
-        pictures.append(folder / f"{frame:04d}.png")
-        render_s.append(rendered(scene, pictures[-1], 1 if small else 12))
+    scene.render.filepath = f"{folder}/"
+    with _Frames() as frames:
+        bpy.ops.render.render(animation=True)
+    pictures = [folder / f"{frame:04d}.png" for frame in range(1, scene.frame_end + 1, EVERY)]
+    refine_s, render_s = np.subtract(frames.ready, frames.begun), np.subtract(frames.written, frames.ready)
     anew, divided = divided_anew(small)
     save_film(pictures, fly_through.RATE // EVERY, images / "paper-film.mp4")
     shown = np.linspace(0, len(pictures) - 1, min(SHOWN, len(pictures))).round().astype(int)
@@ -45,15 +49,55 @@ def make(out: Path, images: Path, small: bool) -> dict[str, float]:
     save_sheet([(path, f"{time:.1f} s") for time, path in times], 4, images / "paper-film.jpg", width=320)
     return {
         "frames": len(pictures),
-        "first_refine_s": refine_s[0],
-        "first_render_s": render_s[0],
-        "later_refine_s": float(np.mean(refine_s[1:])),
-        "later_render_s": float(np.mean(render_s[1:])),
+        "refined": len(set(frames.results)),
+        "first_refine_s": float(refine_s[0]),
+        "first_render_s": float(render_s[0]),
+        "later_refine_s": float(refine_s[1:].mean()),
+        "later_render_s": float(render_s[1:].mean()),
         "divided": divided,
         "divided_anew_min": min(anew),
         "divided_anew_max": max(anew),
         "divided_anew_mean": float(np.mean(anew)),
     }
+
+
+class _Frames:
+    """When each frame of a render began, had its plants, and was written, by the clock; and whose plants it had.
+
+    Attributes
+    ----------
+    begun, ready, written : list of float
+        Seconds, one for each frame.
+    results : list of str
+        Names of the collections that the plants of the frames are in.
+    """
+
+    def __init__(self) -> None:
+        self.begun, self.ready, self.written, self.results = [], [], [], []
+
+    def __enter__(self) -> _Frames:
+        handlers = bpy.app.handlers
+        handlers.render_pre.insert(0, self._begin)
+        handlers.render_pre.append(self._has_plants)
+        handlers.render_write.append(self._write)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        handlers = bpy.app.handlers
+        handlers.render_pre.remove(self._begin)
+        handlers.render_pre.remove(self._has_plants)
+        handlers.render_write.remove(self._write)
+
+    def _begin(self, *_: object) -> None:
+        self.begun.append(time.perf_counter())
+
+    def _has_plants(self, scene: bpy.types.Scene, *_: object) -> None:
+        self.ready.append(time.perf_counter())
+        found = session.part("tetflora_addon.blender.emit").result_collections(scene, 'RENDER')
+        self.results += [collection.name for collection in found[:1]]
+
+    def _write(self, *_: object) -> None:
+        self.written.append(time.perf_counter())
 
 
 def divided_anew(small: bool) -> tuple[list[int], int]:

@@ -34,21 +34,21 @@ def refined(scene: bpy.types.Scene) -> object:
     return session.part("tetflora_addon.blender.job").refine(scene, bpy.context.evaluated_depsgraph_get())
 
 
-def rendered(scene: bpy.types.Scene, path: Path, samples: int) -> float:
-    """Render a picture in Cycles, denoised, as an 8-bit PNG; returns seconds."""
+def choose_cycles(scene: bpy.types.Scene, samples: int) -> None:
+    """Render in Cycles, denoised, as 8-bit PNGs."""
     scene.render.engine = 'CYCLES'
     scene.cycles.samples, scene.cycles.use_denoising = samples, True
     scene.cycles.use_adaptive_sampling = False
     session.part("tetflora_addon.blender.compat").set_still_format(scene.render.image_settings, 'PNG')
+
+
+def rendered(scene: bpy.types.Scene, path: Path, samples: int) -> float:
+    """Render a picture, see `choose_cycles`; returns seconds."""
+    choose_cycles(scene, samples)
     scene.render.filepath = str(path)
     start = time.perf_counter()
     bpy.ops.render.render(write_still=True)
     return time.perf_counter() - start
-
-
-def seconds_of(statistics: object) -> float:
-    """Seconds of modelling and refining, meshes included."""
-    return sum(statistics.seconds.values())
 
 
 def told_figures(statistics: object) -> dict[str, float]:
@@ -60,7 +60,7 @@ def told_figures(statistics: object) -> dict[str, float]:
         "polygons_proxy": statistics.polygons_proxy,
         "tetrahedra_made": statistics.tetrahedra_made,
         "tetrahedra_proxy": statistics.tetrahedra_proxy,
-        "refine_s": seconds_of(statistics),
+        "refine_s": sum(statistics.seconds.values()),
         "polygons_mb": statistics.memory_mb,
         "tetrahedra_mb": statistics.steps[-1].memory_mb,
     }

@@ -86,7 +86,8 @@ TABLES: dict[str, tuple[tuple[str, ...], tuple[Row, ...]]] = {
             ("first frame: model and refine", "21 min", _seconds("first_refine_s")),
             ("first frame: render", "6 min", _seconds("first_render_s")),
             ("later frames, mean, in all", "6.64 min", _seconds("later_refine_s", "later_render_s")),
-            ("of it model and refine", "–", _seconds("later_refine_s")),
+            ("of it model and refine", "–", lambda f: f"{f['later_refine_s']:.2f} s"),
+            ("frames that are refined anew", "all", lambda f: f"{f['refined']:.0f} of {f['frames']:.0f}"),
             (
                 "tetrahedra divided that the frame before did not divide",
                 "40 to 70",

@@ -110,6 +110,8 @@ def test_figure9_is_hazy_as_koschmieder_says(make, tmp_path):
 def test_animation_makes_a_film(make, tmp_path):
     figures = make("animation")
     assert figures["frames"] == 2
+    assert figures["refined"] == 1, "two frames of a walk share their plants"
+    assert figures["later_refine_s"] > 0.0
     assert 0 <= figures["divided_anew_min"] <= figures["divided_anew_mean"] <= figures["divided_anew_max"]
     assert figures["divided_anew_max"] < figures["divided"]
     film = (tmp_path / "images" / "paper-film.mp4").read_bytes()
@@ -146,6 +148,8 @@ def test_tables_hold_what_was_measured_and_nothing_else_changes(tmp_path):
         "divided_anew_max": 9.0,
         "divided_anew_mean": 6.0,
         "divided": 1234.0,
+        "refined": 2.0,
+        "frames": 48.0,
         "polygons_proxy": 99.0,
     }
     _records(tmp_path, {name: figures for names, _ in tables.TABLES.values() for name in names})
@@ -154,6 +158,7 @@ def test_tables_hold_what_was_measured_and_nothing_else_changes(tmp_path):
     assert "| polygons in the image | 784,049 (20.7 %) | 250 (25.0 %) |" in once
     assert "| later frames, mean, in all | 6.64 min | 3.8 s |" in once
     assert "| 3 to 9, mean 6, of 1,234 |" in once
+    assert "| all | 2 of 48 |" in once
     assert "10 MB (1/21)" in once
     assert once.count("Between.") == len(places) - 1
     assert once.startswith("Before.\n")
