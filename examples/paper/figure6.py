@@ -71,16 +71,16 @@ def _kinds(scene: bpy.types.Scene, both: Path, real: Path, samples: int) -> dict
     made = [o for o in scene.objects if o.data and "tetflora_kind" in o]
     proxies = [o for o in made if o["tetflora_kind"] == "proxy"]
     surfaces = [o for o in scene.objects if o.type in {'MESH', 'POINTCLOUD'}]
+    proxy, polygon, rest = (_plain(colour) for colour in (PROXY, REAL, REST))
     for shown in surfaces:
-        material = _plain(PROXY if shown in proxies else REAL if shown in made else REST)
         for number in range(len(shown.data.materials)):
-            shown.data.materials[number] = material
+            shown.data.materials[number] = proxy if shown in proxies else polygon if shown in made else rest
     rendered(scene, both, samples)
-    for proxy in proxies:
-        proxy.hide_render = True
+    for shown in proxies:
+        shown.hide_render = True
     rendered(scene, real, samples)
-    for proxy in proxies:
-        proxy.hide_render = False
+    for shown in proxies:
+        shown.hide_render = False
     counts = {True: 0, False: 0}
     for shown in made:
         counts[shown in proxies] += _amount(shown.data)
