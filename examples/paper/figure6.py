@@ -33,7 +33,7 @@ def make(out: Path, images: Path, small: bool) -> dict[str, float]:
     render_s = rendered(scene, stored, samples)
     stored_mb = _saved_mb(scene, out / "figure6.blend", results=True)
     both, real = out / "kinds.png", out / "real.png"
-    counts = _kinds(scene, both, real, samples)
+    counts = _kinds(scene, both, real, 1 if small else 12)
     mask = plant_mask(scene, out / "mask.png", samples=1 if small else 8)
 
     scene = row(small)
