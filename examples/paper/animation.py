@@ -3,9 +3,9 @@
 """The animation (section 8.2): a film of a walk past the row of eighty, and what a frame costs after the first.
 
 Every fourth frame of a walk of four seconds is filmed, and shown twice as fast. It is rendered as any film is: plants
-are refined before a frame if what those before it left does not serve it as well (*Share Between Frames*). How many tetrahedra a frame
-divides that the frame before did not is counted from each frame to the next, with space divided alike in all of them
-(*Anchored*).
+are refined before a frame if what those before it left does not serve it as well (*Share Between Frames*). How many
+tetrahedra a frame divides that the frame before did not is counted from each frame of the walk to the next, with space
+divided alike in all of them (*Anchored*).
 """
 
 from __future__ import annotations
