@@ -35,6 +35,7 @@ NAMES = (
     "animation",
     "wind",
     "endurance",
+    "farm",
 )
 
 
