@@ -215,9 +215,9 @@ def baked_light(
         most = GROUND_PIXELS if len(sources.occluders) else OPEN_PIXELS
         resolution = sheets.pixels((resolution // 2, most))
         if resolution == most and camera.kind != "ORTHO":
-            away = np.linalg.norm(corners[:, 0] - camera.position, axis=1)
+            away = np.linalg.norm(corners[:, 0] - camera.eye, axis=1)
             radii = (share * away.max() for share in NEAR_SHARES)
-            near = Near(camera.position, tuple(r for r in radii if (away < r).sum() >= NEAR_SHEETS))
+            near = Near(camera.eye, tuple(r for r in radii if (away < r).sum() >= NEAR_SHEETS))
     scene = sources.lights, sources.world, sources.occluders
     found = yield from shadow_steps(clouds, *scene, resolution, sources.ground, sheets=sheets, near=near)
     return BakedLight(found, inside, camera)

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tetflora_addon.refinement.blur import MOST, blur_margins
 from tetflora_addon.refinement.camera import Camera
 from tetflora_addon.refinement.silhouette import expected_pixels
 from tetflora_addon.refinement.view_cells import ViewCells, cell_camera
@@ -75,9 +76,41 @@ def test_the_cells_camera_sees_all_that_any_of_its_cameras_sees(rng, kind):
     points = picture(rng, camera)
     assert (cell.clearance(points) <= 1e-9).all()
     depth = cell.to_camera_space(points)[:, 2]
-    lateral = np.linalg.norm(points - cell.eye, axis=1) * np.sin(CELLS.turn)  # what turning does to depth
-    assert (depth >= cell.near - lateral - 1e-9).all()
-    assert (depth <= cell.far + lateral + 1e-9).all()
+    assert (depth >= cell.near - 1e-9).all()
+    assert (depth <= cell.far + 1e-9).all()
+
+
+@given(RANDOM)
+def test_it_sees_what_the_other_eye_sees_through_a_shifted_window(rng):
+    camera = drawn(rng)
+    shift = rng.uniform(-0.2, 0.2)
+    eye = camera.position + 0.065 * camera.frame[:, 0]
+    left, right, bottom, top = camera.window
+    other = replace(camera, position=eye, window=(left + shift, right + shift, bottom, top))
+    cell = cell_camera(replace(camera, shutter=(other,)), CELLS)
+    if cell is None:
+        assert max(np.abs((*camera.window, *other.window))) > 1.0
+        return
+    assert (cell.clearance(picture(rng, camera)) <= 1e-9).all()
+    assert (cell.clearance(picture(rng, other)) <= 0.01).all()  # a 64th of a pixel at most
+
+
+@given(RANDOM)
+def test_blur_reaches_as_far_into_its_picture_as_into_that_of_any_of_its_cameras(rng):
+    camera = replace(drawn(rng), lens_radius=rng.uniform(0.005, 0.05), focus=rng.uniform(5.0, 50.0))
+    cell = cell_camera(camera, CELLS)
+    if cell is None:
+        return
+    centre, reach = picture(rng, camera, 1), np.full(1, 0.01)
+    away = np.linalg.norm(centre - camera.position)
+    if not 1.5 * cell.room < away < camera.focus / 3.0:  # nearly sharp, it is a matter of how wide cells of focus are
+        return
+    margins = [
+        np.array(blur_margins(viewer, centre, reach))
+        * (viewer.window[1] - viewer.window[0], viewer.window[3] - viewer.window[2])
+        for viewer in (camera, cell)
+    ]
+    assert (margins[1] >= 0.9 * margins[0]).all() or max(blur_margins(cell, centre, reach)) == MOST
 
 
 @given(RANDOM)

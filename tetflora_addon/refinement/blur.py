@@ -39,10 +39,12 @@ def blur_margins(camera: Camera, centre: NDArray[np.float64], reach: NDArray[np.
     if not len(centre) or not (camera.lens_radius > 0.0 or camera.shutter):
         return 0.0, 0.0
     depth = _depths(camera, centre)
-    nearest, farthest = np.maximum(depth - reach, camera.near), np.minimum(depth + reach, camera.far)
-    ahead = (depth + reach > camera.near) & (depth - reach < camera.far)
+    near, far = camera.near - camera.setback, camera.far - camera.setback
+    nearest = np.maximum(depth - reach - camera.room, camera.closest)
+    farthest = np.maximum(np.minimum(depth + reach + camera.room, far), camera.closest)
+    ahead = (depth + reach > near) & (depth - reach < far)
     radius = np.maximum(circle_of_confusion(camera, nearest), circle_of_confusion(camera, farthest))
-    metres = radius if camera.kind == "ORTHO" else radius * np.maximum(farthest, camera.near)
+    metres = radius if camera.kind == "ORTHO" else radius * farthest
     seen = ahead & (camera.clearance(centre) - reach < metres)
     left, right, bottom, top = camera.window
     size = np.array([right - left, top - bottom])
@@ -61,10 +63,11 @@ def circle_of_confusion(camera: Camera, depth: NDArray[np.float64]) -> NDArray[n
         return np.zeros(len(depth))
     if camera.kind == "ORTHO":
         return camera.lens_radius * np.abs(depth / camera.focus - 1.0)
-    return camera.lens_radius * np.abs(1.0 / np.maximum(depth, camera.near) - 1.0 / camera.focus)
+    return camera.lens_radius * np.abs(1.0 / np.maximum(depth, camera.closest) - 1.0 / camera.focus)
 
 
 def _depths(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Depths (n,) from the eye, metres, or distances where a picture is all around it."""
     local = camera.to_camera_space(points)
     return np.linalg.norm(local, axis=-1) if camera.kind == "PANO" else local[..., 2] - camera.setback
 

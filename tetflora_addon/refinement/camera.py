@@ -175,6 +175,11 @@ class Camera:
         return self.pixel_size * self._nearest(depth - self.setback)
 
     @property
+    def closest(self) -> float:
+        """Least distance from an eye at which things count, metres; see `_nearest`."""
+        return max(self.room / 2.0, self.near if self.setback == 0.0 else 0.0)
+
+    @property
     def hides_from(self) -> float:
         """Depth from which on things hide what is behind them, metres: nearer ones not from all eyes; 0 for one eye."""
         return self.setback + _OPEN * self.room
@@ -194,7 +199,7 @@ class Camera:
 
         Within their room nobody knows: half of it is as near as it comes to what is not grazed.
         """
-        return np.maximum(distance - self.room, max(self.room / 2.0, self.near if self.setback == 0.0 else 0.0))
+        return np.maximum(distance - self.room, self.closest)
 
     def extent_around(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Metres (n,) that one pixel spans at points (n, 3), in view or not.

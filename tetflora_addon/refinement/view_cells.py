@@ -103,14 +103,15 @@ def cell_camera(camera: Camera, cells: ViewCells) -> Camera | None:
         return None
     turns = _Turns.around(camera.frame, cells.turn)
     frame = turns.frame(np.zeros(3))
-    camera = _zoomed(camera) if camera.kind != "PANO" else camera
+    others = camera.shutter
+    camera = _zoomed(_with_all_windows(camera)) if camera.kind != "PANO" else camera
     left, right, bottom, top = camera.window
     half = np.array([right - left, top - bottom]) / 2.0
     narrow = np.minimum(ACROSS * half, 1.0) if camera.kind == "PERSP" else np.ones(2)
     steps = cells.length * np.array([*narrow, 1.0])
     eye = frame @ _middle(camera.position @ frame, steps)
     reach = (0.5 + BEYOND) * steps
-    for other in camera.shutter:
+    for other in others:
         beyond = np.abs((other.position - eye) @ frame) > reach
         if beyond.any() or not turns.holds(other.frame, 0.5 + BEYOND_TURN):
             return None
@@ -130,9 +131,9 @@ def _standing_back(camera: Camera, turned: NDArray[np.float64], reach: NDArray[n
     step = np.array([(right - left) / camera.width, (top - bottom) / camera.height])
     seen = np.array([(x, y, -1.0) for x in (left, right) for y in (bottom, top)])
     if camera.kind == "ORTHO":
-        # At the far end of what it sees; the near one is closer to the eye, around which it turns.
-        seen = seen * np.array([1.0, 1.0, camera.far])
+        seen = np.concatenate([seen * np.array([1.0, 1.0, depth]) for depth in (camera.near, camera.far)])
     local = np.einsum("nij,kj->nki", turned, seen).reshape(-1, 3)
+    shallowest, deepest = float((-local[:, 2]).min()), float((-local[:, 2]).max())
     if camera.kind == "PERSP":
         if (-local[:, 2] < _AHEAD * np.linalg.norm(local, axis=1)).any():
             return None
@@ -140,12 +141,18 @@ def _standing_back(camera: Camera, turned: NDArray[np.float64], reach: NDArray[n
     half = np.abs(local[:, :2] - middle).max(axis=0)
     if camera.kind == "ORTHO":
         half = half + reach[:2]
-        setback, near = float(reach[2]), camera.near
+        # Far enough back for what is nearest when it has turned; the lens is larger as its focus is farther away.
+        setback = float(reach[2]) + camera.near - shallowest
+        near, far = camera.near, deepest + setback + float(reach[2])
         away = np.array([0.0, 0.0, setback])
+        focus = camera.focus + setback
+        lens = camera.lens_radius * focus / camera.focus if np.isfinite(focus) else camera.lens_radius
     else:
         # In a frame that is sheared with the window, it is |x| <= half (depth + setback) for all corners of the box.
         setback = float(((reach[:2] + np.abs(middle) * reach[2]) / half).max() + reach[2])
-        near = max(camera.near, setback - float(reach[2]))
+        near = shallowest * camera.near + setback - float(reach[2])
+        far = deepest * camera.far + setback + float(reach[2])
+        lens, focus = camera.lens_radius, camera.focus
         away = np.array([*-middle, 1.0]) * setback
     pixels = np.ceil(2.0 * half / step).astype(int)
     half = pixels * step / 2.0
@@ -154,12 +161,25 @@ def _standing_back(camera: Camera, turned: NDArray[np.float64], reach: NDArray[n
         position=camera.position + camera.frame @ away,
         window=(middle[0] - half[0], middle[0] + half[0], middle[1] - half[1], middle[1] + half[1]),
         near=near,
-        far=camera.far + setback + float(reach[2]),
+        far=far,
         width=int(pixels[0]),
         height=int(pixels[1]),
         setback=setback if camera.kind == "PERSP" else 0.0,
-        focus=camera.focus + (setback if camera.kind == "ORTHO" else 0.0),
+        lens_radius=lens,
+        focus=focus,
     )
+
+
+def _with_all_windows(camera: Camera) -> Camera:
+    """With whole pixels more around its picture where other eyes look past it: their windows may be shifted."""
+    low, high = np.array(camera.window[::2]), np.array(camera.window[1::2])
+    step = (high - low) / [camera.width, camera.height]
+    windows = np.array([camera.window, *(other.window for other in camera.shutter)])
+    below = np.ceil((low - windows[:, ::2].min(axis=0)) / step - 1.0 / _FRACTIONS)
+    above = np.ceil((windows[:, 1::2].max(axis=0) - high) / step - 1.0 / _FRACTIONS)
+    (left, bottom), (right, top) = (low - below * step).tolist(), (high + above * step).tolist()
+    across, up = (below + above).astype(int).tolist()
+    return replace(camera, window=(left, right, bottom, top), width=camera.width + across, height=camera.height + up)
 
 
 def _zoomed(camera: Camera) -> Camera:

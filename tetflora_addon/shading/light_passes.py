@@ -44,7 +44,7 @@ def to_eye(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Unit vectors (m, 3) from points to the camera."""
     if camera.kind == "ORTHO":
         return np.tile(camera.frame[:, 2], (len(points), 1))
-    away = camera.position - points
+    away = camera.eye - points
     return away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
 
 

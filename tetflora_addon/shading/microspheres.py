@@ -62,8 +62,7 @@ def cover_of(facets: Facets, camera: Camera | None) -> NDArray[np.float64]:
 
 def facing(facets: Facets, camera: Camera) -> NDArray[np.float64]:
     """Share (n,) of its area that each facet shows to the camera, 0 to 1."""
-    sight = camera.line_of_sight
-    if "direction" in sight:
-        return np.abs(facets.normal @ sight["direction"])
-    ray = facets.centre - sight["eye"]
+    if camera.kind == "ORTHO":
+        return np.abs(facets.normal @ camera.frame[:, 2])
+    ray = facets.centre - camera.eye
     return np.abs(np.einsum("ni,ni->n", facets.normal, ray)) / np.maximum(np.linalg.norm(ray, axis=1), 1e-300)
