@@ -148,13 +148,14 @@ def test_nothing_that_is_kept_goes_into_a_file(film, tmp_path):
 
 @pytest.mark.parametrize(
     "change",
-    ["plant", "seed", "lens", "settings", "terrain", "camera", "species", "form", "material"],
+    ["plant", "seed", "lens", "settings", "terrain", "camera", "species", "form", "material", "pass index", "engine"],
 )
 def test_what_changes_is_noticed(film, made, change):
     import bpy
 
     ground = add_mesh("ground", size=20.0)
     ground.tetflora.is_occluder = True
+    film.tetflora.output.species.add().species = "fern"
     depsgraph()
     at(film, 1)
     at(film, 1)
@@ -181,7 +182,11 @@ def test_what_changes_is_noticed(film, made, change):
         film.tetflora.proxy_form = 'MICROSPHERES'
     elif change == "material":
         film.tetflora.output.species.add().species = "bush"
-        film.tetflora.output.species[0].leaf = bpy.data.materials.new("mine")
+        film.tetflora.output.species[1].leaf = bpy.data.materials.new("mine")
+    elif change == "pass index":
+        film.tetflora.output.species[0].pass_index = 7
+    elif change == "engine":  # which draws points in another size
+        film.render.engine = 'CYCLES' if film.render.engine != 'CYCLES' else part("compat").eevee_engine()
     depsgraph()
     at(film, 1)
     assert made == [1, 1]
@@ -264,3 +269,149 @@ def test_a_frame_that_fails_leaves_nothing_and_the_next_one_is_right(film, made)
     film.camera = camera
     part("handlers").on_render_init(film)
     assert at(film, 1) == good
+
+
+@pytest.mark.parametrize("change", ["attribute", "material"])
+def test_what_changes_of_explicit_objects_is_noticed(film, made, change):
+    import bpy
+
+    count = 400  # corners; numbers print short where there are more than a thousand
+    foreign = add_mesh("foreign", size=0.5)
+    foreign.data.clear_geometry()
+    foreign.data.from_pydata(
+        [(i % 20 / 20.0, i // 20 / 20.0, 0.0) for i in range(count)],
+        [],
+        [(i, i + 1, i + 21, i + 20) for i in range(count - 21) if i % 20 < 19],
+    )
+    tint = foreign.data.attributes.new("tint", 'FLOAT', 'POINT')
+    foreign.data.materials.append(bpy.data.materials.new("one"))
+    foreign.tetflora.is_explicit = True
+    depsgraph()
+    at(film, 1)
+    if change == "attribute":
+        tint.data[count // 2].value = 1.0
+        foreign.data.update()
+    else:
+        foreign.data.materials[0] = bpy.data.materials.new("two")
+    depsgraph()
+    at(film, 1)
+    assert made == [1, 1]
+
+
+def test_materials_of_leaf_objects_are_noticed(film, made):
+    import bpy
+
+    leaf = add_mesh("blade", size=0.5)
+    leaf.hide_render = True
+    film.tetflora.leaf_limit = 0.05  # real ones in so small a picture
+    leaf.data.materials.append(bpy.data.materials.new("one"))
+    entry = film.tetflora.leaf_objects.add()
+    entry.species, entry.leaf = "bush", leaf
+    depsgraph()
+    at(film, 1)
+    leaf.data.materials[0] = bpy.data.materials.new("two")
+    depsgraph()
+    assert "two" in at(film, 1)[1]["materials"]
+    assert made == [1, 1]
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ((1, 11), (11, 1)),
+        ((1.0, 12.0), (1.01, 2.0)),
+        ({"many": np.zeros(2000)}, {"many": np.eye(2000)[1000]}),
+        ({"exact": np.ones(20)}, {"exact": np.ones(20) + 1e-12}),
+    ],
+)
+def test_digests_tell_values_apart(one, other):
+    import hashlib
+
+    digests = hashlib.sha256(), hashlib.sha256()
+    for digest, value in zip(digests, (one, other), strict=True):
+        part("scene_digest").digest_of(digest, value)
+    assert digests[0].digest() != digests[1].digest()
+
+
+def test_shells_that_come_back_are_shaded_as_they_were(film, made):
+    film.tetflora.proxy_form = 'SHELLS'
+    first = at(film, 1)
+    film.tetflora.shell_diffuse = 0.5
+    assert at(film, 1)[1]["materials"] != first[1]["materials"]
+    film.tetflora.shell_diffuse = 1.0
+    assert at(film, 1) == first
+    assert made == [1, 1]
+
+
+def test_materials_put_on_the_artists_results_do_not_change_the_next_frame(film, made):
+    import bpy
+
+    film.tetflora.leaf_limit = 0.05
+    part("job").refine(film, depsgraph())
+    made.clear()
+    (results_of_artist,) = part("emit").result_collections(film, 'VIEW')
+    leaves = next(o for o in results_of_artist.objects if o.get("tetflora_kind") == "leaf")
+    leaves.material_slots[0].material = bpy.data.materials.new("mine")
+    first = at(film, 1)
+    assert "mine" in first[1]["materials"]
+    assert at(film, 1) == first
+    assert made == [1]
+
+
+def test_view_layers_go_together_as_if_nothing_were_hidden(film, made):
+    import bpy
+
+    foreign = add_mesh("foreign", size=0.5)
+    foreign.tetflora.is_explicit = True
+    apart = bpy.data.collections.new("apart")
+    film.collection.children.link(apart)
+    apart.objects.link(foreign)
+    film.collection.objects.unlink(foreign)
+    second = film.view_layers.new("second")
+    second.layer_collection.children["apart"].exclude = True
+
+    def shown():
+        part("handlers").on_render_pre(film)
+        assert part("handlers").render_errors() == []
+        return [
+            sorted(c.collection.name for c in layer.layer_collection.children if not c.exclude)
+            for layer in film.view_layers
+        ]
+
+    first = shown()
+    assert first[0] != first[1]
+    assert shown() == first
+    assert made == [1, 1]
+
+
+def test_scenes_that_are_rendered_within_a_render_leave_its_results_alone(film, made):
+    import bpy
+
+    first = at(film, 1)
+    other = bpy.data.scenes.new("other")
+    for obj in film.objects:
+        other.collection.objects.link(obj)
+    other.camera = film.camera
+    for prop in ("leaf_limit", "cutoff", "visibility_resolution", "cell_length"):
+        setattr(other.tetflora, prop, getattr(film.tetflora, prop))
+    other.render.resolution_x, other.render.resolution_y = 64, 36
+    names = {collection.name for collection in part("emit").result_collections(film)}
+    part("handlers").on_render_pre(other)
+    assert part("handlers").render_errors() == []
+    theirs = {collection.name for collection in part("emit").result_collections(other)}
+    assert theirs
+    assert not theirs & names
+    part("handlers").on_render_end(other)
+    assert at(film, 1) == first
+    assert made == [1, 1]
+
+
+def test_names_that_are_too_long_still_tell_cells_apart(film, made):
+    foreign = add_mesh("x" * 60, size=0.5)
+    foreign.tetflora.is_explicit = True
+    depsgraph()
+    at(film, 1)
+    _, last = at(film, FRAMES)
+    assert len(made) == 2
+    assert last == alone(film, FRAMES)[1]
+    assert not [name for kind in ("objects", "meshes") for name in last[kind] if name[-4] == "."]

@@ -25,6 +25,8 @@ from .point_clouds import point_object
 
 #: Custom property of a result collection: 'VIEW' for what the artist keeps, 'RENDER' for what lives while rendering.
 PURPOSE = "tetflora_purpose"
+#: Bytes of a name that Blender 4.5 takes (5.0 takes more), but for those with which it tells the same names apart.
+_LONGEST = 59
 #: And on those that are being made.
 UNFINISHED = "tetflora_unfinished"
 NAMES = {'VIEW': "TetFlora", 'RENDER': "TetFlora render"}
@@ -72,7 +74,7 @@ class Results:
         species: Species | None = None,
     ) -> bpy.types.Object:
         """Write one mesh as an object of the collection; of one species, or of None."""
-        name += self.mark
+        name = self._name(name)
         return self._link(bpy.data.objects.new(name, write_mesh(name, buffers, materials)), kind, species)
 
     def add_points(
@@ -84,7 +86,15 @@ class Results:
         species: Species | None = None,
     ) -> bpy.types.Object:
         """Write one cloud of points, which has one material, as an object of the collection."""
-        return self._link(point_object(name + self.mark, buffers, *materials), kind, species)
+        return self._link(point_object(self._name(name), buffers, *materials), kind, species)
+
+    def _name(self, name: str) -> str:
+        """A name that ends in a number, with the mark; Blender must not cut it off where names are too long."""
+        if not self.mark:
+            return name
+        stem, _, number = name.rpartition(" ")
+        end = f" {number}{self.mark}"
+        return stem.encode()[: _LONGEST - len(end)].decode(errors="ignore") + end
 
     def _link(self, made: bpy.types.Object, kind: str, species: Species | None) -> bpy.types.Object:
         tag(made.data)
@@ -319,15 +329,18 @@ def unpack_override_marks() -> None:
 
 
 @contextmanager
-def originals_shown(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Iterator[None]:
-    """While the scene is read, objects that results hide, be it those of another scene, are as the artist left them."""
+def originals_shown(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> Iterator[None]:
+    """While the scene is read, objects that results hide, be it those of another scene, are as the artist left them.
+
+    None for the dependency graph will do where nothing that is evaluated is read.
+    """
     marked = {purpose: _marked(purpose) for purpose in ('RENDER', 'VIEW')}
     before = {o: (o.hide_render, o.hide_viewport) for every in marked.values() for o in every}
     for purpose, every in marked.items():
         for o in every:
             o.hide_render, o.hide_viewport = _marker(o, purpose)[0]
     try:
-        if before:
+        if before and depsgraph is not None:
             depsgraph.update()
         yield
     finally:

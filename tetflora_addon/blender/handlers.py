@@ -24,6 +24,7 @@ from .emit import (
     has_results,
     leave_out_of_file,
     lift_marks,
+    originals_shown,
     pack_override_marks,
     restore_marks,
     result_collections,
@@ -31,7 +32,7 @@ from .emit import (
     unpack_override_marks,
 )
 from .migration import migrate
-from .output import KIND, release_materials
+from .output import KIND, adopt_materials, release_materials
 from .scene_reader import NoPlantsError, has_contents
 from .shell_bounces import raise_bounces
 from .view_layers import show_in, view_layer_groups
@@ -154,8 +155,12 @@ def _make(scene: bpy.types.Scene) -> None:
     """Results for the frame that is about to be rendered; those that the artist made for another view are hidden."""
     # Also where nothing is animated: it is what the renderer does next, and the only way to a depsgraph of this frame.
     scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
+    for earlier in result_collections(scene, 'VIEW'):
+        adopt_materials(scene, earlier)  # first of all, or the next frame would count as changed
+    with originals_shown(scene):  # the frame before has hidden some
+        groups = view_layer_groups(scene)
     wanted = []
-    for layers in view_layer_groups(scene):
+    for layers in groups:
         layers[0].update()  # going to the frame brings only the active layer's depsgraph up to date, if others have any
         camera = kept_results.shared_camera(scene, layers[0].depsgraph)
         wanted.append((kept_results.key_of(scene, layers[0].depsgraph, layers, camera), layers, camera))

@@ -19,6 +19,7 @@ from ..refinement.camera import Camera
 from ..refinement.view_cells import ViewCells, cell_camera
 from .camera_reader import read_camera
 from .emit import hidden_originals, hide_originals, remove_collection, result_collections, show_originals
+from .proxies import shade_again
 from .scene_digest import digest_of, scene_digest
 from .wind_properties import wind_of
 
@@ -30,6 +31,7 @@ _ASIDE = {"statistics", "share_frames", "cell_length", "cell_turn", "kept_memory
 class _Kept:
     """Results of one digest; names, because references do not outlive a load."""
 
+    scene: int  # its number in this session: scenes of a sequencer are rendered while another one is
     collection: str
     originals: list[str]
     megabytes: float
@@ -85,8 +87,8 @@ def key_of(
         As `scene_digest.scene_digest`.
     """
     content = hashlib.sha256(scene_digest(scene, depsgraph, layers[0], camera).encode())
-    digest_of(content, [layer.name for layer in layers])
-    for group in (scene.tetflora, scene.tetflora.output):
+    digest_of(content, [scene.name, *(layer.name for layer in layers)])
+    for group in (scene.tetflora, scene.tetflora.output, *scene.tetflora.output.species):
         digest_of(content, _values(group))
     return content.hexdigest()
 
@@ -125,6 +127,7 @@ def recall(scene: bpy.types.Scene, key: str) -> bpy.types.Collection | None:
     _kept[key] = entry  # most recently seen
     if collection.name not in scene.collection.children:
         scene.collection.children.link(collection)
+    shade_again(scene, collection)
     if scene.tetflora.statistics != entry.statistics:  # or the scene would count as changed
         scene.tetflora.statistics = entry.statistics
     return collection
@@ -133,10 +136,9 @@ def recall(scene: bpy.types.Scene, key: str) -> bpy.types.Collection | None:
 def keep(scene: bpy.types.Scene, key: str, collection: bpy.types.Collection, megabytes: float) -> None:
     """Remember new results of a scene, and let older ones go for which there is no memory."""
     originals = [o.name for o in hidden_originals(scene, 'RENDER')]
-    _kept[key] = _Kept(collection.name, originals, megabytes, scene.tetflora.statistics)
-    shown = {c.name for c in result_collections(scene, 'RENDER')}
+    _kept[key] = _Kept(scene.session_uid, collection.name, originals, megabytes, scene.tetflora.statistics)
     limit = scene.tetflora.kept_memory * 1e3
-    for other in [k for k, entry in _kept.items() if entry.collection not in shown]:
+    for other in _stowed(scene):
         if sum(entry.megabytes for entry in _kept.values()) <= limit:
             break
         _forget(scene, other)
@@ -150,16 +152,22 @@ def hide_for(scene: bpy.types.Scene, keys: Sequence[str]) -> None:
 
 def forget_all(scene: bpy.types.Scene) -> None:
     """Remove all that was kept for a scene and is not shown in it; what is shown is `job.clear`'s business."""
-    shown = {c.name for c in result_collections(scene, 'RENDER')}
-    for key in list(_kept):
-        if _kept[key].collection not in shown:
-            _forget(scene, key)
-    _kept.clear()
+    for key in _stowed(scene):
+        _forget(scene, key)
+    for key in [k for k, entry in _kept.items() if entry.scene == scene.session_uid]:
+        del _kept[key]
 
 
 def forget_names() -> None:
     """Another file is open: nothing of what was kept is there any more."""
     _kept.clear()
+
+
+def _stowed(scene: bpy.types.Scene) -> list[str]:
+    """Digests of results that a scene has but does not show, least recently seen first."""
+    shown = {c.name for c in result_collections(scene, 'RENDER')}
+    own = [key for key, entry in _kept.items() if entry.scene == scene.session_uid]
+    return [key for key in own if _kept[key].collection not in shown]
 
 
 def _forget(scene: bpy.types.Scene, key: str) -> None:

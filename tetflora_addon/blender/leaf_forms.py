@@ -106,14 +106,26 @@ def materials_of(scene: bpy.types.Scene, species: Species, kind: str, form: int)
         return [replaced]
     if kind == "bark":
         return [_in_viewports(bark_material(species.name, species.bark), species, kind)]
-    source = leaf_objects(scene).get(species.identifier) if kind == "leaf" else None
-    if source is None:
-        named = species_for(scene, species.identifier).forms(LEAF_KINDS.index(kind))[form]
-        source = bpy.data.objects.get(named) if isinstance(named, str) else None
-    own = [slot.material for slot in source.material_slots] if source is not None else []
+    own = _brought(scene, species.identifier, kind, form)
     if any(own):
         return own
     return [_in_viewports(leaf_material(species.name if kind == "leaf" else f"{species.name} {kind}"), species, kind)]
+
+
+def brought_materials(scene: bpy.types.Scene, kind_of_plant: str) -> list[list[str]]:
+    """Names of the materials in the slots of objects that are leaves of a species, form by form."""
+    identifier = species_of(kind_of_plant)
+    forms = [(k, n) for k in LEAF_KINDS for n in range(len(species_for(scene, identifier).forms(LEAF_KINDS.index(k))))]
+    return [[getattr(m, "name_full", "") for m in _brought(scene, identifier, kind, form)] for kind, form in forms]
+
+
+def _brought(scene: bpy.types.Scene, identifier: str, kind: str, form: int) -> list[bpy.types.Material | None]:
+    """Materials of the object whose copies leaves of a form are, slot by slot; empty where it is none."""
+    source = leaf_objects(scene).get(identifier) if kind == "leaf" else None
+    if source is None:
+        named = species_for(scene, identifier).forms(LEAF_KINDS.index(kind))[form]
+        source = bpy.data.objects.get(named) if isinstance(named, str) else None
+    return [slot.material for slot in source.material_slots] if source is not None else []
 
 
 def _in_viewports(material: bpy.types.Material, species: Species, kind: str) -> bpy.types.Material:

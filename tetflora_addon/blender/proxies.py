@@ -25,6 +25,7 @@ from .compat import drawn_disc
 from .emit import Results
 from .materials import proxy_material, sphere_material
 from .node_tools import find_socket, is_ours
+from .output import KIND
 from .shell_material import baked_shell_material, shell_material
 
 #: Properties of the scene that the sockets of shells follow, by name of the socket.
@@ -123,8 +124,18 @@ def shade_shells(material: bpy.types.Material, scene: bpy.types.Scene) -> None:
     for node in material.node_tree.nodes:
         if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None and is_ours(node.node_tree):
             for name, identifier in SHADING.items():
-                if name in node.inputs:
-                    find_socket(node.inputs, name).default_value = getattr(scene.tetflora, identifier)
+                value = getattr(scene.tetflora, identifier)
+                if name in node.inputs and find_socket(node.inputs, name).default_value != value:
+                    find_socket(node.inputs, name).default_value = value
+
+
+def shade_again(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
+    """`shade_shells` for results that come back: their material is that of later ones too."""
+    if scene.tetflora.proxy_form != 'SHELLS' or scene.tetflora.baked_light != 'OFF':
+        return
+    shells = [obj for obj in collection.objects if obj.get(KIND) == "proxy"]
+    for material in {material for obj in shells for material in obj.data.materials if material is not None}:
+        shade_shells(material, scene)
 
 
 def _baked_blocks(

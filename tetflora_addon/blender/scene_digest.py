@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 
 import bpy
@@ -12,8 +13,9 @@ import numpy as np
 
 from ..refinement.camera import Camera
 from .camera_reader import read_camera
+from .compat import drawn_disc
 from .job import read_scene
-from .leaf_forms import resolved_species
+from .leaf_forms import brought_materials, resolved_species
 from .output import REPLACED
 from .properties import settings_from
 from .wind_properties import wind_of
@@ -47,7 +49,8 @@ def scene_digest(
     explicit = ()
     if given.explicit is not None:
         meshes = given.explicit.meshes
-        explicit = meshes.surfaces, meshes.surface, meshes.linear, meshes.origin
+        worn = [[getattr(material, "name_full", "") for material in slots] for slots in given.explicit.materials]
+        explicit = meshes.surfaces, meshes.surface, meshes.linear, meshes.origin, worn
     species = [resolved_species(scene, identifier, depsgraph) for identifier in given.species]
     materials = [(e.species, *(getattr(getattr(e, k), "name", "") for k in REPLACED)) for e in group.output.species]
     for part in (
@@ -60,15 +63,17 @@ def scene_digest(
         settings_from(scene),
         [getattr(group, name) for name in _CHOICES],
         species,
+        [brought_materials(scene, identifier) for identifier in given.species],
         materials,
         wind_of(scene),
+        drawn_disc(scene.render.engine),
     ):
         digest_of(content, part)
     return content.hexdigest()
 
 
 def digest_of(content: hashlib._Hash, value: object) -> None:
-    """Add a value of numbers, texts, arrays, sequences or dataclasses of these."""
+    """Add a value of numbers, texts, arrays, or of sequences, mappings or dataclasses of these."""
     if isinstance(value, np.ndarray):
         content.update(f"{value.dtype}{value.shape}".encode())
         content.update(
@@ -79,8 +84,10 @@ def digest_of(content: hashlib._Hash, value: object) -> None:
             content.update(field.name.encode())
             digest_of(content, getattr(value, field.name))
     elif isinstance(value, list | tuple):
-        content.update(f"{len(value)}".encode())
+        content.update(f"{len(value)}:".encode())
         for item in value:
             digest_of(content, item)
+    elif isinstance(value, Mapping):
+        digest_of(content, [part for item in value.items() for part in item])
     else:
-        content.update(repr(value).encode())  # of one session only
+        content.update(f"{value!r};".encode())  # or 1, 11 would be 11, 1
