@@ -191,6 +191,41 @@ def test_an_error_is_said_and_earlier_results_are_rendered(stage, stub, tmp_path
     assert part("handlers").render_errors() == []
 
 
+def test_scenes_in_a_sequencer_forget_no_errors(stage, stub):
+    import bpy
+
+    stub.error = errors().SpeciesError('Unknown species "quercus"')
+    outer, empty = bpy.data.scenes.new("outer"), bpy.data.scenes.new("empty")
+    handlers = part("handlers")
+    handlers.on_render_init(outer)
+    for inner in (stage, empty):  # in the order in which Blender calls: a render within each frame of the other
+        handlers.on_render_pre(outer)
+        handlers.on_render_init(inner)
+        handlers.on_render_pre(inner)
+        handlers.on_render_end(inner)
+    handlers.on_render_end(outer)
+    assert len(handlers.render_errors()) == 1
+    handlers.on_render_init(outer)
+    assert handlers.render_errors() == []
+
+
+def test_bounces_of_each_scene_come_back(stage, stub):
+    import bpy
+
+    other = bpy.data.scenes.new("other")
+    other.camera = stage.camera
+    other.collection.objects.link(bpy.data.objects["plant"])
+    handlers = part("handlers")
+    for n, scene in enumerate((stage, other)):
+        scene.tetflora.proxy_form = 'SHELLS'
+        scene.cycles.transparent_max_bounces = 10 + n
+        handlers.on_render_pre(scene)
+        assert scene.cycles.transparent_max_bounces > 100
+    for scene in (other, stage):
+        handlers.on_render_end(scene)
+    assert [scene.cycles.transparent_max_bounces for scene in (stage, other)] == [10, 11]
+
+
 def test_an_unexpected_error_does_not_stop_later_frames(stage, stub, tmp_path, capfd):
     stub.error = ZeroDivisionError("oops")
     _still(stage, tmp_path / "a.png")

@@ -45,8 +45,8 @@ class _Rendering:
     busy: bool = False
     hidden: list[str] = field(default_factory=list)
     lifted: dict[tuple[str, str], str] = field(default_factory=dict)  # marks of originals, while a file is written
-    bounces: dict[str, int] = field(default_factory=dict)  # of Cycles, as they were
-    scene: str = ""  # whose bounces these are
+    bounces: dict[str, dict[str, int]] = field(default_factory=dict)  # of Cycles, as they were, by name of the scene
+    outer: str = ""  # scene that is rendered; those that its sequencer shows begin and end renders of their own
     errors: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
@@ -62,8 +62,10 @@ def render_errors() -> list[str]:
 
 
 @persistent
-def on_render_init(_scene: bpy.types.Scene, _depsgraph: object = None) -> None:
-    """A render starts: earlier errors are past."""
+def on_render_init(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
+    """A render starts: earlier errors are past, unless it is part of another one."""
+    if _rendering.outer not in {"", scene.name}:
+        return
     _rendering.errors.clear()
     _rendering.warnings.clear()
 
@@ -74,6 +76,7 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     if _rendering.busy:
         return
     _rendering.busy = True
+    _rendering.outer = _rendering.outer or scene.name
     made = False
     try:
         wanted = scene.tetflora.refine_at_render and scene.tetflora.output.show_render
@@ -106,13 +109,16 @@ def on_render_end(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
         _take_back(scene)
     finally:
         _rendering.busy = False
+        if _rendering.outer == scene.name:
+            _rendering.outer = ""
 
 
 @persistent
 def on_save_pre(_path: object, _other: object = None) -> None:
     """Before a file is written: what is only hidden or raised for a render is stored as it was."""
     _show_hidden()
-    _set_bounces()
+    for name in _rendering.bounces:
+        _set_bounces(name)
     leave_out_of_file()
     _rendering.lifted = lift_marks()
     pack_override_marks()
@@ -123,8 +129,8 @@ def on_save_post(_path: object, _other: object = None) -> None:
     """After a file was written, in the middle of a render: hide and raise it again."""
     for collection in _named(_rendering.hidden):
         collection.hide_render = True
-    if _rendering.bounces:
-        raise_bounces(bpy.data.scenes[_rendering.scene, None])
+    for name in _rendering.bounces:
+        raise_bounces(bpy.data.scenes[name, None])
     unpack_override_marks()
     restore_marks(_rendering.lifted)
     _rendering.lifted.clear()
@@ -137,7 +143,7 @@ def on_load_post(_path: object, _other: object = None) -> None:
 
     Meshes that are hidden for results which the file does not hold are shown.
     """
-    _rendering.busy = False
+    _rendering.busy, _rendering.outer = False, ""
     _rendering.bounces.clear()
     _rendering.hidden.clear()
     _rendering.lifted.clear()
@@ -177,12 +183,12 @@ def _make(scene: bpy.types.Scene) -> None:
                 kept_results.keep(scene, key, collection, statistics.memory_mb)
         show_in(scene, new, layers)
     kept_results.hide_for(scene, [key for key, *_ in wanted])
-    if len(scene.view_layers) > 1:
-        # Without, Blender crashes when it renders a layer that is not the window's and objects are new in it.
+    if len(scene.view_layers) > 1 or _rendering.outer != scene.name:
+        # Without, Blender crashes when it renders a layer that is not the window's, or one for a sequencer, and objects
+        # are new in it.
         for layer in scene.view_layers:
             layer.update()
-    _rendering.scene = scene.name
-    _rendering.bounces |= raise_bounces(scene)
+    _rendering.bounces.setdefault(scene.name, {}).update(raise_bounces(scene))
     # Hidden only now: if refinement failed, yesterday's trees are better than none.
     _rendering.hidden += [c.name for c in result_collections(scene, 'VIEW') if not c.hide_render]
     for collection in _named(_rendering.hidden):
@@ -192,15 +198,15 @@ def _make(scene: bpy.types.Scene) -> None:
 def _take_back(scene: bpy.types.Scene) -> None:
     _show_hidden()
     _rendering.hidden.clear()
-    _set_bounces()
-    _rendering.bounces.clear()
+    _set_bounces(scene.name)
+    _rendering.bounces.pop(scene.name, None)
     kept_results.forget_all(scene)
     job.clear(scene, for_render=True)
 
 
-def _set_bounces() -> None:
-    for name, value in _rendering.bounces.items():
-        setattr(bpy.data.scenes[_rendering.scene, None].cycles, name, value)
+def _set_bounces(scene: str) -> None:
+    for name, value in _rendering.bounces.get(scene, {}).items():
+        setattr(bpy.data.scenes[scene, None].cycles, name, value)
 
 
 def _show_hidden() -> None:
