@@ -47,6 +47,7 @@ class _Rendering:
     lifted: dict[tuple[str, str], str] = field(default_factory=dict)  # marks of originals, while a file is written
     bounces: dict[str, dict[str, int]] = field(default_factory=dict)  # of Cycles, as they were, by name of the scene
     outer: str = ""  # scene that is rendered; those that its sequencer shows begin and end renders of their own
+    scenes: list[str] = field(default_factory=list)  # all of these
     errors: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
@@ -77,6 +78,8 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
         return
     _rendering.busy = True
     _rendering.outer = _rendering.outer or scene.name
+    if scene.name not in _rendering.scenes:
+        _rendering.scenes.append(scene.name)
     made = False
     try:
         wanted = scene.tetflora.refine_at_render and scene.tetflora.output.show_render
@@ -101,16 +104,22 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
 
 @persistent
 def on_render_end(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
-    """After the last frame, or when the render was cancelled: leave the scene as it was."""
-    if _rendering.busy:
+    """After the last frame, or when the render was cancelled: leave all scenes as they were.
+
+    Not yet where only a scene ends that a sequencer shows: the render around it goes on, and Blender 5.2 crashes if
+    what it has rendered is gone before that ends as well.
+    """
+    if _rendering.busy or _rendering.outer not in {"", scene.name}:
         return
     _rendering.busy = True
+    rendered = {*_rendering.scenes, scene.name}
     try:
-        _take_back(scene)
+        for other in bpy.data.scenes:
+            if other.name in rendered and other.library is None:
+                _take_back(other)
     finally:
-        _rendering.busy = False
-        if _rendering.outer == scene.name:
-            _rendering.outer = ""
+        _rendering.busy, _rendering.outer = False, ""
+        _rendering.scenes.clear()
 
 
 @persistent
@@ -144,6 +153,7 @@ def on_load_post(_path: object, _other: object = None) -> None:
     Meshes that are hidden for results which the file does not hold are shown.
     """
     _rendering.busy, _rendering.outer = False, ""
+    _rendering.scenes.clear()
     _rendering.bounces.clear()
     _rendering.hidden.clear()
     _rendering.lifted.clear()
