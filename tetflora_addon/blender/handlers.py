@@ -178,14 +178,15 @@ def _make(scene: bpy.types.Scene) -> None:
     wanted = []
     for layers in groups:
         layers[0].update()  # going to the frame brings only the active layer's depsgraph up to date, if others have any
-        camera = kept_results.shared_camera(scene, layers[0].depsgraph)
-        wanted.append((kept_results.key_of(scene, layers[0].depsgraph, layers, camera), layers, camera))
+        depsgraph = layers[0].depsgraph
+        read = kept_results.shared_camera(scene, depsgraph), job.read_scene(scene, depsgraph, layers[0])
+        wanted.append((kept_results.key_of(scene, depsgraph, layers, *read), layers, read))
     kept_results.stow(scene, [key for key, *_ in wanted])
-    for key, layers, camera in wanted:
+    for key, layers, (camera, given) in wanted:
         layer, there = layers[0], kept_results.recall(scene, key)
         new = [] if there is None else [there]
         if there is None:
-            options = {"view_layer": layer, "for_render": True, "camera": camera, "mark": key[:8]}
+            options = {"view_layer": layer, "for_render": True, "camera": camera, "given": given, "mark": key[:8]}
             before = result_collections(scene, 'RENDER')
             statistics = job.refine(scene, layer.depsgraph, beside=before, **options)
             new = [c for c in result_collections(scene, 'RENDER') if c not in before]

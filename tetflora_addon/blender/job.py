@@ -156,6 +156,7 @@ def refine_steps(
     for_render: bool = False,
     beside: Sequence[bpy.types.Collection] = (),
     camera: Camera | None = None,
+    given: Given | None = None,
     mark: str = "",
 ) -> Generator[Progress, bool | None, Statistics]:
     """Refine a scene step by step.
@@ -176,6 +177,8 @@ def refine_steps(
         Earlier results that stay: those of other view layers.
     camera : Camera, optional
         In place of the scene's as it stands.
+    given : Given, optional
+        What `read_scene` has said of it.
     mark : str
         Comes after the names of results.
 
@@ -188,7 +191,8 @@ def refine_steps(
     yield Progress(0.0, "Reading the scene")
     if camera is None:
         camera = read_camera(scene, depsgraph, region_only=for_render)
-    given = read_scene(scene, depsgraph, view_layer or depsgraph.view_layer)
+    if given is None:
+        given = read_scene(scene, depsgraph, view_layer or depsgraph.view_layer)
     settings = refinement_settings(scene)
     clock.lap("read")
     yield Progress(0.02, "Compiling species")

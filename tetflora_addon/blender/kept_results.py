@@ -19,6 +19,7 @@ from ..refinement.camera import Camera
 from ..refinement.view_cells import ViewCells, cell_camera
 from .camera_reader import read_camera
 from .emit import hidden_originals, hide_originals, remove_collection, result_collections, show_originals
+from .job import Given
 from .proxies import shade_again
 from .scene_digest import digest_of, scene_digest
 from .wind_properties import wind_of
@@ -77,16 +78,20 @@ def _is_animated(datablock: bpy.types.ID | None) -> bool:
 
 
 def key_of(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, layers: Sequence[bpy.types.ViewLayer], camera: Camera
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    layers: Sequence[bpy.types.ViewLayer],
+    camera: Camera,
+    given: Given,
 ) -> str:
-    """Digest of all that results for view layers depend on.
+    """Digest of all that results for view layers depend on; camera and what is given are theirs.
 
     Raises
     ------
     TetFloraError
         As `scene_digest.scene_digest`.
     """
-    content = hashlib.sha256(scene_digest(scene, depsgraph, layers[0], camera).encode())
+    content = hashlib.sha256(scene_digest(scene, depsgraph, layers[0], camera, given).encode())
     digest_of(content, [scene.name, *(layer.name for layer in layers)])
     for group in (scene.tetflora, scene.tetflora.output, *scene.tetflora.output.species):
         digest_of(content, _values(group))
@@ -137,7 +142,9 @@ def keep(scene: bpy.types.Scene, key: str, collection: bpy.types.Collection, meg
     """Remember new results of a scene, and let older ones go for which there is no memory."""
     originals = [o.name for o in hidden_originals(scene, 'RENDER')]
     _kept[key] = _Kept(scene.session_uid, collection.name, originals, megabytes, scene.tetflora.statistics)
-    limit = scene.tetflora.kept_memory * 1e3
+    wind = wind_of(scene)
+    # In a wind without a loop nothing comes back.
+    limit = scene.tetflora.kept_memory * 1e3 if wind is None or wind.loop > 0.0 else 0.0
     for other in _stowed(scene):
         if sum(entry.megabytes for entry in _kept.values()) <= limit:
             break

@@ -14,7 +14,7 @@ import numpy as np
 from ..refinement.camera import Camera
 from .camera_reader import read_camera
 from .compat import drawn_disc
-from .job import read_scene
+from .job import Given, read_scene
 from .leaf_forms import brought_materials, resolved_species
 from .output import REPLACED
 from .properties import settings_from
@@ -28,6 +28,7 @@ def scene_digest(
     depsgraph: bpy.types.Depsgraph,
     view_layer: bpy.types.ViewLayer,
     camera: Camera | None = None,
+    given: Given | None = None,
 ) -> str:
     """Digest of camera, plants, meshes that take part or hide plants, lamps, settings, species, materials and wind.
 
@@ -37,6 +38,8 @@ def scene_digest(
     ----------
     camera : Camera, optional
         Which one counts, if it is not the scene's as it stands.
+    given : Given, optional
+        What `job.read_scene` has said of the scene.
 
     Raises
     ------
@@ -44,7 +47,8 @@ def scene_digest(
         The scene cannot be refined as it is.
     """
     group = scene.tetflora
-    given = read_scene(scene, depsgraph, view_layer)
+    if given is None:
+        given = read_scene(scene, depsgraph, view_layer)
     content = hashlib.sha256()
     explicit = ()
     if given.explicit is not None:
