@@ -47,7 +47,7 @@ results: environment
 test: environment
 	@code=0; \
 	$(PY) -m pytest -q -n 2 tests/engine || code=1; \
-	$(PY) -m pytest -q -n 2 --dist loadfile tests/blender tests/packaging || code=1; \
+	$(PY) -m pytest -q -n 2 --dist loadfile tests/blender tests/packaging tests/examples || code=1; \
 	exit $$code
 
 test-lts:

@@ -30,6 +30,8 @@ PANELS = {
     "populate-where": ("TETFLORA_PT_populate_where", "TETFLORA_PT_populate_arrangement", "TETFLORA_PT_populate_size"),
     "brush": ("TETFLORA_PT_brush",),
     "refinement": ("TETFLORA_PT_refinement", "TETFLORA_PT_limits", "TETFLORA_PT_leaf_objects"),
+    "wind": ("TETFLORA_PT_wind",),
+    "films": ("TETFLORA_PT_refinement", "TETFLORA_PT_films"),
     "output": ("TETFLORA_PT_output", "TETFLORA_PT_ray_visibility", "TETFLORA_PT_passes"),
     "preview": ("TETFLORA_PT_preview",),
     "statistics": ("TETFLORA_PT_statistics",),

@@ -48,14 +48,16 @@ def seeds(blender: object, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def expected(seeds: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Frame 1, refined and then rendered by bpy."""
+    """Frame 1, refined for the camera of its cell and then rendered by bpy."""
     import bpy
 
-    job = session.part("tetflora_addon.blender.job")
+    job, kept_results = (session.part(f"tetflora_addon.blender.{name}") for name in ("job", "kept_results"))
     bpy.ops.wm.open_mainfile(filepath=str(seeds))
     scene = bpy.context.scene
     scene.tetflora.refine_at_render = False
-    job.refine(scene, bpy.context.evaluated_depsgraph_get(), view_layer=bpy.context.view_layer)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    camera = kept_results.shared_camera(scene, depsgraph)
+    job.refine(scene, depsgraph, view_layer=bpy.context.view_layer, camera=camera)
     path = tmp_path_factory.mktemp("expected") / "expected.png"
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)

@@ -9,9 +9,6 @@ import pytest
 
 from tests.blender.scenes import depsgraph, part
 
-# The ground comes with matplotlib, which tests inside of a full Blender do without.
-pytest.importorskip("matplotlib")
-
 
 def _walked(frames: int, of: str) -> np.ndarray:
     """Places of the camera (frames, 3), one a frame."""

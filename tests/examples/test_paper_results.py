@@ -11,11 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-# The ground comes with matplotlib, the sheets are made by Pillow; tests inside of a full Blender do without.
-pytest.importorskip("matplotlib")
-pytest.importorskip("flip_evaluator")
-image = pytest.importorskip("PIL.Image")
+from PIL import Image as image  # noqa: N813 (a module)
 
 
 @pytest.fixture
