@@ -51,6 +51,13 @@ def picture(rng: np.random.Generator, camera: Camera, count: int = 400) -> np.nd
     return np.stack([x * scale, y * scale, -depth], axis=1) @ camera.frame.T + camera.position
 
 
+def far_points(rng: np.random.Generator, camera: Camera, cell: Camera) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 3) that a camera sees far from the eyes of its cell, and their distances (n,)."""
+    points = picture(rng, camera)
+    away = np.linalg.norm(points - camera.position, axis=1)
+    return points[away > 8.0 * cell.room], away[away > 8.0 * cell.room]
+
+
 def same(a: Camera, b: Camera) -> bool:
     """Equal to the last bit."""
     return all(np.array_equal(getattr(a, f.name), getattr(b, f.name)) for f in fields(Camera))
@@ -133,9 +140,7 @@ def test_nor_much_nearer_than_it_is(rng):
     cell = cell_camera(camera, CELLS)
     if cell is None:
         return
-    points = picture(rng, camera)
-    away = np.linalg.norm(points - camera.position, axis=1)
-    points, away = points[away > 8.0 * cell.room], away[away > 8.0 * cell.room]
+    points, away = far_points(rng, camera, cell)
     least = (1.0 - 2.5 * cell.room / away) * 2.0 ** (-1.0 / 16.0) * 0.9
     assert (cell.extent_around(points) >= camera.extent_around(points) * least).all()
 
@@ -146,9 +151,7 @@ def test_pixels_are_those_that_the_nearest_camera_sees(rng):
     cell = cell_camera(camera, CELLS)
     if cell is None:
         return
-    points = picture(rng, camera)
-    away = np.linalg.norm(points - camera.position, axis=1)
-    points, away = points[away > 8.0 * cell.room], away[away > 8.0 * cell.room]
+    points, away = far_points(rng, camera, cell)
     corners = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, -1.0, 1.0], [-1.0, 1.0, -1.0]])
     small = points[:, None] + 0.002 * away[:, None, None] * corners
     seen, whole = expected_pixels(small, camera)

@@ -34,6 +34,8 @@ _AHEAD = 0.1
 #: then lies on no border, where rounding errors would decide.
 _BEGIN = 0.381966
 _BEFORE = np.array([0.8446, 0.2397, 0.3581, 0.3173])
+_BEFORE /= np.linalg.norm(_BEFORE)
+_BACK = _BEFORE * np.array([1.0, -1.0, -1.0, -1.0])
 #: Fractions of a pixel to which the picture's place on the sensor is rounded, as single precision asks for.
 _FRACTIONS = 64.0
 
@@ -64,24 +66,19 @@ class _Turns:
 
     @classmethod
     def around(cls, frame: NDArray[np.float64], turn: float) -> _Turns:
-        quaternion = _product(_BEFORE / np.linalg.norm(_BEFORE), _quaternion(frame))
-        largest = int(np.argmax(np.abs(quaternion)))
-        # An angle is twice that between quaternions.
-        step = turn / 2.0
-        place = np.delete(quaternion, largest) / quaternion[largest]
-        return cls(largest, _middle(place, step), step)
+        """The cell in which a rotation (3, 3) is; cells are ``turn`` radians wide."""
+        largest = int(np.argmax(np.abs(_product(_BEFORE, _quaternion(frame)))))
+        step = turn / 2.0  # an angle is twice that between quaternions
+        return cls(largest, _middle(_projected(frame, largest), step), step)
 
     def frame(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
         """Rotation (3, 3) so many steps (3,) away from the middle."""
         quaternion = np.insert(self.middle + away * self.step, self.largest, 1.0)
-        before = _BEFORE / np.linalg.norm(_BEFORE)
-        return _matrix(_product(before * np.array([1.0, -1.0, -1.0, -1.0]), quaternion / np.linalg.norm(quaternion)))
+        return _matrix(_product(_BACK, quaternion / np.linalg.norm(quaternion)))
 
     def holds(self, frame: NDArray[np.float64], reach: float) -> bool:
         """Whether a rotation is within so many steps of the middle."""
-        quaternion = _product(_BEFORE / np.linalg.norm(_BEFORE), _quaternion(frame))
-        place = np.delete(quaternion, self.largest) / quaternion[self.largest]
-        return bool((np.abs(place - self.middle) <= reach * self.step).all())
+        return bool((np.abs(_projected(frame, self.largest) - self.middle) <= reach * self.step).all())
 
 
 def cell_camera(camera: Camera, cells: ViewCells) -> Camera | None:
@@ -210,6 +207,12 @@ def _lens_of_cell(camera: Camera) -> tuple[float, float]:
 def _middle(place: NDArray | float, step: NDArray | float) -> NDArray[np.float64]:
     """Middle of the cell of a lattice in which a place is."""
     return (np.floor(place / np.asarray(step) - _BEGIN) + _BEGIN + 0.5) * step
+
+
+def _projected(frame: NDArray[np.float64], largest: int) -> NDArray[np.float64]:
+    """The other three parts (3,) of the quaternion of a rotation (3, 3), scaled so that one of the four is 1."""
+    quaternion = _product(_BEFORE, _quaternion(frame))
+    return np.delete(quaternion, largest) / quaternion[largest]
 
 
 def _is_whole_sphere(camera: Camera) -> bool:
