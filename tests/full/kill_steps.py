@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a Blender that is about to be killed does: ``blender -b FILE --python kill_steps.py -- WHAT MOMENT``.
+"""What a Blender that is about to be killed does: ``blender -b FILE --python kill_steps.py -- WHAT MOMENT TIMES``.
 
 It says NOW at the moment, having saved the file there, and goes on until it is killed.
 """
@@ -10,7 +10,8 @@ import sys
 
 import bpy
 
-what, moment = sys.argv[-2:]
+what, moment, times = sys.argv[-3:]
+left = int(times)
 job = importlib.import_module("bl_ext.user_default.tetflora.tetflora_addon.blender.job")
 scene = bpy.context.scene
 
@@ -21,9 +22,16 @@ def now() -> None:
 
 
 def save() -> None:
-    """As the artist, or another add-on, may do at any time."""
-    bpy.ops.wm.save_mainfile(compress=False)
-    now()
+    """As the artist, or another add-on, may do at any time.
+
+    Not once more after the last time: the kill is to meet what follows a save, not the next save, in which Blender
+    has no file of this name for a moment.
+    """
+    global left
+    if left:
+        left -= 1
+        bpy.ops.wm.save_mainfile(compress=False)
+        now()
 
 
 def refine() -> None:

@@ -61,7 +61,7 @@ def victim(run: Run, full_blender: str, forest: Path, tmp_path: Path) -> Iterato
     def killed(what: str, moment: str, times: int = 1, delay: float = 0.0) -> Path:
         path = Path(shutil.copy(forest, tmp_path / "forest.blend"))
         process = subprocess.Popen(
-            [full_blender, "-b", str(path), "--python", str(STEPS), "--", what, moment],
+            [full_blender, "-b", str(path), "--python", str(STEPS), "--", what, moment, str(times)],
             env={**os.environ, "BLENDER_USER_RESOURCES": str(home)},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
