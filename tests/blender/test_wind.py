@@ -52,7 +52,6 @@ def test_each_frame_is_another_and_always_the_same(scene):
 def test_a_loop_of_frames_repeats(scene):
     scene.tetflora.wind.loop = 30
     scene.render.fps, scene.render.fps_base = 30, 1.001
-    scene.frame_start = 1
     first = places(scene, 5)
     np.testing.assert_array_equal(places(scene, 35), first)
     np.testing.assert_array_equal(places(scene, 605), first)
@@ -73,14 +72,23 @@ def test_without_wind_all_frames_are_alike(scene, calm):
 def test_settings_become_a_wind(scene):
     wind = scene.tetflora.wind
     wind.direction, wind.gusts, wind.loop = np.radians(90), 0.25, 48
-    scene.render.fps, scene.frame_start = 24, 10
-    scene.frame_set(22)
+    scene.render.fps = 24
+    scene.frame_set(60)
     found = part("wind_properties").wind_of(scene)
     assert (found.speed, found.gusts, found.time, found.loop) == (8.0, 0.25, 0.5, 2.0)
     assert found.direction == pytest.approx(np.pi / 2)
     wind.loop = 0
-    scene.frame_set(4, subframe=0.5)
+    scene.frame_set(-6, subframe=0.5)
     assert part("wind_properties").wind_of(scene).time == pytest.approx(-5.5 / 24)
+
+
+def test_a_frame_is_the_same_whatever_range_is_rendered(scene):
+    """Workers of a farm set the scene's range to the frames that they render."""
+    scene.frame_set(20)
+    wind_of = part("wind_properties").wind_of
+    film = wind_of(scene)
+    scene.frame_start, scene.frame_end = 20, 22
+    assert wind_of(scene) == film
 
 
 def test_results_of_another_frame_are_not_taken_for_this_one(scene):
@@ -132,8 +140,8 @@ def test_velocities_are_there_where_there_is_motion_blur(scene):
 
 @pytest.mark.parametrize(("position", "middle"), [('START', 0.25), ('CENTER', 0.0), ('END', -0.25)])
 def test_with_motion_blur_plants_stand_as_in_the_middle_of_the_exposure(scene, position, middle):
-    scene.frame_set(13)
-    scene.render.fps, scene.frame_start = 24, 1
+    scene.frame_set(12)
+    scene.render.fps = 24
     scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 0.5
     scene.render.motion_blur_position = position
     wind = part("wind_properties").wind_of(scene)

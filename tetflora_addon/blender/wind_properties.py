@@ -55,7 +55,7 @@ class TetFloraWind(bpy.types.PropertyGroup):
     )
     loop: IntProperty(
         name="Loop",
-        description="Frames after which all movement repeats exactly, from the scene's first on; 0 for never",
+        description="Frames after which all movement repeats exactly; 0 for never",
         default=0,
         min=0,
         soft_max=1000,
@@ -66,16 +66,17 @@ class TetFloraWind(bpy.types.PropertyGroup):
 def wind_of(scene: bpy.types.Scene) -> Wind | None:
     """The wind at the scene's frame, the part of a frame included; None where none blows.
 
-    With motion blur it is that of the middle of the exposure, from which Cycles goes back and forth by velocities.
+    With motion blur it is that of the middle of the exposure, from which Cycles goes back and forth by velocities. The
+    scene's range of frames has no say: workers of a farm set it to the frames that they render.
     """
     group = scene.tetflora.wind
     if not group.enabled or group.speed == 0.0:
         return None
     rate = scene.render.fps / scene.render.fps_base
-    frame = scene.frame_current_final - scene.frame_start
+    frame = scene.frame_current_final
+    if group.loop:
+        frame %= group.loop  # here, where frames are whole numbers, it is exact
     blurred = scene.render.use_motion_blur
     if blurred:
         frame += _MIDDLE[scene.render.motion_blur_position] * scene.render.motion_blur_shutter
-    if group.loop:
-        frame %= group.loop  # here, where frames are whole numbers, it is exact
     return Wind(group.speed, group.direction, group.gusts, frame / rate, group.loop / rate, blurred)
