@@ -322,6 +322,7 @@ def test_materials_of_leaf_objects_are_noticed(film, made):
         ((1.0, 12.0), (1.01, 2.0)),
         ({"many": np.zeros(2000)}, {"many": np.eye(2000)[1000]}),
         ({"exact": np.ones(20)}, {"exact": np.ones(20) + 1e-12}),
+        (np.arange(6).reshape(2, 3).T, np.arange(6).reshape(3, 2)),
     ],
 )
 def test_digests_tell_values_apart(one, other):

@@ -35,6 +35,7 @@ from .migration import migrate
 from .output import KIND, adopt_materials, release_materials
 from .scene_reader import NoPlantsError, has_contents
 from .shell_bounces import raise_bounces
+from .species_edits import looked_at_once
 from .view_layers import show_in, view_layer_groups
 
 
@@ -84,7 +85,8 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     try:
         wanted = scene.tetflora.refine_at_render and scene.tetflora.output.show_render
         if wanted and has_contents(scene):
-            _make(scene)
+            with looked_at_once():
+                _make(scene)
             made = True
         elif not scene.tetflora.refine_at_render and has_contents(scene) and not _has_meshes(scene):
             _warn(scene)

@@ -11,6 +11,7 @@ from dataclasses import fields, is_dataclass
 import bpy
 import numpy as np
 
+from ..plants.species import Species
 from ..refinement.camera import Camera
 from .camera_reader import read_camera
 from .compat import drawn_disc
@@ -20,6 +21,9 @@ from .output import REPLACED
 from .properties import settings_from
 from .wind_properties import wind_of
 
+#: Digests of species by number of the object, which is held so that no other gets its number.
+_of_species: dict[int, tuple[Species, str]] = {}
+_MOST_SPECIES = 64
 _CHOICES = ("proxy_form", "baked_light", "expand_everything")
 
 
@@ -66,7 +70,7 @@ def scene_digest(
         explicit,
         settings_from(scene),
         [getattr(group, name) for name in _CHOICES],
-        species,
+        [_digest_of_species(one) for one in species],
         [brought_materials(scene, identifier) for identifier in given.species],
         materials,
         wind_of(scene),
@@ -76,13 +80,22 @@ def scene_digest(
     return content.hexdigest()
 
 
+def _digest_of_species(species: Species) -> str:
+    """Digest of a species; nothing changes one that is there, so it is worked out once."""
+    if id(species) not in _of_species:
+        content = hashlib.sha256()
+        digest_of(content, species)
+        if len(_of_species) >= _MOST_SPECIES:
+            _of_species.clear()
+        _of_species[id(species)] = species, content.hexdigest()
+    return _of_species[id(species)][1]
+
+
 def digest_of(content: hashlib._Hash, value: object) -> None:
     """Add a value of numbers, texts, arrays, or of sequences, mappings or dataclasses of these."""
     if isinstance(value, np.ndarray):
         content.update(f"{value.dtype}{value.shape}".encode())
-        content.update(
-            np.ascontiguousarray(value).tobytes() if value.dtype != object else repr(value.tolist()).encode()
-        )
+        content.update(np.ascontiguousarray(value) if value.dtype != object else repr(value.tolist()).encode())
     elif is_dataclass(value):
         for field in fields(value):
             content.update(field.name.encode())

@@ -11,6 +11,7 @@ import json
 import re
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,7 @@ listeners: list[Callable[[], None]] = []
 _TRUSTED = 0.0 if bpy.app.background else 0.3
 _seen: dict[str, SpeciesInfo] | None = None
 _seen_at = 0.0
+_looking = True  # or what was seen is trusted until told otherwise
 _read: dict[str, dict[str, Any]] = {}  # decoded files, as long as what was seen is trusted
 
 
@@ -51,10 +53,26 @@ def listed() -> dict[str, SpeciesInfo]:
     """
     global _seen, _seen_at
     now = time.monotonic()
-    if _seen is None or now - _seen_at >= _TRUSTED:
+    if _seen is None or (_looking and now - _seen_at >= _TRUSTED):
         _seen, _seen_at = list_species(species_folders()), now
         _read.clear()
     return _seen
+
+
+@contextmanager
+def looked_at_once() -> Iterator[None]:
+    """Folders are looked at now, and not again meanwhile unless TetFlora itself has changed a file.
+
+    Where a whole scene is read, each of its species would ask several times.
+    """
+    global _looking
+    look_again()
+    listed()
+    _looking = False
+    try:
+        yield
+    finally:
+        _looking = True
 
 
 def look_again() -> None:

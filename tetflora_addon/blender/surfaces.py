@@ -38,22 +38,25 @@ def mesh_triangles(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, remedy
     evaluated = obj.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     try:
-        triangles = _triangles(mesh)
+        positions, corners = _triangles(mesh)
     finally:
         evaluated.to_mesh_clear()
-    if not len(triangles):
+    if not len(corners):
         raise SceneError(f'"{obj.name}" has no faces; {remedy}')
     matrix = world_matrix(obj, depsgraph)
-    return triangles @ matrix[:3, :3].T + matrix[:3, 3]
+    return (positions @ matrix[:3, :3].T + matrix[:3, 3])[corners]
 
 
-def _triangles(mesh: bpy.types.Mesh) -> NDArray[np.float64]:
+def _triangles(mesh: bpy.types.Mesh) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Places (v, 3) of vertices, and the vertices (t, 3) of triangles."""
     if not len(mesh.polygons):
-        return np.zeros((0, 3, 3))
+        return np.zeros((0, 3)), np.zeros((0, 3), np.int32)
     mesh.calc_loop_triangles()
-    corners = np.zeros(3 * len(mesh.loop_triangles), np.int32)
-    mesh.loop_triangles.foreach_get("vertices", corners)
+    # Attributes are plain memory; ``foreach_get`` of vertices, be it of the mesh or of triangles, is much slower.
+    loops = np.zeros(3 * len(mesh.loop_triangles), np.int32)
+    mesh.loop_triangles.foreach_get("loops", loops)
+    vertices = np.zeros(len(mesh.loops), np.int32)
+    mesh.attributes[".corner_vert"].data.foreach_get("value", vertices)
     positions = np.zeros(3 * len(mesh.vertices), np.float32)
-    # Attributes are plain memory; ``vertices.foreach_get`` is many times slower.
     mesh.attributes["position"].data.foreach_get("vector", positions)
-    return positions.reshape(-1, 3)[corners].reshape(-1, 3, 3).astype(np.float64)
+    return positions.reshape(-1, 3).astype(np.float64), vertices[loops].reshape(-1, 3)
