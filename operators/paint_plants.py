@@ -78,7 +78,7 @@ class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
             stroke = self._begin_stroke(context, context.scene.tetflora.brush.mode)
             for place in places:
                 self._dab(context, place, 1.0)
-            stroke.flush()
+            stroke.finish()
         except TetFloraError as error:
             self.report({'ERROR'}, str(error))
             return {'CANCELLED'}
@@ -199,7 +199,7 @@ class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
 
     def _end_stroke(self, context: bpy.types.Context) -> None:
         stroke, self._stroke = self._stroke, None
-        stroke.flush()
+        stroke.finish()
         self._done = _said(stroke)
         if stroke.added or stroke.removed:
             remove_empty_collections()

@@ -42,7 +42,8 @@ def report_made(operator: bpy.types.Operator, made: Made) -> None:
         operator.report({'WARNING'}, f"{counted(made.number, 'plant')} of {made.wanted:,} placed{where}: {made.reason}")
         return
     returned = f"; {made.returned:,} that you had deleted are back" if made.returned else ""
-    operator.report({'INFO'}, f"{counted(made.number, 'plant')} placed{where}{returned}")
+    erased = f"; {made.erased:,} stay away, where you erased" if made.erased else ""
+    operator.report({'INFO'}, f"{counted(made.number, 'plant')} placed{where}{returned}{erased}")
 
 
 class _OfPopulation(Reporting):
@@ -106,7 +107,8 @@ class TETFLORA_OT_update_population(_Replacing, bpy.types.Operator):
     bl_label = "Update Population"
     bl_description = (
         "Place the plants of the active population by its settings, in place of those that it has. Plants of it that "
-        "you moved, changed or deleted by hand are placed anew too; other plants keep their room"
+        "you moved, changed or deleted by hand are placed anew too, except where the brush has erased; other plants "
+        "keep their room"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
@@ -207,6 +209,31 @@ class TETFLORA_OT_set_population_ground(_OfPopulation, bpy.types.Operator):
         return {'FINISHED'}
 
 
+class TETFLORA_OT_forget_erased(_Replacing, bpy.types.Operator):
+    """Let plants grow again where they were erased."""
+
+    bl_idname = ids.FORGET_ERASED
+    bl_label = "Forget Erased Places"
+    bl_description = (
+        "Let plants of the active population grow again where the brush has erased some. Press Update to place them"
+    )
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll_population(cls, context: bpy.types.Context, population: bpy.types.PropertyGroup) -> bool:
+        if not population.erased:
+            cls.poll_message_set("The brush has erased nothing of this population")
+            return False
+        return super().poll_population(context, population)
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        population = active_population(context.scene)
+        population.erased = population.placed_by = ""  # so that the panel asks for an update
+        self.report({'INFO'}, f'"{population.name}" may grow everywhere again; press Update')
+        point_preview.schedule()
+        return {'FINISHED'}
+
+
 class TETFLORA_OT_preview_population(Reporting, bpy.types.Operator):
     """Show where plants would stand."""
 
@@ -231,5 +258,6 @@ CLASSES = (
     TETFLORA_OT_remove_population,
     TETFLORA_OT_select_population,
     TETFLORA_OT_set_population_ground,
+    TETFLORA_OT_forget_erased,
     TETFLORA_OT_preview_population,
 )

@@ -6,20 +6,21 @@ import bpy
 
 from ..operators import ids
 from ..tetflora_addon.blender import point_preview
-from ..tetflora_addon.blender.population_rules import shown_population
+from ..tetflora_addon.blender.population_rules import is_outdated, shown_population
 from .base import SidebarPanel, draw_message, split_layout
 from .lists import TETFLORA_UL_mix, draw_list
 
 
 class TETFLORA_UL_populations(bpy.types.UIList):
-    """A population's name, how many plants it has, and whether it is frozen."""
+    """A population's name, how many plants it has, and whether it is frozen or an update would change it."""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, _index, _flag) -> None:
         row = layout.row(align=True)
         row.prop(item, "name", text="", emboss=False, icon='OUTLINER_OB_POINTCLOUD')
         right = row.row()
         right.alignment = 'RIGHT'
-        right.label(text=f"{item.made:,}", icon='FREEZE' if item.frozen else 'NONE')
+        icon = 'FREEZE' if item.frozen else 'FILE_REFRESH' if is_outdated(item) else 'NONE'
+        right.label(text=f"{item.made:,}", icon=icon)
 
 
 class TETFLORA_MT_populations(bpy.types.Menu):
@@ -31,6 +32,7 @@ class TETFLORA_MT_populations(bpy.types.Menu):
         layout = self.layout
         layout.operator(ids.SELECT_POPULATION, icon='RESTRICT_SELECT_OFF')
         layout.operator(ids.REMOVE_POPULATION, text="Remove, and Keep Plants", icon='REMOVE').keep_plants = True
+        layout.operator(ids.FORGET_ERASED, icon='LOOP_BACK')
         layout.separator()
         layout.operator(ids.IMPORT_POPULATIONS, text="Import...", icon='IMPORT')
         layout.operator(ids.EXPORT_POPULATIONS, text="Export...", icon='EXPORT')
@@ -195,7 +197,10 @@ def _draw_status(context: bpy.types.Context, layout: bpy.types.UILayout, setting
     """How many plants as what, and why not more; the switch of the preview."""
     shown = point_preview.shown_in(context.scene)
     row = layout.row(align=True)
-    row.label(text=point_preview.status(settings), icon='INFO')
+    waiting = settings.uid and (not settings.placed_by or is_outdated(settings))
+    # In the place of the other text: a line that comes and goes would move the slider away from under the mouse.
+    text = point_preview.status(settings)
+    row.label(text=f"Update: {text}" if waiting else text, icon='FILE_REFRESH' if waiting else 'INFO')
     row.operator(ids.PREVIEW_POPULATION, text="", icon='HIDE_OFF' if shown else 'HIDE_ON', depress=shown)
     for text in point_preview.complaints(settings):
         draw_message(context, layout, text)

@@ -167,6 +167,7 @@ CASES: list[Case] = [
     ("remove_population", populated, "remove_population", {}),
     ("remove_population, plants stay", populated, "remove_population", {"keep_plants": True}),
     ("select_population", lambda: (populated(), select()), "select_population", {}),
+    ("forget_erased", lambda: (populated(), erase_place()), "forget_erased", {}),
     ("set_population_ground", lambda: (populated(), select(add_mesh("other"))), "set_population_ground", {}),
 ]
 #: Operators with an undo step that cannot be called without a file from outside; their own case is below.
@@ -183,6 +184,10 @@ def mark_ground() -> None:
 def change_population() -> None:
     scene().tetflora.populations[0].count = 7
     scene().tetflora.populations[0].seed = 5
+
+
+def erase_place() -> None:
+    part("erased_places").note_erased(scene().tetflora.populations[0], [(0.0, 0.0)], 2.0)
 
 
 @pytest.fixture

@@ -18,10 +18,12 @@ from ..planting import strokes
 from ..planting.places import Placement
 from ..planting.strokes import Brush
 from .brush_properties import MOST_PAINTED_EMPTIES
+from .erased_places import note_erased
 from .field_edits import add_points, editable, positions, take_points
 from .ground import Ground
 from .plant_fields import fields_of, read_field
 from .plant_objects import add_field, add_plants, plants_of
+from .populations import own_number, own_objects
 from .species_items import default_species
 from .transforms import world_matrix
 
@@ -30,6 +32,9 @@ _PAINTED_MARK = "tetflora_painted"  # on the field that painted plants go to
 _OBJECTS = -1  # where single plants are, in place of the number of a field
 _REACH = 2.0  # radii above and below the brush within which ground counts
 _LEAST_REACH = 10.0  # metres
+_STRONG = 0.5  # strength from which on Erase clears the ground, and not only the plants that it meets
+_SAME = 0.1  # radii within which a dab that removes nothing says no more than the one before
+_PLACE = 0.05  # metres around a plant that was removed, where no other stands
 
 
 def brush_of(scene: bpy.types.Scene, pressure: float = 1.0) -> tuple[Brush, tuple[str, ...]]:
@@ -106,6 +111,19 @@ class Standing:
         self.number = np.concatenate([self.number, first + np.arange(len(places))])
         self.removable = np.concatenate([self.removable, np.ones(len(places), bool)])
 
+    def by_population(self, gone: NDArray[np.bool_]) -> dict[str, NDArray[np.float64]]:
+        """Places of plants, (n,) bool, by the identity of their population; without those of none."""
+        found: dict[str, list[NDArray[np.float64]]] = {}
+        for source in np.unique(self.source[gone]).tolist():
+            own = np.flatnonzero(gone & (self.source == source))
+            if source != _OBJECTS:
+                found.setdefault(self.fields[source].tetflora.population, []).append(self.places[own])
+                continue
+            uids = np.array([self.objects[i].tetflora.population for i in self.number[own].tolist()])
+            for uid in np.unique(uids).tolist():
+                found.setdefault(uid, []).append(self.places[own[uids == uid]])
+        return {uid: np.concatenate(places) for uid, places in found.items() if uid}
+
     def remove(self, gone: NDArray[np.bool_]) -> None:
         """Take plants, (n,) bool, out of the scene and out of the arrays."""
         single = gone & (self.source == _OBJECTS)
@@ -151,6 +169,9 @@ class Stroke:
         self.dabs = self.added = self.removed = 0
         self._new: list[tuple[NDArray[np.float64], NDArray[np.uint64]]] = []
         self._gone = np.zeros(len(self.standing.places), bool)
+        self._cleared: list[tuple[float, float]] = []  # middles of dabs that clear the ground
+        self._weak = False  # whether there were others
+        self._taken: dict[str, list[NDArray[np.float64]]] = {}  # places of plants by their population
 
     def dab(self, centre: Sequence[float], pressure: float = 1.0) -> int:
         """Do what the brush does at a place on the ground (3 floats); how many plants that adds or removes."""
@@ -165,6 +186,12 @@ class Stroke:
         chosen = chosen[self.standing.removable[chosen]]
         self._gone[chosen] = True
         self.removed += len(chosen)
+        if self.mode == 'THIN' or brush.strength < _STRONG:
+            self._weak = True
+        else:
+            last = np.subtract(self._cleared[-1], centre[:2]) if self._cleared else np.inf
+            if len(chosen) or np.linalg.norm(last) > _SAME * brush.radius:
+                self._cleared.append((centre[0], centre[1]))
         return len(chosen)
 
     def _paint(self, brush: Brush, centre: Sequence[float], dab: int) -> int:
@@ -187,10 +214,26 @@ class Stroke:
     def flush(self) -> None:
         """Change the scene by what the dabs since the last flush decided."""
         if self._gone.any():
+            for uid, places in self.standing.by_population(self._gone).items():
+                self._taken.setdefault(uid, []).append(places)
             self.standing.remove(self._gone)
         if any(len(keys) for _, keys in self._new):
             self._make(*(np.concatenate(part) for part in zip(*self._new, strict=True)))
         self._new, self._gone = [], np.zeros(len(self.standing.places), bool)
+
+    def finish(self) -> None:
+        """Change the scene by what is left to do, and let populations remember what was taken from them."""
+        self.flush()
+        for population in self.scene.tetflora.populations:
+            taken = self._taken.get(population.uid)
+            if taken is None:
+                continue
+            population.made = own_number(own_objects(self.scene, population))
+            if self._weak:
+                note_erased(population, np.concatenate(taken), _PLACE)
+            if self._cleared:
+                note_erased(population, self._cleared, self.scene.tetflora.brush.radius)
+        self._taken, self._cleared, self._weak = {}, [], False
 
     def _make(self, places: NDArray[np.float64], keys: NDArray[np.uint64]) -> None:
         brush, species = brush_of(self.scene)

@@ -11,7 +11,8 @@ import bpy
 import numpy as np
 
 from ..errors import SceneError
-from ..planting.places import Occupied, Placement, place
+from ..planting.places import Occupied, Placement, place, without
+from .erased_places import erased_places
 from .ground_reader import read_ground
 from .plant_fields import fields_of, read_field
 from .plant_kinds import species_of
@@ -89,7 +90,8 @@ def place_population(
         paths=population.paths,
         path_distance=population.path_distance,
     )
-    return place(ground, rules, standing(scene, depsgraph, own, species)), species
+    found = place(ground, rules, standing(scene, depsgraph, own, species))
+    return without(found, erased_places(population)), species
 
 
 def standing(

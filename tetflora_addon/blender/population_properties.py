@@ -132,6 +132,8 @@ class TetFloraPopulation(bpy.types.PropertyGroup):
     collection: PointerProperty(name="Collection", type=bpy.types.Collection, **_HIDDEN)
     made: IntProperty(name="Plants Made", **_HIDDEN)
     message: StringProperty(name="Message", **_HIDDEN)
+    placed_by: StringProperty(name="Placed By", **_HIDDEN)  # `population_rules.fingerprint` of when it was placed
+    erased: StringProperty(name="Erased Places", **_HIDDEN)  # as `erased_places` writes it
     slope_limit: FloatProperty(  # of files and scripts before version 2
         name="Slope Limit", default=radians(40.0), update=_take_old_limit, **_HIDDEN
     )

@@ -4,7 +4,10 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+from hashlib import blake2b
 from math import inf
+from typing import Any
 
 import bpy
 
@@ -15,12 +18,44 @@ from .species_items import catalogue, default_species
 #: Square metres of the area that densities are counted on: foresters count trees by the hectare.
 HECTARE = 10_000.0
 #: What a population is and what became of it; all else are settings, which can be copied and written to files.
-IDENTITY = {"rna_type", "name", "uid", "frozen", "collection", "made", "message", "slope_limit", "mix_index"}
+IDENTITY = {
+    *("rna_type", "name", "uid", "frozen", "collection", "made", "message", "placed_by", "erased"),
+    *("slope_limit", "mix_index"),
+}
+_ENTRY = ("species", "weight", "companion", "companion_strength", "companion_distance")
 
 
 def settings_of(group: type[bpy.types.PropertyGroup] | bpy.types.PropertyGroup) -> list[bpy.types.Property]:
     """Properties of a population that say how plants are placed."""
     return [p for p in group.bl_rna.properties if p.identifier not in IDENTITY]
+
+
+def fingerprint(population: TetFloraPopulation) -> str:
+    """A short text that is another one when settings are; what is left at its default does not count.
+
+    So a setting that comes with another version changes nothing of populations that do not use it.
+    """
+    values: list[Any] = [[e.object.name_full for e in population.grounds if e.object is not None]]
+    values += [[getattr(entry, name) for name in _ENTRY] for entry in population.mix]
+    for name, default in _defaults():
+        value = getattr(population, name)
+        if isinstance(value, bpy.types.ID):
+            value = value.name_full
+        if value != default:
+            values.append([name, value])
+    return blake2b(repr(values).encode(), digest_size=8).hexdigest()
+
+
+@lru_cache(maxsize=1)
+def _defaults() -> tuple[tuple[str, Any], ...]:
+    """Names and defaults of settings that are single values; kept, because panels ask at every redraw."""
+    simple = [p for p in settings_of(TetFloraPopulation) if p.type != 'COLLECTION']
+    return tuple((p.identifier, None if p.type == 'POINTER' else p.default) for p in simple)
+
+
+def is_outdated(population: TetFloraPopulation) -> bool:
+    """Whether an update would place by other settings than those by which the plants stand; grounds are not read."""
+    return bool(population.placed_by) and not population.frozen and population.placed_by != fingerprint(population)
 
 
 def copy_settings(source: TetFloraPopulation, target: TetFloraPopulation) -> None:

@@ -30,7 +30,7 @@ from .plant_objects import (
 )
 from .population_ground import place_population
 from .population_properties import MOST_EMPTIES, TetFloraPopulation
-from .population_rules import copy_settings, makes_field
+from .population_rules import copy_settings, fingerprint, makes_field
 
 NAME = "Population"
 
@@ -49,6 +49,8 @@ class Made:
         Why there are fewer, empty if there are not.
     returned : int
         Plants among them that had been deleted by hand.
+    erased : int
+        Plants that stay away because they would stand where the brush has erased.
     """
 
     objects: list[bpy.types.Object]
@@ -56,6 +58,7 @@ class Made:
     wanted: int
     reason: str
     returned: int
+    erased: int
 
 
 def add_population(
@@ -132,7 +135,9 @@ def make_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, populati
     if not made:
         remove_empty_collections()
     population.made, population.message = len(placement), placement.reason
-    return Made(made, len(placement), placement.wanted, placement.reason, min(returned, len(placement)))
+    population.placed_by = fingerprint(population)
+    returned = min(returned, len(placement))
+    return Made(made, len(placement), placement.wanted, placement.reason, returned, placement.erased)
 
 
 def reroll(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraPopulation) -> Made:

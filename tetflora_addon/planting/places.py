@@ -8,7 +8,8 @@ so that a seed means the same arrangement in every version of Blender.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +18,9 @@ from ..errors import SceneError
 from ..plants.hashing import child_key, key_of_seed, uniform
 from .checks import check_rules
 from .companions import Company
-from .ground import Ground
+from .ground import Ground, Path
 from .rules import Rules
-from .site import REMEDIES, Draw, Sample, Site
+from .site import REMEDIES, Draw, Sample, Site, lines_of_paths
 from .spacing import Spacing
 
 MOST = 10_000_000  # plants of one population
@@ -75,6 +76,8 @@ class Placement:
         Why there are fewer, and what to do; empty if there are not.
     up : (n, 3) float64, optional
         Unit vectors along the trunks; upright if not given.
+    erased : int
+        How many were left out by `without`.
     """
 
     position: NDArray[np.float64]
@@ -85,6 +88,7 @@ class Placement:
     wanted: int
     reason: str = ""
     up: NDArray[np.float64] | None = None
+    erased: int = 0
 
     def __post_init__(self) -> None:
         """Plants that nobody tilted are upright."""
@@ -159,6 +163,20 @@ def place(ground: Ground, rules: Rules, occupied: Occupied | None = None) -> Pla
         reason=reason,
         up=_tilted(up, rules.tilt),
     )
+
+
+def without(placement: Placement, bare: Sequence[Path]) -> Placement:
+    """A placement less the plants within the reach of lines that stay bare; all others are as they were.
+
+    Paths of the ground let others grow elsewhere instead; this does not.
+    """
+    lines = lines_of_paths(bare)
+    if lines is None or not len(placement):
+        return placement
+    stay = lines.nearness(placement.position[:, :2]) >= 1.0
+    arrays = {f.name: getattr(placement, f.name) for f in fields(placement)}
+    chosen = {name: values[stay] for name, values in arrays.items() if isinstance(values, np.ndarray)}
+    return replace(placement, **chosen, erased=placement.erased + int((~stay).sum()))
 
 
 def new_seeds(seeds: NDArray[np.int64], roll: int = 0) -> NDArray[np.int32]:

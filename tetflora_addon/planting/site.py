@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from ..plants.hashing import child_key, key_of_seed, uniform
-from .ground import Ground, border_of, sampled
+from .ground import Ground, Path, border_of, sampled
 from .noise import clumps
 from .regions import Lines, inside_any
 from .rules import Rules
@@ -124,19 +124,12 @@ class Site:
         self.cumulative = np.cumsum(area * self.most if weight is not None else area)
         if not self.cumulative[-1] > 0.0:
             raise SceneError("The suitable ground has no area on the map; take ground that does not stand upright")
-        self.border = self.paths = None
+        self.border = None
         if rules.edge_falloff > NO_DISTANCE:
             border = (border_of(ground.triangles) if ground.border is None else ground.border)[..., :2]
             if len(border):
                 self.border = Lines(border[:, 0], border[:, 1], np.full(len(border), float(rules.edge_falloff)))
-        kept_free = [p for p in ground.paths if p.half_width > NO_DISTANCE and len(p.points)]
-        if kept_free:
-            # A line of one point is a place of its own.
-            ends = [np.repeat(p.points, 2, axis=0) if len(p.points) == 1 else p.points for p in kept_free]
-            reach = np.concatenate(
-                [np.full(len(e) - 1, float(p.half_width)) for e, p in zip(ends, kept_free, strict=True)]
-            )
-            self.paths = Lines(np.concatenate([e[:-1] for e in ends]), np.concatenate([e[1:] for e in ends]), reach)
+        self.paths = lines_of_paths(ground.paths)
 
     @property
     def area(self) -> float:
@@ -200,6 +193,17 @@ class Site:
     def _pictured(self, index: NDArray[np.int64], shares: NDArray[np.float64]) -> NDArray[np.float64]:
         uv = _mean(np.take(self.uv.reshape(-1, 6), index, axis=0), shares)
         return np.clip(np.nan_to_num(sampled(self.ground.image, uv)), 0.0, 1.0)
+
+
+def lines_of_paths(paths: Sequence[Path]) -> Lines | None:
+    """Paths as what points can be asked for their nearness to; None if they keep nothing free."""
+    kept_free = [p for p in paths if p.half_width > NO_DISTANCE and len(p.points)]
+    if not kept_free:
+        return None
+    # A line of one point is a place of its own.
+    ends = [np.repeat(p.points, 2, axis=0) if len(p.points) == 1 else p.points for p in kept_free]
+    reach = np.concatenate([np.full(len(e) - 1, float(p.half_width)) for e, p in zip(ends, kept_free, strict=True)])
+    return Lines(np.concatenate([e[:-1] for e in ends]), np.concatenate([e[1:] for e in ends]), reach)
 
 
 def _mean(corners: NDArray[np.float64], shares: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether a population's plants stand by the settings that it has now: what the list shows beside their number."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.blender.scenes import add_mesh, part, select
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+
+def _population():
+    import bpy
+
+    return bpy.context.scene.tetflora.populations[0]
+
+
+def _outdated():
+    return part("population_rules").is_outdated(_population())
+
+
+def _populate():
+    import bpy
+
+    select(add_mesh("ground", size=10.0))
+    bpy.ops.tetflora.populate(count=20, species="bush:2, conifer")
+    return _population()
+
+
+def _other(prop, population):
+    """A value that a setting does not have now."""
+    import bpy
+
+    value = getattr(population, prop.identifier)
+    if prop.type == 'POINTER':
+        images = prop.fixed_type.identifier == "Image"
+        return bpy.data.images.new("mask", 2, 2) if images else bpy.data.collections.new("curves")
+    if prop.type == 'BOOLEAN':
+        return not value
+    if prop.type == 'ENUM':
+        return next(item.identifier for item in prop.enum_items if item.identifier != value)
+    if prop.type == 'STRING':
+        return "another"
+    return value - 0.5 if prop.type == 'FLOAT' and value - 0.5 >= prop.hard_min else value + 1
+
+
+def test_every_setting_counts_and_taking_it_back_too():
+    population = _populate()
+    assert not _outdated()
+    simple = [p for p in part("population_rules").settings_of(population) if p.type != 'COLLECTION']
+    assert len(simple) > 25
+    for prop in simple:
+        before = getattr(population, prop.identifier)
+        setattr(population, prop.identifier, _other(prop, population))
+        assert _outdated(), prop.identifier
+        setattr(population, prop.identifier, before)
+        assert not _outdated(), prop.identifier
+
+
+def test_species_companions_and_grounds_count():
+    population = _populate()
+    entry = population.mix[1]
+    for name, value in (("weight", 3.0), ("species", "birch"), ("companion", "bush"), ("companion_strength", 0.5)):
+        before = getattr(entry, name)
+        setattr(entry, name, value)
+        assert _outdated(), name
+        setattr(entry, name, before)
+        assert not _outdated(), name
+    part("populations").set_grounds(population, [add_mesh("other ground")])
+    assert _outdated()
+
+
+@pytest.mark.parametrize("press", ["update_population", "reroll_population"])
+def test_placing_settles_it(press):
+    import bpy
+
+    _populate().count = 12
+    assert _outdated()
+    getattr(bpy.ops.tetflora, press)()
+    assert not _outdated()
+
+
+def test_frozen_plants_are_as_they_shall_be():
+    import bpy
+
+    population = _populate()
+    bpy.ops.tetflora.freeze_population()
+    population.count = 3
+    assert not _outdated()
+    bpy.ops.tetflora.freeze_population()
+    assert _outdated()
+
+
+def test_a_name_and_what_became_of_it_are_no_settings():
+    population = _populate()
+    population.name, population.message = "Bushes", "no room"
+    assert not _outdated()
+
+
+def test_it_is_known_in_a_file_that_is_opened(tmp_path):
+    import bpy
+
+    _populate().density = 123.4
+    bpy.ops.tetflora.update_population()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "forest.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "forest.blend"))
+    assert not _outdated()
+    _population().density += 1.0
+    assert _outdated()
