@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -79,6 +80,45 @@ def test_render_writes_the_files_that_it_names(forest, tmp_path, capfd):
     assert datablocks() == before
 
 
+def test_in_a_folder_pictures_are_named_by_their_frames(forest, tmp_path, capfd):
+    for output, arguments in (
+        (f"{tmp_path}/new/", ()),
+        (tmp_path / "new", ("--frame", 12)),
+        (tmp_path, ("--frames", 3)),
+    ):
+        assert _run("render", "--output", output, *arguments, "--json") == 0
+        (name,) = _figures(capfd)["files"]
+        assert name == f"{tmp_path}/{'' if output == tmp_path else 'new/'}{arguments[-1] if arguments else 1:04d}.png"
+        assert Path(name).is_file()
+
+
+def test_frames_below_zero_are_rendered_though_no_range_of_blender_has_them(forest, tmp_path, capfd):
+    import bpy
+
+    seen = []
+
+    def rendered(scene, _depsgraph=None):
+        seen.append(scene.frame_current)
+
+    bpy.app.handlers.render_post.append(rendered)
+    try:
+        assert _run("render", "--frames=-3-2:2,-8", "--output", tmp_path / "f_##", "--json") == 0
+    finally:
+        bpy.app.handlers.render_post.remove(rendered)
+    assert seen == [-3, -1, 1, -8]
+    names = _figures(capfd)["files"]
+    assert names == [str(tmp_path / f"f_{n}.png") for n in ("-03", "-01", "01", "-08")]
+    assert all(Path(name).is_file() for name in names)
+
+
+def test_a_file_that_blender_could_not_open_is_no_empty_scene(forest, monkeypatch, capfd):
+    monkeypatch.setattr("sys.argv", ["blender", "-b", "misspelt.blend", "--command", "tetflora", "stats"])
+    assert _run("stats") == 1
+    assert "misspelt.blend could not be opened" in capfd.readouterr().err
+    monkeypatch.setattr("sys.argv", ["blender", "--command", "tetflora", "refine", "--save", "new.blend"])
+    assert _run("stats") == 0
+
+
 def test_a_render_without_its_plants_fails(forest, tmp_path, capfd):
     add_plant("Odd", "quercus")
     assert _run("render", "--output", tmp_path / "a.png") == 1
@@ -107,6 +147,8 @@ def test_a_folder_that_does_not_exist_is_said_before_the_work(forest, tmp_path, 
     before = datablocks()
     assert _run("refine", "--save", tmp_path / "missing" / "a.blend") == 1
     assert "does not exist" in capfd.readouterr().err
+    assert _run("refine", "--save", tmp_path) == 1
+    assert "is a folder" in capfd.readouterr().err
     assert datablocks() == before
 
 
@@ -121,6 +163,9 @@ def test_a_folder_that_does_not_exist_is_said_before_the_work(forest, tmp_path, 
         ("render", "--frames", "9-2"),
         ("render", "--frame", "1", "--frames", "1-2"),
         ("render", "--samples", "0"),
+        ("render", "--samples", "99999999999"),
+        ("render", "--frame", "2000000"),
+        ("render", "--frames", "1-2000000"),
     ],
 )
 def test_wrong_arguments_are_one_line_and_exit_code_2(arguments, capfd):

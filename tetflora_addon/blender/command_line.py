@@ -8,10 +8,12 @@ Exit codes: 0 done, 1 the scene or a file cannot be used, 2 wrong arguments. An 
 
 import argparse
 import json
+import os
 import re
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +23,14 @@ from ..errors import SceneError, TetFloraError
 from . import farm_bundle, handlers, job
 from .camera_reader import read_camera
 from .compat import EEVEE_ENGINES, eevee_engine
-from .farm_template import Run, frame_numbers, frame_runs
+from .farm_template import MOST_FRAME, Run, frame_numbers, frame_runs
 from .pictures import damaged
 from .properties import TetFloraScene
 from .saved_files import write_blend
 
 NAME = "tetflora"
+#: Most samples that Cycles takes.
+_MOST = 1 << 24
 
 _command: Any = None
 
@@ -56,12 +60,13 @@ def main(arguments: Sequence[str]) -> int:
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else 0
     try:
+        _check_file()
         figures = options.run(options)
     except (TetFloraError, OSError) as error:
         return _fail(str(error), 1)
     except RuntimeError as error:
         # Blender's operators say "Error: ..." and more, on several lines.
-        return _fail(" ".join(str(error).split()), 1)
+        return _fail(" ".join(str(error).split()).removeprefix("Error: "), 1)
     if figures is None:
         return 1
     try:
@@ -69,7 +74,8 @@ def main(arguments: Sequence[str]) -> int:
             print(json.dumps(figures), flush=True)
         else:
             for key, value in figures.items():
-                print(f"{key.replace('_', ' '):>22}: {_readable(value)}", flush=True)
+                if key != "steps":  # a line of a dozen figures for each pass: for programs
+                    print(f"{key.replace('_', ' '):>22}: {_readable(value)}", flush=True)
     except OSError as error:  # into a file on a full disk, or into a program that has ended
         return _fail(f"the figures cannot be printed: {error.strerror}", 1)
     return 0
@@ -89,11 +95,13 @@ def _parser() -> argparse.ArgumentParser:
 
     render = commands.add_parser("render", help="refine and render frames")
     which = render.add_mutually_exclusive_group()
-    which.add_argument("--frame", type=int, metavar="N", help="frame to render; the scene's current one if not given")
+    which.add_argument(
+        "--frame", type=_frame, metavar="N", help="frame to render; the scene's current one if not given"
+    )
     which.add_argument("--frames", type=_frames, metavar="A-B", help="frames to render, such as 1-24, 1-99:2 or 3,7-9")
     render.add_argument("--engine", choices=("cycles", "eevee"), help="overrides the scene's render engine")
     render.add_argument("--samples", type=_whole, metavar="N", help="overrides the samples of a pixel")
-    render.add_argument("--output", type=Path, metavar="PATH", help="where pictures go; #### stands for the frame")
+    render.add_argument("--output", metavar="PATH", help="where pictures go, a folder or a name; #### is the frame")
     about = "render pictures that are there already, even if the scene's Overwrite is off"
     render.add_argument("--overwrite", action="store_true", help=about)
     render.set_defaults(run=_render)
@@ -122,13 +130,21 @@ def _refine(options: argparse.Namespace) -> dict:
     if options.cutoff is not None:
         scene.tetflora.cutoff = options.cutoff
     _set_proxies(scene, options)
-    if options.save is not None and not options.save.absolute().parent.is_dir():
-        raise SceneError(f"The folder {options.save.absolute().parent} does not exist; make it or choose another")
+    if options.save is not None:
+        _check_target(options.save.absolute())
     statistics = job.refine(scene, bpy.context.evaluated_depsgraph_get(), view_layer=bpy.context.view_layer)
     if options.save is not None:
         scene.tetflora.output.save_results = True  # that is what was asked for
         write_blend(options.save.absolute(), lambda path: bpy.ops.wm.save_as_mainfile(filepath=path, copy=True))
     return asdict(statistics)
+
+
+def _check_target(path: Path) -> None:
+    """Say before the work what would be said after it."""
+    if not path.parent.is_dir():
+        raise SceneError(f"The folder {path.parent} does not exist; make it or choose another")
+    if path.is_dir():
+        raise SceneError(f"{path} is a folder; name the file to write in it")
 
 
 def _render(options: argparse.Namespace) -> dict | None:
@@ -147,26 +163,25 @@ def _render(options: argparse.Namespace) -> dict | None:
         else:
             raise SceneError(f"The engine {scene.render.engine} has no samples; choose one with --engine")
     if options.output is not None:
-        scene.render.filepath = str(options.output.absolute())
+        scene.render.filepath = _place(options.output)
     if options.overwrite:
         scene.render.use_overwrite = True
-    failed = False
     if options.frames is not None:
-        for scene.frame_start, scene.frame_end, scene.frame_step in options.frames:
-            bpy.ops.render.render(animation=True)
-            failed = failed or bool(handlers.render_errors())  # each render forgets those before
-        files = [scene.render.frame_path(frame=n) for n in frame_numbers(options.frames)]
+        rendered = [_animation(scene, run) for run in options.frames]
+        files = [name for names, _ in rendered for name in names]
+        whole = all(whole for _, whole in rendered)
     else:
+        if scene.render.is_movie_format:
+            raise SceneError("The scene writes a movie; name its frames with --frames, or choose a format of pictures")
         if options.frame is not None:
             scene.frame_set(options.frame)
         # Blender leaves #### as it is in stills.
-        scene.render.filepath = _still_path(scene)
-        bpy.ops.render.render(write_still=True)
-        files = [bpy.path.ensure_ext(scene.render.filepath, scene.render.file_extension)]
+        name, whole = _still(scene, _still_path(scene))
+        files = [name]
     paths = [Path(bpy.path.abspath(f)) for f in files]
     for path in damaged(scene, paths):
         raise SceneError(f"{path} was not written to its end; is the disk full?")
-    if failed or handlers.render_errors():
+    if not whole:
         return None  # said on stderr when it happened
     return {"files": list(map(str, paths)), **json.loads(scene.tetflora.statistics or "{}")}
 
@@ -186,9 +201,58 @@ def _farm(options: argparse.Namespace) -> dict:
     return written
 
 
+def _check_file() -> None:
+    """Refuse to go on where Blender could not open the file: it does, with a cube, whose pictures pass for the film's.
+
+    Raises
+    ------
+    SceneError
+        The command line names a file, and none is open.
+    """
+    named = [text for text in takewhile(lambda text: text != "--command", sys.argv) if re.search(r"\.blend\d*$", text)]
+    if named and not bpy.data.filepath:
+        raise SceneError(f"{named[-1]} could not be opened; Blender's reason is above")
+
+
+def _animation(scene: bpy.types.Scene, run: Run) -> tuple[list[str], bool]:
+    """Render a run of frames: its files, and whether all of them have their plants."""
+    first, last, step = run
+    stills = []
+    while first <= min(last, -1):  # no range of Blender's begins below 0
+        scene.frame_set(first)
+        stills.append(_still(scene, scene.render.frame_path(frame=first)))
+        first += step
+    files, whole = [name for name, _ in stills], all(whole for _, whole in stills)
+    if first <= last:
+        scene.frame_start, scene.frame_end, scene.frame_step = first, last, step
+        bpy.ops.render.render(animation=True)
+        whole = whole and not handlers.render_errors()
+        names = [scene.render.frame_path(frame=n) for n in frame_numbers([(first, last, step)])]
+        files += dict.fromkeys(names)  # all of a movie are one
+    return files, whole
+
+
+def _still(scene: bpy.types.Scene, path: str) -> tuple[str, bool]:
+    """Render the frame of the scene: its file, and whether it has its plants."""
+    before, scene.render.filepath = scene.render.filepath, path
+    bpy.ops.render.render(write_still=True)
+    scene.render.filepath = before
+    return bpy.path.ensure_ext(path, scene.render.file_extension), not handlers.render_errors()
+
+
+def _place(text: str) -> str:
+    """Where pictures go, as Blender wants it: a folder ends with a slash."""
+    if text.startswith("//"):
+        return text  # from the .blend, as in Blender's own fields
+    path = Path(text).absolute()
+    return f"{path}{os.sep}" if text.endswith(("/", os.sep)) or path.is_dir() else str(path)
+
+
 def _still_path(scene: bpy.types.Scene) -> str:
+    folder, name = os.path.split(bpy.path.abspath(scene.render.filepath))
     frame = scene.frame_current
-    return re.sub(r"#+", lambda match: f"{frame:0{len(match.group())}d}", bpy.path.abspath(scene.render.filepath))
+    # In a folder pictures are named by their frames, as in animations.
+    return os.path.join(folder, re.sub(r"#+", lambda match: f"{frame:0{len(match.group())}d}", name or "####"))
 
 
 def _set_proxies(scene: bpy.types.Scene, options: argparse.Namespace) -> None:
@@ -211,8 +275,15 @@ def _positive(text: str) -> float:
 
 def _whole(text: str) -> int:
     value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"{text} is not a number above 0")
+    if not 1 <= value <= _MOST:
+        raise argparse.ArgumentTypeError(f"{text} is not a number from 1 to {_MOST:,}")
+    return value
+
+
+def _frame(text: str) -> int:
+    value = int(text)
+    if abs(value) > MOST_FRAME:
+        raise argparse.ArgumentTypeError(f"{text} is beyond the frames that Blender has, up to {MOST_FRAME:,}")
     return value
 
 
@@ -228,6 +299,8 @@ def _readable(value: object) -> str:
         return ", ".join(f"{key} {_readable(item)}" for key, item in value.items())
     if isinstance(value, list):
         return " ".join(map(str, value))
+    if isinstance(value, bool):
+        return "yes" if value else "no"
     return f"{value:,.2f}" if isinstance(value, float) else f"{value:,}" if isinstance(value, int) else str(value)
 
 

@@ -28,6 +28,9 @@ STEP = "Render"
 #: First, last and step of frames.
 Run = tuple[int, int, int]
 
+#: Last frame that Blender has.
+MOST_FRAME = 1_048_574
+
 _RUN = re.compile(r"(-?\d+)(?:-(-?\d+)(?::(\d+))?)?")
 _LONGEST_NAME = 128
 
@@ -73,7 +76,7 @@ def frame_runs(text: str) -> list[Run]:
     Raises
     ------
     ValueError
-        It is no such expression, or a range runs backwards.
+        It is no such expression, a range runs backwards, or Blender has no such frame.
     """
     runs = []
     for part in text.split(","):
@@ -85,6 +88,8 @@ def frame_runs(text: str) -> list[Run]:
         step = int(match[3] or 1)
         if last < first or step < 1:
             raise ValueError(f"{text} is not a range of frames such as 1-24, 7 or 1-99:2")
+        if max(-first, last) > MOST_FRAME:
+            raise ValueError(f"{text} goes beyond the frames that Blender has, up to {MOST_FRAME:,}")
         runs.append((first, last - (last - first) % step, step))
     return runs
 
