@@ -120,6 +120,7 @@ SPECIES_MISTAKES: list[tuple[str, Any, str]] = [
     ("name", 5, "text"),
     ("description", ["a"], "text"),
     ("colour", 1, "unknown key"),
+    ("Barks", "ridged", 'did you mean "bark"?'),
     ("orders", [], f"1 to {MAX_ORDERS}"),
     ("orders", {}, f"1 to {MAX_ORDERS}"),
     ("orders", [{}], "length: missing"),
@@ -252,7 +253,7 @@ def test_crown_shapes_are_ratios() -> None:
         (b"", "JSON"),
         (b"{", "JSON"),
         (b'{"format": 1,}', "JSON"),
-        (b"\xff\xfe{}", "JSON"),
+        (b"\xff\xfe{}", "JSON: not text in UTF-8"),
         (b"[" * 100_000, "JSON"),
         (b"1" * 5000, "JSON"),
         (b"[1]", "object"),
@@ -268,6 +269,20 @@ def test_broken_files_are_named_and_do_not_hide_the_others(content: bytes, part:
     assert str(caught.value).startswith("broken.json: ")
     assert part in str(caught.value)
     assert set(list_species([tmp_path])) == {"broken", *support.SPECIES}
+
+
+def test_a_key_twice_in_one_object_is_told(tmp_path: Path) -> None:
+    text = json.dumps(support.small()).replace('"branches": ', '"branches": [9, 0], "branches": ', 1)
+    path = tmp_path / "twice.json"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(SpeciesError, match=r"twice\.json: branches: is there twice"):
+        read_species(path)
+
+
+def test_a_mark_of_the_encoding_does_no_harm(tmp_path: Path) -> None:
+    path = tmp_path / "marked.json"
+    path.write_text(json.dumps(support.small(name="Größe")), encoding="utf-8-sig")
+    assert read_species(path).name == list_species([tmp_path])["marked"].name == "Größe"
 
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:

@@ -183,7 +183,7 @@ def _decoded(text: str, name: str) -> dict[str, Any]:
 @lru_cache(maxsize=64)
 def _decoded_file(path: Path, _modified: int, _size: int) -> dict[str, Any]:
     try:
-        return _decoded(path.read_text(encoding="utf-8"), path.name)
+        return _decoded(path.read_text(encoding="utf-8-sig"), path.name)
     except (OSError, UnicodeDecodeError) as error:
         raise SpeciesError(f"{path.name}: cannot be read: {error}") from None
 

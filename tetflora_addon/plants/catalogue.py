@@ -35,7 +35,7 @@ def _info(path: Path, stamp: tuple[int, int]) -> SpeciesInfo:
     try:
         if stamp[1] > MAX_FILE_BYTES:
             raise ValueError("too large to read only for a menu")
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(path.read_text(encoding="utf-8-sig"))
         name, description = str(data.get("name", path.stem)), str(data.get("description", ""))
     except (OSError, ValueError, AttributeError, RecursionError):
         name, description = path.stem, "This file cannot be read; choosing the species tells why"

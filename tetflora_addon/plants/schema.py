@@ -11,6 +11,8 @@ import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -191,7 +193,9 @@ class _Reader:
             raise self.fail(key, f"must be an object {{…}}, is {_shown(value)}")
         for name in value:
             if name not in allowed:
-                raise self.fail(f"{key}.{name}" if key else name, f"unknown key; allowed are {', '.join(allowed)}")
+                near = get_close_matches(name.lower(), allowed, 1)
+                meant = f'did you mean "{near[0]}"? Allowed' if near else "allowed"
+                raise self.fail(f"{key}.{name}" if key else name, f"unknown key; {meant} are {', '.join(allowed)}")
 
     def text(self, value: Any, key: str, least: int = 1) -> str:
         if not isinstance(value, str) or len(value.strip()) < least or len(value) > 1000:
@@ -349,6 +353,16 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
     return species
 
 
+def _once(source: str, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A JSON object whose keys all differ; Python's reader would take the last of equal ones and say nothing."""
+    data = dict(pairs)
+    if len(data) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise SpeciesError(f"{source}: {twice}: is there twice in one object; leave one of them")
+    return data
+
+
 def read_species(path: Path) -> Species:
     """Read and check one species file.
 
@@ -360,9 +374,12 @@ def read_species(path: Path) -> Species:
     try:
         if path.stat().st_size > MAX_FILE_BYTES:
             raise SpeciesError(f"{path.name}: larger than {MAX_FILE_BYTES:,} bytes")
-        data = json.loads(path.read_text(encoding="utf-8"))
+        # Some editors begin a file with a mark of its encoding.
+        data = json.loads(path.read_text(encoding="utf-8-sig"), object_pairs_hook=partial(_once, path.name))
     except OSError as error:
         raise SpeciesError(f"{path.name}: cannot be read: {error.strerror}") from None
-    except (UnicodeDecodeError, RecursionError, ValueError) as error:
+    except UnicodeDecodeError:
+        raise SpeciesError(f"{path.name}: is not valid JSON: not text in UTF-8; save it in that encoding") from None
+    except (RecursionError, ValueError) as error:
         raise SpeciesError(f"{path.name}: is not valid JSON: {error}") from None
     return species_from_dict(data, path.stem, path.name)
