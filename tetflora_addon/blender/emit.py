@@ -19,7 +19,7 @@ import bpy
 from ..buffers import MeshBuffers, PointBuffers
 from ..plants.species import Species
 from .meshes import write_mesh
-from .node_tools import is_ours, tag, untag
+from .node_tools import is_own, tag, untag
 from .output import KIND, PARENT, dress, dress_collection, keep_materials, mark_runtime, parent_of
 from .point_clouds import point_object
 
@@ -136,8 +136,8 @@ def hide_originals(scene: bpy.types.Scene, purpose: str, originals: Sequence[bpy
 
 
 def result_collections(scene: bpy.types.Scene, purpose: str | None = None) -> list[bpy.types.Collection]:
-    """Result collections of a scene, of one purpose or of all."""
-    made = [c for c in scene.collection.children if is_ours(c) and PURPOSE in c]
+    """Result collections of a scene, of one purpose or of all; those that are linked from other files are none."""
+    made = [c for c in scene.collection.children if is_own(c) and PURPOSE in c]
     return [c for c in made if purpose is None or c[PURPOSE] == purpose]
 
 
@@ -159,7 +159,7 @@ def keep_results(scene: bpy.types.Scene) -> int:
     for collection in result_collections(scene, 'VIEW'):
         mark_runtime(collection, False)
         for obj in collection.objects:
-            if is_ours(obj):
+            if is_own(obj):
                 kept += obj.get(KIND) != PARENT
                 obj.hide_select = False
                 for datablock in (obj, obj.data):
@@ -352,11 +352,11 @@ def remove_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) 
     """Remove results, be they linked to the scene or not; returns the number of datablocks removed."""
     data, objects, groups = [], [], set()
     for held in list(collection.objects):
-        if is_ours(held) and held.get(KIND) == PARENT and len(held.users_collection) > 1:
+        if is_own(held) and held.get(KIND) == PARENT and len(held.users_collection) > 1:
             continue  # other results have it too
-        if is_ours(held):
+        if is_own(held):
             objects.append(held)
-            if held.data is not None and is_ours(held.data):
+            if held.data is not None and is_own(held.data):
                 data.append(held.data)
             groups |= {m.node_group for m in held.modifiers if m.type == 'NODES' and m.node_group is not None}
         elif held.name not in scene.collection.objects:
@@ -364,7 +364,7 @@ def remove_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) 
     for child in list(collection.children):
         if child.name not in scene.collection.children:
             scene.collection.children.link(child)
-    materials = {m for d in data for m in d.materials if m is not None and is_ours(m)}
+    materials = {m for d in data for m in d.materials if m is not None and is_own(m)}
     removed = [*objects, *(d for d in data if d.users <= 1), collection]
     bpy.data.batch_remove(removed)
     return len(removed) + _remove_unused(materials, groups)
@@ -382,7 +382,7 @@ def _remove_unused(materials: set[bpy.types.Material], groups: set[bpy.types.Nod
 def _remove_groups(groups: set[bpy.types.NodeTree]) -> int:
     removed = 0
     while True:
-        empty = [g for g in groups if g.users == 0 and is_ours(g)]
+        empty = [g for g in groups if g.users == 0 and is_own(g)]
         if not empty:
             return removed
         inner = {n.node_tree for g in empty for n in g.nodes if n.type == 'GROUP' and n.node_tree is not None}

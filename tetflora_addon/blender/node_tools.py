@@ -36,6 +36,14 @@ def is_ours(datablock: bpy.types.ID) -> bool:
     return datablock.get(MADE) == datablock.name
 
 
+def is_own(datablock: bpy.types.ID) -> bool:
+    """Whether TetFlora may change or remove a datablock: it is ours, and of this file.
+
+    What TetFlora made in another file is linked here by the artist, as itself or as a library override.
+    """
+    return is_ours(datablock) and datablock.library is None and datablock.override_library is None
+
+
 def get_or_create(
     collection: Any, name: str, version: int, new: Callable[[str], Datablock], build: Callable[[Datablock], None]
 ) -> Datablock:
@@ -58,13 +66,15 @@ def get_or_create(
     -------
     bpy.types.ID
         What an artist edited or put there under this name comes back untouched. An outdated datablock of ours is kept
-        under another name, because somebody may have edited it, and is the artist's from then on.
+        under another name, because somebody may have edited it, and is the artist's from then on; one that is linked
+        from another file keeps its name, which is none of this file's.
     """
-    found = collection.get(name)
+    found = collection.get((name, None)) or collection.get(name)
     if found is not None:
         if not is_ours(found) or found.get(VERSION) == version:
             return found
-        found.name = f"{name} (version {found.get(VERSION, 0)})"
+        if found.library is None:
+            found.name = f"{name} (version {found.get(VERSION, 0)})"
     made = new(name)
     build(made)
     made[VERSION] = version

@@ -13,7 +13,7 @@ from typing import Any
 
 import bpy
 
-from .node_tools import is_ours, tag
+from .node_tools import is_ours, is_own, tag
 
 #: Custom property of a result object: 'leaf', 'blossom', 'bark', 'explicit' or 'proxy', or the parent of a species.
 KIND = "tetflora_kind"
@@ -66,7 +66,7 @@ def dress(scene: bpy.types.Scene, made: bpy.types.Object, identifier: str) -> No
 def parent_of(collection: bpy.types.Collection, identifier: str, name: str) -> bpy.types.Object:
     """The parent of a species' results, in a result collection; one for all of the file."""
     found = next(
-        (o for o in bpy.data.objects if o.get(KIND) == PARENT and o.get(SPECIES) == identifier and is_ours(o)), None
+        (o for o in bpy.data.objects if o.get(KIND) == PARENT and o.get(SPECIES) == identifier and is_own(o)), None
     )
     if found is None:
         found = bpy.data.objects.new(f"{name} (TetFlora)", None)
@@ -85,7 +85,7 @@ def dress_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) -
     collection.hide_viewport, collection.hide_render = not output.show_viewport, not output.show_render
     mark_runtime(collection, not output.save_results)
     for obj in collection.objects:
-        if is_ours(obj) and obj.get(KIND) != PARENT:
+        if is_own(obj) and obj.get(KIND) != PARENT:
             dress(scene, obj, obj.get(SPECIES, ""))
 
 
@@ -96,9 +96,9 @@ def mark_runtime(collection: bpy.types.Collection, runtime: bool) -> None:
     """
     collection.is_runtime_data = runtime
     for obj in collection.objects:
-        if is_ours(obj) and (len(obj.users_collection) == 1 or not runtime):
+        if is_own(obj) and (len(obj.users_collection) == 1 or not runtime):
             obj.is_runtime_data = runtime
-            if obj.data is not None and is_ours(obj.data):
+            if obj.data is not None and is_own(obj.data):
                 obj.data.is_runtime_data = runtime
 
 
@@ -126,7 +126,7 @@ def keep_materials(collection: bpy.types.Collection) -> None:
     """Let a file hold the materials of results that it does not hold: somebody may have edited them."""
     for obj in collection.objects:
         for material in obj.data.materials if obj.data is not None else ():
-            if material is not None and is_ours(material) and not material.use_fake_user:
+            if material is not None and is_own(material) and not material.use_fake_user:
                 material.use_fake_user, material[_KEPT] = True, True
 
 
