@@ -228,15 +228,15 @@ def _by_inclination(triangles: NDArray[np.float64], rules: Rules) -> tuple[NDArr
     flat = (length > 0.0) & (upright > 0.0) & (upright >= length * (np.cos(rules.slope_max) - _ROUNDING))
     if not flat.any():
         raise SceneError(
-            f"The surface has no face flatter than the slope limit of {np.degrees(rules.slope_max):.0f}°; raise the "
-            "limit or select another mesh"
+            f"The surface has no face flatter than the slope limit of {np.degrees(rules.slope_max):.0f}°; raise "
+            "Slope To or select another mesh"
         )
     if rules.slope_min > 0.0:
         flat &= upright <= length * (np.cos(rules.slope_min) + _ROUNDING)
         if not flat.any():
             raise SceneError(
                 f"The surface has no face between the slopes {np.degrees(rules.slope_min):.0f}° and "
-                f"{np.degrees(rules.slope_max):.0f}°; lower the least slope or raise the largest"
+                f"{np.degrees(rules.slope_max):.0f}°; lower the least slope, Slope From, or raise Slope To"
             )
     if rules.aspect_spread < np.pi:
         away = np.abs((np.arctan2(normal[:, 0], normal[:, 1]) - rules.aspect + np.pi) % (2.0 * np.pi) - np.pi)
