@@ -224,7 +224,7 @@ def _check_species(plants: list[tuple[str, str]]) -> None:
         raise SceneError(
             f'{_listed([name for name, other in bad if other == species])}: unknown species "{species}"; choose '
             "another in the sidebar's TetFlora tab, or put "
-            f"{species or 'its file'}{'.json' if species else ''} into your species folder (Load Species in the Species Editor does)"
+            f"{species or 'its file'}{'.json' if species else ''} into your species folder, as Load Species does"
         )
 
 
