@@ -11,6 +11,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kept_arrays import keeping
+
+#: Bytes that are kept of what is known of meshes, ten a face: each frame of a film asks for the same again.
+MOST_BYTES = 128 << 20
 #: A flat sheet's boundary is longer than this, squared, in relation to its area (a disc has 4π, a half ball 2π): what
 #: has less is bent back upon itself.
 _SHEET = 2 * np.pi
@@ -22,6 +26,7 @@ _ONE_OF_MANY = 1 / 64
 _ROUNDS = 6
 
 
+@keeping(MOST_BYTES)
 def mesh_features(
     positions: NDArray[np.float64], corner_verts: NDArray[np.integer], face_offsets: NDArray[np.integer]
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.float64]]:

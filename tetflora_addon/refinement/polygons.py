@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -140,26 +141,40 @@ class Meshes:
         self.solid = joined([s.solid for s in surfaces], np.zeros(0, bool))
         self.leaf = joined([s.leaf for s in surfaces], np.zeros(0, bool))
         self.width = joined([s.width for s in surfaces], np.zeros(0))
-        a, b, c = (self.positions[self.corner_verts[self.triangles[:, k]]] for k in range(3))
-        self.area_vectors = 0.5 * np.cross(b - a, c - a)
-        self._measure_faces()
 
-    def _measure_faces(self) -> None:
-        """Centres (f, 3) of the boxes around faces, and the radii (f,) of the spheres about these that hold them."""
+    # What follows is measured when it is asked for: a frame of a film that shares what another made never asks.
+
+    @cached_property
+    def area_vectors(self) -> NDArray[np.float64]:
+        """Area vectors (t, 3) of triangles in their mesh's own space."""
+        a, b, c = (self.positions[self.corner_verts[self.triangles[:, k]]] for k in range(3))
+        return 0.5 * np.cross(b - a, c - a)
+
+    @cached_property
+    def centres(self) -> NDArray[np.float64]:
+        """Centres (f, 3) of the boxes around faces."""
+        if not len(self.face_start):
+            return np.zeros((0, 3))
         points = self.positions[self.corner_verts]
-        if len(self.face_start):
-            low = np.minimum.reduceat(points, self.face_start, axis=0)
-            high = np.maximum.reduceat(points, self.face_start, axis=0)
-            self.centres = (low + high) / 2
-            away = np.linalg.norm(points - np.repeat(self.centres, self.face_size, axis=0), axis=1)
-            self.radii = np.maximum.reduceat(away, self.face_start)
-            # Faces that come to a vertex twice, which a valid mesh does not have.
-            face = np.repeat(np.arange(len(self.face_start)), self.face_size)
-            order = np.lexsort([self.corner_verts, face])
-            twice = (np.diff(face[order]) == 0) & (np.diff(self.corner_verts[order]) == 0)
-            self.knotted = np.bincount(face[order[1:][twice]], minlength=len(self.face_start)) > 0
-        else:
-            self.centres, self.radii, self.knotted = np.zeros((0, 3)), np.zeros(0), np.zeros(0, bool)
+        low = np.minimum.reduceat(points, self.face_start, axis=0)
+        return (low + np.maximum.reduceat(points, self.face_start, axis=0)) / 2
+
+    @cached_property
+    def radii(self) -> NDArray[np.float64]:
+        """Radii (f,) of the spheres about these centres that hold the faces."""
+        if not len(self.face_start):
+            return np.zeros(0)
+        points = self.positions[self.corner_verts]
+        away = np.linalg.norm(points - np.repeat(self.centres, self.face_size, axis=0), axis=1)
+        return np.maximum.reduceat(away, self.face_start)
+
+    @cached_property
+    def knotted(self) -> NDArray[np.bool_]:
+        """Faces (f,) that come to a vertex twice, which a valid mesh does not have."""
+        face = np.repeat(np.arange(len(self.face_start)), self.face_size)
+        order = np.lexsort([self.corner_verts, face])
+        twice = (np.diff(face[order]) == 0) & (np.diff(self.corner_verts[order]) == 0)
+        return np.bincount(face[order[1:][twice]], minlength=len(self.face_start)) > 0
 
     @property
     def faces(self) -> int:
