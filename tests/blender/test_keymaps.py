@@ -110,7 +110,13 @@ def _texts():
     for cls in vars(part("properties")).values():
         if isinstance(cls, type) and hasattr(cls, "bl_rna"):
             found |= {p.name for p in cls.bl_rna.properties}
-    for module, name in (("preferences", "TetFloraPreferences"), ("brush_properties", "TetFloraBrush")):
+    groups = (
+        ("preferences", "TetFloraPreferences"),
+        ("brush_properties", "TetFloraBrush"),
+        ("output_properties", "TetFloraOutput"),
+        ("population_properties", "TetFloraMixEntry"),
+    )
+    for module, name in groups:
         properties = getattr(part(module), name).bl_rna.properties
         found |= {p.name for p in properties}
         found |= {item.name for p in properties if p.type == 'ENUM' for item in p.enum_items}
