@@ -85,6 +85,8 @@ def test_near_meshes_come_out_as_they_are_without_any_plant():
     """Faces, material, texture coordinates; the original is hidden meanwhile."""
     scene = _scene()
     leaves = _leaves()
+    broken = scene.tetflora.species_edits.add()  # none of the scene's business
+    broken.identifier, broken.text = min(part("species_items").catalogue()), "{"
     statistics = _refine(scene)
     made = _made(scene)
     assert sum(len(o.data.polygons) for o in made) == 400 == statistics.polygons_meshed == statistics.polygons_full

@@ -14,6 +14,7 @@ import numpy as np
 from .. import emission, explicit_emission
 from ..baked_emission import Sources
 from ..budget import BYTES_PER_POLYGON, BYTES_PER_SPHERE, afford
+from ..plants.catalogue import list_species, load_species
 from ..plants.compiled import Flora, compile_species
 from ..plants.growth import trunks
 from ..plants.seeds import Seeds
@@ -39,7 +40,6 @@ from .output import adopt_materials, release_materials
 from .properties import settings_from
 from .proxies import tell_facets, write_proxies
 from .scene_reader import NoPlantsError, read_occluders, read_plants
-from .species_items import catalogue
 from .wind_properties import wind_of
 
 __all__ = ["Progress", "clear", "compile_for", "estimate", "has_results", "partition", "refine", "refine_steps"]
@@ -71,11 +71,16 @@ class Progress:
 def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Flora:
     """Load and compile species, leaf objects of the scene included.
 
+    Without any, for meshes alone, it is a shipped one, of which nothing grows: files and edits of the artist's that the
+    scene has no use for must not cost time, or be wrong.
+
     Raises
     ------
     SpeciesError
         Unknown or broken species, or a leaf object that is missing or not a mesh with faces.
     """
+    if not identifiers:
+        return compile_species([load_species(min(list_species()))])
     return compile_species([resolved_species(scene, identifier, depsgraph) for identifier in identifiers])
 
 
@@ -110,8 +115,8 @@ class Given:
 
     @property
     def species(self) -> tuple[str, ...]:
-        """Species to compile; without plants any will do, since none grows."""
-        return self.seeds.identifiers or (min(catalogue()),)
+        """Species of its plants."""
+        return self.seeds.identifiers
 
     @property
     def polygons(self) -> Polygons | None:
