@@ -4,7 +4,7 @@
 
 import bpy
 
-from ..tetflora_addon.blender import emit, job
+from ..tetflora_addon.blender import auto_refresh, emit, job
 from . import ids
 from .base import Reporting, counted, in_object_mode
 
@@ -33,6 +33,7 @@ class TETFLORA_OT_clear(Reporting, bpy.types.Operator):
         return True
 
     def run(self, context: bpy.types.Context) -> set[str]:
+        auto_refresh.stop()
         hidden = emit.hidden_originals(context.scene, 'VIEW')
         removed = f"{counted(job.clear(context.scene), 'datablock')} removed"
         shown = sum(emit.HIDDEN['VIEW'] not in original for original in hidden)

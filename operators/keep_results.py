@@ -4,7 +4,9 @@
 
 import bpy
 
+from ..tetflora_addon.blender import auto_refresh
 from ..tetflora_addon.blender.emit import keep_results, result_collections
+from ..tetflora_addon.errors import TetFloraError
 from . import ids
 from .base import Reporting, counted
 
@@ -32,6 +34,9 @@ class TETFLORA_OT_keep_results(Reporting, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
+        auto_refresh.stop()
+        if not result_collections(scene, 'VIEW'):
+            raise TetFloraError("Refine Automatically was not done yet; wait until it is, or press Refine")
         kept = keep_results(scene)
         scene.tetflora.refine_at_render = False
         scene.tetflora.statistics = ""

@@ -6,7 +6,7 @@ from collections.abc import Generator
 
 import bpy
 
-from ..tetflora_addon.blender import job
+from ..tetflora_addon.blender import auto_refresh, job
 from ..tetflora_addon.blender.plant_objects import plants_of, prepare_scene
 from ..tetflora_addon.blender.shell_bounces import few_bounces
 from ..tetflora_addon.blender.world_reader import read_world
@@ -40,6 +40,7 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
         return True
 
     def steps(self, context: bpy.types.Context) -> Generator[job.Progress, bool | None, Statistics]:
+        auto_refresh.stop()
         return job.refine_steps(
             context.scene, context.evaluated_depsgraph_get(), view_layer=context.view_layer, for_render=False
         )

@@ -20,6 +20,7 @@ def scene(clean_file):
         add_plant(f"tree {i}", seed=i, location=(4.0 * i - 4.0, 0.0, 0.0))
     scene = bpy.context.scene
     scene.render.resolution_x, scene.render.resolution_y = 120, 90
+    bpy.context.view_layer.update()
     yield scene
     scene.tetflora.auto_refine = False
 
@@ -88,6 +89,37 @@ def test_what_changes_is_refined_again(scene, monkeypatch, change):
     assert settle(monkeypatch) > 0
     assert len(results(scene)) == 1
     assert results(scene)[0].session_uid != uid, made
+
+
+@pytest.mark.parametrize("change", ["percentage", "aspect", "engine", "material", "leaf"])
+def test_settings_that_results_depend_on_are_heard(scene, monkeypatch, change):
+    """Blender says no more of them than that the scene has changed."""
+    import bpy
+
+    scene.render.engine = 'CYCLES'
+    material, leaf = bpy.data.materials.new("own"), add_mesh("leaf")
+    scene.tetflora.auto_refine = True
+    settle(monkeypatch)
+    heard = []
+    monkeypatch.setattr(auto(), "schedule", heard.append)
+    auto().on_change(scene, SimpleNamespace(updates=[]))
+    heard.clear()
+    auto().on_change(scene, SimpleNamespace(updates=[]))
+    assert not heard
+    if change == "percentage":
+        scene.render.resolution_percentage = 50
+    elif change == "aspect":
+        scene.render.pixel_aspect_x = 2.0
+    elif change == "engine":
+        scene.render.engine = part("compat").eevee_engine()
+    elif change == "material":
+        entry = scene.tetflora.output.species.add()
+        entry.species, entry.leaf = "bush", material
+    else:
+        entry = scene.tetflora.leaf_objects.add()
+        entry.species, entry.leaf = "bush", leaf
+    auto().on_change(scene, SimpleNamespace(updates=[]))
+    assert heard == [scene]
 
 
 def test_what_has_nothing_to_do_with_plants_starts_nothing(scene, monkeypatch):
@@ -184,3 +216,74 @@ def test_a_plant_hidden_while_it_works_is_heard_afterwards(scene, monkeypatch):
     auto().on_change(scene, SimpleNamespace(updates=[SimpleNamespace(id=SimpleNamespace(original=plant), **flags)]))
     settle(monkeypatch)
     assert '"plants": 2' in scene.tetflora.statistics or '"plants":2' in scene.tetflora.statistics
+
+
+def half_make(scene, monkeypatch, collections):
+    """Have it work until so many collections have results, the last of which is not done."""
+    monkeypatch.setattr(auto(), "SLICE", 0.0)
+    auto().on_change(scene, SimpleNamespace(updates=[]))  # settings as they are
+    auto().schedule(scene)
+    auto()._state.due = 0.0
+    while len(results(scene)) < collections or not results(scene)[-1].objects:
+        assert auto().tick() is not None
+
+
+def test_clear_takes_away_what_is_half_made_too(scene, monkeypatch):
+    import bpy
+
+    before = datablocks()
+    scene.tetflora.auto_refine = True
+    settle(monkeypatch)
+    scene.tetflora.cutoff *= 2.0
+    half_make(scene, monkeypatch, 2)
+    assert bpy.ops.tetflora.clear() == {'FINISHED'}
+    assert datablocks() == before
+    assert auto().message() == ""
+    assert settle(monkeypatch) > 0  # it works on
+
+
+def test_refine_is_alone(scene, monkeypatch):
+    import bpy
+
+    scene.tetflora.auto_refine = True
+    half_make(scene, monkeypatch, 1)
+    assert bpy.ops.tetflora.refine() == {'FINISHED'}
+    assert len(results(scene)) == 1
+    half_make(scene, monkeypatch, 2)
+    assert hasattr(bpy.types, auto().REFINE)
+    monkeypatch.setattr(auto(), "_operator_refines", lambda: True)  # as it does between redraws
+    assert auto().tick() == auto()._BUSY
+    assert len(results(scene)) == 1
+
+
+def test_only_what_is_done_is_kept(scene, monkeypatch):
+    import bpy
+
+    scene.tetflora.auto_refine = True
+    half_make(scene, monkeypatch, 1)
+    with pytest.raises(RuntimeError, match="not done yet"):
+        bpy.ops.tetflora.keep_results()
+    assert not results(scene)
+    settle(monkeypatch)
+    made = {obj.name for obj in results(scene)[0].objects}
+    scene.tetflora.cutoff *= 2.0
+    half_make(scene, monkeypatch, 2)
+    assert bpy.ops.tetflora.keep_results() == {'FINISHED'}
+    assert not results(scene)
+    assert {obj.name for obj in scene.objects if "tetflora_kind" in obj} == made
+
+
+def test_after_an_unexpected_error_it_says_so_and_can_begin_anew(scene, monkeypatch):
+    def broken(*_arguments, **_options):
+        yield part("job").Progress(0.0, "Reading the scene")
+        raise ZeroDivisionError("of another's making")
+
+    scene.tetflora.auto_refine = True
+    with monkeypatch.context() as patch:
+        patch.setattr(part("job"), "refine_steps", broken)
+        with pytest.raises(ZeroDivisionError):
+            settle(monkeypatch)
+    assert "another's making" in auto().message()
+    auto().schedule(scene)
+    assert settle(monkeypatch) > 0
+    assert results(scene) and auto().message() == ""

@@ -86,6 +86,23 @@ def test_levels_are_outdated_when_the_camera_has_moved():
     assert state().is_outdated(scene)
 
 
+@pytest.mark.parametrize(
+    ("owner", "name", "value"),
+    [
+        ("lens", "sensor_width", 20.0),
+        ("lens", "clip_start", 0.2),
+        ("focus", "use_dof", True),
+        ("picture", "pixel_aspect_x", 2.0),
+        ("picture", "use_multiview", True),
+    ],
+)
+def test_levels_are_outdated_when_lens_or_picture_are_others(owner, name, value):
+    scene, camera, _ = scene_of_plants()
+    compute()
+    setattr({"lens": camera.data, "focus": camera.data.dof, "picture": scene.render}[owner], name, value)
+    assert state().is_outdated(scene)
+
+
 def test_a_frozen_camera_stays_while_the_scenes_moves():
     import bpy
 

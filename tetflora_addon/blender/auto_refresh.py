@@ -6,7 +6,8 @@ A change while it works stops it, and it begins again when nothing has changed f
 depends on is digested first (`scene_digest`): where that is the same as last time, nothing is done. The results of the
 time before stay until there are new ones.
 
-Undo, loading and rendering stop it too, because it holds on to datablocks that these take away.
+Undo, loading, rendering, and operators that change results stop it too, because it holds on to datablocks that these
+take away.
 """
 
 from __future__ import annotations
@@ -24,13 +25,16 @@ from . import job
 from .emit import has_results
 from .node_tools import is_ours
 from .plant_objects import prepare_scene
-from .properties import settings_from
-from .scene_digest import scene_digest
+from .preview_state import camera_now
+from .properties import leaf_objects
+from .scene_digest import choices, scene_digest
 from .wind_properties import wind_of
 
 #: Seconds without a change before it begins, and seconds of work between two redraws.
 QUIET, SLICE = 0.6, 0.03
 _BUSY = 0.5  # seconds until it looks again whether Blender has time
+#: The operator that refines in slices of its own.
+REFINE = "TETFLORA_OT_refine"
 _CHANGING = (bpy.types.Object, bpy.types.Camera, bpy.types.Light, bpy.types.Mesh, bpy.types.PointCloud, bpy.types.Curve)
 
 
@@ -91,18 +95,29 @@ def tick() -> float | None:
     wait = _state.due - time.monotonic()
     if _state.steps is None and wait > 0.0:
         return wait
+    if _operator_refines():  # each would take away what the other has half made
+        stop()
+        return _BUSY
     if bpy.app.is_job_running('RENDER') or bpy.context.mode != 'OBJECT':
         return _BUSY
     _state.working = True
     try:
         more = _begin(scene) if _state.steps is None else _slice(scene)
-    except TetFloraError as error:
+    except Exception as error:
+        expected = isinstance(error, TetFloraError)
         _state.steps, more = None, False
-        _state.message = str(error)
+        _state.message = str(error) if expected else f"unexpected error, please report it: {error!r}"
         _redraw()
+        if not expected:
+            raise
     finally:
         _state.working = False
     return 0.001 if more else None
+
+
+def _operator_refines() -> bool:
+    windows = bpy.context.window_manager.windows
+    return any(operator.bl_idname == REFINE for window in windows for operator in window.modal_operators)
 
 
 def _begin(scene: bpy.types.Scene) -> bool:
@@ -160,10 +175,7 @@ def on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Something in a scene changed: is it anything of what refinement depends on?"""
     if _state.working or not scene.tetflora.auto_refine:
         return
-    settings = f"{settings_from(scene)}{scene.tetflora.proxy_form}{scene.tetflora.baked_light}{scene.camera}"
-    settings += (
-        f"{scene.tetflora.expand_everything}{scene.render.resolution_x}{scene.render.resolution_y}{wind_of(scene)}"
-    )
+    settings = f"{choices(scene)}{camera_now(scene)}{leaf_objects(scene)}"
     other = _seen.get(scene.name) != settings
     _seen[scene.name] = settings
     concerns = [update for update in depsgraph.updates if _concerns(update)]

@@ -15,6 +15,18 @@ from ..preview.light_plants import Shapes
 from ..refinement.camera import Camera
 from .camera_reader import read_camera
 
+#: What `camera_reader` reads of a camera, of its depth of field, and of the picture.
+_LENS = (
+    *("type", "lens", "ortho_scale", "shift_x", "shift_y", "sensor_fit", "sensor_width", "sensor_height"),
+    *("clip_start", "clip_end", "panorama_type", "longitude_min", "longitude_max", "latitude_min", "latitude_max"),
+    *("fisheye_fov", "fisheye_lens"),
+)
+_FOCUS = "use_dof", "aperture_fstop", "focus_distance"
+_PICTURE = (
+    *("resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x", "pixel_aspect_y"),
+    *("use_multiview", "use_motion_blur", "motion_blur_shutter", "motion_blur_position"),
+)
+
 #: Called when plants are to be shown in another form, without arguments; `preview_job` listens.
 listeners: list[Callable[[], None]] = []
 
@@ -89,14 +101,17 @@ def forget(scene: bpy.types.Scene) -> None:
 
 
 def camera_now(scene: bpy.types.Scene) -> tuple:
-    """What of the scene's camera and picture decides on levels; cheap, to see whether it has changed."""
+    """What of the scene's camera and picture decides on levels; cheap, to see whether it has changed.
+
+    Not where an object in focus is, and how far apart the eyes of a stereoscopic picture are.
+    """
     camera, render = scene.camera, scene.render
     if camera is None or camera.type != 'CAMERA':
         return ()
     data = camera.data
     matrix = tuple(round(value, 6) for row in camera.matrix_world for value in row)
-    lens = data.type, data.lens, data.ortho_scale, data.shift_x, data.shift_y, data.sensor_fit, data.clip_end
-    return camera.name, matrix, lens, (render.resolution_x, render.resolution_y, render.resolution_percentage)
+    lens = (*(getattr(data, name) for name in _LENS), *(getattr(data.dof, name) for name in _FOCUS))
+    return camera.name, matrix, lens, tuple(getattr(render, name) for name in _PICTURE)
 
 
 def is_outdated(scene: bpy.types.Scene) -> bool:

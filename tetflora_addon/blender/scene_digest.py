@@ -50,7 +50,6 @@ def scene_digest(
     TetFloraError
         The scene cannot be refined as it is.
     """
-    group = scene.tetflora
     if given is None:
         given = read_scene(scene, depsgraph, view_layer)
     content = hashlib.sha256()
@@ -60,7 +59,6 @@ def scene_digest(
         worn = [[getattr(material, "name_full", "") for material in slots] for slots in given.explicit.materials]
         explicit = meshes.surfaces, meshes.surface, meshes.linear, meshes.origin, worn
     species = [resolved_species(scene, identifier, depsgraph) for identifier in given.species]
-    materials = [(e.species, *(getattr(getattr(e, k), "name", "") for k in REPLACED)) for e in group.output.species]
     for part in (
         camera or read_camera(scene, depsgraph),
         given.seeds,
@@ -68,16 +66,20 @@ def scene_digest(
         given.lights,
         given.sources,
         explicit,
-        settings_from(scene),
-        [getattr(group, name) for name in _CHOICES],
+        choices(scene),
         [_digest_of_species(one) for one in species],
         [brought_materials(scene, identifier) for identifier in given.species],
-        materials,
-        wind_of(scene),
-        drawn_disc(scene.render.engine),
     ):
         digest_of(content, part)
     return content.hexdigest()
+
+
+def choices(scene: bpy.types.Scene) -> list:
+    """What of it a scene's own settings say, without a look at objects; cheap enough for every change."""
+    group = scene.tetflora
+    materials = [(e.species, *(getattr(getattr(e, k), "name", "") for k in REPLACED)) for e in group.output.species]
+    chosen = [getattr(group, name) for name in _CHOICES]
+    return [settings_from(scene), chosen, materials, wind_of(scene), drawn_disc(scene.render.engine)]
 
 
 def _digest_of_species(species: Species) -> str:
