@@ -18,6 +18,7 @@ from .plants.pieces import Pieces
 from .refinement.camera import Camera
 from .refinement.contents import Contents
 from .refinement.decisions import Decision
+from .refinement.descent import OPENED_AT_ONCE
 from .refinement.loop import SLACK, Refinement
 from .refinement.transition import Transition
 from .shading.facet_shares import facet_shares
@@ -182,7 +183,7 @@ def _facets(
                 yield species, kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5), False
     proxies = contents.within(~explicit)
     if len(proxies.polygons):
-        for facets, seen in polygon_facets(proxies, result, camera, facet_pixels):
+        for facets, seen in polygon_facets(proxies, result, camera, facet_pixels, FACETS_AT_ONCE):
             yield None, facets, seen
 
 
@@ -207,12 +208,15 @@ def _in_detail(
         large = seen[cell] & (extent > DETAIL * camera.extent_around(some.position))
         placed.append(some.take(~large))
         placed_cell.append(cell[~large])
-        some, cell = some.take(large), cell[large]
-        if len(some):
-            grown, owner, own, own_owner = open_subplants(flora, some)
+        below, below_cell, large = [Branches.empty()], [cell[:0]], np.flatnonzero(large)
+        for start in range(0, len(large), OPENED_AT_ONCE):
+            opened = large[start : start + OPENED_AT_ONCE]
+            grown, owner, own, own_owner = open_subplants(flora, some.take(opened))
             pieces.append(own)
-            piece_cell.append(cell[own_owner])
-            some, cell = grown, cell[owner]
+            piece_cell.append(cell[opened[own_owner]])
+            below.append(grown)
+            below_cell.append(cell[opened[owner]])
+        some, cell = Branches.concatenate(below), np.concatenate(below_cell)
     made = Contents.of(
         flora,
         Branches.concatenate(placed or [Branches.empty()]),

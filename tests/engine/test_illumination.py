@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tetflora_addon.refinement.light_views import Light
+from tetflora_addon.shading import light_buffers
 from tetflora_addon.shading.illumination import Illumination
 from tetflora_addon.shading.light_clouds import Clouds
 from tetflora_addon.shading.light_directions import DIRECTIONS, SOLID_ANGLE, harmonics, irradiance
@@ -306,6 +307,29 @@ def test_sheets_shadow_those_below_and_not_themselves() -> None:
     assert light[clear & ~covered] == pytest.approx(1.0, abs=1e-6)
     assert (light[clear & covered] < 0.1).all()
     assert light.mean() == pytest.approx((~covered).mean(), abs=0.05)
+
+
+def test_however_many_sheets_are_drawn_few_points_are_held_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Small ones and large ones, which are cut into many parts; the light is the same to the last digit."""
+    parts = [random_sheets(seed, 60, side) for seed, side in ((1, 0.01), (2, 0.1), (3, 0.6))]
+    corners, cell = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    sheets, held = Sheets.of(corners, cell, 6), []
+
+    def light() -> np.ndarray:
+        found = shadow_pass(box(5.0, 1), [SUN], DARK, resolution=128, sheets=sheets)
+        return next(found.direct(corners.mean(axis=1), cell, np.arange(len(cell))))[1]
+
+    once, inner = light(), light_buffers.LightBuffer._taps
+
+    def counted(buffer: light_buffers.LightBuffer, points: np.ndarray) -> object:
+        held.append(len(points))
+        return inner(buffer, points)
+
+    monkeypatch.setattr(light_buffers.LightBuffer, "_taps", counted)
+    monkeypatch.setattr(light_buffers, "POINTS_AT_ONCE", 5_000)
+    assert np.array_equal(light(), once)
+    assert sum(held) > 50_000
+    assert max(held) <= 5_000
 
 
 def test_samples_stand_for_their_key_points() -> None:

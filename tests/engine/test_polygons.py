@@ -275,6 +275,22 @@ def test_near_polygons_stay_and_far_ones_become_facets_of_the_same_area(anchored
     assert away.min(axis=1).max() < 1e-5
 
 
+def test_facets_of_polygons_come_in_runs_that_are_bounded_and_the_same() -> None:
+    meshes, camera = grove()
+    result = refined(meshes, camera, anchored=True)
+    proxies = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN))
+    made = []
+    for at_once in (np.inf, 100.0):
+        parts = list(polygon_facets(proxies, result, camera, 0.2, at_once))
+        made.append(
+            [np.concatenate([np.c_[f.centre, f.side] for f, s in parts if s == seen]) for seen in (True, False)]
+        )
+    assert all(map(np.array_equal, *made))
+    sizes = [len(facets) for facets, _ in parts]
+    assert sum(sizes) > 1_000
+    assert max(sizes) < 2 * 100
+
+
 def test_explicit_everywhere_is_the_original() -> None:
     meshes, camera = grove(6)
     result = refined(meshes, camera, leaf_limit=1e-6, hidden=-1.0, cutoff=1e-3, few_polygons=100)

@@ -117,3 +117,25 @@ def test_facets_do_not_depend_on_how_space_is_divided() -> None:
         parts = [f for b in facet_parts(flora, seen, camera, 0.3, Transition(flora, camera, 50.0)) for f, s in b if s]
         made.append({tuple(c) for f in parts for c in f.centre.round(5)})
     assert len(made[0] & made[1]) > 0.8 * len(made[0] | made[1])
+
+
+def test_few_are_opened_at_a_time_and_it_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    from tetflora_addon import facet_emission
+
+    flora, camera, result = scene()
+    transition, opened, inner = Transition(flora, camera, 50.0), [], facet_emission.open_subplants
+
+    def facets() -> np.ndarray:
+        parts = [f for block in facet_parts(flora, result, camera, 0.3, transition) for f, _ in block]
+        every = np.concatenate([np.column_stack([f.centre, f.along, f.side]) for f in parts])
+        return every[np.lexsort(every.T)]
+
+    def counted(flora, subplants):
+        opened.append(len(subplants))
+        return inner(flora, subplants)
+
+    once = facets()
+    monkeypatch.setattr(facet_emission, "open_subplants", counted)
+    monkeypatch.setattr(facet_emission, "OPENED_AT_ONCE", 40)
+    assert np.array_equal(facets(), once)
+    assert max(opened) == 40

@@ -89,7 +89,7 @@ class LightBuffer:
         # One number to sort and to look up by: the pixel, and the distance as its fraction.
         self._reach = float(entry.max(initial=0.0)) * 1.001 + 1e-9
         key = self._key(pixel, entry)
-        order = np.argsort(key)
+        order = np.argsort(key, kind="stable")  # others put equal ones in an order that depends on the processor
         self._order_key, self._cell = key[order], cell[order]
         self._pixel = pixel[order].astype(np.int32)
         # Sums need doubles; what is looked up does not.
@@ -130,28 +130,36 @@ class LightBuffer:
         # Smaller than a pixel, it is where its middle is; larger, no pixel between its parts may go without.
         pixels = longest / np.sqrt(np.maximum(pixel_area, 1e-18))
         cuts = np.where(pixels <= 1.0, 1, np.clip(np.ceil(2.0 * pixels), 1, _MOST_CUTS)).astype(int)
+        covered = seen / pixel_area
         for count in np.unique(cuts):
-            some = np.flatnonzero(cuts == count)
             x = (np.arange(count) + 0.5) / count
             u, v = np.repeat(x, count), np.tile(x, count)
             weights = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=1)
-            points = np.einsum("kc,mcx->mkx", weights, sheets[some]).reshape(-1, 3)
-            taps, inside = self._taps(points)
-            owner = np.repeat(some, count**2)[inside]
-            nearest = taps.pixel[np.arange(len(owner)), taps.weight.argmax(axis=1)] if len(owner) else owner
-            key, first, own = np.unique(
-                owner * (self.width * self.height) + nearest, return_index=True, return_inverse=True
-            )
-            share = np.bincount(own.ravel(), (seen / pixel_area)[owner] / count**2, len(key))
-            metres = np.bincount(own.ravel(), taps.metres, len(key)) / np.maximum(np.bincount(own.ravel()), 1)
-            depth = -np.log1p(-np.minimum(share, _MOST_COVERED))
-            yield (
-                numbers[owner[first]].astype(np.int32),
-                nearest[first].astype(np.int32),
-                metres,
-                np.zeros(len(key)),
-                depth,
-            )
+            share_of_part = covered / count**2
+            alike, step = np.flatnonzero(cuts == count), max(POINTS_AT_ONCE // int(count) ** 2, 1)
+            for start in range(0, len(alike), step):
+                some = alike[start : start + step]
+                points = np.einsum("kc,mcx->mkx", weights, sheets[some]).reshape(-1, 3)
+                owner, pixel, metres, share = self._gathered_parts(points, np.repeat(some, count**2), share_of_part)
+                depth = -np.log1p(-np.minimum(share, _MOST_COVERED))
+                yield numbers[owner].astype(np.int32), pixel.astype(np.int32), metres, np.zeros(len(owner)), depth
+
+    def _gathered_parts(
+        self, points: NDArray[np.float64], owner: NDArray[np.int64], covered: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Parts of sheets by sheet and nearest pixel: both (f,), their mean distance (f,), and what share they cover.
+
+        Parts are at ``points`` (m, 3), of sheets ``owner`` (m,); each of sheet i covers ``covered[i]`` of a pixel.
+        """
+        taps, inside = self._taps(points)
+        owner = owner[inside]
+        nearest = taps.pixel[np.arange(len(owner)), taps.weight.argmax(axis=1)] if len(owner) else owner
+        key, first, own = np.unique(
+            owner * (self.width * self.height) + nearest, return_index=True, return_inverse=True
+        )
+        share = np.bincount(own.ravel(), covered[owner], len(key))
+        metres = np.bincount(own.ravel(), taps.metres, len(key)) / np.maximum(np.bincount(own.ravel()), 1)
+        return owner[first], nearest[first], metres, share
 
     def _near_view(self, sheets: NDArray[np.floating], margin: float) -> NDArray[np.bool_]:
         """Which sheets (m,) may reach into a sun's view, which may be a part of the scene; of other lights all."""

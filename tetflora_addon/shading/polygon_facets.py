@@ -15,6 +15,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from ..plants.expansion import chunks
 from ..plants.growth import spread
 from ..plants.hashing import child_key, key_of_seed, mix, stepped, uniform
 from ..plants.vectors import unit
@@ -30,9 +31,14 @@ _PLACE_U, _PLACE_V = 222, 223
 
 
 def polygon_facets(
-    contents: Contents, result: Refinement, camera: Camera, facet_pixels: float
+    contents: Contents, result: Refinement, camera: Camera, facet_pixels: float, at_once: float = np.inf
 ) -> Iterator[tuple[Facets, bool]]:
     """Facets of the polygons of proxies (``contents``) that are not kept as they are, see `facet_sizes`.
+
+    Parameters
+    ----------
+    at_once : float
+        Facets that are made at a time, about.
 
     Yields
     ------
@@ -41,13 +47,17 @@ def polygon_facets(
     """
     sizes = polygon_facet_sizes(contents, camera, result.chosen(Decision.HIDDEN))
     side, inside = sizes.sides(facet_pixels), result.in_view[contents.polygon_cell]
-    left = ~sizes.kept(facet_pixels)
-    for hidden in (False, True):
-        some = np.flatnonzero(left & inside & (sizes.hidden == hidden))
-        yield chosen_facets(contents.polygons.take(some), sizes.optical[some], side[some]), not hidden
-    some = np.flatnonzero(left & ~inside)
-    beside = chosen_facets(contents.polygons.take(some), sizes.optical[some], side[some])
-    yield kept_out_of_view(beside, camera.clearance, HIDDEN_FACES**-0.5), False
+    left, expected = ~sizes.kept(facet_pixels), sizes.counts(facet_pixels) + 1  # polygons take memory too
+    for alike, seen, beside in (
+        (inside & ~sizes.hidden, True, False),
+        (inside & sizes.hidden, False, False),
+        (~inside, False, True),
+    ):
+        chosen = np.flatnonzero(left & alike)
+        for run in chunks(expected[chosen], at_once):
+            some = chosen[run]
+            made = chosen_facets(contents.polygons.take(some), sizes.optical[some], side[some])
+            yield kept_out_of_view(made, camera.clearance, HIDDEN_FACES**-0.5) if beside else made, seen
 
 
 def chosen_facets(polygons: Polygons, optical: NDArray[np.float64], side: NDArray[np.float64]) -> Facets:
