@@ -2,21 +2,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Make ordinary meshes of the selected plants."""
 
+from collections.abc import Generator
+
 import bpy
 
-from ..tetflora_addon.blender.plant_mesh import make_plant_meshes
+from ..tetflora_addon.blender.job import Progress
+from ..tetflora_addon.blender.plant_mesh import make_plant_mesh_steps
 from . import ids
-from .base import Reporting, counted, in_object_mode, plants_selected, select_only, selected_plants
+from .base import counted, in_object_mode, plants_selected, select_only, selected_plants
+from .modal_job import ModalJob
 
 
-class TETFLORA_OT_make_plant_mesh(Reporting, bpy.types.Operator):
+class TETFLORA_OT_make_plant_mesh(ModalJob, bpy.types.Operator):
     """Turn the selected plants into meshes to edit, export and keep."""
 
     bl_idname = ids.MAKE_PLANT_MESH
     bl_label = "Make Plants Real Meshes"
     bl_description = (
         "Make an ordinary mesh object of each selected plant, with every branch and leaf, to edit, export or animate. "
-        "The plant itself stays, disabled; Clear leaves the mesh alone"
+        "The plant itself stays, disabled; Clear leaves the mesh alone. Esc cancels and leaves the scene as it was"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
@@ -24,8 +28,10 @@ class TETFLORA_OT_make_plant_mesh(Reporting, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         return in_object_mode(cls, context) and plants_selected(cls, context)
 
-    def run(self, context: bpy.types.Context) -> set[str]:
-        made = make_plant_meshes(context.scene, context.evaluated_depsgraph_get(), selected_plants(context))
+    def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, list[bpy.types.Object]]:
+        return make_plant_mesh_steps(context.scene, context.evaluated_depsgraph_get(), selected_plants(context))
+
+    def finish(self, context: bpy.types.Context, made: list[bpy.types.Object]) -> set[str]:
         context.view_layer.update()
         select_only(context, made)
         polygons = sum(len(obj.data.polygons) for obj in made)

@@ -54,6 +54,9 @@ class ModalJob(Reporting):
             # The scene is read in the second step: what is wrong with it is said while the artist still looks here.
             for _ in range(2):
                 progress = next(self._steps)
+        except StopIteration as stop:
+            self._steps = None
+            return self.finish(context, stop.value)
         except TetFloraError as error:
             self.report({'ERROR'}, str(error))
             return {'CANCELLED'}

@@ -7,6 +7,7 @@ from bpy.props import EnumProperty, StringProperty
 
 from ..tetflora_addon.blender.plant_fields import fields_of
 from ..tetflora_addon.blender.plant_objects import plants_of, remove_fields, remove_plants
+from ..tetflora_addon.blender.populations import recount
 from . import ids
 from .base import Reporting, counted, in_object_mode
 
@@ -53,5 +54,6 @@ class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
             self.report({'WARNING'}, f"{none[self.which]}; nothing removed")
             return {'CANCELLED'}
         number = remove_plants(plants) + remove_fields(fields)
+        recount(context.scene)
         self.report({'INFO'}, f"{counted(number, 'plant')} removed")
         return {'FINISHED'}

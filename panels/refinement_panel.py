@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Refinement: how fine, in which form, and the buttons that make it and clear it."""
+"""Refinement: how fine, and in which form."""
 
 import bpy
 
-from ..operators import ids
 from ..operators.mark_explicit import can_be_explicit
 from ..tetflora_addon.blender import auto_refresh
 from ..tetflora_addon.blender.shell_bounces import few_bounces
@@ -21,15 +20,6 @@ class TETFLORA_PT_refinement(SidebarPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = split_layout(self)
         settings = context.scene.tetflora
-        # First, because the tab is longer than most screens are tall.
-        row = layout.row(align=True)
-        row.scale_y = 1.4
-        row.operator(ids.REFINE, icon='MOD_DECIM')
-        row.operator(ids.CLEAR, icon='TRASH')
-        if context.scene.camera is None:
-            draw_message(context, layout, "The scene has no camera: add one, and make it active with Ctrl Numpad 0")
-        elif not settings.refine_at_render and not settings.statistics:
-            draw_message(context, layout, "Nothing is refined: renders show no plants", 'INFO')
         column = layout.column()
         column.active = not settings.expand_everything
         column.prop(settings, "quality")

@@ -7,8 +7,7 @@ from functools import lru_cache
 
 import bpy
 
-from ..tetflora_addon.blender.handlers import render_errors
-from .base import SidebarPanel, draw_message
+from .base import SidebarPanel
 
 
 @lru_cache(maxsize=8)
@@ -44,11 +43,10 @@ class TETFLORA_PT_statistics(SidebarPanel, bpy.types.Panel):
 
     bl_label = "Statistics"
     bl_order = 3
+    bl_options = {'DEFAULT_CLOSED'}
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
-        for error in render_errors()[-1:]:
-            draw_message(context, layout, error)
         rows = rows_of(context.scene.tetflora.statistics)
         if not rows:
             layout.label(text="Nothing refined yet", icon='INFO')

@@ -99,6 +99,17 @@ def test_a_name_and_what_became_of_it_are_no_settings():
     assert not _outdated()
 
 
+def test_populations_know_what_was_removed():
+    import bpy
+
+    population = _populate()
+    select(*part("populations").own_objects(bpy.context.scene, population)[:3])
+    bpy.ops.tetflora.remove_plants(which='SELECTED')
+    assert population.made == 17
+    bpy.ops.tetflora.remove_plants(which='ALL')
+    assert population.made == 0
+
+
 def test_it_is_known_in_a_file_that_is_opened(tmp_path):
     import bpy
 

@@ -41,6 +41,21 @@ def test_the_mesh_is_the_plant_that_expanding_everything_gives():
     assert np.abs(_faces(made) - expected).max() < 1e-4
 
 
+def test_esc_takes_back_what_was_made():
+    import bpy
+
+    plants = [add_plant(f"plant {i}", location=(3.0 * i, 0.0, 0.0)) for i in range(3)]
+    plants[0].tetflora.enabled = False
+    before = {o.name: o.tetflora.enabled for o in bpy.data.objects}
+    steps = part("plant_mesh").make_plant_mesh_steps(bpy.context.scene, depsgraph(), plants)
+    told = [next(steps) for _ in range(3)]
+    assert [round(p.fraction * 3) for p in told] == [0, 1, 2]
+    assert len(bpy.data.objects) == 5
+    steps.close()
+    assert {o.name: o.tetflora.enabled for o in bpy.data.objects} == before
+    assert len(bpy.data.meshes) == 0
+
+
 def test_it_is_the_artists_and_survives_clear():
     import bpy
 

@@ -139,6 +139,7 @@ def press_button(ui, operator):
         ui.press('C', ctrl=True)
         yield 0.03
         if manager.clipboard.startswith(f"bpy.ops.{operator}("):
+            ui.values.setdefault("below_top", {})[operator] = region.y + region.height - y
             break
     else:
         raise LookupError(f"the sidebar shows no button for {operator}")

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Generator, Iterable
 from dataclasses import dataclass, replace
 
 import bpy
@@ -116,7 +116,21 @@ def plant_mesh(scene: bpy.types.Scene, name: str, species: Species, parts: list[
 def make_plant_meshes(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, plants: Iterable[bpy.types.Object]
 ) -> list[bpy.types.Object]:
+    """Make ordinary mesh objects of plants at once; see `make_plant_mesh_steps`."""
+    steps = make_plant_mesh_steps(scene, depsgraph, plants)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as stop:
+            return stop.value
+
+
+def make_plant_mesh_steps(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, plants: Iterable[bpy.types.Object]
+) -> Generator[job.Progress, object, list[bpy.types.Object]]:
     """Make ordinary mesh objects of plants, in their places and collections; the plants are disabled, not deleted.
+
+    A step for each plant; closed before its end, it takes back what was made.
 
     Parameters
     ----------
@@ -127,13 +141,19 @@ def make_plant_meshes(
     plants : iterable of bpy.types.Object
         Plants; each gives an object of its own, whose mesh nobody shares.
 
+    Returns
+    -------
+    list of bpy.types.Object
+        In the order of the plants.
+
     Raises
     ------
     TetFloraError
         A species or place that cannot be used, or too many polygons; nothing is made then.
     """
     plants = list(plants)
-    frame, scale, sound = frames_of(np.array([world_matrix(p, depsgraph)[:3, :3] for p in plants]).reshape(-1, 3, 3))
+    world = np.array([world_matrix(p, depsgraph) for p in plants]).reshape(-1, 4, 4)
+    frame, scale, sound = frames_of(world[:, :3, :3])
     for plant, good in zip(plants, sound, strict=True):
         if not good:
             raise SceneError(f'"{plant.name}": scale 0 or no valid position; give a scale above 0 (Alt S resets it)')
@@ -144,20 +164,38 @@ def make_plant_meshes(
         raise SceneError(
             f"{len(plants):,} plants have some {polygons:,.0f} polygons, more than {MOST_POLYGONS:,}; select fewer"
         )
-    made = []
-    for number, (plant, seed) in enumerate(zip(plants, seeds, strict=True)):
-        flora = floras[kind_of(plant)]
-        mesh = plant_mesh(scene, f"{plant.name} mesh", flora.species[0], plant_parts(flora, seed))
-        obj = bpy.data.objects.new(mesh.name, mesh)
-        for collection in plant.users_collection:
-            collection.objects.link(obj)
-        place = Matrix((frame[number] * scale[number]).tolist()).to_4x4()
-        place.translation = world_matrix(plant, depsgraph)[:3, 3].tolist()
-        if plant.parent is not None:  # what carries the plant carries its mesh
-            obj.parent = plant.parent
-            obj.parent_type, obj.parent_bone = plant.parent_type, plant.parent_bone
-            obj.matrix_parent_inverse = plant.matrix_parent_inverse
-        obj.matrix_world = place
-        plant.tetflora.enabled = False
-        made.append(obj)
+    made, switched = [], []
+    whole = False
+    try:
+        for number, (plant, seed) in enumerate(zip(plants, seeds, strict=True)):
+            yield job.Progress(number / len(plants), f"mesh {number + 1:,} of {len(plants):,}")
+            flora = floras[kind_of(plant)]
+            mesh = plant_mesh(scene, f"{plant.name} mesh", flora.species[0], plant_parts(flora, seed))
+            made.append(_placed(mesh, plant, frame[number] * scale[number], world[number, :3, 3]))
+            if plant.tetflora.enabled:
+                plant.tetflora.enabled = False
+                switched.append(plant)
+        whole = True
+    finally:
+        if not whole:
+            bpy.data.batch_remove([obj.data for obj in made])  # and the objects with them
+            for plant in switched:
+                plant.tetflora.enabled = True
     return made
+
+
+def _placed(
+    mesh: bpy.types.Mesh, plant: bpy.types.Object, frame: NDArray[np.float64], position: NDArray[np.float64]
+) -> bpy.types.Object:
+    """An object of a plant's mesh in the plant's collections, at its place (3,) with its axes (3, 3)."""
+    obj = bpy.data.objects.new(mesh.name, mesh)
+    for collection in plant.users_collection:
+        collection.objects.link(obj)
+    if plant.parent is not None:  # what carries the plant carries its mesh
+        obj.parent = plant.parent
+        obj.parent_type, obj.parent_bone = plant.parent_type, plant.parent_bone
+        obj.matrix_parent_inverse = plant.matrix_parent_inverse
+    place = Matrix(frame.tolist()).to_4x4()
+    place.translation = position.tolist()
+    obj.matrix_world = place
+    return obj

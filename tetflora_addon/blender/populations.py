@@ -61,6 +61,12 @@ class Made:
     erased: int
 
 
+def recount(scene: bpy.types.Scene) -> None:
+    """Let populations know how many plants they still have, after some were removed."""
+    for population in scene.tetflora.populations:
+        population.made = own_number(own_objects(scene, population))
+
+
 def add_population(
     scene: bpy.types.Scene,
     grounds: Iterable[bpy.types.Object] = (),

@@ -22,24 +22,38 @@ def present_species(editor: bpy.types.PropertyGroup) -> str:
     return editor.species or next(iter(catalogue()), "")
 
 
+def _data_of(editor: bpy.types.PropertyGroup) -> dict[str, Any]:
+    """The decoded species that the editor shows; empty where there is none that could be shown."""
+    try:
+        return species_data(editor.id_data, present_species(editor))
+    except SpeciesError:
+        return {}
+
+
+def _orders_in(data: dict[str, Any]) -> list[dict[str, Any]]:
+    orders = data.get("orders")
+    return orders if isinstance(orders, list) and all(isinstance(o, dict) for o in orders) else []
+
+
 def orders_of(editor: bpy.types.PropertyGroup) -> list[dict[str, Any]]:
     """Decoded orders of the species that the editor shows; empty where there is none that could be shown."""
-    try:
-        orders = species_data(editor.id_data, present_species(editor)).get("orders")
-    except SpeciesError:
-        return []
-    return orders if isinstance(orders, list) and all(isinstance(o, dict) for o in orders) else []
+    return _orders_in(_data_of(editor))
 
 
 def parts_of(editor: bpy.types.PropertyGroup) -> list[dict[str, Any]]:
     """The orders, and after them the short shoot of species that have one."""
-    spur = species_value(editor, "spur", None)
-    return orders_of(editor) + ([spur] if isinstance(spur, dict) and orders_of(editor) else [])
+    data = _data_of(editor)  # looked up once: each slider of the panel asks for it at each redraw
+    orders, spur = _orders_in(data), data.get("spur")
+    return orders + ([spur] if isinstance(spur, dict) and orders else [])
 
 
 def present_order(editor: bpy.types.PropertyGroup) -> int:
     """Index among `parts_of` of what the sliders show."""
-    return max(min(editor.order_index, len(parts_of(editor)) - 1), 0)
+    return _order_in(editor, parts_of(editor))
+
+
+def _order_in(editor: bpy.types.PropertyGroup, parts: list[dict[str, Any]]) -> int:
+    return max(min(editor.order_index, len(parts) - 1), 0)
 
 
 def order_label(index: int, order: dict[str, Any], spur: bool = False) -> str:
@@ -60,7 +74,8 @@ def _count(value: Any) -> str:
 
 def value_of(editor: bpy.types.PropertyGroup, name: str) -> Any:
     """Value of a key of the shown order as JSON; the default if the file does not give it."""
-    parts, index, key = parts_of(editor), present_order(editor), ORDER_KEYS[name]
+    parts, key = parts_of(editor), ORDER_KEYS[name]
+    index = _order_in(editor, parts)
     if parts and name in parts[index]:
         return parts[index][name]
     try:
@@ -73,10 +88,7 @@ def value_of(editor: bpy.types.PropertyGroup, name: str) -> Any:
 
 def species_value(editor: bpy.types.PropertyGroup, name: str, default: Any) -> Any:
     """Value of a key of the whole species as JSON."""
-    try:
-        return species_data(editor.id_data, present_species(editor)).get(name, default)
-    except SpeciesError:
-        return default
+    return _data_of(editor).get(name, default)
 
 
 def set_species_value(editor: bpy.types.PropertyGroup, name: str, value: Any) -> None:

@@ -1,0 +1,33 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Refine and Clear on top of the tab, which is longer than most screens are tall, and what keeps renders bare."""
+
+import bpy
+
+from ..operators import ids
+from ..tetflora_addon.blender.first_forest import is_first_forest
+from ..tetflora_addon.blender.handlers import render_errors
+from .base import SidebarPanel, draw_message
+
+
+class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
+    """Refine and clear."""
+
+    bl_label = "Refine"
+    bl_order = -2
+    bl_options = {'HIDE_HEADER'}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, settings = self.layout, context.scene.tetflora
+        row = layout.row(align=True)
+        row.scale_y = 1.4
+        row.operator(ids.REFINE, icon='MOD_DECIM')
+        row.operator(ids.CLEAR, icon='TRASH')
+        for error in render_errors()[-1:]:
+            draw_message(context, layout, error)
+        if context.scene.camera is None:
+            draw_message(context, layout, "The scene has no camera: add one, and make it active with Ctrl Numpad 0")
+        elif is_first_forest(context.scene) and not settings.statistics:
+            layout.label(text="Refine, then F12", icon='INFO')
+        elif not settings.refine_at_render and not settings.statistics:
+            draw_message(context, layout, "Nothing is refined: renders show no plants", 'INFO')
