@@ -14,6 +14,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -79,7 +80,8 @@ def victim(run: Run, full_blender: str, forest: Path, tmp_path: Path) -> Iterato
             time.sleep(delay)
             assert process.poll() is None, "".join(said)
         finally:
-            os.killpg(process.pid, signal.SIGKILL)
+            with suppress(ProcessLookupError):  # it has ended by itself, which the assertion tells
+                os.killpg(process.pid, signal.SIGKILL)
             process.communicate()
         return path
 

@@ -5,6 +5,7 @@
 import bpy
 
 STEPS = 12  # positions of the mouse on its way
+ATTEMPTS = 5  # Blender reads the library in the background, and does not say when it is done
 
 
 def steps(ui):
@@ -20,12 +21,30 @@ def steps(ui):
     params = browser.spaces.active.params
     params.asset_library_reference = "TetFlora"
     params.display_size = 96
-    yield 6.0
+    yield 4.0
     yield from ui.picture("browser")
     region = next(r for r in browser.regions if r.type == 'WINDOW')
     ui.values["browser"] = [region.x, region.y, region.width, region.height]
     ui.values["before"] = sorted(o.name for o in bpy.data.objects)
-    x, y = region.x + 60, region.y + region.height - 60
+    for _ in range(ATTEMPTS):
+        yield from dragged(ui, region.x + 60, region.y + region.height - 60)
+        for _ in range(12):
+            yield 0.5
+            if dropped := len(bpy.data.objects) > len(ui.values["before"]):
+                break
+        if dropped:
+            break
+    yield 1.0
+    yield from ui.picture("dropped")
+    scene = bpy.context.scene
+    new = [o for o in scene.objects if o.name not in ui.values["before"]]
+    ui.values["plants"] = [(o.name, o.tetflora.is_plant, o.tetflora.species, o.library is None) for o in new]
+    ui.values["marks"] = [key for o in new for key in list(o.keys()) if key != "tetflora"]
+    ui.values["locked"] = scene.render.use_lock_interface
+
+
+def dragged(ui, x, y):
+    """Drag what is there to the middle of the viewport."""
     to_x, to_y = ui.centre()
     ui.move(x, y)
     yield 0.5
@@ -36,10 +55,3 @@ def steps(ui):
         yield 0.2
     yield from ui.picture("dragging")
     ui.window.event_simulate(type='LEFTMOUSE', value='RELEASE', x=to_x, y=to_y)
-    yield 1.5
-    yield from ui.picture("dropped")
-    scene = bpy.context.scene
-    new = [o for o in scene.objects if o.name not in ui.values["before"]]
-    ui.values["plants"] = [(o.name, o.tetflora.is_plant, o.tetflora.species, o.library is None) for o in new]
-    ui.values["marks"] = [key for o in new for key in list(o.keys()) if key != "tetflora"]
-    ui.values["locked"] = scene.render.use_lock_interface
