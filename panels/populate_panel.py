@@ -6,7 +6,7 @@ import bpy
 
 from ..operators import ids
 from ..tetflora_addon.blender import point_preview
-from ..tetflora_addon.blender.population_rules import is_outdated, shown_population
+from ..tetflora_addon.blender.population_rules import awaits_update, is_outdated, shown_population
 from .base import SidebarPanel, draw_message, split_layout
 from .lists import TETFLORA_UL_mix, draw_list
 
@@ -197,7 +197,7 @@ def _draw_status(context: bpy.types.Context, layout: bpy.types.UILayout, setting
     """How many plants as what, and why not more; the switch of the preview."""
     shown = point_preview.shown_in(context.scene)
     row = layout.row(align=True)
-    waiting = settings.uid and (not settings.made or not settings.placed_by or is_outdated(settings))
+    waiting = awaits_update(settings)
     # In the place of the other text: a line that comes and goes would move the slider away from under the mouse.
     text = point_preview.status(settings)
     row.label(text=f"Update: {text}" if waiting else text, icon='FILE_REFRESH' if waiting else 'INFO')

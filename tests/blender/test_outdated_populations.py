@@ -110,6 +110,28 @@ def test_populations_know_what_was_removed():
     assert population.made == 0
 
 
+def test_the_panel_tells_the_plants_that_are_there_or_that_an_update_would_place():
+    import bpy
+
+    status = part("point_preview").status
+    waits = part("population_rules").awaits_update
+    population = _populate()
+    part("erased_places").note_erased(population, [(0.0, 0.0)], 5.0)
+    bpy.ops.tetflora.update_population()
+    assert 0 < population.made < 20
+    assert (status(population), waits(population)) == (f"{population.made} plants, as empties", False)
+    population.count = 33
+    assert (status(population), waits(population)) == ("33 plants, as empties", True)
+    population.by_density = True
+    assert (status(population), waits(population)) == ("As many plants as the ground takes", True)
+    bpy.ops.tetflora.forget_erased()
+    bpy.ops.tetflora.update_population()
+    assert (status(population), waits(population)) == (f"{population.made:,} plants, as empties", False)
+    bpy.ops.tetflora.add_population()
+    assert waits(bpy.context.scene.tetflora.populations[1])
+    assert not waits(bpy.context.scene.tetflora.populate)
+
+
 def test_it_is_known_in_a_file_that_is_opened(tmp_path):
     import bpy
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..errors import TetFloraError
 from . import compat, population_properties, species_edits
 from .population_ground import place_population
-from .population_rules import makes_field, shown_population
+from .population_rules import awaits_update, makes_field, shown_population
 from .populations import own_objects
 
 #: Dots that are drawn at most, evenly chosen among the plants.
@@ -138,8 +138,10 @@ def status(population: bpy.types.PropertyGroup) -> str:
     dots = found_for(population)
     if dots is not None:
         number, known = dots.plants, not dots.more or population.by_density
+    elif population.uid and not awaits_update(population):
+        number, known = population.made, True
     elif population.by_density:
-        number, known = population.made, population.made > 0
+        number, known = 0, False
     else:
         number, known = population.count, True
     if dots is not None and dots.more and not population.by_density:

@@ -58,6 +58,13 @@ def is_outdated(population: TetFloraPopulation) -> bool:
     return bool(population.placed_by) and not population.frozen and population.placed_by != fingerprint(population)
 
 
+def awaits_update(population: TetFloraPopulation) -> bool:
+    """Whether a population has no plants yet, or others than an update would give it."""
+    if not population.uid or population.frozen:
+        return False
+    return not population.made or not population.placed_by or is_outdated(population)
+
+
 def copy_settings(source: TetFloraPopulation, target: TetFloraPopulation) -> None:
     """Give a population the settings of another; identity, grounds and plants stay its own."""
     for prop in settings_of(source):
