@@ -34,25 +34,33 @@ def in_object_mode(cls: type[bpy.types.Operator], context: bpy.types.Context) ->
     return False
 
 
+LINKED = (
+    "The plants are linked from another file; choose Object > Relations > Make Local, or Object > Library "
+    "Override > Make"
+)
+
+
 def plants_selected(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """Poll: at least one plant is selected."""
-    if any(obj.tetflora.is_plant for obj in context.selected_objects):
+    """Poll: at least one plant is selected that this file may change."""
+    plants = plants_of(context.selected_objects)
+    if any(obj.library is None for obj in plants):
         return True
-    cls.poll_message_set("Select plants first")
+    cls.poll_message_set(LINKED if plants else "Select plants first")
     return False
 
 
 def plants_or_fields_selected(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """Poll: at least one plant or field of plants is selected."""
-    if any(obj.tetflora.is_plant or obj.tetflora.is_field for obj in context.selected_objects):
+    """Poll: at least one plant or field of plants is selected that this file may change."""
+    found = [obj for obj in context.selected_objects if obj.tetflora.is_plant or obj.tetflora.is_field]
+    if any(obj.library is None for obj in found):
         return True
-    cls.poll_message_set("Select plants first, or a field of plants")
+    cls.poll_message_set(LINKED if found else "Select plants first, or a field of plants")
     return False
 
 
 def selected_plants(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """Selected plants."""
-    return plants_of(context.selected_objects)
+    """Selected plants that this file may change: those that are linked would be as before when it is opened again."""
+    return [obj for obj in plants_of(context.selected_objects) if obj.library is None]
 
 
 def select_only(context: bpy.types.Context, objects: list[bpy.types.Object]) -> None:

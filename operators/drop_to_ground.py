@@ -34,7 +34,7 @@ class TETFLORA_OT_drop_to_ground(Reporting, bpy.types.Operator):
         if not len(ground):
             self.report({'ERROR'}, "The view shows no mesh to fall onto; add ground, or show it")
             return {'CANCELLED'}
-        plants = [o for o in selected_plants(context) if o.library is None]
+        plants = selected_plants(context)
         fields = fields_of(context.selected_objects)
         moved, missed = drop_plants(plants, ground)
         for field in fields:

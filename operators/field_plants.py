@@ -5,7 +5,7 @@
 import bpy
 
 from ..tetflora_addon.blender.plant_fields import FIELD_TYPES, fields_of
-from ..tetflora_addon.blender.plant_objects import field_from_plants, plants_from_field, prepare_scene
+from ..tetflora_addon.blender.plant_objects import field_from_plants, plants_from_field, plants_of, prepare_scene
 from ..tetflora_addon.blender.population_properties import MOST_EMPTIES
 from ..tetflora_addon.blender.species_items import default_species
 from . import ids
@@ -62,8 +62,8 @@ class TETFLORA_OT_make_field(Reporting, bpy.types.Operator):
         return in_object_mode(cls, context) and plants_selected(cls, context)
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        selected = selected_plants(context)
-        plants = [o for o in selected if o.tetflora.enabled and not o.hide_render and o.library is None]
+        selected = plants_of(context.selected_objects)
+        plants = [o for o in selected_plants(context) if o.tetflora.enabled and not o.hide_render]
         if not plants:
             self.report({'WARNING'}, "The selected plants are disabled, hidden in renders, or linked; nothing changed")
             return {'CANCELLED'}

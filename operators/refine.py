@@ -7,6 +7,7 @@ from collections.abc import Generator
 import bpy
 
 from ..tetflora_addon.blender import auto_refresh, job
+from ..tetflora_addon.blender.handlers import forget_render_errors
 from ..tetflora_addon.blender.plant_objects import plants_of, prepare_scene
 from ..tetflora_addon.blender.shell_bounces import few_bounces
 from ..tetflora_addon.blender.world_reader import read_world
@@ -47,6 +48,7 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
 
     def finish(self, context: bpy.types.Context, statistics: Statistics) -> set[str]:
         prepare_scene(context.scene)
+        forget_render_errors()
         for area in context.screen.areas if context.screen else ():
             area.tag_redraw()
         self.report(

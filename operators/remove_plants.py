@@ -9,7 +9,7 @@ from ..tetflora_addon.blender.plant_fields import fields_of
 from ..tetflora_addon.blender.plant_objects import plants_of, remove_fields, remove_plants
 from ..tetflora_addon.blender.populations import recount
 from . import ids
-from .base import Reporting, counted, in_object_mode
+from .base import LINKED, Reporting, counted, in_object_mode
 
 
 class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
@@ -45,7 +45,11 @@ class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
         objects = context.selected_objects if self.which == 'SELECTED' else context.scene.objects
         plants = [o for o in plants_of(objects) if self.which != 'SPECIES' or o.tetflora.species == self.species]
         fields = [] if self.which == 'SPECIES' else fields_of(objects)
-        if not plants and not fields:
+        local = [o for o in (*plants, *fields) if o.library is None]
+        if (plants or fields) and not local:
+            self.report({'WARNING'}, f"{LINKED}; nothing removed")
+            return {'CANCELLED'}
+        if not local:
             none = {
                 'SELECTED': "No plants are selected",
                 'SPECIES': f'The scene has no plants of species "{self.species}"',

@@ -14,8 +14,7 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
     """Refine and clear."""
 
     bl_label = "Refine"
-    bl_order = -2
-    bl_options = {'HIDE_HEADER'}
+    bl_order = -2  # with a header: a panel without one has no ground under its texts where the sidebar is transparent
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, context.scene.tetflora

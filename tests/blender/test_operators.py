@@ -158,6 +158,26 @@ def test_disabled_buttons_say_why(name, says):
         getattr(_ops(), name)()
 
 
+def test_what_a_render_could_not_use_is_forgotten_once_refine_can():
+    import bpy
+
+    scene, handlers = _small_forest(), part("handlers")
+    plant = next(o for o in scene.objects if o.tetflora.is_plant)
+    plant.scale = (0.0, 0.0, 0.0)
+    bpy.context.view_layer.update()
+    handlers.on_render_init(scene)
+    handlers.on_render_pre(scene)
+    handlers.on_render_end(scene)
+    assert len(handlers.render_errors()) == 1
+    with pytest.raises(RuntimeError, match="scale 0"):
+        _ops().refine()
+    assert len(handlers.render_errors()) == 1
+    plant.scale = (1.0, 1.0, 1.0)
+    bpy.context.view_layer.update()
+    _ops().refine()
+    assert handlers.render_errors() == []
+
+
 def test_refine_makes_meshes_and_figures_and_clear_takes_them_back():
     import bpy
 

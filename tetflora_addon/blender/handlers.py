@@ -63,6 +63,11 @@ def render_errors() -> list[str]:
     return list(_rendering.errors)
 
 
+def forget_render_errors() -> None:
+    """What stood in the way of the last render is gone: Refine has made the plants."""
+    _rendering.errors.clear()
+
+
 @persistent
 def on_render_init(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     """A render starts: earlier errors are past, unless it is part of another one."""

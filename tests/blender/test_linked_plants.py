@@ -1,0 +1,85 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Plants of a linked file: they are refined, but no button changes them, as the change would be gone after loading."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.blender.scenes import add_camera, add_mesh, add_plant, select
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+
+@pytest.fixture
+def linked(clean_file, tmp_path):
+    """Linked plants of another file in the scene, selected."""
+    import bpy
+
+    select(add_mesh("ground", size=10.0))
+    bpy.ops.tetflora.populate(count=4, species="bush")
+    path = str(tmp_path / "library.blend")
+    bpy.data.libraries.write(path, {bpy.context.scene.tetflora.populations[0].collection})
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    with bpy.data.libraries.load(path, link=True) as (found, wanted):
+        wanted.collections = list(found.collections)
+    bpy.context.scene.collection.children.link(wanted.collections[0])
+    plants = [o for o in bpy.context.scene.objects if o.tetflora.is_plant]
+    assert len(plants) == 4
+    select(*plants)
+    return plants
+
+
+def _state(plants):
+    return [(o.name, o.tetflora.species, o.tetflora.seed, o.tetflora.enabled) for o in plants]
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("reseed", {}),
+        ("assign_species", {"species": "oak"}),
+        ("make_plant_mesh", {}),
+        ("make_field", {}),
+        ("drop_to_ground", {}),
+    ],
+)
+def test_buttons_say_that_they_are_linked_and_change_nothing(linked, name, options):
+    import bpy
+
+    before, objects = _state(linked), len(bpy.data.objects)
+    with pytest.raises(RuntimeError, match="linked from another file"):
+        getattr(bpy.ops.tetflora, name)(**options)
+    assert _state(linked) == before
+    assert len(bpy.data.objects) == objects
+
+
+@pytest.mark.parametrize("which", ['SELECTED', 'ALL'])
+def test_they_are_not_removed_and_it_is_said(linked, which, capfd):
+    import bpy
+
+    assert bpy.ops.tetflora.remove_plants(which=which) == {'CANCELLED'}
+    assert "linked from another file" in capfd.readouterr().out
+    assert len(_state(linked)) == 4
+
+
+def test_plants_of_this_file_among_them_are_changed(linked):
+    import bpy
+
+    before = _state(linked)
+    own = add_plant("own", location=(3.0, 0.0, 0.0))
+    seed = own.tetflora.seed
+    select(own, *linked)
+    bpy.ops.tetflora.reseed()
+    bpy.ops.tetflora.make_plant_mesh()
+    assert own.tetflora.seed != seed
+    assert [o.name for o in bpy.data.objects if o.type == 'MESH'] == ["own mesh"]
+    assert _state(linked) == before
+
+
+def test_they_are_refined(linked):
+    import bpy
+
+    add_camera()
+    assert bpy.ops.tetflora.refine() == {'FINISHED'}
+    assert '"plants": 4' in bpy.context.scene.tetflora.statistics
