@@ -57,6 +57,18 @@ def test_refine_saves_a_copy_with_the_result(forest, tmp_path, capfd):
     assert part("job").clear(bpy.context.scene) > 0
 
 
+def test_two_slashes_lead_from_the_file(forest, tmp_path, capfd):
+    import bpy
+
+    (tmp_path / "shots").mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shots" / "shot.blend"))
+    assert _run("refine", "--save", "//../refined.blend") == 0
+    assert (tmp_path / "refined.blend").is_file()
+    assert _run("render", "--output", "//pictures/a", "--json") == 0
+    assert Path(_figures(capfd)["files"][0]) == tmp_path / "shots" / "pictures" / "a.png"
+    assert (tmp_path / "shots" / "pictures" / "a.png").is_file()
+
+
 def test_light_is_baked_on_demand(forest, tmp_path, capfd):
     assert _run("refine", "--baked-light", "all", "--json") == 0
     assert "light" in _figures(capfd)["seconds"]

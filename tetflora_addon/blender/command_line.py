@@ -90,7 +90,7 @@ def _parser() -> argparse.ArgumentParser:
 
     refine = commands.add_parser("refine", help="turn plants into meshes for the scene's camera")
     refine.add_argument("--cutoff", type=_positive, metavar="PIXELS", help="overrides the scene's cutoff")
-    refine.add_argument("--save", type=Path, metavar="PATH", help="write a copy of the file with the result")
+    refine.add_argument("--save", metavar="PATH", help="write a copy of the file with the result")
     refine.set_defaults(run=_refine)
 
     render = commands.add_parser("render", help="refine and render frames")
@@ -130,12 +130,13 @@ def _refine(options: argparse.Namespace) -> dict:
     if options.cutoff is not None:
         scene.tetflora.cutoff = options.cutoff
     _set_proxies(scene, options)
-    if options.save is not None:
-        _check_target(options.save.absolute())
+    target = None if options.save is None else _named(options.save)
+    if target is not None:
+        _check_target(target)
     statistics = job.refine(scene, bpy.context.evaluated_depsgraph_get(), view_layer=bpy.context.view_layer)
-    if options.save is not None:
+    if target is not None:
         scene.tetflora.output.save_results = True  # that is what was asked for
-        write_blend(options.save.absolute(), lambda path: bpy.ops.wm.save_as_mainfile(filepath=path, copy=True))
+        write_blend(target, lambda path: bpy.ops.wm.save_as_mainfile(filepath=path, copy=True))
     return asdict(statistics)
 
 
@@ -240,11 +241,14 @@ def _still(scene: bpy.types.Scene, path: str) -> tuple[str, bool]:
     return bpy.path.ensure_ext(path, scene.render.file_extension), not handlers.render_errors()
 
 
+def _named(text: str) -> Path:
+    """A place as the command line names it; Blender's own // leads from the .blend."""
+    return Path(bpy.path.abspath(text)).absolute()
+
+
 def _place(text: str) -> str:
     """Where pictures go, as Blender wants it: a folder ends with a slash."""
-    if text.startswith("//"):
-        return text  # from the .blend, as in Blender's own fields
-    path = Path(text).absolute()
+    path = _named(text)
     return f"{path}{os.sep}" if text.endswith(("/", os.sep)) or path.is_dir() else str(path)
 
 
