@@ -261,6 +261,16 @@ def test_colours_come_from_materials_images_and_attributes():
     np.testing.assert_allclose(found.colour, (0.1, 0.2, 0.2), atol=1e-6)
 
 
+def test_nodes_that_are_switched_off_have_no_say():
+    import bpy
+
+    if bpy.app.version >= (5, 0, 0):
+        pytest.skip("nodes cannot be switched off")
+    material = _material()
+    material.use_nodes, material.diffuse_color = False, (0.7, 0.1, 0.3, 1.0)
+    np.testing.assert_allclose(part("material_means").Looks().of(material, {}).colour, (0.7, 0.1, 0.3), atol=1e-6)
+
+
 @pytest.mark.parametrize("what", ["faces", "numbers"])
 def test_what_cannot_be_refined_is_named(what):
     scene = _scene()

@@ -15,8 +15,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..shading.light_scattering import GLOSS
 from .compat import shader_tree
-from .materials import GLOSS, scatter_group
+from .materials import scatter_group
 from .node_tools import Graph, find_socket, get_or_create
 
 BAKED = "TetFlora baked"

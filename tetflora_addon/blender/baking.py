@@ -16,6 +16,7 @@ from ..plants.compiled import Flora
 from ..refinement.camera import Camera
 from ..refinement.loop import Refinement
 from .baked_material import baked_attributes
+from .compat import tree_in_use
 from .light_reader import read_lights
 from .material_means import Looks
 from .scene_reader import read_occluders, renderable_objects
@@ -42,7 +43,7 @@ def _ground_colour(obj: bpy.types.Object) -> NDArray[np.float64]:
     material = obj.active_material
     if material is None:
         return np.array(Looks().of(None, {}).colour)
-    tree = material.node_tree if getattr(material, "use_nodes", True) else None
+    tree = tree_in_use(material)
     nodes = tree.nodes if tree else ()
     if not any(n.type == 'TEX_IMAGE' and n.image is not None for n in nodes):
         # What nodes make of noise nobody can tell but by their ramps.

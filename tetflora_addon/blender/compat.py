@@ -31,6 +31,16 @@ def shader_tree(owner: bpy.types.Material | bpy.types.World | bpy.types.Light) -
     return owner.node_tree
 
 
+def tree_in_use(owner: bpy.types.Material | bpy.types.World | bpy.types.Light) -> bpy.types.NodeTree | None:
+    """Node tree of a material, world or light; None where its nodes are switched off, which only 4.5 can."""
+    return owner.node_tree if getattr(owner, "use_nodes", True) else None
+
+
+def sky_model(node: bpy.types.ShaderNodeTexSky) -> str:
+    """Type of a sky by its name of today: 4.5 has Nishita's for what is nearly the same."""
+    return 'SINGLE_SCATTERING' if node.sky_type == 'NISHITA' else node.sky_type
+
+
 def set_still_format(settings: bpy.types.ImageFormatSettings, file_format: str) -> None:
     """Choose a still picture's file format: from 5.0 on the media type has to allow it first."""
     if hasattr(settings, "media_type"):

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..refinement.lights import Light
+from .compat import tree_in_use
 from .scene_reader import renderable_objects
 from .transforms import world_matrix
 
@@ -45,7 +46,7 @@ def read_lights(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer)
         else:
             # Without "normalize" the energy is that of a unit surface.
             radius = data.shadow_soft_size
-            share = 1.0 if getattr(data, "normalize", True) else np.pi * radius**2
+            share = 1.0 if data.normalize else np.pi * radius**2
             spot = {"angle": data.spot_size / 2.0, "blend": data.spot_blend} if data.type == 'SPOT' else {}
             colour = colour * share / (4.0 * np.pi)
             found.append(Light(data.type, width=2.0 * radius, colour=colour, **given, **spot))
@@ -56,7 +57,7 @@ def _area(data: bpy.types.AreaLight, matrix: NDArray[np.float64], colour: NDArra
     ellipse = data.shape in {'DISK', 'ELLIPSE'}
     sides = np.array([data.size, data.size_y if data.shape in {'RECTANGLE', 'ELLIPSE'} else data.size])
     span = matrix[:3, :2].T * sides[:, None] / 2.0
-    if not getattr(data, "normalize", True):
+    if not data.normalize:
         colour = colour * np.linalg.norm(np.cross(*span)) * (np.pi if ellipse else 4.0)
     width = 2.0 * float(np.linalg.norm(span, axis=1).max())
     return Light('AREA', width=width, colour=colour / np.pi, span=span, ellipse=ellipse, **given)
@@ -76,7 +77,7 @@ def _colour(data: bpy.types.Light) -> NDArray[np.float64]:
 
 def _emissions(data: bpy.types.Light) -> Iterator[bpy.types.Node]:
     """The emission that a light's own nodes lead to its output."""
-    tree = data.node_tree if getattr(data, "use_nodes", True) else None
+    tree = tree_in_use(data)
     output = next((n for n in tree.nodes if n.type == 'OUTPUT_LIGHT' and n.is_active_output), None) if tree else None
     if output is not None and output.inputs["Surface"].is_linked:
         node = output.inputs["Surface"].links[0].from_node

@@ -16,6 +16,8 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from .compat import tree_in_use
+
 #: What Blender shows where there is no material.
 GREY = (0.8, 0.8, 0.8)
 #: Share of light that goes through a translucent shader, as a rule one of two that are mixed.
@@ -36,22 +38,23 @@ class Look:
 
 
 class Looks:
-    """Reads materials; each image is read once.
-
-    Parameters
-    ----------
-    attributes : mapping of str to (n, k) float32
-        Of the mesh that wears the materials, for those that take their colour from one.
-    """
+    """Reads materials; each image is read once."""
 
     def __init__(self) -> None:
         self._images: dict[bpy.types.Image, tuple[NDArray, float] | None] = {}
 
     def of(self, material: bpy.types.Material | None, attributes: dict[str, NDArray]) -> Look:
-        """Look of a material on a mesh with attributes by name, each (n, k) float32."""
+        """Look of a material.
+
+        Parameters
+        ----------
+        material : bpy.types.Material, optional
+        attributes : mapping of str to (n, k) float32
+            Of the mesh that wears it, for those that take their colour from one.
+        """
         if material is None:
             return Look(transmission=0.0)
-        tree = material.node_tree
+        tree = tree_in_use(material)
         output = (
             next((n for n in tree.nodes if n.type == 'OUTPUT_MATERIAL' and n.is_active_output), None) if tree else None
         )

@@ -6,8 +6,10 @@ from __future__ import annotations
 
 import bpy
 
+from ..shading.light_scattering import GLOSS, GLOSS_ROUGHNESS
 from .bark_material import BARKS, bark_group, bark_version, smooth_step
 from .compat import disable_bump_correction, shader_tree
+from .microsphere_material import THROUGH_TINT
 from .node_tools import Graph, add_socket, find_socket, get_or_create, new_group
 from .shell_material import shell_material
 
@@ -33,11 +35,6 @@ _BLADE_VERSION = 1
 _PROXY_VERSION = 2
 _SPHERE_VERSION = 1
 
-# Light that has passed through a leaf lost more of its blue than light that was reflected: chlorophyll and carotenoids
-# absorb on the whole way. Products over 1 are cut off.
-THROUGH_TINT = (1.15, 1.1, 0.55, 1.0)
-# Share of the waxy surface's own, colourless reflection (4 % at a refractive index of 1.5), and its roughness.
-GLOSS, GLOSS_ROUGHNESS = 0.04, 0.6
 WHITE = (1.0, 1.0, 1.0, 1.0)
 
 # How much more than the mean of both sides a leaf's underside reflects, and the upper side less: fewer pigments lie

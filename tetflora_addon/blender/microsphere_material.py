@@ -13,14 +13,15 @@ from typing import Any
 
 import bpy
 
+from ..shading import light_scattering
 from .node_tools import Graph, add_socket, get_or_create, new_group
 
 MICROSPHERE = "TetFlora Microsphere"
 
 _VERSION = 1
 
-#: Light that has passed through a leaf lost more of its blue than light that was reflected.
-THROUGH_TINT = (1.15, 1.1, 0.55, 1.0)
+#: The engine's, as a colour of a socket.
+THROUGH_TINT = (*light_scattering.THROUGH_TINT.tolist(), 1.0)
 
 # Cosines between the highlight's direction and the face: under the first there is no highlight, over the second all.
 _GLANCING, _CLEAR = 0.0, 0.35

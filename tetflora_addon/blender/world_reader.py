@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ..refinement.lights import Light
 from ..shading.light_sources import World
+from .compat import sky_model, tree_in_use
 
 #: What a scene without a world shows.
 BLACK = World.plain((0.0, 0.0, 0.0))
@@ -58,8 +59,6 @@ _SKIES: dict[str, tuple[tuple[float, ...], ...]] = {
         (0.0676, 0.108, 0.174, -0.104, -0.133, -0.164, 0, 0, 0, 0.0986, 0.201, 0.264, 0, 0, 0),
     ),
 }
-# Names of 4.5 for what is nearly the same.
-_SAME = {'NISHITA': 'SINGLE_SCATTERING'}
 
 
 @dataclass(frozen=True)
@@ -90,7 +89,7 @@ def read_world(scene: bpy.types.Scene) -> WorldLight:
     world = scene.world
     if world is None:
         return WorldLight(BLACK)
-    tree = world.node_tree if getattr(world, "use_nodes", True) else None
+    tree = tree_in_use(world)
     if tree is None:
         return WorldLight(World.plain(world.color[:]))
     output = next((n for n in tree.nodes if n.type == 'OUTPUT_WORLD' and n.is_active_output), None)
@@ -156,7 +155,7 @@ def _image(node: bpy.types.Node, factor: float, turn: float) -> World:
 
 
 def _sky(node: bpy.types.Node, factor: float, turn: float, notes: list[str]) -> tuple[World, tuple[Light, ...]]:
-    kind = _SAME.get(node.sky_type, node.sky_type)
+    kind = sky_model(node)
     if kind not in _SKIES:
         notes.append(f"skies of the type {node.sky_type} are unknown and count as SINGLE_SCATTERING")
         kind = 'SINGLE_SCATTERING'

@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 
 from .light_directions import BAND, harmonics, irradiance
 
-#: As in the material of proxies: light that went through a leaf lost more of its blue; the wax mirrors a little.
+#: Light that has passed through a leaf lost more of its blue than light that was reflected: chlorophyll and carotenoids
+#: absorb on the whole way. Products over 1 are cut off.
 THROUGH_TINT = np.array([1.15, 1.1, 0.55])
+#: Share of the waxy surface's own, colourless reflection (4 % at a refractive index of 1.5), and its roughness.
 GLOSS, GLOSS_ROUGHNESS = 0.04, 0.6
 
 

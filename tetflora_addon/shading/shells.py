@@ -9,11 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..buffers import MeshBuffers
 from ..plants.hashing import mix, uniform
+from ..tetrahedra.geometry import EDGES, FACES
 
-# Faces of a positively oriented tetrahedron, wound outwards; face i lies opposite vertex i.
-_FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]], dtype=np.int32)
-_EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]], dtype=np.int32)
-# Edge from each corner to the next, in the order of _FACES.
+# As a mesh stores them, with the edge from each corner to the next, in the order of faces.
+_FACES, _EDGES = FACES.astype(np.int32), EDGES.astype(np.int32)
 _FACE_EDGES = np.array([[3, 5, 4], [2, 5, 1], [0, 4, 2], [1, 3, 0]], dtype=np.int32)
 _BARYCENTRIC = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float32)
 
