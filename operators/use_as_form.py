@@ -41,8 +41,11 @@ class TETFLORA_OT_use_as_form(Reporting, bpy.types.Operator):
         plants = selected_plants(context)
         if not plants:
             plants = add_plants(context.scene, _in_place_of(form, context.scene, depsgraph), [_species(context.scene)])
+        height = float(skeleton.points[:, 2].max())
         for plant in plants:
             plant.tetflora.form = form
+            if plant.type == 'EMPTY' and height > 0.0:
+                plant.empty_display_size = height  # the arrow was as tall as the species grows by itself
         form.hide_render = True
         select_only(context, plants)
         made = f"{counted(len(skeleton.points), 'point')} drawn"

@@ -236,6 +236,7 @@ def test_the_button_makes_a_plant_in_the_forms_place():
     points = read(form).points @ np.array(plant.matrix_world)[:3, :3].T + np.array(plant.matrix_world)[:3, 3]
     world = np.array([(form.matrix_world @ p.co.to_3d())[:] for p in form.data.splines[0].points])
     np.testing.assert_allclose(points, world, atol=1e-5)
+    assert plant.empty_display_size == pytest.approx(read(form).points[:, 2].max())  # the arrow is as tall as the form
 
 
 def test_the_button_gives_selected_plants_their_form():
