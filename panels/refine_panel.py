@@ -5,6 +5,7 @@
 import bpy
 
 from ..operators import ids
+from ..tetflora_addon.blender import auto_refresh
 from ..tetflora_addon.blender.first_forest import is_first_forest
 from ..tetflora_addon.blender.handlers import render_errors
 from .base import SidebarPanel, draw_message
@@ -22,6 +23,8 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
         row.scale_y = 1.4
         row.operator(ids.REFINE, icon='MOD_DECIM')
         row.operator(ids.CLEAR, icon='TRASH')
+        if settings.auto_refine:  # a line of its own also while nothing is done: what comes and goes moves all below
+            draw_message(context, layout, auto_refresh.message() or "Refine Automatically is on", 'SORTTIME')
         for error in render_errors()[-1:]:
             draw_message(context, layout, error)
         if context.scene.camera is None:

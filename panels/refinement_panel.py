@@ -5,9 +5,8 @@
 import bpy
 
 from ..operators.mark_explicit import can_be_explicit
-from ..tetflora_addon.blender import auto_refresh
 from ..tetflora_addon.blender.shell_bounces import few_bounces
-from .base import SidebarPanel, draw_message, split_layout
+from .base import SidebarPanel, split_layout
 from .lists import TETFLORA_UL_leaf_objects, draw_list
 
 
@@ -38,8 +37,6 @@ class TETFLORA_PT_refinement(SidebarPanel, bpy.types.Panel):
             layout.prop(active.tetflora, "is_explicit")
         layout.prop(settings, "refine_at_render")
         layout.prop(settings, "auto_refine")
-        if settings.auto_refine and auto_refresh.message():
-            draw_message(context, layout, auto_refresh.message(), 'SORTTIME')
 
 
 class TETFLORA_PT_films(SidebarPanel, bpy.types.Panel):
