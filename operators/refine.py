@@ -58,7 +58,8 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
         )
         if not statistics.complete and statistics.levels:
             self.report({'INFO'}, "Stopped before all was refined; Refine again for the rest")
-        for warning in (_cut_off(context.scene), few_bounces(context.scene), _unread_world(context.scene)):
+        outside = _cut_off(context.scene) or _unseen(context.scene, statistics)
+        for warning in (outside, few_bounces(context.scene), _unread_world(context.scene)):
             if warning:
                 self.report({'WARNING'}, warning)
         return {'FINISHED'}
@@ -70,6 +71,16 @@ def _unread_world(scene: bpy.types.Scene) -> str:
         return ""
     note = read_world(scene).note
     return f"Baked light: {note}" if note else ""
+
+
+def _unseen(scene: bpy.types.Scene, statistics: Statistics) -> str:
+    """A warning if the camera sees no plant at all, so that nothing was divided after the first look; else empty."""
+    if statistics.levels != 1 or statistics.polygons_meshed or scene.tetflora.max_passes:
+        return ""
+    return (
+        f'The camera "{scene.camera.name}" sees none of the plants: it looks elsewhere, or stands inside of something. '
+        "Look through it with Numpad 0"
+    )
 
 
 def _cut_off(scene: bpy.types.Scene) -> str:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Refine says so when the camera's range ends before plants: a new file's camera sees 100 m, a forest is larger."""
+"""Refine says so when plants are out of sight: beyond the range, 100 m in a new file, or where nobody looks."""
 
 from __future__ import annotations
 
@@ -41,3 +41,23 @@ def test_no_warning_where_all_are_in_range(far_row):
 
     far_row.data.clip_end = 251.0
     assert session.part("operators.refine")._cut_off(bpy.context.scene) == ""
+
+
+@pytest.mark.parametrize("distance", [20.0, 250.0])
+def test_a_camera_that_sees_none_of_the_plants_is_told(clean_file, capfd, distance):
+    import bpy
+
+    camera = add_camera(location=(0.0, 0.0, 2.0))
+    camera.data.clip_end = 1000.0
+    add_plant("plant", location=(0.0, distance, 0.0))
+    bpy.context.scene.tetflora.quality = 'DRAFT'
+    depsgraph()
+    assert bpy.ops.tetflora.refine() == {'FINISHED'}
+    assert "sees none of the plants" not in capfd.readouterr().out
+    camera.rotation_euler.z += 3.0
+    depsgraph()
+    assert bpy.ops.tetflora.refine() == {'FINISHED'}
+    assert 'The camera "camera" sees none of the plants' in capfd.readouterr().out
+    bpy.context.scene.tetflora.max_passes = 1
+    assert bpy.ops.tetflora.refine() == {'FINISHED'}
+    assert "sees none of the plants" not in capfd.readouterr().out
