@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Facets that stand for explicit polygons: stochastic simplification (Cook, Halstead, Planck and Ryu, SIGGRAPH 2007).
 
-Of many small triangles few are chosen by chance, in proportion to their area, and each is drawn as a square that makes
-up for those that are left out. What a triangle gets follows from its own number and nothing else, so that its facets
-stay where they are when others come into view or are kept as they are. Chances are spread evenly along the triangles of
-a mesh, so that the area of all is that of the mesh with little noise.
+Of many small triangles few are chosen by chance, in proportion to their area, and the facets of
+each make up for those that are left out. What a triangle gets follows from its own number and nothing else, so that its
+facets stay where they are when others come into view or are kept as they are. Chances are spread evenly along the
+triangles of a mesh, so that the area of all is that of the mesh with little noise.
 """
 
 from __future__ import annotations
