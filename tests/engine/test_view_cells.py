@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from tetflora_addon.refinement.blur import MOST, blur_margins
 from tetflora_addon.refinement.camera import Camera
 from tetflora_addon.refinement.silhouette import expected_pixels
-from tetflora_addon.refinement.view_cells import ViewCells, cell_camera
+from tetflora_addon.refinement.view_cells import CLEAR, Around, ViewCells, cell_camera
 from tetflora_addon.refinement.visibility import AlphaBuffer, Buffers
 
 CELLS = ViewCells(4.0, np.radians(3.0))
@@ -203,6 +203,44 @@ def test_a_walk_goes_through_few_cells():
     changes = sum(not same(a, b) for a, b in itertools.pairwise(cells))
     # Along the way, and where it is not quite the lattice's direction now and then across it.
     assert length / CELLS.length - 1 <= changes <= 1.5 * length / CELLS.length
+
+
+def changes(cameras: list[Camera], around: Around | None) -> int:
+    """How often a film comes to another cell."""
+    cells = [cell_camera(c, CELLS, around) for c in cameras]
+    return sum(not same(a, b) for a, b in itertools.pairwise(cells))
+
+
+def test_far_from_all_things_a_flight_goes_through_fewer_cells():
+    camera = Camera("PERSP", np.zeros(3), LEVEL, (-0.36, 0.36, -0.2025, 0.2025), 0.1, 1000.0, 1920, 1080)
+    flight = [replace(camera, position=np.array([0.3, y, 60.0])) for y in np.arange(0.0, 400.0, 0.6)]
+    ground = np.stack(np.meshgrid(np.arange(-100.0, 100.0, 10.0), np.arange(-100.0, 500.0, 10.0), 0.0), -1)
+    low, high = (Around(ground.reshape(-1, 3), np.full(ground.size // 3, height)) for height in (10.0, 55.0))
+    assert changes(flight, low) <= changes(flight, None) / 2
+    assert changes(flight, high) == changes(flight, None)
+
+
+@given(RANDOM, st.sampled_from(["PERSP", "PANO"]))
+def test_all_cameras_of_a_larger_cell_get_the_same_one_and_things_stay_clear_of_it(rng, kind):
+    camera = drawn(rng)
+    if kind == "PANO":
+        camera = replace(camera, kind=kind, window=(-np.pi, np.pi, -np.pi / 2, np.pi / 2))
+    centres, radii = rng.normal(size=(20, 3)) * 300.0, rng.uniform(0.0, 10.0, 20)
+    around = Around(centres, radii)
+    cell = cell_camera(camera, CELLS, around)
+    if cell is None:
+        return
+    small = cell_camera(camera, CELLS)
+    if cell.room > small.room:
+        away = np.linalg.norm(centres - cell.eye, axis=1) - radii
+        assert (away >= CLEAR * cell.room * (1.0 - 1e-9)).all()
+    assert np.linalg.norm(camera.position - cell.eye) <= cell.room * (1.0 + 1e-9)
+    assert float(np.log2(cell.room / small.room)).is_integer()
+    for _ in range(8):
+        other = replace(camera, position=cell.eye + rng.uniform(-1.0, 1.0, 3) * cell.room)
+        shared = cell_camera(other, CELLS, around)
+        inside = np.linalg.norm(cell.eye - shared.eye) < 1e-9 * np.linalg.norm(cell.eye)
+        assert same(shared, cell) or not inside
 
 
 def test_what_leaves_the_cell_while_the_shutter_is_open_shares_nothing():

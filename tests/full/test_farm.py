@@ -56,7 +56,8 @@ def expected(seeds: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     scene = bpy.context.scene
     scene.tetflora.refine_at_render = False
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    camera = kept_results.shared_camera(scene, depsgraph)
+    given = job.read_scene(scene, depsgraph, bpy.context.view_layer)
+    camera = kept_results.shared_camera(scene, depsgraph, given)
     job.refine(scene, depsgraph, view_layer=bpy.context.view_layer, camera=camera)
     path = tmp_path_factory.mktemp("expected") / "expected.png"
     scene.render.filepath = str(path)

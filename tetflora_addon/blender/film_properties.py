@@ -22,7 +22,8 @@ class FilmProperties:
         name="Within Distance",
         description=(
             "How far the camera goes, along its line of sight, until plants are refined anew. Larger is faster, and "
-            "more is made for each frame; 0.1 m and less are for close-ups of single plants"
+            "more is made for each frame; 0.1 m and less are for close-ups of single plants. Where all plants are far "
+            "away it is two, four or more times as far"
         ),
         subtype='DISTANCE',
         default=4.0,

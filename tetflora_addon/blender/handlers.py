@@ -186,7 +186,8 @@ def _make(scene: bpy.types.Scene) -> None:
     for layers in groups:
         layers[0].update()  # going to the frame brings only the active layer's depsgraph up to date, if others have any
         depsgraph = layers[0].depsgraph
-        read = kept_results.shared_camera(scene, depsgraph), job.read_scene(scene, depsgraph, layers[0])
+        given = job.read_scene(scene, depsgraph, layers[0])
+        read = kept_results.shared_camera(scene, depsgraph, given), given
         wanted.append((kept_results.key_of(scene, depsgraph, layers, *read), layers, read))
     kept_results.stow(scene, [key for key, *_ in wanted])
     for key, layers, (camera, given) in wanted:

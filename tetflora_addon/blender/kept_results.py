@@ -14,14 +14,17 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import bpy
+import numpy as np
 
 from ..refinement.camera import Camera
-from ..refinement.view_cells import ViewCells, cell_camera
+from ..refinement.view_cells import Around, ViewCells, cell_camera
 from .camera_reader import read_camera
 from .emit import hidden_originals, hide_originals, remove_collection, result_collections, show_originals
 from .job import Given
+from .plant_kinds import species_of
 from .proxies import shade_again
 from .scene_digest import digest_of, scene_digest
+from .species_edits import species_for
 from .wind_properties import wind_of
 
 #: What a scene's settings say that results do not depend on.
@@ -43,8 +46,10 @@ class _Kept:
 _kept: dict[str, _Kept] = {}
 
 
-def shared_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Camera:
+def shared_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, given: Given | None = None) -> Camera:
     """The active camera, or the one that stands for all that are nearly alike if it moves and the scene asks for it.
+
+    More cameras are alike where what is given is far from them.
 
     Raises
     ------
@@ -54,7 +59,22 @@ def shared_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Cam
     camera, settings = read_camera(scene, depsgraph, region_only=True), scene.tetflora
     if not (settings.share_frames and camera_moves(scene)) or wind_of(scene) is not None:
         return camera  # in the wind, no two frames are alike
-    return cell_camera(camera, ViewCells(settings.cell_length, settings.cell_turn)) or camera
+    around = None if given is None else _around(scene, given)
+    return cell_camera(camera, ViewCells(settings.cell_length, settings.cell_turn), around) or camera
+
+
+def _around(scene: bpy.types.Scene, given: Given) -> Around:
+    """Spheres about the feet of plants, as large as branches are long on the way to the last twig, and about meshes."""
+    seeds, meshes = given.seeds, None if given.explicit is None else given.explicit.meshes
+    # Lengths are in metres for trunks, and in those of their parents for all others.
+    orders = [species_for(scene, species_of(kind)).orders for kind in seeds.identifiers]
+    heights = np.array([np.cumprod([order.length.mean for order in own]).sum() for own in orders])
+    centres, radii = [seeds.position], [heights[seeds.species] * seeds.scale]
+    if meshes is not None:
+        reach = [np.linalg.norm(surface.positions, axis=1).max() for surface in meshes.surfaces]
+        centres.append(meshes.origin)
+        radii.append(np.array(reach)[meshes.surface] * meshes.largest)
+    return Around(np.concatenate(centres), np.concatenate(radii))
 
 
 def camera_moves(scene: bpy.types.Scene) -> bool:

@@ -28,6 +28,9 @@ BEYOND, BEYOND_TURN = 0.1, 0.25
 ZOOMS, FOCI = 16.0, 2.0
 #: Width and height of cells over their length, for a window of which half is as wide as it is far away.
 ACROSS = 2.0
+#: Cells are twice as long, and twice that, where all that is refined is farther from their middle than so many times
+#: the distance to their corners.
+CLEAR = 4.0
 #: Least share of the view's direction that corners of the window must have when the camera has turned: 84 degrees.
 _AHEAD = 0.1
 #: Where lattices begin, in cells, and a turn that comes before them: what artists type in (0, 90 degrees, whole metres)
@@ -47,13 +50,27 @@ class ViewCells:
     Attributes
     ----------
     length : float
-        Along the line of sight, metres. Across it cells are shorter, since there the picture changes faster.
+        Along the line of sight, metres, where something is near. Across it cells are shorter, since there the picture
+        changes faster.
     turn : float
         Angle by which a camera turns from one to the next, radians.
     """
 
     length: float
     turn: float
+
+
+@dataclass(frozen=True)
+class Around:
+    """Spheres about all that is refined: centres (n, 3) and radii (n,), metres. Roughly will do."""
+
+    centres: NDArray[np.float64]
+    radii: NDArray[np.float64]
+
+    def leaves_clear(self, place: NDArray[np.float64], distance: float) -> bool:
+        """Whether all of them are at least so far from a place (3,), metres."""
+        away = np.linalg.norm(self.centres - place, axis=1) - self.radii
+        return bool((away >= distance).all())
 
 
 @dataclass(frozen=True)
@@ -81,7 +98,7 @@ class _Turns:
         return bool((np.abs(_projected(frame, self.largest) - self.middle) <= reach * self.step).all())
 
 
-def cell_camera(camera: Camera, cells: ViewCells) -> Camera | None:
+def cell_camera(camera: Camera, cells: ViewCells, around: Around | None = None) -> Camera | None:
     """The camera that stands for all that are in the same cell as a camera: the same numbers for each of them.
 
     Parameters
@@ -89,6 +106,8 @@ def cell_camera(camera: Camera, cells: ViewCells) -> Camera | None:
     camera : Camera
         As it was read, without margins. Its shutter and other eyes should stay in the cell or next to it, see `BEYOND`.
     cells : ViewCells
+    around : Around, optional
+        Where things are; cells far from all of them are larger. None for the same cells everywhere.
 
     Returns
     -------
@@ -106,6 +125,8 @@ def cell_camera(camera: Camera, cells: ViewCells) -> Camera | None:
     half = np.array([right - left, top - bottom]) / 2.0
     narrow = np.minimum(ACROSS * half, 1.0) if camera.kind == "PERSP" else np.ones(2)
     steps = cells.length * np.array([*narrow, 1.0])
+    if around is not None and len(around.radii) and camera.kind != "ORTHO":
+        steps = _roomy(camera.position @ frame, frame, steps, around)
     eye = frame @ _middle(camera.position @ frame, steps)
     reach = (0.5 + BEYOND) * steps
     for other in others:
@@ -119,6 +140,18 @@ def cell_camera(camera: Camera, cells: ViewCells) -> Camera | None:
         return alike
     corners = [turns.frame((0.5 + BEYOND_TURN) * np.array(away)) for away in product((-1.0, 1.0), repeat=3)]
     return _standing_back(alike, np.array([frame.T @ corner for corner in corners]), reach)
+
+
+def _roomy(
+    place: NDArray[np.float64], frame: NDArray[np.float64], steps: NDArray[np.float64], around: Around
+) -> NDArray[np.float64]:
+    """Sides (3,) of the cell in which a place is, doubled as often as nothing is near the cell then.
+
+    What decides is the cell, not where in it the camera is: so all of its cameras agree.
+    """
+    while around.leaves_clear(frame @ _middle(place, 2.0 * steps), CLEAR * np.linalg.norm(steps)):
+        steps = 2.0 * steps
+    return steps
 
 
 def _standing_back(camera: Camera, turned: NDArray[np.float64], reach: NDArray[np.float64]) -> Camera | None:
