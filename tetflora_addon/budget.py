@@ -19,7 +19,7 @@ from .refinement.camera import Camera
 from .refinement.decisions import Decision, contributions
 from .refinement.loop import Refinement
 from .refinement.settings import RefinementSettings
-from .shading.facet_sizes import piece_facet_sizes, polygon_facet_sizes, subplant_facet_sizes
+from .shading.facet_sizes import coarseness, piece_facet_sizes, polygon_facet_sizes, subplant_facet_sizes
 
 #: Bytes that a polygon takes in Blender and in a renderer together, about: 110 and 500.
 BYTES_PER_POLYGON = 610
@@ -119,15 +119,15 @@ class _Facets:
     """Expected facets of the cells of a refinement as proxies."""
 
     def __init__(self, flora: Flora, result: Refinement, camera: Camera) -> None:
-        contents, hidden = result.contents, result.chosen(Decision.HIDDEN)
+        contents, coarse = result.contents, coarseness(result)
         index = np.zeros(len(result.tree), np.int64)
         index[result.nodes] = np.arange(len(result.nodes))
         self.number = len(result.nodes)
         self.plants = [
-            (subplant_facet_sizes(flora, contents, camera, hidden), index[contents.subplant_cell]),
-            (piece_facet_sizes(flora, contents, camera, hidden), index[contents.piece_cell]),
+            (subplant_facet_sizes(flora, contents, camera, coarse), index[contents.subplant_cell]),
+            (piece_facet_sizes(flora, contents, camera, coarse), index[contents.piece_cell]),
         ]
-        self.polygons = polygon_facet_sizes(contents, camera, hidden)
+        self.polygons = polygon_facet_sizes(contents, camera, result.chosen(Decision.HIDDEN))
         self.polygon_cell = index[contents.polygon_cell]
 
     def by_cell(self, pixels: float, weight: float = 1.0) -> NDArray[np.float64]:

@@ -22,7 +22,7 @@ from .refinement.descent import OPENED_AT_ONCE
 from .refinement.loop import SLACK, Refinement
 from .refinement.transition import Transition
 from .shading.facet_shares import facet_shares
-from .shading.facet_sizes import HIDDEN_LEAVES, piece_facet_sizes, subplant_facet_sizes
+from .shading.facet_sizes import HIDDEN_LEAVES, coarseness, piece_facet_sizes, subplant_facet_sizes
 from .shading.microspheres import spheres
 from .shading.microsurfaces import (
     Facets,
@@ -144,14 +144,14 @@ def _facets(
     contents = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN) | explicit)
     if transition is not None:
         contents = _in_detail(contents, explicit, result.in_view & ~hidden, transition)
-    shares = facet_shares(flora)
+    shares, coarse = facet_shares(flora), coarseness(result)
     every = []
     for things, cell, row, sizes, share_of, make in (
         (
             contents.subplants,
             contents.subplant_cell,
             contents.subplants.row,
-            subplant_facet_sizes(flora, contents, camera, hidden),
+            subplant_facet_sizes(flora, contents, camera, coarse),
             shares.of_subplants,
             _of_subplants,
         ),
@@ -159,7 +159,7 @@ def _facets(
             contents.pieces,
             contents.piece_cell,
             contents.pieces.branches.row,
-            piece_facet_sizes(flora, contents, camera, hidden),
+            piece_facet_sizes(flora, contents, camera, coarse),
             shares.of_pieces,
             _of_pieces,
         ),

@@ -17,7 +17,7 @@ from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.plants.compiled import Flora
 from tetflora_addon.plants.growth import Branches, trunks
 from tetflora_addon.refinement.contents import Contents, bounding_cylinders, subplant_amounts
-from tetflora_addon.shading.facet_sizes import piece_facet_sizes, subplant_facet_sizes
+from tetflora_addon.shading.facet_sizes import COARSE, piece_facet_sizes, subplant_facet_sizes
 from tetflora_addon.shading.microsurfaces import facet_mesh, piece_facets, subplant_facets
 
 
@@ -119,7 +119,9 @@ def test_hidden_wood_gets_no_more_facets_than_it_has_faces() -> None:
     flora = support.small_flora()
     plants, pieces = support.grown(flora, support.plants(np.arange(100)))
     contents = Contents.of(flora, plants, np.zeros(100, int), pieces, np.zeros(len(pieces), int))
-    camera = SimpleNamespace(extent_around=lambda points: np.full(len(points), 1e-3))
+    camera = SimpleNamespace(
+        extent_around=lambda points: np.full(len(points), 1e-3), clearance=lambda points: np.zeros(len(points))
+    )
     for sizes_of, make, things, faces, amounts in (
         (
             subplant_facet_sizes,
@@ -136,13 +138,13 @@ def test_hidden_wood_gets_no_more_facets_than_it_has_faces() -> None:
             contents.piece_amounts,
         ),
     ):
-        sizes = sizes_of(flora, contents, camera, np.ones(1, bool))
+        sizes = sizes_of(flora, contents, camera, np.array([COARSE]))
         made = facet_mesh(make(flora, things, *sizes.sides(1.0)))
         assert made.polygons == pytest.approx(sizes.counts(1.0).sum(), rel=0.02)
         wood = part(made, False)
         assert wood.sum() <= faces * 1.01
         assert support.face_areas(made)[wood].sum() == pytest.approx(amounts.wood_area.sum() / 2, rel=0.1)
-        seen = sizes_of(flora, contents, camera, np.zeros(1, bool))
+        seen = sizes_of(flora, contents, camera, np.ones(1))
         assert part(facet_mesh(make(flora, things, *seen.sides(3.0))), False).sum() > faces * 5
         assert (seen.sides(3.0)[0] >= np.sqrt(seen.one_leaf)).all()
 

@@ -3,7 +3,8 @@
 """How large the facets are that stand for sub-plants, pieces and polygons, and how many that will make.
 
 Less than a pixel is wide there; three times that where nobody looks, and there one stands for several leaves, for
-hidden plants only cast shadows and light up others.
+hidden plants only cast shadows and light up others. They grow further the deeper it is hidden, and the farther it is
+from the view: a forest has far more of it than anybody sees.
 """
 
 from __future__ import annotations
@@ -14,13 +15,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..plants.compiled import Flora
-from ..plants.growth import Branches
 from ..refinement.amounts import Amounts
 from ..refinement.camera import Camera
 from ..refinement.contents import Contents, bounding_cylinders
+from ..refinement.decisions import Decision
+from ..refinement.loop import Refinement
 
-#: How much larger facets of hidden tetrahedra are.
-COARSE = 3.0
+#: How much larger facets of hidden tetrahedra are: at an optical depth in front of them that hides them, and at most,
+#: in proportion to the depth.
+COARSE, COARSEST = 3.0, 9.0
+_HIDING_DEPTH = 4.0  # e^−4 = .02 is left
+#: Side of facets per metre from the view: the sun is .0093 radians wide, so their shadows are half as soft as large.
+_SOFT = 0.02
+#: Facets that a sub-plant keeps, about, however far it is from the view.
+_FEWEST = 8
 #: Leaves that one of them stands for at least.
 HIDDEN_LEAVES = 8
 #: Leaves' faces of explicit polygons that a hidden facet stands for.
@@ -39,8 +47,10 @@ class FacetSizes:
         Area of a leaf, m².
     least_wood : (n,) float64
         Side of facets of which there are as many as the wood has faces, metres.
-    hidden : (n,) bool
-        Where nobody looks.
+    coarse : (n,) float64
+        How much larger than seen ones facets are; 1 where they are seen.
+    clearance : (n,) float64
+        Metres from the space that the picture shows; negative within.
     amounts : Amounts of n
     part : (n,) float64
         Which part of a branch, or of a sub-plant, each is.
@@ -49,9 +59,15 @@ class FacetSizes:
     extent: NDArray[np.float64]
     one_leaf: NDArray[np.float64]
     least_wood: NDArray[np.float64]
-    hidden: NDArray[np.bool_]
+    coarse: NDArray[np.float64]
+    clearance: NDArray[np.float64]
     amounts: Amounts
     part: NDArray[np.float64]
+
+    @property
+    def hidden(self) -> NDArray[np.bool_]:
+        """Where (n,) nobody looks."""
+        return self.coarse > 1.0
 
     @property
     def whole_optical(self) -> NDArray[np.float64]:
@@ -60,9 +76,11 @@ class FacetSizes:
 
     def sides(self, pixels: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Sides (n,), (n,) of facets of leaves and of wood, metres, where those that are seen have so many pixels."""
-        fine = pixels * self.extent
-        coarse = np.maximum(COARSE * fine, np.sqrt(HIDDEN_LEAVES * self.one_leaf))
-        side = np.where(self.hidden, coarse, fine)
+        side = self.coarse * pixels * self.extent
+        optical = self.amounts.leaf_area + self.amounts.wood_area / 2
+        blurred = np.minimum(_SOFT * np.maximum(self.clearance, 0.0), np.sqrt(optical / _FEWEST))
+        unseen = np.maximum(blurred, np.sqrt(HIDDEN_LEAVES * self.one_leaf))
+        side = np.where(self.hidden, np.maximum(side, unseen), side)
         # Where nobody looks, wood is cut into no more facets than it has faces. Elsewhere it is cut as fine as the
         # side asks for, or thin twigs would become blots.
         wood = np.where(self.hidden, np.maximum(side, self.least_wood), side)
@@ -116,6 +134,16 @@ class PolygonFacetSizes:
         return np.where(self.kept(pixels), 1.0, self.optical / np.maximum(self.sides(pixels), 1e-12) ** 2)
 
 
+def coarseness(result: Refinement) -> NDArray[np.float64]:
+    """How much larger facets are (nodes,) than where they are seen, by what is in front; 1 where they are seen."""
+    with np.errstate(divide="ignore"):
+        deep = np.clip(-COARSE / _HIDING_DEPTH * np.log(result.transmittance), COARSE, COARSEST)
+    coarse = np.full(len(result.tree), COARSE)
+    coarse[result.nodes] = deep
+    coarse[~result.in_view] = COARSE
+    return np.where(result.chosen(Decision.HIDDEN), coarse, 1.0)
+
+
 def polygon_facet_sizes(contents: Contents, camera: Camera, hidden: NDArray[np.bool_]) -> PolygonFacetSizes:
     """Facets of the polygons of contents; ``hidden`` (nodes,) says in which nodes nobody looks."""
     own, amounts = contents.polygons, contents.polygon_amounts
@@ -130,25 +158,21 @@ def polygon_facet_sizes(contents: Contents, camera: Camera, hidden: NDArray[np.b
     )
 
 
-def subplant_facet_sizes(flora: Flora, contents: Contents, camera: Camera, hidden: NDArray[np.bool_]) -> FacetSizes:
-    """Facets of the sub-plants of contents; ``hidden`` (nodes,) says in which nodes nobody looks."""
+def subplant_facet_sizes(flora: Flora, contents: Contents, camera: Camera, coarse: NDArray[np.float64]) -> FacetSizes:
+    """Facets of the sub-plants of contents; ``coarse`` (nodes,) as `coarseness` gives it."""
     own = contents.subplants
-    extent = camera.extent_around(bounding_cylinders(flora, own)[0])
     amounts, faces = contents.subplant_amounts, flora.branch_faces(own)
-    return _sizes(flora, own, extent, faces, hidden[contents.subplant_cell], amounts, np.ones(len(own)))
+    least = np.sqrt(amounts.wood_area / 2 / np.maximum(faces, 1))
+    place, coarse = bounding_cylinders(flora, own)[0], coarse[contents.subplant_cell]
+    extent, away = camera.extent_around(place), camera.clearance(place)
+    return FacetSizes(extent, flora.one_leaf_area(own), least, coarse, away, amounts, np.ones(len(own)))
 
 
-def piece_facet_sizes(flora: Flora, contents: Contents, camera: Camera, hidden: NDArray[np.bool_]) -> FacetSizes:
+def piece_facet_sizes(flora: Flora, contents: Contents, camera: Camera, coarse: NDArray[np.float64]) -> FacetSizes:
     """Facets of the pieces of contents; parameters as for `subplant_facet_sizes`."""
     own = contents.pieces
-    extent = camera.extent_around((own.start + own.end) / 2)
-    faces = flora.rows["sides"][own.branches.row]
-    amounts, part = contents.piece_amounts, own.t1 - own.t0
-    return _sizes(flora, own.branches, extent, faces, hidden[contents.piece_cell], amounts, part)
-
-
-def _sizes(
-    flora: Flora, branches: Branches, extent: NDArray, faces: NDArray, hidden: NDArray, amounts: Amounts, part: NDArray
-) -> FacetSizes:
+    amounts, faces = contents.piece_amounts, flora.rows["sides"][own.branches.row]
     least = np.sqrt(amounts.wood_area / 2 / np.maximum(faces, 1))
-    return FacetSizes(extent, flora.one_leaf_area(branches), least, hidden, amounts, part)
+    place, coarse = (own.start + own.end) / 2, coarse[contents.piece_cell]
+    extent, away = camera.extent_around(place), camera.clearance(place)
+    return FacetSizes(extent, flora.one_leaf_area(own.branches), least, coarse, away, amounts, own.t1 - own.t0)
