@@ -206,7 +206,7 @@ def main() -> int:
         install = [blender, "-b", "--command", "extension", "install-file", "-r", "user_default", "-e", archive]
         environment = {**os.environ, "BLENDER_USER_RESOURCES": str(home)}
         subprocess.run(install, env=environment, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        result = window.run_in_window(blender, Path(__file__), out, 240, home)
+        result = window.run_in_window(blender, Path(__file__), out, 600, home)
         if not result["ok"]:
             print(result["error"], json.dumps(result["values"]), file=sys.stderr)
             return 1

@@ -7,6 +7,7 @@ import bpy
 from ..tetflora_addon.blender.plant_fields import FIELD_TYPES, fields_of
 from ..tetflora_addon.blender.plant_objects import field_from_plants, plants_from_field, plants_of, prepare_scene
 from ..tetflora_addon.blender.population_properties import MOST_EMPTIES
+from ..tetflora_addon.blender.populations import adopt, collection_of, owner_of
 from ..tetflora_addon.blender.species_items import default_species
 from . import ids
 from .base import Reporting, counted, in_object_mode, plants_selected, select_only, selected_plants
@@ -68,7 +69,11 @@ class TETFLORA_OT_make_field(Reporting, bpy.types.Operator):
             self.report({'WARNING'}, "The selected plants are disabled, hidden in renders, or linked; nothing changed")
             return {'CANCELLED'}
         left = len(selected) - len(plants)
-        field = field_from_plants(context.scene, context.evaluated_depsgraph_get(), plants)
+        owner = owner_of(context.scene, plants)
+        home = collection_of(context.scene, owner) if owner else None
+        field = field_from_plants(context.scene, context.evaluated_depsgraph_get(), plants, home)
+        if owner:  # or its next update would plant them once more
+            adopt(context.scene, owner, [field])
         select_only(context, [field])
         rest = f"; {counted(left, 'plant')} disabled, hidden in renders, or linked stay objects" if left else ""
         self.report({'INFO'}, f'{counted(len(plants), "plant")} put into "{field.name}"{rest}')
@@ -99,7 +104,12 @@ class TETFLORA_OT_split_field(Reporting, bpy.types.Operator):
         depsgraph = context.evaluated_depsgraph_get()
         made: list[bpy.types.Object] = []
         for field in [o for o in fields_of(context.selected_objects) if o.library is None]:
-            made += plants_from_field(context.scene, depsgraph, field, MOST_EMPTIES - len(made))
+            owner = owner_of(context.scene, [field])
+            home = collection_of(context.scene, owner) if owner else None
+            plants = plants_from_field(context.scene, depsgraph, field, MOST_EMPTIES - len(made), home)
+            if owner:
+                adopt(context.scene, owner, plants)
+            made += plants
         if not made:
             self.report({'WARNING'}, "The selected fields are linked; nothing changed")
             return {'CANCELLED'}

@@ -168,9 +168,17 @@ def add_field(
 
 
 def field_from_plants(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, plants: Iterable[bpy.types.Object]
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    plants: Iterable[bpy.types.Object],
+    collection: bpy.types.Collection | None = None,
 ) -> bpy.types.Object:
     """Put a field in place of plants that are objects; the same individuals stand at the same places.
+
+    Parameters
+    ----------
+    collection : bpy.types.Collection, optional
+        Where it goes; the scene's collection for plants if not given.
 
     Raises
     ------
@@ -181,13 +189,17 @@ def field_from_plants(
     read = single_plants(plants, depsgraph)
     species, forms = [species_of(kind) for kind in read.kinds], [form_of(kind) for kind in read.kinds]
     rows = (read.position, quaternions(read.frame), read.scale, read.species, read.seed)
-    made = _link_field(scene, write_field(FIELD, *rows, species, forms))
+    made = _link_field(scene, write_field(FIELD, *rows, species, forms), collection)
     remove_plants(plants)
     return made
 
 
 def plants_from_field(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, field: bpy.types.Object, most: int
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    field: bpy.types.Object,
+    most: int,
+    collection: bpy.types.Collection | None = None,
 ) -> list[bpy.types.Object]:
     """Put empties in place of a field; the same individuals stand at the same places.
 
@@ -195,6 +207,8 @@ def plants_from_field(
     ----------
     most : int
         Objects that may be made.
+    collection : bpy.types.Collection, optional
+        Where they go; the scene's collection for plants if not given.
 
     Raises
     ------
@@ -209,7 +223,7 @@ def plants_from_field(
         )
     angles = np.array([Matrix(frame).to_euler() for frame in read.frame])
     species, forms = [species_of(kind) for kind in read.kinds], [form_of(kind) for kind in read.kinds]
-    made = _empties(scene, (read.position, angles, read.scale, read.species, read.seed), species, forms)
+    made = _empties(scene, (read.position, angles, read.scale, read.species, read.seed), species, forms, collection)
     remove_fields([field])
     return made
 

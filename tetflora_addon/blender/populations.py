@@ -61,6 +61,21 @@ class Made:
     erased: int
 
 
+def owner_of(scene: bpy.types.Scene, objects: Iterable[bpy.types.Object]) -> TetFloraPopulation | None:
+    """The population that all of these plants and fields belong to; None if there is no such one."""
+    objects = set(objects)
+    uids = {o.tetflora.population for o in objects}
+    found = next((p for p in scene.tetflora.populations if {p.uid} == uids), None)
+    return found if found is not None and objects <= set(own_objects(scene, found)) else None
+
+
+def adopt(scene: bpy.types.Scene, population: TetFloraPopulation, objects: Iterable[bpy.types.Object]) -> None:
+    """Let plants and fields belong to a population, after those that it has."""
+    numbers = [o.tetflora.population_number for o in own_objects(scene, population)]
+    for number, obj in enumerate(objects, max(numbers, default=-1) + 1):
+        obj.tetflora.population, obj.tetflora.population_number = population.uid, number
+
+
 def recount(scene: bpy.types.Scene) -> None:
     """Let populations know how many plants they still have, after some were removed."""
     for population in scene.tetflora.populations:
@@ -130,7 +145,7 @@ def make_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, populati
     returned = max(population.made - own_number(own), 0)
     _release(copies)
     _remove(own)
-    collection = _collection(scene, population)
+    collection = collection_of(scene, population)
     if makes_field(population, len(placement)) and len(placement):
         made = [add_field(scene, placement, species, collection)]
     else:
@@ -228,7 +243,7 @@ def _remove(objects: Iterable[bpy.types.Object]) -> None:
     bpy.data.batch_remove(plants)
 
 
-def _collection(scene: bpy.types.Scene, population: TetFloraPopulation) -> bpy.types.Collection:
+def collection_of(scene: bpy.types.Scene, population: TetFloraPopulation) -> bpy.types.Collection:
     """The collection of a population's plants, within the scene's for plants; made if there is none in the scene."""
     found = population.collection
     if found is None or found.library is not None or found not in set(scene.collection.children_recursive):
