@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
 from tests.blender.scenes import add_mesh, add_plant, datablocks, depsgraph, part
@@ -176,3 +178,27 @@ def test_there_is_nothing_to_keep_without_results(scene):
     import bpy
 
     assert not bpy.ops.tetflora.keep_results.poll()
+
+
+def test_the_file_is_searched_for_a_parent_once_a_collection(scene, monkeypatch):
+    """It may have as many objects as plants, and a forest has hundreds of result objects."""
+    import bpy
+
+    output, searches = part("output"), []
+
+    class Objects:
+        def __iter__(self):
+            searches.append(1)
+            return iter(bpy.data.objects)
+
+        def new(self, *arguments):
+            return bpy.data.objects.new(*arguments)
+
+    monkeypatch.setattr(output, "bpy", SimpleNamespace(data=SimpleNamespace(objects=Objects())))
+    parents = []
+    for _ in range(2):
+        collection = bpy.data.collections.new("results")
+        parents += [output.parent_of(collection, "bush", "Bush") for _ in range(3)]
+        assert list(collection.objects) == parents[:1]
+    assert len(set(parents)) == 1
+    assert len(searches) == 2
