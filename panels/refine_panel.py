@@ -6,8 +6,10 @@ import bpy
 
 from ..operators import ids
 from ..tetflora_addon.blender import auto_refresh
+from ..tetflora_addon.blender.emit import KIND
 from ..tetflora_addon.blender.first_forest import is_first_forest
 from ..tetflora_addon.blender.handlers import render_errors
+from ..tetflora_addon.blender.scene_reader import has_contents
 from .base import SidebarPanel, draw_message
 
 
@@ -29,7 +31,18 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
             draw_message(context, layout, error)
         if context.scene.camera is None:
             draw_message(context, layout, "The scene has no camera: add one, and make it active with Ctrl Numpad 0")
-        elif is_first_forest(context.scene) and not settings.statistics:
-            layout.label(text="Refine, then F12", icon='INFO')
-        elif not settings.refine_at_render and not settings.statistics:
-            draw_message(context, layout, "Nothing is refined: renders show no plants", 'INFO')
+        elif text := hint(context.scene):
+            draw_message(context, layout, text, 'INFO')
+
+
+def hint(scene: bpy.types.Scene) -> str:
+    """What to say of a scene with plants of which nothing is refined; else an empty text. Cheap as a rule."""
+    settings = scene.tetflora
+    if settings.statistics:
+        return ""
+    if settings.refine_at_render:
+        return "Refine, then F12" if is_first_forest(scene) and has_contents(scene) else ""
+    # Of results that were kept as meshes, the first of a collection tells: a panel cannot look through all objects.
+    first = (next(iter(collection.objects), None) for collection in scene.collection.children_recursive)
+    kept = any(obj is not None and KIND in obj for obj in first)
+    return "" if kept or not has_contents(scene) else "Nothing is refined: renders show no plants"

@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from devtools import session
 from tests.blender.scenes import add_camera, add_mesh, datablocks, part
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -164,3 +165,24 @@ def test_its_ground_is_selected_so_that_populate_goes_on_from_there():
     assert active.type == 'MESH' and active.tetflora.is_occluder
     assert [o.name for o in scene.view_layers[0].objects.selected] == [active.name]
     assert bpy.ops.tetflora.populate.poll()
+
+
+def test_the_tab_says_what_comes_next_and_stops_when_it_is_done():
+    import bpy
+
+    scene = bpy.context.scene
+    hint = session.part("panels.refine_panel").hint
+    assert hint(scene) == ""
+    bpy.ops.tetflora.first_forest()
+    scene = bpy.context.scene
+    assert hint(scene) == "Refine, then F12"
+    scene.render.resolution_percentage = 5
+    bpy.ops.tetflora.refine()
+    assert hint(scene) == ""
+    bpy.ops.tetflora.keep_results()
+    assert not scene.tetflora.refine_at_render
+    assert hint(scene) == ""  # what is kept is rendered
+    bpy.data.collections.remove(bpy.data.collections["TetFlora kept"])
+    assert hint(scene) == "Nothing is refined: renders show no plants"
+    bpy.ops.tetflora.remove_plants(which='ALL')
+    assert hint(scene) == ""
