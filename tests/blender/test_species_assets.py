@@ -139,3 +139,15 @@ def test_a_folder_that_cannot_be_written_is_said(tmp_path):
     with pytest.raises(RuntimeError, match="asset library cannot be written"):
         bpy.ops.tetflora.create_asset_library(directory=str(tmp_path / "file"))
     assert datablocks() == before
+
+
+def test_a_file_of_catalogues_that_is_no_text_is_said_and_stays(tmp_path):
+    import bpy
+
+    catalogues = tmp_path / "blender_assets.cats.txt"
+    catalogues.write_bytes(b"VERSION 1\n# Geh\xf6lze\n")
+    before = datablocks()
+    with pytest.raises(RuntimeError, match=r"blender_assets.cats.txt is no text in UTF-8"):
+        bpy.ops.tetflora.create_asset_library(directory=str(tmp_path))
+    assert datablocks() == before
+    assert catalogues.read_bytes() == b"VERSION 1\n# Geh\xf6lze\n"

@@ -49,7 +49,7 @@ def write_asset_library(folder: Path) -> tuple[Path, int]:
     Raises
     ------
     SceneError
-        The folder cannot be written.
+        The folder cannot be written, or its file of catalogues cannot be read.
     SpeciesError
         A species of the catalogue is broken.
     """
@@ -121,7 +121,10 @@ def _set_preview(obj: bpy.types.Object, picture: Path) -> None:
 
 
 def _write_catalog(path: Path) -> None:
-    text = path.read_text(encoding="utf-8") if path.exists() else "VERSION 1\n"
+    try:
+        text = path.read_text(encoding="utf-8") if path.exists() else "VERSION 1\n"
+    except UnicodeDecodeError:
+        raise SceneError(f"{path} is no text in UTF-8, as Blender's files of catalogues are; mend or move it") from None
     if _CATALOG not in text:
         write_whole(path, f"{text.rstrip()}\n{_CATALOG}:TetFlora:TetFlora\n")
 
