@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tests.engine import support
@@ -22,6 +22,8 @@ corners = st.tuples(*[st.floats(-3000, 3000, allow_subnormal=False)] * 3)
 
 
 @given(corners, st.tuples(*[st.floats(0.01, 900)] * 3))
+@example((-1e-17, 0.0, 0.0), (float(np.nextafter(64.0, 65.0)), 1.0, 1.0))
+@example((0.0, 0.0, 0.0), (64.0, 1.0, 1.0))
 @settings(deadline=None, max_examples=40)
 def test_the_root_fills_cubes_around_the_scene(low: tuple, size: tuple) -> None:
     bounds = np.array([low, np.add(low, size)])

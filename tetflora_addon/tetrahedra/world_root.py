@@ -46,7 +46,8 @@ def world_cubes(bounds: ArrayLike) -> tuple[float, NDArray[np.int64], NDArray[np
     if not np.isfinite(bounds).all():
         raise ValueError("the bounds of the scene must be finite")
     longest = max(float(np.ptp(bounds, axis=0).max()), SMALLEST)
-    side = float(2.0 ** np.ceil(np.log2(longest)))
+    share, power = np.frexp(longest)  # a logarithm would round, and a third cube be needed
+    side = float(np.ldexp(1.0, power if share > 0.5 else power - 1))
     low = np.floor(bounds[0] / side).astype(np.int64)
     return side, low, np.maximum(np.ceil(bounds[1] / side).astype(np.int64) - low, 1)
 
