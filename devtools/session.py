@@ -16,10 +16,12 @@ from __future__ import annotations
 
 import atexit
 import importlib
+import io
 import os
 import shutil
 import sys
 import tempfile
+from contextlib import redirect_stdout
 from pathlib import Path
 from types import ModuleType
 
@@ -96,8 +98,10 @@ def stop() -> None:
 
     addon_utils.disable(PACKAGE, default_set=True)
     repositories = bpy.context.preferences.extensions.repos
-    for repository in [r for r in repositories if r.module == REPOSITORY]:
-        repositories.remove(repository)
+    # Blender disables what is in the repository once more, and says that it is not enabled.
+    with redirect_stdout(io.StringIO()):
+        for repository in [r for r in repositories if r.module == REPOSITORY]:
+            repositories.remove(repository)
     shutil.rmtree(home, ignore_errors=True)
     for name in [n for n in sys.modules if n == PACKAGE or n.startswith(PACKAGE + ".")]:
         del sys.modules[name]
