@@ -17,6 +17,8 @@ def view_layer_groups(scene: bpy.types.Scene) -> list[list[bpy.types.ViewLayer]]
     Layers that render the same plants share a refinement; where each has plants of its own, each gets one.
     """
     layers = [layer for layer in scene.view_layers if layer.use] or list(scene.view_layers)
+    if len(layers) == 1:
+        return [layers]  # at no cost: films of ten thousand objects have mostly one
     groups: dict[frozenset[int], list[bpy.types.ViewLayer]] = {}
     for layer in layers:
         rendered = list(renderable_objects(layer))
