@@ -22,7 +22,7 @@ import bpy
 import numpy as np
 
 from devtools import session
-from examples import fly_through
+from examples import fly_through, landscape
 
 from .compare import flip_map, read_picture, render
 from .report import Targets, peak_mb
@@ -34,6 +34,8 @@ ALONE, QUICK_ALONE = 20, 3
 #: Frames next to each other whose pictures are compared, around one at which the row is refined anew.
 AROUND, QUICK_AROUND = 4, 1
 SAMPLES, PERCENT = 16, 50
+#: A flight over the landscape, at so many metres a second, so much higher than the landscape's own camera.
+FLIGHT_SPEED, FLIGHT_HIGHER = 15.0, 32.0
 
 TARGETS: Targets = {
     **{f"next_frame_ratio_{name}": {"max": 0.03} for name in fly_through.SCENES},
@@ -49,6 +51,8 @@ def run(quick: bool) -> dict[str, float]:
     for name in fly_through.SCENES:
         session.clean_file()
         figures |= {f"{key}_{name}": value for key, value in _timed(name).items()}
+    session.clean_file()
+    figures |= _flight()
     chosen = np.linspace(1, FRAMES, QUICK_ALONE if quick else ALONE).round().astype(int).tolist()
     session.clean_file()
     sequence, refined_at = _film(chosen)
@@ -82,6 +86,27 @@ def _timed(name: str) -> dict[str, float]:
         "polygons_meshed": polygons,
         "peak_mb": peak_mb(),
     }
+
+
+def _flight() -> dict[str, int]:
+    """How often a flight is refined: in cells that are larger where plants are far, and in cells of the same size."""
+    scene = bpy.context.scene
+    landscape.build(scene)
+    camera, layer = scene.camera, scene.view_layers[0]
+    camera.location.z += FLIGHT_HIGHER
+    for frame in (1, FRAMES):
+        camera.location.y += FLIGHT_SPEED * (frame - 1) / fly_through.RATE
+        camera.keyframe_insert("location", frame=frame)
+    kept = session.part("tetflora_addon.blender.kept_results")
+    given = session.part("tetflora_addon.blender.job").read_scene(scene, layer.depsgraph, layer)
+    found = {}
+    for name, near in (("flight_refinements", given), ("flight_refinements_small_cells", None)):
+        eyes = []
+        for frame in range(1, FRAMES + 1):
+            scene.frame_set(frame)
+            eyes.append(tuple(kept.shared_camera(scene, layer.depsgraph, near).position))
+        found[name] = len(set(eyes))
+    return found
 
 
 def fingerprint(scene: bpy.types.Scene) -> dict[str, list]:
