@@ -83,7 +83,9 @@ def _same(first, second):
 angles = st.tuples(*[st.floats(-3.0, 3.0)] * 3)
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
+)
 @given(
     turns=st.lists(angles, min_size=3, max_size=3),
     written=st.sampled_from(['QUATERNION', 'FLOAT_VECTOR', None]),

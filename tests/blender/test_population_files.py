@@ -39,7 +39,9 @@ def _numbers(name):
     return st.integers(int(low), int(high)) if prop.type == 'INT' else st.floats(low, high, width=32)
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
+)
 @given(data=st.data())
 def test_what_is_written_comes_back(tmp_path, data):
     import bpy

@@ -32,7 +32,9 @@ def _occluders():
     return part("scene_reader").read_occluders(bpy.context.scene, depsgraph())
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
+)
 @given(
     kind=st.sampled_from(['PERSP', 'ORTHO']),
     fit=st.sampled_from(['AUTO', 'HORIZONTAL', 'VERTICAL']),
@@ -160,7 +162,9 @@ def test_only_enabled_plants_that_render_count():
     assert sorted(_plants().position[:, 0].tolist()) == [0.0, 7.0, 8.0]
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
+)
 @given(
     rotation=st.tuples(*[st.floats(-3.0, 3.0)] * 3),
     scale=st.tuples(*[st.floats(0.1, 5.0)] * 3),

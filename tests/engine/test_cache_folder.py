@@ -89,7 +89,7 @@ def spoil(path: Path, how: str, at: float) -> None:
         path.write_bytes(how.encode() * 40)
 
 
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(
     st.sampled_from(
         ["cut", "flipped", "shape", "type", "not finite", "of another", "objects", "one array", "PK\x03\x04", "junk"]

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from devtools import house
 
@@ -114,3 +115,7 @@ def test_house_rules_can_fail(text: str, tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(house, "ROOT", tmp_path)
     monkeypatch.setattr(house, "files", lambda: [bad])
     assert len(house.problems()) == 3  # header, length, name
+
+
+def test_no_example_of_a_property_is_timed() -> None:
+    assert settings.default.deadline is None
