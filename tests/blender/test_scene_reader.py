@@ -230,10 +230,24 @@ def test_linked_plants_are_read(tmp_path):
     assert np.allclose(_plants().position, [[2.0, 0.0, 0.0]])
 
 
+def _excluded(plants):
+    import bpy
+
+    collection = bpy.data.collections.new("excluded")
+    bpy.context.scene.collection.children.link(collection)
+    for plant in plants:
+        for home in plant.users_collection:
+            home.objects.unlink(plant)
+        collection.objects.link(plant)
+    bpy.context.view_layer.layer_collection.children["excluded"].exclude = True
+
+
 @pytest.mark.parametrize(
     ("break_it", "says"),
     [
         (lambda: None, "No plants are there.*Add > TetFlora Plant"),
+        (lambda: setattr(add_plant(), "hide_render", True), "to render; 1 of the scene.s are hidden in renders"),
+        (lambda: _excluded([add_plant(f"x{i}") for i in range(3)]), "3 of the scene.s.*excluded from the view layer"),
         (lambda: setattr(add_plant().tetflora, "enabled", False), "switched off"),
         (lambda: add_plant("Old oak", "quercus"), '"Old oak": unknown species "quercus".*quercus.json'),
         (lambda: add_plant("Old oak", ""), '"Old oak": unknown species ""'),

@@ -65,15 +65,21 @@ def read_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_lay
     if not read:
         found = own or copies
         off = found and not any(o.tetflora.enabled for o in (*own, *(c.owner for c in copies)))
-        raise NoPlantsError(_none_left(bool(off), [o.name for o in own if o.tetflora.is_field]))
+        hidden = sum(o.tetflora.is_plant or o.tetflora.is_field for o in scene.objects) - len(own)
+        raise NoPlantsError(_none_left(bool(off), [o.name for o in own if o.tetflora.is_field], hidden))
     return _merged(read)
 
 
-def _none_left(off: bool, fields: list[str]) -> str:
+def _none_left(off: bool, fields: list[str], hidden: int) -> str:
     if off:
         return "All plants of the scene are switched off; enable some in the sidebar's TetFlora tab"
     if fields:
         return f"{_listed(fields)}: a field of plants without points; give it vertices, or populate a terrain"
+    if hidden:
+        return (
+            f"No plants are there to render; {hidden:,} of the scene's are hidden in renders or excluded from the view "
+            "layer, by themselves or with their collections, as the outliner shows"
+        )
     return (
         "No plants are there to render; add some with Add > TetFlora Plant or with Populate in the sidebar's "
         "TetFlora tab"
