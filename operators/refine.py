@@ -48,6 +48,8 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
 
     def finish(self, context: bpy.types.Context, statistics: Statistics) -> set[str]:
         prepare_scene(context.scene)
+        if statistics.complete:
+            auto_refresh.refined(context.scene)
         forget_render_errors()
         for area in context.screen.areas if context.screen else ():
             area.tag_redraw()

@@ -242,6 +242,22 @@ def test_clear_takes_away_what_is_half_made_too(scene, monkeypatch):
     assert settle(monkeypatch) > 0  # it works on
 
 
+def test_what_refine_has_made_is_not_made_again(scene, monkeypatch):
+    import bpy
+
+    scene.tetflora.auto_refine = True
+    settle(monkeypatch)
+    scene.tetflora.cutoff *= 2.0
+    assert bpy.ops.tetflora.refine() == {'FINISHED'}
+    made = results(scene)
+    auto().schedule(scene)
+    assert settle(monkeypatch) == 0
+    assert results(scene) == made
+    scene.tetflora.cutoff /= 2.0
+    auto().schedule(scene)
+    assert settle(monkeypatch) > 0
+
+
 def test_refine_is_alone(scene, monkeypatch):
     import bpy
 
@@ -249,6 +265,7 @@ def test_refine_is_alone(scene, monkeypatch):
     half_make(scene, monkeypatch, 1)
     assert bpy.ops.tetflora.refine() == {'FINISHED'}
     assert len(results(scene)) == 1
+    scene.tetflora.cutoff *= 2.0
     half_make(scene, monkeypatch, 2)
     assert hasattr(bpy.types, auto().REFINE)
     monkeypatch.setattr(auto(), "_operator_refines", lambda: True)  # as it does between redraws

@@ -86,6 +86,14 @@ def stop() -> None:
             _state.steps, _state.working, _state.message = None, False, ""
 
 
+def refined(scene: bpy.types.Scene) -> None:
+    """Somebody else has refined a scene as it is now: what that made need not be made again."""
+    if scene.tetflora.auto_refine:
+        layer = _view_layer(scene)
+        layer.update()
+        _done[scene.name] = scene_digest(scene, layer.depsgraph, layer)
+
+
 def tick() -> float | None:
     """Do a slice of what there is to do; seconds until the next, or None if nothing is left."""
     scene = bpy.data.scenes.get((_state.scene, None))
