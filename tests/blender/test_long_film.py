@@ -30,11 +30,11 @@ def test_frames_of_a_film_leave_nothing_behind(clean_file, tmp_path, gigabytes):
     scene.tetflora.cutoff, scene.tetflora.leaf_limit = 8.0, 0.5
     scene.tetflora.kept_memory = gigabytes
     scene.render.filepath = str(tmp_path / "frame_####")
-    before, during = datablocks(), []
+    before, during, hidden = datablocks(), [], []
 
-    def look(_scene, _depsgraph=None):
+    def look(_scene, _depsgraph=None):  # Blender prints what is raised here, and renders on
         during.append({kind: len(names) for kind, names in datablocks().items()})
-        assert stone.hide_render
+        hidden.append(stone.hide_render)
 
     bpy.app.handlers.render_post.append(look)
     try:
@@ -43,6 +43,7 @@ def test_frames_of_a_film_leave_nothing_behind(clean_file, tmp_path, gigabytes):
         bpy.app.handlers.render_post.remove(look)
     assert part("handlers").render_errors() == []
     assert len(during) == FRAMES
+    assert hidden == [True] * FRAMES
     rounds = [during[n : n + 2 * LEG] for n in range(0, FRAMES, 2 * LEG)]
     for kind in before:
         most = [max(counts[kind] for counts in one) for one in rounds]
