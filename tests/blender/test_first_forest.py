@@ -167,6 +167,22 @@ def test_its_ground_is_selected_so_that_populate_goes_on_from_there():
     assert bpy.ops.tetflora.populate.poll()
 
 
+def test_populate_and_the_brush_go_on_with_its_species():
+    import bpy
+
+    bpy.ops.tetflora.first_forest()
+    forest = {o.tetflora.species: 0 for o in bpy.context.scene.objects if o.tetflora.is_plant}
+    assert len(forest) == 4
+    assert {e.species for e in bpy.context.scene.tetflora.populate.mix} == set(forest)
+    before = set(bpy.data.objects)
+    bpy.context.scene.tetflora.brush.density = 20.0
+    bpy.context.view_layer.update()
+    bpy.ops.tetflora.paint_plants(mode='PAINT', stroke="-20 60 2")
+    painted = {o.tetflora.species for o in set(bpy.data.objects) - before}
+    assert len(painted) > 1
+    assert painted <= set(forest)
+
+
 def test_the_tab_says_what_comes_next_and_stops_when_it_is_done():
     import bpy
 

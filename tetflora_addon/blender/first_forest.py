@@ -221,8 +221,13 @@ def _sun() -> bpy.types.Object:
 
 
 def _settings(scene: bpy.types.Scene) -> None:
-    """What lets Refine and a render give a picture in seconds."""
+    """What lets Refine and a render give a picture in seconds, and Populate and the brush go on with these species."""
     scene.tetflora.quality = 'DRAFT'
+    mix, known_species = scene.tetflora.populate.mix, catalogue()
+    for layer in LAYERS if not mix else ():
+        if layer.species in known_species:
+            entry = mix.add()
+            entry.species, entry.weight = layer.species, 0.1 * layer.number
     render = scene.render
     known = {item.identifier for item in bpy.types.RenderSettings.bl_rna.properties["engine"].enum_items}
     if 'CYCLES' in known or hasattr(scene, "cycles"):
