@@ -83,3 +83,31 @@ def test_they_are_refined(linked):
     add_camera()
     assert bpy.ops.tetflora.refine() == {'FINISHED'}
     assert '"plants": 4' in bpy.context.scene.tetflora.statistics
+
+
+def test_what_is_changed_of_overrides_is_there_when_the_file_is_opened_again(linked, tmp_path):
+    import bpy
+
+    def overridden():
+        return [o for o in bpy.context.scene.objects if o.tetflora.is_plant and o.override_library is not None]
+
+    scene = bpy.context.scene
+    scene.collection.children[0].override_hierarchy_create(scene, bpy.context.view_layer)
+    plants = overridden()
+    assert len(plants) == 4
+    for plant in plants:  # as Object > Library Override > Make leaves those that are meant to be edited
+        plant.override_library.is_system_override = False
+    before = {plant.name: plant.tetflora.seed for plant in plants}
+    select(*plants)
+    bpy.ops.tetflora.reseed()
+    bpy.ops.tetflora.assign_species(species="oak")
+    plants[0].tetflora.enabled = False
+    plants[0].tetflora.is_occluder = plants[0].tetflora.is_explicit = True
+    changed = {p.name: (p.tetflora.species, p.tetflora.seed, p.tetflora.enabled) for p in plants}
+    path = str(tmp_path / "scene.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    found = overridden()
+    assert {p.name: (p.tetflora.species, p.tetflora.seed, p.tetflora.enabled) for p in found} == changed
+    assert all(seed != before[name] and species == "oak" for name, (species, seed, _) in changed.items())
+    assert [p.name for p in found if p.tetflora.is_occluder and p.tetflora.is_explicit] == [min(before)]

@@ -40,6 +40,10 @@ _FORM = {
 }
 
 
+#: What overrides of linked objects may change; without, Blender forgets the change when the file is opened again.
+_OVERRIDES = {'LIBRARY_OVERRIDABLE'}
+
+
 class TetFloraFieldEntry(bpy.types.PropertyGroup, SpeciesChoice):
     """One kind of plant of a field; the attribute ``species`` of its points counts through these."""
 
@@ -61,13 +65,15 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
     seed: IntProperty(
         name="Seed",
         description="Every seed is another individual of the species; the same seed is the same plant to the last leaf",
+        override=_OVERRIDES,
     )
     enabled: BoolProperty(
         name="Enabled",
         description="The plant takes part in refinement and rendering",
         default=True,
+        override=_OVERRIDES,
     )
-    form: PointerProperty(**_FORM)
+    form: PointerProperty(**_FORM, override=_OVERRIDES)
     is_field: BoolProperty(
         name="Field of Plants",
         description=(
@@ -89,8 +95,9 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
             "transparent or very thin things should not hide plants"
         ),
         options=set(),
+        override=_OVERRIDES,
     )
-    is_explicit: BoolProperty(**EXPLICIT)
+    is_explicit: BoolProperty(**EXPLICIT, override=_OVERRIDES)
     population: StringProperty(
         name="Population", description="Identity of the population that made this", options={'HIDDEN'}
     )
@@ -275,7 +282,7 @@ def register() -> None:
     """Register the property groups and hang them on Blender's types."""
     for cls in CLASSES:
         bpy.utils.register_class(cls)
-    bpy.types.Object.tetflora = PointerProperty(type=TetFloraObject)
+    bpy.types.Object.tetflora = PointerProperty(type=TetFloraObject, override=_OVERRIDES)
     bpy.types.Scene.tetflora = PointerProperty(type=TetFloraScene)
 
 

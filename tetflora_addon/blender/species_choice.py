@@ -18,6 +18,7 @@ class SpeciesChoice:
     species: StringProperty(
         name="Species",
         description="File name of the species in the catalogue, without its ending",
+        override={'LIBRARY_OVERRIDABLE'},
     )
     species_choice: EnumProperty(
         name="Species",
