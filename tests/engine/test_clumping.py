@@ -181,7 +181,9 @@ def test_species_without_leaves_and_of_one_order_are_fitted() -> None:
     single = support.small()
     single["orders"] = single["orders"][:1]
     single["orders"][0]["branches"] = [0, 0]
-    for data in (bare, single):
+    pole = {**single, "orders": [{"length": [10, 0], "thickness": [0.003, 0]}]}  # one thing, without extent
+    flag = {**single, "orders": [{"length": [10, 0], "thickness": [0.003, 0], "leaves": 0.5, "leaf_size": [20, 0]}]}
+    for data in (bare, single, pole, flag):
         found = support.compiled(data).clumping
         assert all(np.isfinite(getattr(found, name)).all() for name in ("whole", "own", "root", "density"))
 

@@ -181,7 +181,8 @@ def _rays(
     """
     key = key_of_seed(np.array([plant]))
     low, high = things.middle.min(axis=1), things.middle.max(axis=1)
-    extent = float((high - low).max())
+    # A bare stem is one thing, and has no extent between middles.
+    extent = max(float((high - low).max()), float(things.radius.max()))
     finest = max(finest, extent / 100)
     middling = float(np.maximum(high - low, extent / 100).prod() ** (1 / 3))
     sizes = np.geomspace(finest, max(_COARSEST * middling, 2 * finest), _SIZES)
@@ -223,7 +224,8 @@ def _looked_at(
     u, v = basis(direction)
     flat = np.stack([sum(axis[k] * things.middle[k] for k in range(3)) for axis in (u, v)])
     least, most = flat.min(axis=1), flat.max(axis=1)
-    spacing = max(float(np.sqrt((most - least).prod())), 1e-9) / _RAYS
+    # Middles in a line have no area, and as fine a grid as they ask for would have no end.
+    spacing = float(np.sqrt(np.maximum(most - least, things.radius.max()).prod())) / _RAYS
     low = np.floor(least / spacing - 1) + offset  # of rays: at spacing × (low + i)
     shape = np.ceil(most / spacing - low + 1).astype(np.int64)
     place = flat / spacing - low[:, None]
