@@ -104,8 +104,8 @@ def feed_background(kind):
     return node
 
 
-@pytest.mark.parametrize("tilt", [0.0, 90.0])
-def test_an_image_is_the_right_way_round(tilt):
+@pytest.mark.parametrize(("tilt", "broken"), [(0.0, 0.0), (90.0, 0.0), (0.0, np.inf), (90.0, np.nan)])
+def test_an_image_is_the_right_way_round(tilt, broken):
     """Irradiance of planes that face up and +X, under a sky with one bright side, as in Cycles."""
     import bpy
 
@@ -115,6 +115,7 @@ def test_an_image_is_the_right_way_round(tilt):
     pixels = np.ones((16, 32, 4), np.float32)
     pixels[..., :3] = rng.uniform(0.0, 0.2, 3)
     pixels[9:14, 12:19, :3] += rng.uniform(1.0, 2.0, 3)
+    pixels[13, 3, 1] += broken  # as the sun is in some pictures of skies
     image.pixels.foreach_set(pixels.ravel())
     feed_background("ShaderNodeTexEnvironment").image = image
     plane, camera = white_plane(), bpy.context.scene.camera

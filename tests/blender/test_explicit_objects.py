@@ -252,6 +252,13 @@ def test_colours_come_from_materials_images_and_attributes():
     assert look.transmission == 0
     np.testing.assert_allclose(looks.of(_material(), {}).colour, (0.2, 0.5, 0.1), atol=1e-6)
     assert looks.of(None, {}).colour == (0.8, 0.8, 0.8)
+    image = bpy.data.images.new("broken", 4, 4, alpha=True, float_buffer=True)
+    pixels = np.full((16, 4), (0.5, 0.25, 0.0, 1.0), np.float32)
+    pixels[3, 1], pixels[5, 3] = np.nan, np.inf
+    image.pixels.foreach_set(pixels.ravel())
+    look = looks.of(_material("broken", image=image), {})
+    np.testing.assert_allclose(look.colour, (0.5, 0.25, 0.0), atol=1e-6)
+    assert look.coverage == pytest.approx(14 / 16)
     painted = _material("painted")
     tree = painted.node_tree
     node = tree.nodes.new("ShaderNodeVertexColor")

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from ..planting.ground import Ground, Path
 from .ground_curves import Line, lines_of
+from .image_pixels import image_pixels
 from .plant_objects import objects_within
 from .transforms import world_matrix
 
@@ -175,14 +176,10 @@ def _luminance(image: bpy.types.Image) -> NDArray[np.float32]:
     """Grey values of an image, (h, w), the first row at the bottom."""
     if image.source == 'TILED':
         raise SceneError(f'The image "{image.name}" has tiles (UDIM), which Populate cannot read; use a single image')
-    width, height = image.size
-    channels = image.channels
-    if not width or not height or not channels:
+    if not (all(image.size) and image.channels):
         raise SceneError(
             f'The image "{image.name}" cannot be loaded from "{image.filepath}"; find the file with '
             "File > External Data > Find Missing Files, or clear the Image"
         )
-    pixels = np.zeros(width * height * channels, np.float32)
-    image.pixels.foreach_get(pixels)
-    pixels = pixels.reshape(height, width, channels)
-    return pixels[..., :3] @ _LUMINANCE if channels >= 3 else pixels[..., 0].copy()
+    pixels = image_pixels(image)
+    return pixels[..., :3] @ _LUMINANCE if image.channels >= 3 else pixels[..., 0].copy()

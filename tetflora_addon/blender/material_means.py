@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compat import tree_in_use
+from .image_pixels import image_pixels, linear_rgb
 
 #: What Blender shows where there is no material.
 GREY = (0.8, 0.8, 0.8)
@@ -118,14 +119,10 @@ def image_mean(image: bpy.types.Image) -> tuple[NDArray[np.float64], float] | No
     width, height, channels = *image.size, image.channels
     if not (width and height and channels):
         return None
-    pixels = np.zeros(width * height * channels, np.float32)
-    image.pixels.foreach_get(pixels)
     # An odd stride, so that a power of two of columns does not make a few of them stand for all.
-    pixels = pixels.reshape(-1, channels)[:: max(1, width * height // _PIXELS) | 1].astype(np.float64)
-    alpha = pixels[:, 3] if channels == 4 else np.ones(len(pixels))
-    colour = pixels[:, :3] if channels >= 3 else np.repeat(pixels[:, :1], 3, axis=1)
-    if image.colorspace_settings.name == "sRGB" and not image.is_float:
-        colour = np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
+    stride = max(1, width * height // _PIXELS) | 1
+    pixels = image_pixels(image).reshape(-1, channels)[::stride].astype(np.float64)
+    alpha, colour = pixels[:, 3] if channels == 4 else np.ones(len(pixels)), linear_rgb(image, pixels)
     weight = alpha if alpha.sum() > 0 else np.ones(len(alpha))
     return (colour * weight[:, None]).sum(axis=0) / weight.sum(), float(alpha.mean())
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..refinement.lights import Light
 from ..shading.light_sources import World
 from .compat import sky_model, tree_in_use
+from .image_pixels import image_pixels, linear_rgb
 
 #: What a scene without a world shows.
 BLACK = World.plain((0.0, 0.0, 0.0))
@@ -129,18 +130,12 @@ def _colour(socket: bpy.types.NodeSocket, factor: float, notes: list[str]) -> tu
 
 def _image(node: bpy.types.Node, factor: float, turn: float) -> World:
     image = node.image
-    width, height, channels = *image.size, image.channels
-    pixels = np.zeros(width * height * channels, np.float32)
-    image.pixels.foreach_get(pixels)
-    pixels = pixels.reshape(height, width, channels)
-    pixels = pixels[..., :3] if channels >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
-    if image.colorspace_settings.name == "sRGB" and not image.is_float:
-        pixels = np.where(pixels <= 0.04045, pixels / 12.92, ((pixels + 0.055) / 1.055) ** 2.4)
+    pixels = linear_rgb(image, image_pixels(image))
     if node.projection != 'EQUIRECTANGULAR':
         return World.plain(pixels.mean(axis=(0, 1)) * factor)
     # Means of blocks, so that a small sun is not passed over.
-    step = max(1, height // _ROWS)
-    rows, columns = height // step, width // step
+    step = max(1, len(pixels) // _ROWS)
+    rows, columns = len(pixels) // step, pixels.shape[1] // step
     pixels = pixels[: rows * step, : columns * step].reshape(rows, step, columns, step, 3).mean(axis=(1, 3))
 
     def radiance(towards: NDArray[np.float64]) -> NDArray[np.float64]:
