@@ -7,6 +7,7 @@ import bpy
 from ..operators import ids
 from ..tetflora_addon.blender import point_preview
 from ..tetflora_addon.blender.population_rules import awaits_update, is_outdated, shown_population
+from ..tetflora_addon.blender.species_items import catalogue
 from .base import SidebarPanel, draw_message, split_layout
 from .lists import TETFLORA_UL_mix, draw_list
 
@@ -100,7 +101,8 @@ class TETFLORA_PT_populate_species(_PartOfPopulate, bpy.types.Panel):
     def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
         draw_list(layout, TETFLORA_UL_mix, settings, ("mix", "mix_index"), 'MIX')
         if not settings.mix:
-            layout.label(text="First species of the catalogue", icon='INFO')
+            first = next(iter(catalogue().values()), None)
+            layout.label(text=f"None chosen: {first.name}" if first else "The catalogue has no species", icon='INFO')
         elif 0 <= settings.mix_index < len(settings.mix):
             entry = settings.mix[settings.mix_index]
             layout.prop(entry, "companion_choice")
