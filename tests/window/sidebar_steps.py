@@ -17,5 +17,5 @@ def steps(ui):
     yield from ui.picture("sidebar")
     # A key reaches the window: N closes the sidebar.
     ui.press('N')
-    yield 0.5
+    yield from ui.until(lambda: not ui.area().spaces.active.show_region_ui, 20, "closed sidebar")
     ui.values["open_after_n"] = ui.area().spaces.active.show_region_ui
