@@ -55,6 +55,14 @@ def test_facets_grow_with_the_way_to_the_view_and_with_what_hides_them(
         assert (one <= other * (1 + 1e-12)).all()
 
 
+def test_no_budget_makes_blots_of_what_is_deeply_hidden() -> None:
+    """Where facets are large already, depth makes them no larger; nothing is smaller than behind one crown."""
+    for pixels in (0.1, 0.33, 0.9, 1.1, 4.0, 20.0):
+        one, deep = (sizes(0.0, coarse, extent=1.0)[0].sides(pixels)[0] for coarse in (COARSE, COARSEST))
+        assert (deep <= np.maximum(one, 3.0) * (1 + 1e-12)).all()
+        assert (deep >= one).all()
+
+
 @pytest.mark.parametrize("clearance", [3.0, 30.0, 300.0, 1e6])
 def test_shadows_from_beside_the_view_keep_their_area(clearance: float) -> None:
     """However far a plant is, some facets of it are left, and they cover what it covers."""

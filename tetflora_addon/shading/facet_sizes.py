@@ -22,8 +22,10 @@ from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 
 #: How much larger facets of hidden tetrahedra are: at an optical depth in front of them that hides them, and at most,
-#: in proportion to the depth.
+#: in proportion to the depth; but no more pixels wide than this for the depth's sake. Some of what is deeply hidden can
+#: be seen between crowns after all, and where a budget makes facets large it would be blots.
 COARSE, COARSEST = 3.0, 9.0
+_WIDEST = 3.0
 _HIDING_DEPTH = 4.0  # e^−4 = .02 is left
 #: Side of facets per metre from the view: the sun is .0093 radians wide, so their shadows are half as soft as large.
 _SOFT = 0.02
@@ -76,7 +78,7 @@ class FacetSizes:
 
     def sides(self, pixels: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Sides (n,), (n,) of facets of leaves and of wood, metres, where those that are seen have so many pixels."""
-        side = self.coarse * pixels * self.extent
+        side = np.minimum(self.coarse * pixels, max(COARSE * pixels, _WIDEST)) * self.extent
         optical = self.amounts.leaf_area + self.amounts.wood_area / 2
         blurred = np.minimum(_SOFT * np.maximum(self.clearance, 0.0), np.sqrt(optical / _FEWEST))
         unseen = np.maximum(blurred, np.sqrt(HIDDEN_LEAVES * self.one_leaf))
