@@ -1,31 +1,24 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Figure 9: the landscape of 8,636 plants in haze.
-
-Haze follows Koschmieder's law: what is seen at a distance d keeps the share e^(−β d) of its light, and air adds its own
-light for the rest. A box of a volume that absorbs and glows, but scatters nothing, does exactly that, without noise.
-"""
+"""Figure 9: the landscape of 8,636 plants in haze."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import bpy
-import numpy as np
 from PIL import Image
 
 from devtools import session
 
 from .. import landscape
+from ..haze import add_haze
 from .pictures import save_jpeg
 from .scenes import refined, rendered, told_figures
 
 PIXELS, SMALL_PIXELS = 512, 32
 SMALL_PLANTS = 200
-#: β, 1/m, and the radiance of air of which nobody sees the end, linear.
 EXTINCTION, AIRLIGHT = 0.0024, (0.40, 0.45, 0.52)
-#: How far the box reaches beyond the land to all sides, and above it, metres.
-_BESIDE, _ABOVE = 300.0, 90.0
 
 
 def make(out: Path, images: Path, small: bool) -> dict[str, float]:
@@ -34,52 +27,9 @@ def make(out: Path, images: Path, small: bool) -> dict[str, float]:
     scene = bpy.context.scene
     landscape.build(scene, *((SMALL_PLANTS, SMALL_PIXELS) if small else (landscape.PLANTS, PIXELS)))
     scene.tetflora.refine_at_render = False
-    add_haze(scene)
+    add_haze(scene, EXTINCTION, AIRLIGHT)
     statistics = refined(scene)
     picture = out / "figure9.png"
     render_s = rendered(scene, picture, 1 if small else 32)
     save_jpeg(Image.open(picture).convert("RGB"), images / "paper-figure9.jpg")
     return {**told_figures(statistics), "render_s": render_s}
-
-
-def add_haze(scene: bpy.types.Scene) -> bpy.types.Object:
-    """Put the scene's ground, and its camera, into a box of haze that throws no shadow; returns the box."""
-    ground = scene.objects["Ground"]
-    points = np.zeros(3 * len(ground.data.vertices), np.float32)
-    ground.data.vertices.foreach_get("co", points)
-    points = np.vstack([points.reshape(-1, 3), scene.camera.location])
-    low, high = points.min(axis=0) - _BESIDE, points.max(axis=0) + [_BESIDE, _BESIDE, _ABOVE]
-    mesh = bpy.data.meshes.new("Haze")
-    corners = [[(low, high)[bit >> axis & 1][axis] for axis in range(3)] for bit in range(8)]
-    faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
-    mesh.from_pydata(np.array(corners).tolist(), [], faces)
-    mesh.materials.append(_air())
-    box = bpy.data.objects.new("Haze", mesh)
-    # Between the eye and what it sees alone: light that plants get from lamps and sky is as it was without.
-    box.visible_shadow = box.visible_diffuse = box.visible_glossy = box.visible_transmission = False
-    scene.collection.objects.link(box)
-    return box
-
-
-def _air() -> bpy.types.Material:
-    """A volume with β = `EXTINCTION` that is as bright as `AIRLIGHT` where nobody sees through."""
-    material = bpy.data.materials.new("Haze")
-    tree = session.part("tetflora_addon.blender.compat").shader_tree(material)
-    tree.nodes.clear()
-    absorb, glow, both, output = (
-        tree.nodes.new(kind)
-        for kind in (
-            "ShaderNodeVolumeAbsorption",
-            "ShaderNodeEmission",
-            "ShaderNodeAddShader",
-            "ShaderNodeOutputMaterial",
-        )
-    )
-    absorb.inputs["Color"].default_value = (0.0, 0.0, 0.0, 1.0)
-    absorb.inputs["Density"].default_value = EXTINCTION
-    glow.inputs["Color"].default_value = (*AIRLIGHT, 1.0)
-    glow.inputs["Strength"].default_value = EXTINCTION
-    tree.links.new(absorb.outputs[0], both.inputs[0])
-    tree.links.new(glow.outputs[0], both.inputs[1])
-    tree.links.new(both.outputs[0], output.inputs["Volume"])
-    return material

@@ -79,6 +79,7 @@ def test_figure9_is_hazy_as_koschmieder_says(make, tmp_path):
     import bpy
 
     from devtools import session
+    from examples.haze import add_haze
     from examples.paper import figure9
     from tests.blender import renders
 
@@ -97,7 +98,7 @@ def test_figure9_is_hazy_as_koschmieder_says(make, tmp_path):
     tree.links.new(emission.outputs[0], output.inputs[0])
     mesh.materials.append(glow)
     bpy.context.scene.collection.objects.link(bpy.data.objects.new("Ground", mesh))
-    figure9.add_haze(bpy.context.scene)
+    add_haze(bpy.context.scene, figure9.EXTINCTION, figure9.AIRLIGHT)
     passed = np.exp(-figure9.EXTINCTION * 50.0)  # the camera is 50 m above the ground, which is as bright as 1
     expected = passed + (1 - passed) * np.array(figure9.AIRLIGHT)
     assert np.allclose(renders.picture().mean(axis=(0, 1)), expected, rtol=0.01)
