@@ -34,6 +34,7 @@ def main() -> int:
     session.start()
     from .demo import run
     from .landscape import render_landscape
+    from .million import render_million
     from .species_sheet import render_opening, render_sheet
 
     IMAGES.mkdir(parents=True, exist_ok=True)
@@ -44,6 +45,8 @@ def main() -> int:
             as_jpeg(out / f"{name}.png", IMAGES / f"row80-{name}.jpg")
         render_landscape(out / "landscape.png")
         as_jpeg(out / "landscape.png", IMAGES / "landscape.jpg")
+        render_million(out / "million.png", memory=6.0)
+        as_jpeg(out / "million.png", IMAGES / "million.jpg")
     render_sheet(IMAGES / "species.jpg")
     render_opening(IMAGES / "orders.jpg")
     session.stop()

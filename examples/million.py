@@ -101,7 +101,7 @@ def render_million(
     Returns
     -------
     dict
-        Plants, polygons and facets that were made, and seconds.
+        Plants, polygons if expanded, polygons and facets that were made, and seconds.
     """
     session.clean_file()
     scene = bpy.context.scene
@@ -117,6 +117,7 @@ def render_million(
     bpy.ops.render.render(write_still=True)
     return {
         "plants": statistics.plants,
+        "polygons_full": statistics.polygons_full,
         "polygons": statistics.polygons_meshed,
         "facets": statistics.polygons_proxy,
         "refine_s": refined - begin,
