@@ -11,22 +11,18 @@ import sys
 import tempfile
 from pathlib import Path
 
+from PIL import Image
+
 from devtools import session
 
+from .paper.pictures import LARGEST, save_jpeg
+
 IMAGES = Path(__file__).resolve().parent.parent / "docs" / "images"
-LARGEST = 500_000
 
 
-def as_jpeg(source: Path, target: Path, quality: int = 88) -> None:
-    """Store a picture as a JPEG, without any colour management."""
-    import bpy
-
-    image = bpy.data.images.load(str(source))
-    image.colorspace_settings.name = "Non-Color"
-    image.update()  # read it now: what was only named has nothing to save
-    image.file_format, image.filepath_raw = 'JPEG', str(target)
-    image.save(quality=quality)
-    bpy.data.images.remove(image)
+def store(source: Path, target: Path) -> None:
+    """Store a picture as a JPEG, without what Blender writes into it, such as the path of the file."""
+    save_jpeg(Image.open(source).convert("RGB"), target)
 
 
 def main() -> int:
@@ -42,11 +38,11 @@ def main() -> int:
         out = Path(folder)
         run(out, 960)
         for name in ("cycles", "eevee", "top"):
-            as_jpeg(out / f"{name}.png", IMAGES / f"row80-{name}.jpg")
+            store(out / f"{name}.png", IMAGES / f"row80-{name}.jpg")
         render_landscape(out / "landscape.png")
-        as_jpeg(out / "landscape.png", IMAGES / "landscape.jpg")
+        store(out / "landscape.png", IMAGES / "landscape.jpg")
         render_million(out / "million.png", memory=6.0)
-        as_jpeg(out / "million.png", IMAGES / "million.jpg")
+        store(out / "million.png", IMAGES / "million.jpg")
     render_sheet(IMAGES / "species.jpg")
     render_opening(IMAGES / "orders.jpg")
     session.stop()
