@@ -21,7 +21,7 @@ def keeping(most_bytes: int) -> Callable[[Callable[..., Arrays]], Callable[..., 
     """Decorator for functions that take arrays alone, and give arrays that follow from these alone.
 
     Results are read only, for all who ask for the same get the same arrays. What nobody has asked for longest goes
-    first; what is too large for the limit by itself is given, and not kept.
+    first; what is too large for the limit by itself is given, not kept, and makes nothing else go.
 
     Parameters
     ----------
@@ -40,14 +40,20 @@ def keeping(most_bytes: int) -> Callable[[Callable[..., Arrays]], Callable[..., 
                 found = tuple(np.array(result) for result in function(*given))
                 for result in found:
                     result.flags.writeable = False
+            if _size(found) > most_bytes:
+                return found
             kept[key] = found
-            while sum(result.nbytes for results in kept.values() for result in results) > most_bytes:
+            while sum(map(_size, kept.values())) > most_bytes:
                 del kept[next(iter(kept))]
             return found
 
         return remembering
 
     return decorated
+
+
+def _size(arrays: Arrays) -> int:
+    return sum(array.nbytes for array in arrays)
 
 
 def _digest(arrays: Arrays) -> bytes:

@@ -72,6 +72,13 @@ def test_what_nobody_asked_for_longest_goes_first(double):
     assert len(double.asked) == 4
 
 
+def test_what_is_too_large_makes_nothing_else_go(double):
+    double(np.arange(3.0))
+    double(np.ones(100))
+    double(np.arange(3.0))
+    assert len(double.asked) == 2
+
+
 def test_what_is_too_large_is_given_all_the_same(double):
     for _ in range(2):
         assert len(double(np.ones(100))[0]) == 100

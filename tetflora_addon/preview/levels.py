@@ -193,7 +193,7 @@ def mean_colours(flora: Flora, contents: Contents, nodes: NDArray[np.integer], s
     if len(contents.polygon_cell):
         polygons, amounts = contents.polygons, contents.polygon_amounts
         colours = polygons.meshes.colours[polygons.meshes.slot[polygons.face]]
-        parts.append((contents.polygon_cell, amounts.leaf_area + amounts.wood_area / 2, colours))
+        parts.append((contents.polygon_cell, amounts.optical_area, colours))
     sums, area = np.zeros((size, 3)), np.zeros(size)
     for cells, weight, colours in parts:
         area += np.bincount(cells, weight, size)

@@ -48,6 +48,11 @@ class Amounts:
         """Leaves and wood together (n,), m²."""
         return self.leaf_area + self.wood_area
 
+    @property
+    def optical_area(self) -> NDArray[np.float64]:
+        """What can hold up light (n,), m²: leaves, and half of the wood, as closed branches show no more than that."""
+        return self.leaf_area + self.wood_area / 2
+
     def take(self, index: NDArray | slice) -> Amounts:
         """Selection by indices, mask or slice."""
         return Amounts(*(getattr(self, f.name)[index] for f in fields(self)))

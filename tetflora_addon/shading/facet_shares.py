@@ -33,7 +33,7 @@ from ..plants.hashing import mix
 from ..plants.outlines import Things, things_of
 from ..plants.pieces import Pieces
 from ..plants.seeds import Seeds
-from ..refinement.amounts import Amounts, piece_amounts, subplant_amounts
+from ..refinement.amounts import piece_amounts, subplant_amounts
 from .microsurfaces import CIRCUMRADIUS, SIN_60, Facets, piece_facets, subplant_facets
 
 #: Shares of the shipped species, made by ``python -m devtools.facet_tables``. Raise the number when facets or shares
@@ -288,14 +288,14 @@ class _Sight:
     @classmethod
     def of_subplants(cls, flora: Flora, some: Branches, beyond: NDArray[np.float64]) -> _Sight:
         """To the last leaf."""
-        area = _optical(subplant_amounts(flora, some))
+        area = subplant_amounts(flora, some).optical_area
         return cls(flora, some, beyond, _grown(flora, some), area, flora.one_leaf_area(some), None)
 
     @classmethod
     def of_branches(cls, flora: Flora, some: Branches, beyond: NDArray[np.float64]) -> _Sight:
         """Without what grows on the branches but leaves."""
         pieces, owner = open_subplants(flora, some)[2:]
-        area = np.bincount(owner, _optical(piece_amounts(flora, pieces)), len(some))
+        area = np.bincount(owner, piece_amounts(flora, pieces).optical_area, len(some))
         return cls(flora, some, beyond, _grown(flora, some, orders=1), area, flora.one_leaf_area(some), pieces)
 
     def views(self) -> list[_View]:
@@ -377,10 +377,6 @@ def _grown(flora: Flora, some: Branches, orders: int | None = None) -> Things:
     rows = len(flora.rows)
     forms = flora.forms[int(flora.species_of(some.row[:1])[0])]
     return things_of(flora.rows, forms, some, np.zeros(rows, np.intp), 0, np.ones(rows), orders)
-
-
-def _optical(amounts: Amounts) -> NDArray[np.float64]:
-    return amounts.leaf_area + amounts.wood_area / 2
 
 
 def _ray_numbers(point: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -73,14 +73,13 @@ class FacetSizes:
 
     @property
     def whole_optical(self) -> NDArray[np.float64]:
-        """Optical area (n,) of the whole of which each is a part, m²: of closed branches half of the surface."""
-        return (self.amounts.leaf_area + self.amounts.wood_area / 2) / np.maximum(self.part, 1e-12)
+        """Optical area (n,) of the whole of which each is a part, m²."""
+        return self.amounts.optical_area / np.maximum(self.part, 1e-12)
 
     def sides(self, pixels: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Sides (n,), (n,) of facets of leaves and of wood, metres, where those that are seen have so many pixels."""
         side = np.minimum(self.coarse * pixels, max(COARSE * pixels, _WIDEST)) * self.extent
-        optical = self.amounts.leaf_area + self.amounts.wood_area / 2
-        blurred = np.minimum(_SOFT * np.maximum(self.clearance, 0.0), np.sqrt(optical / _FEWEST))
+        blurred = np.minimum(_SOFT * np.maximum(self.clearance, 0.0), np.sqrt(self.amounts.optical_area / _FEWEST))
         unseen = np.maximum(blurred, np.sqrt(HIDDEN_LEAVES * self.one_leaf))
         side = np.where(self.hidden, np.maximum(side, unseen), side)
         # Where nobody looks, wood is cut into no more facets than it has faces. Elsewhere it is cut as fine as the
@@ -137,7 +136,11 @@ class PolygonFacetSizes:
 
 
 def coarseness(result: Refinement) -> NDArray[np.float64]:
-    """How much larger facets are (nodes,) than where they are seen, by what is in front; 1 where they are seen."""
+    """How much larger facets are (nodes,) than where they are seen: 1 there, `COARSE` to `COARSEST` where hidden.
+
+    In proportion to the optical depth in front, −ln of the transmittance that the visibility step finds (paper, section
+    6.3). Beside the view, where nothing is in front, `COARSE`; there `FacetSizes.clearance` makes them larger.
+    """
     with np.errstate(divide="ignore"):
         deep = np.clip(-COARSE / _HIDING_DEPTH * np.log(result.transmittance), COARSE, COARSEST)
     coarse = np.full(len(result.tree), COARSE)
@@ -155,7 +158,7 @@ def polygon_facet_sizes(contents: Contents, camera: Camera, hidden: NDArray[np.b
         meshes.face_areas(own.face, own.instance),
         meshes.leaf[own.face],
         hidden[contents.polygon_cell],
-        amounts.leaf_area + amounts.wood_area / 2,
+        amounts.optical_area,
         meshes.solid[own.face],
     )
 
