@@ -9,6 +9,7 @@ from bpy_extras import view3d_utils
 
 from ..tetflora_addon.blender.ground import Ground, Hit
 from ..tetflora_addon.blender.ground_cursor import GroundCursor
+from ..tetflora_addon.blender.runtime import redraw
 from .base import in_object_mode
 
 # Turning and moving the view, which goes on while a tool runs.
@@ -66,7 +67,7 @@ class GroundTool:
         self._ground = self._hit = None
         if context.workspace is not None:
             context.workspace.status_text_set(None)
-        redraw(context)
+        redraw()
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Blender ends the tool."""
@@ -102,18 +103,11 @@ class GroundTool:
             bpy.ops.ed.undo()
             self._steps, self._undone = self._steps - 1, self._undone + 1
         self._look_around(bpy.context)  # objects of before are no more
-        redraw(bpy.context)
+        redraw()
         return True
 
     def _look_around(self, context: bpy.types.Context) -> None:
         self._ground = Ground(context.view_layer, context.evaluated_depsgraph_get())
-
-
-def redraw(context: bpy.types.Context) -> None:
-    """Draw all 3D views of the window again."""
-    for area in context.screen.areas if context.screen else ():
-        if area.type == 'VIEW_3D':
-            area.tag_redraw()
 
 
 def _view_of(screen: bpy.types.Screen | None) -> bpy.types.Area | None:

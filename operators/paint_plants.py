@@ -13,11 +13,12 @@ from bpy.props import EnumProperty, StringProperty
 from ..tetflora_addon.blender.brush import Stroke, draped_circle
 from ..tetflora_addon.blender.brush_properties import MODES
 from ..tetflora_addon.blender.plant_objects import remove_empty_collections
+from ..tetflora_addon.blender.runtime import redraw
 from ..tetflora_addon.errors import SceneError, TetFloraError
 from ..tetflora_addon.planting.strokes import dabs_along
 from . import ids
 from .base import counted
-from .ground_tool import NAVIGATION, GroundTool, redraw
+from .ground_tool import NAVIGATION, GroundTool
 
 _SPACING = 0.25  # radii from dab to dab
 _PATIENCE = 4.0  # times what showing the plants cost last time, before it is done again
@@ -219,7 +220,7 @@ class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
         done = f"   |   {self._done}" if self._done else ""
         text = _KEYS.format(mode=mode.capitalize(), does=_DOES[mode], radius=settings.radius, done=done)
         context.workspace.status_text_set(text)
-        redraw(context)
+        redraw()
 
 
 def _places(text: str) -> list[tuple[float, float, float]]:

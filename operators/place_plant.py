@@ -12,6 +12,7 @@ from bpy.props import EnumProperty
 
 from ..tetflora_addon.blender.ground_cursor import circle
 from ..tetflora_addon.blender.plant_objects import add_plants, plants_of
+from ..tetflora_addon.blender.runtime import redraw
 from ..tetflora_addon.blender.species_items import (
     NO_SPECIES,
     catalogue,
@@ -23,7 +24,7 @@ from ..tetflora_addon.errors import TetFloraError
 from ..tetflora_addon.planting.places import Placement, new_seeds
 from . import ids
 from .base import select_only
-from .ground_tool import NAVIGATION, GroundTool, redraw
+from .ground_tool import NAVIGATION, GroundTool
 
 _NOTCH = radians(15.0)
 _LARGER = 1.1
@@ -134,4 +135,4 @@ class TETFLORA_OT_place_plant(GroundTool, bpy.types.Operator):
         name = known[self._chosen].name if self._chosen in known else self._chosen
         turn = np.degrees(self._turn)
         context.workspace.status_text_set(_KEYS.format(name=name, turn=turn, scale=self._scale))
-        redraw(context)
+        redraw()

@@ -9,6 +9,7 @@ import bpy
 from ..tetflora_addon.blender import auto_refresh, job
 from ..tetflora_addon.blender.handlers import forget_render_errors
 from ..tetflora_addon.blender.plant_objects import plants_of, prepare_scene
+from ..tetflora_addon.blender.runtime import redraw
 from ..tetflora_addon.blender.shell_bounces import few_bounces
 from ..tetflora_addon.blender.world_reader import read_world
 from ..tetflora_addon.refinement.statistics import Statistics
@@ -41,18 +42,16 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
         return True
 
     def steps(self, context: bpy.types.Context) -> Generator[job.Progress, bool | None, Statistics]:
-        auto_refresh.stop()
-        return job.refine_steps(
-            context.scene, context.evaluated_depsgraph_get(), view_layer=context.view_layer, for_render=False
-        )
+        with auto_refresh.paused():
+            depsgraph = context.evaluated_depsgraph_get()
+            return (yield from job.refine_steps(context.scene, depsgraph, view_layer=context.view_layer))
 
     def finish(self, context: bpy.types.Context, statistics: Statistics) -> set[str]:
         prepare_scene(context.scene)
         if statistics.complete:
             auto_refresh.refined(context.scene)
         forget_render_errors()
-        for area in context.screen.areas if context.screen else ():
-            area.tag_redraw()
+        redraw()
         self.report(
             {'INFO'},
             f"{counted(statistics.plants, 'plant')}: {statistics.polygons_meshed:,} of {statistics.polygons_full:,} "

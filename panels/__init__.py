@@ -4,6 +4,7 @@
 
 import bpy
 
+from ..tetflora_addon.blender import handlers
 from . import (
     add_menu,
     brush_panel,
@@ -66,10 +67,12 @@ def register() -> None:
         bpy.utils.register_class(cls)
     bpy.types.VIEW3D_MT_add.append(add_menu.draw_in_add_menu)
     bpy.types.VIEW3D_MT_object.append(object_menu.draw_in_object_menu)
+    handlers.nothing_refined.append(nothing_refined.open_nothing_refined)
 
 
 def unregister() -> None:
     """Unregister panels and menus."""
+    handlers.nothing_refined.remove(nothing_refined.open_nothing_refined)
     bpy.types.VIEW3D_MT_object.remove(object_menu.draw_in_object_menu)
     bpy.types.VIEW3D_MT_add.remove(add_menu.draw_in_add_menu)
     for cls in reversed(CLASSES):

@@ -5,16 +5,21 @@
 import bpy
 
 from ..operators import ids
-from ..tetflora_addon.blender.handlers import NOTHING_REFINED
+from ..tetflora_addon.blender.runtime import open_menu
 
 
 class TETFLORA_MT_nothing_refined(bpy.types.Menu):
     """Nothing is refined."""
 
-    bl_idname = NOTHING_REFINED
+    bl_idname = "TETFLORA_MT_nothing_refined"
     bl_label = "The Render Shows No Plants"
 
     def draw(self, context: bpy.types.Context) -> None:
         self.layout.label(text="Nothing is refined, and Refine at Render is off", icon='INFO')
         self.layout.operator(ids.REFINE, icon='MOD_DECIM')
         self.layout.prop(context.scene.tetflora, "refine_at_render")
+
+
+def open_nothing_refined() -> None:
+    """Open the menu, where there is a window."""
+    open_menu(TETFLORA_MT_nothing_refined.bl_idname)

@@ -14,7 +14,6 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from bpy.app.handlers import persistent
 
 from ..errors import SceneError
 from ..plants.catalogue import SpeciesInfo, list_species, load_species
@@ -22,6 +21,7 @@ from ..whole_files import write_whole
 from .migration import VERSION
 from .plant_objects import prepare_scene
 from .preferences import species_folders
+from .runtime import Handlers
 from .saved_files import write_blend
 from .thumbnails import thumbnail_file
 
@@ -129,7 +129,6 @@ def _write_catalog(path: Path) -> None:
         write_whole(path, f"{text.rstrip()}\n{_CATALOG}:TetFlora:TetFlora\n")
 
 
-@persistent
 def _on_import(context: bpy.types.BlendImportContext, _other: object = None) -> None:
     """Plants came from another file: this scene needs what a scene with plants needs."""
     # Dragged assets are still linked here, and become the file's own afterwards.
@@ -138,11 +137,5 @@ def _on_import(context: bpy.types.BlendImportContext, _other: object = None) -> 
         prepare_scene(bpy.context.scene)
 
 
-def register() -> None:
-    """Watch what is appended."""
-    bpy.app.handlers.blend_import_post.append(_on_import)
-
-
-def unregister() -> None:
-    """Watch no longer."""
-    bpy.app.handlers.blend_import_post.remove(_on_import)
+_HANDLERS = Handlers(blend_import_post=_on_import)
+register, unregister = _HANDLERS.register, _HANDLERS.unregister

@@ -13,12 +13,11 @@ take away.
 from __future__ import annotations
 
 import time
-from collections.abc import Generator
-from contextlib import suppress
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ..errors import TetFloraError
 from . import job
@@ -26,15 +25,14 @@ from .emit import has_results
 from .node_tools import is_ours
 from .plant_objects import prepare_scene
 from .preview_state import camera_now
-from .properties import leaf_objects
+from .properties import auto_refine_switched, leaf_objects
+from .runtime import Handlers, call_off, call_soon, redraw
 from .scene_digest import choices, scene_digest
 from .wind_properties import wind_of
 
 #: Seconds without a change before it begins, and seconds of work between two redraws.
 QUIET, SLICE = 0.6, 0.03
 _BUSY = 0.5  # seconds until it looks again whether Blender has time
-#: The operator that refines in slices of its own.
-REFINE = "TETFLORA_OT_refine"
 _CHANGING = (bpy.types.Object, bpy.types.Camera, bpy.types.Light, bpy.types.Mesh, bpy.types.PointCloud, bpy.types.Curve)
 
 
@@ -49,6 +47,7 @@ class _State:
     message: str = ""
     working: bool = False  # in here right now: what changes is our own doing
     again: bool = False  # look once more when the job is done
+    paused: int = 0  # others that refine
 
 
 _state = _State()
@@ -60,7 +59,7 @@ def message() -> str:
     return _state.message
 
 
-def switched(scene: bpy.types.Scene) -> None:
+def _switched(scene: bpy.types.Scene) -> None:
     """It was switched on or off in a scene."""
     stop()
     _state.message = ""
@@ -72,8 +71,8 @@ def schedule(scene: bpy.types.Scene) -> None:
     """Refine a scene when it has been quiet for a moment; stops what was begun before."""
     stop()
     _state.scene, _state.due = scene.name, time.monotonic() + QUIET
-    if not bpy.app.background and not bpy.app.timers.is_registered(tick):
-        bpy.app.timers.register(tick, first_interval=QUIET)
+    if not bpy.app.background:
+        call_soon(tick, QUIET)
 
 
 def stop() -> None:
@@ -84,6 +83,17 @@ def stop() -> None:
             _state.steps.close()
         finally:
             _state.steps, _state.working, _state.message = None, False, ""
+
+
+@contextmanager
+def paused() -> Iterator[None]:
+    """Stop, and wait while somebody else refines: each would take away what the other has half made."""
+    stop()
+    _state.paused += 1
+    try:
+        yield
+    finally:
+        _state.paused -= 1
 
 
 def refined(scene: bpy.types.Scene) -> None:
@@ -103,10 +113,7 @@ def tick() -> float | None:
     wait = _state.due - time.monotonic()
     if _state.steps is None and wait > 0.0:
         return wait
-    if _operator_refines():  # each would take away what the other has half made
-        stop()
-        return _BUSY
-    if bpy.app.is_job_running('RENDER') or bpy.context.mode != 'OBJECT':
+    if _state.paused or bpy.app.is_job_running('RENDER') or bpy.context.mode != 'OBJECT':
         return _BUSY
     _state.working = True
     try:
@@ -115,17 +122,12 @@ def tick() -> float | None:
         expected = isinstance(error, TetFloraError)
         _state.steps, more = None, False
         _state.message = str(error) if expected else f"unexpected error, please report it: {error!r}"
-        _redraw()
+        redraw()
         if not expected:
             raise
     finally:
         _state.working = False
     return 0.001 if more else None
-
-
-def _operator_refines() -> bool:
-    windows = bpy.context.window_manager.windows
-    return any(operator.bl_idname == REFINE for window in windows for operator in window.modal_operators)
 
 
 def _begin(scene: bpy.types.Scene) -> bool:
@@ -135,7 +137,7 @@ def _begin(scene: bpy.types.Scene) -> bool:
     digest = scene_digest(scene, layer.depsgraph, layer)
     if _done.get(scene.name) == digest and has_results(scene):
         _state.message = ""
-        _redraw()
+        redraw()
         return False
     _state.digest, _state.again = digest, False
     _state.steps = job.refine_steps(scene, layer.depsgraph, view_layer=layer)
@@ -152,13 +154,13 @@ def _slice(scene: bpy.types.Scene) -> bool:
         _state.steps, _state.message = None, ""
         _done[scene.name] = _state.digest
         prepare_scene(scene)
-        _redraw()
+        redraw()
         _state.due = time.monotonic() + QUIET
         return _state.again
     text = f"{progress.fraction:.0%}  {progress.message}"
     if text != _state.message:  # a redraw of the viewport may take longer than the slice
         _state.message = text
-        _redraw()
+        redraw()
     return True
 
 
@@ -168,17 +170,9 @@ def _view_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
     return shown or scene.view_layers[0]
 
 
-def _redraw() -> None:
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == 'VIEW_3D':
-                area.tag_redraw()
-
-
 _seen: dict[str, str] = {}  # settings of scenes as they were at the last change
 
 
-@persistent
 def on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Something in a scene changed: is it anything of what refinement depends on?"""
     if _state.working or not scene.tetflora.auto_refine:
@@ -196,7 +190,6 @@ def on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         schedule(scene)
 
 
-@persistent
 def on_frame(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     """Another frame: in the wind all plants have moved."""
     if not _state.working and scene.tetflora.auto_refine and wind_of(scene) is not None:
@@ -214,7 +207,6 @@ def _only_flags(update: bpy.types.DepsgraphUpdate) -> bool:
     return isinstance(update.id.original, bpy.types.Object) and not moved
 
 
-@persistent
 def on_interruption(*_arguments: object) -> None:
     """Undo, load or render: datablocks that the job holds may go."""
     scene = bpy.data.scenes.get((_state.scene, None)) if _state.steps is not None else None
@@ -223,38 +215,33 @@ def on_interruption(*_arguments: object) -> None:
         schedule(scene)
 
 
-@persistent
 def on_load(*_arguments: object) -> None:
     """Another file: its results are none of ours."""
     _done.clear()
     _seen.clear()
     _state.message = ""
-    if bpy.app.timers.is_registered(tick):
-        bpy.app.timers.unregister(tick)
+    call_off(tick)
 
 
-_HANDLERS = {
-    "depsgraph_update_post": (on_change,),
-    "frame_change_post": (on_frame,),
-    "undo_pre": (on_interruption,),
-    "redo_pre": (on_interruption,),
-    "render_init": (on_interruption,),
-    "load_pre": (on_interruption, on_load),
-}
+_HANDLERS = Handlers(
+    depsgraph_update_post=on_change,
+    frame_change_post=on_frame,
+    undo_pre=on_interruption,
+    redo_pre=on_interruption,
+    render_init=on_interruption,
+    load_pre=(on_interruption, on_load),
+)
 
 
 def register() -> None:
     """Listen."""
-    for name, handlers in _HANDLERS.items():
-        for handler in handlers:
-            getattr(bpy.app.handlers, name).append(handler)
+    auto_refine_switched.append(_switched)
+    _HANDLERS.register()
 
 
 def unregister() -> None:
     """Stop, and listen no more."""
     stop()
     on_load()
-    for name, handlers in _HANDLERS.items():
-        for handler in handlers:
-            with suppress(ValueError):
-                getattr(bpy.app.handlers, name).remove(handler)
+    _HANDLERS.unregister()
+    auto_refine_switched.remove(_switched)

@@ -16,7 +16,6 @@ import traceback
 from dataclasses import dataclass, field
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ..errors import TetFloraError
 from . import job, kept_results
@@ -33,6 +32,7 @@ from .emit import (
 )
 from .migration import migrate
 from .output import KIND, adopt_materials, release_materials
+from .runtime import Handlers, Listeners, complain
 from .scene_reader import NoPlantsError, has_contents
 from .shell_bounces import raise_bounces
 from .species_edits import looked_at_once
@@ -54,8 +54,8 @@ class _Rendering:
 
 
 _rendering = _Rendering()
-#: Menu that says that a render shows no plants, and has the buttons that mend it.
-NOTHING_REFINED = "TETFLORA_MT_nothing_refined"
+#: Notified when a render shows no plants because nothing is refined for it.
+nothing_refined = Listeners()
 
 
 def render_errors() -> list[str]:
@@ -68,7 +68,6 @@ def forget_render_errors() -> None:
     _rendering.errors.clear()
 
 
-@persistent
 def on_render_init(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     """A render starts: earlier errors are past, unless it is part of another one."""
     if _rendering.outer not in {"", scene.name}:
@@ -77,7 +76,6 @@ def on_render_init(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     _rendering.warnings.clear()
 
 
-@persistent
 def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     """Before a frame: refine for its camera, unless what an earlier frame left serves it as well."""
     if _rendering.busy:
@@ -109,7 +107,6 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
         _rendering.busy = False
 
 
-@persistent
 def on_render_end(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     """After the last frame, or when the render was cancelled: leave all scenes as they were.
 
@@ -129,7 +126,6 @@ def on_render_end(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
         _rendering.scenes.clear()
 
 
-@persistent
 def on_save_pre(_path: object, _other: object = None) -> None:
     """Before a file is written: what is only hidden or raised for a render is stored as it was."""
     _show_hidden()
@@ -140,7 +136,6 @@ def on_save_pre(_path: object, _other: object = None) -> None:
     pack_override_marks()
 
 
-@persistent
 def on_save_post(_path: object, _other: object = None) -> None:
     """After a file was written, in the middle of a render: hide and raise it again."""
     for collection in _named(_rendering.hidden):
@@ -153,7 +148,6 @@ def on_save_post(_path: object, _other: object = None) -> None:
     release_materials()
 
 
-@persistent
 def on_load_post(_path: object, _other: object = None) -> None:
     """After a file was read: nothing of an earlier render counts any more; bring old properties up to date.
 
@@ -249,55 +243,23 @@ def _warn(scene: bpy.types.Scene) -> None:
         return
     _rendering.warnings.append(text)
     print(f"TetFlora: warning: {text}", file=sys.stderr, flush=True)
-    if not bpy.app.background:
-        bpy.app.timers.register(_show_what_mends_it)
+    nothing_refined.notify()
 
 
 def _complain(scene: bpy.types.Scene, message: str) -> None:
     text = f"frame {scene.frame_current} rendered without its plants: {message}"
     _rendering.errors.append(text)
-    print(f"TetFlora: error: {text}", file=sys.stderr, flush=True)
-    if not bpy.app.background:
-        # Renders run in a thread of their own, the window belongs to the main one; timers fire there.
-        bpy.app.timers.register(lambda: _show_message(text))
+    complain(text)
 
 
-def _show_what_mends_it() -> None:
-    windows = bpy.context.window_manager.windows
-    if windows:
-        with bpy.context.temp_override(window=windows[0]):
-            bpy.ops.wm.call_menu(name=NOTHING_REFINED)
-
-
-def _show_message(text: str) -> None:
-    windows = bpy.context.window_manager.windows
-    if not windows:
-        return
-    with bpy.context.temp_override(window=windows[0]):
-        bpy.context.window_manager.popup_menu(
-            lambda menu, _context: menu.layout.label(text=text), title="TetFlora", icon='ERROR'
-        )
-
-
-_HANDLERS = {
-    "render_init": on_render_init,
-    "render_pre": on_render_pre,
-    "render_complete": on_render_end,
-    "render_cancel": on_render_end,
-    "save_pre": on_save_pre,
-    "save_post": on_save_post,
-    "save_post_fail": on_save_post,
-    "load_post": on_load_post,
-}
-
-
-def register() -> None:
-    """Add the handlers."""
-    for name, handler in _HANDLERS.items():
-        getattr(bpy.app.handlers, name).append(handler)
-
-
-def unregister() -> None:
-    """Take the handlers out."""
-    for name, handler in _HANDLERS.items():
-        getattr(bpy.app.handlers, name).remove(handler)
+_HANDLERS = Handlers(
+    render_init=on_render_init,
+    render_pre=on_render_pre,
+    render_complete=on_render_end,
+    render_cancel=on_render_end,
+    save_pre=on_save_pre,
+    save_post=on_save_post,
+    save_post_fail=on_save_post,
+    load_post=on_load_post,
+)
+register, unregister = _HANDLERS.register, _HANDLERS.unregister

@@ -12,8 +12,9 @@ import time
 from dataclasses import dataclass, field
 
 import bpy
+import gpu
 import numpy as np
-from bpy.app.handlers import persistent
+from gpu_extras.batch import batch_for_shader
 from numpy.typing import NDArray
 
 from ..errors import TetFloraError
@@ -21,6 +22,7 @@ from . import compat, population_properties, species_edits
 from .population_ground import place_population
 from .population_rules import awaits_update, makes_field, shown_population
 from .populations import own_objects
+from .runtime import Handlers, call_off, call_soon, redraw
 
 #: Dots that are drawn at most, evenly chosen among the plants.
 MOST_DOTS = 20_000
@@ -101,10 +103,9 @@ def error() -> str:
 
 def schedule() -> None:
     """Place dots anew soon; many changes in a row are one placing."""
-    if _state.scene is None or bpy.app.background or bpy.app.timers.is_registered(_on_timer):
-        return
-    # What takes long to place must not keep the window busy while a slider is dragged.
-    bpy.app.timers.register(_on_timer, first_interval=max(_SOON, _state.seconds))
+    if _state.scene is not None and not bpy.app.background:
+        # What takes long to place must not keep the window busy while a slider is dragged.
+        call_soon(_on_timer, max(_SOON, _state.seconds))
 
 
 def dots_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Dots:
@@ -178,13 +179,10 @@ def _on_timer() -> None:
     _state.dots, _state.uid = dots, shown_population(scene).uid
     if dots is not None and len(dots.position):
         _state.handle = bpy.types.SpaceView3D.draw_handler_add(_draw, (), 'WINDOW', 'POST_VIEW')
-    _redraw()
+    redraw()
 
 
 def _draw() -> None:
-    import gpu  # not there in a Blender without a window
-    from gpu_extras.batch import batch_for_shader
-
     context = bpy.context
     if _state.dots is None or context.scene.name != _state.scene or not context.space_data.overlay.show_overlays:
         return
@@ -203,51 +201,34 @@ def _clear() -> None:
     if _state.handle is not None:
         bpy.types.SpaceView3D.draw_handler_remove(_state.handle, 'WINDOW')
     _state.handle = _state.batch = _state.dots = None
-    _redraw()
+    redraw()
 
 
-def _redraw() -> None:
-    for window in getattr(bpy.context.window_manager, "windows", ()):
-        for area in window.screen.areas:
-            if area.type == 'VIEW_3D':
-                area.tag_redraw()
-
-
-def _call_off() -> None:
-    # Also before a file is loaded: 4.5's wheel hangs at exit if Blender itself has dropped a waiting timer.
-    if bpy.app.timers.is_registered(_on_timer):
-        bpy.app.timers.unregister(_on_timer)
-
-
-@persistent
 def _on_undo(_scene: bpy.types.Scene, _other: object = None) -> None:
     schedule()
 
 
-@persistent
 def _on_load_pre(_path: object, _other: object = None) -> None:
     _state.scene = None
-    _call_off()
+    call_off(_on_timer)
     _clear()
 
 
-_HANDLERS = {"undo_post": _on_undo, "redo_post": _on_undo, "load_pre": _on_load_pre}
+_HANDLERS = Handlers(undo_post=_on_undo, redo_post=_on_undo, load_pre=_on_load_pre)
 
 
 def register() -> None:
     """Listen to changes of populations and species, undo and loading."""
     population_properties.listeners.append(schedule)
     species_edits.listeners.append(schedule)
-    for name, handler in _HANDLERS.items():
-        getattr(bpy.app.handlers, name).append(handler)
+    _HANDLERS.register()
 
 
 def unregister() -> None:
     """Take the dots and all that listens away."""
     _state.scene = None
-    _call_off()
+    call_off(_on_timer)
     _clear()
-    for name, handler in _HANDLERS.items():
-        getattr(bpy.app.handlers, name).remove(handler)
+    _HANDLERS.unregister()
     species_edits.listeners.remove(schedule)
     population_properties.listeners.remove(schedule)

@@ -5,7 +5,6 @@
 The same group holds the settings for new populations (``Scene.tetflora.populate``). `populations` acts on it.
 """
 
-from collections.abc import Callable
 from math import pi, radians
 
 import bpy
@@ -19,6 +18,7 @@ from bpy.props import (
     StringProperty,
 )
 
+from .runtime import Listeners
 from .species_choice import SpeciesChoice
 from .species_items import items_for, number_of
 
@@ -35,13 +35,12 @@ STORAGE_ITEMS = (
 NOBODY = ("NONE", "None", "These plants do not care for others", 'NONE', 0)
 
 #: Called after each change of a setting, without arguments; the preview of points listens.
-listeners: list[Callable[[], None]] = []
+listeners = Listeners()
 _kept_items: dict[int, list] = {}  # Blender keeps no copy of the strings of dynamic items
 
 
 def _tell(_group: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    for listener in listeners:
-        listener()
+    listeners.notify()
 
 
 def _take_old_limit(group: "TetFloraPopulation", _context: bpy.types.Context | None) -> None:

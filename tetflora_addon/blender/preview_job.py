@@ -11,7 +11,6 @@ import time
 from collections.abc import Generator
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ..errors import TetFloraError
 from ..preview.levels import Levels, gather
@@ -19,7 +18,8 @@ from ..preview.light_plants import Shapes, bounds_of_plants, light_plants
 from ..refinement.loop import refine as refine_loop
 from . import job, preview_state, species_edits
 from .camera_reader import read_camera
-from .preview_state import camera_now, find, of, redraw
+from .preview_state import camera_now, find, of
+from .runtime import Handlers, call_off, call_soon, redraw
 from .scene_reader import NoPlantsError, read_plants
 
 _SOON = 0.2  # seconds from a change of plants to reading them again
@@ -89,10 +89,9 @@ def read_shapes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Shape
 
 def schedule() -> None:
     """Read the plants of what is open soon; many changes in a row are one reading."""
-    if bpy.app.background or bpy.app.timers.is_registered(_on_timer):
-        return
-    # A forest of many plants must not keep the window busy while one of them is moved.
-    bpy.app.timers.register(_on_timer, first_interval=max(_SOON, preview_state.longest_reading()))
+    if not bpy.app.background:
+        # A forest of many plants must not keep the window busy while one of them is moved.
+        call_soon(_on_timer, max(_SOON, preview_state.longest_reading()))
 
 
 def _on_timer() -> None:
@@ -104,13 +103,6 @@ def _on_timer() -> None:
                 read_shapes(scene, depsgraph)
 
 
-def _call_off() -> None:
-    # Also before a file is loaded: 4.5's wheel hangs at exit if Blender itself has dropped a waiting timer.
-    if bpy.app.timers.is_registered(_on_timer):
-        bpy.app.timers.unregister(_on_timer)
-
-
-@persistent
 def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if scene.tetflora.preview.plants == 'NONE':
         return
@@ -130,18 +122,15 @@ def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
             return
 
 
-@persistent
 def _on_undo(scene: bpy.types.Scene, _other: object = None) -> None:
     preview_state.bring_in_step(scene)
 
 
-@persistent
 def _on_load_pre(_path: object, _other: object = None) -> None:
     preview_state.forget_all()
-    _call_off()
+    call_off(_on_timer)
 
 
-@persistent
 def _on_load_post(_path: object, _other: object = None) -> None:
     for scene in bpy.data.scenes:
         settings = scene.tetflora.preview
@@ -151,20 +140,15 @@ def _on_load_post(_path: object, _other: object = None) -> None:
             schedule()
 
 
-_HANDLERS = {
-    "depsgraph_update_post": _on_update,
-    "undo_post": _on_undo,
-    "redo_post": _on_undo,
-    "load_pre": _on_load_pre,
-    "load_post": _on_load_post,
-}
+_HANDLERS = Handlers(load_pre=_on_load_pre, load_post=_on_load_post)
+_IN_WINDOW = Handlers(depsgraph_update_post=_on_update, undo_post=_on_undo, redo_post=_on_undo)
 
 
 def register() -> None:
     """Listen to changes of plants where there is a window, and to loading in any case."""
-    for name, handler in _HANDLERS.items():
-        if name.startswith("load") or not bpy.app.background:
-            getattr(bpy.app.handlers, name).append(handler)
+    _HANDLERS.register()
+    if not bpy.app.background:
+        _IN_WINDOW.register()
     for listeners in (species_edits.listeners, preview_state.listeners):
         listeners.append(schedule)
 
@@ -174,8 +158,6 @@ def unregister() -> None:
     for listeners in (species_edits.listeners, preview_state.listeners):
         listeners.remove(schedule)
     preview_state.forget_all()
-    _call_off()
-    for name, handler in _HANDLERS.items():
-        handlers = getattr(bpy.app.handlers, name)
-        if handler in handlers:
-            handlers.remove(handler)
+    call_off(_on_timer)
+    _IN_WINDOW.unregister()
+    _HANDLERS.unregister()

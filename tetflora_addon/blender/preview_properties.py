@@ -6,13 +6,14 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty
 
 from . import preview_state
+from .runtime import redraw
 
 #: Reached by the slider; more can be typed.
 _USUAL_LEVELS = 24
 
 
 def _redraw(_group: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    preview_state.redraw()
+    redraw()
 
 
 def _plants_changed(group: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:

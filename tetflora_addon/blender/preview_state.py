@@ -14,6 +14,7 @@ from ..preview.levels import Levels
 from ..preview.light_plants import Shapes
 from ..refinement.camera import Camera
 from .camera_reader import read_camera
+from .runtime import Listeners, redraw
 
 #: What `camera_reader` reads of a camera, of its depth of field, and of the picture.
 _LENS = (
@@ -28,7 +29,7 @@ _PICTURE = (
 )
 
 #: Called when plants are to be shown in another form, without arguments; `preview_job` listens.
-listeners: list[Callable[[], None]] = []
+listeners = Listeners()
 
 
 @dataclass
@@ -154,13 +155,4 @@ def plants_wanted(scene: bpy.types.Scene) -> None:
         preview.made += 1
         redraw()
     else:
-        for listener in listeners:
-            listener()
-
-
-def redraw() -> None:
-    """Have all viewports drawn again."""
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == 'VIEW_3D':
-                area.tag_redraw()
+        listeners.notify()

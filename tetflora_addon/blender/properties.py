@@ -24,10 +24,14 @@ from .population_properties import CLASSES as POPULATION_CLASSES
 from .population_properties import TetFloraPopulation
 from .preview_properties import TetFloraPreview
 from .refinement_properties import RefinementProperties
+from .runtime import Listeners
 from .species_choice import SpeciesChoice
 from .species_editor import TetFloraSpeciesEditor
 from .species_edits import TetFloraSpeciesEdit
 from .wind_properties import TetFloraWind
+
+#: Notified with a scene when Refine Automatically is switched on or off there.
+auto_refine_switched = Listeners()
 
 _FORM = {
     "name": "Form",
@@ -120,10 +124,8 @@ class TetFloraLeafObject(bpy.types.PropertyGroup, SpeciesChoice):
     )
 
 
-def _auto_refine_switched(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    from . import auto_refresh  # which reads the properties of this module
-
-    auto_refresh.switched(self.id_data)
+def _tell_auto_refine(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    auto_refine_switched.notify(self.id_data)
 
 
 class TetFloraScene(RefinementProperties, FilmProperties, bpy.types.PropertyGroup):
@@ -208,7 +210,7 @@ class TetFloraScene(RefinementProperties, FilmProperties, bpy.types.PropertyGrou
             "that is overtaken by another change is dropped. Large forests keep the processor busy with it"
         ),
         default=False,
-        update=_auto_refine_switched,
+        update=_tell_auto_refine,
         options=set(),
     )
     expand_everything: BoolProperty(

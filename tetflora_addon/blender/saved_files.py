@@ -12,17 +12,14 @@ ends with the magic number of the table of its frames.
 from __future__ import annotations
 
 import os
-import sys
 import uuid
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-import bpy
-from bpy.app.handlers import persistent
-
 from ..errors import SceneError
 from ..whole_files import PART
+from .runtime import Handlers, complain
 
 _COMPRESSED = b"\x28\xb5\x2f\xfd"
 _END = b"\xb1\xea\x92\x8f"
@@ -69,7 +66,6 @@ def write_blend(path: Path, write: Callable[[str], object]) -> None:
             part.unlink(missing_ok=True)
 
 
-@persistent
 def _on_save_post(path: str, _other: object = None) -> None:
     """Blender has said that it saved the file; say so if it has not."""
     saved = Path(path)
@@ -79,18 +75,8 @@ def _on_save_post(path: str, _other: object = None) -> None:
     older = saved.with_name(saved.name + "1")
     if older.is_file():
         text += f"; the state before is in {older.name}, until you save twice"
-    print(f"TetFlora: error: {text}", file=sys.stderr, flush=True)
-    if not bpy.app.background:
-        bpy.context.window_manager.popup_menu(
-            lambda menu, _context: menu.layout.label(text=text), title="TetFlora", icon='ERROR'
-        )
+    complain(text)
 
 
-def register() -> None:
-    """Look at files when they were saved."""
-    bpy.app.handlers.save_post.append(_on_save_post)
-
-
-def unregister() -> None:
-    """Look no longer."""
-    bpy.app.handlers.save_post.remove(_on_save_post)
+_HANDLERS = Handlers(save_post=_on_save_post)
+register, unregister = _HANDLERS.register, _HANDLERS.unregister

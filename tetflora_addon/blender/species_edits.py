@@ -24,9 +24,10 @@ from ..plants.catalogue import SpeciesInfo, list_species, load_species
 from ..plants.schema import species_from_dict
 from ..plants.species import Species
 from .preferences import species_folders
+from .runtime import Listeners
 
 #: Called after every change of a species, without arguments; the preview listens.
-listeners: list[Callable[[], None]] = []
+listeners = Listeners()
 
 # In the background nothing is drawn, and scripts expect to find what they have just written.
 _TRUSTED = 0.0 if bpy.app.background else 0.3
@@ -237,8 +238,7 @@ def revert_species(identifier: str) -> int:
 def tell_listeners() -> None:
     """Some species has changed."""
     look_again()
-    for listener in listeners:
-        listener()
+    listeners.notify()
 
 
 def new_identifier(name: str, taken: Callable[[str], bool]) -> str:

@@ -12,7 +12,6 @@ import time
 from dataclasses import dataclass, replace
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ..errors import TetFloraError
 from ..plants.compiled import Flora, compile_species
@@ -21,6 +20,7 @@ from ..plants.species import Range
 from . import job, species_edits, species_values
 from .node_tools import is_ours, tag
 from .plant_mesh import expected_polygons, plant_mesh, plant_parts, single_seed
+from .runtime import Handlers, call_off, call_soon, redraw
 
 NAME = "TetFlora preview"
 #: Polygons that a preview has at most, about: what is rebuilt while a slider moves.
@@ -66,16 +66,8 @@ def schedule() -> None:
 
 
 def _call_soon() -> None:
-    if bpy.app.timers.is_registered(_on_timer):
-        return
     # A large plant must not keep the window busy while a slider is dragged.
-    bpy.app.timers.register(_on_timer, first_interval=max(_SOON, _state.seconds))
-
-
-def _call_off() -> None:
-    # Also before a file is loaded: 4.5's wheel hangs at exit if Blender itself has dropped a waiting timer.
-    if bpy.app.timers.is_registered(_on_timer):
-        bpy.app.timers.unregister(_on_timer)
+    call_soon(_on_timer, max(_SOON, _state.seconds))
 
 
 def _on_timer() -> None:
@@ -104,7 +96,7 @@ def refresh() -> None:
     _state.seconds = time.perf_counter() - begin
     cut = f" of the first {orders} orders; all would be too many to follow a slider" if orders else ""
     _state.message, _state.failed = f"{len(mesh.polygons):,} polygons{cut}", False
-    _redraw()
+    redraw()
 
 
 def _limited(flora: Flora, seeds: Seeds) -> tuple[Flora, int]:
@@ -156,41 +148,30 @@ def _remove() -> None:
     bpy.data.batch_remove([*objects, *{o.data for o in objects if is_ours(o.data)}, *_collections()])
 
 
-def _redraw() -> None:
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == 'VIEW_3D':
-                area.tag_redraw()
-
-
-@persistent
 def _on_undo(_scene: bpy.types.Scene, _other: object = None) -> None:
     # Undo may also bring back a preview that was switched off since.
     if _state.scene is not None or _objects():
         _call_soon()
 
 
-@persistent
 def _on_load_pre(_path: object, _other: object = None) -> None:
     _state.scene = None
-    _call_off()
+    call_off(_on_timer)
 
 
-_HANDLERS = {"undo_post": _on_undo, "redo_post": _on_undo, "load_pre": _on_load_pre}
+_HANDLERS = Handlers(undo_post=_on_undo, redo_post=_on_undo, load_pre=_on_load_pre)
 
 
 def register() -> None:
     """Listen to changes of species, undo and loading."""
     species_edits.listeners.append(schedule)
-    for name, handler in _HANDLERS.items():
-        getattr(bpy.app.handlers, name).append(handler)
+    _HANDLERS.register()
 
 
 def unregister() -> None:
     """Take the preview and all that listens away."""
     _remove()
     _state.scene = None
-    _call_off()
-    for name, handler in _HANDLERS.items():
-        getattr(bpy.app.handlers, name).remove(handler)
+    call_off(_on_timer)
+    _HANDLERS.unregister()
     species_edits.listeners.remove(schedule)
