@@ -44,7 +44,7 @@ def run(quick: bool) -> dict[str, float]:
     eight, bisection = (session.part(f"tetflora_addon.tetrahedra.{n}") for n in ("eight", "bisection"))
 
     def along(choose: Callable[[NDArray[np.float64]], NDArray[np.intp]]) -> Divide:
-        return lambda v: eight.divide_in_eight(v, choose(eight.squared_diagonals(v), axis=1))[1]
+        return lambda v: eight.divide_in_eight(v, choose(squared_diagonals(v), axis=1))[1]
 
     ways: dict[str, tuple[Divide, int]] = {
         "shape": (lambda v: eight.divide_by_shape(v)[1], LEVELS),
@@ -71,6 +71,16 @@ def run(quick: bool) -> dict[str, float]:
         figures[f"pieces_{name}_share"] = share.min()
         figures[f"pieces_{name}_under_80"] = int((share < 0.8).sum())
     return figures
+
+
+def squared_diagonals(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Squared lengths ``(n, 3)`` of the three diagonals of the inner octahedron of tetrahedra ``(n, 4, 3)``, m².
+
+    Diagonal ``k`` joins the middles of edges ``k`` and ``5 - k`` of the tetrahedron: four times its square is the sum
+    of the other four edges' squares less the sum of these two.
+    """
+    squared = session.part("tetflora_addon.tetrahedra.geometry").squared_edges(vertices)
+    return (np.sum(squared, axis=1, keepdims=True) - 2.0 * (squared[:, :3] + squared[:, :2:-1])) / 4.0
 
 
 def halves() -> NDArray[np.float64]:

@@ -13,7 +13,3 @@ class SpeciesError(TetFloraError):
 
 class SceneError(TetFloraError):
     """The scene lacks something that refinement needs, or holds something that it cannot use."""
-
-
-class Cancelled(TetFloraError):
-    """The user pressed Esc; nothing was changed."""

@@ -28,6 +28,7 @@ from tetflora_addon.plants.seeds import Seeds
 from tetflora_addon.plants.tubes import tube_buffers
 from tetflora_addon.refinement.camera import Camera
 from tetflora_addon.refinement.loop import Refinement
+from tetflora_addon.tetrahedra.geometry import FACES, barycentric, face_area_vectors
 
 SPECIES = tuple(sorted(path.stem for path in builtin_folder().glob("*.json")))
 #: Species of so many alike branches that a few plants settle means of place and direction (a palm has 30 fronds).
@@ -238,3 +239,32 @@ def moment(*meshes: MeshBuffers) -> NDArray[np.float64]:
 def facet_buffers(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.33) -> MeshBuffers | None:
     """All facets of proxies in one mesh; None where there are none."""
     return concatenate_buffers(list(facet_blocks(flora, result, camera, facet_pixels)))
+
+
+def face_planes(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Planes of the four faces of positive tetrahedra; distances are negative inside.
+
+    Parameters
+    ----------
+    vertices : (..., 4, 3) float64
+        Positively oriented tetrahedra, metres.
+
+    Returns
+    -------
+    (..., 4, 4) float64
+        Plane ``(nx, ny, nz, d)`` of the face opposite each vertex, outward unit normal. A face without area has the
+        normal 0.
+    """
+    areas = face_area_vectors(vertices)
+    length = np.linalg.norm(areas, axis=-1, keepdims=True)
+    normals = areas / np.where(length > 0.0, length, 1.0)
+    on_face = vertices[..., FACES[:, 0], :]
+    return np.concatenate([normals, -np.sum(normals * on_face, axis=-1, keepdims=True)], axis=-1)
+
+
+def contains(vertices: NDArray[np.float64], points: NDArray[np.float64], tolerance: float = 1e-9) -> NDArray[np.bool_]:
+    """Whether each point ``(..., 3)`` lies in its tetrahedron ``(..., 4, 3)``; result ``(...)`` bool.
+
+    ``tolerance`` is in barycentric coordinates, without unit: the faces belong to the tetrahedron.
+    """
+    return np.min(barycentric(vertices, points), axis=-1) >= -tolerance

@@ -16,7 +16,7 @@ from tetflora_addon.plants.seeds import Seeds
 from tetflora_addon.refinement.amounts import piece_amounts, subplant_amounts
 from tetflora_addon.refinement.contents import Contents, Holdings, bounding_box
 from tetflora_addon.refinement.descent import Slack, push_down
-from tetflora_addon.tetrahedra.geometry import face_planes, volume
+from tetflora_addon.tetrahedra.geometry import volume
 from tetflora_addon.tetrahedra.roots import view_root
 from tetflora_addon.tetrahedra.tree import TetrahedralTree
 
@@ -227,13 +227,13 @@ def test_what_reaches_a_little_beyond_a_plane_stays_whole(view: tuple[int, str],
     tree, contents = loose
     vertices = tree.vertices(contents.piece_cell)
     middle = (contents.pieces.start + contents.pieces.end) / 2
-    outside = (face_planes(vertices)[..., :3] * middle[:, None]).sum(-1) + face_planes(vertices)[..., 3]
+    outside = (support.face_planes(vertices)[..., :3] * middle[:, None]).sum(-1) + support.face_planes(vertices)[..., 3]
     # A piece goes where most of it is; what is left of it beyond is within the slack at each of few planes.
     assert (outside.max(axis=1, initial=-1) <= 3 * far).all()
     for one in np.random.default_rng(view[0]).permutation(len(contents.subplants))[:20]:
         meshes = support.meshes(flora, support.expanded(flora, contents.subplants.take(one[None])))
         points = np.concatenate([m.positions for group in meshes for m in group]).astype(np.float64)
-        planes = face_planes(tree.vertices(contents.subplant_cell[one][None]))[0]
+        planes = support.face_planes(tree.vertices(contents.subplant_cell[one][None]))[0]
         beyond = (points @ planes[:, :3].T + planes[:, 3]).max(axis=1)
         assert np.quantile(beyond, 0.9) <= 3 * far
 

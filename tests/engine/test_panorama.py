@@ -17,7 +17,6 @@ from tetflora_addon.refinement.panorama import PanoramaBuffer, face_cameras, pix
 from tetflora_addon.refinement.rasterise import pixel_rays
 from tetflora_addon.refinement.settings import RefinementSettings
 from tetflora_addon.refinement.silhouette import expected_pixels
-from tetflora_addon.tetrahedra.geometry import face_planes
 from tetflora_addon.tetrahedra.world_root import world_root
 
 SPHERE = (-np.pi, np.pi, -np.pi / 2, np.pi / 2)
@@ -54,7 +53,7 @@ def cells_around(number: int, seed: int = 0) -> tuple[NDArray, NDArray]:
 
 def cast(vertices: NDArray, extinction: NDArray, camera: Camera) -> tuple[NDArray, NDArray]:
     """Pixels and transmittance by rays that meet all cells, sorted by distance."""
-    directions, planes = rays(camera), face_planes(vertices)
+    directions, planes = rays(camera), support.face_planes(vertices)
     count, seen = np.zeros((2, len(vertices)))
     above = planes[..., :3] @ camera.position + planes[..., 3]
     for part in np.array_split(directions, 64):

@@ -19,7 +19,7 @@ from tetflora_addon.refinement.camera import Camera
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.loop import refine
 from tetflora_addon.refinement.settings import RefinementSettings
-from tetflora_addon.tetrahedra.geometry import face_planes, projected_area, signed_volume, volume
+from tetflora_addon.tetrahedra.geometry import projected_area, signed_volume, volume
 from tetflora_addon.tetrahedra.tree import TetrahedralTree
 
 ORTHO = support.camera((0.0, -9.0, 1.0), (0.0, 0.0, 0.5), kind="ORTHO", view=6.0)
@@ -60,7 +60,7 @@ def areas(projected: Projected, camera: Camera, number: int) -> np.ndarray:
 
 def through(vertices: np.ndarray, start: np.ndarray, toward: np.ndarray) -> np.ndarray:
     """Length (r, n) of rays, given by starts and unit directions (r, 3), within tetrahedra (n, 4, 3)."""
-    planes = face_planes(vertices)
+    planes = support.face_planes(vertices)
     slope = np.einsum("rk,nfk->rnf", toward, planes[..., :3])
     away = np.einsum("rk,nfk->rnf", start, planes[..., :3]) + planes[..., 3]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -98,7 +98,7 @@ def test_the_thick_point_is_where_its_ray_is_longest_within(seed: int, camera: C
     # A ray that grazes a vertex by the last bit may miss it.
     np.testing.assert_allclose(own, projected.thickness, atol=1e-6)
     # The thick point is where the ray comes in: just before it there is nothing.
-    distance = np.einsum("nfk,nk->nf", face_planes(vertices)[..., :3], thick) + face_planes(vertices)[..., 3]
+    distance = np.einsum("nfk,nk->nf", planes[..., :3], thick) + planes[..., 3]
     np.testing.assert_allclose(distance.max(axis=1), 0.0, atol=1e-9)
     others = np.random.default_rng(seed + 1).normal(0, 0.2, (50, 3))
     if camera.kind == "ORTHO":
@@ -216,7 +216,7 @@ def test_levels_are_drawn_back_to_front_from_anywhere(gathered: levels.Levels, e
         vertices = gathered.vertices(level).astype(float)[order]
         toward = np.random.default_rng(3).normal(size=(200, 3))
         toward /= np.linalg.norm(toward, axis=1, keepdims=True)
-        planes = face_planes(vertices)
+        planes = support.face_planes(vertices)
         slope = np.einsum("rk,nfk->rnf", toward, planes[..., :3])
         away = planes[..., :3] @ np.array(eye) + planes[..., 3]
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -7,6 +7,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from tests.engine.support import contains, face_planes
 from tetflora_addon.tetrahedra import geometry
 from tetflora_addon.tetrahedra.bisection import bisect, longest_edge
 
@@ -40,7 +41,7 @@ def test_faces_close_and_point_outwards(vertices):
     areas = geometry.face_area_vectors(vertices)
     scale = np.abs(areas).max()
     np.testing.assert_allclose(areas.sum(axis=0), 0, atol=1e-12 * scale)
-    planes = geometry.face_planes(vertices)
+    planes = face_planes(vertices)
     np.testing.assert_allclose(np.linalg.norm(planes[:, :3], axis=1), 1)
     distance = geometry.plane_distance(planes[:, None], vertices[None])
     size = np.abs(vertices).max()
@@ -59,9 +60,9 @@ def test_barycentric_coordinates_give_the_point_back(vertices, point):
     assert np.isclose(weights.sum(), 1)
     tolerance = 1e-9 * (1 + np.abs(weights).max()) * np.abs(vertices).max()
     np.testing.assert_allclose(weights @ vertices, point, atol=tolerance)
-    inside = geometry.plane_distance(geometry.face_planes(vertices), point)
+    inside = geometry.plane_distance(face_planes(vertices), point)
     if np.abs(inside).min() > 1e-6:
-        assert geometry.contains(vertices, point) == (inside < 0).all()
+        assert contains(vertices, point) == (inside < 0).all()
 
 
 @given(positive())

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.engine.support import contains
 from tetflora_addon.refinement.camera import Camera
 from tetflora_addon.tetrahedra import geometry
 from tetflora_addon.tetrahedra.roots import view_root
@@ -96,7 +97,7 @@ def test_points_are_found_in_the_cell_that_holds_them(kind, window, seed, far):
     points = rng.uniform(*bounds, (2000, 3))
     found = tree.locate(points)
     assert (tree.children[found] == -1).all()
-    assert geometry.contains(tree.vertices(found), points, 1e-7).all()
+    assert contains(tree.vertices(found), points, 1e-7).all()
     # Only one terminal holds the middle of a terminal.
     nodes = tree.terminals()
     np.testing.assert_array_equal(tree.locate(tree.vertices(nodes).mean(axis=1)), nodes)
@@ -124,7 +125,7 @@ def test_ranks_rise_along_every_ray(kind, window, seed, far):
         steps = starts[:, None] + np.linspace(0, 1, 400)[:, None] * (ends - starts)[:, None]
         cells = tree.locate(steps.reshape(-1, 3))
         # Beyond the root's box there are no cells to be in order.
-        held = geometry.contains(tree.vertices(cells), steps.reshape(-1, 3)).reshape(30, 400)
+        held = contains(tree.vertices(cells), steps.reshape(-1, 3)).reshape(30, 400)
         along = np.where(held, ranks[cells].reshape(30, 400), -1)
         highest = np.maximum.accumulate(along, axis=1)
         assert (highest == along)[held].all()
@@ -134,11 +135,10 @@ def divide_at_random(tree, rng, rounds):
     """All ways to divide, mixed, with planes through the middle of nodes and through their vertices."""
     for _ in range(rounds):
         nodes = rng.permutation(tree.terminals())[:400]
-        way = rng.integers(0, 5, len(nodes))
+        way = rng.integers(0, 4, len(nodes))
         tree.split(nodes[way == 0])
-        tree.split_eight(nodes[way == 1])
-        tree.split_by_shape(nodes[way == 2])
-        cut = nodes[way == 3]
+        tree.split_by_shape(nodes[way == 1])
+        cut = nodes[way == 2]
         weights = rng.dirichlet([1, 1, 1, 1], (len(cut), 3))
         fixed = rng.integers(0, 3, len(cut))
         weights = np.where(np.arange(3)[:, None] < fixed[:, None, None], np.eye(4)[:3], weights)
@@ -206,13 +206,12 @@ def test_eight_and_cut_hang_where_they_say():
     tree = view_root(camera, bounds)
     nodes = tree.terminals()
     inside = tree.inside[nodes]
-    for split, of in ((tree.split_eight, nodes[::3]), (tree.split_by_shape, nodes[1::3])):
-        made = split(of)
-        assert made.shape == (len(of), 8)
-        np.testing.assert_array_equal(tree.parent[tree.parent[tree.parent[made]]], np.repeat(of[:, None], 8, axis=1))
-        np.testing.assert_array_equal(tree.level[made], np.repeat(tree.level[of, None] + 3, 8, axis=1))
-        np.testing.assert_array_equal(tree.inside[made[:, 0]], tree.inside[of])
-    rest = nodes[2::3]
+    of, rest = np.concatenate([nodes[::3], nodes[1::3]]), nodes[2::3]
+    made = tree.split_by_shape(of)
+    assert made.shape == (len(of), 8)
+    np.testing.assert_array_equal(tree.parent[tree.parent[tree.parent[made]]], np.repeat(of[:, None], 8, axis=1))
+    np.testing.assert_array_equal(tree.level[made], np.repeat(tree.level[of, None] + 3, 8, axis=1))
+    np.testing.assert_array_equal(tree.inside[made[:, 0]], tree.inside[of])
     through = tree.vertices(rest).mean(axis=1)
     normals = rng.normal(size=(len(rest), 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -273,7 +272,6 @@ def test_only_terminal_tetrahedra_are_split_and_only_once():
     below = tree.terminals()[:1]
     plane = np.array([[1.0, 0, 0, -9]])
     for divide in (
-        tree.split_eight,
         tree.split_by_shape,
         lambda nodes: tree.cut(nodes, np.repeat(plane, len(nodes), 0)),
     ):
@@ -282,8 +280,7 @@ def test_only_terminal_tetrahedra_are_split_and_only_once():
         with pytest.raises(ValueError, match="only once"):
             divide(np.repeat(below, 2))
     with pytest.raises(ValueError, match="region"):
-        TetrahedralTree().split_eight([0])
-    assert tree.split_eight(np.zeros(0, int)).shape == (0, 8)
+        TetrahedralTree().split_by_shape([0])
     assert tree.split_by_shape(np.zeros(0, int)).shape == (0, 8)
     assert len(tree.cut(np.zeros(0, int), np.zeros((0, 4)))[0]) == 0
     with pytest.raises(ValueError, match="region"):

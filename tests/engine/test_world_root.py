@@ -14,7 +14,7 @@ from tests.engine.test_contents import expanded, measures
 from tests.engine.test_loop import check, run
 from tetflora_addon.refinement.decisions import ACROSS_THE_BORDER, Decision
 from tetflora_addon.refinement.settings import RefinementSettings
-from tetflora_addon.tetrahedra.geometry import contains, quality, volume
+from tetflora_addon.tetrahedra.geometry import quality, volume
 from tetflora_addon.tetrahedra.tree import TetrahedralTree
 from tetflora_addon.tetrahedra.world_root import world_cubes, world_root
 
@@ -39,7 +39,7 @@ def test_the_root_fills_cubes_around_the_scene(low: tuple, size: tuple) -> None:
     assert volume(vertices) == pytest.approx(side**3 / 6)
     assert not tree.inside.any()
     points = np.random.default_rng(1).uniform(*bounds, (200, 3))
-    assert contains(tree.vertices(tree.locate(points)), points).all()
+    assert support.contains(tree.vertices(tree.locate(points)), points).all()
 
 
 def test_bisection_makes_three_shapes_that_fit_face_to_face() -> None:

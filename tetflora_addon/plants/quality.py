@@ -24,9 +24,6 @@ from .members import Members, expected_members, expected_polygons
 from .schema import MAX_POLYGONS, ORDER_KEYS, QUALITY_LIMITS
 from .species import LEAF_KINDS, Order, Range, Species
 
-TOLERANCE = 0.1
-"""How far the expected polygons may be from those asked for, as a fraction of them."""
-
 _FEW = 12.0  # a kind with no more members than this keeps them all
 _SHAPE_PACE = 1.0  # how much sooner than members a trunk's sides and segments go; of twigs, `_TWIG_PACE` more
 _TWIG_PACE = 0.5
@@ -40,33 +37,6 @@ _SHORTEST = 0.5  # of the length of boughs
 _SWAY_HIGH = 1.25  # highest factor on the random bend of joints: the bound of a plant grows with it
 _DETAIL_HIGH = 16.0
 _STEPS = 36  # of bisection: to a hundred millionth of a unit
-
-
-def quality_for(species: Species, polygons: float) -> float:
-    """Quality at which a plant of the species has about a given number of polygons.
-
-    Parameters
-    ----------
-    species : Species
-        As described, quality 1.
-    polygons : float
-        Expected polygons of one plant.
-
-    Raises
-    ------
-    SpeciesError
-        The number is not finite and positive, or even the least or highest quality misses it by more than `TOLERANCE`.
-    """
-    described = expected_polygons(species)
-    if not (math.isfinite(polygons) and polygons > 0):
-        raise SpeciesError(f"{species.identifier}: polygons must be a number greater than 0, is {polygons}")
-    quality = min(max(polygons / described, QUALITY_LIMITS[0]), QUALITY_LIMITS[1])
-    if abs(quality * described / polygons - 1) > TOLERANCE:
-        raise SpeciesError(
-            f"{species.identifier}: one plant cannot have {polygons:.3g} polygons; ask for"
-            f" {QUALITY_LIMITS[0] * described:.3g} to {QUALITY_LIMITS[1] * described:.3g}"
-        )
-    return quality
 
 
 @lru_cache(maxsize=256)

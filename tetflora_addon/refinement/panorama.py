@@ -85,7 +85,7 @@ class PanoramaBuffer:
     def add(self, cells: NDArray[np.integer], vertices: NDArray[np.float64], extinction: ArrayLike) -> Outline:
         """Draw tetrahedra; as `AlphaBuffer.add`."""
         count, extinction = len(vertices), np.asarray(extinction, np.float64)
-        pixels, opacity, nearest = np.zeros(count), np.zeros(count), np.full(count, np.inf)
+        pixels, opacity = np.zeros((2, count))
         if count:
             self._make_room(int(np.max(cells)) + 1)
         for number, face in enumerate(self.faces):
@@ -94,10 +94,9 @@ class PanoramaBuffer:
             self._weight[number, cells[some]] = outline.pixels
             pixels[some] += outline.pixels
             opacity[some] += outline.pixels * outline.opacity
-            nearest[some] = np.minimum(nearest[some], outline.nearest)
         beside = self.camera.clearance(vertices.reshape(-1, 3)).reshape(-1, 4)
         whole = (beside <= 0.0).all(axis=1)
-        return Outline(pixels, opacity / np.where(pixels > 0.0, pixels, 1.0), nearest, whole)
+        return Outline(pixels, opacity / np.where(pixels > 0.0, pixels, 1.0), whole)
 
     def remove(self, chosen: NDArray[np.bool_]) -> None:
         """Take away tetrahedra; ``chosen`` is a mask by their numbers."""

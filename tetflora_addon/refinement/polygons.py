@@ -124,7 +124,6 @@ class Meshes:
         self.first_vertex = starts([len(s.positions) for s in surfaces])
         self.first_corner = starts([len(s.corner_verts) for s in surfaces])
         self.first_face = starts([len(s.material) for s in surfaces])
-        self.first_triangle = starts([len(s.triangles) for s in surfaces])
         self.first_slot = starts([len(s.colours) for s in surfaces])
         every = list(enumerate(surfaces))
         none, flat = np.zeros(0, np.int64), np.zeros((0, 3))

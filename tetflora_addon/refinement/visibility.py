@@ -40,15 +40,12 @@ class Outline:
         Area in pixels of the final picture that the tetrahedron affects, hidden or not; 0 out of view.
     opacity : (n,) float64
         Mean of 1 − e^−τ over its own silhouette, 0 to 1; 0 out of view.
-    nearest : (n,) float64
-        Least distance from the eye along the buffer's rays, metres; infinite out of view.
     whole : (n,) bool
         Whether all of it is in view.
     """
 
     pixels: NDArray[np.float64]
     opacity: NDArray[np.float64]
-    nearest: NDArray[np.float64]
     whole: NDArray[np.bool_]
 
 
@@ -130,8 +127,6 @@ class AlphaBuffer:
         exact = whole & (weight > 0.0)
         if self.worth is not None:
             exact, final = np.zeros(count, bool), 1.0
-        nearest = np.full(count, np.inf)
-        np.minimum.at(nearest, cell, fragments.entry)
         # What lies behind an occluder neither is seen nor hides anything.
         open_ones = slice(None) if self.end is None else np.flatnonzero(share)
         self._changed[pixel[open_ones]] = True
@@ -144,7 +139,7 @@ class AlphaBuffer:
         ):
             setattr(self, name, np.concatenate([getattr(self, name), values[open_ones]]))
         pixels = np.where(exact, pixels, weight * final) * self.camera.pixel_gain(np.asarray(vertices).mean(axis=1))
-        return Outline(pixels, opacity, nearest, whole)
+        return Outline(pixels, opacity, whole)
 
     def remove(self, chosen: NDArray[np.bool_]) -> None:
         """Take away tetrahedra; ``chosen`` is a mask by their numbers."""
@@ -173,11 +168,6 @@ class AlphaBuffer:
         self._changed[:] = False
         self._before[some] = np.exp(-self._depth_before(some, rank))
         return np.bincount(self._cell, self._share * self._before, len(rank))
-
-    def alpha(self) -> NDArray[np.float64]:
-        """Opacity (height, width) of all tetrahedra together, as far as no occluder hides them; row 0 is lowest."""
-        total = np.bincount(self._pixel, self._depth, self.width * self.height)
-        return -np.expm1(-total).reshape(self.height, self.width)
 
     def _depth_before(self, some: NDArray[np.intp], rank: NDArray[np.integer]) -> NDArray[np.float64]:
         """Optical depth in front of some fragments (n,), among which are all of their pixels."""

@@ -55,16 +55,6 @@ def _tables() -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 _CHILDREN, _PLANES = _tables()
 
 
-def squared_diagonals(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Squared lengths ``(n, 3)`` of the three diagonals of the inner octahedron of tetrahedra ``(n, 4, 3)``, m².
-
-    Diagonal ``k`` joins the middles of edges ``k`` and ``5 - k`` of `geometry.EDGES`: four times its square is the sum
-    of the other four edges' squares less the sum of these two.
-    """
-    squared = squared_edges(vertices)
-    return (np.sum(squared, axis=1, keepdims=True) - 2.0 * (squared[:, :3] + squared[:, :2:-1])) / 4.0
-
-
 def best_diagonal(vertices: NDArray[np.float64]) -> NDArray[np.intp]:
     """Diagonal along which the worst of the inner tetrahedra has the best quality.
 
@@ -76,7 +66,8 @@ def best_diagonal(vertices: NDArray[np.float64]) -> NDArray[np.intp]:
     Returns
     -------
     (n,) intp
-        See `squared_diagonals`; the first of those that are equally good.
+        Diagonal ``k`` joins the middles of edges ``k`` and ``5 - k`` of `geometry.EDGES`; the first of those that are
+        equally good.
 
     Notes
     -----
@@ -103,7 +94,7 @@ def divide_in_eight(
     vertices : (n, 4, 3) float64
         Positively oriented tetrahedra, metres.
     diagonal : (n,) int, optional
-        Which diagonal of the inner octahedron to cut along, see `squared_diagonals`; `best_diagonal` if None.
+        Which diagonal of the inner octahedron to cut along; `best_diagonal` if None.
 
     Returns
     -------
@@ -122,35 +113,13 @@ def divide_in_eight(
     return plane_through(through[..., :3, :], through[..., 3, :]), points[every, _CHILDREN[diagonal]]
 
 
-def prefers_eight(vertices: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Whether the eight or longest-edge bisection three times keeps tetrahedra in better shape.
-
-    Both give eight of equal volume, three planes deep. Worst qualities are compared, with a `HANDICAP` on bisection of
-    compact tetrahedra.
-
-    Parameters
-    ----------
-    vertices : (n, 4, 3) float64
-        Positively oriented tetrahedra, metres.
-
-    Returns
-    -------
-    (n,) bool
-        True for the eight.
-
-    Notes
-    -----
-    The paper "chooses a subdivision depending on the aspect ratio of the resulting tetrahedra in order to avoid sliver
-    subvolumes" (section 4). The eight leave compact shapes at least three quarters of their quality, but cannot help
-    with long ones: where opposite edges differ much, all three diagonals are equally bad. Those gain by bisection.
-    """
-    return _prefers_eight(vertices, divide_in_eight(vertices)[1], bisect_thrice(vertices)[1])
-
-
 def divide_by_shape(
     vertices: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Divide tetrahedra into eight in the way that `prefers_eight`, so that no slivers arise.
+    """Divide tetrahedra into eight in the way that keeps them in better shape, so that no slivers arise.
+
+    Both ways give eight of equal volume, three planes deep. Worst qualities are compared, with a `HANDICAP` on the
+    bisection of compact tetrahedra.
 
     Parameters
     ----------
@@ -164,10 +133,17 @@ def divide_by_shape(
     children : (n, 8, 4, 3) float64
         Positively oriented, of equal volume.
     eight : (n,) bool
-        Which were divided into the canonical eight; the others were bisected three times.
+        Which were divided into the canonical eight; the others were bisected three times along their longest edges.
+
+    Notes
+    -----
+    The paper "chooses a subdivision depending on the aspect ratio of the resulting tetrahedra in order to avoid sliver
+    subvolumes" (section 4). The eight leave compact shapes at least three quarters of their quality, but cannot help
+    with long ones: where opposite edges differ much, all three diagonals are equally bad. Those gain by bisection.
     """
     (planes, children), (other, halves) = divide_in_eight(vertices), bisect_thrice(vertices)
-    chosen = _prefers_eight(vertices, children, halves)
+    handicap = np.where(quality(vertices) > COMPACT, HANDICAP, 1.0 + TIE)
+    chosen = handicap * np.min(quality(children), axis=1) >= np.min(quality(halves), axis=1)
     bisected = ~chosen
     planes[bisected], children[bisected] = other[bisected], halves[bisected]
     return planes, children, chosen
@@ -181,10 +157,3 @@ def bisect_thrice(vertices: NDArray[np.float64]) -> tuple[NDArray[np.float64], N
         planes.append(cutting.reshape(len(vertices), cuts, 4))
         pieces = pieces.reshape(-1, 4, 3)
     return np.concatenate(planes, axis=1), pieces.reshape(len(vertices), 8, 4, 3)
-
-
-def _prefers_eight(
-    vertices: NDArray[np.float64], eight: NDArray[np.float64], bisected: NDArray[np.float64]
-) -> NDArray[np.bool_]:
-    handicap = np.where(quality(vertices) > COMPACT, HANDICAP, 1.0 + TIE)
-    return handicap * np.min(quality(eight), axis=1) >= np.min(quality(bisected), axis=1)

@@ -91,27 +91,6 @@ def face_area_vectors(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.concatenate([-np.sum(sides, axis=-2, keepdims=True), sides], axis=-2)
 
 
-def face_planes(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Planes of the four faces of positive tetrahedra; distances are negative inside.
-
-    Parameters
-    ----------
-    vertices : (..., 4, 3) float64
-        Positively oriented tetrahedra, metres.
-
-    Returns
-    -------
-    (..., 4, 4) float64
-        Plane ``(nx, ny, nz, d)`` of the face opposite each vertex, outward unit normal. A face without area has the
-        normal 0.
-    """
-    areas = face_area_vectors(vertices)
-    length = np.linalg.norm(areas, axis=-1, keepdims=True)
-    normals = areas / np.where(length > 0.0, length, 1.0)
-    on_face = vertices[..., FACES[:, 0], :]
-    return np.concatenate([normals, -np.sum(normals * on_face, axis=-1, keepdims=True)], axis=-1)
-
-
 def projected_area(vertices: NDArray[np.float64], direction: NDArray[np.float64]) -> NDArray[np.float64]:
     """Area of the silhouette in parallel projection: half of Σ |A_i · ω|.
 
@@ -167,14 +146,6 @@ def barycentric(vertices: NDArray[np.float64], points: NDArray[np.float64]) -> N
     gradients = barycentric_gradients(vertices)[..., 1:, :]
     rest = np.sum(gradients * (points - vertices[..., 0, :])[..., None, :], axis=-1)
     return np.concatenate([1.0 - np.sum(rest, axis=-1, keepdims=True), rest], axis=-1)
-
-
-def contains(vertices: NDArray[np.float64], points: NDArray[np.float64], tolerance: float = 1e-9) -> NDArray[np.bool_]:
-    """Whether each point ``(..., 3)`` lies in its tetrahedron ``(..., 4, 3)``; result ``(...)`` bool.
-
-    ``tolerance`` is in barycentric coordinates, without unit: the faces belong to the tetrahedron.
-    """
-    return np.min(barycentric(vertices, points), axis=-1) >= -tolerance
 
 
 def plane_through(points: NDArray[np.float64], negative: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .bisection import bisect
 from .cuts import TOLERANCE, Pieces, cut_tetrahedra
-from .eight import divide_by_shape, divide_in_eight
+from .eight import divide_by_shape
 from .geometry import plane_distance
 
 #: Points that `TetrahedralTree.locate` takes down the tree at a time; bounds its memory to some tens of megabytes.
@@ -25,7 +25,7 @@ class TetrahedralTree:
 
     Node 0 is the root. Inner nodes near it may be convex regions without a tetrahedron; terminal nodes are tetrahedra
     once `split` is used (`tetflora_addon.tetrahedra.roots` sees to that). Between a tetrahedron and those that
-    `split_eight` or `cut` make of it there may be such regions too.
+    `split_by_shape` or `cut` make of it there may be such regions too.
 
     Parameters
     ----------
@@ -124,8 +124,8 @@ class TetrahedralTree:
         self.place(children.ravel(), halves.reshape(-1, 4, 3))
         return children
 
-    def split_eight(self, nodes: ArrayLike) -> NDArray[np.int32]:
-        """Divide terminal tetrahedra into the canonical eight, along the best inner diagonal.
+    def split_by_shape(self, nodes: ArrayLike) -> NDArray[np.int32]:
+        """Divide terminal tetrahedra into eight as suits their shape: the canonical eight, or three bisections.
 
         Parameters
         ----------
@@ -135,21 +135,12 @@ class TetrahedralTree:
         Returns
         -------
         (n, 8) int32
-            Terminals three levels further down, see `eight.divide_in_eight`; they inherit `inside`. The six nodes
-            between are regions without a tetrahedron.
+            Terminals three levels further down, see `eight.divide_by_shape`; they inherit `inside`.
 
         Raises
         ------
         ValueError
             If a node is not terminal, has no tetrahedron, or occurs twice.
-        """
-        nodes = np.asarray(nodes, np.intp)
-        return self._divide_thrice(nodes, *divide_in_eight(self._tetrahedra(nodes)))
-
-    def split_by_shape(self, nodes: ArrayLike) -> NDArray[np.int32]:
-        """Divide terminal tetrahedra into eight as suits their shape: the canonical eight, or three bisections.
-
-        Parameters, result and errors are those of `split_eight`; see `eight.prefers_eight` for the choice.
         """
         nodes = np.asarray(nodes, np.intp)
         planes, pieces, _ = divide_by_shape(self._tetrahedra(nodes))
