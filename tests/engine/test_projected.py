@@ -98,6 +98,7 @@ def test_the_thick_point_is_where_its_ray_is_longest_within(seed: int, camera: C
     # A ray that grazes a vertex by the last bit may miss it.
     np.testing.assert_allclose(own, projected.thickness, atol=1e-6)
     # The thick point is where the ray comes in: just before it there is nothing.
+    planes = support.face_planes(vertices)
     distance = np.einsum("nfk,nk->nf", planes[..., :3], thick) + planes[..., 3]
     np.testing.assert_allclose(distance.max(axis=1), 0.0, atol=1e-9)
     others = np.random.default_rng(seed + 1).normal(0, 0.2, (50, 3))
