@@ -9,14 +9,13 @@ from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntPrope
 from ..tetflora_addon.blender.plant_objects import add_plants, plants_of
 from ..tetflora_addon.blender.species_items import NO_SPECIES, default_species, operator_items
 from ..tetflora_addon.planting.places import Placement, new_seeds
-from . import ids
 from .base import Reporting, in_object_mode, select_only
 
 
 class TETFLORA_OT_add_plant(Reporting, bpy.types.Operator):
     """Add an empty that stands for a plant at the 3D cursor."""
 
-    bl_idname = ids.ADD_PLANT
+    bl_idname = "tetflora.add_plant"
     bl_label = "Add Plant"
     bl_description = (
         "Add a plant at the 3D cursor. It is stored as an empty with species and seed; "
@@ -71,3 +70,6 @@ class TETFLORA_OT_add_plant(Reporting, bpy.types.Operator):
         )
         select_only(context, add_plants(context.scene, placement, [species]))
         return {'FINISHED'}
+
+
+CLASSES = (TETFLORA_OT_add_plant,)

@@ -9,14 +9,13 @@ from ..tetflora_addon.blender.field_edits import assign_field_species
 from ..tetflora_addon.blender.plant_fields import fields_of, stored_size
 from ..tetflora_addon.blender.plant_objects import assign_species
 from ..tetflora_addon.blender.species_items import NO_SPECIES, operator_items
-from . import ids
 from .base import Reporting, counted, plants_or_fields_selected, selected_plants
 
 
 class TETFLORA_OT_assign_species(Reporting, bpy.types.Operator):
     """Give the selected plants, and those of selected fields, another species."""
 
-    bl_idname = ids.ASSIGN_SPECIES
+    bl_idname = "tetflora.assign_species"
     bl_label = "Change Species"
     bl_description = (
         "Make all selected plants, and all plants of selected fields, belong to this species. Their seeds, sizes and "
@@ -40,3 +39,6 @@ class TETFLORA_OT_assign_species(Reporting, bpy.types.Operator):
                 changed += stored_size(field)
         self.report({'INFO'}, f"{counted(changed, 'plant')} changed")
         return {'FINISHED'}
+
+
+CLASSES = (TETFLORA_OT_assign_species,)

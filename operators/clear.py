@@ -5,14 +5,13 @@
 import bpy
 
 from ..tetflora_addon.blender import auto_refresh, emit, job
-from . import ids
 from .base import Reporting, counted, in_object_mode
 
 
 class TETFLORA_OT_clear(Reporting, bpy.types.Operator):
     """Remove what Refine made."""
 
-    bl_idname = ids.CLEAR
+    bl_idname = "tetflora.clear"
     bl_label = "Clear"
     bl_description = (
         "Remove all meshes, materials and proxies that Refine made, and nothing else. The plants stay, and meshes that "
@@ -39,3 +38,6 @@ class TETFLORA_OT_clear(Reporting, bpy.types.Operator):
         shown = sum(emit.HIDDEN['VIEW'] not in original for original in hidden)
         self.report({'INFO'}, f"{removed}, {counted(shown, 'object')} shown again" if shown else removed)
         return {'FINISHED'}
+
+
+CLASSES = (TETFLORA_OT_clear,)

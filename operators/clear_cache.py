@@ -5,14 +5,13 @@
 import bpy
 
 from ..tetflora_addon import cache_folder
-from . import ids
 from .base import Reporting, counted
 
 
 class TETFLORA_OT_clear_cache(Reporting, bpy.types.Operator):
     """Delete what was kept about species."""
 
-    bl_idname = ids.CLEAR_CACHE
+    bl_idname = "tetflora.clear_cache"
     bl_label = "Clear Cache"
     bl_description = (
         "Delete what the cache folder keeps about species, and nothing else in it. It is found out anew when needed"
@@ -29,3 +28,6 @@ class TETFLORA_OT_clear_cache(Reporting, bpy.types.Operator):
     def run(self, _context: bpy.types.Context) -> set[str]:
         self.report({'INFO'}, f"{counted(cache_folder.clear(), 'file')} deleted from {cache_folder.used()}")
         return {'FINISHED'}
+
+
+CLASSES = (TETFLORA_OT_clear_cache,)

@@ -8,14 +8,13 @@ from ..tetflora_addon.blender.field_edits import editable
 from ..tetflora_addon.blender.ground import Ground
 from ..tetflora_addon.blender.grounding import drop_field, drop_plants
 from ..tetflora_addon.blender.plant_fields import fields_of
-from . import ids
 from .base import Reporting, counted, in_object_mode, plants_or_fields_selected, selected_plants
 
 
 class TETFLORA_OT_drop_to_ground(Reporting, bpy.types.Operator):
     """Move the selected plants up or down onto the ground."""
 
-    bl_idname = ids.DROP_TO_GROUND
+    bl_idname = "tetflora.drop_to_ground"
     bl_label = "Drop Plants to Ground"
     bl_description = (
         "Move the selected plants, and the plants of selected fields, along the vertical onto the nearest visible "
@@ -48,3 +47,6 @@ class TETFLORA_OT_drop_to_ground(Reporting, bpy.types.Operator):
         said = f"{counted(moved, 'plant')} moved to the ground"
         self.report({'WARNING' if notes else 'INFO'}, "; ".join([said, *notes]))
         return {'FINISHED'} if moved else {'CANCELLED'}
+
+
+CLASSES = (TETFLORA_OT_drop_to_ground,)

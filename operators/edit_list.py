@@ -7,14 +7,13 @@ from bpy.props import EnumProperty
 
 from ..tetflora_addon.blender.population_rules import shown_population
 from ..tetflora_addon.blender.species_items import catalogue, default_species
-from . import ids
 from .base import Reporting
 
 
 class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
     """Add an entry to a list of species, or remove the active one."""
 
-    bl_idname = ids.EDIT_LIST
+    bl_idname = "tetflora.edit_list"
     bl_label = "Edit List"
     bl_options = {'REGISTER', 'UNDO', 'INTERNAL'}
 
@@ -71,3 +70,6 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
         if self.which == 'MIX':
             return shown_population(context.scene), "mix"
         return context.scene.tetflora, "leaf_objects"
+
+
+CLASSES = (TETFLORA_OT_edit_list,)

@@ -9,14 +9,13 @@ from ..tetflora_addon.blender.plant_objects import field_from_plants, plants_fro
 from ..tetflora_addon.blender.population_properties import MOST_EMPTIES
 from ..tetflora_addon.blender.populations import adopt, collection_of, owner_of
 from ..tetflora_addon.blender.species_items import default_species
-from . import ids
 from .base import Reporting, counted, in_object_mode, plants_selected, select_only, selected_plants
 
 
 class TETFLORA_OT_mark_field(Reporting, bpy.types.Operator):
     """Use the active mesh or point cloud as a field of plants, or no longer."""
 
-    bl_idname = ids.MARK_FIELD
+    bl_idname = "tetflora.mark_field"
     bl_label = "Use as Field of Plants"
     bl_description = (
         "Each point of the active mesh or point cloud, as its modifiers leave it, becomes a plant. Attributes species, "
@@ -50,7 +49,7 @@ class TETFLORA_OT_mark_field(Reporting, bpy.types.Operator):
 class TETFLORA_OT_make_field(Reporting, bpy.types.Operator):
     """Make one field of the selected plants."""
 
-    bl_idname = ids.MAKE_FIELD
+    bl_idname = "tetflora.make_field"
     bl_label = "Make Field of Plants"
     bl_description = (
         "Replace the selected plants by one object whose vertices are the same individuals at the same places. It "
@@ -83,7 +82,7 @@ class TETFLORA_OT_make_field(Reporting, bpy.types.Operator):
 class TETFLORA_OT_split_field(Reporting, bpy.types.Operator):
     """Make an empty of each plant of the selected fields."""
 
-    bl_idname = ids.SPLIT_FIELD
+    bl_idname = "tetflora.split_field"
     bl_label = "Make Objects of Field"
     bl_description = (
         "Replace the selected fields by an empty for each plant: the same individuals at the same places. "
@@ -116,3 +115,6 @@ class TETFLORA_OT_split_field(Reporting, bpy.types.Operator):
         select_only(context, made)
         self.report({'INFO'}, f"{counted(len(made), 'plant')} made")
         return {'FINISHED'}
+
+
+CLASSES = (TETFLORA_OT_mark_field, TETFLORA_OT_make_field, TETFLORA_OT_split_field)

@@ -6,14 +6,13 @@ import bpy
 from bpy.props import IntProperty
 
 from ..tetflora_addon.blender.first_forest import build
-from . import ids
 from .base import Reporting, in_object_mode
 
 
 class TETFLORA_OT_first_forest(Reporting, bpy.types.Operator):
     """Make a small complete forest."""
 
-    bl_idname = ids.FIRST_FOREST
+    bl_idname = "tetflora.first_forest"
     bl_label = "First Forest"
     bl_description = (
         "Make a small complete scene: ground, some ninety plants of four species, camera, sun and sky, ready for "
@@ -50,3 +49,6 @@ def _activate_ground(scene: bpy.types.Scene) -> None:
             obj.select_set(False, view_layer=layer)
         ground.select_set(True, view_layer=layer)
         layer.objects.active = ground
+
+
+CLASSES = (TETFLORA_OT_first_forest,)

@@ -7,14 +7,13 @@ import bpy
 from ..tetflora_addon.blender import auto_refresh
 from ..tetflora_addon.blender.emit import keep_results, result_collections
 from ..tetflora_addon.errors import TetFloraError
-from . import ids
 from .base import Reporting, counted
 
 
 class TETFLORA_OT_keep_results(Reporting, bpy.types.Operator):
     """Make ordinary meshes of what Refine made."""
 
-    bl_idname = ids.KEEP_RESULTS
+    bl_idname = "tetflora.keep_results"
     bl_label = "Keep Results as Meshes"
     bl_description = (
         "Make what Refine made your own: ordinary meshes that are saved in the file and that you can edit. Refine and "
@@ -42,3 +41,6 @@ class TETFLORA_OT_keep_results(Reporting, bpy.types.Operator):
         scene.tetflora.statistics = ""
         self.report({'INFO'}, f"{counted(kept, 'object')} kept as meshes; Refine at Render is off")
         return {'FINISHED'}
+
+
+CLASSES = (TETFLORA_OT_keep_results,)

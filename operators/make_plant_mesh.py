@@ -8,7 +8,6 @@ import bpy
 
 from ..tetflora_addon.blender.job import Progress
 from ..tetflora_addon.blender.plant_mesh import make_plant_mesh_steps
-from . import ids
 from .base import counted, in_object_mode, plants_selected, select_only, selected_plants
 from .modal_job import ModalJob
 
@@ -16,7 +15,7 @@ from .modal_job import ModalJob
 class TETFLORA_OT_make_plant_mesh(ModalJob, bpy.types.Operator):
     """Turn the selected plants into meshes to edit, export and keep."""
 
-    bl_idname = ids.MAKE_PLANT_MESH
+    bl_idname = "tetflora.make_plant_mesh"
     bl_label = "Make Plants Real Meshes"
     bl_description = (
         "Make an ordinary mesh object of each selected plant, with every branch and leaf, to edit, export or animate. "
@@ -37,3 +36,6 @@ class TETFLORA_OT_make_plant_mesh(ModalJob, bpy.types.Operator):
         polygons = sum(len(obj.data.polygons) for obj in made)
         self.report({'INFO'}, f"{counted(len(made), 'mesh object')} of {polygons:,} polygons made")
         return {'FINISHED'}
+
+
+CLASSES = (TETFLORA_OT_make_plant_mesh,)

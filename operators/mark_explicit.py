@@ -6,7 +6,6 @@ import bpy
 
 from ..tetflora_addon.blender.explicit_objects import SURFACE_TYPES
 from ..tetflora_addon.blender.plant_copies import may_instance
-from . import ids
 from .marking import Marking, action_property
 
 
@@ -19,7 +18,7 @@ def can_be_explicit(obj: bpy.types.Object) -> bool:
 class TETFLORA_OT_mark_explicit(Marking, bpy.types.Operator):
     """Let the selected objects' own polygons take part in refinement, or take the mark away."""
 
-    bl_idname = ids.MARK_EXPLICIT
+    bl_idname = "tetflora.mark_explicit"
     bl_label = "Refine These Meshes"
     bl_description = (
         "Refine the selected objects' own polygons with the plants: trees from elsewhere, rocks, scans, and what "
@@ -31,3 +30,6 @@ class TETFLORA_OT_mark_explicit(Marking, bpy.types.Operator):
     action: action_property("Their polygons are refined", "They are left as they are")
 
     fits = staticmethod(can_be_explicit)
+
+
+CLASSES = (TETFLORA_OT_mark_explicit,)

@@ -4,14 +4,13 @@
 
 import bpy
 
-from . import ids
 from .marking import Marking, action_property
 
 
 class TETFLORA_OT_mark_occluder(Marking, bpy.types.Operator):
     """Mark the selected meshes as hiding the plants behind them, or take the mark away."""
 
-    bl_idname = ids.MARK_OCCLUDER
+    bl_idname = "tetflora.mark_occluder"
     bl_label = "Mark as Hiding Plants"
     bl_description = (
         "Mark the selected meshes, such as terrain and buildings, as hiding plants: what stands behind them costs "
@@ -25,3 +24,6 @@ class TETFLORA_OT_mark_occluder(Marking, bpy.types.Operator):
     @staticmethod
     def fits(obj: bpy.types.Object) -> bool:
         return obj.type == 'MESH'
+
+
+CLASSES = (TETFLORA_OT_mark_occluder,)

@@ -16,7 +16,6 @@ from ..tetflora_addon.blender.plant_objects import remove_empty_collections
 from ..tetflora_addon.blender.runtime import redraw
 from ..tetflora_addon.errors import SceneError, TetFloraError
 from ..tetflora_addon.planting.strokes import dabs_along
-from . import ids
 from .base import counted
 from .ground_tool import NAVIGATION, GroundTool
 
@@ -37,7 +36,7 @@ _DONE = {'PAINT': "painted", 'ERASE': "erased", 'THIN': "thinned out"}
 class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
     """Paint plants onto the ground."""
 
-    bl_idname = ids.PAINT_PLANTS
+    bl_idname = "tetflora.paint_plants"
     bl_label = "Paint Plants"
     bl_description = (
         "Paint, erase or thin plants with a brush on the visible meshes. Every stroke is one undo step; "
@@ -237,3 +236,6 @@ def _places(text: str) -> list[tuple[float, float, float]]:
 def _said(stroke: Stroke) -> str:
     number = stroke.added if stroke.mode == 'PAINT' else stroke.removed
     return f"{counted(number, 'plant')} {_DONE[stroke.mode]}"
+
+
+CLASSES = (TETFLORA_OT_paint_plants,)

@@ -22,7 +22,6 @@ from ..tetflora_addon.blender.species_items import (
 )
 from ..tetflora_addon.errors import TetFloraError
 from ..tetflora_addon.planting.places import Placement, new_seeds
-from . import ids
 from .base import select_only
 from .ground_tool import NAVIGATION, GroundTool
 
@@ -38,7 +37,7 @@ _KEYS = (
 class TETFLORA_OT_place_plant(GroundTool, bpy.types.Operator):
     """Click on the ground to set plants."""
 
-    bl_idname = ids.PLACE_PLANT
+    bl_idname = "tetflora.place_plant"
     bl_label = "Place Plants by Clicking"
     bl_description = (
         "Click on the ground to set plants one by one, each another individual. The wheel turns, Ctrl and the wheel "
@@ -136,3 +135,6 @@ class TETFLORA_OT_place_plant(GroundTool, bpy.types.Operator):
         turn = np.degrees(self._turn)
         context.workspace.status_text_set(_KEYS.format(name=name, turn=turn, scale=self._scale))
         redraw()
+
+
+CLASSES = (TETFLORA_OT_place_plant,)

@@ -12,7 +12,6 @@ from ..tetflora_addon.blender.population_rules import copy_companion
 from ..tetflora_addon.blender.populations import add_population, make_plants, remove_population
 from ..tetflora_addon.blender.species_items import catalogue, default_species
 from ..tetflora_addon.errors import SceneError, TetFloraError
-from . import ids
 from .base import Reporting, in_object_mode, select_only
 from .populations import ground_selected, report_made, selected_grounds
 
@@ -23,7 +22,7 @@ _SHARED = ("count", "as_field", "seed", "slope_limit", "min_distance", "scale_mi
 class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
     """Scatter plants over the selected meshes."""
 
-    bl_idname = ids.POPULATE
+    bl_idname = "tetflora.populate"
     bl_label = "Populate"
     bl_description = (
         "Scatter plants over the selected meshes, as a new population that can be changed afterwards. Each plant is an "
@@ -150,3 +149,6 @@ def _parse_shares(text: str) -> dict[str, float]:
         except ValueError:
             raise SceneError(f'"{part}" is no species with a share; write for example {identifier}:2') from None
     return shares
+
+
+CLASSES = (TETFLORA_OT_populate,)

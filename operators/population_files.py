@@ -9,7 +9,6 @@ from bpy.props import BoolProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ..tetflora_addon.blender import point_preview, population_files
-from . import ids
 from .base import Reporting, counted
 from .populations import selected_grounds
 
@@ -17,7 +16,7 @@ from .populations import selected_grounds
 class TETFLORA_OT_export_populations(Reporting, bpy.types.Operator, ExportHelper):
     """Write populations to a file."""
 
-    bl_idname = ids.EXPORT_POPULATIONS
+    bl_idname = "tetflora.export_populations"
     bl_label = "Export Populations"
     bl_description = (
         "Write the settings of this scene's populations to a file, for other scenes. Plants are not written"
@@ -48,7 +47,7 @@ class TETFLORA_OT_export_populations(Reporting, bpy.types.Operator, ExportHelper
 class TETFLORA_OT_import_populations(Reporting, bpy.types.Operator, ImportHelper):
     """Add the populations of a file."""
 
-    bl_idname = ids.IMPORT_POPULATIONS
+    bl_idname = "tetflora.import_populations"
     bl_label = "Import Populations"
     bl_description = (
         "Add the populations of a file to this scene, without plants: press Update for each. They grow on meshes of "

@@ -16,7 +16,6 @@ from ..tetflora_addon.blender.populations import (
     reroll,
     set_grounds,
 )
-from . import ids
 from .base import Reporting, counted, in_object_mode, select_only
 
 
@@ -77,7 +76,7 @@ class _Replacing(_OfPopulation):
 class TETFLORA_OT_add_population(Reporting, bpy.types.Operator):
     """Add a population without plants."""
 
-    bl_idname = ids.ADD_POPULATION
+    bl_idname = "tetflora.add_population"
     bl_label = "Add Population"
     bl_description = (
         "Add a population on the selected meshes, with the settings of the one that is shown, and no plants yet. "
@@ -103,7 +102,7 @@ class TETFLORA_OT_add_population(Reporting, bpy.types.Operator):
 class TETFLORA_OT_update_population(_Replacing, bpy.types.Operator):
     """Place plants by the settings."""
 
-    bl_idname = ids.UPDATE_POPULATION
+    bl_idname = "tetflora.update_population"
     bl_label = "Update Population"
     bl_description = (
         "Place the plants of the active population by its settings, in place of those that it has. Plants of it that "
@@ -122,7 +121,7 @@ class TETFLORA_OT_update_population(_Replacing, bpy.types.Operator):
 class TETFLORA_OT_reroll_population(_Replacing, bpy.types.Operator):
     """Place plants anew with another seed."""
 
-    bl_idname = ids.REROLL_POPULATION
+    bl_idname = "tetflora.reroll_population"
     bl_label = "Re-roll Population"
     bl_description = "Place the plants of the active population by its settings with another seed: another arrangement"
     bl_options = {'REGISTER', 'UNDO'}
@@ -135,7 +134,7 @@ class TETFLORA_OT_reroll_population(_Replacing, bpy.types.Operator):
 class TETFLORA_OT_freeze_population(_OfPopulation, bpy.types.Operator):
     """Keep a population's plants as they are."""
 
-    bl_idname = ids.FREEZE_POPULATION
+    bl_idname = "tetflora.freeze_population"
     bl_label = "Freeze Population"
     bl_description = (
         "The plants of the active population are yours: no update replaces them, and they stay if the population is "
@@ -154,7 +153,7 @@ class TETFLORA_OT_freeze_population(_OfPopulation, bpy.types.Operator):
 class TETFLORA_OT_remove_population(_OfPopulation, bpy.types.Operator):
     """Remove a population with its plants."""
 
-    bl_idname = ids.REMOVE_POPULATION
+    bl_idname = "tetflora.remove_population"
     bl_label = "Remove Population"
     bl_description = "Remove the active population and its plants. Plants of a frozen population stay"
     bl_options = {'REGISTER', 'UNDO'}
@@ -177,7 +176,7 @@ class TETFLORA_OT_remove_population(_OfPopulation, bpy.types.Operator):
 class TETFLORA_OT_select_population(_OfPopulation, bpy.types.Operator):
     """Select a population's plants."""
 
-    bl_idname = ids.SELECT_POPULATION
+    bl_idname = "tetflora.select_population"
     bl_label = "Select Plants of Population"
     bl_description = "Select the plants of the active population, or its field"
     bl_options = {'REGISTER', 'UNDO'}
@@ -194,7 +193,7 @@ class TETFLORA_OT_select_population(_OfPopulation, bpy.types.Operator):
 class TETFLORA_OT_set_population_ground(_OfPopulation, bpy.types.Operator):
     """Grow on the selected meshes."""
 
-    bl_idname = ids.SET_POPULATION_GROUND
+    bl_idname = "tetflora.set_population_ground"
     bl_label = "Use Selected Meshes"
     bl_description = "Let the active population grow on the selected meshes instead. Press Update to place its plants"
     bl_options = {'REGISTER', 'UNDO'}
@@ -212,7 +211,7 @@ class TETFLORA_OT_set_population_ground(_OfPopulation, bpy.types.Operator):
 class TETFLORA_OT_forget_erased(_Replacing, bpy.types.Operator):
     """Let plants grow again where they were erased."""
 
-    bl_idname = ids.FORGET_ERASED
+    bl_idname = "tetflora.forget_erased"
     bl_label = "Forget Erased Places"
     bl_description = (
         "Let plants of the active population grow again where the brush has erased some. Press Update to place them"
@@ -237,7 +236,7 @@ class TETFLORA_OT_forget_erased(_Replacing, bpy.types.Operator):
 class TETFLORA_OT_preview_population(Reporting, bpy.types.Operator):
     """Show where plants would stand."""
 
-    bl_idname = ids.PREVIEW_POPULATION
+    bl_idname = "tetflora.preview_population"
     bl_label = "Preview Points"
     bl_description = (
         "Show a dot in the viewport for each plant that the shown settings would place, coloured by species, and "

@@ -10,7 +10,6 @@ from mathutils import Matrix
 from ..tetflora_addon.blender import job, preview_job, preview_state
 from ..tetflora_addon.preview.levels import Levels
 from ..tetflora_addon.refinement.camera import Camera
-from . import ids
 from .base import counted
 from .modal_job import ModalJob
 
@@ -29,7 +28,7 @@ def _camera_is_there(cls: type[bpy.types.Operator], context: bpy.types.Context) 
 class TETFLORA_OT_preview_levels(ModalJob, bpy.types.Operator):
     """Refine without making anything."""
 
-    bl_idname = ids.PREVIEW_LEVELS
+    bl_idname = "tetflora.preview_levels"
     bl_label = "Compute Levels"
     bl_description = (
         "Refine for the scene's camera, or for the frozen one, without making any mesh, and keep every level to step "
@@ -59,7 +58,7 @@ class TETFLORA_OT_preview_levels(ModalJob, bpy.types.Operator):
 class TETFLORA_OT_forget_levels(bpy.types.Operator):
     """Take the levels out of viewports and memory."""
 
-    bl_idname = ids.FORGET_LEVELS
+    bl_idname = "tetflora.forget_levels"
     bl_label = "Forget Levels"
     bl_description = "Take the levels out of the viewports and out of memory. Nothing in the file changes"
 
@@ -79,7 +78,7 @@ class TETFLORA_OT_forget_levels(bpy.types.Operator):
 class TETFLORA_OT_look_through(bpy.types.Operator):
     """Look at the preview from where it was made for."""
 
-    bl_idname = ids.LOOK_THROUGH
+    bl_idname = "tetflora.look_through"
     bl_label = "Look Through the Camera"
     bl_description = (
         "Look through the scene's camera or, where it is frozen, from the place of the frozen one, in its direction"
@@ -113,3 +112,6 @@ def look_from(space: bpy.types.SpaceView3D, camera: Camera) -> None:
     if camera.kind == "PERSP":
         space.lens = min(max(_VIEWPORT / max(right - left, top - bottom), 1.0), 250.0)
     region.view_matrix = matrix.inverted()
+
+
+CLASSES = (TETFLORA_OT_preview_levels, TETFLORA_OT_forget_levels, TETFLORA_OT_look_through)

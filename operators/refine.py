@@ -13,7 +13,6 @@ from ..tetflora_addon.blender.runtime import redraw
 from ..tetflora_addon.blender.shell_bounces import few_bounces
 from ..tetflora_addon.blender.world_reader import read_world
 from ..tetflora_addon.refinement.statistics import Statistics
-from . import ids
 from .base import counted
 from .modal_job import ModalJob
 
@@ -21,7 +20,7 @@ from .modal_job import ModalJob
 class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
     """Make meshes and proxies of all plants, as fine as the scene's camera sees them."""
 
-    bl_idname = ids.REFINE
+    bl_idname = "tetflora.refine"
     bl_label = "Refine"
     bl_description = (
         "Make meshes of the plants near the scene's camera and proxies of the others, in place of earlier ones. "
@@ -99,3 +98,6 @@ def _cut_off(scene: bpy.types.Scene) -> str:
         f"{beyond:,} of {counted(len(plants), 'plant')} stand beyond the camera's range and will not be seen; "
         f'raise Clip End of "{camera.name}", now {end:g} m'
     )
+
+
+CLASSES = (TETFLORA_OT_refine,)

@@ -8,14 +8,13 @@ from bpy.props import EnumProperty, StringProperty
 from ..tetflora_addon.blender.plant_fields import fields_of
 from ..tetflora_addon.blender.plant_objects import plants_of, remove_fields, remove_plants
 from ..tetflora_addon.blender.populations import recount
-from . import ids
 from .base import LINKED, Reporting, counted, in_object_mode
 
 
 class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
     """Delete plants from the scene."""
 
-    bl_idname = ids.REMOVE_PLANTS
+    bl_idname = "tetflora.remove_plants"
     bl_label = "Remove Plants"
     bl_options = {'REGISTER', 'UNDO'}
 
@@ -61,3 +60,6 @@ class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
         recount(context.scene)
         self.report({'INFO'}, f"{counted(number, 'plant')} removed")
         return {'FINISHED'}
+
+
+CLASSES = (TETFLORA_OT_remove_plants,)

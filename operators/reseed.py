@@ -8,14 +8,13 @@ from bpy.props import IntProperty
 from ..tetflora_addon.blender.field_edits import reseed_field
 from ..tetflora_addon.blender.plant_fields import fields_of, stored_size
 from ..tetflora_addon.blender.plant_objects import reseed
-from . import ids
 from .base import Reporting, counted, plants_or_fields_selected, selected_plants
 
 
 class TETFLORA_OT_reseed(Reporting, bpy.types.Operator):
     """Make other individuals of the selected plants."""
 
-    bl_idname = ids.RESEED
+    bl_idname = "tetflora.reseed"
     bl_label = "Re-roll Seeds"
     bl_description = (
         "Turn each selected plant, and each plant of selected fields, into another individual of its species. Copies "
@@ -39,3 +38,6 @@ class TETFLORA_OT_reseed(Reporting, bpy.types.Operator):
             number += stored_size(field)
         self.report({'INFO'}, f"{counted(number, 'plant')} re-rolled")
         return {'FINISHED'}
+
+
+CLASSES = (TETFLORA_OT_reseed,)

@@ -6,14 +6,13 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from ..tetflora_addon.blender.plant_objects import plants_of
-from . import ids
 from .base import Reporting, counted
 
 
 class TETFLORA_OT_select_species(Reporting, bpy.types.Operator):
     """Select all plants of a species."""
 
-    bl_idname = ids.SELECT_SPECIES
+    bl_idname = "tetflora.select_species"
     bl_label = "Select Species"
     bl_description = "Select all plants of the active plant's species"
     bl_options = {'REGISTER', 'UNDO'}
@@ -47,3 +46,6 @@ class TETFLORA_OT_select_species(Reporting, bpy.types.Operator):
             obj.select_set(True)
         self.report({'INFO'}, f'{counted(len(found), "plant")} of species "{self.species}" selected')
         return {'FINISHED'}
+
+
+CLASSES = (TETFLORA_OT_select_species,)

@@ -8,14 +8,13 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from ..tetflora_addon.blender.asset_library import add_to_preferences, write_asset_library
-from . import ids
 from .base import Reporting, counted
 
 
 class TETFLORA_OT_create_asset_library(Reporting, bpy.types.Operator):
     """Write a .blend with a plant of each species, to drag into scenes."""
 
-    bl_idname = ids.CREATE_ASSET_LIBRARY
+    bl_idname = "tetflora.create_asset_library"
     bl_label = "Create Asset Library"
     bl_description = (
         "Write a file with one plant of each species, marked as assets with their pictures, into a folder of your "
@@ -45,3 +44,6 @@ class TETFLORA_OT_create_asset_library(Reporting, bpy.types.Operator):
         more = "; Blender's asset libraries have the folder now" if shown else ""
         self.report({'INFO'}, f"{counted(number, 'plant')} written to {path}{more}")
         return {'FINISHED'}
+
+
+CLASSES = (TETFLORA_OT_create_asset_library,)

@@ -20,7 +20,6 @@ from ..tetflora_addon.blender.species_items import catalogue
 from ..tetflora_addon.blender.species_values import orders_of, present_species
 from ..tetflora_addon.plants.schema import DEFAULT_SPUR
 from ..tetflora_addon.plants.species import MAX_ORDERS
-from . import ids
 from .base import Reporting, counted, selected_plants
 
 
@@ -35,7 +34,7 @@ def species_shown(cls: type[bpy.types.Operator], context: bpy.types.Context) -> 
 class TETFLORA_OT_duplicate_species(Reporting, bpy.types.Operator):
     """Make a new species in this file."""
 
-    bl_idname = ids.DUPLICATE_SPECIES
+    bl_idname = "tetflora.duplicate_species"
     bl_label = "Duplicate as New Species"
     bl_description = "Make a new species of the shown one. It belongs to this file until you save it for all files"
     bl_options = {'REGISTER', 'UNDO'}
@@ -85,7 +84,7 @@ class TETFLORA_OT_duplicate_species(Reporting, bpy.types.Operator):
 class TETFLORA_OT_revert_species(Reporting, bpy.types.Operator):
     """Forget the edits of a species."""
 
-    bl_idname = ids.REVERT_SPECIES
+    bl_idname = "tetflora.revert_species"
     bl_label = "Revert"
     bl_description = (
         "Forget what was changed in this file, and take the catalogue's species again. "
@@ -115,7 +114,7 @@ class TETFLORA_OT_revert_species(Reporting, bpy.types.Operator):
 class TETFLORA_OT_edit_orders(Reporting, bpy.types.Operator):
     """Add an order of branches to the species, or remove the last one."""
 
-    bl_idname = ids.EDIT_ORDERS
+    bl_idname = "tetflora.edit_orders"
     bl_label = "Edit Orders"
     bl_options = {'REGISTER', 'UNDO'}
 
@@ -178,3 +177,6 @@ def _toggle_spur(data: dict) -> None:
 def _remove(data: dict) -> None:
     data["orders"].pop()
     data["orders"][-1]["branches"] = [0, 0]
+
+
+CLASSES = (TETFLORA_OT_duplicate_species, TETFLORA_OT_revert_species, TETFLORA_OT_edit_orders)

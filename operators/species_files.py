@@ -11,7 +11,6 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 from ..tetflora_addon.blender import species_files
 from ..tetflora_addon.blender.species_items import catalogue
 from ..tetflora_addon.blender.species_values import present_species
-from . import ids
 from .base import Reporting
 from .species_edit import species_shown
 
@@ -19,7 +18,7 @@ from .species_edit import species_shown
 class TETFLORA_OT_save_species(Reporting, bpy.types.Operator):
     """Save the shown species for all files."""
 
-    bl_idname = ids.SAVE_SPECIES
+    bl_idname = "tetflora.save_species"
     bl_label = "Save to My Species"
     bl_description = (
         "Save the species into your species folder, for all files. It takes the place of a shipped species of the same "
@@ -40,7 +39,7 @@ class TETFLORA_OT_save_species(Reporting, bpy.types.Operator):
 class TETFLORA_OT_load_species(Reporting, bpy.types.Operator, ImportHelper):
     """Take a species file into the user's own species."""
 
-    bl_idname = ids.LOAD_SPECIES
+    bl_idname = "tetflora.load_species"
     bl_label = "Load Species"
     bl_description = "Copy a species file into your species folder, so that all files have the species"
     bl_options = {'REGISTER', 'UNDO'}
@@ -61,7 +60,7 @@ class TETFLORA_OT_load_species(Reporting, bpy.types.Operator, ImportHelper):
 class TETFLORA_OT_export_species(Reporting, bpy.types.Operator, ExportHelper):
     """Write the shown species to a file of the artist's choice."""
 
-    bl_idname = ids.EXPORT_SPECIES
+    bl_idname = "tetflora.export_species"
     bl_label = "Share Species"
     bl_description = "Write the species to a file, to give it to others. Its file name is the identifier of the species"
     bl_options = {'REGISTER'}
@@ -88,7 +87,7 @@ class TETFLORA_OT_export_species(Reporting, bpy.types.Operator, ExportHelper):
 class TETFLORA_OT_delete_species(Reporting, bpy.types.Operator):
     """Delete a species file of the user's own."""
 
-    bl_idname = ids.DELETE_SPECIES
+    bl_idname = "tetflora.delete_species"
     bl_label = "Delete from My Species"
     bl_description = "Delete the file of the shown species from your species folder. Shipped species stay; no undo"
     bl_options = {'REGISTER'}
@@ -107,3 +106,6 @@ class TETFLORA_OT_delete_species(Reporting, bpy.types.Operator):
         path = species_files.delete_species_file(present_species(context.scene.tetflora.species_editor))
         self.report({'INFO'}, f"{path.name} deleted")
         return {'FINISHED'}
+
+
+CLASSES = (TETFLORA_OT_save_species, TETFLORA_OT_load_species, TETFLORA_OT_export_species, TETFLORA_OT_delete_species)

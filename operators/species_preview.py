@@ -5,7 +5,6 @@
 import bpy
 
 from ..tetflora_addon.blender import species_preview
-from . import ids
 from .base import Reporting
 from .species_edit import species_shown
 
@@ -13,7 +12,7 @@ from .species_edit import species_shown
 class TETFLORA_OT_preview_species(Reporting, bpy.types.Operator):
     """Show one plant of the edited species."""
 
-    bl_idname = ids.PREVIEW_SPECIES
+    bl_idname = "tetflora.preview_species"
     bl_label = "Preview Species"
     bl_description = (
         "Show one plant of the species at the 3D cursor, and follow every change. "
@@ -29,3 +28,6 @@ class TETFLORA_OT_preview_species(Reporting, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> set[str]:
         species_preview.show(context.scene, not species_preview.shown_in(context.scene))
         return {'FINISHED'}
+
+
+CLASSES = (TETFLORA_OT_preview_species,)

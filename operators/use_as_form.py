@@ -11,14 +11,13 @@ from ..tetflora_addon.blender.species_items import catalogue, default_species
 from ..tetflora_addon.blender.species_values import present_species
 from ..tetflora_addon.blender.transforms import world_matrix
 from ..tetflora_addon.planting.places import Placement, new_seeds
-from . import ids
 from .base import Reporting, counted, in_object_mode, select_only, selected_plants
 
 
 class TETFLORA_OT_use_as_form(Reporting, bpy.types.Operator):
     """Make the active curve or mesh of edges the form of the selected plants, or of a new one in its place."""
 
-    bl_idname = ids.USE_AS_FORM
+    bl_idname = "tetflora.use_as_form"
     bl_label = "Make Plant from Form"
     bl_description = (
         "The active curve, hair curves or mesh of edges becomes trunk and limbs of the selected plants, or, where none "
@@ -69,3 +68,6 @@ def _species(scene: bpy.types.Scene) -> str:
     """The species that the editor shows."""
     present = present_species(scene.tetflora.species_editor)
     return present if present in catalogue() else default_species()
+
+
+CLASSES = (TETFLORA_OT_use_as_form,)

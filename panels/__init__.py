@@ -16,6 +16,7 @@ from . import (
     pie_menu,
     plants_panel,
     populate_panel,
+    preferences_page,
     preview_panel,
     refine_panel,
     refinement_panel,
@@ -24,47 +25,34 @@ from . import (
     wind_panel,
 )
 
-CLASSES = (
-    lists.TETFLORA_UL_mix,
-    lists.TETFLORA_UL_leaf_objects,
-    lists.TETFLORA_UL_field_species,
-    lists.TETFLORA_UL_output_species,
-    refine_panel.TETFLORA_PT_refine,
-    first_panel.TETFLORA_PT_first,
-    plants_panel.TETFLORA_PT_plants,
-    plants_panel.TETFLORA_PT_selected_plants,
-    species_panel.TETFLORA_MT_species_files,
-    species_panel.TETFLORA_PT_species,
-    species_panel.TETFLORA_PT_species_orders,
-    species_panel.TETFLORA_PT_species_leaves,
-    species_panel.TETFLORA_PT_species_whole,
-    *populate_panel.CLASSES,
-    brush_panel.TETFLORA_PT_brush,
-    refinement_panel.TETFLORA_PT_refinement,
-    refinement_panel.TETFLORA_PT_films,
-    refinement_panel.TETFLORA_PT_limits,
-    refinement_panel.TETFLORA_PT_proxy_shading,
-    refinement_panel.TETFLORA_PT_leaf_objects,
-    preview_panel.TETFLORA_PT_preview,
-    wind_panel.TETFLORA_PT_wind,
-    output_panel.TETFLORA_PT_output,
-    output_panel.TETFLORA_PT_ray_visibility,
-    output_panel.TETFLORA_PT_passes,
-    statistics_panel.TETFLORA_PT_statistics,
-    statistics_panel.TETFLORA_PT_steps,
-    add_menu.TETFLORA_MT_add_plant,
-    nothing_refined.TETFLORA_MT_nothing_refined,
-    add_menu.TETFLORA_MT_place_plant,
-    plants_panel.TETFLORA_MT_species,
-    object_menu.TETFLORA_MT_object,
-    pie_menu.TETFLORA_MT_pie,
+# In the order of registration: a panel after its parent, and of panels with the same `bl_order` the upper one first.
+_MODULES = (
+    lists,
+    refine_panel,
+    first_panel,
+    plants_panel,
+    species_panel,
+    populate_panel,
+    brush_panel,
+    refinement_panel,
+    preview_panel,
+    wind_panel,
+    output_panel,
+    statistics_panel,
+    add_menu,
+    nothing_refined,
+    object_menu,
+    pie_menu,
 )
+CLASSES = tuple(cls for module in _MODULES for cls in module.CLASSES)
+
+_register, _unregister = bpy.utils.register_classes_factory(CLASSES)
 
 
 def register() -> None:
     """Register panels and menus."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
+    _register()
+    preferences_page.register()
     bpy.types.VIEW3D_MT_add.append(add_menu.draw_in_add_menu)
     bpy.types.VIEW3D_MT_object.append(object_menu.draw_in_object_menu)
     handlers.nothing_refined.append(nothing_refined.open_nothing_refined)
@@ -75,5 +63,5 @@ def unregister() -> None:
     handlers.nothing_refined.remove(nothing_refined.open_nothing_refined)
     bpy.types.VIEW3D_MT_object.remove(object_menu.draw_in_object_menu)
     bpy.types.VIEW3D_MT_add.remove(add_menu.draw_in_add_menu)
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+    preferences_page.unregister()
+    _unregister()

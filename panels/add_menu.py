@@ -4,7 +4,9 @@
 
 import bpy
 
-from ..operators import ids
+from ..operators.add_plant import TETFLORA_OT_add_plant
+from ..operators.first_forest import TETFLORA_OT_first_forest
+from ..operators.place_plant import TETFLORA_OT_place_plant
 from ..tetflora_addon.blender.species_items import catalogue
 from .base import picture
 
@@ -18,7 +20,7 @@ class TETFLORA_MT_add_plant(bpy.types.Menu):
         known = catalogue()
         for info in known.values():
             icon = picture(info.identifier)
-            self.layout.operator(ids.ADD_PLANT, text=info.name, **icon).species = info.identifier
+            self.layout.operator(TETFLORA_OT_add_plant.bl_idname, text=info.name, **icon).species = info.identifier
         if not known:
             self.layout.label(text="The catalogue has no species", icon='ERROR')
 
@@ -33,12 +35,15 @@ class TETFLORA_MT_place_plant(bpy.types.Menu):
         self.layout.operator_context = 'INVOKE_DEFAULT'
         for info in catalogue().values():
             icon = picture(info.identifier)
-            self.layout.operator(ids.PLACE_PLANT, text=info.name, **icon).species = info.identifier
+            self.layout.operator(TETFLORA_OT_place_plant.bl_idname, text=info.name, **icon).species = info.identifier
 
 
 def draw_in_add_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     """The entry in Blender's Add menu."""
     menu.layout.separator()
-    menu.layout.operator(ids.FIRST_FOREST, icon='WORLD')
+    menu.layout.operator(TETFLORA_OT_first_forest.bl_idname, icon='WORLD')
     menu.layout.menu(TETFLORA_MT_place_plant.__name__, icon='RESTRICT_SELECT_OFF')
     menu.layout.menu(TETFLORA_MT_add_plant.__name__, icon='OUTLINER_OB_FORCE_FIELD')
+
+
+CLASSES = (TETFLORA_MT_add_plant, TETFLORA_MT_place_plant)

@@ -4,7 +4,7 @@
 
 import bpy
 
-from ..operators import ids
+from ..operators.paint_plants import TETFLORA_OT_paint_plants
 from ..tetflora_addon.blender.brush_properties import MODES
 from .base import SidebarPanel, split_layout
 
@@ -22,7 +22,9 @@ class TETFLORA_PT_brush(SidebarPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.scale_y = 1.4
         for mode, name, _, icon, _ in MODES:
-            button = row.operator(ids.PAINT_PLANTS, text=name, icon=icon, depress=settings.mode == mode)
+            button = row.operator(
+                TETFLORA_OT_paint_plants.bl_idname, text=name, icon=icon, depress=settings.mode == mode
+            )
             button.mode = mode
         column = layout.column(align=True)
         column.prop(settings, "radius")
@@ -39,3 +41,6 @@ class TETFLORA_PT_brush(SidebarPanel, bpy.types.Panel):
         column = layout.column()
         column.prop(settings, "store")
         column.prop(settings, "seed")
+
+
+CLASSES = (TETFLORA_PT_brush,)

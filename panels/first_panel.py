@@ -4,7 +4,7 @@
 
 import bpy
 
-from ..operators import ids
+from ..operators.first_forest import TETFLORA_OT_first_forest
 from ..tetflora_addon.blender.scene_reader import has_contents
 from .base import SidebarPanel
 
@@ -26,5 +26,8 @@ class TETFLORA_PT_first(SidebarPanel, bpy.types.Panel):
         column = self.layout.column()
         row = column.row()
         row.scale_y = 1.6
-        row.operator(ids.FIRST_FOREST, icon='WORLD')
+        row.operator(TETFLORA_OT_first_forest.bl_idname, icon='WORLD')
         column.label(text="Then Refine, then F12")
+
+
+CLASSES = (TETFLORA_PT_first,)

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import bpy
 
-from ..operators import ids
+from ..operators.edit_list import TETFLORA_OT_edit_list
 
 
 class TETFLORA_UL_mix(bpy.types.UIList):
@@ -66,5 +66,8 @@ def draw_list(
     row.template_list(cls.__name__, "", owner, entries, owner, index, rows=2)
     column = row.column(align=True)
     for icon, action in (('ADD', 'ADD'), ('REMOVE', 'REMOVE')):
-        button = column.operator(ids.EDIT_LIST, text="", icon=icon)
+        button = column.operator(TETFLORA_OT_edit_list.bl_idname, text="", icon=icon)
         button.which, button.action = which, action
+
+
+CLASSES = (TETFLORA_UL_mix, TETFLORA_UL_leaf_objects, TETFLORA_UL_field_species, TETFLORA_UL_output_species)

@@ -4,7 +4,7 @@
 
 import bpy
 
-from ..operators import ids
+from ..operators.refine import TETFLORA_OT_refine
 from ..tetflora_addon.blender.runtime import open_menu
 
 
@@ -16,10 +16,13 @@ class TETFLORA_MT_nothing_refined(bpy.types.Menu):
 
     def draw(self, context: bpy.types.Context) -> None:
         self.layout.label(text="Nothing is refined, and Refine at Render is off", icon='INFO')
-        self.layout.operator(ids.REFINE, icon='MOD_DECIM')
+        self.layout.operator(TETFLORA_OT_refine.bl_idname, icon='MOD_DECIM')
         self.layout.prop(context.scene.tetflora, "refine_at_render")
 
 
 def open_nothing_refined() -> None:
     """Open the menu, where there is a window."""
     open_menu(TETFLORA_MT_nothing_refined.bl_idname)
+
+
+CLASSES = (TETFLORA_MT_nothing_refined,)

@@ -4,7 +4,7 @@
 
 import bpy
 
-from ..operators import ids
+from ..operators.keep_results import TETFLORA_OT_keep_results
 from ..tetflora_addon.blender.plant_objects import plant_collections
 from .base import SidebarPanel, split_layout
 from .lists import TETFLORA_UL_output_species, draw_list
@@ -28,7 +28,7 @@ class TETFLORA_PT_output(SidebarPanel, bpy.types.Panel):
             column = layout.column(heading=collection.name)
             column.prop(collection, "hide_viewport", text="Viewports", toggle=False, invert_checkbox=True)
             column.prop(collection, "hide_render", text="Renders", toggle=False, invert_checkbox=True)
-        layout.operator(ids.KEEP_RESULTS, icon='MESH_DATA')
+        layout.operator(TETFLORA_OT_keep_results.bl_idname, icon='MESH_DATA')
 
 
 class TETFLORA_PT_ray_visibility(SidebarPanel, bpy.types.Panel):
@@ -63,3 +63,6 @@ class TETFLORA_PT_passes(SidebarPanel, bpy.types.Panel):
             layout.prop_search(entry, "light_group", layer, "lightgroups")
             for name in ("leaf", "blossom", "bark"):
                 layout.prop(entry, name, text=name.capitalize())  # the field itself says Material
+
+
+CLASSES = (TETFLORA_PT_output, TETFLORA_PT_ray_visibility, TETFLORA_PT_passes)

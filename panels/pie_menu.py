@@ -4,8 +4,13 @@
 
 import bpy
 
-from ..operators import ids
-from ..tetflora_addon.blender.keymaps import PIE
+from ..operators.clear import TETFLORA_OT_clear
+from ..operators.drop_to_ground import TETFLORA_OT_drop_to_ground
+from ..operators.first_forest import TETFLORA_OT_first_forest
+from ..operators.keymaps import PIE
+from ..operators.paint_plants import TETFLORA_OT_paint_plants
+from ..operators.populate import TETFLORA_OT_populate
+from ..operators.refine import TETFLORA_OT_refine
 
 
 class TETFLORA_MT_pie(bpy.types.Menu):
@@ -17,11 +22,14 @@ class TETFLORA_MT_pie(bpy.types.Menu):
     def draw(self, _context: bpy.types.Context) -> None:
         pie = self.layout.menu_pie()
         # West, east, south, north, north-west, north-east, south-west, south-east: Blender's own order.
-        pie.operator(ids.PAINT_PLANTS, icon='BRUSH_DATA')
-        pie.operator(ids.REFINE, icon='MOD_DECIM')
-        pie.operator(ids.POPULATE, text="Populate with Plants", icon='OUTLINER_OB_POINTCLOUD')
+        pie.operator(TETFLORA_OT_paint_plants.bl_idname, icon='BRUSH_DATA')
+        pie.operator(TETFLORA_OT_refine.bl_idname, icon='MOD_DECIM')
+        pie.operator(TETFLORA_OT_populate.bl_idname, text="Populate with Plants", icon='OUTLINER_OB_POINTCLOUD')
         pie.menu("TETFLORA_MT_place_plant", icon='RESTRICT_SELECT_OFF')
-        pie.operator(ids.DROP_TO_GROUND, icon='TRIA_DOWN_BAR')
-        pie.operator(ids.CLEAR, icon='TRASH')
-        pie.operator(ids.FIRST_FOREST, icon='WORLD')
+        pie.operator(TETFLORA_OT_drop_to_ground.bl_idname, icon='TRIA_DOWN_BAR')
+        pie.operator(TETFLORA_OT_clear.bl_idname, icon='TRASH')
+        pie.operator(TETFLORA_OT_first_forest.bl_idname, icon='WORLD')
         pie.menu("TETFLORA_MT_species", text="Change Species", icon='OUTLINER_OB_EMPTY')
+
+
+CLASSES = (TETFLORA_MT_pie,)

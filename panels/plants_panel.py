@@ -4,7 +4,13 @@
 
 import bpy
 
-from ..operators import ids
+from ..operators.assign_species import TETFLORA_OT_assign_species
+from ..operators.field_plants import TETFLORA_OT_make_field, TETFLORA_OT_mark_field, TETFLORA_OT_split_field
+from ..operators.make_plant_mesh import TETFLORA_OT_make_plant_mesh
+from ..operators.remove_plants import TETFLORA_OT_remove_plants
+from ..operators.reseed import TETFLORA_OT_reseed
+from ..operators.select_species import TETFLORA_OT_select_species
+from ..operators.use_as_form import TETFLORA_OT_use_as_form
 from ..tetflora_addon.blender.plant_copies import has_nodes
 from ..tetflora_addon.blender.plant_fields import FIELD_TYPES, stored_size
 from ..tetflora_addon.blender.plant_form import FORM_TYPES
@@ -21,7 +27,7 @@ class TETFLORA_MT_species(bpy.types.Menu):
     def draw(self, _context: bpy.types.Context) -> None:
         for info in catalogue().values():
             icon = picture(info.identifier)
-            self.layout.operator(ids.ASSIGN_SPECIES, text=info.name, **icon).species = info.identifier
+            self.layout.operator(TETFLORA_OT_assign_species.bl_idname, text=info.name, **icon).species = info.identifier
 
 
 class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
@@ -52,11 +58,11 @@ class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
         # A mesh with faces is ground or something else, as a rule; the Object menu offers these for it too.
         faces = active.type == 'MESH' and len(active.data.polygons) > 0
         if active.type in FORM_TYPES and not faces:
-            layout.operator(ids.USE_AS_FORM, icon='CURVE_DATA')
+            layout.operator(TETFLORA_OT_use_as_form.bl_idname, icon='CURVE_DATA')
         field = active.tetflora.is_field
         if active.type in FIELD_TYPES and (field or not faces or has_nodes(active)):
             layout.operator(
-                ids.MARK_FIELD,
+                TETFLORA_OT_mark_field.bl_idname,
                 text="Field of Plants" if field else "Use as Field of Plants",
                 icon='CHECKMARK' if field else 'POINTCLOUD_DATA',
                 depress=field,
@@ -90,11 +96,16 @@ class TETFLORA_PT_selected_plants(SidebarPanel, bpy.types.Panel):
     def draw(self, _context: bpy.types.Context) -> None:
         column = self.layout.column(align=True)
         column.menu(TETFLORA_MT_species.__name__, text="Change Species", icon='OUTLINER_OB_EMPTY')
-        column.operator(ids.RESEED, icon='FILE_REFRESH')
-        column.operator(ids.SELECT_SPECIES, text="Select All of This Species", icon='RESTRICT_SELECT_OFF')
-        column.operator(ids.MAKE_PLANT_MESH, text="Make Real Meshes", icon='OUTLINER_OB_MESH')
-        column.operator(ids.MAKE_FIELD, icon='POINTCLOUD_DATA')
-        column.operator(ids.SPLIT_FIELD, icon='OUTLINER_OB_EMPTY')
+        column.operator(TETFLORA_OT_reseed.bl_idname, icon='FILE_REFRESH')
+        column.operator(
+            TETFLORA_OT_select_species.bl_idname, text="Select All of This Species", icon='RESTRICT_SELECT_OFF'
+        )
+        column.operator(TETFLORA_OT_make_plant_mesh.bl_idname, text="Make Real Meshes", icon='OUTLINER_OB_MESH')
+        column.operator(TETFLORA_OT_make_field.bl_idname, icon='POINTCLOUD_DATA')
+        column.operator(TETFLORA_OT_split_field.bl_idname, icon='OUTLINER_OB_EMPTY')
         column = self.layout.column(align=True)
-        column.operator(ids.REMOVE_PLANTS, text="Remove Selected", icon='X').which = 'SELECTED'
-        column.operator(ids.REMOVE_PLANTS, text="Remove All Plants", icon='TRASH').which = 'ALL'
+        column.operator(TETFLORA_OT_remove_plants.bl_idname, text="Remove Selected", icon='X').which = 'SELECTED'
+        column.operator(TETFLORA_OT_remove_plants.bl_idname, text="Remove All Plants", icon='TRASH').which = 'ALL'
+
+
+CLASSES = (TETFLORA_MT_species, TETFLORA_PT_plants, TETFLORA_PT_selected_plants)

@@ -4,7 +4,20 @@
 
 import bpy
 
-from ..operators import ids
+from ..operators.mark_occluder import TETFLORA_OT_mark_occluder
+from ..operators.populate import TETFLORA_OT_populate
+from ..operators.population_files import TETFLORA_OT_export_populations, TETFLORA_OT_import_populations
+from ..operators.populations import (
+    TETFLORA_OT_add_population,
+    TETFLORA_OT_forget_erased,
+    TETFLORA_OT_freeze_population,
+    TETFLORA_OT_preview_population,
+    TETFLORA_OT_remove_population,
+    TETFLORA_OT_reroll_population,
+    TETFLORA_OT_select_population,
+    TETFLORA_OT_set_population_ground,
+    TETFLORA_OT_update_population,
+)
 from ..tetflora_addon.blender import point_preview
 from ..tetflora_addon.blender.population_rules import awaits_update, is_outdated, shown_population
 from ..tetflora_addon.blender.species_items import catalogue
@@ -31,12 +44,14 @@ class TETFLORA_MT_populations(bpy.types.Menu):
 
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
-        layout.operator(ids.SELECT_POPULATION, icon='RESTRICT_SELECT_OFF')
-        layout.operator(ids.REMOVE_POPULATION, text="Remove, and Keep Plants", icon='REMOVE').keep_plants = True
-        layout.operator(ids.FORGET_ERASED, icon='LOOP_BACK')
+        layout.operator(TETFLORA_OT_select_population.bl_idname, icon='RESTRICT_SELECT_OFF')
+        layout.operator(
+            TETFLORA_OT_remove_population.bl_idname, text="Remove, and Keep Plants", icon='REMOVE'
+        ).keep_plants = True
+        layout.operator(TETFLORA_OT_forget_erased.bl_idname, icon='LOOP_BACK')
         layout.separator()
-        layout.operator(ids.IMPORT_POPULATIONS, text="Import...", icon='IMPORT')
-        layout.operator(ids.EXPORT_POPULATIONS, text="Export...", icon='EXPORT')
+        layout.operator(TETFLORA_OT_import_populations.bl_idname, text="Import...", icon='IMPORT')
+        layout.operator(TETFLORA_OT_export_populations.bl_idname, text="Export...", icon='EXPORT')
 
 
 class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
@@ -51,11 +66,13 @@ class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
         _draw_populations(layout, group)
         if settings.uid:
             row = layout.row(align=True)
-            row.operator(ids.UPDATE_POPULATION, text="Update", icon='FILE_REFRESH')
-            row.operator(ids.REROLL_POPULATION, text="Re-roll", icon='MOD_NOISE')
-            row.operator(ids.FREEZE_POPULATION, text="Freeze", icon='FREEZE', depress=settings.frozen)
+            row.operator(TETFLORA_OT_update_population.bl_idname, text="Update", icon='FILE_REFRESH')
+            row.operator(TETFLORA_OT_reroll_population.bl_idname, text="Re-roll", icon='MOD_NOISE')
+            row.operator(TETFLORA_OT_freeze_population.bl_idname, text="Freeze", icon='FREEZE', depress=settings.frozen)
         else:
-            layout.operator(ids.POPULATE, text="Populate Selected Meshes", icon='OUTLINER_OB_POINTCLOUD')
+            layout.operator(
+                TETFLORA_OT_populate.bl_idname, text="Populate Selected Meshes", icon='OUTLINER_OB_POINTCLOUD'
+            )
         _draw_status(context, layout, settings)
         column = layout.column()
         column.active = not settings.frozen
@@ -72,7 +89,7 @@ class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
         active = context.active_object
         marked = active is not None and active.tetflora.is_occluder
         layout.operator(
-            ids.MARK_OCCLUDER,
+            TETFLORA_OT_mark_occluder.bl_idname,
             text="Hides Plants" if marked else "Mark as Hiding Plants",
             icon='CHECKMARK' if marked else 'MOD_MASK',
             depress=marked,
@@ -189,9 +206,9 @@ def _draw_populations(layout: bpy.types.UILayout, group: bpy.types.PropertyGroup
         rows=3 if group.populations else 1,
     )
     column = row.column(align=True)
-    column.operator(ids.ADD_POPULATION, text="", icon='ADD')
+    column.operator(TETFLORA_OT_add_population.bl_idname, text="", icon='ADD')
     if group.populations:
-        column.operator(ids.REMOVE_POPULATION, text="", icon='REMOVE')
+        column.operator(TETFLORA_OT_remove_population.bl_idname, text="", icon='REMOVE')
     column.menu(TETFLORA_MT_populations.__name__, text="", icon='DOWNARROW_HLT')
 
 
@@ -203,7 +220,9 @@ def _draw_status(context: bpy.types.Context, layout: bpy.types.UILayout, setting
     # In the place of the other text: a line that comes and goes would move the slider away from under the mouse.
     text = point_preview.status(settings)
     row.label(text=f"Update: {text}" if waiting else text, icon='FILE_REFRESH' if waiting else 'INFO')
-    row.operator(ids.PREVIEW_POPULATION, text="", icon='HIDE_OFF' if shown else 'HIDE_ON', depress=shown)
+    row.operator(
+        TETFLORA_OT_preview_population.bl_idname, text="", icon='HIDE_OFF' if shown else 'HIDE_ON', depress=shown
+    )
     for text in point_preview.complaints(settings):
         draw_message(context, layout, text)
 
@@ -216,7 +235,7 @@ def _draw_grounds(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup)
     left.alignment = 'RIGHT'
     left.label(text="Ground")
     row.label(text=", ".join(names) + (f" and {more:,} more" if more > 0 else "") or "None")
-    layout.operator(ids.SET_POPULATION_GROUND, icon='MESH_GRID')
+    layout.operator(TETFLORA_OT_set_population_ground.bl_idname, icon='MESH_GRID')
     layout.prop(settings, "ground_collection", text="Collection")
 
 

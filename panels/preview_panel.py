@@ -4,7 +4,7 @@
 
 import bpy
 
-from ..operators import ids
+from ..operators.preview_levels import TETFLORA_OT_forget_levels, TETFLORA_OT_look_through, TETFLORA_OT_preview_levels
 from ..tetflora_addon.blender import preview_state
 from .base import SidebarPanel, draw_message, split_layout
 
@@ -28,10 +28,10 @@ class TETFLORA_PT_preview(SidebarPanel, bpy.types.Panel):
             if preview is not None and preview.message:
                 draw_message(context, column, preview.message)
         row = layout.row(align=True)
-        row.operator(ids.PREVIEW_LEVELS, icon='MOD_REMESH')
-        row.operator(ids.FORGET_LEVELS, text="", icon='X')
+        row.operator(TETFLORA_OT_preview_levels.bl_idname, icon='MOD_REMESH')
+        row.operator(TETFLORA_OT_forget_levels.bl_idname, text="", icon='X')
         layout.prop(settings, "freeze")
-        layout.operator(ids.LOOK_THROUGH, icon='VIEW_CAMERA')
+        layout.operator(TETFLORA_OT_look_through.bl_idname, icon='VIEW_CAMERA')
         if preview is None or preview.levels is None:
             return
         column = layout.column()
@@ -46,3 +46,6 @@ class TETFLORA_PT_preview(SidebarPanel, bpy.types.Panel):
         column.prop(settings, "statistics")
         if preview_state.is_outdated(context.scene):
             draw_message(context, layout, "The camera has changed: compute again, or freeze it before it moves")
+
+
+CLASSES = (TETFLORA_PT_preview,)

@@ -4,7 +4,8 @@
 
 import bpy
 
-from ..operators import ids
+from ..operators.clear import TETFLORA_OT_clear
+from ..operators.refine import TETFLORA_OT_refine
 from ..tetflora_addon.blender import auto_refresh
 from ..tetflora_addon.blender.emit import KIND
 from ..tetflora_addon.blender.first_forest import is_first_forest
@@ -23,8 +24,8 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
         layout, settings = self.layout, context.scene.tetflora
         row = layout.row(align=True)
         row.scale_y = 1.4
-        row.operator(ids.REFINE, icon='MOD_DECIM')
-        row.operator(ids.CLEAR, icon='TRASH')
+        row.operator(TETFLORA_OT_refine.bl_idname, icon='MOD_DECIM')
+        row.operator(TETFLORA_OT_clear.bl_idname, icon='TRASH')
         if settings.auto_refine:  # a line of its own also while nothing is done: what comes and goes moves all below
             draw_message(context, layout, auto_refresh.message() or "Refine Automatically is on", 'SORTTIME')
         for error in render_errors()[-1:]:
@@ -46,3 +47,6 @@ def hint(scene: bpy.types.Scene) -> str:
     first = (next(iter(collection.objects), None) for collection in scene.collection.children_recursive)
     kept = any(obj is not None and KIND in obj for obj in first)
     return "" if kept or not has_contents(scene) else "Nothing is refined: renders show no plants"
+
+
+CLASSES = (TETFLORA_PT_refine,)

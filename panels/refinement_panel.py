@@ -112,3 +112,12 @@ class TETFLORA_PT_leaf_objects(SidebarPanel, bpy.types.Panel):
             ("leaf_objects", "leaf_objects_index"),
             'LEAVES',
         )
+
+
+CLASSES = (
+    TETFLORA_PT_refinement,
+    TETFLORA_PT_films,
+    TETFLORA_PT_limits,
+    TETFLORA_PT_proxy_shading,
+    TETFLORA_PT_leaf_objects,
+)

@@ -4,7 +4,15 @@
 
 import bpy
 
-from ..operators import ids
+from ..operators.species_assets import TETFLORA_OT_create_asset_library
+from ..operators.species_edit import TETFLORA_OT_duplicate_species, TETFLORA_OT_edit_orders, TETFLORA_OT_revert_species
+from ..operators.species_files import (
+    TETFLORA_OT_delete_species,
+    TETFLORA_OT_export_species,
+    TETFLORA_OT_load_species,
+    TETFLORA_OT_save_species,
+)
+from ..operators.species_preview import TETFLORA_OT_preview_species
 from ..tetflora_addon.blender import species_preview
 from ..tetflora_addon.blender.species_editor import VARIATION, order_keys
 from ..tetflora_addon.blender.species_edits import find_edit, problem_of
@@ -26,13 +34,13 @@ class TETFLORA_MT_species_files(bpy.types.Menu):
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
         layout.operator_context = 'INVOKE_DEFAULT'
-        layout.operator(ids.SAVE_SPECIES, icon='FILE_TICK')
-        layout.operator(ids.LOAD_SPECIES, icon='IMPORT')
-        layout.operator(ids.EXPORT_SPECIES, icon='EXPORT')
+        layout.operator(TETFLORA_OT_save_species.bl_idname, icon='FILE_TICK')
+        layout.operator(TETFLORA_OT_load_species.bl_idname, icon='IMPORT')
+        layout.operator(TETFLORA_OT_export_species.bl_idname, icon='EXPORT')
         layout.separator()
-        layout.operator(ids.DELETE_SPECIES, icon='TRASH')
+        layout.operator(TETFLORA_OT_delete_species.bl_idname, icon='TRASH')
         layout.separator()
-        layout.operator(ids.CREATE_ASSET_LIBRARY, icon='ASSET_MANAGER')
+        layout.operator(TETFLORA_OT_create_asset_library.bl_idname, icon='ASSET_MANAGER')
 
 
 class TETFLORA_PT_species(SidebarPanel, bpy.types.Panel):
@@ -51,8 +59,8 @@ class TETFLORA_PT_species(SidebarPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.use_property_split = False
         row.prop(editor, "species_choice", text="")
-        row.operator(ids.DUPLICATE_SPECIES, text="", icon='DUPLICATE')
-        row.operator(ids.REVERT_SPECIES, text="", icon='LOOP_BACK')
+        row.operator(TETFLORA_OT_duplicate_species.bl_idname, text="", icon='DUPLICATE')
+        row.operator(TETFLORA_OT_revert_species.bl_idname, text="", icon='LOOP_BACK')
         row.menu(TETFLORA_MT_species_files.__name__, text="", icon='DOWNARROW_HLT')
         if find_edit(scene, identifier) is not None:
             layout.label(text="Edited in this file", icon='GREASEPENCIL')
@@ -63,7 +71,12 @@ class TETFLORA_PT_species(SidebarPanel, bpy.types.Panel):
         shown = species_preview.shown_in(scene)
         row = layout.row(align=True)
         row.use_property_split = False
-        row.operator(ids.PREVIEW_SPECIES, text="Preview", icon='HIDE_OFF' if shown else 'HIDE_ON', depress=shown)
+        row.operator(
+            TETFLORA_OT_preview_species.bl_idname,
+            text="Preview",
+            icon='HIDE_OFF' if shown else 'HIDE_ON',
+            depress=shown,
+        )
         row.prop(editor, "preview_seed")
         text, failed = species_preview.message()
         if shown and text and text != problem:
@@ -116,7 +129,7 @@ class TETFLORA_PT_species_orders(_SpeciesPart, bpy.types.Panel):
         row.column(align=True).prop(editor, "order", expand=True)
         buttons = row.column(align=True)
         for action, icon in (('ADD', 'ADD'), ('REMOVE', 'REMOVE'), ('SPUR', 'OUTLINER_OB_FORCE_FIELD')):
-            buttons.operator(ids.EDIT_ORDERS, text="", icon=icon).action = action
+            buttons.operator(TETFLORA_OT_edit_orders.bl_idname, text="", icon=icon).action = action
         _draw_keys(split_layout(self), editor, leaves=False)
 
 
@@ -149,3 +162,12 @@ def _draw_keys(layout: bpy.types.UILayout, editor: bpy.types.PropertyGroup, leav
             row.prop(editor, name + VARIATION, text="")
         if key.kind == "colour":
             column.separator()
+
+
+CLASSES = (
+    TETFLORA_MT_species_files,
+    TETFLORA_PT_species,
+    TETFLORA_PT_species_whole,
+    TETFLORA_PT_species_orders,
+    TETFLORA_PT_species_leaves,
+)

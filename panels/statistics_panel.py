@@ -87,3 +87,6 @@ class TETFLORA_PT_steps(SidebarPanel, bpy.types.Panel):
         for row in (("Pass", "Tetrahedra", "To divide", "Polygons", "s"), *steps_of(context.scene.tetflora.statistics)):
             for text in row:
                 grid.label(text=text)
+
+
+CLASSES = (TETFLORA_PT_statistics, TETFLORA_PT_steps)

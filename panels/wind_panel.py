@@ -24,3 +24,6 @@ class TETFLORA_PT_wind(SidebarPanel, bpy.types.Panel):
         column.use_property_decorate = True  # they can be animated
         for name in ("speed", "direction", "gusts", "loop"):
             column.prop(wind, name)
+
+
+CLASSES = (TETFLORA_PT_wind,)

@@ -6,7 +6,10 @@ from __future__ import annotations
 
 import importlib.util
 import re
+from operator import attrgetter
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import pytest
 
@@ -26,13 +29,10 @@ HEARD = {
     "Screen Editing",
     "Frames",
 }
-# Operators that need an argument, so that they stand in menus under other names or once for each argument.
-BY_ARGUMENT = {"tetflora.edit_list", "tetflora.edit_orders"}
 
 
 def _ids():
-    ids = session.part("operators.ids")
-    return {name: value for name, value in vars(ids).items() if name.isupper()}
+    return {cls.bl_idname for cls in session.part("operators").CLASSES}
 
 
 def _default_keys():
@@ -51,7 +51,7 @@ def _default_keys():
 def test_keys_are_free_in_blenders_own_keymap():
     taken = {tuple(key[1:]) for key in _default_keys() if key[0] in HEARD}
     assert len(taken) > 100
-    keys = part("keymaps").KEYS
+    keys = session.part("operators.keymaps").KEYS
     assert 1 <= len(keys) <= 4
     assert not [key for key in keys if (key.key, key.ctrl, key.alt, key.shift) in taken]
 
@@ -59,24 +59,23 @@ def test_keys_are_free_in_blenders_own_keymap():
 def test_keys_are_registered_once_and_open_what_is_there():
     import bpy
 
-    keymaps = part("keymaps")
+    keymaps = session.part("operators.keymaps")
     config = bpy.context.window_manager.keyconfigs.addon
     ours = [
-        item
+        (item.idname, getattr(item.properties, "name", ""))
         for item in config.keymaps[keymaps.KEYMAP].keymap_items
         if item.idname.startswith("tetflora.") or getattr(item.properties, "name", "").startswith("TETFLORA_")
     ]
-    assert len(ours) == len(keymaps.KEYS)
-    assert hasattr(bpy.types, keymaps.PIE)
-    known = set(_ids().values()) | {"wm.call_menu_pie"}
-    assert {key.operator for key in keymaps.KEYS} <= known
+    assert sorted(ours) == sorted((key.operator, key.menu) for key in keymaps.KEYS)
+    for operator, menu in ours:
+        assert operator in _ids() or issubclass(getattr(bpy.types, menu), bpy.types.Menu)
 
 
 def test_every_operator_is_registered_and_named():
     import bpy
 
     names = {}
-    for identifier in _ids().values():
+    for identifier in _ids():
         group, name = identifier.split(".")
         rna = getattr(getattr(bpy.ops, group), name).get_rna_type()
         assert rna.name, identifier
@@ -86,11 +85,16 @@ def test_every_operator_is_registered_and_named():
 
 
 def test_new_tools_stand_in_menus_so_that_search_finds_them():
-    source = "".join(
-        (build.ROOT / "panels" / f"{name}.py").read_text(encoding="utf-8") for name in ("add_menu", "object_menu")
-    )
-    for name in ("PAINT_PLANTS", "PLACE_PLANT", "DROP_TO_GROUND", "FIRST_FOREST"):
-        assert f"ids.{name}" in source
+    import bpy
+
+    layout = MagicMock()
+    for name, draw in (("add_menu", "draw_in_add_menu"), ("object_menu", "TETFLORA_MT_object.draw")):
+        attrgetter(draw)(session.part(f"panels.{name}"))(SimpleNamespace(layout=layout), bpy.context)
+    drawn = {call.args[0] for call in layout.operator.call_args_list}
+    menus = {call.args[0] for call in layout.menu.call_args_list}
+    assert {f"tetflora.{name}" for name in ("paint_plants", "drop_to_ground", "first_forest")} <= drawn <= _ids()
+    assert "TETFLORA_MT_place_plant" in menus
+    assert all(hasattr(bpy.types, menu) for menu in menus)
 
 
 def _texts():
@@ -107,20 +111,11 @@ def _texts():
                 found.add(prop.name)
                 if prop.type == 'ENUM':
                     found |= {item.name for item in prop.enum_items}
-    for cls in vars(part("properties")).values():
-        if isinstance(cls, type) and hasattr(cls, "bl_rna"):
-            found |= {p.name for p in cls.bl_rna.properties}
-    groups = (
-        ("preferences", "TetFloraPreferences"),
-        ("brush_properties", "TetFloraBrush"),
-        ("output_properties", "TetFloraOutput"),
-        ("population_properties", "TetFloraMixEntry"),
-    )
-    for module, name in groups:
-        properties = getattr(part(module), name).bl_rna.properties
+    for cls in (*part("properties").CLASSES, part("preferences").TetFloraPreferences):
+        properties = cls.bl_rna.properties
         found |= {p.name for p in properties}
         found |= {item.name for p in properties if p.type == 'ENUM' for item in p.enum_items}
-    for identifier in _ids().values():
+    for identifier in _ids():
         group, name = identifier.split(".")
         found.add(getattr(getattr(bpy.ops, group), name).get_rna_type().name)
     for path in (build.ROOT / "panels").glob("*.py"):

@@ -35,15 +35,13 @@ def _small_forest():
     return tiny_render()
 
 
-def test_identifiers_are_those_of_the_registry(blender):
+def test_every_class_of_operators_is_registered_under_its_own_name(blender):
     import bpy
 
-    ids = session.part("operators.ids")
-    wanted = {value for name, value in vars(ids).items() if name.isupper()}
-    assert wanted == {c.bl_idname for c in session.part("operators").CLASSES}
-    for identifier in wanted:
-        namespace, name = identifier.split(".")
-        assert hasattr(bpy.types, f"{namespace.upper()}_OT_{name}")
+    classes = session.part("operators").CLASSES
+    registered = {name for name in dir(bpy.types) if name.startswith("TETFLORA_OT_")}
+    assert {cls.__name__ for cls in classes} == registered
+    assert all(cls.bl_idname == cls.__name__.replace("TETFLORA_OT_", "tetflora.") for cls in classes)
 
 
 def test_add_plant_stands_at_the_cursor_with_another_seed_each_time():

@@ -7,7 +7,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from devtools import session
 from tests.blender.scenes import add_camera, add_plant, datablocks, depsgraph, errors, part
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -259,4 +258,3 @@ def test_every_setting_has_a_name_of_its_own():
     properties = part("preview_properties").TetFloraPreview.bl_rna.properties
     names = [p.name for p in properties if p.identifier not in {"rna_type", "name"}]
     assert len(names) == len(set(names)) == 8
-    assert session.part("operators.ids").PREVIEW_LEVELS == "tetflora.preview_levels"

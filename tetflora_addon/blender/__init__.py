@@ -7,7 +7,6 @@ from . import (
     auto_refresh,
     command_line,
     handlers,
-    keymaps,
     point_preview,
     preferences,
     preview_job,
@@ -33,7 +32,6 @@ _PARTS = (
     point_preview,
     asset_library,
     command_line,
-    keymaps,
     translations,
 )
 

@@ -117,3 +117,6 @@ class TetFloraBrush(bpy.types.PropertyGroup, SpeciesChoice):
     strokes: IntProperty(
         name="Strokes", description="Strokes painted so far; each has a chance of its own", min=0, options={'HIDDEN'}
     )
+
+
+CLASSES = (TetFloraBrush,)

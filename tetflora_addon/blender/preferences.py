@@ -10,15 +10,12 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from .. import cache_folder
 from ..errors import SpeciesError
-from . import keymaps
 
 # Blender files preferences under the name of the extension's root package, two levels above this one. Only the name
 # is needed; nothing in tetflora_addon imports what lies above it.
 ROOT_PACKAGE = __package__.rsplit(".", 2)[0]
 #: Variable of the environment that names the cache folder for farms, whatever the preferences say; "off" for none.
 CACHE_VARIABLE = "TETFLORA_CACHE"
-#: Operator that empties the cache folder; defined above this package, which knows no operators.
-CLEAR_CACHE = "tetflora.clear_cache"
 
 
 def _use_cache(_preferences: object = None, _context: object = None) -> None:
@@ -80,43 +77,6 @@ class TetFloraPreferences(bpy.types.AddonPreferences):
         default="",
         update=_use_cache,
     )
-
-    def draw(self, context: bpy.types.Context) -> None:
-        """The page in Preferences > Add-ons."""
-        layout = self.layout
-        layout.use_property_split = True
-        layout.prop(self, "species_folder")
-        if self.species_folder and not species_folders():
-            layout.label(text="This folder does not exist", icon='ERROR')
-        layout.prop(self, "new_quality")
-        layout.prop(self, "new_memory")
-        _draw_cache(layout, self)
-        _draw_keys(layout, context)
-
-
-def _draw_cache(layout: bpy.types.UILayout, own: TetFloraPreferences) -> None:
-    column = layout.column()
-    if CACHE_VARIABLE in os.environ:
-        column.label(text=f"{CACHE_VARIABLE} is set: {os.environ[CACHE_VARIABLE]}", icon='INFO')
-    column.prop(own, "use_cache")
-    row = column.row()
-    row.active = own.use_cache
-    row.prop(own, "cache_folder")
-    column.operator(CLEAR_CACHE)
-    if cache_folder.trouble():
-        column.label(text=cache_folder.trouble(), icon='ERROR')
-
-
-def _draw_keys(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Our keys as in Preferences > Keymap, to be changed here."""
-    import rna_keymap_ui  # Blender's own; only there while its interface is
-
-    column = layout.column()
-    column.label(text=f"Keys in {keymaps.KEYMAP}")
-    config = context.window_manager.keyconfigs.user
-    for keymap, item in keymaps.items():
-        column.context_pointer_set("keymap", keymap)
-        rna_keymap_ui.draw_kmi([], config, keymap, item, column, 0)
 
 
 def preferences() -> TetFloraPreferences | None:

@@ -112,5 +112,4 @@ class TetFloraPreview(bpy.types.PropertyGroup):
     )
 
 
-#: Registered by `properties`, with the scene's other groups.
 CLASSES = (TetFloraPreview,)

@@ -15,20 +15,21 @@ from bpy.props import (
 )
 
 from ..refinement.settings import RefinementSettings
-from . import output_properties
-from .brush_properties import TetFloraBrush
+from . import (
+    brush_properties,
+    output_properties,
+    population_properties,
+    preview_properties,
+    species_editor,
+    species_edits,
+    wind_properties,
+)
 from .explicit_objects import PROPERTY as EXPLICIT
 from .film_properties import FilmProperties
 from .plant_form import FORM_TYPES
-from .population_properties import CLASSES as POPULATION_CLASSES
-from .population_properties import TetFloraPopulation
-from .preview_properties import TetFloraPreview
 from .refinement_properties import RefinementProperties
 from .runtime import Listeners
 from .species_choice import SpeciesChoice
-from .species_editor import TetFloraSpeciesEditor
-from .species_edits import TetFloraSpeciesEdit
-from .wind_properties import TetFloraWind
 
 #: Notified with a scene when Refine Automatically is switched on or off there.
 auto_refine_switched = Listeners()
@@ -221,17 +222,17 @@ class TetFloraScene(RefinementProperties, FilmProperties, bpy.types.PropertyGrou
         ),
     )
 
-    populate: PointerProperty(type=TetFloraPopulation)
+    populate: PointerProperty(type=population_properties.TetFloraPopulation)
     populations: CollectionProperty(
         name="Populations",
         description="Plants that were placed together, with the rules by which they can be placed anew",
-        type=TetFloraPopulation,
+        type=population_properties.TetFloraPopulation,
     )
     populations_index: IntProperty(name="Active Population", options={'HIDDEN', 'SKIP_SAVE'})
     output: PointerProperty(type=output_properties.TetFloraOutput)
-    brush: PointerProperty(type=TetFloraBrush)
-    wind: PointerProperty(type=TetFloraWind)
-    preview: PointerProperty(type=TetFloraPreview)
+    brush: PointerProperty(type=brush_properties.TetFloraBrush)
+    wind: PointerProperty(type=wind_properties.TetFloraWind)
+    preview: PointerProperty(type=preview_properties.TetFloraPreview)
     leaf_objects: CollectionProperty(
         name="Leaf Objects",
         description="Meshes of your own in place of a species' leaf",
@@ -241,10 +242,12 @@ class TetFloraScene(RefinementProperties, FilmProperties, bpy.types.PropertyGrou
     species_edits: CollectionProperty(
         name="Species Edits",
         description="Species that are edited in this file, as JSON; they take the place of the catalogue's",
-        type=TetFloraSpeciesEdit,
+        type=species_edits.TetFloraSpeciesEdit,
         options={'HIDDEN'},
     )
-    species_editor: PointerProperty(name="Species Editor", type=TetFloraSpeciesEditor, options={'HIDDEN'})
+    species_editor: PointerProperty(
+        name="Species Editor", type=species_editor.TetFloraSpeciesEditor, options={'HIDDEN'}
+    )
     statistics: StringProperty(
         name="Statistics",
         description="Figures of the last refinement, as JSON",
@@ -252,19 +255,24 @@ class TetFloraScene(RefinementProperties, FilmProperties, bpy.types.PropertyGrou
     )
 
 
+_MODULES = (
+    brush_properties,
+    output_properties,
+    population_properties,
+    preview_properties,
+    species_editor,
+    species_edits,
+    wind_properties,
+)
 CLASSES = (
+    *(cls for module in _MODULES for cls in module.CLASSES),
     TetFloraFieldEntry,
-    TetFloraObject,
-    *POPULATION_CLASSES,
-    TetFloraBrush,
     TetFloraLeafObject,
-    TetFloraPreview,
-    TetFloraSpeciesEdit,
-    TetFloraSpeciesEditor,
-    TetFloraWind,
-    *output_properties.CLASSES,
+    TetFloraObject,
     TetFloraScene,
 )
+
+_register, _unregister = bpy.utils.register_classes_factory(CLASSES)
 
 
 def settings_from(scene: bpy.types.Scene) -> RefinementSettings:
@@ -282,8 +290,7 @@ def leaf_objects(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
 
 def register() -> None:
     """Register the property groups and hang them on Blender's types."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
+    _register()
     bpy.types.Object.tetflora = PointerProperty(type=TetFloraObject, override=_OVERRIDES)
     bpy.types.Scene.tetflora = PointerProperty(type=TetFloraScene)
 
@@ -292,5 +299,4 @@ def unregister() -> None:
     """Take everything back; what is stored in the file stays there."""
     del bpy.types.Scene.tetflora
     del bpy.types.Object.tetflora
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+    _unregister()

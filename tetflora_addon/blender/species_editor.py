@@ -203,3 +203,6 @@ TetFloraSpeciesEditor = type(
         "__module__": __name__,
     },
 )
+
+
+CLASSES = (TetFloraSpeciesEditor,)

@@ -263,3 +263,6 @@ def edited_infos() -> dict[str, SpeciesInfo]:
             name, description = str(data.get("name", edit.identifier)), str(data.get("description", ""))
             found[edit.identifier] = SpeciesInfo(edit.identifier, name, description, Path())
     return found
+
+
+CLASSES = (TetFloraSpeciesEdit,)

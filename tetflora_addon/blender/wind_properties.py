@@ -80,3 +80,6 @@ def wind_of(scene: bpy.types.Scene) -> Wind | None:
     if blurred:
         frame += _MIDDLE[scene.render.motion_blur_position] * scene.render.motion_blur_shutter
     return Wind(group.speed, group.direction, group.gusts, frame / rate, group.loop / rate, blurred)
+
+
+CLASSES = (TetFloraWind,)

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import bpy
 
+from .refine import TETFLORA_OT_refine
+
 KEYMAP = "Object Mode"
 PIE = "TETFLORA_MT_pie"
 
@@ -35,7 +37,7 @@ class Key:
 
 KEYS = (
     Key("wm.call_menu_pie", 'F', alt=True, shift=True, menu=PIE),
-    Key("tetflora.refine", 'F', ctrl=True, alt=True, shift=True),
+    Key(TETFLORA_OT_refine.bl_idname, 'F', ctrl=True, alt=True, shift=True),
 )
 
 _made: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []
