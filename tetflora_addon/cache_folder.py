@@ -97,7 +97,9 @@ def clear() -> int:
             Path(entry).unlink(missing_ok=True)
             number += 1
     except OSError as error:
-        raise TetFloraError(f"The cache folder {_folder} cannot be emptied: {error.strerror}") from None
+        raise TetFloraError(
+            f"Cannot clear the cache folder {_folder}: {error.strerror}. Check its permissions"
+        ) from None
     return number
 
 
@@ -118,7 +120,7 @@ def _read(path: Path, shape: tuple[int, ...]) -> NDArray[np.float64] | None:
 
 
 def _damaged(path: Path) -> None:
-    _warn(f"{path} is damaged or cannot be read; it is made anew")
+    _warn(f"{path} is damaged or unreadable and will be rebuilt")
 
 
 def _write(path: Path, values: NDArray[np.float64]) -> None:
@@ -129,7 +131,7 @@ def _write(path: Path, values: NDArray[np.float64]) -> None:
         write_whole(path, content.getvalue())
         _make_room()
     except OSError as error:
-        _warn(f"the cache folder {path.parent} cannot be written to: {error.strerror}")
+        _warn(f"cannot write to the cache folder {path.parent}: {error.strerror}")
 
 
 def _make_room() -> None:

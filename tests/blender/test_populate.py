@@ -107,7 +107,7 @@ def test_a_full_terrain_takes_no_more_and_says_why():
     placed = _place(count=1000, min_distance=1.0)
     # No gap of a radius of 1 m is left: as many plants as a dense random packing holds, not only a few.
     assert 60 <= len(placed) < 130
-    assert "no room for more at a distance of 1 m" in placed.reason
+    assert "no room for more plants at a Min Distance of 1 m" in placed.reason
     corners = np.stack(np.meshgrid(np.linspace(0, 10, 41), np.linspace(0, 10, 41)), axis=-1).reshape(-1, 2)
     gaps = np.linalg.norm(corners[:, None] - placed.position[None, :, :2], axis=-1).min(axis=1)
     assert gaps.max() < 1.35
@@ -128,9 +128,9 @@ def test_ground_far_away_and_tiny_distances_work():
 
 def test_no_ground_is_an_error():
     wall = SQUARE[..., [0, 2, 1]]
-    with pytest.raises(errors().SceneError, match="slope limit of 57°"):
+    with pytest.raises(errors().SceneError, match="flatter than Slope To"):
         _place(wall)
-    with pytest.raises(errors().SceneError, match="share above 0"):
+    with pytest.raises(errors().SceneError, match="weight above 0"):
         _place(shares=(0.0,))
 
 
@@ -190,7 +190,7 @@ def test_populate_twice_leaves_the_first_plants_their_room():
     [
         (dict(species="quercus"), 'Unknown species "quercus"'),
         (dict(species="bush:many"), "no species with a share"),
-        (dict(species="bush:0"), "share above 0"),
+        (dict(species="bush:0"), "weight above 0"),
     ],
 )
 def test_bad_arguments_change_nothing(options, says):

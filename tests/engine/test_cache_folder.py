@@ -180,7 +180,7 @@ def test_a_folder_that_cannot_be_emptied_is_named(folder: Path, monkeypatch: pyt
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(Path, "unlink", refused)
-    with pytest.raises(TetFloraError, match=r"cache.*cannot be emptied: Permission denied"):
+    with pytest.raises(TetFloraError, match=r"Cannot clear .*cache: Permission denied"):
         cache_folder.clear()
 
 

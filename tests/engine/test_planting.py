@@ -366,20 +366,20 @@ def test_the_border_is_where_the_ground_ends():
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
-        (dict(shares=(0.0, -1.0)), "share above 0"),
-        (dict(slope_min=0.8, slope_max=0.2), "least slope"),
-        (dict(altitude_min=3.0, altitude_max=1.0), "lowest altitude, 3 m, is above"),
-        (dict(altitude_min=30.0), "altitudes 30 and inf m: it reaches from"),
-        (dict(slope_max=0.0), "flatter than the slope limit of 0°"),
-        (dict(slope_min=1.55), "between the slopes 89° and 90°"),
+        (dict(shares=(0.0, -1.0)), "weight above 0"),
+        (dict(slope_min=0.8, slope_max=0.2), "Slope From .* is greater"),
+        (dict(altitude_min=3.0, altitude_max=1.0), "Altitude From .3 m. is greater"),
+        (dict(altitude_min=30.0), "altitudes 30 and inf m; the ground extends from"),
+        (dict(slope_max=0.0), r"flatter than Slope To \(0°\)"),
+        (dict(slope_min=1.55), "slope between 89° and 90°"),
         (dict(aspect_spread=0.0, aspect=0.123), "No slope faces within 0° of 7°"),
-        (dict(count=0), "at least one"),
-        (dict(by_density=True, density=0.0), "density is 0"),
-        (dict(min_distance=float("nan")), "least distance is nan"),
-        (dict(by_density=True, density=1e9), "lower the density"),
-        (dict(clumping=1.0, clump_size=0.0), "Clumps of 0 m"),
-        (dict(companions=(Companion(0, 7, 1.0, 1.0),)), "names species 1 and 8 of 1"),
-        (dict(scale_min=0.0), "without a size"),
+        (dict(count=0), "Count must be at least 1, not 0"),
+        (dict(by_density=True, density=0.0), "Density must be greater than 0"),
+        (dict(min_distance=float("nan")), "Min Distance must be 0 or greater, not nan"),
+        (dict(by_density=True, density=1e9), "Lower the density"),
+        (dict(clumping=1.0, clump_size=0.0), "Clump Size must be greater than 0, not 0 m"),
+        (dict(companions=(Companion(0, 7, 1.0, 1.0),)), "refers to species 1 and 8, but the list has 1"),
+        (dict(scale_min=0.0), "Scale must be greater than 0"),
     ],
 )
 def test_rules_that_cannot_be_are_refused_by_name(changes, says):
@@ -396,22 +396,25 @@ def test_ground_that_cannot_be_is_refused_by_name():
         Ground(SQUARE[:0])
     with pytest.raises(SceneError, match="vertex group has no weight"):
         place(Ground(SQUARE, weight=np.zeros((2, 3))), Rules())
-    with pytest.raises(SceneError, match="inside of the areas' curves"):
+    with pytest.raises(SceneError, match="inside the Areas curves"):
         place(Ground(SQUARE, areas=(SQUARE[0, :, :2] + 50.0,)), Rules())
     with pytest.raises(SceneError, match="image is black"):
         place(Ground(SQUARE, uv=SQUARE[..., :2], image=np.zeros((4, 4), np.float32)), Rules())
-    with pytest.raises(SceneError, match="paths leave hardly any"):
+    with pytest.raises(SceneError, match="Paths curves leave almost no ground"):
         place(Ground(SQUARE, paths=(Path(np.array([[5.0, 5.0]]), 50.0),)), Rules())
 
 
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
-        (dict(count=1000, min_distance=1.0), "no room for more at a distance of 1 m"),
-        (dict(by_density=True, density=20.0, min_distance=1.0), "no room for more at a distance of 1 m"),
+        (dict(count=1000, min_distance=1.0), "no room for more plants at a Min Distance of 1 m"),
+        (dict(by_density=True, density=20.0, min_distance=1.0), "no room for more plants at a Min Distance of 1 m"),
         (dict(by_density=True, density=1e-4), "less than one"),
-        (dict(count=5000, shares=(1.0, 1.0), companions=(Companion(0, 0, -1.0, 1.0),)), "companions leave no room"),
-        (dict(shares=(1.0, 0.0), companions=(Companion(0, 1, 1.0, 1.0),)), "companions leave no room"),
+        (
+            dict(count=5000, shares=(1.0, 1.0), companions=(Companion(0, 0, -1.0, 1.0),)),
+            "companion rules leave no room",
+        ),
+        (dict(shares=(1.0, 0.0), companions=(Companion(0, 1, 1.0, 1.0),)), "companion rules leave no room"),
     ],
 )
 def test_fewer_plants_come_with_a_reason(changes, says):

@@ -160,5 +160,5 @@ def test_what_a_quality_may_be(quality: float) -> None:
 
 
 def test_what_cannot_be_reached_is_said() -> None:
-    with pytest.raises(SpeciesError, match=r"at most 2e\+07 are allowed; lower the quality"):
+    with pytest.raises(SpeciesError, match=r"the limit is 2e\+07; lower the quality"):
         with_quality(kind("oak"), QUALITY_LIMITS[1])

@@ -117,8 +117,8 @@ SPECIES_MISTAKES: list[tuple[str, Any, str]] = [
     ("format", 2, "must be 1"),
     ("format", True, "must be 1"),
     ("name", "  ", "1 to 1000"),
-    ("name", 5, "text"),
-    ("description", ["a"], "text"),
+    ("name", 5, "string"),
+    ("description", ["a"], "string"),
     ("colour", 1, "unknown key"),
     ("Barks", "ridged", 'did you mean "bark"?'),
     ("orders", [], f"1 to {MAX_ORDERS}"),
@@ -160,7 +160,7 @@ def test_mistakes_in_a_species(key: str, value: Any, part: str) -> None:
 def test_missing_keys(key: str) -> None:
     data = support.small()
     del data[key]
-    assert refusal(data) == f"oak.json: {key}: missing"
+    assert refusal(data) == f"oak.json: {key}: missing; add this key"
 
 
 @pytest.mark.parametrize("data", [None, [], 3, "species", [[[]]]])
@@ -177,7 +177,7 @@ def test_too_many_polygons_are_refused() -> None:
     data = support.small(order0=many, order1=many, order2={"leaves": [10_000, 0]})  # 9 × 10⁸ leaves
     message = refusal(data)
     assert "polygons" in message
-    assert "at most" in message
+    assert "the limit is" in message
 
 
 SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
@@ -253,7 +253,7 @@ def test_crown_shapes_are_ratios() -> None:
         (b"", "JSON"),
         (b"{", "JSON"),
         (b'{"format": 1,}', "JSON"),
-        (b"\xff\xfe{}", "JSON: not text in UTF-8"),
+        (b"\xff\xfe{}", "JSON: not UTF-8 text"),
         (b"[" * 100_000, "JSON"),
         (b"1" * 5000, "JSON"),
         (b"[1]", "object"),
@@ -275,7 +275,7 @@ def test_a_key_twice_in_one_object_is_told(tmp_path: Path) -> None:
     text = json.dumps(support.small()).replace('"branches": ', '"branches": [9, 0], "branches": ', 1)
     path = tmp_path / "twice.json"
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(SpeciesError, match=r"twice\.json: branches: is there twice"):
+    with pytest.raises(SpeciesError, match=r"twice\.json: branches: duplicate key"):
         read_species(path)
 
 

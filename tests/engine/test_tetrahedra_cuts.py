@@ -193,5 +193,5 @@ def test_known_cuts():
 def test_nothing_to_cut_and_shapes_that_do_not_fit():
     nothing = cut_tetrahedra(np.zeros((0, 4, 3)), np.zeros((0, 4)))
     assert nothing.vertices.shape == (0, 4, 3) and nothing.owner.shape == (0,)
-    with pytest.raises(ValueError, match="one plane each"):
+    with pytest.raises(ValueError, match="must have shapes"):
         cut_tetrahedra(CORNER[None], np.zeros((2, 4)))

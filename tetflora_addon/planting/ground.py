@@ -73,15 +73,15 @@ class Ground:
         broken = int((~np.isfinite(self.triangles).all(axis=(1, 2))).sum())
         if broken:
             raise SceneError(
-                f"{broken:,} of {count:,} triangles of the ground have corners that are no finite numbers; "
+                f"{broken:,} of {count:,} triangles of the ground have corners that are not finite numbers; "
                 "check its transform, modifiers and drivers, or run Mesh > Clean Up > Degenerate Dissolve"
             )
         if self.weight is not None and np.shape(self.weight) != (count, 3):
-            raise ValueError(f"weight of shape {np.shape(self.weight)} for {count} triangles")
+            raise ValueError(f"weight has shape {np.shape(self.weight)}, expected ({count}, 3)")
         if (self.uv is None) != (self.image is None):
-            raise ValueError("an image needs uv, and uv an image")
+            raise ValueError("image and uv must be given together")
         if self.uv is not None and np.shape(self.uv) != (count, 3, 2):
-            raise ValueError(f"uv of shape {np.shape(self.uv)} for {count} triangles")
+            raise ValueError(f"uv has shape {np.shape(self.uv)}, expected ({count}, 3, 2)")
 
 
 def border_of(triangles: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -201,8 +201,8 @@ class _Sowing:
             expected = self.rules.density * self.site.area * part
             if expected > MOST:
                 raise SceneError(
-                    f"{self.rules.density:.3g} plants for each square metre are {expected:,.0f} on this ground, and "
-                    f"{MOST:,} are the most; lower the density"
+                    f"A density of {self.rules.density:.3g} plants per m² makes {expected:,.0f} plants on this ground; "
+                    f"the limit is {MOST:,}. Lower the density"
                 )
             # What is left of a whole plant comes by chance.
             places = int(expected + uniform(key, Draw.SUITABLE))
@@ -269,14 +269,14 @@ class _Sowing:
         rules = self.rules
         if not self.drawn:
             return (
-                f"{rules.density:.3g} plants for each square metre are less than one on {self.site.area:.3g} m²; "
-                "raise the density or take a larger surface"
+                f"a density of {rules.density:.3g} plants per m² makes less than one plant on {self.site.area:.3g} m²; "
+                "raise the density or use a larger surface"
             )
         if kept and kept >= self.wanted:
             return ""
         worst = max(self.lost, key=self.lost.__getitem__)
         if not self.suitable and self.drawn > 10_000:
-            raise SceneError(f"No plant finds a place: {REMEDIES[worst]}")
+            raise SceneError(f"No plants could be placed: {REMEDIES[worst]}")
         shares = {
             "suitable": self.suitable / self.drawn,
             "companions": 1.0 - self.refused["companions"] / max(self.suitable, 1),
@@ -287,13 +287,13 @@ class _Sowing:
         least = min(shares, key=shares.__getitem__)
         if least == "distance":
             return (
-                f"no room for more at a distance of {rules.min_distance:.3g} m; "
-                "lower the distance or take a larger surface"
+                f"no room for more plants at a Min Distance of {rules.min_distance:.3g} m; "
+                "lower Min Distance or use a larger surface"
             )
         if least == "companions":
             return (
-                "companions leave no room for more; soften their strength, or change their distance: "
-                "longer where species seek others, shorter where they shun them"
+                "companion rules leave no room for more plants; bring Attraction closer to 0, or change Reach: "
+                "raise it where species attract each other, lower it where they repel"
             )
         return REMEDIES[worst]
 

@@ -43,13 +43,13 @@ class Draw(IntEnum):
 
 #: Why a place was not suitable, and what to do, in the order in which rules are asked.
 REMEDIES = {
-    "weight": "the vertex group leaves hardly any of the ground; paint more weight, or invert or clear the group",
-    "image": "the image is black on nearly all of the ground; paint it brighter, or invert or clear it",
-    "altitude": "hardly any ground lies between the lowest and the highest altitude; widen them or lower their falloff",
-    "areas": "the curves of the areas hold hardly any suitable ground; draw them larger, or clear the areas",
-    "paths": "the paths leave hardly any ground free; lower their distance, or clear the paths",
-    "edge": "all ground is near its border; lower the edge falloff",
-    "clumping": "clumping leaves too little ground; lower it, or take larger or smaller clumps",
+    "weight": "the vertex group leaves almost no ground; paint more weight, or invert or clear the vertex group",
+    "image": "the image is black on almost all of the ground; paint it brighter, or invert or clear it",
+    "altitude": "almost no ground lies between Altitude From and To; widen the range or lower Altitude Falloff",
+    "areas": "the Areas curves contain almost no suitable ground; enlarge them, or clear Areas",
+    "paths": "the Paths curves leave almost no ground; lower Path Distance, or clear Paths",
+    "edge": "all ground is close to the border; lower Edge Falloff",
+    "clumping": "clumping leaves too little ground; lower Clumping, or change Clump Size",
 }
 
 
@@ -96,15 +96,14 @@ class Site:
             triangles, normal, chosen, weight = _kept(weight.max(axis=1) > 0.0, triangles, normal, chosen, weight)
             if not len(chosen):
                 raise SceneError(
-                    "The vertex group has no weight on ground of the right slope; paint some, invert it or clear it"
+                    "The vertex group has no weight within the slope limits; paint some, or invert or clear it"
                 )
         low, high = triangles[..., 2].min(axis=1), triangles[..., 2].max(axis=1)
         at_altitude = (high >= rules.altitude_min) & (low <= rules.altitude_max)
         if not at_altitude.any():
             raise SceneError(
-                f"No suitable ground lies between the altitudes {rules.altitude_min:.5g} and "
-                f"{rules.altitude_max:.5g} m: it reaches from {low.min():.5g} to {high.max():.5g} m; widen the lowest "
-                "and the highest altitude"
+                f"No suitable ground lies between altitudes {rules.altitude_min:.5g} and {rules.altitude_max:.5g} m; "
+                f"the ground extends from {low.min():.5g} to {high.max():.5g} m. Change Altitude From and To"
             )
         self.lowest = max(float(low[at_altitude].min()), rules.altitude_min)
         self.highest = min(float(high[at_altitude].max()), rules.altitude_max)
@@ -114,16 +113,14 @@ class Site:
             source, triangles, weight, uv = _near_areas(ground.areas, triangles, weight, uv)
             normal = normal[source]
             if not len(source):
-                raise SceneError(
-                    "No suitable ground lies inside of the areas' curves; draw them over it, or clear the areas"
-                )
+                raise SceneError("No suitable ground lies inside the Areas curves; move them over it, or clear Areas")
         self.triangles, self.weight, self.uv = triangles, weight, uv
         self.normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
         self.most = np.ones(len(triangles)) if weight is None else weight.max(axis=1)
         area = 0.5 * np.linalg.norm(_map_cross(triangles), axis=1) if ground.areas else 0.5 * np.abs(normal[:, 2])
         self.cumulative = np.cumsum(area * self.most if weight is not None else area)
         if not self.cumulative[-1] > 0.0:
-            raise SceneError("The suitable ground has no area on the map; take ground that does not stand upright")
+            raise SceneError("The suitable ground is vertical and has no area seen from above; select another mesh")
         self.border = None
         if rules.edge_falloff > NO_DISTANCE:
             border = (border_of(ground.triangles) if ground.border is None else ground.border)[..., :2]
@@ -228,15 +225,15 @@ def _by_inclination(triangles: NDArray[np.float64], rules: Rules) -> tuple[NDArr
     flat = (length > 0.0) & (upright > 0.0) & (upright >= length * (np.cos(rules.slope_max) - _ROUNDING))
     if not flat.any():
         raise SceneError(
-            f"The surface has no face flatter than the slope limit of {np.degrees(rules.slope_max):.0f}°; raise "
-            "Slope To or select another mesh"
+            f"No face of the ground is flatter than Slope To ({np.degrees(rules.slope_max):.0f}°); "
+            "raise Slope To or select another mesh"
         )
     if rules.slope_min > 0.0:
         flat &= upright <= length * (np.cos(rules.slope_min) + _ROUNDING)
         if not flat.any():
             raise SceneError(
-                f"The surface has no face between the slopes {np.degrees(rules.slope_min):.0f}° and "
-                f"{np.degrees(rules.slope_max):.0f}°; lower the least slope, Slope From, or raise Slope To"
+                f"No face of the ground has a slope between {np.degrees(rules.slope_min):.0f}° and "
+                f"{np.degrees(rules.slope_max):.0f}°; lower Slope From or raise Slope To"
             )
     if rules.aspect_spread < np.pi:
         away = np.abs((np.arctan2(normal[:, 0], normal[:, 1]) - rules.aspect + np.pi) % (2.0 * np.pi) - np.pi)
@@ -245,7 +242,7 @@ def _by_inclination(triangles: NDArray[np.float64], rules: Rules) -> tuple[NDArr
         if not flat.any():
             raise SceneError(
                 f"No slope faces within {np.degrees(rules.aspect_spread):.0f}° of {np.degrees(rules.aspect):.0f}° "
-                "(clockwise from north, +Y); widen the spread of the aspect or turn it"
+                "(clockwise from north, +Y); raise Facing Spread or change Facing"
             )
     chosen = np.flatnonzero(flat)
     return triangles[chosen], normal[chosen], chosen

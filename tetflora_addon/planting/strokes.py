@@ -120,7 +120,7 @@ def paint(
         `too_many` cells.
     """
     if too_many(brush):
-        raise ValueError(f"more than {MOST_CELLS} cells under the brush")
+        raise ValueError(f"the brush covers more than {MOST_CELLS:,} cells; lower its radius")
     side = cell_size(brush.density)
     middle = np.asarray(centre, float)[:2]
     first, last = (np.floor((middle + sign * brush.radius) / side).astype(np.int64) for sign in (-1.0, 1.0))

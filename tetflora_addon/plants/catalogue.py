@@ -34,11 +34,11 @@ def builtin_folder() -> Path:
 def _info(path: Path, stamp: tuple[int, int]) -> SpeciesInfo:
     try:
         if stamp[1] > MAX_FILE_BYTES:
-            raise ValueError("too large to read only for a menu")
+            raise ValueError("larger than menus read")
         data = json.loads(path.read_text(encoding="utf-8-sig"))
         name, description = str(data.get("name", path.stem)), str(data.get("description", ""))
     except (OSError, ValueError, AttributeError, RecursionError):
-        name, description = path.stem, "This file cannot be read; choosing the species tells why"
+        name, description = path.stem, "This file cannot be read; choose the species to see why"
     return SpeciesInfo(path.stem, name, description, path)
 
 
@@ -90,6 +90,6 @@ def load_species(
     """
     known = list_species(folders) if known is None else known
     if identifier not in known:
-        raise SpeciesError(f"Unknown species \"{identifier}\"; the catalogue has {', '.join(known) or 'none'}")
+        raise SpeciesError(f"Unknown species \"{identifier}\"; available: {', '.join(known) or 'none'}")
     path = known[identifier].path
     return _species(path, _stamp(path))

@@ -210,7 +210,7 @@ def _compiled(species: tuple[Species, ...]) -> Flora:
         for kind, name in enumerate(LEAF_KINDS):
             for form in one.forms(kind):
                 if not isinstance(form, LeafModel):
-                    raise SpeciesError(f'{one.identifier}: the {name} object "{form}" has not been resolved to a mesh')
+                    raise SpeciesError(f'{one.identifier}: the {name} object "{form}" was not replaced with a mesh')
     rows = build_rows(species)
     forms = tuple(tuple(one.forms(kind) for kind in range(len(LEAF_KINDS))) for one in species)
     leaf = row_leaves(rows, forms, np.array([[one.leaf_transmission, one.blossom_transmission] for one in species]))

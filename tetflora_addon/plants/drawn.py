@@ -58,8 +58,8 @@ def drawn_lines(branches: DrawnBranches) -> DrawnLines:
     number = len(branches)
     if number > MAX_DRAWN:
         raise SpeciesError(
-            f"The form has {number:,} branches, at most {MAX_DRAWN:,} can be drawn by hand; "
-            "leave the thinnest away, the computer grows them"
+            f"The form has {number:,} branches, the limit is {MAX_DRAWN:,}; "
+            "remove the thinnest ones, the species grows them"
         )
     segments = np.clip(_FINER * (np.diff(branches.first) - 1), 1, MAX_SEGMENTS)
     # Fractions of the length at which knots lie, one row a branch; the last one is repeated.

@@ -134,18 +134,22 @@ def leaf_model(positions: ArrayLike, faces: list[list[int]], uv: ArrayLike | Non
         raise SpeciesError(f"leaf model: vertices must be finite, each coordinate within ±{MAX_COORDINATE:g}")
     sizes = [len(f) for f in faces]
     if not 1 <= len(faces) <= MAX_LEAF_POLYGONS or min(sizes) < 3:
-        raise SpeciesError(f"leaf model: needs 1 to {MAX_LEAF_POLYGONS} faces of 3 or more vertices, has {len(faces)}")
+        raise SpeciesError(
+            f"leaf model: must have 1 to {MAX_LEAF_POLYGONS} faces of 3 or more vertices, has {len(faces)}"
+        )
     if max(sum(sizes), len(positions)) > MAX_LEAF_CORNERS:
-        raise SpeciesError(f"leaf model: at most {MAX_LEAF_CORNERS} vertices and corners of faces are allowed")
+        raise SpeciesError(f"leaf model: must have at most {MAX_LEAF_CORNERS} vertices and face corners")
     named = [v for f in faces for v in f]
     if wrong := [v for v in named if not 0 <= v < len(positions)]:
-        raise SpeciesError(f"leaf model: faces name vertex {wrong[0]}, but there are {len(positions)}, counted from 0")
+        raise SpeciesError(
+            f"leaf model: faces refer to vertex {wrong[0]}, but the vertices are 0 to {len(positions) - 1}"
+        )
     if any(len(set(f)) < len(f) for f in faces):
-        raise SpeciesError("leaf model: a face names a vertex twice")
+        raise SpeciesError("leaf model: a face uses a vertex twice")
     offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int32)
     by_vertex = np.asarray(uv, dtype=np.float64) if uv is not None else positions[:, :2] + [0.5, 0.0]
     if by_vertex.shape != (len(positions), 2) or not (np.abs(by_vertex) <= MAX_UV).all():
-        raise SpeciesError(f"leaf model: uv must hold one [u, v] within ±{MAX_UV:g} for each vertex")
+        raise SpeciesError(f"leaf model: uv must have one [u, v] within ±{MAX_UV:g} for each vertex")
     used, corners = np.unique(np.array(named, dtype=np.int32), return_inverse=True)
     corners = corners.reshape(-1).astype(np.int32)
     model = LeafModel(positions[used], corners, offsets, by_vertex[used][corners].astype(np.float32))

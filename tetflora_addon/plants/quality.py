@@ -70,14 +70,14 @@ def with_quality(species: Species, quality: float) -> Species:
     """
     low, high = QUALITY_LIMITS
     if not low <= quality <= high:  # false for NaN as well
-        raise SpeciesError(f"{species.identifier}: quality must be from {low:g} to {high:g}, is {quality:g}")
+        raise SpeciesError(f"{species.identifier}: quality must be from {low:g} to {high:g}, not {quality:g}")
     if quality == 1:
         return species
     target = quality * expected_polygons(species)
     if target > MAX_POLYGONS:
         raise SpeciesError(
-            f"{species.identifier}: at quality {quality:g} one plant would have {target:.3g} polygons,"
-            f" at most {MAX_POLYGONS:.0g} are allowed; lower the quality"
+            f"{species.identifier}: at quality {quality:g} one plant would have {target:.3g} polygons, "
+            f"the limit is {MAX_POLYGONS:.0g}; lower the quality"
         )
 
     # Sides and segments as real numbers make the count continuous; once they are whole, members make up for it.

@@ -55,67 +55,74 @@ class Key:
 
 
 ORDER_KEYS: dict[str, Key] = {
-    "length": Key("range", 0.001, 200, None, "m for the trunk, else of the parent's length", "length of a branch"),
-    "thickness": Key(
-        "range", 0.001, 1, None, "of the length for the trunk, else of the parent's radius", "radius at the base"
+    "length": Key(
+        "range", 0.001, 200, None, "m for the trunk, otherwise fraction of the parent's length", "length of a branch"
     ),
-    "taper": Key("range", 0, 1, [0.3, 0], "of the radius at the base", "radius at the tip"),
-    "flare": Key("number", 0, 4, 0.0, "of the radius", "how much thicker the very base is"),
+    "thickness": Key(
+        "range", 0.001, 1, None, "fraction of the trunk's length, or of the parent's radius", "radius at the base"
+    ),
+    "taper": Key("range", 0, 1, [0.3, 0], "fraction of the base radius", "radius at the tip"),
+    "flare": Key("number", 0, 4, 0.0, "fraction of the radius", "extra thickness at the very base"),
     "pipe": Key(
         "number",
         0,
         4,
         0.0,
         "",
-        "exponent of the pipe model by which radii are shared out among the children (2: Leonardo's rule; less than 1 "
-        "counts as 1); 0: each child's thickness is a share of its parent's at that place",
+        "exponent of the pipe model, which divides the radius of a branch among its children (2 is Leonardo's rule; "
+        "values below 1 count as 1); 0 makes the thickness of a child a fraction of the parent's radius there",
     ),
-    "segments": Key("integer", 1, 32, 1, "", "straight pieces along a branch"),
+    "segments": Key("integer", 1, 32, 1, "", "straight segments along a branch"),
     "sides": Key("integer", 3, 64, 4, "", "faces around a branch"),
-    "curvature": Key("range", -360, 360, [0, 0], "degrees", "bend over the length, positive towards the parent"),
+    "curvature": Key("range", -360, 360, [0, 0], "degrees", "bend along the length; positive bends towards the parent"),
     "curvature_tip": Key(
-        "number", -360, 360, math.nan, "degrees", "the same as the outer half of a branch has it (default: no change)"
+        "number", -360, 360, math.nan, "degrees", "bend of the outer half of the branch (default: same as curvature)"
     ),
     "attraction": Key(
-        "range", -360, 360, [0, 0], "degrees", "turn towards the sky over the length, where level; negative: down"
+        "range", -360, 360, [0, 0], "degrees", "turn of a level branch towards the sky; negative turns down"
     ),
-    "angle": Key("range", 0, 180, [0, 0], "degrees", "from the parent's direction, at the parent's base"),
-    "angle_tip": Key("number", 0, 180, math.nan, "degrees", "the same at the parent's tip (default: as at the base)"),
-    "azimuth": Key("range", -360, 360, [137.5, 10], "degrees", "around the parent from one branch to the next"),
-    "spray": Key("number", 0, 1, 0.0, "", "how far branches leave their parent level, left and right of it"),
-    "whorl": Key("integer", 1, 12, 1, "", "branches at one place: 1 alternate, 2 opposite, more a whorl"),
-    "branches": Key("range", 0, 10_000, [0, 0], "", "branches of the next order on one branch"),
-    "branch_start": Key("range", 0, 0.99, [0.1, 0], "of the length", "part of the branch that is bare of branches"),
-    "crown": Key("shape", 0, 0, "cylindrical", "", "how the children's length varies along the branch"),
+    "angle": Key("range", 0, 180, [0, 0], "degrees", "angle between branch and parent, at the parent's base"),
+    "angle_tip": Key("number", 0, 180, math.nan, "degrees", "the same at the parent's tip (default: same as angle)"),
+    "azimuth": Key("range", -360, 360, [137.5, 10], "degrees", "rotation around the parent between branches"),
+    "spray": Key("number", 0, 1, 0.0, "", "how strongly branches spread horizontally to both sides of their parent"),
+    "whorl": Key("integer", 1, 12, 1, "", "branches at each node: 1 alternate, 2 opposite, 3 or more a whorl"),
+    "branches": Key("range", 0, 10_000, [0, 0], "", "number of branches of the next order on each branch"),
+    "branch_start": Key("range", 0, 0.99, [0.1, 0], "fraction of the length", "part at the base without branches"),
+    "crown": Key("shape", 0, 0, "cylindrical", "", "how the length of child branches varies along the branch"),
     "count_by_length": Key(
         "number",
         0,
         1,
         0.0,
         "",
-        "how far branches and leaves are fewer on shorter branches: 0 not at all, 1 in proportion",
+        "how much the number of branches and leaves decreases on shorter branches: 0 not at all, 1 in proportion",
     ),
-    "forks": Key("range", 0, 8, [0, 0], "", "stems into which the branch divides, at least one; 0: it does not"),
-    "fork_at": Key("number", 0.05, 0.95, 0.5, "of the length", "where it divides first"),
-    "fork_angle": Key("range", 0, 120, [25, 8], "degrees", "by which each of the stems turns away"),
-    "fork_levels": Key("integer", 1, 4, 1, "", "times that it divides, evenly from there to the tip"),
-    "spurs": Key("range", 0, 10_000, [0, 0], "", "short shoots on one branch, as the species' spur describes them"),
-    "spur_start": Key("range", 0, 0.99, [0.1, 0], "of the length", "part of the branch that is bare of short shoots"),
-    "leaf_kind": Key("kind", 0, 0, "leaf", "", "what the branch bears: the species' leaf or its blossom"),
-    "leaves": Key("range", 0, 10_000, [0, 0], "", "leaves on one branch of this order itself"),
-    "leaf_whorl": Key("integer", 1, 64, 1, "", "leaves at one place: 1 alternate, 2 opposite, more a whorl or bundle"),
-    "leaf_start": Key("range", 0, 0.99, [0.1, 0], "of the length", "part of the branch that is bare of leaves"),
+    "forks": Key("range", 0, 8, [0, 0], "", "number of stems that the branch forks into; 0 disables forking"),
+    "fork_at": Key("number", 0.05, 0.95, 0.5, "fraction of the length", "position of the first fork"),
+    "fork_angle": Key("range", 0, 120, [25, 8], "degrees", "angle by which each stem turns away"),
+    "fork_levels": Key("integer", 1, 4, 1, "", "number of successive forks, evenly spaced up to the tip"),
+    "spurs": Key("range", 0, 10_000, [0, 0], "", "number of short shoots on each branch, as defined by spur"),
+    "spur_start": Key("range", 0, 0.99, [0.1, 0], "fraction of the length", "part at the base without short shoots"),
+    "leaf_kind": Key("kind", 0, 0, "leaf", "", "what grows on the branch: the leaf or the blossom of the species"),
+    "leaves": Key("range", 0, 10_000, [0, 0], "", "number of leaves directly on each branch of this order"),
+    "leaf_whorl": Key("integer", 1, 64, 1, "", "leaves at each node: 1 alternate, 2 opposite, 3 or more a whorl"),
+    "leaf_start": Key("range", 0, 0.99, [0.1, 0], "fraction of the length", "part at the base without leaves"),
     "leaf_size": Key("range", 0.0005, 20, [0.08, 0.02], "m", "length of a leaf"),
-    "leaf_size_tip": Key("number", 0.05, 5, 1.0, "of leaf_size", "size of leaves at the outside of the crown"),
-    "leaf_angle": Key("range", 0, 180, [50, 15], "degrees", "between branch and leaf"),
-    "leaf_azimuth": Key("range", -360, 360, [137.5, 20], "degrees", "around the branch from one leaf to the next"),
-    "leaf_light": Key("range", 0, 1, [0.5, 0], "", "how far leaves turn to the sky"),
-    "leaf_spray": Key("number", 0, 1, 0.0, "", "how far leaves stand level to the left and right of their branch"),
-    "leaf_droop": Key("number", 0, 1, 0.0, "", "how far leaves hang"),
-    "branch_colour": Key("colour", 0, 1, [[0.16, 0.11, 0.07], [0.04, 0.03, 0.02]], "linear RGB", "colour of bark"),
-    "leaf_colour": Key("colour", 0, 1, [[0.08, 0.19, 0.03], [0.03, 0.06, 0.01]], "linear RGB", "colour of leaves"),
+    "leaf_size_tip": Key("number", 0.05, 5, 1.0, "fraction of leaf_size", "size of leaves at the outside of the crown"),
+    "leaf_angle": Key("range", 0, 180, [50, 15], "degrees", "angle between branch and leaf"),
+    "leaf_azimuth": Key("range", -360, 360, [137.5, 20], "degrees", "rotation around the branch between leaves"),
+    "leaf_light": Key("range", 0, 1, [0.5, 0], "", "how strongly leaves turn towards the sky"),
+    "leaf_spray": Key("number", 0, 1, 0.0, "", "how strongly leaves spread horizontally to both sides of their branch"),
+    "leaf_droop": Key("number", 0, 1, 0.0, "", "how strongly leaves hang down"),
+    "branch_colour": Key("colour", 0, 1, [[0.16, 0.11, 0.07], [0.04, 0.03, 0.02]], "linear RGB", "color of the bark"),
+    "leaf_colour": Key("colour", 0, 1, [[0.08, 0.19, 0.03], [0.03, 0.06, 0.01]], "linear RGB", "color of the leaves"),
     "leaf_colour_tip": Key(
-        "rgb", 0, 1, None, "linear RGB", "mean colour of leaves at the outside of the crown (default: no change)"
+        "rgb",
+        0,
+        1,
+        None,
+        "linear RGB",
+        "color of leaves at the outside of the crown (default: same as leaf_colour)",
     ),
 }
 
@@ -145,16 +152,16 @@ class _Reader:
 
     def number(self, value: Any, key: str, low: float, high: float) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.fail(key, f"must be a number from {low:g} to {high:g}, is {_shown(value)}")
+            raise self.fail(key, f"must be a number from {low:g} to {high:g}, not {_shown(value)}")
         if not low <= value <= high:  # false for NaN as well
-            raise self.fail(key, f"must be from {low:g} to {high:g}, is {_shown(value)}")
+            raise self.fail(key, f"must be from {low:g} to {high:g}, not {_shown(value)}")
         return float(value)
 
     def range(self, value: Any, key: str, low: float, high: float) -> Range:
         if isinstance(value, int | float) and not isinstance(value, bool):
             return Range(self.number(value, key, low, high))
         if not isinstance(value, list) or len(value) != 2:
-            raise self.fail(key, f"must be [mean, variation] within {low:g} to {high:g}, is {_shown(value)}")
+            raise self.fail(key, f"must be [mean, variation] within {low:g} to {high:g}, not {_shown(value)}")
         mean = self.number(value[0], f"{key}[0] (mean)", low, high)
         variation = self.number(value[1], f"{key}[1] (variation)", 0, high - low)
         if mean - variation < low - 1e-12 or mean + variation > high + 1e-12:
@@ -169,37 +176,37 @@ class _Reader:
         if not (
             isinstance(value, list) and len(value) == 2 and all(isinstance(v, list) and len(v) == 3 for v in value)
         ):
-            raise self.fail(key, f"must be {form} with numbers from 0 to 1, is {_shown(value)}")
+            raise self.fail(key, f"must be {form} with numbers from 0 to 1, not {_shown(value)}")
         channels = [self.range([m, v], f"{key}.{c}", 0, 1) for m, v, c in zip(*value, "rgb", strict=True)]
         return Colour(tuple(c.mean for c in channels), tuple(c.variation for c in channels))
 
     def rgb(self, value: Any, key: str) -> tuple[float, float, float]:
         if not isinstance(value, list | tuple) or len(value) != 3:
-            raise self.fail(key, f"must be [r, g, b] with numbers from 0 to 1, is {_shown(value)}")
+            raise self.fail(key, f"must be [r, g, b] with numbers from 0 to 1, not {_shown(value)}")
         return tuple(self.number(v, f"{key}.{c}", 0, 1) for v, c in zip(value, "rgb", strict=True))
 
     def truth(self, value: Any, key: str) -> bool:
         if not isinstance(value, bool):
-            raise self.fail(key, f"must be true or false, is {_shown(value)}")
+            raise self.fail(key, f"must be true or false, not {_shown(value)}")
         return value
 
     def choice(self, value: Any, key: str, choices: tuple[str, ...]) -> str:
         if value not in choices:
-            raise self.fail(key, f"must be one of {', '.join(choices)}; is {_shown(value)}")
+            raise self.fail(key, f"must be one of {', '.join(choices)}, not {_shown(value)}")
         return value
 
     def keys(self, value: Any, key: str, allowed: Mapping[str, Any] | tuple[str, ...]) -> None:
         if not isinstance(value, dict):
-            raise self.fail(key, f"must be an object {{…}}, is {_shown(value)}")
+            raise self.fail(key, f"must be an object {{…}}, not {_shown(value)}")
         for name in value:
             if name not in allowed:
                 near = get_close_matches(name.lower(), allowed, 1)
                 meant = f'did you mean "{near[0]}"? Allowed' if near else "allowed"
-                raise self.fail(f"{key}.{name}" if key else name, f"unknown key; {meant} are {', '.join(allowed)}")
+                raise self.fail(f"{key}.{name}" if key else name, f"unknown key; {meant} keys: {', '.join(allowed)}")
 
     def text(self, value: Any, key: str, least: int = 1) -> str:
         if not isinstance(value, str) or len(value.strip()) < least or len(value) > 1000:
-            raise self.fail(key, f"must be a text of {least} to 1000 characters, is {_shown(value)}")
+            raise self.fail(key, f"must be a string of {least} to 1000 characters, not {_shown(value)}")
         return value
 
 
@@ -234,12 +241,14 @@ def _read_order(reader: _Reader, data: Any, where: str, first: bool, last: bool)
         elif key.kind == "integer":
             number = reader.number(value, path, key.low, key.high)
             if number != int(number):
-                raise reader.fail(path, f"must be a whole number, is {_shown(value)}")
+                raise reader.fail(path, f"must be a whole number, not {_shown(value)}")
             values[name] = int(number)
         else:
             values[name] = reader.choice(value, path, CHOICES[key.kind])
     if last and values["branches"].high > 0:
-        raise reader.fail(f"{where}.branches", "must be [0, 0]: no order follows that could describe these branches")
+        raise reader.fail(
+            f"{where}.branches", "must be [0, 0], because no order follows; add an order to describe these branches"
+        )
     return Order(**values)
 
 
@@ -262,10 +271,12 @@ def _read_leaf(reader: _Reader, data: Any, where: str) -> LeafModel | str:
     reader.keys(data, where, LEAF_KEYS)
     forms = [k for k in ("model", "object", "vertices") if k in data]
     if len(forms) != 1:
-        raise reader.fail(where, "needs exactly one of model (built-in), object (Blender mesh) or vertices with faces")
+        raise reader.fail(
+            where, "must have exactly one of model (built-in), object (Blender mesh) or vertices with faces"
+        )
     if "model" in data:
         if not isinstance(data["model"], str) or data["model"] not in LEAF_MODELS:
-            raise reader.fail(f"{where}.model", f"must be one of {', '.join(LEAF_MODELS)}; is {_shown(data['model'])}")
+            raise reader.fail(f"{where}.model", f"must be one of {', '.join(LEAF_MODELS)}, not {_shown(data['model'])}")
         return LEAF_MODELS[data["model"]]
     if "object" in data:
         return reader.text(data["object"], f"{where}.object")
@@ -276,7 +287,7 @@ def _read_leaf(reader: _Reader, data: Any, where: str) -> LeafModel | str:
         raise reader.fail(f"{where}.faces", "must be a list of faces, each a list of vertex indices")
     for key, form in (("vertices", "[x, y, z]"), ("uv", "[u, v]")):
         if key in data and not _is_list_of_points(data[key], form.count(",") + 1):
-            raise reader.fail(f"{where}.{key}", f"must be a list of {form} with numbers")
+            raise reader.fail(f"{where}.{key}", f"must be a list of {form} numbers")
     try:
         return leaf_model(data["vertices"], faces, data.get("uv"))
     except SpeciesError as error:
@@ -312,13 +323,13 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
     """
     reader = _Reader(source)
     if not isinstance(data, dict):
-        raise reader.fail("species", f"must be an object {{…}}, is {_shown(data)}")
+        raise reader.fail("species", f"must be an object {{…}}, not {_shown(data)}")
     reader.keys(data, "", SPECIES_KEYS)
     for key in ("format", "name", "orders", "leaf"):
         if key not in data:
-            raise reader.fail(key, "missing")
+            raise reader.fail(key, "missing; add this key")
     if data["format"] != FORMAT or isinstance(data["format"], bool):
-        raise reader.fail("format", f"must be {FORMAT} for this version of TetFlora, is {_shown(data['format'])}")
+        raise reader.fail("format", f"must be {FORMAT} for this version of TetFlora, not {_shown(data['format'])}")
     orders = data["orders"]
     if not isinstance(orders, list) or not 1 <= len(orders) <= MAX_ORDERS:
         found = len(orders) if isinstance(orders, list) else _shown(orders)
@@ -329,7 +340,7 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
         spur = _read_order(reader, data.get("spur", DEFAULT_SPUR), "spur", True, True)
         for key in ("spurs", "forks"):
             if getattr(spur, key).high > 0:
-                raise reader.fail(f"spur.{key}", "must be [0, 0]: a short shoot bears nothing but leaves")
+                raise reader.fail(f"spur.{key}", "must be [0, 0], because a short shoot has only leaves")
     species = Species(
         identifier=identifier,
         name=reader.text(data["name"], "name"),
@@ -348,7 +359,7 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
     if polygons > MAX_POLYGONS:
         raise reader.fail(
             "orders" if species.quality <= 1 else "quality",
-            f"one plant would have {polygons:.3g} polygons, at most {MAX_POLYGONS:.0g} are allowed",
+            f"one plant would have {polygons:.3g} polygons, the limit is {MAX_POLYGONS:.0g}; use fewer branches",
         )
     return species
 
@@ -359,7 +370,7 @@ def _once(source: str, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(data) < len(pairs):
         names = [name for name, _ in pairs]
         twice = next(name for name in names if names.count(name) > 1)
-        raise SpeciesError(f"{source}: {twice}: is there twice in one object; leave one of them")
+        raise SpeciesError(f"{source}: {twice}: duplicate key in one object; remove one of them")
     return data
 
 
@@ -373,13 +384,13 @@ def read_species(path: Path) -> Species:
     """
     try:
         if path.stat().st_size > MAX_FILE_BYTES:
-            raise SpeciesError(f"{path.name}: larger than {MAX_FILE_BYTES:,} bytes")
+            raise SpeciesError(f"{path.name}: larger than {MAX_FILE_BYTES:,} bytes, the limit for a species file")
         # Some editors begin a file with a mark of its encoding.
         data = json.loads(path.read_text(encoding="utf-8-sig"), object_pairs_hook=partial(_once, path.name))
     except OSError as error:
         raise SpeciesError(f"{path.name}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise SpeciesError(f"{path.name}: is not valid JSON: not text in UTF-8; save it in that encoding") from None
+        raise SpeciesError(f"{path.name}: is not valid JSON: not UTF-8 text; save the file as UTF-8") from None
     except (RecursionError, ValueError) as error:
         raise SpeciesError(f"{path.name}: is not valid JSON: {error}") from None
     return species_from_dict(data, path.stem, path.name)

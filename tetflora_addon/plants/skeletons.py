@@ -62,9 +62,9 @@ class Skeleton:
             object.__setattr__(self, name, array)
         n = len(self.points)
         if self.points.shape != (n, 3) or {self.radius.shape, self.parent.shape, self.line.shape} != {(n,)}:
-            raise ValueError("a skeleton needs (p, 3) points, (p,) radii, (p,) parents and (p,) lines")
+            raise ValueError("a skeleton must have (p, 3) points, (p,) radii, (p,) parents and (p,) lines")
         if not ((self.parent >= -1) & (self.parent < np.arange(n))).all():
-            raise ValueError("a skeleton's parents must stand before their children; -1 is none")
+            raise ValueError("the parents of a skeleton must precede their children; use -1 for no parent")
 
     @cached_property
     def content(self) -> bytes:
@@ -167,19 +167,19 @@ def skeleton_from_edges(
     points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
     edges = np.asarray(edges, dtype=np.int64).reshape(-1, 2)
     given = np.zeros(len(points)) if radius is None else np.asarray(radius, dtype=np.float64).reshape(-1)
-    refused = f'"{source}" cannot be the form of a plant: '
+    refused = f'"{source}" cannot be used as the form of a plant: '
     if not len(edges):
-        raise SpeciesError(refused + "it has no edges; draw a curve, or a mesh whose edges are the branches")
+        raise SpeciesError(refused + "it has no edges; use a curve, or a mesh whose edges are the branches")
     if edges.min() < 0 or edges.max() >= len(points) or len(given) != len(points):
-        raise SpeciesError(refused + "its edges or radii do not fit its points; export or convert it again")
+        raise SpeciesError(refused + "its edges or radii do not match its points; export or convert it again")
     used, edges = np.unique(edges, return_inverse=True)
     edges, points, given = edges.reshape(-1, 2), points[used], given[used]
     if not (np.isfinite(points).all() and (given >= 0).all() and np.isfinite(given).all()):
-        raise SpeciesError(refused + "a position or radius is not a number or is negative; correct or delete the point")
+        raise SpeciesError(refused + "it has a point with an invalid position or radius; correct or delete the point")
     if len(points) > MAX_POINTS:
         raise SpeciesError(
             f"{refused}it has {len(points):,} points, more than {MAX_POINTS:,}; lower the curve's resolution, or "
-            "simplify the mesh until only the centre lines of branches are left"
+            "simplify the mesh to the centerlines of the branches"
         )
     size = float(np.ptp(points, axis=0).max())
     merged = coinciding(points, size * MERGED_WITHIN)
@@ -187,7 +187,7 @@ def skeleton_from_edges(
     stays = np.flatnonzero(pairs[:, 0] != pairs[:, 1])
     pairs, first = np.unique(pairs[stays], axis=0, return_index=True)
     if not len(pairs):
-        raise SpeciesError(refused + "its edges have no length; draw a curve, or a mesh whose edges are the branches")
+        raise SpeciesError(refused + "its edges have no length; use a curve, or a mesh whose edges are the branches")
     thickest = np.zeros(len(points))
     np.maximum.at(thickest, merged, given)
     order, parent = breadth_first(pairs, _roots(points, pairs, size))

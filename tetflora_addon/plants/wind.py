@@ -102,9 +102,9 @@ class Wind:
 
     def __post_init__(self) -> None:
         if not np.isfinite([self.speed, self.direction, self.gusts, self.time, self.loop]).all():
-            raise TetFloraError("Wind: speed, direction, gusts, time and loop must be numbers")
+            raise TetFloraError("Wind: Speed, Direction, Gusts, Loop and the time must be finite numbers")
         if self.speed < 0 or self.loop < 0 or not 0 <= self.gusts <= 1:
-            raise TetFloraError("Wind: speed and loop must not be negative, and gusts lie between 0 and 1")
+            raise TetFloraError("Wind: Speed and Loop must be 0 or greater, and Gusts between 0 and 1")
 
     @property
     def strength(self) -> float:

@@ -59,7 +59,7 @@ def colours_of(level: Level, mode: str, deepest: int) -> NDArray[np.float32]:
         for decision, colour in FORMS.items():
             table[decision] = colour
         return table[level.decision]
-    raise ValueError(f'no colours for "{mode}"; use LEVEL, VISIBILITY, FORM or CONTRIBUTION')
+    raise ValueError(f'unknown color mode "{mode}"; use LEVEL, VISIBILITY, FORM or CONTRIBUTION')
 
 
 def as_shown(linear: NDArray[np.floating]) -> NDArray[np.float32]:

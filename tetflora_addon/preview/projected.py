@@ -106,7 +106,7 @@ def project(vertices: NDArray[np.float64], extinction: NDArray[np.float64], came
         If the camera is a panorama.
     """
     if camera.kind == "PANO":
-        raise ValueError("edges of tetrahedra are not straight in a panorama; project them for another camera")
+        raise ValueError("a panorama bends the edges of tetrahedra; use a perspective or orthographic camera")
     vertices = np.asarray(vertices, np.float64)
     gradients = barycentric_gradients(vertices)
     if camera.kind == "ORTHO":

@@ -101,7 +101,7 @@ class Meshes:
         broken += [surfaces[s].name for s in self.surface[~sound]]
         if broken:
             raise ValueError(
-                f'"{broken[0]}" has vertices or a transform that are no finite numbers; delete such vertices or reset '
+                f'"{broken[0]}" has vertices or a transform that are not finite; delete the vertices or reset '
                 "the transform"
             )
         # Rows times these are vectors in the world; the cofactors do the same for area vectors.

@@ -85,7 +85,7 @@ class AlphaBuffer:
         self.width, self.height = buffer_size(camera, resolution)
         self.end = None if occluders_depth is None else np.ravel(occluders_depth)
         if self.end is not None and len(self.end) != self.width * self.height:
-            raise ValueError(f"the occluders' buffer does not have {self.width} × {self.height} pixels")
+            raise ValueError(f"the depth buffer of the occluders must have {self.width} × {self.height} pixels")
         self._cell, self._pixel = np.zeros((2, 0), np.int32)
         # Optical depth that a fragment brings into its pixel, its share of its tetrahedron as far as it is not
         # occluded, and the transmittance of what is before it.

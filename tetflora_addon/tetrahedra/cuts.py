@@ -188,7 +188,7 @@ def cut_tetrahedra(vertices: ArrayLike, planes: ArrayLike, tolerance: float = TO
     vertices, planes = np.asarray(vertices, np.float64), np.asarray(planes, np.float64)
     if vertices.ndim != 3 or vertices.shape[1:] != (4, 3) or planes.shape != (len(vertices), 4):
         raise ValueError(
-            f"tetrahedra {vertices.shape} and planes {planes.shape}: give (n, 4, 3) and (n, 4), one plane each"
+            f"tetrahedra {vertices.shape} and planes {planes.shape}: must have shapes (n, 4, 3) and (n, 4)"
         )
     distance = plane_distance(planes[:, None], vertices)
     sign = np.where(np.abs(distance) <= tolerance, 0.0, np.sign(distance)).astype(np.int8)

@@ -260,7 +260,7 @@ class TetrahedralTree:
             If neither an eye nor a direction is given.
         """
         if eye is None and direction is None:
-            raise ValueError("a visibility order needs an eye or a direction")
+            raise ValueError("a visibility order requires an eye or a direction")
         children, inner = self.children, self._levels_of_inner()
         count = np.ones(self._size, np.int32)
         for nodes in reversed(inner):
@@ -313,12 +313,12 @@ class TetrahedralTree:
     def _tetrahedra(self, nodes: NDArray[np.intp]) -> NDArray[np.float64]:
         vertices = self.vertices(nodes)
         if np.isnan(vertices[:, 0, 0]).any():
-            raise ValueError("only nodes with a tetrahedron can be bisected or cut; divide regions by a plane instead")
+            raise ValueError("only nodes with a tetrahedron can be bisected or cut; split regions by a plane instead")
         return vertices
 
     def _check_terminal(self, nodes: NDArray[np.intp]) -> None:
         if (self.children[nodes, 0] >= 0).any() or (len(nodes) and np.bincount(nodes).max() > 1):
-            raise ValueError("only terminal nodes can be divided, and each only once")
+            raise ValueError("only terminal nodes can be split, and each only once")
 
     def _descend(self, points: NDArray[np.float64]) -> NDArray[np.int32]:
         node = np.zeros(len(points), np.int32)
