@@ -23,6 +23,7 @@ import numpy as np
 
 from devtools import session
 from examples import fly_through, landscape
+from tetflora_addon.blender import emit, handlers, job, kept_results
 
 from .compare import flip_map, read_picture, render
 from .report import Targets, peak_mb
@@ -66,14 +67,13 @@ def _timed(name: str) -> dict[str, float]:
     """Seconds of the first frame, and of later ones on average."""
     scene = bpy.context.scene
     fly_through.build(scene, FRAMES, name)
-    handlers, kept = session.part("tetflora_addon.blender.handlers"), session.part("tetflora_addon.blender.emit")
     seconds, cells = [], set()
     for frame in range(1, FRAMES + 1):
         scene.frame_set(frame)
         start = time.perf_counter()
         handlers.on_render_pre(scene)
         seconds.append(time.perf_counter() - start)
-        cells.add(kept.result_collections(scene, 'RENDER')[0].name)
+        cells.add(emit.result_collections(scene, 'RENDER')[0].name)
     polygons = json.loads(scene.tetflora.statistics)["polygons_meshed"]
     handlers.on_render_end(scene)
     first, later = seconds[0], np.array(seconds[1:])
@@ -97,14 +97,13 @@ def _flight() -> dict[str, int]:
     for frame in (1, FRAMES):
         camera.location.y += FLIGHT_SPEED * (frame - 1) / fly_through.RATE
         camera.keyframe_insert("location", frame=frame)
-    kept = session.part("tetflora_addon.blender.kept_results")
-    given = session.part("tetflora_addon.blender.job").read_scene(scene, layer.depsgraph, layer)
+    given = job.read_scene(scene, layer.depsgraph, layer)
     found = {}
     for name, near in (("flight_refinements", given), ("flight_refinements_small_cells", None)):
         eyes = []
         for frame in range(1, FRAMES + 1):
             scene.frame_set(frame)
-            eyes.append(tuple(kept.shared_camera(scene, layer.depsgraph, near).position))
+            eyes.append(tuple(kept_results.shared_camera(scene, layer.depsgraph, near).position))
         found[name] = len(set(eyes))
     return found
 
@@ -112,7 +111,7 @@ def _flight() -> dict[str, int]:
 def fingerprint(scene: bpy.types.Scene) -> dict[str, list]:
     """Numbers of vertices and faces of all meshes of a frame, and hashes of where the vertices are."""
     found = {}
-    for collection in session.part("tetflora_addon.blender.emit").result_collections(scene, 'RENDER'):
+    for collection in emit.result_collections(scene, 'RENDER'):
         for obj in collection.objects:
             if obj.type == 'MESH':
                 places = np.empty(3 * len(obj.data.vertices), np.float32)
@@ -131,7 +130,7 @@ def frame_alone(frame: int) -> dict[str, list]:
 
 def _prepared(scene: bpy.types.Scene, frame: int) -> dict[str, list]:
     scene.frame_set(frame)
-    session.part("tetflora_addon.blender.handlers").on_render_pre(scene)
+    handlers.on_render_pre(scene)
     return fingerprint(scene)
 
 
@@ -145,7 +144,7 @@ def _film(chosen: list[int]) -> tuple[dict[int, dict[str, list]], int]:
         names.append(min(made))
         if frame in chosen:
             found[frame] = made
-    session.part("tetflora_addon.blender.handlers").on_render_end(scene)
+    handlers.on_render_end(scene)
     changes = [n for n in range(1, FRAMES) if names[n] != names[n - 1]]
     return found, (changes[0] if changes else FRAMES // 2) + 1
 
@@ -179,7 +178,7 @@ def _flicker(changes_at: int, around: int) -> dict[str, float]:
     with tempfile.TemporaryDirectory() as folder:
         refined = _pictures(scene, frames, Path(folder))
         scene.tetflora.refine_at_render, scene.tetflora.expand_everything = False, True
-        session.part("tetflora_addon.blender.job").refine(scene, bpy.context.evaluated_depsgraph_get())
+        job.refine(scene, bpy.context.evaluated_depsgraph_get())
         expanded = _pictures(scene, frames, Path(folder))
     steps = np.array([_steps(refined), _steps(expanded)])
     beyond = steps[0] - steps[1]

@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from devtools import session
+from tetflora_addon.plants import catalogue, compiled, expansion, foliage, growth, orientation, pieces
+from tetflora_addon.refinement import amounts
 
 from .plants import Targets
 from .plants import plants as planted
@@ -37,7 +38,6 @@ _FIELDS = 14  # leaf area, wood area, leaf area × colour, moment × leaf area o
 
 def run(quick: bool) -> dict[str, float]:
     """Measure all species."""
-    catalogue, compiled = (session.part(f"tetflora_addon.plants.{n}") for n in ("catalogue", "compiled"))
     figures: dict[str, float] = {}
     for name in catalogue.list_species():
         flora = compiled.compile_species([catalogue.load_species(name)])
@@ -53,8 +53,6 @@ def run(quick: bool) -> dict[str, float]:
 
 def species_errors(flora: Any, seeds: int) -> dict[str, dict[str, float]]:
     """Largest error over the orders of each kind, its standard error, and the largest excess."""
-    part = session.part
-    growth, expansion = part("tetflora_addon.plants.growth"), part("tetflora_addon.plants.expansion")
     trunks = growth.trunks(flora.rows, planted(flora, seeds * float(flora.polygons[flora.first_row[0]])))
     polygons = flora.polygons[trunks.row]
     groups = list(expansion.chunks(polygons, min(AT_ONCE, polygons.sum() / GROUPS)))
@@ -116,25 +114,22 @@ def summed_up(error: np.ndarray, each: np.ndarray) -> dict[str, float]:
 
 def foretold(flora: Any, subplants: Any, oriented: bool) -> np.ndarray:
     """Expected sums over sub-plants."""
-    sizes, orientation = (session.part(f"tetflora_addon.{n}") for n in ("refinement.amounts", "plants.orientation"))
-    amounts = sizes.subplant_amounts(flora, subplants)
+    expected = amounts.subplant_amounts(flora, subplants)
     out = np.zeros(_FIELDS)
-    out[0], out[1] = amounts.leaf_area.sum(), amounts.wood_area.sum()
-    out[2:5] = amounts.leaf_area @ flora.leaf_colours(subplants)
+    out[0], out[1] = expected.leaf_area.sum(), expected.wood_area.sum()
+    out[2:5] = expected.leaf_area @ flora.leaf_colours(subplants)
     if oriented:
         each = orientation.leaf_moments(flora.orientation, subplants)
-        out[5:] = np.einsum("n,nij->ij", amounts.leaf_area, each).ravel()
+        out[5:] = np.einsum("n,nij->ij", expected.leaf_area, each).ravel()
     return out
 
 
-def grown(flora: Any, pieces: Any, oriented: bool) -> tuple[np.ndarray, int]:
+def grown(flora: Any, wood: Any, oriented: bool) -> tuple[np.ndarray, int]:
     """The same sums over the branches' own leaves and wood as they are, and the number of leaves."""
-    part = session.part
-    foliage, growth = part("tetflora_addon.plants.foliage"), part("tetflora_addon.plants.growth")
     out = np.zeros(_FIELDS)
-    out[1] = part("tetflora_addon.plants.pieces").wood_areas(flora, pieces).sum()
+    out[1] = pieces.wood_areas(flora, wood).sum()
     rows = flora.rows
-    bearers = pieces.take(pieces.t1 == 1).branches
+    bearers = wood.take(wood.t1 == 1).branches
     total = 0
     for row in np.unique(bearers.row):
         branches = bearers.take(bearers.row == row)

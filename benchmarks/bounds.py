@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
-from devtools import session
+from tetflora_addon.plants import bounds, catalogue, compiled, expansion, foliage, growth, pieces, sides, tubes
 
 from .plants import plants as planted
 from .report import Targets
@@ -39,7 +39,6 @@ QUICK_TARGETS: Targets = TARGETS
 
 def run(quick: bool) -> dict[str, float]:
     """Measure all species; see the table in ``docs/results.md`` for what the figures mean."""
-    catalogue, compiled = (session.part(f"tetflora_addon.plants.{n}") for n in ("catalogue", "compiled"))
     beyond, begun = 0, time.perf_counter()
     ratios: dict[str, float] = {}
     cylinders: list[float] = []
@@ -67,11 +66,9 @@ def run(quick: bool) -> dict[str, float]:
 
 def grown(flora: Any, branches: Any) -> NDArray[np.float64]:
     """All vertices (v, 3) of sub-plants of one species."""
-    part = session.part
-    tubes, foliage = part("tetflora_addon.plants.tubes"), part("tetflora_addon.plants.foliage")
-    stems = list(part("tetflora_addon.plants.expansion").expand(flora, branches))
-    tubes = tubes.tube_buffers(flora, part("tetflora_addon.plants.pieces").Pieces.empty(), stems)
-    out = [] if tubes is None else [tubes.positions]
+    stems = list(expansion.expand(flora, branches))
+    bark = tubes.tube_buffers(flora, pieces.Pieces.empty(), stems)
+    out = [] if bark is None else [bark.positions]
     for own, leaves in placed_leaves(flora, stems):
         row = own.row[:1]
         frame = foliage.settled(flora.rows, row, leaves.frame, leaves.light, np.array([0.0, 0.0, 1.0]))
@@ -86,7 +83,6 @@ def grown(flora: Any, branches: Any) -> NDArray[np.float64]:
 
 def placed_leaves(flora: Any, stems: list[Any]) -> Iterator[tuple[Any, Any]]:
     """Branches and all leaves on their own axes, row by row."""
-    foliage, growth = (session.part(f"tetflora_addon.plants.{n}") for n in ("foliage", "growth"))
     rows = flora.rows
     for some in stems:
         for row in np.unique(some.branches.row):
@@ -104,9 +100,7 @@ def vertices_outside(flora: Any, seeds: int) -> int:
 
     Plants whose spheres around leaves and around the ends of wood lie inside have none; others are looked at whole.
     """
-    part = session.part
-    growth, expansion, bounds = (part(f"tetflora_addon.plants.{n}") for n in ("growth", "expansion", "bounds"))
-    bodies_of = part("tetflora_addon.plants.sides").bounding_bodies
+    bodies_of = sides.bounding_bodies
     trunks = growth.trunks(flora.rows, planted(flora, seeds * float(flora.polygons[0])))
     wide = np.maximum(1 + flora.rows["flare"], bounds.ring_stretch(flora.rows))
     out = 0
@@ -141,8 +135,6 @@ def excess(bodies: NDArray[np.float64], which: NDArray, points: NDArray[np.float
 
 def subplants(flora: Any, number: int, polygons: float) -> dict[int, Any]:
     """Sub-plants by order (100 for short shoots), from several plants."""
-    part = session.part
-    growth, expansion = part("tetflora_addon.plants.growth"), part("tetflora_addon.plants.expansion")
     rng = np.random.default_rng(0)
     level = growth.trunks(flora.rows, planted(flora, 30 * float(flora.polygons[0])))
     kinds: dict[int, list[Any]] = {}
@@ -162,7 +154,6 @@ def subplants(flora: Any, number: int, polygons: float) -> dict[int, Any]:
 
 def hull_ratios(flora: Any, subplant: Any) -> tuple[float, float]:
     """Volume of the body that planes may not enter, and of the compiled one, over that of the vertices' hull."""
-    sides = session.part("tetflora_addon.plants.sides")
     points = grown(flora, subplant)
     hull = ConvexHull(points)
     corners = points[hull.vertices]

@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devtools import session
+from tetflora_addon.blender import compat, meshes, shell_material
+from tetflora_addon.shading import shells
 
 from .report import Targets
 
@@ -32,7 +34,7 @@ KINDS = ("one", "stack")
 
 def run(quick: bool) -> dict[str, float]:
     """RMS differences of pictures from the formulas, worst engine and by engine; ``furnace_error`` is of means."""
-    engines = {"cycles": 'CYCLES', "eevee": session.part("tetflora_addon.blender.compat").eevee_engine()}
+    engines = {"cycles": 'CYCLES', "eevee": compat.eevee_engine()}
     figures: dict[str, float] = {}
     for name, engine in engines.items():
         for kind, key in zip(KINDS, ("shell_rms", "shell_stack_rms"), strict=True):
@@ -70,7 +72,7 @@ def _scene(engine: str, samples: int, sky: float = 1.0) -> None:
     cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = cycles.transmission_bounces = 256
     cycles.sample_clamp_indirect = cycles.blur_glossy = 0.0
     scene.world = bpy.data.worlds.new("sky")
-    tree = session.part("tetflora_addon.blender.compat").shader_tree(scene.world)
+    tree = compat.shader_tree(scene.world)
     tree.nodes["Background"].inputs["Color"].default_value = (sky, sky, sky, 1.0)
     camera = bpy.data.cameras.new("camera")
     camera.type, camera.ortho_scale = 'ORTHO', WIDTH
@@ -84,7 +86,7 @@ def _place(cells: NDArray, kappa: NDArray, light: NDArray | None = None, **value
     count = len(cells)
     axes = np.random.default_rng(9).normal(size=(count, 3))
     matrices = kappa[:, None] ** 2 * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
-    buffers = session.part("tetflora_addon.shading.shells").shell_buffers(
+    buffers = shells.shell_buffers(
         cells,
         np.full((count, 3), values.pop("colour", 1.0)),
         np.full(count, values.pop("transmission", 0.0)),
@@ -94,14 +96,13 @@ def _place(cells: NDArray, kappa: NDArray, light: NDArray | None = None, **value
         rank=-cells[..., 2].mean(axis=1),
         light=light,
     )
-    materials = session.part("tetflora_addon.blender.shell_material")
-    material = materials.shell_material() if light is None else materials.baked_shell_material()
+    material = shell_material.shell_material() if light is None else shell_material.baked_shell_material()
     group = next(n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeGroup")
     if light is None:
         group.inputs["Through Tint"].default_value = (1.0, 1.0, 1.0, 1.0)
         for name, value in {"Variation": 0.0, "Stochastic": 0.0, **values}.items():
             group.inputs[name].default_value = value
-    mesh = session.part("tetflora_addon.blender.meshes").write_mesh("shells", buffers, [material])
+    mesh = meshes.write_mesh("shells", buffers, [material])
     bpy.context.scene.collection.objects.link(bpy.data.objects.new("shells", mesh))
 
 
@@ -110,7 +111,7 @@ def _picture() -> NDArray[np.float64]:
     settings = bpy.context.scene.render
     with tempfile.TemporaryDirectory() as folder:
         path = str(Path(folder) / "picture.exr")
-        session.part("tetflora_addon.blender.compat").set_still_format(settings.image_settings, 'OPEN_EXR')
+        compat.set_still_format(settings.image_settings, 'OPEN_EXR')
         settings.image_settings.color_depth = '32'
         settings.filepath = path
         bpy.ops.render.render(write_still=True)

@@ -44,8 +44,8 @@ def run(quick: bool) -> dict[str, float]:
     """Render the animation; see ``docs/results.md`` for what the figures mean."""
     import bpy
 
-    from devtools import session
     from examples import row80
+    from tetflora_addon.blender import handlers
 
     scene = bpy.context.scene
     row80.build(scene, count=6)
@@ -88,7 +88,7 @@ def run(quick: bool) -> dict[str, float]:
         "polygons_mean": float(np.mean(polygons)),
         "different_frames": len(set(polygons)),
         "datablocks_left": _datablocks() - before,
-        "errors": len(session.part("tetflora_addon.blender.handlers").render_errors()),
+        "errors": len(handlers.render_errors()),
     }
 
 

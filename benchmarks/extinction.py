@@ -21,7 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from devtools import session
+from tetflora_addon.plants import catalogue, cells, clumping, compiled, expansion, growth, meshing, pieces, seeds, tubes
+from tetflora_addon.refinement import amounts
 
 from .plants import Targets
 
@@ -42,7 +43,6 @@ QUICK_TARGETS: Targets = {"after_mean": {"max": 0.05}}
 
 def run(quick: bool) -> dict[str, float]:
     """Measure the species one by one."""
-    catalogue, compiled = (session.part(f"tetflora_addon.plants.{n}") for n in ("catalogue", "compiled"))
     figures: dict[str, float] = {}
     all_errors: dict[str, list[float]] = {f"{kind}_{when}": [] for kind in KINDS for when in ("before", "after")}
     taken = []
@@ -92,23 +92,18 @@ def grown(flora: Any, seed: int) -> tuple[list[tuple], np.ndarray, np.ndarray, n
 
     Polygons are corners (c, 3), first corners and numbers (f,), middles and area vectors (f, 3), and a weight.
     """
-    part = session.part
-    growth, expansion = part("tetflora_addon.plants.growth"), part("tetflora_addon.plants.expansion")
-    pieces, amounts = part("tetflora_addon.plants.pieces"), part("tetflora_addon.refinement.amounts")
-    seeds = part("tetflora_addon.plants.seeds").Seeds(
-        ("",), np.zeros(1, np.int32), np.array([seed]), np.zeros((1, 3)), np.eye(3)[None], np.ones(1)
-    )
+    plant = seeds.Seeds(("",), np.zeros(1, np.int32), np.array([seed]), np.zeros((1, 3)), np.eye(3)[None], np.ones(1))
     surfaces, places, weights, coefficients = [], [], [], []
     none = pieces.Pieces.empty()
-    for stems in expansion.expand(flora, growth.trunks(flora.rows, seeds)):
+    for stems in expansion.expand(flora, growth.trunks(flora.rows, plant)):
         own, _ = pieces.whole_pieces(flora.rows, stems)
         held = amounts.piece_amounts(flora, own)
         places.append((own.start + own.end) / 2)
         weights.append(held.leaf_area + held.wood_area / 2)
         coefficients.append(flora.clumping.coefficients(own.branches, flora.clumping.own))
-        leaves = part("tetflora_addon.plants.meshing").leaf_meshes(flora, none, 0, [stems])
+        leaves = meshing.leaf_meshes(flora, none, 0, [stems])
         surfaces += [polygons(leaf.buffers, 1.0) for leaf in leaves]
-        surfaces.append(polygons(part("tetflora_addon.plants.tubes").tube_buffers(flora, none, [stems]), 0.5))
+        surfaces.append(polygons(tubes.tube_buffers(flora, none, [stems]), 0.5))
     return surfaces, np.concatenate(places), np.concatenate(weights), np.concatenate(coefficients)
 
 
@@ -128,7 +123,6 @@ def polygons(buffers: Any, weight: float) -> tuple:
 
 def seen(surfaces: list[tuple], direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Origins (k, 3) of parallel rays over polygons, and whether each meets any (k,)."""
-    cells = session.part("tetflora_addon.plants.cells")
     across = np.stack(cells.basis(direction), axis=1)
     flat = [corners @ across for corners, *_ in surfaces]
     low, high = np.min([f.min(axis=0) for f in flat], axis=0), np.max([f.max(axis=0) for f in flat], axis=0)
@@ -155,7 +149,6 @@ def depths(
     size: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Optical depths (k,), (k,) of rays through evenly filled tetrahedra: by area alone, and as fitted."""
-    cells, clumping = session.part("tetflora_addon.plants.cells"), session.part("tetflora_addon.plants.clumping")
     side = size * 6 ** (1 / 3)
     corner = box[0] - 0.41 * side
     shape = np.maximum(np.ceil((box[1] - corner) / side), 1).astype(np.int64)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from devtools import session
 from examples import stands
+from tetflora_addon.blender import compat
 
 from .compare import colour_error, coverage, flip_map, linear_light, read_picture, render
 from .row80 import timed_refine
@@ -237,4 +238,4 @@ class _Stand:
 
 
 def _identifier(engine: str) -> str:
-    return 'CYCLES' if engine == "cycles" else session.part("tetflora_addon.blender.compat").eevee_engine()
+    return 'CYCLES' if engine == "cycles" else compat.eevee_engine()

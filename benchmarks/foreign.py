@@ -16,8 +16,8 @@ import numpy as np
 from mathutils import Vector
 from numpy.typing import NDArray
 
-from devtools import session
 from examples.row80 import add_daylight
+from tetflora_addon.blender import compat, job
 
 from .compare import difference, plant_mask
 from .report import Targets, peak_mb
@@ -154,7 +154,7 @@ def _material(name: str, colour: tuple[float, float, float]) -> bpy.types.Materi
     image.pixels.foreach_set(np.concatenate([encoded, np.ones((64, 64, 1))], axis=2).astype(np.float32).ravel())
     image.pack()
     material = bpy.data.materials.new(name)
-    tree = session.part("tetflora_addon.blender.compat").shader_tree(material)
+    tree = compat.shader_tree(material)
     texture = tree.nodes.new("ShaderNodeTexImage")
     texture.image = image
     principled = next(node for node in tree.nodes if node.type == 'BSDF_PRINCIPLED')
@@ -191,7 +191,6 @@ def run(quick: bool) -> dict[str, float]:
     scene.render.resolution_x, scene.render.resolution_y = 480, 270
     scene.render.resolution_percentage = 50 if quick else 100
     scene.tetflora.refine_at_render = False
-    job = session.part("tetflora_addon.blender.job")
     bpy.context.view_layer.update()
     area = sum(map(_area, trees))
     figures: dict[str, float] = {"triangles": len(trees) * len(trees[0].data.polygons)}

@@ -13,7 +13,7 @@ from math import pi, tau
 
 import bpy
 
-from devtools import session
+from tetflora_addon.blender import compat, materials
 
 from .report import Targets
 
@@ -27,7 +27,6 @@ QUICK_TARGETS: Targets = TARGETS
 
 def run(quick: bool) -> dict[str, float]:
     """Measure all barks; `cycles_<bark>` is its time over that of the plain material."""
-    materials = session.part("tetflora_addon.blender.materials")
     scene = bpy.context.scene
     trunk, plain = _trunk_scene(scene), _plain_material()
     scene.cycles.samples = 8 if quick else 32
@@ -70,7 +69,7 @@ def _trunk_scene(scene: bpy.types.Scene) -> bpy.types.Object:
 def _plain_material() -> bpy.types.Material:
     """Principled as Blender gives it, with the colour of the faces."""
     material = bpy.data.materials.new("Plain")
-    tree = session.part("tetflora_addon.blender.compat").shader_tree(material)
+    tree = compat.shader_tree(material)
     colour = tree.nodes.new("ShaderNodeAttribute")
     colour.attribute_name = "tf_colour"
     principled = next(node for node in tree.nodes if node.type == 'BSDF_PRINCIPLED')

@@ -19,7 +19,9 @@ from typing import Any
 import bpy
 import numpy as np
 
-from devtools import session
+from tetflora_addon import emission
+from tetflora_addon.blender import meshes
+from tetflora_addon.plants import catalogue, compiled, seeds
 
 from .report import Targets
 
@@ -42,7 +44,7 @@ def plants(flora: Any, polygons: float) -> Any:
     count = int(np.clip(round(polygons / flora.polygons[0]), 1, MOST_PLANTS))
     side = int(np.ceil(np.sqrt(count)))
     index = np.arange(count)
-    return session.part("tetflora_addon.plants.seeds").Seeds(
+    return seeds.Seeds(
         (flora.species[0].identifier,),
         np.zeros(count, np.int32),
         index.astype(np.int64),
@@ -117,9 +119,6 @@ def peak_over_mesh(emission: ModuleType, meshes: ModuleType, flora: Any) -> floa
 
 def run(quick: bool) -> dict[str, float]:
     """Measure all species; see the table in ``docs/results.md`` for what the figures mean."""
-    part = session.part
-    emission, meshes = part("tetflora_addon.emission"), part("tetflora_addon.blender.meshes")
-    catalogue, compiled = part("tetflora_addon.plants.catalogue"), part("tetflora_addon.plants.compiled")
     compile_species = compiled._compiled.__wrapped__  # never from the cache
     repeats = QUICK_REPEATS if quick else REPEATS
     speed, memory, compiling, sampling, copying = {}, {}, {}, {}, {}

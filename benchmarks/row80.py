@@ -10,8 +10,8 @@ from pathlib import Path
 
 import bpy
 
-from devtools import session
 from examples import row80
+from tetflora_addon.blender import job
 
 from .compare import difference, plant_mask, render
 from .report import Targets, peak_mb
@@ -32,7 +32,6 @@ def timed_refine(scene: bpy.types.Scene, **settings: object) -> tuple[object, fl
     """Refine with some settings of the scene changed; returns the statistics and the seconds."""
     for name, value in settings.items():
         setattr(scene.tetflora, name, value)
-    job = session.part("tetflora_addon.blender.job")
     start = time.perf_counter()
     statistics = job.refine(scene, bpy.context.evaluated_depsgraph_get())
     return statistics, time.perf_counter() - start

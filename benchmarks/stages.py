@@ -16,8 +16,9 @@ from typing import Any
 import bpy
 import numpy as np
 
-from devtools import session
 from examples import landscape
+from tetflora_addon import emission, facet_emission
+from tetflora_addon.blender import job, meshes, scene_reader
 
 from .report import Targets
 
@@ -65,12 +66,8 @@ def run(quick: bool) -> dict[str, float]:
         seconds[stage], left[stage] = seconds.get(stage, 0.0) + now - begun, left.get(stage, 0) + size
         begun = time.process_time()
 
-    part = session.part
-    job, reader = part("tetflora_addon.blender.job"), part("tetflora_addon.blender.scene_reader")
-    emission, meshes = part("tetflora_addon.emission"), part("tetflora_addon.blender.meshes")
-    facet_emission = part("tetflora_addon.facet_emission")
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    seeds = reader.read_plants(scene, depsgraph, depsgraph.view_layer)
+    seeds = scene_reader.read_plants(scene, depsgraph, depsgraph.view_layer)
     lap("read", held(seeds))
     flora = job.compile_for(seeds.identifiers, scene, depsgraph)
     lap("compile", held([flora.rows, flora.bound]))

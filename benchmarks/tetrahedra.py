@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from devtools import session
+from tetflora_addon.refinement import camera
+from tetflora_addon.tetrahedra import bisection, eight, geometry, roots
 
 from .report import Targets
 
@@ -41,7 +42,6 @@ Divide = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 def run(quick: bool) -> dict[str, float]:
     """Divide by each way; no targets for time."""
-    eight, bisection = (session.part(f"tetflora_addon.tetrahedra.{n}") for n in ("eight", "bisection"))
 
     def along(choose: Callable[[NDArray[np.float64]], NDArray[np.intp]]) -> Divide:
         return lambda v: eight.divide_in_eight(v, choose(squared_diagonals(v), axis=1))[1]
@@ -79,7 +79,7 @@ def squared_diagonals(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     Diagonal ``k`` joins the middles of edges ``k`` and ``5 - k`` of the tetrahedron: four times its square is the sum
     of the other four edges' squares less the sum of these two.
     """
-    squared = session.part("tetflora_addon.tetrahedra.geometry").squared_edges(vertices)
+    squared = geometry.squared_edges(vertices)
     return (np.sum(squared, axis=1, keepdims=True) - 2.0 * (squared[:, :3] + squared[:, :2:-1])) / 4.0
 
 
@@ -92,7 +92,6 @@ def halves() -> NDArray[np.float64]:
 
 def around_views(number: int) -> NDArray[np.float64]:
     """Pieces (n, 4, 3) of the roots of views at random places, half of them orthographic."""
-    camera, roots = (session.part(f"tetflora_addon.{n}") for n in ("refinement.camera", "tetrahedra.roots"))
     rng = np.random.default_rng(0)
     found = []
     for view in range(number):
@@ -113,7 +112,6 @@ def descend(
     vertices: NDArray[np.float64], divide: Divide, levels: int, most: int
 ) -> tuple[NDArray[np.float64], int, int]:
     """Worst quality (levels + 1, n) of the descendants of each, most shapes at a level, and how many were inverted."""
-    geometry = session.part("tetflora_addon.tetrahedra.geometry")
     rng = np.random.default_rng(0)
     root, shapes, inverted = np.arange(len(vertices)), 0, 0
     worst = [geometry.quality(vertices)]

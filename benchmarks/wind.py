@@ -11,8 +11,8 @@ import time
 
 import bpy
 
-from devtools import session
 from examples import row80
+from tetflora_addon.blender import job
 
 from .report import Targets
 
@@ -49,7 +49,6 @@ def run(quick: bool) -> dict[str, float]:
 def _refined(scene: bpy.types.Scene, speed: float) -> tuple[float, object]:
     """Seconds of a refinement in a wind, and its statistics."""
     scene.tetflora.wind.enabled, scene.tetflora.wind.speed = speed > 0, speed
-    job = session.part("tetflora_addon.blender.job")
     begun = time.process_time()
     statistics = job.refine(scene, bpy.context.evaluated_depsgraph_get())
     return time.process_time() - begun, statistics

@@ -8,14 +8,14 @@
     session.clean_file()         # an empty file
     session.stop()               # disables it; also runs by itself at exit
 
-The modules that Blender uses are ``bl_ext.tetflora_dev.tetflora.*``. They are other objects than ``tetflora_addon.*``
-imported from the root of the repository: one program uses either, never both. `part` gives those that Blender uses.
+The modules that Blender uses are ``bl_ext.tetflora_dev.tetflora.*``. From `start` to `stop`, ``tetflora_addon``,
+``operators`` and ``panels`` are other names of the same modules, so ``from tetflora_addon.blender import job`` imports
+what Blender runs. Without a session these names mean the files at the root of the repository; a process uses either.
 """
 
 from __future__ import annotations
 
 import atexit
-import importlib
 import io
 import os
 import shutil
@@ -24,6 +24,8 @@ import tempfile
 from contextlib import redirect_stdout
 from pathlib import Path
 from types import ModuleType
+
+from .aliases import alias, forget
 
 ROOT = Path(__file__).resolve().parent.parent
 REPOSITORY = "tetflora_dev"
@@ -45,11 +47,12 @@ def start() -> ModuleType:
     Raises
     ------
     RuntimeError
-        The extension could not be enabled; Blender has printed the reason.
+        The extension could not be enabled; Blender has printed the reason. Or its modules were imported without it.
     """
     global _home
     if _home is not None:
         return sys.modules[PACKAGE]
+    alias(PACKAGE)
     home = Path(tempfile.mkdtemp(prefix="tetflora-"))
     atexit.register(shutil.rmtree, home, ignore_errors=True)
     if "bpy" not in sys.modules:
@@ -65,19 +68,16 @@ def start() -> ModuleType:
     bpy.context.preferences.extensions.repos.new(name=REPOSITORY, module=REPOSITORY, custom_directory=str(repository))
     failures: list[BaseException] = []
     if addon_utils.enable(PACKAGE, default_set=True, handle_error=failures.append) is None:
+        forget()
         raise RuntimeError(f"Blender could not enable {PACKAGE} from {ROOT}") from next(iter(failures), None)
     _home = home
+    from tetflora_addon import cache_folder
+
     # Inside a full Blender it would be the user's own.
-    part("tetflora_addon.cache_folder").use(home / "cache")
+    cache_folder.use(home / "cache")
     # Blender 4.5's wheel hangs at exit while a callback of an add-on is registered.
     atexit.register(stop)
     return sys.modules[PACKAGE]
-
-
-def part(name: str) -> ModuleType:
-    """A module of the extension as Blender knows it, for instance ``part("tetflora_addon.blender.job")``."""
-    start()
-    return importlib.import_module(f"{PACKAGE}.{name}")
 
 
 def clean_file() -> None:
@@ -93,6 +93,7 @@ def stop() -> None:
     if _home is None:
         return
     home, _home = _home, None
+    forget()
     import addon_utils
     import bpy
 

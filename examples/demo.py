@@ -30,11 +30,11 @@ def run(out: Path, width: int) -> dict:
     """Build, save, refine and render; returns what ``stats.json`` holds."""
     import bpy
 
+    from tetflora_addon.blender import compat, job
+
     from . import row80
     from .top_view import render_top_view
 
-    job = session.part("tetflora_addon.blender.job")
-    compat = session.part("tetflora_addon.blender.compat")
     session.clean_file()
     scene = bpy.context.scene
     out.mkdir(parents=True, exist_ok=True)

@@ -12,7 +12,7 @@ from bpy_extras import anim_utils
 from mathutils import Vector
 from numpy.typing import NDArray
 
-from devtools import session
+from tetflora_addon.blender import scene_reader
 
 from . import landscape, row80
 
@@ -75,9 +75,8 @@ def _ground(scene: bpy.types.Scene, places: NDArray[np.float64]) -> NDArray[np.f
 
 def _lane(scene: bpy.types.Scene, length: float) -> NDArray[np.float64]:
     """Where a walk along +y begins that keeps farther from all plants than others near the middle, (2,)."""
-    reader = session.part("tetflora_addon.blender.scene_reader")
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    plants = reader.read_plants(scene, depsgraph, depsgraph.view_layer).position[:, :2]
+    plants = scene_reader.read_plants(scene, depsgraph, depsgraph.view_layer).position[:, :2]
     begin = np.linspace(-_ASIDE, _ASIDE, 481) + scene.camera.location.x
     beyond = np.maximum(np.maximum(_BEGIN - plants[:, 1], plants[:, 1] - _BEGIN - length), 0.0)
     nearest = [np.hypot(plants[:, 0] - x, beyond).min() for x in begin]

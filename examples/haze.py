@@ -11,7 +11,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from devtools import session
+from tetflora_addon.blender import compat
 
 #: How far the box reaches beyond the land to all sides, and above it, metres.
 _BESIDE, _ABOVE = 300.0, 90.0
@@ -54,7 +54,7 @@ def add_haze(scene: bpy.types.Scene, extinction: float, airlight: tuple[float, f
 def _air(extinction: float, airlight: tuple[float, float, float]) -> bpy.types.Material:
     """A volume that is as bright as the airlight where nobody sees through."""
     material = bpy.data.materials.new("Haze")
-    tree = session.part("tetflora_addon.blender.compat").shader_tree(material)
+    tree = compat.shader_tree(material)
     tree.nodes.clear()
     absorb, glow, both, output = (
         tree.nodes.new(kind)

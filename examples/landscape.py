@@ -14,6 +14,8 @@ import numpy as np
 from mathutils import Vector
 
 from devtools import session
+from tetflora_addon.blender import ground_reader, job, plant_objects
+from tetflora_addon.planting import places, rules
 
 from .row80 import add_daylight
 from .terrain import Terrain, elevation
@@ -89,15 +91,14 @@ def render_landscape(path: Path, width: int = 960, samples: int = 64) -> None:
     render.engine, render.image_settings.file_format, render.filepath = 'CYCLES', 'PNG', str(path)
     scene.cycles.samples, scene.cycles.use_denoising = samples, False
     scene.tetflora.refine_at_render = False
-    session.part("tetflora_addon.blender.job").refine(scene, bpy.context.evaluated_depsgraph_get())
+    job.refine(scene, bpy.context.evaluated_depsgraph_get())
     bpy.ops.render.render(write_still=True)
 
 
 def plant(scene: bpy.types.Scene, surface: bpy.types.Object, plants: int) -> bpy.types.Object:
     """Scatter plants over a surface, as one object of points."""
-    part = session.part
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    rules = part("tetflora_addon.planting.rules").Rules(
+    scattered = rules.Rules(
         count=plants,
         seed=7,
         slope_max=np.radians(60.0),
@@ -106,6 +107,6 @@ def plant(scene: bpy.types.Scene, surface: bpy.types.Object, plants: int) -> bpy
         scale_max=1.35,
         shares=tuple(SPECIES.values()),
     )
-    ground = part("tetflora_addon.blender.ground_reader").read_ground([surface], depsgraph)
-    found = part("tetflora_addon.planting.places").place(ground, rules)
-    return part("tetflora_addon.blender.plant_objects").add_field(scene, found, tuple(SPECIES))
+    ground = ground_reader.read_ground([surface], depsgraph)
+    found = places.place(ground, scattered)
+    return plant_objects.add_field(scene, found, tuple(SPECIES))

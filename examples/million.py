@@ -5,6 +5,7 @@
 ``python -m examples.million`` renders it; ``--plants``, ``--width`` and ``--memory`` make it smaller.
 """
 
+# ruff: noqa: E402  (run as a program, it starts Blender before it imports what needs Blender)
 from __future__ import annotations
 
 import argparse
@@ -12,11 +13,16 @@ import sys
 import time
 from pathlib import Path
 
+from devtools import session
+
+session.start()
+
 import bpy
 import numpy as np
 from mathutils import Vector
 
-from devtools import session
+from tetflora_addon.blender import ground_reader, job, plant_objects
+from tetflora_addon.planting import places, rules
 
 from .haze import add_haze
 from .row80 import add_daylight
@@ -57,10 +63,8 @@ def build(scene: bpy.types.Scene, plants: int = PLANTS, width: int = 960) -> Non
 
 def _plant(scene: bpy.types.Scene, surface: bpy.types.Object, land: Terrain, plants: int) -> None:
     """Broadleaved trees up to two thirds of the height, conifers from the middle on, both in stands and glades."""
-    part = session.part
-    rules, places = part("tetflora_addon.planting.rules"), part("tetflora_addon.planting.places")
-    add_field = part("tetflora_addon.blender.plant_objects").add_field
-    ground = part("tetflora_addon.blender.ground_reader").read_ground([surface], bpy.context.evaluated_depsgraph_get())
+    add_field = plant_objects.add_field
+    ground = ground_reader.read_ground([surface], bpy.context.evaluated_depsgraph_get())
     low, high = float(land.heights.min()), float(land.heights.max())
     common = {"min_distance": 2.0, "scale_min": 0.75, "scale_max": 1.4, "clump_size": 110.0}
     valleys = places.place(
@@ -112,7 +116,7 @@ def render_million(
     scene.tetflora.refine_at_render = False
     scene.tetflora.max_memory = memory
     begin = time.perf_counter()
-    statistics = session.part("tetflora_addon.blender.job").refine(scene, bpy.context.evaluated_depsgraph_get())
+    statistics = job.refine(scene, bpy.context.evaluated_depsgraph_get())
     refined = time.perf_counter()
     bpy.ops.render.render(write_still=True)
     return {
@@ -134,7 +138,6 @@ def main() -> int:
     parser.add_argument("--memory", type=float, default=8.0, help="gigabytes for plants and renderer")
     parser.add_argument("--output", type=Path, default=Path("out") / "million.png")
     arguments = parser.parse_args()
-    session.start()
     arguments.output.parent.mkdir(parents=True, exist_ok=True)
     made = render_million(
         arguments.output.resolve(), arguments.plants, arguments.width, arguments.samples, arguments.memory

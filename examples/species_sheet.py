@@ -10,7 +10,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from devtools import session
+from tetflora_addon.blender import job, leaf_forms, materials, meshes, plant_mesh
+from tetflora_addon.plants import catalogue, expansion, growth, meshing, tubes
+from tetflora_addon.shading import microsurfaces
 
 from .studio import render_cells, save_sheet
 
@@ -37,7 +39,7 @@ def species_cell(
         empty.tetflora.is_plant, empty.tetflora.species, empty.tetflora.seed = True, identifier, seed
         scene.collection.objects.link(empty)
         bpy.context.view_layer.update()
-        make = session.part("tetflora_addon.blender.plant_mesh").make_plant_meshes
+        make = plant_mesh.make_plant_meshes
         (plant,) = make(scene, bpy.context.evaluated_depsgraph_get(), [empty])
         polygons[identifier] = len(plant.data.polygons)
         return _points(plant.data), f"{name}\n{polygons[identifier]:,} polygons"
@@ -49,27 +51,23 @@ def opened_cell(identifier: str, orders: int) -> Callable[[], tuple[np.ndarray, 
     """Puts one plant of which some orders are opened into the scene: their wood as it is, the rest as microsurfaces."""
 
     def build() -> tuple[np.ndarray, str]:
-        part = session.part
         scene, depsgraph = bpy.context.scene, bpy.context.evaluated_depsgraph_get()
-        flora = part("tetflora_addon.blender.job").compile_for((identifier,), scene, depsgraph)
-        single = part("tetflora_addon.blender.plant_mesh").single_seed(identifier, SEED)
-        closed = part("tetflora_addon.plants.growth").trunks(flora.rows, single)
-        meshing, tubes = part("tetflora_addon.plants.meshing"), part("tetflora_addon.plants.tubes")
-        materials = part("tetflora_addon.blender.leaf_forms")
+        flora = job.compile_for((identifier,), scene, depsgraph)
+        single = plant_mesh.single_seed(identifier, SEED)
+        closed = growth.trunks(flora.rows, single)
         parts = []
         for _ in range(orders):
-            closed, _, pieces, _ = part("tetflora_addon.plants.expansion").open_subplants(flora, closed)
+            closed, _, pieces, _ = expansion.open_subplants(flora, closed)
             parts.append(("bark", 0, tubes.tube_buffers(flora, pieces)))
             parts += [("leaf", leaf.form, leaf.buffers) for leaf in meshing.leaf_meshes(flora, pieces, 0)]
         points = []
         if len(closed):
-            surfaces = part("tetflora_addon.shading.microsurfaces")
-            facets = surfaces.subplant_facets(flora, closed, np.full(len(closed), FACET))
-            parts.append(("proxy", 0, surfaces.facet_mesh(facets)))
+            facets = microsurfaces.subplant_facets(flora, closed, np.full(len(closed), FACET))
+            parts.append(("proxy", 0, microsurfaces.facet_mesh(facets)))
         for number, (kind, form, buffers) in enumerate(p for p in parts if p[2] is not None):
-            proxy = part("tetflora_addon.blender.materials").proxy_material
-            own = [proxy()] if kind == "proxy" else materials.materials_of(scene, flora.species[0], kind, form)
-            mesh = part("tetflora_addon.blender.meshes").write_mesh(f"{kind} {number}", buffers, own)
+            proxy = materials.proxy_material
+            own = [proxy()] if kind == "proxy" else leaf_forms.materials_of(scene, flora.species[0], kind, form)
+            mesh = meshes.write_mesh(f"{kind} {number}", buffers, own)
             scene.collection.objects.link(bpy.data.objects.new(mesh.name, mesh))
             points.append(_points(mesh))
         count = sum(p[2].polygons for p in parts if p[2] is not None)
@@ -94,7 +92,7 @@ def render_sheet(path: Path, samples: int = 32, identifiers: Sequence[str] | Non
     dict of str to int
         Polygons of each plant.
     """
-    known = session.part("tetflora_addon.plants.catalogue").list_species()
+    known = catalogue.list_species()
     polygons: dict[str, int] = {}
     cells = [species_cell(one, known[one].name, polygons) for one in (identifiers or known)]
     save_sheet(render_cells(cells, WIDTH, HEIGHT, samples), COLUMNS, path)
@@ -103,7 +101,6 @@ def render_sheet(path: Path, samples: int = 32, identifiers: Sequence[str] | Non
 
 def render_opening(path: Path, samples: int = 32) -> None:
     """Render one plant with none of its orders opened, one, and so on to all, as a JPEG."""
-    catalogue = session.part("tetflora_addon.plants.catalogue")
     orders = len(catalogue.load_species(OPENED).orders)
     cells = [opened_cell(OPENED, number) for number in range(orders + 1)]
     save_sheet(render_cells(cells, 380, 400, samples), len(cells), path)

@@ -13,7 +13,9 @@ from math import pi, radians, tan
 import bpy
 import numpy as np
 
-from devtools import session
+from tetflora_addon import emission
+from tetflora_addon.blender import compat
+from tetflora_addon.plants import catalogue, compiled, seeds
 
 SPECIES = ("oak", "birch", "spruce", "aspen")
 #: Directions of the sun's light as its azimuth over the direction of view, degrees: 0 shines over the viewer's
@@ -141,8 +143,6 @@ def _add_plant(
 
 def _height(identifier: str) -> float:
     """Height of a plant of a species, metres."""
-    catalogue, compiled = (session.part(f"tetflora_addon.plants.{name}") for name in ("catalogue", "compiled"))
-    seeds, emission = session.part("tetflora_addon.plants.seeds"), session.part("tetflora_addon.emission")
     flora = compiled.compile_species([catalogue.load_species(identifier)])
     one = seeds.Seeds(
         (identifier,), np.zeros(1, np.int32), np.zeros(1, np.int64), np.zeros((1, 3)), np.eye(3)[None], np.ones(1)
@@ -154,7 +154,7 @@ def _add_ground(scene: bpy.types.Scene, side: float) -> None:
     ground = bpy.data.meshes.new("Ground")
     ground.from_pydata([(-side, -side, 0), (side, -side, 0), (side, side, 0), (-side, side, 0)], [], [(0, 1, 2, 3)])
     material = bpy.data.materials.new("Ground")
-    tree = session.part("tetflora_addon.blender.compat").shader_tree(material)
+    tree = compat.shader_tree(material)
     tree.nodes.clear()
     diffuse, output = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new("ShaderNodeOutputMaterial")
     diffuse.inputs["Color"].default_value = _GROUND
@@ -172,7 +172,7 @@ def set_light(scene: bpy.types.Scene, light: str) -> None:
         bpy.data.worlds.remove(scene.world)
     world = bpy.data.worlds.new("Sky")
     scene.world = world
-    tree = session.part("tetflora_addon.blender.compat").shader_tree(world)
+    tree = compat.shader_tree(world)
     background = next(n for n in tree.nodes if n.type == 'BACKGROUND')
     background.inputs["Color"].default_value = (0.75, 0.85, 1.0, 1.0)
     background.inputs["Strength"].default_value = 1.0 if azimuth is None else 0.35

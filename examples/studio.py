@@ -14,6 +14,7 @@ import numpy as np
 from mathutils import Vector
 
 from devtools import session
+from tetflora_addon.blender import compat
 
 from .row80 import add_daylight
 
@@ -49,7 +50,7 @@ def add_studio(points: np.ndarray, title: str, aspect: float) -> None:
     floor.from_pydata([(x, y, z + low[2]) for x, y, z in corners], [], [(0, 1, 2, 3)])
     material = bpy.data.materials.new("Floor")
     material.diffuse_color = _FLOOR
-    tree = session.part("tetflora_addon.blender.compat").shader_tree(material)
+    tree = compat.shader_tree(material)
     tree.nodes.clear()
     diffuse, output = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new("ShaderNodeOutputMaterial")
     diffuse.inputs["Color"].default_value = _FLOOR
@@ -74,7 +75,7 @@ def add_studio(points: np.ndarray, title: str, aspect: float) -> None:
     label.rotation_euler = camera.rotation_euler
     label.visible_shadow = label.visible_diffuse = False
     ink = bpy.data.materials.new("Ink")
-    tree = session.part("tetflora_addon.blender.compat").shader_tree(ink)
+    tree = compat.shader_tree(ink)
     tree.nodes.clear()
     black, output = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeOutputMaterial")
     black.inputs["Color"].default_value = (0.02, 0.02, 0.02, 1.0)
@@ -117,7 +118,7 @@ def render_cells(
             scene.render.engine = 'CYCLES'
             scene.cycles.samples, scene.cycles.use_denoising = samples, True
             scene.render.resolution_x, scene.render.resolution_y = width, height
-            session.part("tetflora_addon.blender.compat").set_still_format(scene.render.image_settings, 'PNG')
+            compat.set_still_format(scene.render.image_settings, 'PNG')
             scene.render.filepath = str(Path(folder) / f"{number}.png")
             bpy.ops.render.render(write_still=True)
             image = bpy.data.images.load(scene.render.filepath)

@@ -28,6 +28,8 @@ def render_thumbnail(identifier: str, path: Path) -> None:
     import numpy as np
     from mathutils import Vector
 
+    from tetflora_addon.blender import compat, plant_mesh
+
     from .row80 import add_daylight
 
     session.clean_file()
@@ -36,7 +38,7 @@ def render_thumbnail(identifier: str, path: Path) -> None:
     empty.tetflora.is_plant, empty.tetflora.species, empty.tetflora.seed = True, identifier, SEED
     scene.collection.objects.link(empty)
     bpy.context.view_layer.update()
-    make = session.part("tetflora_addon.blender.plant_mesh").make_plant_meshes
+    make = plant_mesh.make_plant_meshes
     (plant,) = make(scene, bpy.context.evaluated_depsgraph_get(), [empty])
     points = np.zeros((len(plant.data.vertices), 3), np.float32)
     plant.data.vertices.foreach_get("co", points.reshape(-1))
@@ -59,7 +61,7 @@ def render_thumbnail(identifier: str, path: Path) -> None:
     scene.view_settings.exposure = 1.1
     scene.render.resolution_x = scene.render.resolution_y = SIDE
     image = scene.render.image_settings
-    session.part("tetflora_addon.blender.compat").set_still_format(image, 'PNG')
+    compat.set_still_format(image, 'PNG')
     image.color_mode, image.color_depth, image.compression = 'RGBA', '8', 100
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
@@ -95,7 +97,9 @@ def _shrink(source: Path, target: Path) -> None:
 def main(wanted: list[str]) -> int:
     """Make the pictures that are asked for, or all; exit code 1 if one is too large."""
     session.start()
-    known = session.part("tetflora_addon.plants.catalogue").list_species()
+    from tetflora_addon.plants import catalogue
+
+    known = catalogue.list_species()
     FOLDER.mkdir(exist_ok=True)
     large = []
     with tempfile.TemporaryDirectory() as folder:

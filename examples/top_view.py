@@ -11,7 +11,8 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from devtools import session
+from tetflora_addon.blender import job, scene_reader
+from tetflora_addon.refinement import decisions
 
 #: Colours of the lines by decision, linear RGB, and the height at which they lie, so that the rarer are on top.
 STYLES = {
@@ -35,14 +36,12 @@ def render_top_view(scene: bpy.types.Scene, path: Path, width: int = 1600, sampl
     width : int
         Pixels; the height follows from the partition's shape.
     """
-    job = session.part("tetflora_addon.blender.job")
-    reader = session.part("tetflora_addon.blender.scene_reader")
     depsgraph = bpy.context.evaluated_depsgraph_get()
     camera, result = job.partition(scene, depsgraph)
-    decision = session.part("tetflora_addon.refinement.decisions").Decision
+    decision = decisions.Decision
     drawing = bpy.data.scenes.new("Top view")
     try:
-        plants = reader.read_plants(scene, depsgraph, depsgraph.view_layer)
+        plants = scene_reader.read_plants(scene, depsgraph, depsgraph.view_layer)
         far = np.linalg.norm(plants.position[:, :2] - camera.position[:2], axis=1).max() + 20
         centre_line = plants.position[:, :2].mean(axis=0) - camera.position[:2]
         centre_line /= np.linalg.norm(centre_line)

@@ -17,6 +17,7 @@ import bpy
 import numpy as np
 
 from devtools import session
+from tetflora_addon.blender import compat, emit, job
 
 from .. import fly_through
 from .pictures import save_sheet
@@ -95,7 +96,7 @@ class _Frames:
 
     def _has_plants(self, scene: bpy.types.Scene, *_: object) -> None:
         self.ready.append(time.perf_counter())
-        found = session.part("tetflora_addon.blender.emit").result_collections(scene, 'RENDER')
+        found = emit.result_collections(scene, 'RENDER')
         self.results += [collection.name for collection in found[:1]]
 
     def _write(self, *_: object) -> None:
@@ -120,7 +121,6 @@ def divided_anew(small: bool) -> tuple[list[int], int]:
 
 def _divided(scene: bpy.types.Scene) -> set[tuple[int, ...]]:
     """Tetrahedra that a frame divides, by centre (tenths of a millimetre) and level."""
-    job = session.part("tetflora_addon.blender.job")
     tree = job.partition(scene, bpy.context.evaluated_depsgraph_get())[1].tree
     nodes = np.flatnonzero(tree.children[:, 0] >= 0)
     centres = tree.vertices(nodes).mean(axis=1)
@@ -154,7 +154,7 @@ def save_film(pictures: list[Path], rate: int, path: Path) -> None:
     scene.frame_start, scene.frame_end = 1, len(pictures)
     scene.view_settings.view_transform = 'Standard'  # pictures are what they should look like
     render.fps, render.filepath, render.use_file_extension = rate, str(path), False
-    session.part("tetflora_addon.blender.compat").set_film_format(render.image_settings)
+    compat.set_film_format(render.image_settings)
     render.ffmpeg.format, render.ffmpeg.codec = 'MPEG4', 'H264'
     render.ffmpeg.constant_rate_factor = 'MEDIUM'
     bpy.ops.render.render(animation=True, scene=scene.name)

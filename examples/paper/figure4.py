@@ -6,13 +6,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from devtools import session
+from tetflora_addon.plants import catalogue
 
 from ..species_sheet import render_sheet
 
 
 def make(out: Path, images: Path, small: bool) -> dict[str, float]:
     """Make ``species.jpg``; returns the number of species and the polygons of the smallest and the largest plant."""
-    known = list(session.part("tetflora_addon.plants.catalogue").list_species())
+    known = list(catalogue.list_species())
     polygons = render_sheet(images / "species.jpg", *((1, known[:2]) if small else ()))
     return {"species": len(polygons), "polygons_min": min(polygons.values()), "polygons_max": max(polygons.values())}

@@ -15,7 +15,7 @@ from pathlib import Path
 import bpy
 
 from benchmarks.compare import difference, plant_mask
-from devtools import session
+from tetflora_addon.blender import compat
 
 from .pictures import save_sheet
 from .scenes import refined, rendered, row, told_figures
@@ -97,7 +97,7 @@ def _amount(data: bpy.types.ID) -> int:
 def _plain(colour: tuple[float, float, float, float]) -> bpy.types.Material:
     """A dull surface of one colour."""
     material = bpy.data.materials.new("Kind")
-    tree = session.part("tetflora_addon.blender.compat").shader_tree(material)
+    tree = compat.shader_tree(material)
     tree.nodes.clear()
     diffuse, output = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new("ShaderNodeOutputMaterial")
     diffuse.inputs["Color"].default_value = colour

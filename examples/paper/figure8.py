@@ -12,7 +12,7 @@ from pathlib import Path
 
 import bpy
 
-from devtools import session
+from tetflora_addon.blender import job
 
 from .pictures import save_sheet
 from .scenes import refined, rendered, row
@@ -29,7 +29,6 @@ def make(out: Path, images: Path, small: bool) -> dict[str, float]:
     scene = row(small, (480, 270))
     scene.tetflora.proxy_form = 'SHELLS'
     scene.cycles.transparent_max_bounces = _THROUGH
-    job = session.part("tetflora_addon.blender.job")
     steps = refined(scene).steps
     cells, figures = [], {"passes": len(steps)}
     for last in SMALL_PASSES if small else PASSES:

@@ -10,6 +10,7 @@ from pathlib import Path
 import bpy
 
 from devtools import session
+from tetflora_addon.blender import compat, job
 
 from .. import row80
 
@@ -31,7 +32,7 @@ def row(small: bool, size: tuple[int, int] = SIZE) -> bpy.types.Scene:
 def refined(scene: bpy.types.Scene) -> object:
     """Refine the scene for its frame; returns the statistics."""
     bpy.context.view_layer.update()
-    return session.part("tetflora_addon.blender.job").refine(scene, bpy.context.evaluated_depsgraph_get())
+    return job.refine(scene, bpy.context.evaluated_depsgraph_get())
 
 
 def choose_cycles(scene: bpy.types.Scene, samples: int) -> None:
@@ -39,7 +40,7 @@ def choose_cycles(scene: bpy.types.Scene, samples: int) -> None:
     scene.render.engine = 'CYCLES'
     scene.cycles.samples, scene.cycles.use_denoising = samples, True
     scene.cycles.use_adaptive_sampling = False
-    session.part("tetflora_addon.blender.compat").set_still_format(scene.render.image_settings, 'PNG')
+    compat.set_still_format(scene.render.image_settings, 'PNG')
 
 
 def rendered(scene: bpy.types.Scene, path: Path, samples: int) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from devtools import session
+from tetflora_addon.refinement import decisions
 
 #: Display colours, opacity included; what is rarer comes later, and on top.
 COLOURS = {"HIDDEN": (110, 115, 130, 110), "PROXY": (245, 140, 25, 150), "EXPLICIT": (20, 80, 215, 70)}
@@ -30,7 +30,7 @@ def draw_wires(picture: Path, camera: object, refinement: object) -> None:
     camera : Camera
     refinement : Refinement
     """
-    decision = session.part("tetflora_addon.refinement.decisions").Decision
+    decision = decisions.Decision
     shown = Image.open(picture).convert("RGBA")
     lines = Image.new("RGBA", (shown.width * _FINER, shown.height * _FINER))
     draw = ImageDraw.Draw(lines)

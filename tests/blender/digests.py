@@ -13,6 +13,7 @@ import hashlib
 import warnings
 from typing import Any
 
+import bpy
 import numpy as np
 
 #: Properties that are not what a file says: where things lie in memory, what is evaluated, what is drawn.
@@ -78,8 +79,6 @@ def everything() -> dict[str, dict[str, Any]]:
 
 
 def _everything() -> dict[str, dict[str, Any]]:
-    import bpy
-
     bpy.context.view_layer.update()
     found: dict[str, dict[str, Any]] = {}
     for prop in bpy.data.bl_rna.properties:
@@ -123,8 +122,6 @@ def _difference(before: Any, after: Any, path: str) -> list[str]:
 
 def _struct(value: Any, depth: int) -> dict[str, Any]:
     """All properties of a datablock, or of a group within one."""
-    import bpy
-
     bulk = _BULK.get(type(value).__name__, frozenset())
     found = {}
     for prop in value.bl_rna.properties:
@@ -144,8 +141,6 @@ def _struct(value: Any, depth: int) -> dict[str, Any]:
 
 
 def _plain(held: Any, prop: Any, depth: int) -> Any:
-    import bpy
-
     if prop.identifier == "species_editor":
         # Its sliders show what is stored elsewhere, in the list of the file's own species: reading them takes long.
         return held.species, held.order_index
@@ -172,8 +167,6 @@ def _plain(held: Any, prop: Any, depth: int) -> Any:
 
 
 def _item(item: Any, depth: int) -> Any:
-    import bpy
-
     if item is None:
         return None  # an empty slot of materials
     if isinstance(item, bpy.types.ID) and not item.is_embedded_data:
@@ -192,8 +185,6 @@ def _custom(value: Any) -> dict[str, str]:
 
 def _bulk(data: Any) -> dict[str, tuple[int, str, str, str]]:
     """Attributes: how many values, on what, of which type, and a hash of them; the topology of faces among them."""
-    import bpy
-
     found = {}
     for layer in data.attributes:
         if not len(layer.data) or layer.name.startswith(".select") or layer.name.startswith(".hide"):

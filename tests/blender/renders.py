@@ -8,21 +8,16 @@ import tempfile
 from math import pi, radians
 from pathlib import Path
 
+import bpy
 import numpy as np
 
-from devtools import session
-
-
-def compat():
-    return session.part("tetflora_addon.blender.compat")
+from tetflora_addon.blender import compat
 
 
 def small_scene(
     sky: float, samples: int, sun: float | None = None, size: int = 16, engine: str = "CYCLES", width: float = 2.0
 ) -> None:
     """Look down from z = 50 on `width` metres, under a grey sky and a sun of π W/m² so many degrees off the zenith."""
-    import bpy
-
     scene = bpy.context.scene
     render = scene.render
     render.engine = engine
@@ -35,7 +30,7 @@ def small_scene(
     scene.cycles.seed = 1
     world = bpy.data.worlds.new("sky")
     scene.world = world
-    tree = compat().shader_tree(world)
+    tree = compat.shader_tree(world)
     tree.nodes["Background"].inputs["Color"].default_value = (sky, sky, sky, 1.0)
     camera = bpy.data.cameras.new("camera")
     camera.type = 'ORTHO'
@@ -53,12 +48,10 @@ def small_scene(
 
 def picture() -> np.ndarray:
     """Render; linear radiance ``(height, width, 3)``, bottom row first."""
-    import bpy
-
     settings = bpy.context.scene.render
     with tempfile.TemporaryDirectory() as folder:
         path = str(Path(folder) / "picture.exr")
-        compat().set_still_format(settings.image_settings, 'OPEN_EXR')
+        compat.set_still_format(settings.image_settings, 'OPEN_EXR')
         settings.image_settings.color_depth = '32'
         settings.filepath = path
         bpy.ops.render.render(write_still=True)

@@ -4,26 +4,16 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 
-from devtools import session
+from tetflora_addon.blender import compat
 
 SPECIES = "bush"
 
 
-def part(name: str):
-    """A module of the extension's bridge to Blender, as Blender knows it."""
-    return session.part(f"tetflora_addon.blender.{name}")
-
-
-def errors():
-    return session.part("tetflora_addon.errors")
-
-
 def add_camera(location=(0.0, -20.0, 2.0), rotation=(np.pi / 2, 0.0, 0.0)):
     """The scene's active camera; looks along +Y by default."""
-    import bpy
-
     scene = bpy.context.scene
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     camera.location, camera.rotation_euler = location, rotation
@@ -34,8 +24,6 @@ def add_camera(location=(0.0, -20.0, 2.0), rotation=(np.pi / 2, 0.0, 0.0)):
 
 def add_plant(name="plant", species=SPECIES, seed=1, location=(0.0, 0.0, 0.0), collection=None, **properties):
     """One plant, made without the operators."""
-    import bpy
-
     plant = bpy.data.objects.new(name, None)
     (collection or bpy.context.scene.collection).objects.link(plant)
     plant.location = location
@@ -47,8 +35,6 @@ def add_plant(name="plant", species=SPECIES, seed=1, location=(0.0, 0.0, 0.0), c
 
 def add_mesh(name="mesh", faces=((0, 1, 2, 3),), size=1.0, z=0.0):
     """A square of side 2 × size at a height."""
-    import bpy
-
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata([(-size, -size, z), (size, -size, z), (size, size, z), (-size, size, z)], [], list(faces))
     obj = bpy.data.objects.new(name, mesh)
@@ -58,8 +44,6 @@ def add_mesh(name="mesh", faces=((0, 1, 2, 3),), size=1.0, z=0.0):
 
 def select(*objects):
     """Select these and nothing else; the first becomes active."""
-    import bpy
-
     bpy.context.view_layer.update()  # what was made a moment ago cannot be selected before
     for obj in bpy.context.view_layer.objects:
         obj.select_set(obj in objects)
@@ -68,30 +52,24 @@ def select(*objects):
 
 def depsgraph():
     """What the scene evaluates to now."""
-    import bpy
-
     bpy.context.view_layer.update()
     return bpy.context.evaluated_depsgraph_get()
 
 
 def tiny_render(samples=1, size=16):
     """Cycles as fast as it gets."""
-    import bpy
-
     scene = bpy.context.scene
     scene.render.engine = 'CYCLES'
     scene.render.resolution_x = scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
     scene.cycles.samples = samples
     scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
-    part("compat").set_still_format(scene.render.image_settings, "PNG")
+    compat.set_still_format(scene.render.image_settings, "PNG")
     return scene
 
 
 def datablocks():
     """Names of everything in the file, by type; to tell whether something was left behind."""
-    import bpy
-
     found = {}
     kinds = (
         "objects",

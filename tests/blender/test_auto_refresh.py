@@ -6,15 +6,15 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import bpy
 import pytest
 
-from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph, part
+from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph
+from tetflora_addon.blender import auto_refresh, compat, emit, job
 
 
 @pytest.fixture
 def scene(clean_file):
-    import bpy
-
     add_camera(location=(0.0, -30.0, 3.0))
     for i in range(3):
         add_plant(f"tree {i}", seed=i, location=(4.0 * i - 4.0, 0.0, 0.0))
@@ -25,24 +25,20 @@ def scene(clean_file):
     scene.tetflora.auto_refine = False
 
 
-def auto():
-    return part("auto_refresh")
-
-
 def settle(monkeypatch) -> int:
     """Let time pass until nothing is left to do; the number of slices of work."""
-    monkeypatch.setattr(auto(), "QUIET", 0.0)
-    monkeypatch.setattr(auto(), "SLICE", 0.0)
-    auto()._state.due = 0.0
+    monkeypatch.setattr(auto_refresh, "QUIET", 0.0)
+    monkeypatch.setattr(auto_refresh, "SLICE", 0.0)
+    auto_refresh._state.due = 0.0
     slices = 0
-    while auto().tick() is not None:
+    while auto_refresh.tick() is not None:
         slices += 1
         assert slices < 10_000
     return slices
 
 
 def results(scene):
-    return part("emit").result_collections(scene, 'VIEW')
+    return emit.result_collections(scene, 'VIEW')
 
 
 def test_it_refines_when_it_is_switched_on(scene, monkeypatch):
@@ -50,22 +46,20 @@ def test_it_refines_when_it_is_switched_on(scene, monkeypatch):
     scene.tetflora.auto_refine = True
     assert settle(monkeypatch) > 5
     assert len(results(scene)) == 1
-    assert auto().message() == ""
+    assert auto_refresh.message() == ""
 
 
 def test_nothing_is_done_where_nothing_has_changed(scene, monkeypatch):
     scene.tetflora.auto_refine = True
     settle(monkeypatch)
     made = results(scene)[0]
-    auto().schedule(scene)
+    auto_refresh.schedule(scene)
     assert settle(monkeypatch) == 0
     assert results(scene) == [made]
 
 
 @pytest.mark.parametrize("change", ["camera", "plant", "cutoff", "seed", "new", "form"])
 def test_what_changes_is_refined_again(scene, monkeypatch, change):
-    import bpy
-
     scene.tetflora.auto_refine = True
     settle(monkeypatch)
     made = results(scene)[0].name_full
@@ -84,8 +78,8 @@ def test_what_changes_is_refined_again(scene, monkeypatch, change):
     else:
         add_plant("another", seed=9, location=(0.0, 5.0, 0.0))
     bpy.context.view_layer.update()
-    auto().on_change(scene, depsgraph())
-    auto().schedule(scene)
+    auto_refresh.on_change(scene, depsgraph())
+    auto_refresh.schedule(scene)
     assert settle(monkeypatch) > 0
     assert len(results(scene)) == 1
     assert results(scene)[0].session_uid != uid, made
@@ -94,44 +88,40 @@ def test_what_changes_is_refined_again(scene, monkeypatch, change):
 @pytest.mark.parametrize("change", ["percentage", "aspect", "engine", "material", "leaf"])
 def test_settings_that_results_depend_on_are_heard(scene, monkeypatch, change):
     """Blender says no more of them than that the scene has changed."""
-    import bpy
-
     scene.render.engine = 'CYCLES'
     material, leaf = bpy.data.materials.new("own"), add_mesh("leaf")
     scene.tetflora.auto_refine = True
     settle(monkeypatch)
     heard = []
-    monkeypatch.setattr(auto(), "schedule", heard.append)
-    auto().on_change(scene, SimpleNamespace(updates=[]))
+    monkeypatch.setattr(auto_refresh, "schedule", heard.append)
+    auto_refresh.on_change(scene, SimpleNamespace(updates=[]))
     heard.clear()
-    auto().on_change(scene, SimpleNamespace(updates=[]))
+    auto_refresh.on_change(scene, SimpleNamespace(updates=[]))
     assert not heard
     if change == "percentage":
         scene.render.resolution_percentage = 50
     elif change == "aspect":
         scene.render.pixel_aspect_x = 2.0
     elif change == "engine":
-        scene.render.engine = part("compat").eevee_engine()
+        scene.render.engine = compat.eevee_engine()
     elif change == "material":
         entry = scene.tetflora.output.species.add()
         entry.species, entry.leaf = "bush", material
     else:
         entry = scene.tetflora.leaf_objects.add()
         entry.species, entry.leaf = "bush", leaf
-    auto().on_change(scene, SimpleNamespace(updates=[]))
+    auto_refresh.on_change(scene, SimpleNamespace(updates=[]))
     assert heard == [scene]
 
 
 def test_what_has_nothing_to_do_with_plants_starts_nothing(scene, monkeypatch):
-    import bpy
-
     scene.tetflora.auto_refine = True
     settle(monkeypatch)
     made = results(scene)[0]
     add_mesh("box")
     bpy.data.materials.new("paint")
     bpy.context.view_layer.update()
-    auto().schedule(scene)
+    auto_refresh.schedule(scene)
     assert settle(monkeypatch) == 0
     assert results(scene) == [made]
 
@@ -139,14 +129,14 @@ def test_what_has_nothing_to_do_with_plants_starts_nothing(scene, monkeypatch):
 def test_a_change_in_the_middle_drops_what_is_half_made(scene, monkeypatch):
     before = datablocks()
     scene.tetflora.auto_refine = True
-    monkeypatch.setattr(auto(), "SLICE", 0.0)
-    auto()._state.due = 0.0
+    monkeypatch.setattr(auto_refresh, "SLICE", 0.0)
+    auto_refresh._state.due = 0.0
     for _ in range(400):
-        auto().tick()
+        auto_refresh.tick()
         if results(scene) and results(scene)[0].objects:
             break
     assert results(scene)
-    auto().on_interruption()
+    auto_refresh.on_interruption()
     assert datablocks() == before
     assert settle(monkeypatch) > 5
     assert results(scene)
@@ -157,36 +147,32 @@ def test_switched_off_it_keeps_what_is_there_and_stops(scene, monkeypatch):
     settle(monkeypatch)
     scene.tetflora.auto_refine = False
     scene.camera.location.x += 3.0
-    assert auto().tick() is None
+    assert auto_refresh.tick() is None
     assert len(results(scene)) == 1
 
 
 def test_what_cannot_be_refined_is_said(scene, monkeypatch):
-    import bpy
-
     bpy.data.objects["tree 0"].tetflora.species = "quercus"
     scene.tetflora.auto_refine = True
     settle(monkeypatch)
-    assert "quercus" in auto().message()
+    assert "quercus" in auto_refresh.message()
     assert not results(scene)
     bpy.data.objects["tree 0"].tetflora.species = "bush"
-    auto().schedule(scene)
+    auto_refresh.schedule(scene)
     settle(monkeypatch)
-    assert auto().message() == ""
+    assert auto_refresh.message() == ""
     assert results(scene)
 
 
 @pytest.mark.parametrize("moved", [False, True])
 def test_only_a_change_of_plants_stops_the_job_not_the_flags_that_results_update(scene, monkeypatch, moved):
-    import bpy
-
     scene.tetflora.auto_refine = True
-    auto().on_change(scene, SimpleNamespace(updates=[]))  # settings as they are
-    monkeypatch.setattr(auto(), "SLICE", 0.0)
-    auto()._state.due = 0.0
+    auto_refresh.on_change(scene, SimpleNamespace(updates=[]))  # settings as they are
+    monkeypatch.setattr(auto_refresh, "SLICE", 0.0)
+    auto_refresh._state.due = 0.0
     for _ in range(5):
-        auto().tick()
-    job = auto()._state.steps
+        auto_refresh.tick()
+    job = auto_refresh._state.steps
     assert job is not None
     # What Blender tells of every object when a collection of results is linked.
     update = SimpleNamespace(
@@ -195,42 +181,40 @@ def test_only_a_change_of_plants_stops_the_job_not_the_flags_that_results_update
         is_updated_geometry=False,
         is_updated_shading=True,
     )
-    auto().on_change(scene, SimpleNamespace(updates=[update]))
-    assert (auto()._state.steps is job) == (not moved)
+    auto_refresh.on_change(scene, SimpleNamespace(updates=[update]))
+    assert (auto_refresh._state.steps is job) == (not moved)
     settle(monkeypatch)
     assert len(results(scene)) == 1
 
 
 def test_a_plant_hidden_while_it_works_is_heard_afterwards(scene, monkeypatch):
-    import bpy
-
     scene.tetflora.auto_refine = True
-    auto().on_change(scene, SimpleNamespace(updates=[]))
-    monkeypatch.setattr(auto(), "SLICE", 0.0)
-    auto()._state.due = 0.0
+    auto_refresh.on_change(scene, SimpleNamespace(updates=[]))
+    monkeypatch.setattr(auto_refresh, "SLICE", 0.0)
+    auto_refresh._state.due = 0.0
     for _ in range(5):
-        auto().tick()
+        auto_refresh.tick()
     plant = bpy.data.objects["tree 1"]
     plant.hide_render = True
     flags = {"is_updated_transform": False, "is_updated_geometry": False}
-    auto().on_change(scene, SimpleNamespace(updates=[SimpleNamespace(id=SimpleNamespace(original=plant), **flags)]))
+    auto_refresh.on_change(
+        scene, SimpleNamespace(updates=[SimpleNamespace(id=SimpleNamespace(original=plant), **flags)])
+    )
     settle(monkeypatch)
     assert '"plants": 2' in scene.tetflora.statistics or '"plants":2' in scene.tetflora.statistics
 
 
 def half_make(scene, monkeypatch, collections):
     """Have it work until so many collections have results, the last of which is not done."""
-    monkeypatch.setattr(auto(), "SLICE", 0.0)
-    auto().on_change(scene, SimpleNamespace(updates=[]))  # settings as they are
-    auto().schedule(scene)
-    auto()._state.due = 0.0
+    monkeypatch.setattr(auto_refresh, "SLICE", 0.0)
+    auto_refresh.on_change(scene, SimpleNamespace(updates=[]))  # settings as they are
+    auto_refresh.schedule(scene)
+    auto_refresh._state.due = 0.0
     while len(results(scene)) < collections or not results(scene)[-1].objects:
-        assert auto().tick() is not None
+        assert auto_refresh.tick() is not None
 
 
 def test_clear_takes_away_what_is_half_made_too(scene, monkeypatch):
-    import bpy
-
     before = datablocks()
     scene.tetflora.auto_refine = True
     settle(monkeypatch)
@@ -238,44 +222,38 @@ def test_clear_takes_away_what_is_half_made_too(scene, monkeypatch):
     half_make(scene, monkeypatch, 2)
     assert bpy.ops.tetflora.clear() == {'FINISHED'}
     assert datablocks() == before
-    assert auto().message() == ""
+    assert auto_refresh.message() == ""
     assert settle(monkeypatch) > 0  # it works on
 
 
 def test_what_refine_has_made_is_not_made_again(scene, monkeypatch):
-    import bpy
-
     scene.tetflora.auto_refine = True
     settle(monkeypatch)
     scene.tetflora.cutoff *= 2.0
     assert bpy.ops.tetflora.refine() == {'FINISHED'}
     made = results(scene)
-    auto().schedule(scene)
+    auto_refresh.schedule(scene)
     assert settle(monkeypatch) == 0
     assert results(scene) == made
     scene.tetflora.cutoff /= 2.0
-    auto().schedule(scene)
+    auto_refresh.schedule(scene)
     assert settle(monkeypatch) > 0
 
 
 def test_refine_is_alone(scene, monkeypatch):
-    import bpy
-
     scene.tetflora.auto_refine = True
     half_make(scene, monkeypatch, 1)
     assert bpy.ops.tetflora.refine() == {'FINISHED'}
     assert len(results(scene)) == 1
     scene.tetflora.cutoff *= 2.0
     half_make(scene, monkeypatch, 2)
-    with auto().paused():  # as the operator does between redraws
-        assert auto().tick() == auto()._BUSY
+    with auto_refresh.paused():  # as the operator does between redraws
+        assert auto_refresh.tick() == auto_refresh._BUSY
         assert len(results(scene)) == 1
     assert settle(monkeypatch) > 0
 
 
 def test_only_what_is_done_is_kept(scene, monkeypatch):
-    import bpy
-
     scene.tetflora.auto_refine = True
     half_make(scene, monkeypatch, 1)
     with pytest.raises(RuntimeError, match="not done yet"):
@@ -292,15 +270,15 @@ def test_only_what_is_done_is_kept(scene, monkeypatch):
 
 def test_after_an_unexpected_error_it_says_so_and_can_begin_anew(scene, monkeypatch):
     def broken(*_arguments, **_options):
-        yield part("job").Progress(0.0, "Reading the scene")
+        yield job.Progress(0.0, "Reading the scene")
         raise ZeroDivisionError("of another's making")
 
     scene.tetflora.auto_refine = True
     with monkeypatch.context() as patch:
-        patch.setattr(part("job"), "refine_steps", broken)
+        patch.setattr(job, "refine_steps", broken)
         with pytest.raises(ZeroDivisionError):
             settle(monkeypatch)
-    assert "another's making" in auto().message()
-    auto().schedule(scene)
+    assert "another's making" in auto_refresh.message()
+    auto_refresh.schedule(scene)
     assert settle(monkeypatch) > 0
-    assert results(scene) and auto().message() == ""
+    assert results(scene) and auto_refresh.message() == ""

@@ -6,28 +6,24 @@ from __future__ import annotations
 
 from math import pi, radians
 
+import bpy
 import numpy as np
 import pytest
 
-from devtools import session
-from tests.blender.renders import compat, picture, small_scene
-from tests.blender.scenes import add_mesh, add_plant, datablocks, depsgraph, part
+from tests.blender.renders import picture, small_scene
+from tests.blender.scenes import add_mesh, add_plant, datablocks, depsgraph
+from tetflora_addon.blender import baked_material, compat, job, light_reader, node_tools, world_reader
+from tetflora_addon.shading import light_directions, light_sources
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 UP = np.array([[0.0, 0.0, 1.0]])
 
 
-def sources():
-    return session.part("tetflora_addon.shading.light_sources")
-
-
 def white_plane():
     """A white diffuse square of 4 m at the origin."""
-    import bpy
-
     plane = add_mesh(size=2.0)
     material = bpy.data.materials.new("white")
-    tree = compat().shader_tree(material)
+    tree = compat.shader_tree(material)
     tree.nodes.clear()
     diffuse, output = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new("ShaderNodeOutputMaterial")
     diffuse.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
@@ -37,8 +33,6 @@ def white_plane():
 
 
 def add_light(kind, location=(0.3, 0.2, 3.0), turn=(0.0, 0.0, 0.0), **properties):
-    import bpy
-
     data = bpy.data.lights.new("light", kind)
     for key, value in properties.items():
         setattr(data, key, value)
@@ -49,12 +43,10 @@ def add_light(kind, location=(0.3, 0.2, 3.0), turn=(0.0, 0.0, 0.0), **properties
 
 def irradiance_of_lights():
     """W/m² at the origin on level ground, by the engine."""
-    import bpy
-
-    found = part("light_reader").read_lights(depsgraph(), bpy.context.view_layer)
+    found = light_reader.read_lights(depsgraph(), bpy.context.view_layer)
     total = np.zeros(3)
-    for light in sources().split_areas(found):
-        towards, arriving = sources().arriving(light, np.zeros((1, 3)))
+    for light in light_sources.split_areas(found):
+        towards, arriving = light_sources.arriving(light, np.zeros((1, 3)))
         total += arriving[0] * max(towards[0, 2], 0.0)
     return total
 
@@ -79,25 +71,20 @@ def test_irradiance_is_that_of_cycles(name):
 
 
 def world_irradiance(world, normals=UP):
-    directions = session.part("tetflora_addon.shading.light_directions")
-    return directions.irradiance(np.tile(world.parts.sum(axis=0), (len(normals), 1, 1)), normals)
+    return light_directions.irradiance(np.tile(world.parts.sum(axis=0), (len(normals), 1, 1)), normals)
 
 
 def test_a_plain_world():
-    import bpy
-
     small_scene(sky=0.25, samples=1)
-    found = part("world_reader").read_world(bpy.context.scene)
+    found = world_reader.read_world(bpy.context.scene)
     assert world_irradiance(found.world)[0] == pytest.approx(0.25 * pi, rel=1e-3)
     assert not found.suns
     assert not found.note
     bpy.context.scene.world = None
-    assert part("world_reader").read_world(bpy.context.scene).world.dark
+    assert world_reader.read_world(bpy.context.scene).world.dark
 
 
 def feed_background(kind):
-    import bpy
-
     tree = bpy.context.scene.world.node_tree
     node = tree.nodes.new(kind)
     tree.links.new(node.outputs[0], tree.nodes["Background"].inputs["Color"])
@@ -107,8 +94,6 @@ def feed_background(kind):
 @pytest.mark.parametrize(("tilt", "broken"), [(0.0, 0.0), (90.0, 0.0), (0.0, np.inf), (90.0, np.nan)])
 def test_an_image_is_the_right_way_round(tilt, broken):
     """Irradiance of planes that face up and +X, under a sky with one bright side, as in Cycles."""
-    import bpy
-
     small_scene(sky=0.0, samples=256, size=8, width=0.02)
     rng = np.random.default_rng(3)
     image = bpy.data.images.new("sky", 32, 16, float_buffer=True)
@@ -122,14 +107,12 @@ def test_an_image_is_the_right_way_round(tilt, broken):
     plane.rotation_euler = camera.rotation_euler = (0.0, radians(tilt), 0.0)
     normal = np.array([[np.sin(radians(tilt)), 0.0, np.cos(radians(tilt))]])
     camera.location = 50.0 * normal[0]
-    found = part("world_reader").read_world(bpy.context.scene)
+    found = world_reader.read_world(bpy.context.scene)
     wanted = picture().mean(axis=(0, 1)) * pi
     assert world_irradiance(found.world, normal)[0] == pytest.approx(wanted, rel=0.08)
 
 
 def test_skies_give_ground_as_much_light_as_in_cycles():
-    import bpy
-
     small_scene(sky=0.0, samples=256, size=8, width=0.02)
     white_plane()
     sky = feed_background("ShaderNodeTexSky")
@@ -137,7 +120,7 @@ def test_skies_give_ground_as_much_light_as_in_cycles():
         sky.sky_type = kind
         sky.sun_elevation, sky.sun_rotation = radians(40.0), 1.0
         sky.sun_direction = (0.5, 0.5, 0.6)
-        found = part("world_reader").read_world(bpy.context.scene)
+        found = world_reader.read_world(bpy.context.scene)
         total = world_irradiance(found.world)[0]
         for sun in found.suns:
             total = total + sun.colour * -sun.direction[2]
@@ -146,26 +129,20 @@ def test_skies_give_ground_as_much_light_as_in_cycles():
 
 
 def test_what_cannot_be_read_is_said():
-    import bpy
-
     small_scene(sky=0.0, samples=1)
     feed_background("ShaderNodeTexNoise")
-    found = part("world_reader").read_world(bpy.context.scene)
+    found = world_reader.read_world(bpy.context.scene)
     assert "grey" in found.note
     assert not found.world.dark
 
 
 def baked_square(front, back, colour=0.5):
-    import bpy
-
     square = add_mesh(size=0.5, z=1.0)
-    attributes = part("baked_material").baked_attributes(
-        'FACE', np.array([front], np.float32), np.array([back], np.float32)
-    )
+    attributes = baked_material.baked_attributes('FACE', np.array([front], np.float32), np.array([back], np.float32))
     attributes = {**attributes, "tf_colour": ('FACE', np.full((1, 3), colour, np.float32))}
     for name, (domain, values) in attributes.items():
         square.data.attributes.new(name, 'FLOAT_VECTOR', domain).data.foreach_set("vector", values.ravel())
-    square.data.materials.append(part("baked_material").baked_material())
+    square.data.materials.append(baked_material.baked_material())
     bpy.context.view_layer.update()
     return square
 
@@ -174,7 +151,7 @@ def baked_square(front, back, colour=0.5):
 def test_the_camera_sees_what_was_baked(engine):
     """Front and back, whatever lights there are."""
     small_scene(
-        sky=0.7, samples=4, sun=20.0, width=0.5, engine="CYCLES" if engine == "CYCLES" else compat().eevee_engine()
+        sky=0.7, samples=4, sun=20.0, width=0.5, engine="CYCLES" if engine == "CYCLES" else compat.eevee_engine()
     )
     square = baked_square((0.1, 0.2, 0.3), (0.4, 0.05, 0.6))
     assert picture().mean(axis=(0, 1)) == pytest.approx([0.1, 0.2, 0.3], rel=0.01)
@@ -183,8 +160,6 @@ def test_the_camera_sees_what_was_baked(engine):
 
 
 def test_it_throws_a_shadow_and_lights_nothing():
-    import bpy
-
     small_scene(sky=0.0, samples=32, sun=0.0, width=0.4)
     bpy.context.scene.camera.location = (0.0, 0.0, 0.6)
     white_plane()
@@ -198,11 +173,9 @@ FORMS = ['MICROSURFACES', 'SHELLS', 'MICROSPHERES']
 
 def bush_before_the_sky(engine='CYCLES', samples=16):
     """A bush that is proxies for the most part, in sun and skylight, 48 pixels wide; gives the scene."""
-    import bpy
-
     small_scene(sky=0.4, samples=samples, sun=40.0, size=48, width=3.6)
     scene = bpy.context.scene
-    scene.render.engine = engine if engine == 'CYCLES' else compat().eevee_engine()
+    scene.render.engine = engine if engine == 'CYCLES' else compat.eevee_engine()
     scene.cycles.transparent_max_bounces = scene.cycles.min_transparent_bounces = 256
     scene.camera.location, scene.camera.rotation_euler = (0.0, -50.0, 1.3), (pi / 2, 0.0, 0.0)
     add_plant("bush", "bush")
@@ -214,7 +187,7 @@ def bush_before_the_sky(engine='CYCLES', samples=16):
 def refined(scene, **settings):
     for name, value in settings.items():
         setattr(scene.tetflora, name, value)
-    return part("job").refine(scene, depsgraph())
+    return job.refine(scene, depsgraph())
 
 
 def results(scene, *kinds):
@@ -268,13 +241,13 @@ def test_clear_and_esc_leave_nothing_of_baked_light(form, baked):
     before = datablocks()
     refined(scene)
     assert results(scene, "proxy")
-    part("job").clear(scene)
+    job.clear(scene)
     assert datablocks() == before
-    job = part("job").refine_steps(scene, depsgraph())
-    for progress in job:
+    steps = job.refine_steps(scene, depsgraph())
+    for progress in steps:
         if "shadows" in progress.message:
             break
-    job.close()
+    steps.close()
     assert datablocks() == before
 
 
@@ -284,13 +257,13 @@ def test_real_leaves_show_baked_light_only_if_asked_for_and_materials_stay():
     refined(scene)
     assert len(results(scene, "leaf", "bark")) > 1
     lit = [m.name for o in results(scene, "leaf", "bark") for m in o.data.materials]
-    assert part("baked_material").BAKED not in lit
+    assert baked_material.BAKED not in lit
     refined(scene, baked_light='PROXIES')
     assert [m.name for o in results(scene, "leaf", "bark") for m in o.data.materials] == lit
     assert all("tf_light_front" not in o.data.attributes for o in results(scene, "leaf", "bark"))
     refined(scene, baked_light='ALL')
     real = results(scene, "leaf", "bark")
-    assert {m.name for o in real for m in o.data.materials} == {part("baked_material").BAKED}
+    assert {m.name for o in real for m in o.data.materials} == {baked_material.BAKED}
     for made in real:
         layer = made.data.attributes["tf_light_front"]
         assert layer.domain == ('POINT' if made["tetflora_kind"] == "bark" else 'FACE')
@@ -303,8 +276,6 @@ def test_real_leaves_show_baked_light_only_if_asked_for_and_materials_stay():
 
 def test_meshes_that_hide_plants_throw_shadows_and_light():
     """A roof takes the sun away; black ground takes what white ground gives."""
-    import bpy
-
     scene = bush_before_the_sky()
     scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.0, 0.0, 0.0, 1.0)
 
@@ -319,7 +290,7 @@ def test_meshes_that_hide_plants_throw_shadows_and_light():
     ground = add_mesh(size=8.0, z=-0.05)
     ground.tetflora.is_occluder = True
     material = bpy.data.materials.new("ground")
-    tree = compat().shader_tree(material)
+    tree = compat.shader_tree(material)
     principled = next(n for n in tree.nodes if n.type == 'BSDF_PRINCIPLED')
     ground.data.materials.append(material)
     colours = {}
@@ -345,7 +316,7 @@ def test_shells_follow_the_scene_and_old_groups_give_way():
     assert found == pytest.approx({"p": 0.5, "s": 0.04, "spear": 20.0, "Roundness": 0.25, "Variation": 0.05})
     refined(scene, shell_diffuse=1.0)
     assert group().inputs["p"].default_value == 1.0
-    version = part("node_tools").VERSION
+    version = node_tools.VERSION
     old, material = group().node_tree, results(scene, "proxy")[0].data.materials[0]
     old[version] -= 1
     material[version] -= 1

@@ -4,10 +4,12 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 import pytest
 
-from tests.blender.scenes import add_mesh, add_plant, depsgraph, part, select
+from tests.blender.scenes import add_mesh, add_plant, depsgraph, select
+from tetflora_addon.blender import brush_properties, ground, node_tools, plant_fields
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -15,8 +17,6 @@ FLAT = [(x, 0.0, 0.0) for x in (-6.0, 0.0, 6.0)]
 
 
 def _brush(**changes):
-    import bpy
-
     settings = bpy.context.scene.tetflora.brush
     options = dict(radius=5.0, density=20.0, min_distance=0.0, store='EMPTIES', source='ONE', species="bush")
     for name, value in {**options, **changes}.items():
@@ -25,8 +25,6 @@ def _brush(**changes):
 
 
 def _stroke(mode='PAINT', places=FLAT):
-    import bpy
-
     bpy.context.view_layer.update()
     stroke = ", ".join(" ".join(str(number) for number in place) for place in places)
     assert bpy.ops.tetflora.paint_plants(mode=mode, stroke=stroke) == {'FINISHED'}
@@ -34,14 +32,10 @@ def _stroke(mode='PAINT', places=FLAT):
 
 
 def _plants():
-    import bpy
-
     return [o for o in bpy.data.objects if o.tetflora.is_plant]
 
 
 def _field():
-    import bpy
-
     found = [o for o in bpy.data.objects if o.tetflora.is_field]
     assert len(found) == 1
     return found[0]
@@ -52,8 +46,6 @@ def _places(field):
 
 
 def test_painted_plants_stand_on_the_ground_under_the_brush():
-    import bpy
-
     ground = add_mesh("ground", size=30.0)
     ground.data.vertices[1].co.z = ground.data.vertices[2].co.z = 6.0  # rises along x
     _brush()
@@ -88,8 +80,6 @@ def test_the_least_distance_holds_against_plants_of_fields_and_by_hand():
 
 
 def test_the_mixture_is_that_of_populate():
-    import bpy
-
     add_mesh("ground", size=30.0)
     for species, weight in (("bush", 3.0), ("conifer", 1.0)):
         entry = bpy.context.scene.tetflora.populate.mix.add()
@@ -101,11 +91,9 @@ def test_the_mixture_is_that_of_populate():
 
 
 def test_many_plants_go_to_one_field_with_all_that_says_how_they_grow():
-    import bpy
-
     add_mesh("ground", size=60.0)
     settings = _brush(store='AUTOMATIC', radius=25.0, density=90.0)
-    limit = part("brush_properties").MOST_PAINTED_EMPTIES
+    limit = brush_properties.MOST_PAINTED_EMPTIES
     for x in (-30.0, 0.0, 30.0):
         _stroke(places=[(x, 0.0, 0.0)])
     field = _field()
@@ -116,7 +104,7 @@ def test_many_plants_go_to_one_field_with_all_that_says_how_they_grow():
     _stroke(places=[(0.0, 40.0, 0.0)])
     assert _field() == field
     assert [entry.species for entry in field.tetflora.field_species] == ["bush", "conifer"]
-    read = part("plant_fields").read_field(field, depsgraph(), np.eye(4)[None])
+    read = plant_fields.read_field(field, depsgraph(), np.eye(4)[None])
     assert (read.species[:before] == 0).all()
     assert (read.species[before:] == 1).all()
     assert (read.scale > 0.79).all()
@@ -154,8 +142,6 @@ def test_erase_and_thin_reach_empties_and_fields_and_keep_attributes():
 
 
 def test_fields_from_elsewhere_and_hidden_plants_are_left_alone():
-    import bpy
-
     add_mesh("ground", size=30.0)
     foreign = add_mesh("foreign", size=2.0, z=0.0)
     foreign.tetflora.is_field = True
@@ -170,8 +156,6 @@ def test_fields_from_elsewhere_and_hidden_plants_are_left_alone():
 
 
 def test_a_field_that_was_moved_gets_plants_where_the_brush_is():
-    import bpy
-
     add_mesh("ground", size=30.0)
     _brush(store='FIELD')
     _stroke()
@@ -182,15 +166,13 @@ def test_a_field_that_was_moved_gets_plants_where_the_brush_is():
     new = _places(field)[first:]
     assert len(new) > 10
     assert (np.abs(new[:, 1]) <= 5.0 + 1e-3).all()
-    read = part("plant_fields").read_field(field, depsgraph(), np.array(field.matrix_world)[None])
+    read = plant_fields.read_field(field, depsgraph(), np.array(field.matrix_world)[None])
     assert 0.79 <= read.scale[first:].min() <= read.scale[first:].max() <= 1.21
     assert np.allclose(read.frame[first:, :, 2], (0.0, 0.0, 1.0), atol=1e-5)
     assert bpy.data.objects["Painted plants"] == field
 
 
 def test_a_linked_duplicate_keeps_its_plants():
-    import bpy
-
     add_mesh("ground", size=30.0)
     _brush(store='FIELD')
     _stroke()
@@ -207,7 +189,7 @@ def test_a_linked_duplicate_keeps_its_plants():
 def test_plants_and_results_are_no_ground():
     add_mesh("ground", size=30.0)
     roof = add_mesh("TetFlora result", size=10.0, z=4.0)
-    part("node_tools").tag(roof)
+    node_tools.tag(roof)
     tree = add_mesh("scanned tree", size=10.0, z=5.0)
     tree.tetflora.is_explicit = True
     _brush()
@@ -217,29 +199,25 @@ def test_plants_and_results_are_no_ground():
 
 
 def test_rays_find_the_nearest_ground_of_many():
-    import bpy
-
     for i in range(12):
         add_mesh(f"step {i}", size=1.0, z=float(i)).location = (3.0 * i, 0.0, 0.0)
-    ground = part("ground").Ground(bpy.context.view_layer, depsgraph())
-    assert len(ground) == 12
+    surface = ground.Ground(bpy.context.view_layer, depsgraph())
+    assert len(surface) == 12
     places = np.array([[3.0 * i, 0.2] for i in range(12)] + [[1.5, 0.0]])
-    heights = ground.heights(places, 100.0, -100.0)
+    heights = surface.heights(places, 100.0, -100.0)
     assert np.allclose(heights[:12], np.arange(12), atol=1e-4)
     assert np.isnan(heights[12])
     bent = bpy.data.objects["step 3"]
     bent.scale, bent.rotation_euler = (1.0, 3.0, 2.0), (0.0, 0.5, 0.0)
-    ground = part("ground").Ground(bpy.context.view_layer, depsgraph())
+    surface = ground.Ground(bpy.context.view_layer, depsgraph())
     from mathutils import Vector
 
-    place, normal = ground.cast(Vector((9.0 + 6.0 * np.sin(0.5), 0.0, 50.0)), Vector((0.0, 0.0, -2.0)))
+    place, normal = surface.cast(Vector((9.0 + 6.0 * np.sin(0.5), 0.0, 50.0)), Vector((0.0, 0.0, -2.0)))
     assert normal.z > 0.8
     assert (bent.matrix_world.inverted() @ place).z == pytest.approx(3.0, abs=1e-4)
 
 
 def test_settings_that_cannot_work_are_told_and_change_nothing():
-    import bpy
-
     add_mesh("ground", size=30.0)
     _brush(radius=1000.0, density=1000.0)
     with pytest.raises(RuntimeError, match="make it smaller or the density lower"):

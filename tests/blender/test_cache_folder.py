@@ -4,10 +4,13 @@
 
 from __future__ import annotations
 
+import bpy
 import pytest
 
-from devtools import session
-from tests.blender.scenes import add_camera, add_plant, depsgraph, part
+from tests.blender.scenes import add_camera, add_plant, depsgraph
+from tetflora_addon import cache_folder
+from tetflora_addon.blender import job, preferences
+from tetflora_addon.shading import facet_shares
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -15,18 +18,15 @@ pytestmark = pytest.mark.usefixtures("clean_file")
 @pytest.fixture
 def cache():
     """The engine's module; afterwards it uses the folder that it used before."""
-    module = session.part("tetflora_addon.cache_folder")
-    before = module.used()
-    yield module
-    own = part("preferences").preferences()
+    before = cache_folder.used()
+    yield cache_folder
+    own = preferences.preferences()
     own.use_cache, own.cache_folder = True, ""
-    module.use(before)
+    cache_folder.use(before)
 
 
 def test_it_lies_where_blender_keeps_what_belongs_to_the_extension(cache, monkeypatch):
-    import bpy
-
-    own = part("preferences").preferences()
+    own = preferences.preferences()
     own.cache_folder = ""
     assert cache.used().is_relative_to(bpy.utils.user_resource('EXTENSIONS'))
     assert not cache.used().exists()
@@ -36,7 +36,7 @@ def test_it_lies_where_blender_keeps_what_belongs_to_the_extension(cache, monkey
 
 
 def test_the_environment_has_the_first_word(cache, monkeypatch, tmp_path):
-    own = part("preferences").preferences()
+    own = preferences.preferences()
     monkeypatch.setenv("TETFLORA_CACHE", str(tmp_path / "shared"))
     own.use_cache = False
     assert cache.used() == tmp_path / "shared"
@@ -49,9 +49,7 @@ def test_the_environment_has_the_first_word(cache, monkeypatch, tmp_path):
 
 
 def test_an_edited_species_is_looked_at_once(cache, tmp_path, monkeypatch):
-    import bpy
-
-    part("preferences").preferences().cache_folder = str(tmp_path / "cache")
+    preferences.preferences().cache_folder = str(tmp_path / "cache")
     scene = bpy.context.scene
     add_camera(location=(0.0, -8.0, 2.0))
     add_plant("fern", "fern")
@@ -59,15 +57,14 @@ def test_an_edited_species_is_looked_at_once(cache, tmp_path, monkeypatch):
     editor = scene.tetflora.species_editor
     editor.species, editor.order = "fern", "0"
     editor.length = 0.05
-    job, shares = part("job"), session.part("tetflora_addon.shading.facet_shares")
-    monkeypatch.setattr(shares, "_found", {})
+    monkeypatch.setattr(facet_shares, "_found", {})
     job.refine(scene, depsgraph())
     (kept,) = (tmp_path / "cache").iterdir()
     (tmp_path / "cache" / "notes.txt").write_text("mine")
 
-    monkeypatch.setattr(shares, "_found", {})
-    shares._shares.cache_clear()
-    monkeypatch.setattr(shares, "fitted_shares", lambda *_: pytest.fail("looked at again"))
+    monkeypatch.setattr(facet_shares, "_found", {})
+    facet_shares._shares.cache_clear()
+    monkeypatch.setattr(facet_shares, "fitted_shares", lambda *_: pytest.fail("looked at again"))
     job.refine(scene, depsgraph())
     assert bpy.ops.tetflora.clear_cache() == {'FINISHED'}
     assert [p.name for p in (tmp_path / "cache").iterdir()] == ["notes.txt"]

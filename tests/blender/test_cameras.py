@@ -6,19 +6,19 @@ from __future__ import annotations
 
 import math
 
+import bpy
 import numpy as np
 import pytest
 
 from tests.blender import renders
-from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, part
+from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph
+from tetflora_addon.blender import camera_reader, compat, job
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
 def _read():
-    import bpy
-
-    return part("camera_reader").read_camera(bpy.context.scene, depsgraph())
+    return camera_reader.read_camera(bpy.context.scene, depsgraph())
 
 
 def test_a_pinhole_that_stands_still_has_neither_lens_nor_shutter():
@@ -45,8 +45,6 @@ def test_the_focus_object_counts_by_its_depth():
 
 @pytest.mark.parametrize(("position", "expected"), [('START', [3.5]), ('CENTER', [2.75, 3.25]), ('END', [2.5])])
 def test_an_animated_camera_is_read_while_its_shutter_is_open(position, expected):
-    import bpy
-
     scene = bpy.context.scene
     obj = add_camera(location=(0.0, 0.0, 0.0))
     rail = add_mesh("rail")
@@ -72,8 +70,6 @@ def test_an_animated_camera_is_read_while_its_shutter_is_open(position, expected
 
 
 def test_a_turning_camera_is_read_in_every_rotation_mode():
-    import bpy
-
     scene = bpy.context.scene
     scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 1.0
     scene.render.motion_blur_position = 'CENTER'
@@ -96,8 +92,6 @@ def test_a_turning_camera_is_read_in_every_rotation_mode():
 
 
 def test_equirectangular_cameras_have_their_limits():
-    import bpy
-
     obj = add_camera()
     obj.data.type, obj.data.panorama_type = 'PANO', 'EQUIRECTANGULAR'
     bpy.context.scene.render.resolution_x, bpy.context.scene.render.resolution_y = 400, 200
@@ -109,8 +103,6 @@ def test_equirectangular_cameras_have_their_limits():
 
 
 def test_a_fisheye_is_a_whole_sphere_of_its_density():
-    import bpy
-
     obj = add_camera()
     obj.data.type, obj.data.panorama_type, obj.data.fisheye_fov = 'PANO', 'FISHEYE_EQUIDISTANT', math.pi
     bpy.context.scene.render.resolution_x = bpy.context.scene.render.resolution_y = 300
@@ -121,8 +113,6 @@ def test_a_fisheye_is_a_whole_sphere_of_its_density():
 
 def _around():
     """Bushes around a panorama, and a spot that each longitude shows."""
-    import bpy
-
     scene = bpy.context.scene
     renders.small_scene(0.8, 8, sun=40.0)
     obj = add_camera(location=(0.0, 0.0, 1.0))
@@ -142,7 +132,7 @@ def test_a_panorama_is_rendered_as_if_all_were_expanded():
     pictures = []
     for everything in (False, True):
         scene.tetflora.expand_everything = everything
-        part("job").refine(scene, depsgraph())
+        job.refine(scene, depsgraph())
         pictures.append(renders.picture())
     refined, expanded = pictures
     plants = np.abs(expanded - bare).max(axis=2) > 0.1
@@ -156,8 +146,6 @@ def test_a_panorama_is_rendered_as_if_all_were_expanded():
 
 def test_longitudes_and_latitudes_are_those_of_cycles():
     """A small dark square is where the engine says, right of the middle and left, above and below."""
-    import bpy
-
     scene = bpy.context.scene
     renders.small_scene(0.8, 4)
     obj = add_camera(location=(1.0, -2.0, 1.0), rotation=(1.3, 0.2, 0.4))
@@ -167,7 +155,7 @@ def test_longitudes_and_latitudes_are_those_of_cycles():
     scene.render.resolution_x, scene.render.resolution_y = 100, 60
     square = add_mesh(size=0.25)
     material = bpy.data.materials.new("black")
-    renders.compat().shader_tree(material).nodes["Principled BSDF"].inputs["Base Color"].default_value = (0, 0, 0, 1)
+    compat.shader_tree(material).nodes["Principled BSDF"].inputs["Base Color"].default_value = (0, 0, 0, 1)
     square.data.materials.append(material)
     for longitude, latitude in ((0.9, 0.3), (-0.5, -0.6)):
         depsgraph().update()

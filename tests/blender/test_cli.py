@@ -7,9 +7,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import bpy
 import pytest
 
-from tests.blender.scenes import add_camera, add_plant, datablocks, part, tiny_render
+from tests.blender.scenes import add_camera, add_plant, datablocks, tiny_render
+from tetflora_addon.blender import command_line, job
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -25,7 +27,7 @@ def forest():
 
 
 def _run(*arguments) -> int:
-    return part("command_line").main([str(a) for a in arguments])
+    return command_line.main([str(a) for a in arguments])
 
 
 def _figures(capfd) -> dict:
@@ -44,8 +46,6 @@ def test_stats_changes_nothing(forest, capfd):
 
 
 def test_refine_saves_a_copy_with_the_result(forest, tmp_path, capfd):
-    import bpy
-
     path = tmp_path / "refined.blend"
     assert _run("refine", "--cutoff", 8, "--form", "shells", "--save", path, "--json") == 0
     figures = _figures(capfd)
@@ -53,13 +53,11 @@ def test_refine_saves_a_copy_with_the_result(forest, tmp_path, capfd):
     assert set(figures["seconds"]) >= {"read", "refine", "emit"}
     assert (forest.tetflora.cutoff, forest.tetflora.proxy_form) == (8.0, 'SHELLS')
     bpy.ops.wm.open_mainfile(filepath=str(path))
-    assert part("job").has_results(bpy.context.scene)
-    assert part("job").clear(bpy.context.scene) > 0
+    assert job.has_results(bpy.context.scene)
+    assert job.clear(bpy.context.scene) > 0
 
 
 def test_two_slashes_lead_from_the_file(forest, tmp_path, capfd):
-    import bpy
-
     (tmp_path / "shots").mkdir()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shots" / "shot.blend"))
     assert _run("refine", "--save", "//../refined.blend") == 0
@@ -105,8 +103,6 @@ def test_in_a_folder_pictures_are_named_by_their_frames(forest, tmp_path, capfd)
 
 
 def test_frames_below_zero_are_rendered_though_no_range_of_blender_has_them(forest, tmp_path, capfd):
-    import bpy
-
     seen = []
 
     def rendered(scene, _depsgraph=None):
@@ -141,8 +137,6 @@ def test_a_render_without_its_plants_fails(forest, tmp_path, capfd):
 
 @pytest.mark.parametrize("command", ["refine", "stats", "render"])
 def test_a_scene_that_cannot_be_used_is_one_line_and_exit_code_1(command, forest, capfd):
-    import bpy
-
     if command == "stats":
         bpy.data.objects["p0"].tetflora.species = "quercus"
     else:

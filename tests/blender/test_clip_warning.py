@@ -4,9 +4,10 @@
 
 from __future__ import annotations
 
+import bpy
 import pytest
 
-from devtools import session
+from operators import refine
 from tests.blender.scenes import add_camera, add_plant, depsgraph
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -15,8 +16,6 @@ pytestmark = pytest.mark.usefixtures("clean_file")
 @pytest.fixture
 def far_row():
     """A camera that looks along +Y from the origin; plants 50, 150 and 250 m away, and one that is switched off."""
-    import bpy
-
     camera = add_camera(location=(0.0, 0.0, 2.0))
     camera.scale = (3.0, 3.0, 3.0)  # a camera's scale does not move its range
     for distance in (50.0, 150.0, 250.0, 350.0):
@@ -28,25 +27,19 @@ def far_row():
 
 @pytest.mark.parametrize(("clip_end", "beyond"), [(100.0, 2), (200.0, 1)])
 def test_plants_beyond_the_range_are_counted(far_row, clip_end, beyond):
-    import bpy
-
     far_row.data.clip_end = clip_end
-    text = session.part("operators.refine")._cut_off(bpy.context.scene)
+    text = refine._cut_off(bpy.context.scene)
     assert text.startswith(f"{beyond} of 3 plants")
     assert f'raise Clip End of "camera", now {clip_end:g} m' in text
 
 
 def test_no_warning_where_all_are_in_range(far_row):
-    import bpy
-
     far_row.data.clip_end = 251.0
-    assert session.part("operators.refine")._cut_off(bpy.context.scene) == ""
+    assert refine._cut_off(bpy.context.scene) == ""
 
 
 @pytest.mark.parametrize("distance", [20.0, 250.0])
 def test_a_camera_that_sees_none_of_the_plants_is_told(clean_file, capfd, distance):
-    import bpy
-
     camera = add_camera(location=(0.0, 0.0, 2.0))
     camera.data.clip_end = 1000.0
     add_plant("plant", location=(0.0, distance, 0.0))

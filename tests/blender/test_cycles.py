@@ -8,6 +8,7 @@ import gc
 import os
 from pathlib import Path
 
+import bpy
 import numpy as np
 import pytest
 
@@ -33,8 +34,6 @@ def size(data: object) -> int:
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="asks Linux how much memory there is in use")
 @pytest.mark.parametrize("form", ['MICROSURFACES', 'MICROSPHERES'])
 def test_cycles_of_refine_and_clear_leave_nothing_behind(clean_file, form):
-    import bpy
-
     scene = bpy.context.scene
     add_camera(location=(0.0, -14.0, 3.0), rotation=(1.4, 0.0, 0.0))
     scene.render.resolution_x = scene.render.resolution_y = 48

@@ -4,39 +4,37 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 import pytest
 
-from devtools import session
-from tests.blender.scenes import add_mesh, add_plant, depsgraph, part, select
+from tests.blender.scenes import add_mesh, add_plant, depsgraph, select
+from tetflora_addon.blender import plant_fields, plant_objects, transforms
+from tetflora_addon.planting import places
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
-def _field(places=((0.0, 0.0, 4.0), (2.0, 0.0, -3.0), (90.0, 0.0, 1.0)), species=("bush", "conifer"), kinds=None):
-    import bpy
-
-    places = np.array(places)
-    number = len(places)
-    placement = session.part("tetflora_addon.planting.places").Placement(
-        position=places,
+def _field(positions=((0.0, 0.0, 4.0), (2.0, 0.0, -3.0), (90.0, 0.0, 1.0)), species=("bush", "conifer"), kinds=None):
+    positions = np.array(positions)
+    number = len(positions)
+    placement = places.Placement(
+        position=positions,
         azimuth=np.zeros(number),
         scale=np.ones(number),
         species=np.array(kinds or [i % len(species) for i in range(number)], np.int32),
         seed=np.arange(number, dtype=np.int32) + 5,
         wanted=number,
     )
-    return part("plant_objects").add_field(bpy.context.scene, placement, species)
+    return plant_objects.add_field(bpy.context.scene, placement, species)
 
 
 def _read(field):
     graph = depsgraph()
-    return part("plant_fields").read_field(field, graph, part("transforms").world_matrix(field, graph)[None])
+    return plant_fields.read_field(field, graph, transforms.world_matrix(field, graph)[None])
 
 
 def test_plants_fall_and_rise_to_the_nearest_ground(capfd):
-    import bpy
-
     add_mesh("ground", size=20.0)
     add_mesh("ledge", size=1.0, z=5.0)
     plants = [
@@ -57,8 +55,6 @@ def test_plants_fall_and_rise_to_the_nearest_ground(capfd):
 
 
 def test_children_and_their_parents_both_arrive():
-    import bpy
-
     add_mesh("ground", size=20.0)
     parent = add_plant("a parent", location=(1.0, 0.0, 8.0))
     child = add_plant("a child", location=(3.0, 0.0, 2.0))
@@ -72,8 +68,6 @@ def test_children_and_their_parents_both_arrive():
 
 
 def test_points_of_a_field_fall_wherever_the_field_is():
-    import bpy
-
     add_mesh("ground", size=20.0, z=1.0)
     field = _field()
     field.location, field.rotation_euler = (1.0, 2.0, 3.0), (0.0, 0.0, 0.7)
@@ -88,16 +82,12 @@ def test_points_of_a_field_fall_wherever_the_field_is():
 
 
 def test_without_ground_nothing_happens():
-    import bpy
-
     select(add_plant("alone", location=(0.0, 0.0, 4.0)))
     with pytest.raises(RuntimeError, match="no mesh to fall onto"):
         bpy.ops.tetflora.drop_to_ground()
 
 
 def test_the_species_of_fields_changes_with_that_of_plants():
-    import bpy
-
     field, plant = _field(kinds=[0, 1, 0]), add_plant("plant", species="conifer")
     before = _read(field)
     select(field, plant)
@@ -111,8 +101,6 @@ def test_the_species_of_fields_changes_with_that_of_plants():
 
 
 def test_a_field_of_nodes_keeps_its_numbers():
-    import bpy
-
     field = add_mesh("foreign")
     field.tetflora.is_field = True
     for species in ("bush", "conifer"):
@@ -125,8 +113,6 @@ def test_a_field_of_nodes_keeps_its_numbers():
 
 
 def test_fields_are_re_rolled_and_each_roll_is_another():
-    import bpy
-
     field = _field()
     select(field)
     seen = [_read(field).seed.tolist()]

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 import pytest
 
@@ -15,8 +16,6 @@ MIDDLE, RADIUS = (3.0, -2.0, 0.0), 4.0
 
 
 def _scene():
-    import bpy
-
     return bpy.context.scene
 
 
@@ -37,8 +36,6 @@ def _places():
 
 
 def _populate(as_field='EMPTIES'):
-    import bpy
-
     select(add_mesh("ground", size=15.0))
     bpy.ops.tetflora.populate(count=150, species="bush", min_distance=0.5, as_field=as_field)
     bpy.context.view_layer.update()
@@ -46,8 +43,6 @@ def _populate(as_field='EMPTIES'):
 
 
 def _stroke(mode='ERASE', **changes):
-    import bpy
-
     for name, value in {"radius": RADIUS, "strength": 1.0, **changes}.items():
         setattr(_scene().tetflora.brush, name, value)
     bpy.context.view_layer.update()
@@ -57,8 +52,6 @@ def _stroke(mode='ERASE', **changes):
 
 
 def _update(name="update_population"):
-    import bpy
-
     getattr(bpy.ops.tetflora, name)()
     bpy.context.view_layer.update()
     return _places()
@@ -101,8 +94,6 @@ def test_what_is_thinned_stays_away_one_by_one(how):
 
 
 def test_plants_by_hand_and_other_populations_are_not_asked():
-    import bpy
-
     _populate()
     erased = _population().erased
     _scene().tetflora.populations.add().uid = "another"
@@ -118,8 +109,6 @@ def test_plants_by_hand_and_other_populations_are_not_asked():
 
 
 def test_places_can_be_forgotten():
-    import bpy
-
     before = _populate()
     _stroke()
     bpy.ops.tetflora.forget_erased()

@@ -4,19 +4,20 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 import pytest
 
-from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph, errors, part, select
+from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph, select
+from tetflora_addon import errors
+from tetflora_addon.blender import compat, explicit_objects, handlers, job, material_means, species_items
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
 def _material(name="paint", colour=(0.2, 0.5, 0.1, 1.0), image=None):
-    import bpy
-
     material = bpy.data.materials.new(name)
-    tree = part("compat").shader_tree(material)
+    tree = compat.shader_tree(material)
     principled = next(n for n in tree.nodes if n.type == 'BSDF_PRINCIPLED')
     principled.inputs["Base Color"].default_value = colour
     if image is not None:
@@ -29,8 +30,6 @@ def _material(name="paint", colour=(0.2, 0.5, 0.1, 1.0), image=None):
 
 def _leaves(name="leaves", count=400, spread=2.0, size=0.1, seed=0, material=None):
     """Loose quads, the last of them without area."""
-    import bpy
-
     rng = np.random.default_rng(seed)
     middle = rng.uniform([-spread, -spread, 0], [spread, spread, 2 * spread], (count, 1, 3))
     a, b = size * rng.normal(size=(2, count, 1, 3))
@@ -48,8 +47,6 @@ def _leaves(name="leaves", count=400, spread=2.0, size=0.1, seed=0, material=Non
 
 
 def _scene():
-    import bpy
-
     add_camera(location=(0.0, -16.0, 2.0))
     scene = bpy.context.scene
     scene.render.resolution_x, scene.render.resolution_y = 320, 240
@@ -60,7 +57,7 @@ def _scene():
 def _refine(scene, **settings):
     for name, value in settings.items():
         setattr(scene.tetflora, name, value)
-    return part("job").refine(scene, depsgraph())
+    return job.refine(scene, depsgraph())
 
 
 def _made(scene, kind="explicit"):
@@ -76,9 +73,7 @@ def _area(objects):
 
 
 def _read():
-    import bpy
-
-    return part("explicit_objects").read_explicit(depsgraph(), bpy.context.view_layer)
+    return explicit_objects.read_explicit(depsgraph(), bpy.context.view_layer)
 
 
 def test_near_meshes_come_out_as_they_are_without_any_plant():
@@ -86,7 +81,7 @@ def test_near_meshes_come_out_as_they_are_without_any_plant():
     scene = _scene()
     leaves = _leaves()
     broken = scene.tetflora.species_edits.add()  # none of the scene's business
-    broken.identifier, broken.text = min(part("species_items").catalogue()), "{"
+    broken.identifier, broken.text = min(species_items.catalogue()), "{"
     statistics = _refine(scene)
     made = _made(scene)
     assert sum(len(o.data.polygons) for o in made) == 400 == statistics.polygons_meshed == statistics.polygons_full
@@ -128,7 +123,7 @@ def test_clear_gives_visibility_back(flags):
     assert first.polygons_meshed == second.polygons_meshed
     assert len(_made(scene)) > 0
     leaves.name = "renamed"
-    part("job").clear(scene)
+    job.clear(scene)
     assert (leaves.hide_render, leaves.hide_viewport) == flags
     leaves.name = "leaves"
     assert datablocks() == before
@@ -139,11 +134,11 @@ def test_a_job_that_is_closed_or_fails_leaves_originals_visible(monkeypatch):
     scene = _scene()
     leaves = _leaves()
     before = datablocks()
-    job = part("job").refine_steps(scene, depsgraph())
-    for progress in job:
+    steps = job.refine_steps(scene, depsgraph())
+    for progress in steps:
         if "Keeping" in progress.message:
             break
-    job.close()
+    steps.close()
     assert datablocks() == before
     assert not (leaves.hide_render or leaves.hide_viewport)
 
@@ -151,12 +146,12 @@ def test_a_job_that_is_closed_or_fails_leaves_originals_visible(monkeypatch):
         raise MemoryError
 
     _refine(scene)
-    monkeypatch.setattr(part("job"), "write_proxies", broken)
+    monkeypatch.setattr(job, "write_proxies", broken)
     with pytest.raises(MemoryError):
         _refine(scene)
     assert leaves.hide_render  # earlier results are still there
     assert _made(scene)
-    part("job").clear(scene)
+    job.clear(scene)
     assert not (leaves.hide_render or leaves.hide_viewport)
 
 
@@ -164,15 +159,15 @@ def test_results_for_a_render_and_those_of_the_artist_do_not_meet():
     scene = _scene()
     leaves = _leaves()
     _refine(scene)
-    part("job").refine(scene, depsgraph(), for_render=True)
+    job.refine(scene, depsgraph(), for_render=True)
     assert leaves.hide_render
-    part("job").clear(scene, for_render=True)
+    job.clear(scene, for_render=True)
     assert (leaves.hide_render, leaves.hide_viewport) == (True, True)
-    part("job").clear(scene)
+    job.clear(scene)
     assert (leaves.hide_render, leaves.hide_viewport) == (False, False)
-    part("job").refine(scene, depsgraph(), for_render=True)
+    job.refine(scene, depsgraph(), for_render=True)
     assert (leaves.hide_render, leaves.hide_viewport) == (True, False)
-    part("job").clear(scene, for_render=True)
+    job.clear(scene, for_render=True)
     assert not leaves.hide_render
 
 
@@ -180,7 +175,6 @@ def test_a_render_refines_a_scene_that_has_meshes_alone():
     """Refine at Render needs no plant; afterwards the original is as it was."""
     scene = _scene()
     leaves = _leaves()
-    handlers = part("handlers")
     assert scene.tetflora.refine_at_render
     handlers.on_render_pre(scene)
     assert handlers.render_errors() == []
@@ -193,8 +187,6 @@ def test_a_render_refines_a_scene_that_has_meshes_alone():
 
 def test_instances_of_collections_take_part_each_in_its_place():
     """With all that the collection shows; the empty is hidden, the collection is not."""
-    import bpy
-
     scene = _scene()
     group = bpy.data.collections.new("group")
     for obj in (_leaves(), add_mesh("rock")):
@@ -214,13 +206,11 @@ def test_instances_of_collections_take_part_each_in_its_place():
     assert all(o.hide_render for o in explicit.originals)
     height = [_points(_made(scene))[:, 2][np.abs(_points(_made(scene))[:, 0] - x) < 2].max() for x in (-6, 0, 6)]
     assert height[0] < 0.7 * height[1] < 0.7 * height[2]
-    part("job").clear(scene)
+    job.clear(scene)
     assert not any(o.hide_render or o.hide_viewport for o in explicit.originals)
 
 
 def test_modifiers_and_curves_count():
-    import bpy
-
     scene = _scene()
     box = add_mesh("sheet")
     box.modifiers.new("array", 'ARRAY').count = 5
@@ -239,9 +229,7 @@ def test_modifiers_and_curves_count():
 
 
 def test_colours_come_from_materials_images_and_attributes():
-    import bpy
-
-    looks = part("material_means").Looks()
+    looks = material_means.Looks()
     image = bpy.data.images.new("picture", 8, 8, alpha=True)
     pixels = np.zeros((8, 8, 4), np.float32)
     pixels[:4] = (1.0, 0.5, 0.0, 1.0)  # the other half is transparent, and counts for nothing
@@ -269,14 +257,12 @@ def test_colours_come_from_materials_images_and_attributes():
 
 
 def test_nodes_that_are_switched_off_have_no_say():
-    import bpy
-
     material = _material(colour=(0.2, 0.5, 0.1, 1.0))
     material.diffuse_color = (0.7, 0.1, 0.3, 1.0)
     if bpy.app.version < (5, 0, 0):  # from then on nodes cannot be switched off
         material.use_nodes = False
     expected = (0.7, 0.1, 0.3) if bpy.app.version < (5, 0, 0) else (0.2, 0.5, 0.1)
-    np.testing.assert_allclose(part("material_means").Looks().of(material, {}).colour, expected, atol=1e-6)
+    np.testing.assert_allclose(material_means.Looks().of(material, {}).colour, expected, atol=1e-6)
 
 
 @pytest.mark.parametrize("what", ["faces", "numbers"])
@@ -287,22 +273,20 @@ def test_what_cannot_be_refined_is_named(what):
     if what == "numbers":
         stone.data.vertices[1].co.x = float("nan")
     before = datablocks()
-    with pytest.raises(errors().SceneError, match="stone"):
+    with pytest.raises(errors.SceneError, match="stone"):
         _refine(scene)
     assert datablocks() == before
     assert not stone.hide_render
 
 
 def test_what_is_linked_is_refused_because_its_file_keeps_its_flags(tmp_path):
-    import bpy
-
     scene, path = _scene(), str(tmp_path / "rocks.blend")
     bpy.data.libraries.write(path, {_leaves("source")})
     bpy.data.batch_remove([bpy.data.objects["source"]])
     with bpy.data.libraries.load(path, link=True) as (_, wanted):
         wanted.objects = ["source"]
     scene.collection.objects.link(wanted.objects[0])
-    with pytest.raises(errors().SceneError, match=r'"source" is linked .* library override'):
+    with pytest.raises(errors.SceneError, match=r'"source" is linked .* library override'):
         _refine(scene)
 
 
@@ -323,7 +307,6 @@ def test_plants_meshes_and_occluders_together():
 
 def test_the_refined_picture_is_that_of_the_mesh():
     """Mean radiance over blocks of the picture; the leaf limit makes most of it proxies."""
-    import bpy
 
     from tests.blender.renders import picture
 
@@ -331,7 +314,7 @@ def test_the_refined_picture_is_that_of_the_mesh():
     leaves = _leaves(count=30_000, size=0.025, spread=3.0)
     leaves.location.z = -1.0
     scene.world = bpy.data.worlds.new("sky")
-    part("compat").shader_tree(scene.world).nodes["Background"].inputs["Color"].default_value = (0.8, 0.8, 0.8, 1.0)
+    compat.shader_tree(scene.world).nodes["Background"].inputs["Color"].default_value = (0.8, 0.8, 0.8, 1.0)
     scene.render.engine = 'CYCLES'
     scene.render.resolution_x, scene.render.resolution_y = 96, 72
     scene.cycles.samples = 64
@@ -351,8 +334,6 @@ def test_the_refined_picture_is_that_of_the_mesh():
 
 
 def test_smooth_normals_survive_turning_and_mirroring():
-    import bpy
-
     scene = _scene()
     bpy.ops.mesh.primitive_uv_sphere_add(segments=16, ring_count=8)
     ball = bpy.context.object
@@ -376,8 +357,6 @@ def test_smooth_normals_survive_turning_and_mirroring():
 
 
 def test_instances_of_nodes_take_part_and_their_maker_is_hidden():
-    import bpy
-
     _scene()
     leaves = _leaves(count=50)
     leaves.hide_render = True  # as who scatters it would have it; its instances render all the same
@@ -405,8 +384,6 @@ def test_instances_of_nodes_take_part_and_their_maker_is_hidden():
 
 
 def test_the_operator_marks_and_unmarks():
-    import bpy
-
     add_camera()
     stone, plant = add_mesh("stone"), add_plant()
     select(stone, plant)

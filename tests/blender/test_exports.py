@@ -13,11 +13,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import bpy
 import numpy as np
 import pytest
 
 from devtools import session
-from tests.blender.scenes import add_camera, add_plant, depsgraph, part
+from tests.blender.scenes import add_camera, add_plant, depsgraph
+from tetflora_addon.blender import compat, job
 
 FORMATS = ("usdc", "abc", "obj", "glb")
 FORMS = ('MICROSURFACES', 'SHELLS')
@@ -48,8 +50,6 @@ def ready(blender_format: str) -> None:
 
 def is_absent(suffix: str) -> bool:
     """Whether this Blender is built without the library of a format; then it has no exporter for it either."""
-    import bpy
-
     libraries = {"usdc": bpy.app.build_options.usd, "abc": bpy.app.build_options.alembic}
     if libraries.get(suffix, True):
         return False
@@ -60,8 +60,6 @@ def is_absent(suffix: str) -> bool:
 
 
 def export(path: Path, **options: object) -> None:
-    import bpy
-
     ready(path.suffix[1:])
     call: Callable = {
         ".usdc": bpy.ops.wm.usd_export,
@@ -74,8 +72,6 @@ def export(path: Path, **options: object) -> None:
 
 def read_back(path: Path) -> None:
     """Import into an empty file."""
-    import bpy
-
     session.clean_file()
     ready(path.suffix[1:])
     call: Callable = {
@@ -90,8 +86,6 @@ def read_back(path: Path) -> None:
 
 def refined(form: str):
     """Two plants of different species before a small camera, refined: real leaves, bark and proxies."""
-    import bpy
-
     session.clean_file()
     scene = bpy.context.scene
     add_camera(location=(0.0, -14.0, 3.0), rotation=(1.4, 0.0, 0.0))
@@ -99,7 +93,7 @@ def refined(form: str):
     for n, species in enumerate(("bush", "conifer")):
         add_plant(species, species, seed=n, location=(3.0 * n - 1.5, 0.0, 0.0))
     scene.tetflora.proxy_form, scene.tetflora.leaf_limit = form, 0.3
-    part("job").refine(scene, depsgraph())
+    job.refine(scene, depsgraph())
     bpy.context.view_layer.update()
     return scene
 
@@ -111,8 +105,6 @@ def plain(name: str) -> str:
 
 def surfaces() -> dict[str, Surface]:
     """All meshes with faces by name, in world space."""
-    import bpy
-
     return {plain(o.name): measure(o) for o in bpy.context.scene.objects if o.type == 'MESH' and o.data.polygons}
 
 
@@ -194,8 +186,6 @@ def test_usd_holds_the_colour_of_each_leaf(blender, tmp_path):
 
 
 def test_obj_holds_the_viewport_colour_of_each_material(blender, tmp_path):
-    import bpy
-
     refined('MICROSURFACES')
     colours = {plain(m.name): tuple(m.diffuse_color)[:3] for m in bpy.data.materials}
     export(tmp_path / "forest.obj")
@@ -210,8 +200,6 @@ def test_obj_holds_the_viewport_colour_of_each_material(blender, tmp_path):
 def test_parents_of_species_come_along(blender, tmp_path, suffix):
     if is_absent(suffix):
         return
-    import bpy
-
     refined('MICROSURFACES')
     expected = {plain(o.name): plain(o.parent.name) for o in bpy.context.scene.objects if o.parent is not None}
     assert set(expected.values()) == {"Bush__TetFlora_", "Conifer__TetFlora_"}
@@ -226,8 +214,6 @@ def test_parents_of_species_come_along(blender, tmp_path, suffix):
 def test_microspheres_come_back_from_usd_alone(blender, tmp_path, suffix):
     if is_absent(suffix):
         return
-    import bpy
-
     refined('MICROSPHERES')
     clouds = [o for o in bpy.context.scene.objects if o.get("tetflora_kind") == "proxy"]
     points = sum(len(o.data.points if o.type == 'POINTCLOUD' else o.data.vertices) for o in clouds)
@@ -237,7 +223,7 @@ def test_microspheres_come_back_from_usd_alone(blender, tmp_path, suffix):
     read_back(tmp_path / f"forest.{suffix}")
     read = [o for o in bpy.context.scene.objects if o.type in {'POINTCLOUD', 'MESH'} and "proxies" in o.name]
     found = sum(len(o.data.points if o.type == 'POINTCLOUD' else o.data.vertices) for o in read)
-    by_usd = suffix == "usdc" and part("compat").can_resize_point_clouds()
+    by_usd = suffix == "usdc" and compat.can_resize_point_clouds()
     assert found == (points if by_usd else 0)
     assert set(surfaces()) == set(expected)  # the rest is there all the same
     if by_usd:
@@ -249,8 +235,6 @@ def test_results_are_exported_by_themselves(blender, tmp_path, suffix):
     """Nothing but results: as a selection once they are kept, since before nothing of them can be selected."""
     if is_absent(suffix):
         return
-    import bpy
-
     refined('MICROSURFACES')
     expected = surfaces()
     ground = bpy.data.objects.new("ground", bpy.data.meshes.new("ground"))
@@ -279,8 +263,6 @@ def test_the_collection_is_exported_by_name(blender, tmp_path, suffix, option):
     """The exporters of a collection's own panel, which nothing has to be selected for."""
     if is_absent(suffix):
         return
-    import bpy
-
     refined('MICROSURFACES')
     expected = surfaces()
     ground = bpy.data.objects.new("ground", bpy.data.meshes.new("ground"))

@@ -9,11 +9,14 @@ import os
 import zipfile
 from pathlib import Path
 
+import bpy
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, errors, part, tiny_render
+from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, tiny_render
+from tetflora_addon import errors
+from tetflora_addon.blender import command_line, compat, farm_bundle, farm_template
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -21,8 +24,6 @@ pytestmark = pytest.mark.usefixtures("clean_file")
 @pytest.fixture
 def shot(tmp_path: Path) -> Path:
     """A saved file of one bush, frames 1, 3, 5, 7."""
-    import bpy
-
     scene = tiny_render()
     add_camera(location=(0.0, -60.0, 2.0))
     add_plant()
@@ -35,7 +36,7 @@ def shot(tmp_path: Path) -> Path:
 
 
 def _run(*arguments) -> int:
-    return part("command_line").main(["farm", *map(str, arguments)])
+    return command_line.main(["farm", *map(str, arguments)])
 
 
 def _read(folder: Path, title: str) -> dict:
@@ -75,8 +76,6 @@ def test_every_parameter_of_a_command_is_defined(shot, tmp_path):
 
 
 def test_nothing_of_the_artist_is_changed(shot, tmp_path):
-    import bpy
-
     before, content = datablocks(), shot.read_bytes()
     scene = bpy.context.scene
     settings = (scene.frame_start, scene.frame_end, scene.frame_step, scene.frame_current, scene.render.filepath)
@@ -96,15 +95,12 @@ def test_the_zip_holds_the_extension_and_nothing_else(shot, tmp_path):
         names = archive.namelist()
     assert {"blender_manifest.toml", "__init__.py", "tetflora_addon/blender/farm_installer.py"} <= set(names)
     assert [n for n in names if "__pycache__" in n or n.startswith(("tests/", "docs/", ".", "benchmarks/"))] == []
-    bundle = part("farm_bundle")
-    bundle.write_zip(tmp_path / "again.zip")
+    farm_bundle.write_zip(tmp_path / "again.zip")
     assert (tmp_path / "again.zip").read_bytes() == path.read_bytes()
 
 
 def _with_assets(shot: Path) -> dict[str, Path]:
     """Give the scene a picture, a sequence of pictures, and a library that uses a picture itself."""
-    import bpy
-
     project = shot.parents[1]
     files = {"leaf": "textures/leaf.png", "1": "plates/p_01.png", "2": "plates/p_02.png", "bark": "props/bark.png"}
     paths = {key: project / name for key, name in files.items()}
@@ -117,7 +113,7 @@ def _with_assets(shot: Path) -> dict[str, Path]:
     paths["library"] = project / "props" / "props.blend"
     prop = add_mesh("prop")
     material = bpy.data.materials.new("bark")
-    node = part("compat").shader_tree(material).nodes.new("ShaderNodeTexImage")
+    node = compat.shader_tree(material).nodes.new("ShaderNodeTexImage")
     node.image = bpy.data.images.load(str(paths["bark"]))
     node.image.filepath = f"//{os.path.relpath(paths['bark'], paths['library'].parent)}"
     prop.data.materials.append(material)
@@ -144,8 +140,6 @@ def test_files_of_the_scene_are_named(shot, tmp_path):
 
 
 def test_a_copied_scene_finds_its_files_elsewhere(shot, tmp_path):
-    import bpy
-
     paths = _with_assets(shot)
     assert _run(tmp_path / "job", "--copy") == 0
     bundle = (tmp_path / "job").rename(tmp_path / "moved")
@@ -161,8 +155,6 @@ def test_a_copied_scene_finds_its_files_elsewhere(shot, tmp_path):
 
 
 def test_files_that_are_not_there_and_absolute_paths_are_told(shot, tmp_path, capfd):
-    import bpy
-
     paths = _with_assets(shot)
     paths["leaf"].unlink()
     bpy.data.images["p_01.png"].filepath = str(paths["1"])
@@ -191,8 +183,6 @@ def test_a_file_that_was_never_saved(tmp_path, capfd):
     ids=["no camera", "unknown species"],
 )
 def test_what_no_worker_could_render(shot, tmp_path, capfd, spoil, says):
-    import bpy
-
     spoil(bpy.context.scene)
     assert _run(tmp_path / "job") == 1
     assert says in _error(capfd)
@@ -200,9 +190,8 @@ def test_what_no_worker_could_render(shot, tmp_path, capfd, spoil, says):
 
 
 def test_no_frames_and_frames_named_twice(shot, tmp_path, capfd):
-    template = part("farm_template")
-    with pytest.raises(errors().SceneError, match="no frames"):
-        template.frame_expression([(5, 4, 1)])
+    with pytest.raises(errors.SceneError, match="no frames"):
+        farm_template.frame_expression([(5, 4, 1)])
     assert _run(tmp_path / "job", "--frames", "1-4,3") == 1
     assert "Frame 3 is named twice" in _error(capfd)
     assert _run(tmp_path / "job", "--frames", "9-2") == 2
@@ -227,7 +216,7 @@ def test_a_failure_leaves_nothing_behind(shot, tmp_path, capfd, monkeypatch):
     def no_space(*_):
         raise OSError(28, "No space left on device", "x.zip")
 
-    monkeypatch.setattr(part("farm_bundle"), "write_zip", no_space)
+    monkeypatch.setattr(farm_bundle, "write_zip", no_space)
     assert _run(tmp_path / "job") == 1
     assert "No space left" in _error(capfd)
     assert not (tmp_path / "job").exists()
@@ -245,19 +234,18 @@ RUNS = st.lists(
 
 @given(RUNS)
 def test_an_expression_names_the_frames_that_it_was_made_of(runs):
-    template = part("farm_template")
-    numbers = template.frame_numbers(runs)
+    numbers = farm_template.frame_numbers(runs)
     if len(set(numbers)) < len(numbers):
         return
-    assert template.frame_numbers(template.frame_runs(template.frame_expression(runs))) == numbers
+    assert farm_template.frame_numbers(farm_template.frame_runs(farm_template.frame_expression(runs))) == numbers
 
 
 @pytest.mark.parametrize("text", ["", "a", "1-", "3-1", "1-9:0", "1..4", "1-9:-1", "1,,2"])
 def test_other_expressions_are_refused(text):
     with pytest.raises(ValueError, match="not a range of frames"):
-        part("farm_template").frame_runs(text)
+        farm_template.frame_runs(text)
 
 
 def test_a_name_is_no_variable():
-    assert part("farm_template").job_name("a{{Param.X}}\n") == "a Param.X (TetFlora)"
-    assert len(part("farm_template").job_name("x" * 500)) == 128
+    assert farm_template.job_name("a{{Param.X}}\n") == "a Param.X (TetFlora)"
+    assert len(farm_template.job_name("x" * 500)) == 128

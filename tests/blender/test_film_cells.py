@@ -4,10 +4,12 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 import pytest
 
-from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, part
+from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph
+from tetflora_addon.blender import emit, handlers, job, kept_results
 
 FRAMES = 9
 
@@ -15,8 +17,6 @@ FRAMES = 9
 @pytest.fixture
 def flight(clean_file):
     """Two bushes, as seen from 60 m by a long lens, and a camera that goes 12 m aside."""
-    import bpy
-
     scene = bpy.context.scene
     scene.render.resolution_x, scene.render.resolution_y = 64, 36
     camera = add_camera(location=(-6.0, -60.0, 2.0))
@@ -30,15 +30,15 @@ def flight(clean_file):
     settings.leaf_limit, settings.cutoff, settings.visibility_resolution = 1.0, 6.0, 64
     depsgraph()
     yield scene
-    part("handlers").on_render_end(scene)
+    handlers.on_render_end(scene)
 
 
 def at(scene, frame):
     """Vertices of all meshes of a frame, by name."""
     scene.frame_set(frame)
-    part("handlers").on_render_pre(scene)
-    assert part("handlers").render_errors() == []
-    (collection,) = part("emit").result_collections(scene, 'RENDER')
+    handlers.on_render_pre(scene)
+    assert handlers.render_errors() == []
+    (collection,) = emit.result_collections(scene, 'RENDER')
     found = {}
     for obj in collection.objects:
         if obj.type == 'MESH':
@@ -54,8 +54,8 @@ def rooms(scene):
     found = []
     for frame in range(1, FRAMES + 1):
         scene.frame_set(frame)
-        given = part("job").read_scene(scene, depsgraph(), depsgraph().view_layer)
-        found.append(part("kept_results").shared_camera(scene, depsgraph(), given).room)
+        given = job.read_scene(scene, depsgraph(), depsgraph().view_layer)
+        found.append(kept_results.shared_camera(scene, depsgraph(), given).room)
     return found
 
 
@@ -63,13 +63,13 @@ def test_each_frame_of_a_flight_is_the_frame_alone(flight):
     sequence = {n: at(flight, n) for n in range(1, FRAMES + 1)}
     assert len({min(found) for found in sequence.values()}) < FRAMES
     for n in range(FRAMES, 0, -1):
-        part("handlers").on_render_end(flight)
+        handlers.on_render_end(flight)
         assert at(flight, n) == sequence[n]
 
 
 @pytest.mark.parametrize("thing", ["plant", "mesh", "tall plant"])
 def test_cells_are_larger_far_from_all_that_is_refined(flight, thing):
-    small = part("kept_results").shared_camera(flight, depsgraph()).room
+    small = kept_results.shared_camera(flight, depsgraph()).room
     assert min(rooms(flight)) >= 2.0 * small
     if thing == "plant":
         add_plant("near", seed=3, location=(0.0, -57.0, 0.0))

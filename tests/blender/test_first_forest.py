@@ -4,18 +4,18 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 import pytest
 
-from devtools import session
-from tests.blender.scenes import add_camera, add_mesh, datablocks, part
+from panels import refine_panel
+from tests.blender.scenes import add_camera, add_mesh, datablocks
+from tetflora_addon.blender import first_forest, new_scenes, preferences
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
 def _plant(**options):
-    import bpy
-
     assert bpy.ops.tetflora.first_forest(**options) == {'FINISHED'}
     return bpy.context.scene
 
@@ -26,8 +26,6 @@ def _plants(scene):
 
 def _startup():
     """What a new file of Blender holds."""
-    import bpy
-
     mesh = bpy.data.meshes.new("Cube")
     corners = [(a, b, c) for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)]
     mesh.from_pydata(corners, [], [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
@@ -43,20 +41,17 @@ def _startup():
 
 
 def test_an_empty_scene_becomes_a_forest_that_can_be_refined():
-    import bpy
-
     before = bpy.context.scene
     scene = _plant()
     assert scene == before
     plants = _plants(scene)
     assert 60 <= len(plants) <= 100
     assert 3 <= len({o.tetflora.species for o in plants}) <= 4
-    first = part("first_forest")
     places = np.array([o.location for o in plants])
-    assert np.allclose(places[:, 2], first.height(places[:, 0], places[:, 1]), atol=1e-4)
-    assert np.abs(places[:, 0] - first.path(places[:, 1])).min() > 2.0  # the path is free
+    assert np.allclose(places[:, 2], first_forest.height(places[:, 0], places[:, 1]), atol=1e-4)
+    assert np.abs(places[:, 0] - first_forest.path(places[:, 1])).min() > 2.0  # the path is free
     camera = scene.camera
-    assert camera.location.z - first.height(*camera.location[:2]) == pytest.approx(1.7, abs=1e-4)
+    assert camera.location.z - first_forest.height(*camera.location[:2]) == pytest.approx(1.7, abs=1e-4)
     assert scene.world is not None
     assert [o.type for o in scene.objects if o.type == 'LIGHT'] == ['LIGHT']
     assert {c.name for c in scene.collection.children} == {"First forest", "TetFlora plants"}
@@ -76,17 +71,14 @@ def test_plants_stand_within_the_ground_that_is_seen():
 
 
 def test_the_same_seed_is_the_same_forest():
-    first = part("first_forest")
-    for a, b, c in zip(first.places(3), first.places(3), first.places(4), strict=True):
+    for a, b, c in zip(first_forest.places(3), first_forest.places(3), first_forest.places(4), strict=True):
         assert np.array_equal(a, b)
         assert not np.array_equal(a, c)
 
 
 def test_the_untouched_startup_scene_is_used_and_its_cube_only_hidden():
-    import bpy
-
     before = _startup()
-    assert part("first_forest").is_startup(before)
+    assert first_forest.is_startup(before)
     scene = _plant()
     assert scene == before
     assert {"Cube", "Camera", "Light"} <= set(scene.objects.keys())
@@ -97,8 +89,6 @@ def test_the_untouched_startup_scene_is_used_and_its_cube_only_hidden():
 
 @pytest.mark.parametrize("touched", ["moved", "modelled", "renamed", "more"])
 def test_anything_else_keeps_its_scene(touched):
-    import bpy
-
     scene = _startup()
     cube = scene.objects["Cube"]
     if touched == "moved":
@@ -123,17 +113,13 @@ def test_anything_else_keeps_its_scene(touched):
 
 
 def test_a_world_that_was_there_is_kept():
-    import bpy
-
     bpy.context.scene.world = bpy.data.worlds.new("mine")
     _plant()
     assert bpy.data.worlds["mine"].use_fake_user
 
 
 def test_quality_and_memory_of_new_scenes_come_from_the_preferences():
-    import bpy
-
-    chosen = part("preferences").preferences()
+    chosen = preferences.preferences()
     chosen.new_quality, chosen.new_memory = 'DRAFT', 3.0
     try:
         add_camera()
@@ -147,7 +133,7 @@ def test_quality_and_memory_of_new_scenes_come_from_the_preferences():
         assert (group.quality, group.max_memory) == ('PREVIEW', 0.0)
         other = bpy.data.scenes.new("own")
         other.tetflora.cutoff = 7.0
-        part("new_scenes").begin(other)
+        new_scenes.begin(other)
         assert other.tetflora.cutoff == 7.0
         assert other.tetflora.leaf_limit != group.leaf_limit
     finally:
@@ -155,8 +141,6 @@ def test_quality_and_memory_of_new_scenes_come_from_the_preferences():
 
 
 def test_its_ground_is_selected_so_that_populate_goes_on_from_there():
-    import bpy
-
     _startup()
     bpy.context.view_layer.objects.active = bpy.data.objects["Cube"]
     bpy.data.objects["Cube"].select_set(True)
@@ -168,8 +152,6 @@ def test_its_ground_is_selected_so_that_populate_goes_on_from_there():
 
 
 def test_populate_and_the_brush_go_on_with_its_species():
-    import bpy
-
     bpy.ops.tetflora.first_forest()
     forest = {o.tetflora.species: 0 for o in bpy.context.scene.objects if o.tetflora.is_plant}
     assert len(forest) == 4
@@ -184,10 +166,8 @@ def test_populate_and_the_brush_go_on_with_its_species():
 
 
 def test_the_tab_says_what_comes_next_and_stops_when_it_is_done():
-    import bpy
-
     scene = bpy.context.scene
-    hint = session.part("panels.refine_panel").hint
+    hint = refine_panel.hint
     assert hint(scene) == ""
     bpy.ops.tetflora.first_forest()
     scene = bpy.context.scene

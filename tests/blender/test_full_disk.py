@@ -8,18 +8,21 @@ import io
 import sys
 from pathlib import Path
 
+import bpy
 import pytest
 
 from devtools import session
-from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, part, select, tiny_render
+from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, select, tiny_render
 from tests.limits import full_disk
+from tetflora_addon.blender import command_line, compat, preferences
+from tetflora_addon.plants import catalogue
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
 @pytest.fixture
 def own_folder(tmp_path):
-    own = part("preferences").preferences()
+    own = preferences.preferences()
     own.species_folder = str(tmp_path / "species")
     yield tmp_path / "species"
     own.species_folder = ""
@@ -30,35 +33,25 @@ def _contents(folder: Path) -> dict[str, bytes]:
 
 
 def _species_to(path: Path) -> None:
-    import bpy
-
     bpy.context.scene.tetflora.species_editor.species = "bush"
     bpy.ops.tetflora.export_species(filepath=str(path))
 
 
 def _own_species_to(path: Path) -> None:
-    import bpy
-
     bpy.context.scene.tetflora.species_editor.species = "bush"
     bpy.ops.tetflora.save_species()
 
 
 def _loaded_species_to(path: Path) -> None:
-    import bpy
-
-    shipped = session.part("tetflora_addon.plants.catalogue").list_species()["bush"].path
+    shipped = catalogue.list_species()["bush"].path
     bpy.ops.tetflora.load_species(filepath=str(shipped), replace=True)
 
 
 def _populations_to(path: Path) -> None:
-    import bpy
-
     bpy.ops.tetflora.export_populations(filepath=str(path))
 
 
 def _assets_to(path: Path) -> None:
-    import bpy
-
     bpy.ops.tetflora.create_asset_library(directory=str(path.parent))
 
 
@@ -74,8 +67,6 @@ def _assets_to(path: Path) -> None:
     ids=["species", "own species", "loaded species", "populations", "asset library"],
 )
 def test_an_earlier_file_stays(own_folder, write, name, most):
-    import bpy
-
     own_folder.mkdir()
     select(add_mesh("ground"))
     bpy.ops.tetflora.add_population()
@@ -94,8 +85,6 @@ def test_an_earlier_file_stays(own_folder, write, name, most):
 
 def _refined(samples: int = 1):
     """A bush with its results."""
-    import bpy
-
     scene = tiny_render(samples)
     add_camera(location=(0.0, -6.0, 1.5))
     add_plant()
@@ -110,8 +99,6 @@ def _refined(samples: int = 1):
 @pytest.mark.parametrize("keep", [True, False], ids=["with results", "without"])
 def test_saving_the_file(tmp_path, keep):
     """The earlier file is whole, the open one has what it had, and saving again where there is room works."""
-    import bpy
-
     path = tmp_path / "forest.blend"
     scene = tiny_render()
     bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=False)
@@ -128,8 +115,6 @@ def test_saving_the_file(tmp_path, keep):
 
 
 def test_a_compressed_file_that_blender_takes_for_saved(tmp_path, capfd):
-    import bpy
-
     path = tmp_path / "forest.blend"
     tiny_render()
     bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True)
@@ -148,8 +133,6 @@ def test_a_compressed_file_that_blender_takes_for_saved(tmp_path, capfd):
 
 
 def _assert_saved(path: Path, results: bool) -> None:
-    import bpy
-
     session.clean_file()  # Blender refuses to look into the file that it has open
     with bpy.data.libraries.load(str(path)) as (held, _):
         assert ("TetFlora" in held.collections) == results
@@ -157,7 +140,7 @@ def _assert_saved(path: Path, results: bool) -> None:
 
 
 def _command(*arguments: object) -> int:
-    return part("command_line").main([*map(str, arguments)])
+    return command_line.main([*map(str, arguments)])
 
 
 def _error(capfd: pytest.CaptureFixture) -> str:
@@ -167,8 +150,6 @@ def _error(capfd: pytest.CaptureFixture) -> str:
 
 @pytest.mark.parametrize("compress", [False, True])
 def test_command_refine_saves_nothing_or_all(tmp_path, capfd, compress):
-    import bpy
-
     _refined()
     target = tmp_path / "refined.blend"
     target.write_bytes(b"mine")
@@ -185,7 +166,7 @@ def test_command_refine_saves_nothing_or_all(tmp_path, capfd, compress):
 @pytest.mark.parametrize("form", ['PNG', 'OPEN_EXR', 'JPEG'])
 def test_command_render_does_not_take_half_a_picture_for_one(tmp_path, capfd, form):
     scene = _refined(samples=4)
-    part("compat").set_still_format(scene.render.image_settings, form)
+    compat.set_still_format(scene.render.image_settings, form)
     scene.render.image_settings.quality = 100
     arguments = ("render", "--frames", "1-2", "--output", tmp_path / "frame_####")
     with full_disk(4_000):
@@ -198,8 +179,6 @@ def test_command_render_does_not_take_half_a_picture_for_one(tmp_path, capfd, fo
 
 
 def test_a_job_for_a_farm_is_written_or_not_there(tmp_path, capfd):
-    import bpy
-
     scene = _refined()
     scene.render.filepath = "//frame_####"
     (tmp_path / "project").mkdir()

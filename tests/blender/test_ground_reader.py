@@ -4,22 +4,23 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 import pytest
 
-from devtools import session
-from tests.blender.scenes import add_mesh, depsgraph, errors, part
+from tests.blender.scenes import add_mesh, depsgraph
+from tetflora_addon import errors
+from tetflora_addon.blender import ground_reader
+from tetflora_addon.planting import places, rules
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
 def _read(*objects, **options):
-    return part("ground_reader").read_ground(objects, depsgraph(), **options)
+    return ground_reader.read_ground(objects, depsgraph(), **options)
 
 
 def _collection(name, *objects):
-    import bpy
-
     collection = bpy.data.collections.new(name)
     bpy.context.scene.collection.children.link(collection)
     for obj in objects:
@@ -28,8 +29,6 @@ def _collection(name, *objects):
 
 
 def _curve(kind='POLY', points=((0, 0, 0), (4, 0, 0), (4, 3, 0)), cyclic=False, **data):
-    import bpy
-
     curve = bpy.data.curves.new("curve", 'CURVE')
     curve.dimensions = '3D'
     spline = curve.splines.new(kind)
@@ -48,8 +47,6 @@ def _curve(kind='POLY', points=((0, 0, 0), (4, 0, 0), (4, 3, 0)), cyclic=False, 
 
 
 def _image(values):
-    import bpy
-
     height, width = values.shape
     image = bpy.data.images.new("mask", width, height, float_buffer=True, is_data=True)
     image.pixels.foreach_set(np.repeat(values[..., None], 4, axis=-1).astype(np.float32).ravel())
@@ -101,10 +98,10 @@ def test_plants_grow_where_the_image_is_bright():
     ground = _with_uv(add_mesh("ground"))
     values = np.zeros((16, 16))
     values[8:, :8] = 1.0  # north-west: rows of pixels go up
-    rules = session.part("tetflora_addon.planting.rules").Rules(count=200)
-    place = session.part("tetflora_addon.planting.places").place
+    wanted = rules.Rules(count=200)
+    place = places.place
     for inverted in (False, True):
-        placed = place(_read(ground, image=_image(values), invert_image=inverted), rules).position
+        placed = place(_read(ground, image=_image(values), invert_image=inverted), wanted).position
         # Half a texel of the border is neither black nor white.
         bright = (placed[:, 0] < 1.0 / 8.0) & (placed[:, 1] > -1.0 / 8.0)
         dark = (placed[:, 0] > -1.0 / 8.0) | (placed[:, 1] < 1.0 / 8.0)
@@ -112,8 +109,6 @@ def test_plants_grow_where_the_image_is_bright():
 
 
 def test_colours_count_by_their_luminance():
-    import bpy
-
     ground = _with_uv(add_mesh("ground"))
     image = bpy.data.images.new("green", 2, 2, float_buffer=True, is_data=True)
     image.pixels.foreach_set(np.tile([0.0, 1.0, 0.0, 1.0], 4).astype(np.float32))
@@ -161,13 +156,11 @@ def test_nurbs_curves_work_without_a_bevel():
     points = ((0, 0, 0), (4, 0, 0), (4, 4, 0), (0, 4, 0))
     read = _read(ground, areas=_collection("areas", _curve('NURBS', points, cyclic=True)))
     assert len(read.areas[0]) > 10
-    with pytest.raises(errors().SceneError, match=r'NURBS curve "curve\.001" has a bevel'):
+    with pytest.raises(errors.SceneError, match=r'NURBS curve "curve\.001" has a bevel'):
         _read(ground, areas=_collection("bevelled", _curve('NURBS', points, cyclic=True, bevel_depth=0.1)))
 
 
 def test_hair_curves_are_lines():
-    import bpy
-
     curves = bpy.data.hair_curves.new("hair")
     curves.add_curves([3, 2])
     curves.attributes["position"].data.foreach_set("vector", np.arange(15, dtype=np.float32))
@@ -191,8 +184,6 @@ def _missing_layer(ground):
 
 
 def _missing_file(ground):
-    import bpy
-
     _with_uv(ground)
     image = bpy.data.images.new("lost", 1, 1)
     image.source, image.filepath = 'FILE', "//nowhere.png"
@@ -220,17 +211,15 @@ def _open_curves(ground):
 )
 def test_what_is_missing_is_named(options, says):
     ground = add_mesh("ground")
-    with pytest.raises(errors().SceneError, match=says):
+    with pytest.raises(errors.SceneError, match=says):
         _read(ground, **options(ground))
 
 
 def test_ground_without_faces_is_named():
-    import bpy
-
-    with pytest.raises(errors().SceneError, match='"Bare" has no faces'):
+    with pytest.raises(errors.SceneError, match='"Bare" has no faces'):
         _read(add_mesh("Bare", faces=()))
-    with pytest.raises(errors().SceneError, match="no ground"):
+    with pytest.raises(errors.SceneError, match="no ground"):
         _read()
-    with pytest.raises(errors().SceneError, match='"curve" is not a mesh'):
+    with pytest.raises(errors.SceneError, match='"curve" is not a mesh'):
         _read(_curve())
     assert not [m for m in bpy.data.meshes if not m.users]

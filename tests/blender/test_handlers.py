@@ -6,10 +6,13 @@ from __future__ import annotations
 
 import json
 
+import bpy
 import numpy as np
 import pytest
 
-from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph, errors, part, tiny_render
+from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph, tiny_render
+from tetflora_addon import errors
+from tetflora_addon.blender import camera_reader, compat, emit, handlers, job, node_tools, scene_reader, shell_bounces
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -17,14 +20,12 @@ pytestmark = pytest.mark.usefixtures("clean_file")
 @pytest.fixture
 def stage(tmp_path):
     """A camera above a plant, white sky, pictures in a temporary folder; gives the scene."""
-    import bpy
-
     scene = tiny_render()
     add_camera(location=(0.0, 0.0, 10.0), rotation=(0.0, 0.0, 0.0))
     add_plant()
     world = bpy.data.worlds.new("sky")
     scene.world = world
-    background = part("compat").shader_tree(world).nodes["Background"]
+    background = compat.shader_tree(world).nodes["Background"]
     background.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
     scene.render.filepath = str(tmp_path / "frame_####")
     return scene
@@ -37,13 +38,11 @@ class _Stub:
         self.cameras, self.plants, self.error = [], [], None
 
     def __call__(self, scene, depsgraph, *, view_layer=None, for_render=False, **_options):
-        import bpy
-
         assert for_render
         if self.error is not None:
             raise self.error
-        camera = part("camera_reader").read_camera(scene, depsgraph)
-        seeds = part("scene_reader").read_plants(scene, depsgraph, view_layer)
+        camera = camera_reader.read_camera(scene, depsgraph)
+        seeds = scene_reader.read_plants(scene, depsgraph, view_layer)
         self.cameras.append(camera.position.round(4).tolist())
         self.plants.append(seeds.position.round(4).tolist())
         x, y, _ = camera.position
@@ -51,33 +50,31 @@ class _Stub:
         mesh = bpy.data.meshes.new("square")
         mesh.from_pydata(square.tolist(), [], [(0, 1, 2, 3)])
         black = bpy.data.materials.new("black")
-        tree = part("compat").shader_tree(black)
+        tree = compat.shader_tree(black)
         tree.nodes.clear()
         holdout = tree.nodes.new("ShaderNodeEmission")
         holdout.inputs["Strength"].default_value = 0.0
         output = tree.nodes.new("ShaderNodeOutputMaterial")
         tree.links.new(holdout.outputs["Emission"], output.inputs["Surface"])
         mesh.materials.append(black)
-        results = part("emit").Results(scene, 'RENDER')
+        results = emit.Results(scene, 'RENDER')
         results.open()
         made = bpy.data.objects.new("square", mesh)
         for datablock in (mesh, made, black):
-            part("node_tools").tag(datablock)
+            node_tools.tag(datablock)
         results.collection.objects.link(made)
-        return part("job").Statistics()
+        return job.Statistics()
 
 
 @pytest.fixture
 def stub(monkeypatch):
     stub = _Stub()
-    monkeypatch.setattr(part("job"), "refine", stub)
+    monkeypatch.setattr(job, "refine", stub)
     return stub
 
 
 def _centre(path) -> float:
     """Mean of the middle of a picture: 0 where the square is, 1 where it is not."""
-    import bpy
-
     image = bpy.data.images.load(str(path))
     try:
         pixels = np.array(image.pixels).reshape(image.size[1], image.size[0], -1)
@@ -87,16 +84,12 @@ def _centre(path) -> float:
 
 
 def _still(scene, path):
-    import bpy
-
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
     return _centre(path)
 
 
 def test_animations_are_refined_for_the_camera_and_plants_of_each_frame(stage, stub, tmp_path):
-    import bpy
-
     for obj, way in ((stage.camera, (6.0, 0.0, 10.0)), (bpy.data.objects["plant"], (0.0, 4.0, 0.0))):
         obj.keyframe_insert("location", frame=1)
         obj.location = way
@@ -122,15 +115,13 @@ def test_stills_leave_nothing_behind_render_after_render(stage, stub, tmp_path, 
 
 
 def test_a_scene_without_the_setting_or_without_plants_is_left_alone(stage, stub, tmp_path):
-    import bpy
-
     stage.tetflora.refine_at_render = False
     assert _still(stage, tmp_path / "a.png") == pytest.approx(1.0, abs=0.3)
     stage.tetflora.refine_at_render = True
     bpy.data.objects.remove(bpy.data.objects["plant"])
     _still(stage, tmp_path / "b.png")
     assert stub.cameras == []
-    assert part("handlers").render_errors() == []
+    assert handlers.render_errors() == []
 
 
 def test_a_render_that_will_show_no_plants_says_so_once(stage, tmp_path, capfd):
@@ -139,29 +130,27 @@ def test_a_render_that_will_show_no_plants_says_so_once(stage, tmp_path, capfd):
     for _ in range(2):
         _still(stage, tmp_path / "a.png")
     assert capfd.readouterr().err.count("nothing is refined") == 2
-    assert part("handlers").render_errors() == []
-    part("job").refine(stage, __import__("bpy").context.evaluated_depsgraph_get())
+    assert handlers.render_errors() == []
+    job.refine(stage, bpy.context.evaluated_depsgraph_get())
     _still(stage, tmp_path / "b.png")
-    part("emit").keep_results(stage)
+    emit.keep_results(stage)
     _still(stage, tmp_path / "c.png")
     assert "nothing is refined" not in capfd.readouterr().err
 
 
 def test_disabled_plants_are_no_error(stage, tmp_path):
-    import bpy
-
     bpy.data.objects["plant"].tetflora.enabled = False
     _still(stage, tmp_path / "a.png")
-    assert part("handlers").render_errors() == []
+    assert handlers.render_errors() == []
 
 
 def _refined_by_hand(scene):
     """A result of Refine that covers the picture, as if made for another view."""
-    results = part("emit").Results(scene, 'VIEW')
+    results = emit.Results(scene, 'VIEW')
     results.open()
     cover = add_mesh("cover", size=50.0, z=5.0)
-    part("node_tools").tag(cover)
-    part("node_tools").tag(cover.data)
+    node_tools.tag(cover)
+    node_tools.tag(cover.data)
     results.collection.objects.link(cover)
     scene.collection.objects.unlink(cover)
     results.finish()
@@ -180,23 +169,20 @@ def test_results_made_by_hand_are_hidden_while_rendering_only(stage, stub, tmp_p
 
 def test_an_error_is_said_and_earlier_results_are_rendered(stage, stub, tmp_path, capfd):
     made = _refined_by_hand(stage)
-    stub.error = errors().SpeciesError('Unknown species "quercus"')
+    stub.error = errors.SpeciesError('Unknown species "quercus"')
     covered = _still(stage, tmp_path / "a.png")
     assert covered > 0.0
     assert not made.hide_render
-    assert len(part("handlers").render_errors()) == 1
+    assert len(handlers.render_errors()) == 1
     assert 'TetFlora: error: frame 1 rendered without its plants: Unknown species "quercus"' in capfd.readouterr().err
     stub.error = None
     _still(stage, tmp_path / "b.png")
-    assert part("handlers").render_errors() == []
+    assert handlers.render_errors() == []
 
 
 def test_scenes_in_a_sequencer_forget_no_errors(stage, stub):
-    import bpy
-
-    stub.error = errors().SpeciesError('Unknown species "quercus"')
+    stub.error = errors.SpeciesError('Unknown species "quercus"')
     outer, empty = bpy.data.scenes.new("outer"), bpy.data.scenes.new("empty")
-    handlers = part("handlers")
     handlers.on_render_init(outer)
     for inner in (stage, empty):  # in the order in which Blender calls: a render within each frame of the other
         handlers.on_render_pre(outer)
@@ -210,12 +196,9 @@ def test_scenes_in_a_sequencer_forget_no_errors(stage, stub):
 
 
 def test_bounces_of_each_scene_come_back(stage, stub):
-    import bpy
-
     other = bpy.data.scenes.new("other")
     other.camera = stage.camera
     other.collection.objects.link(bpy.data.objects["plant"])
-    handlers = part("handlers")
     for n, scene in enumerate((stage, other)):
         scene.tetflora.proxy_form = 'SHELLS'
         scene.cycles.transparent_max_bounces = 10 + n
@@ -230,14 +213,12 @@ def test_an_unexpected_error_does_not_stop_later_frames(stage, stub, tmp_path, c
     stub.error = ZeroDivisionError("oops")
     _still(stage, tmp_path / "a.png")
     assert "ZeroDivisionError" in capfd.readouterr().err
-    assert len(part("handlers").render_errors()) == 1
+    assert len(handlers.render_errors()) == 1
     stub.error = None
     assert _still(stage, tmp_path / "b.png") == 0.0
 
 
 def test_a_file_saved_in_the_middle_of_a_render_holds_nothing_of_it(stage, stub, tmp_path):
-    import bpy
-
     hand = _refined_by_hand(stage)
     stage.tetflora.output.save_results = True
     path = str(tmp_path / "middle.blend")
@@ -262,9 +243,7 @@ def test_a_file_saved_in_the_middle_of_a_render_holds_nothing_of_it(stage, stub,
 
 def test_a_file_saved_in_the_middle_of_a_render_holds_meshes_as_the_artist_left_them(stage, tmp_path):
     """And the render goes on without them; a mark that a crash left behind is taken back on load."""
-    import bpy
-
-    rock, handlers, path = add_mesh("rock"), part("handlers"), str(tmp_path / "middle.blend")
+    rock, path = add_mesh("rock"), str(tmp_path / "middle.blend")
     rock.tetflora.is_explicit = True
     handlers.on_render_pre(stage)
     mark = rock["tetflora_hidden_for_render"]
@@ -285,8 +264,6 @@ def test_a_file_saved_in_the_middle_of_a_render_holds_meshes_as_the_artist_left_
 
 def test_a_library_override_comes_back_after_its_file_was_saved_and_read(stage, tmp_path):
     """Blender stores that it is hidden, but not the property that says how it was."""
-    import bpy
-
     rock, library, path = add_mesh("rock"), str(tmp_path / "rocks.blend"), str(tmp_path / "forest.blend")
     rock.tetflora.is_explicit = True
     bpy.data.libraries.write(library, {rock})
@@ -296,7 +273,7 @@ def test_a_library_override_comes_back_after_its_file_was_saved_and_read(stage, 
     override = wanted.objects[0].override_create(remap_local_usages=True)
     stage.collection.objects.link(override)
     stage.tetflora.output.save_results = True
-    part("job").refine(stage, depsgraph())
+    job.refine(stage, depsgraph())
     assert override.hide_render
     bpy.ops.wm.save_as_mainfile(filepath=path)
     assert "tetflora_hidden_overrides" not in stage
@@ -304,7 +281,7 @@ def test_a_library_override_comes_back_after_its_file_was_saved_and_read(stage, 
     scene, rock = bpy.context.scene, bpy.data.objects["rock", None]
     assert rock.hide_render
     assert "tetflora_hidden_overrides" not in scene
-    part("job").clear(scene)
+    job.clear(scene)
     assert not (rock.hide_render or rock.hide_viewport)
 
 
@@ -317,18 +294,16 @@ def test_the_real_job_puts_plants_into_the_picture_and_leaves_none_behind(stage,
     assert figures["plants"] == 1
     stage.tetflora.refine_at_render = False
     assert with_plant < 0.9 * _still(stage, tmp_path / "b.png")
-    assert part("handlers").render_errors() == []
+    assert handlers.render_errors() == []
 
 
 @pytest.mark.parametrize("baked", ['OFF', 'PROXIES'])
 def test_shells_are_rendered_with_enough_transparent_bounces_and_the_settings_come_back(stage, tmp_path, baked):
     """Baked shells need as many as others do."""
-    import bpy
-
     scene = bpy.context.scene
     scene.cycles.transparent_max_bounces, scene.cycles.min_transparent_bounces = 8, 2
     scene.tetflora.proxy_form, scene.tetflora.baked_light = 'SHELLS', baked
-    assert "too few" in part("shell_bounces").few_bounces(scene)
+    assert "too few" in shell_bounces.few_bounces(scene)
     seen = []
 
     def read(*_):
@@ -343,12 +318,10 @@ def test_shells_are_rendered_with_enough_transparent_bounces_and_the_settings_co
     assert seen == [(256, 256)]
     assert (scene.cycles.transparent_max_bounces, scene.cycles.min_transparent_bounces) == (8, 2)
     scene.cycles.transparent_max_bounces = 128
-    assert not part("shell_bounces").few_bounces(scene)
+    assert not shell_bounces.few_bounces(scene)
 
 
 def test_baked_light_is_made_for_each_render_and_outlives_the_file(stage, tmp_path):
-    import bpy
-
     scene = bpy.context.scene
     scene.tetflora.baked_light = 'ALL'
     before = datablocks()

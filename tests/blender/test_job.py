@@ -6,22 +6,19 @@ from __future__ import annotations
 
 import json
 
+import bpy
 import numpy as np
 import pytest
 
-from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, errors, part
+from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks
+from tetflora_addon import errors
+from tetflora_addon.blender import compat, job
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
-def _job():
-    return part("job")
-
-
 def _forest(count=3):
     """Some trees, and one far away that is proxies only."""
-    import bpy
-
     add_camera(location=(0.0, -60.0, 4.0))
     for i in range(count):
         add_plant(f"tree {i}", seed=i, location=(4.0 * i - 4.0, 500.0 if i == 0 else 3.0 * i, 0.0))
@@ -31,11 +28,9 @@ def _forest(count=3):
 
 
 def _refine(scene, **settings):
-    import bpy
-
     for name, value in settings.items():
         setattr(scene.tetflora, name, value)
-    return _job().refine(scene, bpy.context.evaluated_depsgraph_get())
+    return job.refine(scene, bpy.context.evaluated_depsgraph_get())
 
 
 def _made(scene):
@@ -47,10 +42,10 @@ def test_clear_removes_all_that_was_made_and_nothing_else():
     before = datablocks()
     _refine(scene)
     assert _made(scene)
-    assert _job().has_results(scene)
-    _job().clear(scene)
+    assert job.has_results(scene)
+    job.clear(scene)
     assert datablocks() == before
-    assert not _job().has_results(scene)
+    assert not job.has_results(scene)
 
 
 def test_refining_again_replaces():
@@ -96,8 +91,6 @@ def test_the_result_fits_the_budget(form):
 
 def test_shadows_of_what_is_behind_the_camera_are_refined_if_asked_for():
     """A tree behind the camera, the sun behind the tree: its shadow is in the picture."""
-    import bpy
-
     camera = add_camera(location=(0.0, -12.0, 4.0))
     camera.rotation_euler = (1.2, 0.0, 0.0)
     add_plant("tree", location=(0.0, -18.0, 0.0))
@@ -132,18 +125,16 @@ def test_results_carry_uvs_materials_and_smooth_tubes():
 @pytest.mark.parametrize("steps", [1, 2, 5, 1000])
 def test_closing_the_job_leaves_the_scene_as_it_was(steps):
     """As Esc does; 1,000 steps are more than there are, so that the last close comes at the last step."""
-    import bpy
-
     scene = _forest()
     before = datablocks()
-    job = _job().refine_steps(scene, bpy.context.evaluated_depsgraph_get())
+    running = job.refine_steps(scene, bpy.context.evaluated_depsgraph_get())
     done = 0
     for _ in range(steps):
-        progress = next(job)
+        progress = next(running)
         done += 1
         if progress.fraction >= 0.95 and "proxies" in progress.message:
             break
-    job.close()
+    running.close()
     assert done > 0
     assert datablocks() == before
 
@@ -156,7 +147,7 @@ def test_an_error_while_writing_leaves_nothing(monkeypatch):
     def broken(*_arguments):
         raise MemoryError
 
-    monkeypatch.setattr(_job(), "write_proxies", broken)
+    monkeypatch.setattr(job, "write_proxies", broken)
     with pytest.raises(MemoryError):
         _refine(scene)
     assert datablocks() == before
@@ -169,13 +160,11 @@ def test_objects_that_the_artist_puts_among_the_results_survive():
     for collection in list(rock.users_collection):
         collection.objects.unlink(rock)
     next(c for c in scene.collection.children if c.name == "TetFlora").objects.link(rock)
-    _job().clear(scene)
+    job.clear(scene)
     assert rock.name in scene.collection.objects
 
 
 def test_any_mesh_serves_as_a_leaf():
-    import bpy
-
     scene = _forest(1)
     plain = _refine(scene, expand_everything=True)
     leaf = add_mesh("my leaf", faces=[(0, 1, 2)])
@@ -195,16 +184,14 @@ def test_a_leaf_that_cannot_be_used_is_named():
     entry = scene.tetflora.leaf_objects.add()
     entry.species, entry.leaf = scene.objects["tree 0"].tetflora.species, empty
     before = datablocks()
-    with pytest.raises(errors().SpeciesError, match=r"bare leaf.*no faces"):
+    with pytest.raises(errors.SpeciesError, match=r"bare leaf.*no faces"):
         _refine(scene)
     assert datablocks() == before
 
 
 def test_estimates_agree_with_what_is_made():
-    import bpy
-
     scene = _forest()
-    estimate = _job().estimate(scene, bpy.context.evaluated_depsgraph_get())
+    estimate = job.estimate(scene, bpy.context.evaluated_depsgraph_get())
     expanded = _refine(scene, expand_everything=True)
     assert estimate.polygons_full == expanded.polygons_full
     assert expanded.polygons_meshed == pytest.approx(estimate.polygons_full, rel=0.1)
@@ -213,7 +200,6 @@ def test_estimates_agree_with_what_is_made():
 @pytest.mark.parametrize(("form", "bound"), [('MICROSURFACES', 0.03), ('MICROSPHERES', 0.04), ('SHELLS', 0.06)])
 def test_the_refined_picture_is_that_of_the_plants(form, bound):
     """Mean radiance over blocks of the picture, refined against expanded; the leaf limit makes most of it proxies."""
-    import bpy
 
     from tests.blender.renders import picture
 
@@ -223,7 +209,7 @@ def test_the_refined_picture_is_that_of_the_plants(form, bound):
     scene = bpy.context.scene
     world = bpy.data.worlds.new("sky")
     scene.world = world
-    part("compat").shader_tree(world).nodes["Background"].inputs["Color"].default_value = (0.8, 0.8, 0.8, 1.0)
+    compat.shader_tree(world).nodes["Background"].inputs["Color"].default_value = (0.8, 0.8, 0.8, 1.0)
     scene.render.engine = 'CYCLES'
     scene.render.resolution_x, scene.render.resolution_y = 96, 72
     scene.cycles.samples = 64
@@ -245,11 +231,9 @@ def test_the_refined_picture_is_that_of_the_plants(form, bound):
 
 
 def test_a_job_that_is_told_to_stop_refining_makes_what_it_has():
-    import bpy
-
     scene = _forest()
     scene.tetflora.cutoff = 0.5
-    steps = part("job").refine_steps(scene, bpy.context.evaluated_depsgraph_get())
+    steps = job.refine_steps(scene, bpy.context.evaluated_depsgraph_get())
     while not (progress := next(steps)).message.startswith("Refining"):
         pass
     with pytest.raises(StopIteration) as stop:
@@ -259,7 +243,7 @@ def test_a_job_that_is_told_to_stop_refining_makes_what_it_has():
             progress = next(steps)
     statistics = stop.value.value
     assert not statistics.complete
-    assert part("job").has_results(scene)
+    assert job.has_results(scene)
     whole = _refine(scene)
     assert whole.complete
     assert whole.levels > statistics.levels
@@ -267,8 +251,6 @@ def test_a_job_that_is_told_to_stop_refining_makes_what_it_has():
 
 def test_materials_show_the_colours_of_their_species_in_solid_viewports():
     """Once: a colour that an artist gives stays."""
-    import bpy
-
     add_camera(location=(0.0, -20.0, 4.0))
     for i, species in enumerate(("cherry_blossom", "cypress")):
         add_plant(species, seed=i, location=(6.0 * i - 3.0, 0.0, 0.0), species=species)

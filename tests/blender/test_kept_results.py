@@ -6,11 +6,13 @@ from __future__ import annotations
 
 import random
 
+import bpy
 import numpy as np
 import pytest
 
 from tests.blender.digests import everything
-from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph, part
+from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph
+from tetflora_addon.blender import camera_reader, compat, emit, handlers, job, kept_results, scene_digest
 
 FRAMES = 12
 
@@ -18,8 +20,6 @@ FRAMES = 12
 @pytest.fixture
 def film(clean_file):
     """Two bushes and a camera that walks past them, 12 frames in which it goes through several cells."""
-    import bpy
-
     scene = bpy.context.scene
     scene.render.resolution_x, scene.render.resolution_y = 64, 36
     camera = add_camera(location=(-1.5, -9.0, 1.0))
@@ -33,25 +33,25 @@ def film(clean_file):
     settings.cell_length = 1.0
     depsgraph()
     yield scene
-    part("handlers").on_render_end(scene)
+    handlers.on_render_end(scene)
 
 
 @pytest.fixture
 def made(monkeypatch):
     """Frames for which something was refined."""
-    frames, real = [], part("job").refine
+    frames, real = [], job.refine
 
     def refine(scene, *arguments, **options):
         frames.append(scene.frame_current)
         return real(scene, *arguments, **options)
 
-    monkeypatch.setattr(part("job"), "refine", refine)
+    monkeypatch.setattr(job, "refine", refine)
     return frames
 
 
 def results(scene):
     """What a frame is rendered with, datablock by datablock."""
-    (collection,) = part("emit").result_collections(scene, 'RENDER')
+    (collection,) = emit.result_collections(scene, 'RENDER')
     every = everything()
     kept = {"objects": {o.name for o in collection.objects}}
     kept["meshes"] = {o.data.name for o in collection.objects if o.type == 'MESH'}
@@ -65,17 +65,17 @@ def results(scene):
 def at(scene, frame):
     """Go to a frame as a render does."""
     scene.frame_set(frame)
-    part("handlers").on_render_pre(scene)
-    assert part("handlers").render_errors() == []
+    handlers.on_render_pre(scene)
+    assert handlers.render_errors() == []
     return results(scene)
 
 
 def alone(scene, frame):
     """A frame of a render of its own."""
-    part("handlers").on_render_end(scene)
-    part("handlers").on_render_init(scene)
+    handlers.on_render_end(scene)
+    handlers.on_render_init(scene)
     found = at(scene, frame)
-    part("handlers").on_render_end(scene)
+    handlers.on_render_end(scene)
     return found
 
 
@@ -114,8 +114,8 @@ def test_what_was_not_seen_for_longest_goes_first(film, made):
     sizes = []
     for n in (1, FRAMES // 2, FRAMES):
         at(film, n)
-        sizes.append(sum(entry.megabytes for entry in part("kept_results")._kept.values()))
-    part("handlers").on_render_end(film)
+        sizes.append(sum(entry.megabytes for entry in kept_results._kept.values()))
+    handlers.on_render_end(film)
     made.clear()
     film.tetflora.kept_memory = (sizes[-1] - sizes[0] / 2.0) / 1e3  # room for two of three
     for n in (1, FRAMES // 2, 1, FRAMES):  # the one in the middle is the oldest now
@@ -131,14 +131,12 @@ def test_nothing_is_left_when_the_render_ends(film):
     before = datablocks()
     for n in range(1, FRAMES + 1):
         at(film, n)
-    part("handlers").on_render_end(film)
+    handlers.on_render_end(film)
     assert datablocks() == before
-    assert part("kept_results")._kept == {}
+    assert kept_results._kept == {}
 
 
 def test_nothing_that_is_kept_goes_into_a_file(film, tmp_path):
-    import bpy
-
     at(film, 1)
     at(film, FRAMES)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "film.blend"), copy=True)
@@ -151,8 +149,6 @@ def test_nothing_that_is_kept_goes_into_a_file(film, tmp_path):
     ["plant", "seed", "lens", "settings", "terrain", "camera", "species", "form", "material", "pass index", "engine"],
 )
 def test_what_changes_is_noticed(film, made, change):
-    import bpy
-
     ground = add_mesh("ground", size=20.0)
     ground.tetflora.is_occluder = True
     film.tetflora.output.species.add().species = "fern"
@@ -186,7 +182,7 @@ def test_what_changes_is_noticed(film, made, change):
     elif change == "pass index":
         film.tetflora.output.species[0].pass_index = 7
     elif change == "engine":  # which draws points in another size
-        film.render.engine = 'CYCLES' if film.render.engine != 'CYCLES' else part("compat").eevee_engine()
+        film.render.engine = 'CYCLES' if film.render.engine != 'CYCLES' else compat.eevee_engine()
     depsgraph()
     at(film, 1)
     assert made == [1, 1]
@@ -207,8 +203,8 @@ def test_a_camera_that_stands_still_is_refined_for_exactly(film, made):
     film.camera.animation_data_clear()
     film.camera.location = (0.0, -8.0, 1.0)
     depsgraph()
-    exact = part("camera_reader").read_camera(film, depsgraph(), region_only=True)
-    shared = part("kept_results").shared_camera(film, depsgraph())
+    exact = camera_reader.read_camera(film, depsgraph(), region_only=True)
+    shared = kept_results.shared_camera(film, depsgraph())
     assert shared.position.tolist() == exact.position.tolist()
     assert (shared.window, shared.width, shared.setback) == (exact.window, exact.width, 0.0)
     for n in (1, 2, 3):
@@ -218,10 +214,8 @@ def test_a_camera_that_stands_still_is_refined_for_exactly(film, made):
 
 @pytest.mark.parametrize("mover", ["parent", "constraint", "driver", "parent's parent"])
 def test_whatever_moves_the_camera_counts_as_animation(film, mover):
-    import bpy
-
     film.camera.animation_data_clear()
-    moves = part("kept_results").camera_moves
+    moves = kept_results.camera_moves
     assert not moves(film)
     carrier = bpy.data.objects.new("carrier", None)
     film.collection.objects.link(carrier)
@@ -247,15 +241,13 @@ def test_switched_off_each_frame_is_refined_for_its_own_camera(film, made):
 
 
 def test_explicit_objects_are_hidden_for_what_is_shown_and_shown_at_the_end(film, made):
-    import bpy
-
     bush = add_mesh("foreign", size=0.5, z=0.3)
     bush.tetflora.is_explicit = True
     depsgraph()
     for n in (1, FRAMES, 1, 2):
         at(film, n)
         assert bush.hide_render
-    part("handlers").on_render_end(film)
+    handlers.on_render_end(film)
     assert not bush.hide_render
     assert "tetflora_hidden_for_render" not in bpy.data.objects["foreign"]
 
@@ -263,18 +255,16 @@ def test_explicit_objects_are_hidden_for_what_is_shown_and_shown_at_the_end(film
 def test_a_frame_that_fails_leaves_nothing_and_the_next_one_is_right(film, made):
     good = at(film, 1)
     camera, film.camera = film.camera, None
-    part("handlers").on_render_pre(film)
-    assert len(part("handlers").render_errors()) == 1
-    assert part("emit").result_collections(film, 'RENDER') == []
+    handlers.on_render_pre(film)
+    assert len(handlers.render_errors()) == 1
+    assert emit.result_collections(film, 'RENDER') == []
     film.camera = camera
-    part("handlers").on_render_init(film)
+    handlers.on_render_init(film)
     assert at(film, 1) == good
 
 
 @pytest.mark.parametrize("change", ["attribute", "material"])
 def test_what_changes_of_explicit_objects_is_noticed(film, made, change):
-    import bpy
-
     count = 400  # corners; numbers print short where there are more than a thousand
     foreign = add_mesh("foreign", size=0.5)
     foreign.data.clear_geometry()
@@ -299,8 +289,6 @@ def test_what_changes_of_explicit_objects_is_noticed(film, made, change):
 
 
 def test_materials_of_leaf_objects_are_noticed(film, made):
-    import bpy
-
     leaf = add_mesh("blade", size=0.5)
     leaf.hide_render = True
     film.tetflora.leaf_limit = 0.05  # real ones in so small a picture
@@ -330,7 +318,7 @@ def test_digests_tell_values_apart(one, other):
 
     digests = hashlib.sha256(), hashlib.sha256()
     for digest, value in zip(digests, (one, other), strict=True):
-        part("scene_digest").digest_of(digest, value)
+        scene_digest.digest_of(digest, value)
     assert digests[0].digest() != digests[1].digest()
 
 
@@ -345,12 +333,10 @@ def test_shells_that_come_back_are_shaded_as_they_were(film, made):
 
 
 def test_materials_put_on_the_artists_results_do_not_change_the_next_frame(film, made):
-    import bpy
-
     film.tetflora.leaf_limit = 0.05
-    part("job").refine(film, depsgraph())
+    job.refine(film, depsgraph())
     made.clear()
-    (results_of_artist,) = part("emit").result_collections(film, 'VIEW')
+    (results_of_artist,) = emit.result_collections(film, 'VIEW')
     leaves = next(o for o in results_of_artist.objects if o.get("tetflora_kind") == "leaf")
     leaves.material_slots[0].material = bpy.data.materials.new("mine")
     first = at(film, 1)
@@ -360,8 +346,6 @@ def test_materials_put_on_the_artists_results_do_not_change_the_next_frame(film,
 
 
 def test_view_layers_go_together_as_if_nothing_were_hidden(film, made):
-    import bpy
-
     foreign = add_mesh("foreign", size=0.5)
     foreign.tetflora.is_explicit = True
     apart = bpy.data.collections.new("apart")
@@ -372,8 +356,8 @@ def test_view_layers_go_together_as_if_nothing_were_hidden(film, made):
     second.layer_collection.children["apart"].exclude = True
 
     def shown():
-        part("handlers").on_render_pre(film)
-        assert part("handlers").render_errors() == []
+        handlers.on_render_pre(film)
+        assert handlers.render_errors() == []
         return [
             sorted(c.collection.name for c in layer.layer_collection.children if not c.exclude)
             for layer in film.view_layers
@@ -386,8 +370,6 @@ def test_view_layers_go_together_as_if_nothing_were_hidden(film, made):
 
 
 def test_scenes_that_are_rendered_within_a_render_leave_its_results_alone(film, made):
-    import bpy
-
     first = at(film, 1)
     other = bpy.data.scenes.new("other")
     for obj in film.objects:
@@ -396,13 +378,13 @@ def test_scenes_that_are_rendered_within_a_render_leave_its_results_alone(film, 
     for prop in ("leaf_limit", "cutoff", "visibility_resolution", "cell_length"):
         setattr(other.tetflora, prop, getattr(film.tetflora, prop))
     other.render.resolution_x, other.render.resolution_y = 64, 36
-    names = {collection.name for collection in part("emit").result_collections(film)}
-    part("handlers").on_render_pre(other)
-    assert part("handlers").render_errors() == []
-    theirs = {collection.name for collection in part("emit").result_collections(other)}
+    names = {collection.name for collection in emit.result_collections(film)}
+    handlers.on_render_pre(other)
+    assert handlers.render_errors() == []
+    theirs = {collection.name for collection in emit.result_collections(other)}
     assert theirs
     assert not theirs & names
-    part("handlers").on_render_end(other)
+    handlers.on_render_end(other)
     assert at(film, 1) == first
     assert made == [1, 1]
 

@@ -6,15 +6,18 @@ from __future__ import annotations
 
 import importlib.util
 import re
-from operator import attrgetter
 from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import MagicMock
 
+import bpy
 import pytest
 
-from devtools import build, session
-from tests.blender.scenes import part
+import operators
+from devtools import build
+from operators import keymaps
+from panels import add_menu, object_menu
+from tetflora_addon.blender import preferences, properties, translations
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -32,13 +35,11 @@ HEARD = {
 
 
 def _ids():
-    return {cls.bl_idname for cls in session.part("operators").CLASSES}
+    return {cls.bl_idname for cls in operators.CLASSES}
 
 
 def _default_keys():
     """Blender's own keys as its preset makes them: (keymap, key, ctrl, alt, shift)."""
-    import bpy
-
     path = Path(bpy.utils.system_resource('SCRIPTS')) / "presets/keyconfig/keymap_data/blender_default.py"
     spec = importlib.util.spec_from_file_location("blender_default", path)
     module = importlib.util.module_from_spec(spec)
@@ -51,15 +52,12 @@ def _default_keys():
 def test_keys_are_free_in_blenders_own_keymap():
     taken = {tuple(key[1:]) for key in _default_keys() if key[0] in HEARD}
     assert len(taken) > 100
-    keys = session.part("operators.keymaps").KEYS
+    keys = keymaps.KEYS
     assert 1 <= len(keys) <= 4
     assert not [key for key in keys if (key.key, key.ctrl, key.alt, key.shift) in taken]
 
 
 def test_keys_are_registered_once_and_open_what_is_there():
-    import bpy
-
-    keymaps = session.part("operators.keymaps")
     config = bpy.context.window_manager.keyconfigs.addon
     ours = [
         (item.idname, getattr(item.properties, "name", ""))
@@ -72,8 +70,6 @@ def test_keys_are_registered_once_and_open_what_is_there():
 
 
 def test_every_operator_is_registered_and_named():
-    import bpy
-
     names = {}
     for identifier in _ids():
         group, name = identifier.split(".")
@@ -85,11 +81,9 @@ def test_every_operator_is_registered_and_named():
 
 
 def test_new_tools_stand_in_menus_so_that_search_finds_them():
-    import bpy
-
     layout = MagicMock()
-    for name, draw in (("add_menu", "draw_in_add_menu"), ("object_menu", "TETFLORA_MT_object.draw")):
-        attrgetter(draw)(session.part(f"panels.{name}"))(SimpleNamespace(layout=layout), bpy.context)
+    for draw in (add_menu.draw_in_add_menu, object_menu.TETFLORA_MT_object.draw):
+        draw(SimpleNamespace(layout=layout), bpy.context)
     drawn = {call.args[0] for call in layout.operator.call_args_list}
     menus = {call.args[0] for call in layout.menu.call_args_list}
     assert {f"tetflora.{name}" for name in ("paint_plants", "drop_to_ground", "first_forest")} <= drawn <= _ids()
@@ -99,8 +93,6 @@ def test_new_tools_stand_in_menus_so_that_search_finds_them():
 
 def _texts():
     """All texts that the interface shows, as far as they are registered or written out in panels."""
-    import bpy
-
     found = set()
     for name in dir(bpy.types):
         cls = getattr(bpy.types, name)
@@ -111,10 +103,10 @@ def _texts():
                 found.add(prop.name)
                 if prop.type == 'ENUM':
                     found |= {item.name for item in prop.enum_items}
-    for cls in (*part("properties").CLASSES, part("preferences").TetFloraPreferences):
-        properties = cls.bl_rna.properties
-        found |= {p.name for p in properties}
-        found |= {item.name for p in properties if p.type == 'ENUM' for item in p.enum_items}
+    for cls in (*properties.CLASSES, preferences.TetFloraPreferences):
+        settings = cls.bl_rna.properties
+        found |= {p.name for p in settings}
+        found |= {item.name for p in settings if p.type == 'ENUM' for item in p.enum_items}
     for identifier in _ids():
         group, name = identifier.split(".")
         found.add(getattr(getattr(bpy.ops, group), name).get_rna_type().name)
@@ -124,7 +116,7 @@ def _texts():
 
 
 def test_every_translated_text_is_in_the_interface():
-    dictionary = part("translations").DICTIONARY
+    dictionary = translations.DICTIONARY
     texts = _texts()
     for language, entries in dictionary.items():
         assert re.fullmatch(r"[a-z]{2}_[A-Z]{2}", language)

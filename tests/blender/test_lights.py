@@ -6,17 +6,17 @@ from __future__ import annotations
 
 from math import radians
 
+import bpy
 import numpy as np
 import pytest
 
-from tests.blender.scenes import depsgraph, part
+from tests.blender.scenes import depsgraph
+from tetflora_addon.blender import light_reader
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
 def _add(name, kind, **properties):
-    import bpy
-
     obj = bpy.data.objects.new(name, bpy.data.lights.new(name, kind))
     for key, value in properties.items():
         setattr(obj.data, key, value)
@@ -25,9 +25,7 @@ def _add(name, kind, **properties):
 
 
 def _read():
-    import bpy
-
-    return part("light_reader").read_lights(depsgraph(), bpy.context.view_layer)
+    return light_reader.read_lights(depsgraph(), bpy.context.view_layer)
 
 
 def test_every_kind_of_light_is_read_by_name():

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import bpy
 import pytest
 
 from tests.blender.scenes import add_camera, add_mesh, add_plant, select
@@ -14,8 +15,6 @@ pytestmark = pytest.mark.usefixtures("clean_file")
 @pytest.fixture
 def linked(clean_file, tmp_path):
     """Linked plants of another file in the scene, selected."""
-    import bpy
-
     select(add_mesh("ground", size=10.0))
     bpy.ops.tetflora.populate(count=4, species="bush")
     path = str(tmp_path / "library.blend")
@@ -45,8 +44,6 @@ def _state(plants):
     ],
 )
 def test_buttons_say_that_they_are_linked_and_change_nothing(linked, name, options):
-    import bpy
-
     before, objects = _state(linked), len(bpy.data.objects)
     with pytest.raises(RuntimeError, match="linked from another file"):
         getattr(bpy.ops.tetflora, name)(**options)
@@ -56,16 +53,12 @@ def test_buttons_say_that_they_are_linked_and_change_nothing(linked, name, optio
 
 @pytest.mark.parametrize("which", ['SELECTED', 'ALL'])
 def test_they_are_not_removed_and_it_is_said(linked, which, capfd):
-    import bpy
-
     assert bpy.ops.tetflora.remove_plants(which=which) == {'CANCELLED'}
     assert "linked from another file" in capfd.readouterr().out
     assert len(_state(linked)) == 4
 
 
 def test_plants_of_this_file_among_them_are_changed(linked):
-    import bpy
-
     before = _state(linked)
     own = add_plant("own", location=(3.0, 0.0, 0.0))
     seed = own.tetflora.seed
@@ -78,16 +71,12 @@ def test_plants_of_this_file_among_them_are_changed(linked):
 
 
 def test_they_are_refined(linked):
-    import bpy
-
     add_camera()
     assert bpy.ops.tetflora.refine() == {'FINISHED'}
     assert '"plants": 4' in bpy.context.scene.tetflora.statistics
 
 
 def test_what_is_changed_of_overrides_is_there_when_the_file_is_opened_again(linked, tmp_path):
-    import bpy
-
     def overridden():
         return [o for o in bpy.context.scene.objects if o.tetflora.is_plant and o.override_library is not None]
 

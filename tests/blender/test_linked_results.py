@@ -4,27 +4,25 @@
 
 from __future__ import annotations
 
+import bpy
 import pytest
 
 from devtools import session
-from tests.blender.scenes import add_camera, add_plant, depsgraph, part, tiny_render
+from tests.blender.scenes import add_camera, add_plant, depsgraph, tiny_render
+from tetflora_addon.blender import emit, job, materials
 
 
 def refined(seed):
     """A scene with one plant and its results; their collection."""
-    import bpy
-
     scene = tiny_render(size=48)
     add_plant("bush", seed=seed)
     add_camera(location=(0.0, -6.0, 1.5))
-    part("job").refine(scene, depsgraph())
+    job.refine(scene, depsgraph())
     bpy.context.view_layer.update()
-    return part("emit").result_collections(scene, 'VIEW')[0]
+    return emit.result_collections(scene, 'VIEW')[0]
 
 
 def save(path):
-    import bpy
-
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     session.clean_file()
     return str(path)
@@ -32,14 +30,12 @@ def save(path):
 
 @pytest.mark.parametrize("overridden", [False, True], ids=["linked", "overridden"])
 def test_results_of_another_file_are_not_results_of_this(clean_file, tmp_path, overridden):
-    import bpy
-
     bpy.context.scene.tetflora.output.save_results = True
     name = refined(seed=3).name
     path = save(tmp_path / "forest.blend")
     with bpy.data.libraries.load(path, link=True) as (_, wanted):
         wanted.collections = [name]
-    linked, scene, emit = wanted.collections[0], bpy.context.scene, part("emit")
+    linked, scene = wanted.collections[0], bpy.context.scene
     scene.collection.children.link(linked)
     if overridden:
         linked = linked.override_hierarchy_create(scene, bpy.context.view_layer, do_fully_editable=True)
@@ -52,16 +48,13 @@ def test_results_of_another_file_are_not_results_of_this(clean_file, tmp_path, o
     scene.tetflora.output.show_render = False
     assert own.hide_render and not linked.hide_render
 
-    part("job").clear(scene)
+    job.clear(scene)
     assert not emit.result_collections(scene)
     assert {obj.session_uid for obj in linked.objects} == held
     assert linked in scene.collection.children_recursive
 
 
 def test_an_outdated_material_of_another_file_keeps_its_name(clean_file, tmp_path):
-    import bpy
-
-    materials = part("materials")
     old = materials.proxy_material()
     name, old["tetflora_version"], old.use_fake_user = old.name, 1, True
     path = save(tmp_path / "old.blend")

@@ -4,9 +4,11 @@
 
 from __future__ import annotations
 
+import bpy
 import pytest
 
-from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, part, tiny_render
+from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, tiny_render
+from tetflora_addon.blender import handlers
 
 FRAMES, LEG = 24, 4
 
@@ -14,8 +16,6 @@ FRAMES, LEG = 24, 4
 @pytest.mark.parametrize("gigabytes", [0.0, 4.0], ids=["nothing kept", "results kept"])
 def test_frames_of_a_film_leave_nothing_behind(clean_file, tmp_path, gigabytes):
     """The camera goes to and fro: whatever is kept from frame to frame, a third round needs no more than a second."""
-    import bpy
-
     scene = tiny_render(size=24)
     for n, species in enumerate(("bush", "fern")):
         add_plant(species, species, seed=n, location=(2.0 * n - 1.0, 0.0, 0.0))
@@ -41,7 +41,7 @@ def test_frames_of_a_film_leave_nothing_behind(clean_file, tmp_path, gigabytes):
         bpy.ops.render.render(animation=True)
     finally:
         bpy.app.handlers.render_post.remove(look)
-    assert part("handlers").render_errors() == []
+    assert handlers.render_errors() == []
     assert len(during) == FRAMES
     assert hidden == [True] * FRAMES
     rounds = [during[n : n + 2 * LEG] for n in range(0, FRAMES, 2 * LEG)]

@@ -10,28 +10,36 @@ import re
 import pytest
 
 from devtools import build
-from tests.blender.scenes import part
+from tetflora_addon.blender import (
+    brush_properties,
+    output_properties,
+    population_properties,
+    preferences,
+    preview_properties,
+    properties,
+    wind_properties,
+)
 
 MANUAL = (build.ROOT / "docs" / "manual.md").read_text(encoding="utf-8")
 
 
 GROUPS = (
-    ("properties", "TetFloraScene"),
-    ("properties", "TetFloraLeafObject"),
-    ("population_properties", "TetFloraPopulation"),
-    ("population_properties", "TetFloraMixEntry"),
-    ("output_properties", "TetFloraOutput"),
-    ("output_properties", "TetFloraSpeciesOutput"),
-    ("preview_properties", "TetFloraPreview"),
-    ("brush_properties", "TetFloraBrush"),
-    ("wind_properties", "TetFloraWind"),
-    ("preferences", "TetFloraPreferences"),
+    properties.TetFloraScene,
+    properties.TetFloraLeafObject,
+    population_properties.TetFloraPopulation,
+    population_properties.TetFloraMixEntry,
+    output_properties.TetFloraOutput,
+    output_properties.TetFloraSpeciesOutput,
+    preview_properties.TetFloraPreview,
+    brush_properties.TetFloraBrush,
+    wind_properties.TetFloraWind,
+    preferences.TetFloraPreferences,
 )
 
 
-@pytest.mark.parametrize(("module", "group"), GROUPS)
-def test_every_setting_is_explained(clean_file, module, group):
-    properties = getattr(part(module), group).bl_rna.properties
+@pytest.mark.parametrize("group", GROUPS, ids=lambda group: group.__name__)
+def test_every_setting_is_explained(clean_file, group):
+    properties = group.bl_rna.properties
     hidden = {"rna_type", "bl_idname"}
     shown = {p.name for p in properties if not p.is_hidden and p.identifier not in hidden and p.name != "Name"}
     internal = {"Populate", "Species"}
@@ -39,13 +47,13 @@ def test_every_setting_is_explained(clean_file, module, group):
 
 
 def test_every_default_is_the_one_that_is_told(clean_file):
-    properties = part("properties").TetFloraScene.bl_rna.properties
+    settings = properties.TetFloraScene.bl_rna.properties
     rows = dict(re.findall(r"^\| \*\*(.+?)\*\* \| [^|]+ \| ([\d,.]+) \|", MANUAL, flags=re.MULTILINE))
-    told = {p.identifier: rows[p.name] for p in properties if p.name in rows}
+    told = {p.identifier: rows[p.name] for p in settings if p.name in rows}
     assert {"cutoff", "leaf_limit", "block", "hidden", "max_tetrahedra"} <= set(told)
     for identifier, text in told.items():
-        default = properties[identifier].default
-        if properties[identifier].subtype == 'ANGLE':
+        default = settings[identifier].default
+        if settings[identifier].subtype == 'ANGLE':
             default = math.degrees(default)
         assert float(text.replace(",", "")) == pytest.approx(default), identifier
 

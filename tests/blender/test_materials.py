@@ -2,21 +2,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Materials return no more light than they get, look alike at a distance, and leave the artist's work alone."""
 
+import bpy
 import numpy as np
 import pytest
 
 from devtools import session
-from tests.blender.renders import compat, picture, small_scene
+from tests.blender.renders import picture, small_scene
+from tetflora_addon import buffers, errors
+from tetflora_addon.blender import compat, materials, meshes, node_tools
+from tetflora_addon.plants import species
 
 pytestmark = pytest.mark.usefixtures("clean_file")
-
-
-def materials():
-    return session.part("tetflora_addon.blender.materials")
-
-
-def tools():
-    return session.part("tetflora_addon.blender.node_tools")
 
 
 def tube(radius, colour, material, turns=0):
@@ -32,7 +28,7 @@ def tube(radius, colour, material, turns=0):
     u, v = np.stack([k, k + 1, k + 1, k], axis=1) / sides + turns, 7 * np.stack([i, i, i + 1, i + 1], axis=1) / rings
     pairs = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     edges, edge_of_corner = np.unique(pairs, axis=0, return_inverse=True)
-    buffers = session.part("tetflora_addon.buffers").MeshBuffers(
+    polygons = buffers.MeshBuffers(
         (along[:, None] + ring).reshape(-1, 3).astype(np.float32),
         edges.astype(np.int32),
         corners.reshape(-1).astype(np.int32),
@@ -45,15 +41,15 @@ def tube(radius, colour, material, turns=0):
         },
         smooth=True,
     )
-    return added("tube", buffers, material)
+    return added("tube", polygons, material)
 
 
 def bark_seen(character, radius, engine="CYCLES", turns=0, colour=(0.4, 0.3, 0.2)):
     """Picture of the middle half of a branch, five perimeters of it, under an even sky of 1."""
     session.clean_file()
-    engine = compat().eevee_engine() if engine == "EEVEE" else engine
+    engine = compat.eevee_engine() if engine == "EEVEE" else engine
     small_scene(sky=1.0, samples=16, size=96, engine=engine, width=4 * 2 * np.pi * radius)
-    tube(radius, colour, materials().bark_material("Oak", character), turns)
+    tube(radius, colour, materials.bark_material("Oak", character), turns)
     seen = picture()
     tall = len(seen)
     reach = int(0.8 * tall / (8 * np.pi))  # from the axis, of the radius
@@ -63,7 +59,7 @@ def bark_seen(character, radius, engine="CYCLES", turns=0, colour=(0.4, 0.3, 0.2
 def sheet(colour, transmission, material):
     """A square of 8 m across the view, facing up; the leaf's length is that of the view."""
     corners = np.array([[-4, -4, 0], [4, -4, 0], [4, 4, 0], [-4, 4, 0]], dtype=np.float32)
-    buffers = session.part("tetflora_addon.buffers").MeshBuffers(
+    polygons = buffers.MeshBuffers(
         corners,
         np.array([[0, 1], [1, 2], [2, 3], [3, 0]], dtype=np.int32),
         np.arange(4, dtype=np.int32),
@@ -75,13 +71,11 @@ def sheet(colour, transmission, material):
             "tf_transmission": ("FACE", np.array([transmission], dtype=np.float32)),
         },
     )
-    return added("sheet", buffers, material)
+    return added("sheet", polygons, material)
 
 
 def added(name, buffers, material):
-    import bpy
-
-    mesh = session.part("tetflora_addon.blender.meshes").write_mesh(name, buffers, [material])
+    mesh = meshes.write_mesh(name, buffers, [material])
     made = bpy.data.objects.new(name, mesh)
     bpy.context.scene.collection.objects.link(made)
     return made
@@ -90,11 +84,11 @@ def added(name, buffers, material):
 @pytest.mark.parametrize("transmission", [0.0, 0.4, 1.0])
 def test_leaves_return_what_they_are_said_to_on_the_mean_of_both_sides(transmission):
     small_scene(sky=1.0, samples=64, size=32)
-    made = sheet((0.5, 0.4, 0.6), transmission, materials().leaf_material("Oak"))
+    made = sheet((0.5, 0.4, 0.6), transmission, materials.leaf_material("Oak"))
     upper = picture().mean(axis=(0, 1))
     made.rotation_euler = (0.0, np.pi, 0.0)
     lower = picture().mean(axis=(0, 1))
-    tint, gloss = np.array(materials().THROUGH_TINT[:3]), materials().GLOSS
+    tint, gloss = np.array(materials.THROUGH_TINT[:3]), materials.GLOSS
     wanted = (1.0 - gloss) * np.array([0.5, 0.4, 0.6]) * ((1.0 - transmission) + transmission * tint) + gloss
     np.testing.assert_allclose((upper + lower) / 2, wanted, rtol=0.01)
     if transmission < 1.0:
@@ -104,7 +98,7 @@ def test_leaves_return_what_they_are_said_to_on_the_mean_of_both_sides(transmiss
 @pytest.mark.parametrize("transmission", [0.0, 0.4, 1.0])
 def test_a_white_leaf_in_a_white_world_returns_no_more_than_it_gets(transmission):
     small_scene(sky=1.0, samples=64)
-    sheet((1.0, 1.0, 1.0), transmission, materials().leaf_material("Oak"))
+    sheet((1.0, 1.0, 1.0), transmission, materials.leaf_material("Oak"))
     seen = picture()
     assert (seen.mean(axis=(0, 1)) <= 1.002).all()
     assert (seen <= 1.02).all()
@@ -113,9 +107,9 @@ def test_a_white_leaf_in_a_white_world_returns_no_more_than_it_gets(transmission
 def test_a_leaf_lit_from_behind_shows_its_transmission_only():
     """The sun from below, S = π W/m²: radiance is colour times tint times share, times what gloss leaves."""
     small_scene(sky=0.0, samples=64, sun=180.0, size=32)
-    sheet((0.2, 0.4, 0.1), 0.5, materials().leaf_material("Oak"))
-    tint = np.array(materials().THROUGH_TINT[:3])
-    wanted = np.array([0.2, 0.4, 0.1]) * tint * 0.5 * (1.0 - materials().GLOSS)
+    sheet((0.2, 0.4, 0.1), 0.5, materials.leaf_material("Oak"))
+    tint = np.array(materials.THROUGH_TINT[:3])
+    wanted = np.array([0.2, 0.4, 0.1]) * tint * 0.5 * (1.0 - materials.GLOSS)
     seen = picture()
     np.testing.assert_allclose(seen.mean(axis=(0, 1)), wanted, rtol=0.01)
     assert np.ptp(seen[..., 1]) > 0.05 * wanted[1], "no veins"
@@ -123,7 +117,7 @@ def test_a_leaf_lit_from_behind_shows_its_transmission_only():
 
 def test_leaves_that_let_little_light_through_have_no_veins():
     small_scene(sky=0.0, samples=64, sun=180.0, size=32)
-    sheet((0.2, 0.4, 0.1), 0.12, materials().leaf_material("Pine"))
+    sheet((0.2, 0.4, 0.1), 0.12, materials.leaf_material("Pine"))
     seen = picture()
     assert np.ptp(seen[..., 1]) < 0.03 * seen[..., 1].mean()
 
@@ -156,21 +150,21 @@ def test_branches_of_other_colours_have_other_patterns():
 
 
 def test_another_bark_is_another_material_and_the_old_one_is_kept():
-    old = materials().bark_material("Oak", "ridged")
-    new = materials().bark_material("Oak", "banded")
+    old = materials.bark_material("Oak", "ridged")
+    new = materials.bark_material("Oak", "banded")
     assert new != old
     assert new.name == "TetFlora Oak bark"
-    assert materials().bark_material("Oak", "banded") == new
+    assert materials.bark_material("Oak", "banded") == new
 
 
 def test_a_bark_that_is_not_there_is_named():
-    with pytest.raises(session.part("tetflora_addon.errors").SpeciesError, match='"wooly"; choose one of ridged'):
-        materials().bark_material("Oak", "wooly")
+    with pytest.raises(errors.SpeciesError, match='"wooly"; choose one of ridged'):
+        materials.bark_material("Oak", "wooly")
 
 
 def test_bark_lets_no_light_through():
     small_scene(sky=0.0, samples=16, sun=180.0)
-    sheet((0.3, 0.2, 0.1), 0.0, materials().bark_material("Oak"))
+    sheet((0.3, 0.2, 0.1), 0.0, materials.bark_material("Oak"))
     assert picture().max() == 0.0
 
 
@@ -182,7 +176,7 @@ def test_microsurfaces_match_leaves_and_bark():
         for kind in (name, "proxy"):
             session.clean_file()
             small_scene(sky=0.5, samples=64, sun=30.0)
-            made = materials().proxy_material() if kind == "proxy" else getattr(materials(), f"{name}_material")("Oak")
+            made = materials.proxy_material() if kind == "proxy" else getattr(materials, f"{name}_material")("Oak")
             sheet(colour, transmission, made)
             seen[name, kind] = picture().mean(axis=(0, 1))
     np.testing.assert_allclose(seen["leaf", "proxy"], seen["leaf", "leaf"], rtol=0.15)
@@ -191,56 +185,52 @@ def test_microsurfaces_match_leaves_and_bark():
 
 def test_names_and_marks():
     made = [
-        materials().leaf_material("Oak"),
-        materials().bark_material("Oak"),
-        materials().proxy_material(),
-        materials().shell_material(),
-        materials().scatter_group(),
+        materials.leaf_material("Oak"),
+        materials.bark_material("Oak"),
+        materials.proxy_material(),
+        materials.shell_material(),
+        materials.scatter_group(),
     ]
     names = ["TetFlora Oak leaf", "TetFlora Oak bark", "TetFlora proxy", "TetFlora shell", "TetFlora Scatter"]
     assert [m.name for m in made] == names
-    assert all(tools().is_ours(m) for m in made)
-    assert materials().leaf_material("Oak") == made[0]
+    assert all(node_tools.is_ours(m) for m in made)
+    assert materials.leaf_material("Oak") == made[0]
 
 
 def test_an_edited_material_stays_as_it_is():
-    made = materials().leaf_material("Oak")
+    made = materials.leaf_material("Oak")
     made.node_tree.nodes.clear()
-    assert materials().leaf_material("Oak") == made
+    assert materials.leaf_material("Oak") == made
     assert len(made.node_tree.nodes) == 0
 
 
 def test_copies_and_renamed_materials_are_the_artists():
-    made = materials().leaf_material("Oak")
+    made = materials.leaf_material("Oak")
     copy = made.copy()
-    assert not tools().is_ours(copy)
+    assert not node_tools.is_ours(copy)
     made.name = "My oak"
-    assert not tools().is_ours(made)
-    assert materials().leaf_material("Oak") != made
+    assert not node_tools.is_ours(made)
+    assert materials.leaf_material("Oak") != made
 
 
 def test_an_outdated_material_is_kept_beside_the_new_one():
-    old = materials().leaf_material("Oak")
-    old[tools().VERSION] = 0
-    new = materials().leaf_material("Oak")
+    old = materials.leaf_material("Oak")
+    old[node_tools.VERSION] = 0
+    new = materials.leaf_material("Oak")
     assert new != old
     assert new.name == "TetFlora Oak leaf"
     assert old.name == "TetFlora Oak leaf (version 0)"
-    assert not tools().is_ours(old)
+    assert not node_tools.is_ours(old)
 
 
 def test_a_material_that_the_artist_made_under_our_name_is_used():
-    import bpy
-
     theirs = bpy.data.materials.new("TetFlora Oak bark")
-    assert materials().bark_material("Oak") == theirs
-    assert not tools().is_ours(theirs)
+    assert materials.bark_material("Oak") == theirs
+    assert not node_tools.is_ours(theirs)
 
 
 def test_every_link_is_valid_and_every_species_shares_the_group():
-    import bpy
-
-    for made in (materials().leaf_material("Oak"), materials().bark_material("Fir"), materials().proxy_material()):
+    for made in (materials.leaf_material("Oak"), materials.bark_material("Fir"), materials.proxy_material()):
         groups = [n.node_tree for n in made.node_tree.nodes if n.bl_idname == "ShaderNodeGroup"]
         assert bpy.data.node_groups["TetFlora Scatter"] in groups
         assert all(link.is_valid for link in made.node_tree.links)
@@ -249,4 +239,4 @@ def test_every_link_is_valid_and_every_species_shares_the_group():
 
 def test_every_bark_that_species_may_name_is_there():
     """In the same order: the number of a character is part of its materials' version."""
-    assert materials().BARKS == session.part("tetflora_addon.plants.species").BARKS
+    assert materials.BARKS == species.BARKS

@@ -4,24 +4,26 @@
 
 from dataclasses import replace
 
+import bpy
 import numpy as np
 import pytest
 
-from devtools import session
+from tetflora_addon import buffers
+from tetflora_addon.blender import meshes
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
 def write_mesh(*args):
-    return session.part("tetflora_addon.blender.meshes").write_mesh(*args)
+    return meshes.write_mesh(*args)
 
 
 def read_mesh_arrays(*args):
-    return session.part("tetflora_addon.blender.meshes").read_mesh_arrays(*args)
+    return meshes.read_mesh_arrays(*args)
 
 
 def MeshBuffers(*args, **fields):  # noqa: N802 - stands for the class of the enabled extension
-    return session.part("tetflora_addon.buffers").MeshBuffers(*args, **fields)
+    return buffers.MeshBuffers(*args, **fields)
 
 
 def prism():
@@ -94,8 +96,6 @@ def test_shading(smooth):
 
 
 def test_materials_fill_the_slots():
-    import bpy
-
     materials = [bpy.data.materials.new("a"), None, bpy.data.materials.new("b")]
     assert list(write_mesh("prism", prism(), materials).materials) == materials
 
@@ -121,8 +121,6 @@ def test_an_empty_mesh():
 
 
 def test_a_mesh_of_an_artist():
-    import bpy
-
     bpy.ops.mesh.primitive_cube_add()
     mesh = bpy.context.object.data
     back = read_mesh_arrays(mesh)
@@ -153,8 +151,6 @@ def test_a_mesh_of_an_artist():
     ],
 )
 def test_broken_buffers_are_refused_and_leave_nothing(change, message):
-    import bpy
-
     with pytest.raises(ValueError, match=message):
         write_mesh("broken", replace(prism(), **change))
     assert len(bpy.data.meshes) == 0

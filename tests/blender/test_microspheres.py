@@ -6,11 +6,13 @@ from __future__ import annotations
 
 import json
 
+import bpy
 import numpy as np
 import pytest
 
-from tests.blender.scenes import datablocks, part
-from tests.blender.test_job import _forest, _job, _made, _refine
+from tests.blender.scenes import datablocks
+from tests.blender.test_job import _forest, _made, _refine
+from tetflora_addon.blender import compat, job, materials, point_clouds
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -21,8 +23,6 @@ def _proxies(scene):
 
 def _points(made):
     """Attributes of the points that are drawn."""
-    import bpy
-
     evaluated = made.evaluated_get(bpy.context.evaluated_depsgraph_get())
     geometry = evaluated.evaluated_geometry()  # keeps the cloud alive
     cloud = geometry.pointcloud
@@ -35,8 +35,6 @@ def _points(made):
 
 
 def test_spheres_take_the_places_of_facets_and_clear_removes_them():
-    import bpy
-
     scene = _forest()
     scene.render.engine = 'CYCLES'
     before = datablocks()
@@ -56,18 +54,17 @@ def test_spheres_take_the_places_of_facets_and_clear_removes_them():
     assert points["radius"].min() > 0
     assert 0 <= points["tf_colour"].min() <= points["tf_colour"].max() <= 1
     assert len(np.unique(points["tf_transmission"])) == 2  # wood and leaves
-    scene.render.engine = part("compat").eevee_engine()  # which draws less of a sphere
+    scene.render.engine = compat.eevee_engine()  # which draws less of a sphere
     _refine(scene)
     assert len(_proxies(scene)) == 1
     larger, _ = _points(_proxies(scene)[0])
     assert larger["radius"] == pytest.approx(points["radius"] * np.sqrt(np.pi / 2), rel=1e-4)
-    assert _job().clear(scene) > 3
+    assert job.clear(scene) > 3
     assert datablocks() == before
     assert not bpy.data.pointclouds
 
 
 def test_refine_at_render_takes_spheres_back():
-    import bpy
 
     from tests.blender.scenes import tiny_render
 
@@ -82,20 +79,17 @@ def test_refine_at_render_takes_spheres_back():
 
 def test_the_group_for_vertices_makes_the_same_points():
     """What versions without `PointCloud.resize` use works on all."""
-    import bpy
-
-    clouds = part("point_clouds")
     random = np.random.default_rng(1)
     colour, radius = random.random((5, 3), np.float32), random.random(5, np.float32)
-    buffers = part("point_clouds").PointBuffers(
+    buffers = point_clouds.PointBuffers(
         random.random((5, 3), np.float32), radius, {"tf_colour": colour, "tf_transmission": radius / 2}
     )
-    material = part("materials").sphere_material()
-    for by_nodes in {True, not part("compat").can_resize_point_clouds()}:
-        made = clouds.point_object("spheres", buffers, material, by_nodes=by_nodes)
+    material = materials.sphere_material()
+    for by_nodes in {True, not compat.can_resize_point_clouds()}:
+        made = point_clouds.point_object("spheres", buffers, material, by_nodes=by_nodes)
         bpy.context.collection.objects.link(made)
-        points, materials = _points(made)
-        assert materials == [material.name]
+        points, names = _points(made)
+        assert names == [material.name]
         assert (points["position"] == buffers.positions).all()
         assert (points["radius"] == radius).all()
         assert (points["tf_colour"] == colour).all()
@@ -103,26 +97,23 @@ def test_the_group_for_vertices_makes_the_same_points():
 
 
 def test_what_was_written_wrongly_leaves_nothing_behind():
-    clouds, buffers = part("point_clouds"), part("point_clouds").PointBuffers
-    part("materials").sphere_material()
+    materials.sphere_material()
     before = datablocks()
-    wrong = buffers(np.zeros((4, 3), np.float32), np.ones(3, np.float32))
+    wrong = point_clouds.PointBuffers(np.zeros((4, 3), np.float32), np.ones(3, np.float32))
     with pytest.raises(ValueError, match="radius"):
-        clouds.point_object("spheres", wrong, part("materials").sphere_material())
+        point_clouds.point_object("spheres", wrong, materials.sphere_material())
     assert datablocks() == before
 
 
 @pytest.mark.parametrize("transmission", [0.0, 0.5])
 def test_white_spheres_vanish_before_a_white_sky(transmission):
     """What falls on a sphere comes back from it, through it or from its surface, and nothing else does."""
-    import bpy
 
     from tests.blender.renders import picture, small_scene
 
     small_scene(sky=1.0, samples=64)
     white = {"tf_colour": np.ones((1, 3), np.float32), "tf_transmission": np.full(1, transmission, np.float32)}
-    clouds = part("point_clouds")
-    buffers = clouds.PointBuffers(np.zeros((1, 3), np.float32), np.full(1, 1.5, np.float32), white)
-    made = clouds.point_object("sphere", buffers, part("materials").sphere_material())
+    buffers = point_clouds.PointBuffers(np.zeros((1, 3), np.float32), np.full(1, 1.5, np.float32), white)
+    made = point_clouds.point_object("sphere", buffers, materials.sphere_material())
     bpy.context.collection.objects.link(made)
     assert picture()[..., 0].mean() == pytest.approx(1.0, abs=0.01)

@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The microsphere group gives back what it takes: uniform light is neither gained nor lost, in either engine."""
 
+import bpy
 import numpy as np
 import pytest
 
 from devtools import session
-from tests.blender.renders import compat, picture, small_scene
+from tests.blender.renders import picture, small_scene
+from tetflora_addon.blender import compat, microsphere_material
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -16,14 +18,11 @@ MIXTURES = ((0.0, 0.04, 0.0), (0.0, 0.04, 0.5), (1.0, 0.04, 0.5), (1.0, 0.3, 0.0
 
 def place(tilt=0.0, **inputs):
     """A square of 2 m in the middle, its face `tilt` off the viewer, with the group's inputs as named."""
-    import bpy
-
-    module = session.part("tetflora_addon.blender.microsphere_material")
     material = bpy.data.materials.new("microspheres")
-    tree = compat().shader_tree(material)
+    tree = compat.shader_tree(material)
     tree.nodes.clear()
     group = tree.nodes.new("ShaderNodeGroup")
-    group.node_tree = module.microsphere_group()
+    group.node_tree = microsphere_material.microsphere_group()
     given = {"Colour": (1.0, 1.0, 1.0, 1.0), "Through Tint": (1.0, 1.0, 1.0, 1.0), **inputs}
     for name, value in given.items():
         group.inputs[name].default_value = value
@@ -35,7 +34,7 @@ def place(tilt=0.0, **inputs):
         output.target = target.upper()
         tree.links.new(thin.outputs[0], output.inputs["Thickness"])
         tree.links.new(group.outputs[target], output.inputs["Surface"])
-    compat().disable_bump_correction(material)
+    compat.disable_bump_correction(material)
     bpy.ops.mesh.primitive_plane_add(size=2.0, rotation=(0.0, tilt, 0.0))
     square = bpy.context.scene.objects["Plane"]
     square.data.materials.append(material)
@@ -44,8 +43,6 @@ def place(tilt=0.0, **inputs):
 
 def tolerance() -> float:
     """Cycles of 4.5 LTS takes away up to a twentieth where normals lean off the face; later ones do not."""
-    import bpy
-
     return 0.01 if bpy.app.version >= (5, 0, 0) else 0.055
 
 
@@ -62,8 +59,6 @@ def test_a_white_cloud_vanishes_in_white_surroundings(plane, s, transmission, ti
 @pytest.mark.parametrize("plane", [0.0, 1.0])
 def test_light_that_is_sampled_counts_as_light_that_is_hit(plane, transmission):
     """The same sky with a texture of which all colours are one: Cycles then also picks directions in the sky."""
-    import bpy
-
     small_scene(sky=1.0, samples=256, size=8, width=0.5)
     place(0.9, Plane=plane, s=0.0, Transmission=transmission, Normal=(0.3, 0.2, 0.9))
     tree = bpy.context.scene.world.node_tree
@@ -77,7 +72,7 @@ def test_light_that_is_sampled_counts_as_light_that_is_hit(plane, transmission):
 def test_eevee_gains_and_loses_no_more():
     for plane, s, transmission in MIXTURES[1:4]:
         session.clean_file()
-        small_scene(sky=1.0, samples=4, size=8, width=0.5, engine=compat().eevee_engine())
+        small_scene(sky=1.0, samples=4, size=8, width=0.5, engine=compat.eevee_engine())
         place(0.5, Plane=plane, s=s, Transmission=transmission, Normal=(0.3, 0.2, 0.9))
         assert picture().mean() == pytest.approx(1.0, abs=0.02)
 
@@ -85,7 +80,7 @@ def test_eevee_gains_and_loses_no_more():
 @pytest.mark.parametrize("name", ["CYCLES", "EEVEE"])
 def test_planes_follow_the_cosine_to_the_light(name):
     """p cos α, whatever the face: sun from the zenith, planes 40° off."""
-    engine = compat().eevee_engine() if name == "EEVEE" else name
+    engine = compat.eevee_engine() if name == "EEVEE" else name
     for face in (0.0, 0.6):
         session.clean_file()
         small_scene(sky=0.0, samples=4, size=8, sun=0.0, width=0.4, engine=engine)
@@ -96,9 +91,7 @@ def test_planes_follow_the_cosine_to_the_light(name):
 @pytest.mark.parametrize("name", ["CYCLES", "EEVEE"])
 def test_light_from_behind_passes_through(name):
     """A sun below the square, seen from above: the share that is transmitted, times the tint."""
-    import bpy
-
-    engine = compat().eevee_engine() if name == "EEVEE" else name
+    engine = compat.eevee_engine() if name == "EEVEE" else name
     small_scene(sky=0.0, samples=64, size=8, sun=180.0, width=0.4, engine=engine)
     tint = (1.0, 0.5, 0.25, 1.0)
     square = place(Transmission=0.4, Roundness=0.0, **{"Through Tint": tint, "Colour": (0.5, 0.5, 0.5, 1.0)})
@@ -127,9 +120,7 @@ def test_particles_with_a_surface_of_their_own_use_its_normal():
 
 def test_haze_dims_it_and_adds_its_own_light():
     """A world volume between viewer and cloud, in both engines: Blender's own, so the surface only has to take part."""
-    import bpy
-
-    for engine in ("CYCLES", compat().eevee_engine()):
+    for engine in ("CYCLES", compat.eevee_engine()):
         session.clean_file()
         small_scene(sky=0.0, samples=8, size=8, width=0.4, engine=engine)
         scene = bpy.context.scene
@@ -151,7 +142,7 @@ def test_haze_dims_it_and_adds_its_own_light():
 
 
 def test_every_socket_is_described_and_every_link_valid():
-    group = session.part("tetflora_addon.blender.microsphere_material").microsphere_group()
+    group = microsphere_material.microsphere_group()
     sockets = [item for item in group.interface.items_tree if item.item_type == 'SOCKET']
     assert {s.name for s in sockets if s.in_out == 'INPUT'} >= {"Colour", "Transmission", "Normal", "Plane", "p", "s"}
     assert all(s.description for s in sockets if s.in_out == 'INPUT')

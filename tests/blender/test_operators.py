@@ -7,23 +7,24 @@ from __future__ import annotations
 import json
 from types import SimpleNamespace
 
+import bpy
 import pytest
 
-from devtools import session
-from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, errors, part, select, tiny_render
+import operators
+from operators import modal_job, refine
+from panels import statistics_panel
+from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, select, tiny_render
+from tetflora_addon import errors
+from tetflora_addon.blender import handlers, job
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
 def _ops():
-    import bpy
-
     return bpy.ops.tetflora
 
 
 def _plants():
-    import bpy
-
     return {o.name: o.tetflora for o in bpy.data.objects if o.tetflora.is_plant}
 
 
@@ -36,17 +37,13 @@ def _small_forest():
 
 
 def test_every_class_of_operators_is_registered_under_its_own_name(blender):
-    import bpy
-
-    classes = session.part("operators").CLASSES
+    classes = operators.CLASSES
     registered = {name for name in dir(bpy.types) if name.startswith("TETFLORA_OT_")}
     assert {cls.__name__ for cls in classes} == registered
     assert all(cls.bl_idname == cls.__name__.replace("TETFLORA_OT_", "tetflora.") for cls in classes)
 
 
 def test_add_plant_stands_at_the_cursor_with_another_seed_each_time():
-    import bpy
-
     bpy.context.scene.cursor.location = (1.0, 2.0, 3.0)
     _ops().add_plant(species="conifer")
     _ops().add_plant(species="conifer")
@@ -77,8 +74,6 @@ def test_reseed_parts_copies_and_leaves_others_alone():
 
 
 def test_species_are_selected_assigned_and_removed():
-    import bpy
-
     add_plant("a", "bush")
     add_plant("b", "conifer")
     add_plant("c", "gone")
@@ -99,8 +94,6 @@ def test_species_are_selected_assigned_and_removed():
 
 
 def test_removing_the_last_plant_takes_the_empty_collection_along():
-    import bpy
-
     _ops().add_plant(species="bush")
     assert [c.name for c in bpy.data.collections] == ["TetFlora plants"]
     _ops().remove_plants(which='ALL')
@@ -108,8 +101,6 @@ def test_removing_the_last_plant_takes_the_empty_collection_along():
 
 
 def test_mark_occluder_toggles_meshes_only():
-    import bpy
-
     first, second = add_mesh("first"), add_mesh("second")
     plant = add_plant()
     select(first, second, plant)
@@ -123,8 +114,6 @@ def test_mark_occluder_toggles_meshes_only():
 
 
 def test_lists_grow_and_shrink():
-    import bpy
-
     settings = bpy.context.scene.tetflora
     assert _ops().edit_list(which='MIX', action='REMOVE') == {'CANCELLED'}
     for _ in range(3):
@@ -157,9 +146,7 @@ def test_disabled_buttons_say_why(name, says):
 
 
 def test_what_a_render_could_not_use_is_forgotten_once_refine_can():
-    import bpy
-
-    scene, handlers = _small_forest(), part("handlers")
+    scene = _small_forest()
     plant = next(o for o in scene.objects if o.tetflora.is_plant)
     plant.scale = (0.0, 0.0, 0.0)
     bpy.context.view_layer.update()
@@ -177,17 +164,15 @@ def test_what_a_render_could_not_use_is_forgotten_once_refine_can():
 
 
 def test_refine_makes_meshes_and_figures_and_clear_takes_them_back():
-    import bpy
-
     scene = _small_forest()
     before = datablocks()
     assert _ops().refine() == {'FINISHED'}
-    assert part("job").has_results(scene)
+    assert job.has_results(scene)
     figures = json.loads(scene.tetflora.statistics)
     assert figures["plants"] == 2
     assert figures["polygons_meshed"] + figures["polygons_proxy"] > 0
-    rows = dict(session.part("panels.statistics_panel").rows_of(scene.tetflora.statistics))
-    passes = session.part("panels.statistics_panel").steps_of(scene.tetflora.statistics)
+    rows = dict(statistics_panel.rows_of(scene.tetflora.statistics))
+    passes = statistics_panel.steps_of(scene.tetflora.statistics)
     assert [int(row[0]) for row in passes] == list(range(1, len(passes) + 1))
     assert passes[-1][1] == rows["Tetrahedra made"]
     assert passes[-1][2] == "0"
@@ -196,8 +181,8 @@ def test_refine_makes_meshes_and_figures_and_clear_takes_them_back():
     assert len(bpy.data.meshes) > 0
     assert _ops().clear() == {'FINISHED'}
     assert datablocks() == before
-    assert session.part("panels.statistics_panel").rows_of(scene.tetflora.statistics) == ()
-    assert session.part("panels.statistics_panel").steps_of(scene.tetflora.statistics) == ()
+    assert statistics_panel.rows_of(scene.tetflora.statistics) == ()
+    assert statistics_panel.steps_of(scene.tetflora.statistics) == ()
 
 
 def _refined_rock():
@@ -214,8 +199,6 @@ def _refined_rock():
 @pytest.mark.parametrize("unlinked", [False, True])
 def test_clear_shows_what_results_that_were_deleted_by_hand_hid(unlinked):
     """Also where the mesh was unlinked from the scene, or the scene was renamed meanwhile."""
-    import bpy
-
     rock, scene = _refined_rock(), bpy.context.scene
     (made,) = (c for c in bpy.data.collections if "tetflora_purpose" in c)
     bpy.data.batch_remove([*made.objects, made])
@@ -223,7 +206,7 @@ def test_clear_shows_what_results_that_were_deleted_by_hand_hid(unlinked):
         rock.use_fake_user = True
         scene.collection.objects.unlink(rock)
         scene.name = "renamed"
-    assert not part("job").has_results(scene)
+    assert not job.has_results(scene)
     assert _ops().clear() == {'FINISHED'}
     assert (rock.hide_render, rock.hide_viewport) == (False, False)
     assert not _ops().clear.poll()
@@ -231,21 +214,19 @@ def test_clear_shows_what_results_that_were_deleted_by_hand_hid(unlinked):
 
 def test_clear_shows_a_mesh_only_when_no_scene_has_results_in_its_place():
     """A scene that is renamed keeps its claim."""
-    import bpy
-
     rock, first = _refined_rock(), bpy.context.scene
     second = bpy.data.scenes.new("second")
     for obj in (rock, first.camera):
         second.collection.objects.link(obj)
     second.camera = first.camera
     with bpy.context.temp_override(scene=second, view_layer=second.view_layers[0]):
-        part("job").refine(second, bpy.context.evaluated_depsgraph_get())
-    assert part("job").has_results(second)
+        job.refine(second, bpy.context.evaluated_depsgraph_get())
+    assert job.has_results(second)
     second.name = "other"
     _ops().clear()
     assert (rock.hide_render, rock.hide_viewport) == (True, True)
     assert not _ops().clear.poll()
-    part("job").clear(second)
+    job.clear(second)
     assert (rock.hide_render, rock.hide_viewport) == (False, False)
     assert "tetflora_hidden" not in rock
 
@@ -272,8 +253,6 @@ class _Window:
     """As much of a window as the modal operator touches, so that its steps can be taken one by one."""
 
     def __init__(self):
-        import bpy
-
         self.progress, self.status, self.timers = [], [], 0
         self.window_manager = SimpleNamespace(
             progress_begin=lambda _a, _b: None,
@@ -303,7 +282,7 @@ class _Operator:
         self.reports = []
         self._steps = self._timer = None
         self._enough = False
-        self.kind = session.part("operators.refine").TETFLORA_OT_refine
+        self.kind = refine.TETFLORA_OT_refine
 
     def __getattr__(self, name):
         found = getattr(self.kind, name)
@@ -315,10 +294,9 @@ class _Operator:
 
 @pytest.fixture
 def window(blender, monkeypatch):
-    refine = session.part("operators.modal_job")
     # Not in the background as far as the operator can tell; a slice of no time is one step a tick.
-    monkeypatch.setattr(refine, "bpy", SimpleNamespace(app=SimpleNamespace(background=False)))
-    monkeypatch.setattr(refine, "_SLICE", 1e-9)
+    monkeypatch.setattr(modal_job, "bpy", SimpleNamespace(app=SimpleNamespace(background=False)))
+    monkeypatch.setattr(modal_job, "_SLICE", 1e-9)
     return _Window()
 
 
@@ -355,7 +333,7 @@ def test_return_stops_refining_and_makes_what_there_is(clean_file, window):
     assert _tick(operator, window, 'RET', 'PRESS') == {'RUNNING_MODAL'}
     while _tick(operator, window) == {'RUNNING_MODAL'}:
         assert "Refining, pass" not in window.status[-1] or window.status.count(window.status[-1]) < 3
-    assert session.part("tetflora_addon.blender.job").has_results(scene)
+    assert job.has_results(scene)
     assert any("Stopped before" in message for _, message in operator.reports)
     assert window.status[-1] is None
 
@@ -394,13 +372,13 @@ def test_errors_in_the_middle_are_reported(clean_file, window, monkeypatch):
     window.__init__()
 
     def broken(*_arguments, **_options):
-        progress = part("job").Progress
+        progress = job.Progress
         yield progress(0.0, "one")
         yield progress(0.1, "two")
         yield progress(0.2, "three")
-        raise errors().SpeciesError("leaf without faces")
+        raise errors.SpeciesError("leaf without faces")
 
-    monkeypatch.setattr(part("job"), "refine_steps", broken)
+    monkeypatch.setattr(job, "refine_steps", broken)
     operator = _Operator()
     assert operator.invoke(window, None) == {'RUNNING_MODAL'}
     assert _tick(operator, window) == {'RUNNING_MODAL'}

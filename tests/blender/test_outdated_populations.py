@@ -4,26 +4,24 @@
 
 from __future__ import annotations
 
+import bpy
 import pytest
 
-from tests.blender.scenes import add_mesh, part, select
+from tests.blender.scenes import add_mesh, select
+from tetflora_addon.blender import erased_places, point_preview, population_rules, populations
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
 def _population():
-    import bpy
-
     return bpy.context.scene.tetflora.populations[0]
 
 
 def _outdated():
-    return part("population_rules").is_outdated(_population())
+    return population_rules.is_outdated(_population())
 
 
 def _populate():
-    import bpy
-
     select(add_mesh("ground", size=10.0))
     bpy.ops.tetflora.populate(count=20, species="bush:2, conifer")
     return _population()
@@ -31,8 +29,6 @@ def _populate():
 
 def _other(prop, population):
     """A value that a setting does not have now."""
-    import bpy
-
     value = getattr(population, prop.identifier)
     if prop.type == 'POINTER':
         images = prop.fixed_type.identifier == "Image"
@@ -49,7 +45,7 @@ def _other(prop, population):
 def test_every_setting_counts_and_taking_it_back_too():
     population = _populate()
     assert not _outdated()
-    simple = [p for p in part("population_rules").settings_of(population) if p.type != 'COLLECTION']
+    simple = [p for p in population_rules.settings_of(population) if p.type != 'COLLECTION']
     assert len(simple) > 25
     for prop in simple:
         before = getattr(population, prop.identifier)
@@ -68,14 +64,12 @@ def test_species_companions_and_grounds_count():
         assert _outdated(), name
         setattr(entry, name, before)
         assert not _outdated(), name
-    part("populations").set_grounds(population, [add_mesh("other ground")])
+    populations.set_grounds(population, [add_mesh("other ground")])
     assert _outdated()
 
 
 @pytest.mark.parametrize("press", ["update_population", "reroll_population"])
 def test_placing_settles_it(press):
-    import bpy
-
     _populate().count = 12
     assert _outdated()
     getattr(bpy.ops.tetflora, press)()
@@ -83,8 +77,6 @@ def test_placing_settles_it(press):
 
 
 def test_frozen_plants_are_as_they_shall_be():
-    import bpy
-
     population = _populate()
     bpy.ops.tetflora.freeze_population()
     population.count = 3
@@ -100,10 +92,8 @@ def test_a_name_and_what_became_of_it_are_no_settings():
 
 
 def test_populations_know_what_was_removed():
-    import bpy
-
     population = _populate()
-    select(*part("populations").own_objects(bpy.context.scene, population)[:3])
+    select(*populations.own_objects(bpy.context.scene, population)[:3])
     bpy.ops.tetflora.remove_plants(which='SELECTED')
     assert population.made == 17
     bpy.ops.tetflora.remove_plants(which='ALL')
@@ -111,12 +101,10 @@ def test_populations_know_what_was_removed():
 
 
 def test_the_panel_tells_the_plants_that_are_there_or_that_an_update_would_place():
-    import bpy
-
-    status = part("point_preview").status
-    waits = part("population_rules").awaits_update
+    status = point_preview.status
+    waits = population_rules.awaits_update
     population = _populate()
-    part("erased_places").note_erased(population, [(0.0, 0.0)], 5.0)
+    erased_places.note_erased(population, [(0.0, 0.0)], 5.0)
     bpy.ops.tetflora.update_population()
     assert 0 < population.made < 20
     assert (status(population), waits(population)) == (f"{population.made} plants, as empties", False)
@@ -133,8 +121,6 @@ def test_the_panel_tells_the_plants_that_are_there_or_that_an_update_would_place
 
 
 def test_it_is_known_in_a_file_that_is_opened(tmp_path):
-    import bpy
-
     _populate().density = 123.4
     bpy.ops.tetflora.update_population()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "forest.blend"))

@@ -6,15 +6,15 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import bpy
 import pytest
 
-from tests.blender.scenes import add_mesh, add_plant, datablocks, depsgraph, part
+from tests.blender.scenes import add_mesh, add_plant, datablocks, depsgraph
+from tetflora_addon.blender import emit, job, output
 
 
 @pytest.fixture
 def scene(clean_file):
-    import bpy
-
     scene = bpy.context.scene
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     scene.collection.objects.link(camera)
@@ -27,24 +27,20 @@ def scene(clean_file):
 
 
 def refine(scene):
-    import bpy
-
-    part("job").refine(scene, depsgraph())
+    job.refine(scene, depsgraph())
     bpy.context.view_layer.update()
     return [o for o in scene.objects if o.get("tetflora_kind", "species") != "species"]
 
 
 def test_files_hold_results_only_if_asked(scene, tmp_path):
-    import bpy
-
     path = str(tmp_path / "forest.blend")
     refine(scene)
     bpy.ops.wm.save_as_mainfile(filepath=path)
     light = (tmp_path / "forest.blend").stat().st_size
-    assert part("job").has_results(scene)
+    assert job.has_results(scene)
     bpy.ops.wm.open_mainfile(filepath=path)
     scene = bpy.context.scene
-    assert not part("job").has_results(scene)
+    assert not job.has_results(scene)
     assert scene.tetflora.statistics == ""
     assert sorted(o.name for o in bpy.data.objects) == ["camera", "plant", "plant.001"]
     scene.tetflora.output.save_results = True
@@ -57,8 +53,6 @@ def test_files_hold_results_only_if_asked(scene, tmp_path):
 
 
 def test_a_mesh_that_is_hidden_for_results_is_shown_where_the_file_lacks_them(scene, tmp_path):
-    import bpy
-
     rock = add_mesh("rock")
     rock.tetflora.is_explicit = True
     refine(scene)
@@ -71,8 +65,6 @@ def test_a_mesh_that_is_hidden_for_results_is_shown_where_the_file_lacks_them(sc
 
 
 def test_an_edited_material_outlives_files_without_results(scene, tmp_path):
-    import bpy
-
     path = str(tmp_path / "edited.blend")
     made = next(o for o in refine(scene) if o["tetflora_kind"] == "bark")
     name = made.data.materials[0].name
@@ -84,7 +76,7 @@ def test_an_edited_material_outlives_files_without_results(scene, tmp_path):
     again = next(o for o in refine(scene) if o.data.materials[0].name == name)
     assert tuple(again.data.materials[0].diffuse_color) == (1.0, 0.0, 0.0, 1.0)
     assert not again.data.materials[0].use_fake_user
-    part("job").clear(scene)
+    job.clear(scene)
     assert name not in bpy.data.materials
 
 
@@ -106,11 +98,11 @@ def test_settings_reach_results_that_are_there_and_new_ones(scene):
 def test_hidden_results_are_hidden(scene):
     refine(scene)
     scene.tetflora.output.show_viewport = False
-    collection = part("emit").result_collections(scene, 'VIEW')[0]
+    collection = emit.result_collections(scene, 'VIEW')[0]
     assert collection.hide_viewport
     assert not collection.hide_render
     refine(scene)
-    assert part("emit").result_collections(scene, 'VIEW')[0].hide_viewport
+    assert emit.result_collections(scene, 'VIEW')[0].hide_viewport
 
 
 @pytest.mark.parametrize("form", ['AUTOMATIC', 'MICROSURFACES', 'MICROSPHERES'])
@@ -127,23 +119,19 @@ def test_every_object_has_one_species_and_its_parent(scene, form):
 
 
 def test_parents_keep_their_names_and_go_with_the_last_results(scene):
-    import bpy
-
     before = datablocks()
     names = [{o.parent.name for o in refine(scene)} for _ in range(2)]
-    part("job").refine(scene, depsgraph(), for_render=True)
-    render = part("emit").result_collections(scene, 'RENDER')[0]
+    job.refine(scene, depsgraph(), for_render=True)
+    render = emit.result_collections(scene, 'RENDER')[0]
     names.append({o.parent.name for o in render.objects if o.parent is not None})
     assert names[0] == names[1] == names[2]
-    part("job").clear(scene, for_render=True)
+    job.clear(scene, for_render=True)
     assert names[0] <= {o.name for o in bpy.data.objects}
-    part("job").clear(scene)
+    job.clear(scene)
     assert datablocks() == before
 
 
 def test_materials_of_the_artist_take_the_place_of_ours(scene):
-    import bpy
-
     given = bpy.data.materials.new("wax")
     scene.tetflora.leaf_limit = 0.05
     made = next(o for o in refine(scene) if (o["tetflora_kind"], o["tetflora_species"]) == ("leaf", "bush"))
@@ -157,15 +145,13 @@ def test_materials_of_the_artist_take_the_place_of_ours(scene):
 
 
 def test_kept_results_are_the_artists(scene, tmp_path):
-    import bpy
-
     rock = add_mesh("rock")
     rock.tetflora.is_explicit = True
     made = refine(scene)
     assert bpy.ops.tetflora.keep_results() == {'FINISHED'}
-    assert not part("job").has_results(scene)
+    assert not job.has_results(scene)
     assert not scene.tetflora.refine_at_render
-    assert part("job").clear(scene) == 0
+    assert job.clear(scene) == 0
     assert rock.hide_render
     assert all(not o.hide_select for o in made)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "kept.blend"))
@@ -175,16 +161,12 @@ def test_kept_results_are_the_artists(scene, tmp_path):
 
 
 def test_there_is_nothing_to_keep_without_results(scene):
-    import bpy
-
     assert not bpy.ops.tetflora.keep_results.poll()
 
 
 def test_the_file_is_searched_for_a_parent_once_a_collection(scene, monkeypatch):
     """It may have as many objects as plants, and a forest has hundreds of result objects."""
-    import bpy
-
-    output, searches = part("output"), []
+    searches = []
 
     class Objects:
         def __iter__(self):

@@ -6,12 +6,15 @@ from __future__ import annotations
 
 from itertools import pairwise
 
+import bpy
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, errors, part, select
+from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
+from tetflora_addon import errors
+from tetflora_addon.blender import job, plant_fields, scene_reader
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -21,8 +24,6 @@ PLACES = ((0.0, 0.0, 0.0), (1.0, 2.0, 3.0), (-4.0, 0.5, 0.0))
 
 def _field(places=PLACES, name="field", kinds=("bush", "conifer"), collection=None, cloud=False, **attributes):
     """A field whose attributes are given as (type, values)."""
-    import bpy
-
     data = (bpy.data.pointclouds if cloud else bpy.data.meshes).new(name)
     data.resize(len(places)) if cloud else data.vertices.add(len(places))
     attributes = {"position": ('FLOAT_VECTOR', places), **attributes}
@@ -40,8 +41,6 @@ def _field(places=PLACES, name="field", kinds=("bush", "conifer"), collection=No
 
 def _nodes(obj, *chain, **inputs):
     """Give an object geometry nodes, one after the other from its own geometry; the group's links and nodes."""
-    import bpy
-
     group = bpy.data.node_groups.new("nodes", "GeometryNodeTree")
     for in_out in ('INPUT', 'OUTPUT'):
         group.interface.new_socket("Geometry", in_out=in_out, socket_type='NodeSocketGeometry')
@@ -64,9 +63,7 @@ def _instance_on_points(obj, instanced):
 
 
 def _plants():
-    import bpy
-
-    return part("scene_reader").read_plants(bpy.context.scene, depsgraph(), bpy.context.view_layer)
+    return scene_reader.read_plants(bpy.context.scene, depsgraph(), bpy.context.view_layer)
 
 
 def _same(first, second):
@@ -94,7 +91,6 @@ angles = st.tuples(*[st.floats(-3.0, 3.0)] * 3)
     own=st.tuples(angles, st.sampled_from([(1.0, 1.0, 1.0), (2.0, 2.0, 2.0), (-1.0, 1.0, 1.0), (1.0, 3.0, 0.5)])),
 )
 def test_points_are_the_plants_that_empties_would_be(turns, written, scales, stretch, own):
-    import bpy
     from mathutils import Euler, Matrix, Vector
 
     bpy.data.batch_remove(list(bpy.data.objects))
@@ -164,14 +160,12 @@ def test_point_clouds_and_what_nodes_make_of_meshes():
 
 
 def test_point_cloud_objects():
-    import bpy
-
     cloud = bpy.data.pointclouds.new("probe")
     if not hasattr(cloud, "resize"):  # before 5.1 scripts cannot make points, but an empty cloud
         obj = bpy.data.objects.new("probe", cloud)
         bpy.context.scene.collection.objects.link(obj)
         obj.tetflora.is_field = True
-        with pytest.raises(part("scene_reader").NoPlantsError):
+        with pytest.raises(scene_reader.NoPlantsError):
             _plants()
         return
     _field(cloud=True, seed=('INT', [4, 5, 6]), kinds=("conifer",))
@@ -192,8 +186,6 @@ def test_empties_points_and_instances_make_one_forest():
 
 @pytest.mark.parametrize("what", ["plant", "field", "collection"])
 def test_nodes_instance_plants_and_fields(what):
-    import bpy
-
     hidden = bpy.data.collections.new("sources")
     plant = add_plant("plant", seed=3, collection=hidden)
     if what == "field":
@@ -210,15 +202,13 @@ def test_nodes_instance_plants_and_fields(what):
     assert np.allclose(read.scale, 2.0)
     assert len(set(read.seed.tolist()) - {3}) == 3
     assert _plants().seed.tolist() == read.seed.tolist()
-    assert part("scene_reader").has_contents(bpy.context.scene)
+    assert scene_reader.has_contents(bpy.context.scene)
     plant.hide_render = True
-    with pytest.raises(errors().SceneError, match="No plants"):
+    with pytest.raises(errors.SceneError, match="No plants"):
         _plants()
 
 
 def test_instances_of_nodes_stand_where_blender_says():
-    import bpy
-
     hidden = bpy.data.collections.new("sources")
     grove = bpy.data.collections.new("grove")
     hidden.children.link(grove)
@@ -253,8 +243,6 @@ def test_instances_on_vertices_are_read_as_well():
 
 
 def test_instanced_collections_hold_fields():
-    import bpy
-
     grove = bpy.data.collections.new("grove")
     _field(collection=grove, seed=('INT', [1, 1, 1]))
     for x in (0.0, 100.0):
@@ -282,7 +270,7 @@ def test_instanced_collections_hold_fields():
 )
 def test_fields_that_cannot_be_used_are_named(attributes, says):
     _field(**attributes)
-    with pytest.raises(errors().SceneError, match=says):
+    with pytest.raises(errors.SceneError, match=says):
         _plants()
 
 
@@ -302,12 +290,11 @@ def test_a_quaternion_of_no_length_turns_nothing():
 )
 def test_fields_without_plants_say_so(change, says):
     change(_field())
-    with pytest.raises(errors().SceneError, match=says):
+    with pytest.raises(errors.SceneError, match=says):
         _plants()
 
 
 def test_linked_fields_are_read(tmp_path):
-    import bpy
 
     from devtools import session
 
@@ -329,8 +316,6 @@ def test_a_field_that_is_hidden_in_viewports_renders():
 
 
 def test_a_field_that_is_being_edited_is_read():
-    import bpy
-
     field = _field(seed=('INT', [1, 2, 3]))
     select(field)
     bpy.ops.object.mode_set(mode='EDIT')
@@ -343,8 +328,6 @@ def test_a_field_that_is_being_edited_is_read():
 
 
 def test_a_field_and_its_plants_are_the_same_forest():
-    import bpy
-
     camera = add_camera()
     plants = [
         add_plant(f"{i}", kind, seed=i - 1, location=(i, 0.0, 0.0), scale=[0.5 + i] * 3, rotation_euler=(i, 2.0, 0.3))
@@ -365,8 +348,6 @@ def test_a_field_and_its_plants_are_the_same_forest():
 
 
 def test_marking_and_removing():
-    import bpy
-
     ground = add_mesh("ground")
     select(ground)
     bpy.ops.tetflora.mark_field()
@@ -383,14 +364,11 @@ def test_marking_and_removing():
 
 
 def test_a_field_alone_is_a_forest_for_renders_and_estimates():
-    import bpy
-
     scene = bpy.context.scene
-    reader, job = part("scene_reader"), part("job")
-    assert not reader.has_contents(scene)
+    assert not scene_reader.has_contents(scene)
     seeds = [1, 2, 3]
     field = _field(seed=('INT', seeds))
-    assert reader.has_contents(scene)
+    assert scene_reader.has_contents(scene)
     of_field = job.estimate(scene, depsgraph())
     bpy.data.objects.remove(field)
     for seed, place in zip(seeds, PLACES, strict=True):
@@ -403,7 +381,6 @@ def test_a_field_alone_is_a_forest_for_renders_and_estimates():
 def test_rotations_to_quaternions_and_back():
     frames = np.linalg.qr(np.random.default_rng(3).normal(size=(200, 3, 3)))[0]
     frames *= np.sign(np.linalg.det(frames))[:, None, None]
-    fields = part("plant_fields")
     frames = np.concatenate([frames, [np.diag(d) for d in ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))]])
-    back = fields._from_quaternions(np.ascontiguousarray(fields.quaternions(frames).T))
+    back = plant_fields._from_quaternions(np.ascontiguousarray(plant_fields.quaternions(frames).T))
     assert np.allclose(back.transpose(2, 0, 1), frames, atol=1e-9)

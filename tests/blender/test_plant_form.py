@@ -4,11 +4,14 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 import pytest
 
-from devtools import session
-from tests.blender.scenes import add_mesh, add_plant, depsgraph, errors, part, select
+from tests.blender.scenes import add_mesh, add_plant, depsgraph, select
+from tetflora_addon import errors
+from tetflora_addon.blender import plant_form
+from tetflora_addon.plants import skeletons
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -17,16 +20,12 @@ EDGES = ((0, 1), (1, 2), (1, 3))
 
 
 def _link(name, data):
-    import bpy
-
     obj = bpy.data.objects.new(name, data)
     bpy.context.scene.collection.objects.link(obj)
     return obj
 
 
 def add_edges(points=FORK, edges=EDGES, radius=None, name="edges"):
-    import bpy
-
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(points, edges, [])
     if radius is not None:
@@ -36,8 +35,6 @@ def add_edges(points=FORK, edges=EDGES, radius=None, name="edges"):
 
 def add_curve(*splines, kind='POLY', radius=None, bevel=0.0, name="curve"):
     """A curve object; each spline is a list of points, ``radius`` a list for each."""
-    import bpy
-
     curve = bpy.data.curves.new(name, 'CURVE')
     curve.dimensions, curve.bevel_depth = '3D', bevel
     for number, places in enumerate(splines):
@@ -53,11 +50,11 @@ def add_curve(*splines, kind='POLY', radius=None, bevel=0.0, name="curve"):
 
 
 def read(obj):
-    return part("plant_form").read_skeleton(obj, depsgraph())
+    return plant_form.read_skeleton(obj, depsgraph())
 
 
 def branches(skeleton):
-    return session.part("tetflora_addon.plants.skeletons").drawn_branches(skeleton)
+    return skeletons.drawn_branches(skeleton)
 
 
 def _wire(obj):
@@ -85,8 +82,6 @@ def test_a_mesh_without_radii_gets_them():
 
 
 def test_skin_is_taken_off_and_gives_the_radii():
-    import bpy
-
     obj = add_edges()
     select(obj)
     bpy.ops.object.modifier_add(type='SKIN')  # makes the radii, too
@@ -160,8 +155,6 @@ def test_shape_keys_and_switched_off_curves():
 
 @pytest.mark.parametrize("kind", ['CATMULL_ROM', 'POLY', 'BEZIER', 'NURBS'])
 def test_hair_curves(kind):
-    import bpy
-
     data = bpy.data.hair_curves.new("hair")
     data.add_curves([4, 3])
     trunk, limb = [(0, 0, 0), (0.2, 0, 2), (0, 0, 5), (0, 0, 8)], [(0, 0, 5), (1, 0, 6), (2, 0, 6)]
@@ -209,20 +202,18 @@ def test_equal_forms_are_equal_skeletons():
     ],
 )
 def test_what_cannot_be_a_form_is_named(make, message):
-    with pytest.raises(errors().SpeciesError, match=message):
+    with pytest.raises(errors.SpeciesError, match=message):
         read(make())
 
 
 def test_scale_0_is_named():
     obj = add_edges()
     obj.scale = (1, 1, 0)
-    with pytest.raises(errors().SpeciesError, match=r'"edges".*scale is 0'):
+    with pytest.raises(errors.SpeciesError, match=r'"edges".*scale is 0'):
         read(obj)
 
 
 def test_the_button_makes_a_plant_in_the_forms_place():
-    import bpy
-
     form = add_curve(FORK[:3], name="Old oak")
     form.location, form.rotation_euler = (3, 4, 5), (0.2, 0, 0.7)
     bpy.context.scene.tetflora.species_editor.species = "oak"
@@ -240,8 +231,6 @@ def test_the_button_makes_a_plant_in_the_forms_place():
 
 
 def test_the_button_gives_selected_plants_their_form():
-    import bpy
-
     form, plants = add_edges(), [add_plant(str(i)) for i in range(2)]
     other = add_plant("other")
     select(form, *plants)
@@ -251,8 +240,6 @@ def test_the_button_gives_selected_plants_their_form():
 
 
 def test_the_button_refuses_and_changes_nothing():
-    import bpy
-
     cube = add_mesh("Cube")
     select(cube)
     with pytest.raises(RuntimeError, match=r"Cube.*has faces"):
@@ -264,8 +251,6 @@ def test_the_button_refuses_and_changes_nothing():
 
 def test_only_what_can_be_a_form_is_offered():
     """A plant keeps its form through copies and lets it go when it is deleted."""
-    import bpy
-
     form, plant = add_edges(), add_plant()
     plant.tetflora.form = form
     assert plant.copy().tetflora.form == form

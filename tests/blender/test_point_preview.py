@@ -4,43 +4,35 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 import pytest
 
-from tests.blender.scenes import add_mesh, depsgraph, part, select
+from tests.blender.scenes import add_mesh, depsgraph, select
+from tetflora_addon.blender import point_preview
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
 def _ops():
-    import bpy
-
     return bpy.ops.tetflora
 
 
 def _settings():
-    import bpy
-
     return bpy.context.scene.tetflora
 
 
 def _populate(count, **options):
-    import bpy
-
     select(add_mesh("ground", size=20.0))
     _ops().populate(count=count, **{"min_distance": 1.0, "species": "bush:2, conifer", **options})
     bpy.context.view_layer.update()
 
 
 def _dots():
-    import bpy
-
-    return part("point_preview").dots_of(bpy.context.scene, depsgraph(), bpy.context.view_layer)
+    return point_preview.dots_of(bpy.context.scene, depsgraph(), bpy.context.view_layer)
 
 
 def test_dots_stand_where_plants_will():
-    import bpy
-
     _populate(count=15)
     _settings().populations[0].seed = 9
     dots = _dots()
@@ -63,28 +55,24 @@ def test_without_a_population_dots_stand_on_what_is_selected():
 
 def test_the_preview_shows_few_dots_of_many_and_says_how_many(monkeypatch):
     _populate(count=500, min_distance=0.0)
-    preview = part("point_preview")
-    monkeypatch.setattr(preview, "MOST_DOTS", 60)
+    monkeypatch.setattr(point_preview, "MOST_DOTS", 60)
     dots = _dots()
     assert (len(dots.position), dots.plants, dots.more) == (60, 500, False)
-    monkeypatch.setattr(preview, "MOST_PLACED", 100)
+    monkeypatch.setattr(point_preview, "MOST_PLACED", 100)
     dots = _dots()
     assert (dots.plants, dots.more) == (100, True)
 
 
 def test_in_the_background_nothing_is_drawn():
-    import bpy
-
     _populate(count=5)
-    preview = part("point_preview")
     try:
         _ops().preview_population()
-        assert preview.shown_in(bpy.context.scene) or not bpy.app.background
-        assert preview._state.handle is None
-        assert not bpy.app.timers.is_registered(preview._on_timer) or not bpy.app.background
+        assert point_preview.shown_in(bpy.context.scene) or not bpy.app.background
+        assert point_preview._state.handle is None
+        assert not bpy.app.timers.is_registered(point_preview._on_timer) or not bpy.app.background
     finally:
-        preview.show(bpy.context.scene, False)
-    assert preview._state.handle is None
+        point_preview.show(bpy.context.scene, False)
+    assert point_preview._state.handle is None
 
 
 @pytest.mark.parametrize(
@@ -99,6 +87,6 @@ def test_in_the_background_nothing_is_drawn():
 def test_the_panel_says_what_will_be_made(count, as_field, says):
     draft = _settings().populate
     draft.count, draft.as_field = count, as_field
-    assert part("point_preview").status(draft) == says
+    assert point_preview.status(draft) == says
     draft.by_density = True
-    assert "As many plants" in part("point_preview").status(draft)
+    assert "As many plants" in point_preview.status(draft)

@@ -4,13 +4,16 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from devtools import session
-from tests.blender.scenes import add_mesh, add_plant, errors, part, select
+from tests.blender.scenes import add_mesh, add_plant, select
+from tetflora_addon import errors
+from tetflora_addon.blender import scene_reader
+from tetflora_addon.planting import ground, places, rules
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -31,10 +34,9 @@ def _place(triangles=SQUARE, **changes):
     given = {**options, **changes}
     low, high = given.pop("scale_range")
     occupied = given.pop("occupied", None)
-    planting = {name: session.part(f"tetflora_addon.planting.{name}") for name in ("ground", "places", "rules")}
-    rules = planting["rules"].Rules(slope_max=given.pop("slope_limit"), scale_min=low, scale_max=high, **given)
-    older = None if occupied is None else planting["places"].Occupied(occupied)
-    return planting["places"].place(planting["ground"].Ground(triangles), rules, older)
+    limits = rules.Rules(slope_max=given.pop("slope_limit"), scale_min=low, scale_max=high, **given)
+    older = None if occupied is None else places.Occupied(occupied)
+    return places.place(ground.Ground(triangles), limits, older)
 
 
 def _distances(points: np.ndarray) -> np.ndarray:
@@ -128,15 +130,13 @@ def test_ground_far_away_and_tiny_distances_work():
 
 def test_no_ground_is_an_error():
     wall = SQUARE[..., [0, 2, 1]]
-    with pytest.raises(errors().SceneError, match="flatter than Slope To"):
+    with pytest.raises(errors.SceneError, match="flatter than Slope To"):
         _place(wall)
-    with pytest.raises(errors().SceneError, match="weight above 0"):
+    with pytest.raises(errors.SceneError, match="weight above 0"):
         _place(shares=(0.0,))
 
 
 def test_the_operator_makes_upright_empties_of_the_chosen_species():
-    import bpy
-
     ground = add_mesh("ground", size=50.0, z=3.0)
     other = add_mesh("not selected", size=500.0)
     select(ground)
@@ -162,8 +162,6 @@ def test_the_operator_makes_upright_empties_of_the_chosen_species():
 
 
 def test_the_panels_settings_serve_where_nothing_is_given():
-    import bpy
-
     settings = bpy.context.scene.tetflora.populate
     settings.count, settings.min_distance = 7, 0.0
     settings.mix.add().species = "conifer"
@@ -173,8 +171,6 @@ def test_the_panels_settings_serve_where_nothing_is_given():
 
 
 def test_populate_twice_leaves_the_first_plants_their_room():
-    import bpy
-
     select(add_mesh("ground", size=20.0))
     add_plant("by hand", location=(0.0, 0.0, 0.0))
     for seed in (1, 2):
@@ -194,8 +190,6 @@ def test_populate_twice_leaves_the_first_plants_their_room():
     ],
 )
 def test_bad_arguments_change_nothing(options, says):
-    import bpy
-
     select(add_mesh("ground", size=10.0))
     with pytest.raises(RuntimeError, match=says):
         bpy.ops.tetflora.populate(**options)
@@ -204,8 +198,6 @@ def test_bad_arguments_change_nothing(options, says):
 
 
 def test_a_mesh_without_faces_is_named():
-    import bpy
-
     select(add_mesh("Bare", faces=()))
     with pytest.raises(RuntimeError, match='"Bare" has no faces'):
         bpy.ops.tetflora.populate(count=3, species="bush")
@@ -213,20 +205,16 @@ def test_a_mesh_without_faces_is_named():
 
 def _populated(**options):
     """Plants of the scene after Populate, in order of their places."""
-    import bpy
-
     bpy.context.view_layer.update()
     bpy.ops.tetflora.populate(count=60, seed=3, min_distance=1.0, species="bush:2, conifer", **options)
     bpy.context.view_layer.update()
     graph = bpy.context.evaluated_depsgraph_get()
-    read = part("scene_reader").read_plants(bpy.context.scene, graph, bpy.context.view_layer)
+    read = scene_reader.read_plants(bpy.context.scene, graph, bpy.context.view_layer)
     order = np.lexsort(np.round(read.position.T, 3))
     return read.identifiers, read.species[order], read.seed[order], read.position[order], read.frame[order]
 
 
 def test_a_field_holds_the_same_plants_as_empties():
-    import bpy
-
     select(add_mesh("ground", size=20.0))
     empties = _populated(as_field='EMPTIES')
     assert not [o for o in bpy.data.objects if o.tetflora.is_field]
@@ -239,8 +227,6 @@ def test_a_field_holds_the_same_plants_as_empties():
 
 
 def test_many_plants_become_a_field_unasked():
-    import bpy
-
     ground = add_mesh("ground", size=20.0)
     select(ground)
     bpy.ops.tetflora.populate(count=10_001, min_distance=0.0, species="bush")
@@ -253,8 +239,6 @@ def test_many_plants_become_a_field_unasked():
 
 
 def test_plants_of_fields_keep_others_away():
-    import bpy
-
     select(add_mesh("ground", size=15.0))
     for seed in (1, 2):
         bpy.ops.tetflora.populate(count=40, seed=seed, min_distance=2.0, species="bush", as_field='FIELD')

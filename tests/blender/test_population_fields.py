@@ -4,16 +4,16 @@
 
 from __future__ import annotations
 
+import bpy
 import pytest
 
-from tests.blender.scenes import add_mesh, add_plant, part, select
+from tests.blender.scenes import add_mesh, add_plant, select
+from tetflora_addon.blender import populations
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
 def _scene():
-    import bpy
-
     return bpy.context.scene
 
 
@@ -22,17 +22,15 @@ def _population(number=0):
 
 
 def _own(number=0):
-    return part("populations").own_objects(_scene(), _population(number))
+    return populations.own_objects(_scene(), _population(number))
 
 
 def _plants():
     """How many plants the scene has, in fields and by themselves."""
-    return part("populations").own_number(o for o in _scene().objects if o.tetflora.is_plant or o.tetflora.is_field)
+    return populations.own_number(o for o in _scene().objects if o.tetflora.is_plant or o.tetflora.is_field)
 
 
 def _populate(count=20, ground=None):
-    import bpy
-
     select(ground or add_mesh("ground", size=15.0))
     bpy.ops.tetflora.populate(count=count, species="bush, conifer", min_distance=0.5)
     bpy.context.view_layer.update()
@@ -40,8 +38,6 @@ def _populate(count=20, ground=None):
 
 @pytest.mark.parametrize("chosen", [20, 8])
 def test_a_field_of_its_plants_is_replaced_by_an_update(chosen):
-    import bpy
-
     _populate()
     home = _population().collection
     select(*_own()[:chosen])
@@ -50,15 +46,13 @@ def test_a_field_of_its_plants_is_replaced_by_an_update(chosen):
     assert field.tetflora.is_field
     assert field in _own()
     assert list(field.users_collection) == [_population().collection] == [home]
-    assert part("populations").own_number(_own()) == _plants() == 20
+    assert populations.own_number(_own()) == _plants() == 20
     _population().count = 12
     bpy.ops.tetflora.update_population()
     assert _plants() == 12
 
 
 def test_objects_of_its_field_are_replaced_by_an_update():
-    import bpy
-
     _populate()
     _population().as_field = 'FIELD'
     bpy.ops.tetflora.update_population()
@@ -72,8 +66,6 @@ def test_objects_of_its_field_are_replaced_by_an_update():
 
 
 def test_a_field_of_several_owners_is_the_artists():
-    import bpy
-
     _populate()
     hand = add_plant("by hand", location=(30.0, 0.0, 0.0))
     copy = _own()[-1].copy()

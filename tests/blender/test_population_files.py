@@ -6,20 +6,21 @@ from __future__ import annotations
 
 import json
 
+import bpy
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tests.blender.scenes import add_mesh, errors, part, select
+from tests.blender.scenes import add_mesh, select
+from tetflora_addon import errors
+from tetflora_addon.blender import population_files, population_properties, populations
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
 def _add(**values):
-    import bpy
-
     ground = bpy.data.objects.get("ground") or add_mesh("ground", size=10.0)
-    population = part("populations").add_population(bpy.context.scene, [ground])
+    population = populations.add_population(bpy.context.scene, [ground])
     for name, value in values.items():
         setattr(population, name, value)
     return population
@@ -27,14 +28,13 @@ def _add(**values):
 
 def _values(population):
     """All settings as Blender stores them."""
-    files = part("population_files")
-    simple = {p.identifier: getattr(population, p.identifier) for p in files._simple_settings(population)}
-    mix = [tuple(getattr(e, name) for name in files._MIX) for e in population.mix]
+    simple = {p.identifier: getattr(population, p.identifier) for p in population_files._simple_settings(population)}
+    mix = [tuple(getattr(e, name) for name in population_files._MIX) for e in population.mix]
     return simple, mix, [e.object for e in population.grounds]
 
 
 def _numbers(name):
-    prop = part("population_properties").TetFloraPopulation.bl_rna.properties[name]
+    prop = population_properties.TetFloraPopulation.bl_rna.properties[name]
     low, high = max(prop.hard_min, -1e6), min(prop.hard_max, 1e6)
     return st.integers(int(low), int(high)) if prop.type == 'INT' else st.floats(low, high, width=32)
 
@@ -44,11 +44,8 @@ def _numbers(name):
 )
 @given(data=st.data())
 def test_what_is_written_comes_back(tmp_path, data):
-    import bpy
-
-    files = part("population_files")
     population = _add(name=data.draw(st.text(st.characters(exclude_categories=("C",)), max_size=20)))
-    for prop in files._simple_settings(population):
+    for prop in population_files._simple_settings(population):
         if prop.type in {'INT', 'FLOAT'} and data.draw(st.booleans()):
             # Bounds that are no single-precision numbers are left to their ends.
             value = data.draw(_numbers(prop.identifier) if prop.subtype != 'ANGLE' else st.floats(0.0, 1.5))
@@ -60,8 +57,8 @@ def test_what_is_written_comes_back(tmp_path, data):
         entry.species, entry.weight = species, data.draw(st.floats(0.0, 9.0, width=32))
         entry.companion_strength = data.draw(st.floats(-1.0, 1.0, width=32))
     before, name = _values(population), population.name
-    path = files.write_populations([population], tmp_path / "p.json")
-    number, missing = files.read_populations(bpy.context.scene, path)
+    path = population_files.write_populations([population], tmp_path / "p.json")
+    number, missing = population_files.read_populations(bpy.context.scene, path)
     assert (number, missing) == (1, [])
     group = bpy.context.scene.tetflora
     read = group.populations[len(group.populations) - 1]
@@ -72,8 +69,6 @@ def test_what_is_written_comes_back(tmp_path, data):
 
 
 def test_images_and_collections_are_found_by_name_or_said_to_be_missing(tmp_path):
-    import bpy
-
     image, roads = bpy.data.images.new("mask", 4, 4), bpy.data.collections.new("roads")
     _add(image=image, paths=roads)
     bpy.ops.tetflora.export_populations(filepath=str(tmp_path / "p.json"))
@@ -86,18 +81,16 @@ def test_images_and_collections_are_found_by_name_or_said_to_be_missing(tmp_path
     assert (read.image, read.paths) == (image, None)
     assert [e.object for e in read.grounds] == [other]
     (tmp_path / "q.json").write_text((tmp_path / "p.json").read_text(encoding="utf-8"), encoding="utf-8")
-    _, missing = part("population_files").read_populations(bpy.context.scene, tmp_path / "q.json")
+    _, missing = population_files.read_populations(bpy.context.scene, tmp_path / "q.json")
     assert missing == ['the collection "roads"', 'the ground "ground"']
 
 
 def test_what_a_file_does_not_say_is_as_in_a_new_scene(tmp_path):
-    import bpy
-
     bpy.context.scene.tetflora.populate.clumping = 0.5
     path = tmp_path / "p.json"
     text = {"format": "TetFlora populations", "version": 1, "populations": [{"name": "x", "slope_max": 12.5}]}
     path.write_text(json.dumps(text), encoding="utf-8")
-    part("population_files").read_populations(bpy.context.scene, path)
+    population_files.read_populations(bpy.context.scene, path)
     read = bpy.context.scene.tetflora.populations[0]
     assert (read.clumping, read.count) == (0.0, 100)
     assert read.slope_max == pytest.approx(0.21816616)  # 12.5 degrees
@@ -131,27 +124,22 @@ def test_what_a_file_does_not_say_is_as_in_a_new_scene(tmp_path):
     ],
 )
 def test_broken_files_are_refused_by_file_and_key_and_change_nothing(tmp_path, change, says):
-    import bpy
-
     _add()
-    files = part("population_files")
-    data = files.as_data(bpy.context.scene.tetflora.populations)
+    data = population_files.as_data(bpy.context.scene.tetflora.populations)
     change(data)
     path = tmp_path / "broken.json"
     path.write_text(json.dumps(data), encoding="utf-8")
-    with pytest.raises(errors().SceneError, match=r"^broken\.json: ") as caught:
-        files.read_populations(bpy.context.scene, path)
+    with pytest.raises(errors.SceneError, match=r"^broken\.json: ") as caught:
+        population_files.read_populations(bpy.context.scene, path)
     assert says in str(caught.value)
     assert len(bpy.context.scene.tetflora.populations) == 1
 
 
 @pytest.mark.parametrize("text", ["", "{", '{"format": NaN}', "[" * 100_000, "\ud800".encode("utf-8", "surrogatepass")])
 def test_what_is_no_json_is_refused(tmp_path, text):
-    import bpy
-
     path = tmp_path / "broken.json"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    with pytest.raises(errors().SceneError, match=r"broken\.json: is not JSON"):
-        part("population_files").read_populations(bpy.context.scene, path)
-    with pytest.raises(errors().SceneError, match=r"none\.json: cannot be read"):
-        part("population_files").read_populations(bpy.context.scene, tmp_path / "none.json")
+    with pytest.raises(errors.SceneError, match=r"broken\.json: is not JSON"):
+        population_files.read_populations(bpy.context.scene, path)
+    with pytest.raises(errors.SceneError, match=r"none\.json: cannot be read"):
+        population_files.read_populations(bpy.context.scene, tmp_path / "none.json")

@@ -4,23 +4,21 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 import pytest
 
-from tests.blender.scenes import add_mesh, add_plant, datablocks, depsgraph, part, select
+from tests.blender.scenes import add_mesh, add_plant, datablocks, depsgraph, select
+from tetflora_addon.blender import migration, plant_fields, population_files, populations
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
 def _ops():
-    import bpy
-
     return bpy.ops.tetflora
 
 
 def _settings():
-    import bpy
-
     return bpy.context.scene.tetflora
 
 
@@ -29,20 +27,14 @@ def _active():
 
 
 def _plants():
-    import bpy
-
     return [o for o in bpy.context.scene.objects if o.tetflora.is_plant]
 
 
 def _own(population=None):
-    import bpy
-
-    return part("populations").own_objects(bpy.context.scene, population or _active())
+    return populations.own_objects(bpy.context.scene, population or _active())
 
 
 def _populate(count=30, size=20.0, name="ground", **options):
-    import bpy
-
     ground = bpy.data.objects.get(name) or add_mesh(name, size=size)
     select(ground)
     _ops().populate(count=count, **{"min_distance": 1.0, "species": "bush:2, conifer", **options})
@@ -52,8 +44,6 @@ def _populate(count=30, size=20.0, name="ground", **options):
 
 def _state():
     """All that populations could change, datablock by datablock."""
-    import bpy
-
     objects = {
         o.name: (
             o.type,
@@ -69,9 +59,8 @@ def _state():
         )
         for o in bpy.context.scene.objects
     }
-    files = part("population_files")
     populations = [(p.uid, p.frozen, p.made, p.message) for p in _settings().populations]
-    return objects, populations, files.as_data(_settings().populations), datablocks()
+    return objects, populations, population_files.as_data(_settings().populations), datablocks()
 
 
 def _places(objects):
@@ -196,8 +185,6 @@ def test_what_is_kind_of_storage_changes_with_the_setting():
 
 
 def test_renamed_copied_and_deleted_plants_do_not_confuse_a_population():
-    import bpy
-
     _populate(count=10)
     own = _own()
     own[0].name = "My favourite"
@@ -218,8 +205,6 @@ def test_renamed_copied_and_deleted_plants_do_not_confuse_a_population():
 
 
 def test_plants_deleted_by_hand_come_back_and_it_is_said(capfd):
-    import bpy
-
     _populate(count=10)
     bpy.data.batch_remove(_own()[:3])
     _ops().update_population()
@@ -228,8 +213,6 @@ def test_plants_deleted_by_hand_come_back_and_it_is_said(capfd):
 
 
 def test_copies_in_the_collection_outlive_the_population():
-    import bpy
-
     _populate(count=4)
     copy = _own()[0].copy()
     _active().collection.objects.link(copy)
@@ -241,8 +224,6 @@ def test_copies_in_the_collection_outlive_the_population():
 
 @pytest.mark.parametrize("delete", [True, False])
 def test_ground_that_is_gone_is_said_and_plants_stay(delete):
-    import bpy
-
     ground = _populate(count=6)
     if delete:
         bpy.data.objects.remove(ground)
@@ -271,8 +252,6 @@ def test_a_reroll_that_fails_keeps_the_seed():
 
 
 def test_a_collection_of_grounds_takes_what_is_added_later():
-    import bpy
-
     _populate(count=6)
     grounds = bpy.data.collections.new("Grounds")
     bpy.context.scene.collection.children.link(grounds)
@@ -289,8 +268,6 @@ def test_a_collection_of_grounds_takes_what_is_added_later():
 
 
 def test_linked_plants_are_neither_counted_nor_deleted(tmp_path):
-    import bpy
-
     _populate(count=5)
     bpy.data.libraries.write(str(tmp_path / "lib.blend"), {_active().collection})
     with bpy.data.libraries.load(str(tmp_path / "lib.blend"), link=True) as (_, to):
@@ -312,8 +289,6 @@ def test_density_is_by_the_hectare():
 
 
 def test_companions_and_masks_reach_the_engine():
-    import bpy
-
     ground = _populate(count=400, size=50.0, min_distance=0.0)
     group = ground.vertex_groups.new(name="wood")
     group.add([0, 3], 1.0, 'REPLACE')
@@ -344,7 +319,7 @@ def test_tilted_empties_and_fields_agree():
     _active().as_field = 'FIELD'
     _ops().update_population()
     graph = depsgraph()
-    read = part("plant_fields").read_field(_own()[0], graph, np.eye(4)[None])
+    read = plant_fields.read_field(_own()[0], graph, np.eye(4)[None])
     for seed, frame in zip(read.seed.tolist(), read.frame, strict=True):
         assert np.allclose(empties[seed], frame, atol=1e-4)
 
@@ -369,8 +344,6 @@ def test_new_populations_begin_like_the_one_that_is_shown():
 
 
 def test_populations_survive_save_and_load(tmp_path):
-    import bpy
-
     _populate(count=9)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     before = _state()
@@ -382,8 +355,6 @@ def test_populations_survive_save_and_load(tmp_path):
 
 
 def test_files_of_before_keep_their_slope_limit(tmp_path):
-    import bpy
-
     settings = _settings()
     settings.populate.slope_limit = 0.25
     settings.populate.slope_max = 1.0  # as a file has it that never knew of the other
@@ -391,13 +362,11 @@ def test_files_of_before_keep_their_slope_limit(tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
     assert _settings().populate.slope_max == pytest.approx(0.25)
-    assert _settings().version == part("migration").VERSION
+    assert _settings().version == migration.VERSION
 
 
 @pytest.mark.parametrize("operator", ["update_population", "reroll_population", "freeze_population", "add_population"])
 def test_undo_restores_everything_in_one_step(operator):
-    import bpy
-
     bpy.ops.ed.undo_push(message="begin")
     _populate()
     bpy.ops.ed.undo_push(message="populated")

@@ -6,56 +6,50 @@ from __future__ import annotations
 
 from dataclasses import fields
 
+import bpy
 import pytest
 
-from devtools import session
-from tests.blender.scenes import add_mesh, add_plant, part
+from tests.blender.scenes import add_mesh, add_plant
+from tetflora_addon.blender import migration, preferences, properties, species_items
+from tetflora_addon.refinement import settings
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
 def _reopen(path):
-    import bpy
-
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.open_mainfile(filepath=str(path))
 
 
 def test_settings_mirror_the_engine():
-    import bpy
-
-    settings = session.part("tetflora_addon.refinement.settings").RefinementSettings()
+    defaults = settings.RefinementSettings()
     scene = bpy.context.scene
-    read = part("properties").settings_from(scene)
-    for field in fields(settings):
-        assert getattr(read, field.name) == pytest.approx(getattr(settings, field.name), rel=1e-6), field.name
+    read = properties.settings_from(scene)
+    for field in fields(defaults):
+        assert getattr(read, field.name) == pytest.approx(getattr(defaults, field.name), rel=1e-6), field.name
     scene.tetflora.cutoff = 3.5
     scene.tetflora.max_tetrahedra = 1234
-    read = part("properties").settings_from(scene)
+    read = properties.settings_from(scene)
     assert (read.cutoff, read.max_tetrahedra) == (3.5, 1234)
 
 
 def test_qualities_set_what_they_say_and_are_recognised():
-    import bpy
-
-    qualities = session.part("tetflora_addon.refinement.settings").QUALITIES
-    settings = bpy.context.scene.tetflora
-    assert settings.quality == 'FINAL'
+    qualities = settings.QUALITIES
+    own = bpy.context.scene.tetflora
+    assert own.quality == 'FINAL'
     for name, values in qualities.items():
-        settings.quality = name
-        assert settings.quality == name
+        own.quality = name
+        assert own.quality == name
         for field, value in values.items():
-            assert getattr(settings, field) == pytest.approx(value)
-    settings.cutoff = 3.7
-    assert settings.quality == 'CUSTOM'
-    settings.quality = 'CUSTOM'
-    assert settings.cutoff == pytest.approx(3.7)
+            assert getattr(own, field) == pytest.approx(value)
+    own.cutoff = 3.7
+    assert own.quality == 'CUSTOM'
+    own.quality = 'CUSTOM'
+    assert own.cutoff == pytest.approx(3.7)
 
 
 def test_everything_the_artist_sees_is_explained():
-    import bpy
-
-    groups = {cls.__name__: cls.bl_rna for cls in part("properties").CLASSES}
+    groups = {cls.__name__: cls.bl_rna for cls in properties.CLASSES}
     operators = {name: getattr(bpy.types, name).bl_rna for name in dir(bpy.types) if name.startswith("TETFLORA_OT_")}
     assert len(operators) >= 9
     unexplained = [
@@ -72,8 +66,6 @@ def test_everything_the_artist_sees_is_explained():
 
 
 def test_an_unknown_species_survives_the_panel_and_the_file(tmp_path):
-    import bpy
-
     plant = add_plant(species="not_in_the_catalogue", seed=-7)
     assert plant.tetflora.species_choice == "not_in_the_catalogue"
     _reopen(tmp_path / "a.blend")
@@ -85,24 +77,21 @@ def test_an_unknown_species_survives_the_panel_and_the_file(tmp_path):
 
 
 def test_items_keep_their_numbers_when_the_catalogue_grows(tmp_path):
-    items = part("species_items").items_for("gone")
+    items = species_items.items_for("gone")
     numbers = {item[0]: item[4] for item in items}
     assert len(set(numbers.values())) == len(numbers)
-    assert numbers["gone"] == part("species_items").number_of("gone")
-    assert {i[0]: i[4] for i in part("species_items").items_for()} == {k: v for k, v in numbers.items() if k != "gone"}
+    assert numbers["gone"] == species_items.number_of("gone")
+    assert {i[0]: i[4] for i in species_items.items_for()} == {k: v for k, v in numbers.items() if k != "gone"}
 
 
 def test_species_of_the_users_own_folder(tmp_path):
-    import bpy
-
-    preferences = part("preferences")
-    shipped = part("species_items").catalogue()
+    shipped = species_items.catalogue()
     own = bpy.context.preferences.addons[preferences.ROOT_PACKAGE].preferences
     (tmp_path / "mine.json").write_text(shipped["bush"].path.read_text(encoding="utf-8"), encoding="utf-8")
     try:
         own.species_folder = str(tmp_path)
         assert preferences.species_folders() == (tmp_path,)
-        assert set(part("species_items").catalogue()) == {*shipped, "mine"}
+        assert set(species_items.catalogue()) == {*shipped, "mine"}
         own.species_folder = str(tmp_path / "missing")
         assert preferences.species_folders() == ()
     finally:
@@ -110,22 +99,17 @@ def test_species_of_the_users_own_folder(tmp_path):
 
 
 def test_leaf_objects_are_pointers(tmp_path):
-    import bpy
-
     leaf = add_mesh("my leaf")
     entry = bpy.context.scene.tetflora.leaf_objects.add()
     entry.species, entry.leaf = "bush", leaf
     assert bpy.context.scene.tetflora.leaf_objects.add().species == ""
     leaf.name = "renamed"
     _reopen(tmp_path / "a.blend")
-    found = part("properties").leaf_objects(bpy.context.scene)
+    found = properties.leaf_objects(bpy.context.scene)
     assert {k: v.name for k, v in found.items()} == {"bush": "renamed"}
 
 
 def test_old_files_are_brought_up_to_date_and_newer_ones_left_alone(tmp_path, capsys):
-    import bpy
-
-    migration = part("migration")
     add_plant("old")
     newer = add_plant("newer")
     newer.tetflora.version = migration.VERSION + 1
@@ -139,7 +123,6 @@ def test_old_files_are_brought_up_to_date_and_newer_ones_left_alone(tmp_path, ca
 
 
 def test_steps_of_a_migration_run_once_and_in_order(monkeypatch):
-    migration = part("migration")
     plant = add_plant()
     seen = []
     monkeypatch.setattr(migration, "VERSION", 3)

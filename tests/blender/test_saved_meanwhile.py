@@ -4,9 +4,11 @@
 
 from __future__ import annotations
 
+import bpy
 import pytest
 
-from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, part, tiny_render
+from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, tiny_render
+from tetflora_addon.blender import emit, job
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -23,13 +25,11 @@ def scene():
 
 @pytest.mark.parametrize("moment", ["Refining", "Making polygons", "Keeping polygons", "Making proxies"])
 def test_half_a_result_is_in_no_file(scene, tmp_path, moment):
-    import bpy
-
-    part("job").refine(scene, depsgraph())
+    job.refine(scene, depsgraph())
     names = sorted(o.name for o in bpy.data.collections["TetFlora"].objects)
     scene.tetflora.leaf_limit = 0.5  # another result
     saved = 0
-    for step in part("job").refine_steps(scene, depsgraph()):
+    for step in job.refine_steps(scene, depsgraph()):
         if step.message.startswith(moment):
             bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "meanwhile.blend"), copy=True)
             saved += 1
@@ -40,12 +40,10 @@ def test_half_a_result_is_in_no_file(scene, tmp_path, moment):
     assert sorted(o.name for o in bpy.data.collections["TetFlora"].objects) == names
     assert bpy.data.objects["stone"].hide_render
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "after.blend"))
-    assert len(part("emit").result_collections(bpy.context.scene, 'VIEW')) == 1
+    assert len(emit.result_collections(bpy.context.scene, 'VIEW')) == 1
 
 
 def test_bounces_that_are_raised_for_a_render_are_not_saved(scene, tmp_path):
-    import bpy
-
     scene.tetflora.proxy_form = 'SHELLS'
     cycles = scene.cycles
     cycles.transparent_max_bounces, cycles.min_transparent_bounces = 8, 2
@@ -67,5 +65,5 @@ def test_bounces_that_are_raised_for_a_render_are_not_saved(scene, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=str(path))
     cycles = bpy.context.scene.cycles
     assert (cycles.transparent_max_bounces, cycles.min_transparent_bounces) == (8, 2)
-    assert part("emit").result_collections(bpy.context.scene) == []
+    assert emit.result_collections(bpy.context.scene) == []
     assert not bpy.data.objects["stone"].hide_render

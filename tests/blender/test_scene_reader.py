@@ -4,32 +4,29 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, errors, part
+from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph
+from tetflora_addon import errors
+from tetflora_addon.blender import camera_reader, scene_reader
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
 def _camera():
-    import bpy
-
-    return part("camera_reader").read_camera(bpy.context.scene, depsgraph())
+    return camera_reader.read_camera(bpy.context.scene, depsgraph())
 
 
 def _plants():
-    import bpy
-
-    return part("scene_reader").read_plants(bpy.context.scene, depsgraph(), bpy.context.view_layer)
+    return scene_reader.read_plants(bpy.context.scene, depsgraph(), bpy.context.view_layer)
 
 
 def _occluders():
-    import bpy
-
-    return part("scene_reader").read_occluders(bpy.context.scene, depsgraph())
+    return scene_reader.read_occluders(bpy.context.scene, depsgraph())
 
 
 @settings(
@@ -46,7 +43,6 @@ def _occluders():
     scale=st.sampled_from([(1.0, 1.0, 1.0), (2.5, 2.5, 2.5), (1.0, 3.0, 0.5)]),
 )
 def test_projections_agree_with_blenders(kind, fit, lens, shift, size, aspect, rotation, scale):
-    import bpy
     from bpy_extras.object_utils import world_to_camera_view
     from mathutils import Vector
 
@@ -79,8 +75,6 @@ def test_projections_agree_with_blenders(kind, fit, lens, shift, size, aspect, r
 
 
 def test_size_of_the_picture_and_clipping():
-    import bpy
-
     camera = add_camera()
     camera.data.clip_start, camera.data.clip_end = 0.25, 750.0
     render = bpy.context.scene.render
@@ -91,8 +85,6 @@ def test_size_of_the_picture_and_clipping():
 
 
 def test_a_parented_and_animated_camera_is_read_where_it_is():
-    import bpy
-
     camera = add_camera(location=(0.0, 0.0, 0.0))
     rail = bpy.data.objects.new("rail", None)
     bpy.context.scene.collection.objects.link(rail)
@@ -117,10 +109,8 @@ def test_a_parented_and_animated_camera_is_read_where_it_is():
     ],
 )
 def test_cameras_that_cannot_be_used_are_named(break_it, says):
-    import bpy
-
     break_it(bpy.context.scene, add_camera())
-    with pytest.raises(errors().SceneError, match=says):
+    with pytest.raises(errors.SceneError, match=says):
         _camera()
 
 
@@ -140,8 +130,6 @@ def test_plants_come_as_arrays_sorted_by_name():
 
 
 def test_only_enabled_plants_that_render_count():
-    import bpy
-
     scene = bpy.context.scene
     add_plant("seen")
     add_plant("hidden", hide_render=True)
@@ -171,8 +159,6 @@ def test_only_enabled_plants_that_render_count():
     signs=st.tuples(*[st.sampled_from([-1.0, 1.0])] * 3),
 )
 def test_any_scale_gives_a_rotation_that_keeps_the_trunk(rotation, scale, signs):
-    import bpy
-
     plant = bpy.data.objects.get("plant") or add_plant()
     plant.rotation_euler = rotation
     plant.scale = np.multiply(scale, signs)
@@ -186,8 +172,6 @@ def test_any_scale_gives_a_rotation_that_keeps_the_trunk(rotation, scale, signs)
 
 
 def test_parents_constraints_and_animation_move_plants():
-    import bpy
-
     parent = add_mesh("parent")
     parent.location = (5.0, 0.0, 0.0)
     add_plant("a", parent=parent)
@@ -201,8 +185,6 @@ def test_parents_constraints_and_animation_move_plants():
 
 
 def test_instanced_collections_grow_individuals():
-    import bpy
-
     grove = bpy.data.collections.new("grove")
     add_plant("a", seed=4, location=(1.0, 0.0, 0.0), collection=grove)
     for x in (0.0, 10.0):
@@ -216,7 +198,6 @@ def test_instanced_collections_grow_individuals():
 
 
 def test_linked_plants_are_read(tmp_path):
-    import bpy
 
     from devtools import session
 
@@ -231,8 +212,6 @@ def test_linked_plants_are_read(tmp_path):
 
 
 def _excluded(plants):
-    import bpy
-
     collection = bpy.data.collections.new("excluded")
     bpy.context.scene.collection.children.link(collection)
     for plant in plants:
@@ -258,7 +237,7 @@ def _excluded(plants):
 )
 def test_plants_that_cannot_be_used_are_named(break_it, says):
     break_it()
-    with pytest.raises(errors().SceneError, match=says):
+    with pytest.raises(errors.SceneError, match=says):
         _plants()
 
 
@@ -278,15 +257,13 @@ def test_occluders_are_triangles_in_world_space_with_modifiers():
 
 
 def test_occluders_that_hide_nothing_are_named():
-    import bpy
-
     bare = add_mesh("Bare", faces=())
     bare.tetflora.is_occluder = True
-    with pytest.raises(errors().SceneError, match='"Bare" has no faces'):
+    with pytest.raises(errors.SceneError, match='"Bare" has no faces'):
         _occluders()
     bpy.data.objects.remove(bare)
     curve = bpy.data.objects.new("Path", bpy.data.curves.new("Path", 'CURVE'))
     bpy.context.scene.collection.objects.link(curve)
     curve.tetflora.is_occluder = True
-    with pytest.raises(errors().SceneError, match='"Path" is not a mesh; it is marked as hiding plants'):
+    with pytest.raises(errors.SceneError, match='"Path" is not a mesh; it is marked as hiding plants'):
         _occluders()

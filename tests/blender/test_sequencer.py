@@ -4,10 +4,13 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 import pytest
 
-from tests.blender.scenes import add_camera, add_plant, datablocks, depsgraph, errors, part, tiny_render
+from tests.blender.scenes import add_camera, add_plant, datablocks, depsgraph, tiny_render
+from tetflora_addon import errors
+from tetflora_addon.blender import compat, handlers, job, kept_results
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -17,8 +20,6 @@ FRAMES = 4
 @pytest.fixture
 def film(tmp_path):
     """A scene without plants whose sequencer shows one with a plant, past which the camera flies; gives both."""
-    import bpy
-
     wood = tiny_render()
     camera = add_camera(location=(-1.0, 0.0, 12.0), rotation=(0.0, 0.0, 0.0))
     camera.keyframe_insert("location", frame=1)
@@ -29,14 +30,14 @@ def film(tmp_path):
     settings.leaf_limit, settings.cutoff, settings.cell_length = 4.0, 8.0, 1.0
     world = bpy.data.worlds.new("sky")
     wood.world = world
-    part("compat").shader_tree(world).nodes["Background"].inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    compat.shader_tree(world).nodes["Background"].inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
     wood.frame_start, wood.frame_end = 1, FRAMES  # which the strip is as long as
     film = bpy.data.scenes.new("film")
     film.camera = camera
     film.frame_start, film.frame_end = 1, FRAMES
     film.render.resolution_x = film.render.resolution_y = 16
     film.render.engine, film.cycles.samples = 'CYCLES', 1
-    part("compat").set_still_format(film.render.image_settings, "PNG")
+    compat.set_still_format(film.render.image_settings, "PNG")
     film.render.filepath = str(tmp_path / "frame_####")
     strips = film.sequence_editor_create().strips
     strips.new_scene("wood", wood, 1, 1)
@@ -45,8 +46,6 @@ def film(tmp_path):
 
 
 def picture(folder, frame):
-    import bpy
-
     image = bpy.data.images.load(str(folder / f"frame_{frame:04d}.png"))
     values = np.array(image.pixels[:]).reshape(-1, 4)[:, :3]
     bpy.data.images.remove(image)
@@ -54,15 +53,13 @@ def picture(folder, frame):
 
 
 def test_scenes_in_a_sequencer_show_their_plants(film, tmp_path):
-    import bpy
-
     outer, _ = film
     before = datablocks()
     bpy.ops.render.render(animation=True, scene=outer.name)
     pictures = [picture(tmp_path, n) for n in range(1, FRAMES + 1)]
     assert datablocks() == before
-    assert part("kept_results")._kept == {}
-    assert part("handlers").render_errors() == []
+    assert kept_results._kept == {}
+    assert handlers.render_errors() == []
     for values in pictures:  # white sky and the plant before it
         assert values.max() > 0.7
         assert values.min() < 0.6
@@ -70,13 +67,11 @@ def test_scenes_in_a_sequencer_show_their_plants(film, tmp_path):
 
 
 def test_errors_of_a_scene_in_a_sequencer_are_told(film, monkeypatch):
-    import bpy
-
     def refuse(*_arguments, **_options):
-        raise errors().SpeciesError("no such species")
+        raise errors.SpeciesError("no such species")
 
-    monkeypatch.setattr(part("job"), "refine", refuse)
+    monkeypatch.setattr(job, "refine", refuse)
     before = datablocks()
     bpy.ops.render.render(animation=True, scene=film[0].name)
-    assert len(part("handlers").render_errors()) == FRAMES
+    assert len(handlers.render_errors()) == FRAMES
     assert datablocks() == before

@@ -5,11 +5,14 @@
 Black cells before a white sky: what is seen is their transmittance.
 """
 
+import bpy
 import numpy as np
 import pytest
 
 from devtools import session
-from tests.blender.renders import compat, picture, small_scene
+from tests.blender.renders import picture, small_scene
+from tetflora_addon.blender import compat, meshes, shell_material
+from tetflora_addon.shading import shells
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -23,10 +26,8 @@ def place(
     vertices, extinction, colour=0.0, transmission=0.0, normal=(0.0, 0.0, 1.0), plane=0.0, stochastic=1.0, **sockets
 ):
     """Link shells of the cells (n, 4, 3) with S (n, 6) to the scene."""
-    import bpy
-
     count = len(vertices)
-    buffers = session.part("tetflora_addon.shading.shells").shell_buffers(
+    buffers = shells.shell_buffers(
         vertices,
         np.full((count, 3), colour),
         np.full(count, transmission),
@@ -34,11 +35,11 @@ def place(
         np.tile(normal, (count, 1)),
         np.full(count, plane),
     )
-    material = session.part("tetflora_addon.blender.shell_material").shell_material()
+    material = shell_material.shell_material()
     group = next(n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeGroup")
     for name, value in {"Stochastic": stochastic, "s": 0.0, "Variation": 0.0, "Roundness": 0.0, **sockets}.items():
         group.inputs[name].default_value = value
-    mesh = session.part("tetflora_addon.blender.meshes").write_mesh("shells", buffers, [material])
+    mesh = meshes.write_mesh("shells", buffers, [material])
     bpy.context.scene.collection.objects.link(bpy.data.objects.new("shells", mesh))
 
 
@@ -74,8 +75,6 @@ def transmittance(vertices, kappa):
 
 def prepare(samples, **changes):
     small_scene(sky=1.0, samples=samples, size=SIZE, width=WIDTH, **changes)
-    import bpy
-
     # A box of one pixel, as the reference has.
     bpy.context.scene.cycles.pixel_filter_type = 'BOX'
 
@@ -143,8 +142,6 @@ def test_extinction_depends_on_direction():
 
 def test_far_from_the_origin():
     """Five kilometres away positions are rounded to half a millimetre, thickness is not."""
-    import bpy
-
     away = np.array([4000.0, 3000.0, 0.0])
     prepare(64)
     bpy.context.scene.camera.location.x += away[0]
@@ -166,7 +163,7 @@ def test_light_from_the_viewer_gives_the_colour():
 
 
 def test_one_output_for_each_engine():
-    material = session.part("tetflora_addon.blender.shell_material").shell_material()
+    material = shell_material.shell_material()
     targets = sorted(n.target for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
     assert targets == ['CYCLES', 'EEVEE']
     assert material.cycles.use_bump_map_correction is False
@@ -175,8 +172,6 @@ def test_one_output_for_each_engine():
 
 def at_centres(samples=1, **changes):
     """Pixels that look through their centres only, as exact as the renderer's arithmetic."""
-    import bpy
-
     prepare(samples, **changes)
     scene = bpy.context.scene
     scene.cycles.pixel_filter_type = 'BLACKMAN_HARRIS'
@@ -186,7 +181,7 @@ def at_centres(samples=1, **changes):
 
 
 def engine(name):
-    return compat().eevee_engine() if name == "EEVEE" else name
+    return compat.eevee_engine() if name == "EEVEE" else name
 
 
 @pytest.mark.parametrize("name", ["CYCLES", "EEVEE"])
@@ -203,8 +198,6 @@ def test_stacks_are_exact_at_the_centres_of_pixels(name):
 @pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
 def test_a_camera_inside_sees_what_is_left_of_the_way(name, kind):
     """From the middle of a cell, whose entry face is behind the camera, what counts is the way to the wall."""
-    import bpy
-
     at_centres(engine=engine(name))
     camera = bpy.context.scene.camera
     camera.location = (0.02, -0.03, 0.05)
@@ -230,10 +223,8 @@ def test_a_camera_inside_sees_what_is_left_of_the_way(name, kind):
 
 def baked(path, light, extinction):
     """Baked picture of cells (n, 4, 3), far to near, whose radiance at the corners is `light` (n, 4)."""
-    import bpy
-
     count = len(path)
-    buffers = session.part("tetflora_addon.shading.shells").shell_buffers(
+    buffers = shells.shell_buffers(
         path,
         np.zeros((count, 3)),
         np.zeros(count),
@@ -243,8 +234,8 @@ def baked(path, light, extinction):
         rank=np.arange(count)[::-1],
         light=np.repeat(light[..., None], 3, axis=2),
     )
-    material = session.part("tetflora_addon.blender.shell_material").baked_shell_material()
-    mesh = session.part("tetflora_addon.blender.meshes").write_mesh("shells", buffers, [material])
+    material = shell_material.baked_shell_material()
+    mesh = meshes.write_mesh("shells", buffers, [material])
     bpy.context.scene.collection.objects.link(bpy.data.objects.new("shells", mesh))
 
 
@@ -288,18 +279,16 @@ def _top(cell, x, y):
 
 def test_cycles_casts_the_shadow_of_the_cloud():
     """On white ground under a sun, seen from below the cells, what is left of the light is e^{−κℓ}."""
-    import bpy
-
     cells, kappa = stack(6), np.linspace(0.2, 1.0, 6)
     prepare(256, sun=0.0)
     scene = bpy.context.scene
-    compat().shader_tree(scene.world).nodes["Background"].inputs["Color"].default_value = (0.0, 0.0, 0.0, 1.0)
+    compat.shader_tree(scene.world).nodes["Background"].inputs["Color"].default_value = (0.0, 0.0, 0.0, 1.0)
     scene.camera.location.z = -20.0
     bpy.ops.mesh.primitive_plane_add(size=20.0, location=(0.0, 0.0, -30.0))
     place(cells, ISOTROPIC * kappa[:, None] ** 2, stochastic=0.0)
     bare = 0.8  # of the new material's diffuse colour
     material = bpy.data.materials.new("ground")
-    tree = compat().shader_tree(material)
+    tree = compat.shader_tree(material)
     tree.nodes.clear()
     diffuse, output = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new("ShaderNodeOutputMaterial")
     diffuse.inputs["Color"].default_value = (bare, bare, bare, 1.0)

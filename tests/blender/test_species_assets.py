@@ -6,35 +6,34 @@ from __future__ import annotations
 
 import shutil
 
+import bpy
 import numpy as np
 import pytest
 
 from devtools import session
-from tests.blender.scenes import add_camera, add_plant, datablocks, depsgraph, part, select
+from tests.blender.scenes import add_camera, add_plant, datablocks, depsgraph, select
+from tetflora_addon.blender import asset_library, job, migration, preferences, species_items, thumbnails
+from tetflora_addon.plants import catalogue
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
 @pytest.fixture
 def own_folder(tmp_path):
-    import bpy
-
-    preferences = bpy.context.preferences.addons[part("preferences").ROOT_PACKAGE].preferences
+    own = bpy.context.preferences.addons[preferences.ROOT_PACKAGE].preferences
     folder = tmp_path / "species"
     (folder / "thumbnails").mkdir(parents=True)
-    preferences.species_folder = str(folder)
+    own.species_folder = str(folder)
     yield folder
-    preferences.species_folder = ""
+    own.species_folder = ""
 
 
 def _shipped():
-    return session.part("tetflora_addon.plants.catalogue").list_species()
+    return catalogue.list_species()
 
 
 def test_pictures_are_small_squares_of_known_species():
-    import bpy
-
-    folder = session.part("tetflora_addon.plants.catalogue").builtin_folder() / "thumbnails"
+    folder = catalogue.builtin_folder() / "thumbnails"
     pictures = sorted(folder.glob("*"))
     assert {p.stem for p in pictures} <= set(_shipped())
     assert len(pictures) >= 3
@@ -53,10 +52,9 @@ def test_pictures_are_small_squares_of_known_species():
 
 def test_a_species_without_a_picture_gets_an_icon(own_folder):
     shipped = _shipped()
-    thumbnails, items = part("thumbnails"), part("species_items")
     shutil.copy(shipped["bush"].path, own_folder / "mine.json")
     assert thumbnails.icon_of("mine") == thumbnails.icon_of("") == thumbnails.icon_of("gone") == 0
-    mine = next(i for i in items.items_for() if i[0] == "mine")
+    mine = next(i for i in species_items.items_for() if i[0] == "mine")
     assert mine[3] == thumbnails.FALLBACK_ICON
     shutil.copy(thumbnails.thumbnail_file("bush"), own_folder / "thumbnails" / "mine.png")
     assert thumbnails.thumbnail_file("mine") == own_folder / "thumbnails" / "mine.png"
@@ -65,13 +63,11 @@ def test_a_species_without_a_picture_gets_an_icon(own_folder):
 
 
 def test_the_library_holds_a_plant_of_each_species(tmp_path):
-    import bpy
-
     add_plant("Bush", "conifer", seed=5)  # has the name of an asset
     before = datablocks()
     assert bpy.ops.tetflora.create_asset_library(directory=str(tmp_path / "lib")) == {'FINISHED'}
     assert datablocks() == before
-    path = tmp_path / "lib" / part("asset_library").FILE
+    path = tmp_path / "lib" / asset_library.FILE
     with bpy.data.libraries.load(str(path), assets_only=True) as (there, _here):
         names = list(there.objects)
     assert sorted(names) == sorted(info.name for info in _shipped().values())
@@ -82,9 +78,7 @@ def test_the_library_holds_a_plant_of_each_species(tmp_path):
 
 
 def test_an_asset_becomes_a_working_plant(tmp_path):
-    import bpy
-
-    path, _ = part("asset_library").write_asset_library(tmp_path)
+    path, _ = asset_library.write_asset_library(tmp_path)
     session.clean_file()
     scene = bpy.context.scene
     add_camera()
@@ -92,19 +86,17 @@ def test_an_asset_becomes_a_working_plant(tmp_path):
     bpy.ops.wm.append(directory=f"{path}/Object/", filename="Bush")
     (plant,) = (o for o in scene.objects if o.tetflora.is_plant)
     assert (plant.tetflora.species, plant.tetflora.seed, plant.tetflora.enabled) == ("bush", 1, True)
-    assert plant.tetflora.version == part("migration").VERSION
+    assert plant.tetflora.version == migration.VERSION
     assert scene.render.use_lock_interface
     assert "tetflora_temporary" not in plant
-    assert part("job").estimate(scene, depsgraph()).polygons_full > 1000
+    assert job.estimate(scene, depsgraph()).polygons_full > 1000
     select(plant)
     bpy.ops.tetflora.reseed()
     assert plant.tetflora.seed != 1
 
 
 def test_assets_have_picture_and_tags(tmp_path):
-    import bpy
-
-    path, _ = part("asset_library").write_asset_library(tmp_path)
+    path, _ = asset_library.write_asset_library(tmp_path)
     bpy.ops.wm.open_mainfile(filepath=str(path))
     bush = next(o for o in bpy.data.objects if o.tetflora.species == "bush")
     assert {"plant", "TetFlora", "bush"} == {t.name for t in bush.asset_data.tags}
@@ -116,8 +108,6 @@ def test_assets_have_picture_and_tags(tmp_path):
 
 
 def test_preferences_change_only_when_asked(tmp_path):
-    import bpy
-
     libraries = bpy.context.preferences.filepaths.asset_libraries
     before = len(libraries)
     bpy.ops.tetflora.create_asset_library(directory=str(tmp_path))
@@ -132,8 +122,6 @@ def test_preferences_change_only_when_asked(tmp_path):
 
 
 def test_a_folder_that_cannot_be_written_is_said(tmp_path):
-    import bpy
-
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     before = datablocks()
     with pytest.raises(RuntimeError, match="asset library cannot be written"):
@@ -142,8 +130,6 @@ def test_a_folder_that_cannot_be_written_is_said(tmp_path):
 
 
 def test_a_file_of_catalogues_that_is_no_text_is_said_and_stays(tmp_path):
-    import bpy
-
     catalogues = tmp_path / "blender_assets.cats.txt"
     catalogues.write_bytes(b"VERSION 1\n# Geh\xf6lze\n")
     before = datablocks()

@@ -7,46 +7,44 @@ from __future__ import annotations
 import json
 import math
 
+import bpy
 import pytest
 
 from devtools import session
-from tests.blender.scenes import add_camera, add_plant, depsgraph, errors, part, select
+from tests.blender.scenes import add_camera, add_plant, depsgraph, select
+from tetflora_addon import errors
+from tetflora_addon.blender import job, preferences, species_editor, species_edits, species_files, species_items
+from tetflora_addon.plants import catalogue, schema, species
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
 def _editor(species="bush", order=0):
-    import bpy
-
     editor = bpy.context.scene.tetflora.species_editor
     editor.species, editor.order_index = species, order
     return editor
 
 
 def _edited(identifier="bush"):
-    import bpy
-
-    return part("species_edits").species_for(bpy.context.scene, identifier)
+    return species_edits.species_for(bpy.context.scene, identifier)
 
 
 def _shipped(identifier="bush"):
-    return session.part("tetflora_addon.plants.catalogue").load_species(identifier)
+    return catalogue.load_species(identifier)
 
 
 @pytest.fixture
 def own_folder(tmp_path):
-    import bpy
-
-    preferences = bpy.context.preferences.addons[part("preferences").ROOT_PACKAGE].preferences
-    preferences.species_folder = str(tmp_path / "species")
+    own = bpy.context.preferences.addons[preferences.ROOT_PACKAGE].preferences
+    own.species_folder = str(tmp_path / "species")
     yield tmp_path / "species"
-    preferences.species_folder = ""
+    own.species_folder = ""
 
 
 def test_every_key_of_an_order_has_its_sliders_with_limits_and_tooltip():
-    keys = session.part("tetflora_addon.plants.schema").ORDER_KEYS
+    keys = schema.ORDER_KEYS
     properties = _editor().bl_rna.properties
-    assert set(part("species_editor").order_keys()) == set(keys)
+    assert set(species_editor.order_keys()) == set(keys)
     for name, key in keys.items():
         assert name in properties, name
         assert key.meaning[1:] in properties[name].description
@@ -62,7 +60,7 @@ def test_sliders_show_what_the_species_has(identifier):
     species = _shipped(identifier)
     for index, order in enumerate(species.orders):
         editor = _editor(identifier, index)
-        for name, key in session.part("tetflora_addon.plants.schema").ORDER_KEYS.items():
+        for name, key in schema.ORDER_KEYS.items():
             shown, value = getattr(editor, name), getattr(order, name)
             if key.kind == "range":
                 shown, value = (shown, getattr(editor, name + "_variation")), tuple(value)
@@ -80,19 +78,15 @@ def test_sliders_show_what_the_species_has(identifier):
 
 
 def test_looking_stores_nothing():
-    import bpy
-
     editor = _editor("conifer", 1)
-    for name in part("species_editor").order_keys():
+    for name in species_editor.order_keys():
         getattr(editor, name)
     assert len(bpy.context.scene.tetflora.species_edits) == 0
     assert _edited("conifer") == _shipped("conifer")
 
 
 def test_every_slider_changes_its_own_value_and_no_other():
-    keys = session.part("tetflora_addon.plants.schema").ORDER_KEYS
-    import bpy
-
+    keys = schema.ORDER_KEYS
     last = len(_shipped().orders) - 1
     for name, key in keys.items():
         if name == "branches":
@@ -126,8 +120,6 @@ def test_every_slider_changes_its_own_value_and_no_other():
 
 
 def test_edits_live_in_the_file_and_override_the_catalogue(tmp_path):
-    import bpy
-
     editor = _editor("bush", 2)
     editor.leaf_size = 0.2
     editor.leaf_form, editor.leaf_transmission = "kite", 0.1
@@ -137,18 +129,15 @@ def test_edits_live_in_the_file_and_override_the_catalogue(tmp_path):
     species = _edited()
     assert species.orders[2].leaf_size.mean == pytest.approx(0.2)
     assert (species.leaf[0].polygons, species.leaf_transmission, species.name) == (1, 0.1, "Broad Bush")
-    assert part("species_items").catalogue()["bush"].name == "Broad Bush"
+    assert species_items.catalogue()["bush"].name == "Broad Bush"
     assert _shipped().name == "Bush"
     session.clean_file()
     assert _edited() == _shipped()
 
 
 def test_edits_hold_for_all_scenes_of_the_file_and_are_kept_once():
-    import bpy
-
     _editor().length = 0.3
     other = bpy.data.scenes.new("other")
-    species_edits = part("species_edits")
     assert species_edits.species_for(other, "bush").orders[0].length.mean == pytest.approx(0.3)
     other.tetflora.species_editor.species = "bush"
     other.tetflora.species_editor.length = 0.4
@@ -157,11 +146,8 @@ def test_edits_hold_for_all_scenes_of_the_file_and_are_kept_once():
 
 
 def test_refinement_takes_the_edited_species():
-    import bpy
-
     add_camera()
     plant = add_plant()
-    job = part("job")
     before = job.estimate(bpy.context.scene, depsgraph()).polygons_full
     editor = _editor("bush", 3)
     editor.leaves, editor.leaves_variation = 10.0, 0.0
@@ -174,37 +160,31 @@ def test_refinement_takes_the_edited_species():
 
 
 def test_what_breaks_a_rule_is_said_and_stops_refinement():
-    import bpy
-
     add_plant()
     editor = _editor("bush", 1)
     editor.angle_variation = math.radians(100.0)
-    problem = part("species_edits").problem_of(bpy.context.scene, "bush")
+    problem = species_edits.problem_of(bpy.context.scene, "bush")
     assert "orders[1].angle" in problem
     assert "0 to 180" in problem
-    with pytest.raises(errors().SpeciesError, match=r"orders\[1\].angle"):
-        part("job").estimate(bpy.context.scene, depsgraph())
+    with pytest.raises(errors.SpeciesError, match=r"orders\[1\].angle"):
+        job.estimate(bpy.context.scene, depsgraph())
     assert editor.angle_variation == pytest.approx(math.radians(100.0), rel=1e-5)  # the slider stays where it was put
     editor.angle_variation = 0.1
-    assert part("species_edits").problem_of(bpy.context.scene, "bush") == ""
+    assert species_edits.problem_of(bpy.context.scene, "bush") == ""
 
 
 @pytest.mark.parametrize("text", ["", "[1]", "{", '{"orders": 3}', '{"orders": [1]}', '{"name": 4, "orders": [{}]}'])
 def test_a_broken_text_breaks_no_panel(text):
-    import bpy
-
     edit = bpy.context.scene.tetflora.species_edits.add()
     edit.identifier, edit.text = "bush", text
     editor = _editor()
     for prop in editor.bl_rna.properties:
         getattr(editor, prop.identifier)
-    assert part("species_edits").problem_of(bpy.context.scene, "bush")
-    assert "bush" in part("species_items").catalogue()
+    assert species_edits.problem_of(bpy.context.scene, "bush")
+    assert "bush" in species_items.catalogue()
 
 
 def test_duplicate_revert_and_orders():
-    import bpy
-
     plant, other = add_plant("a"), add_plant("b")
     select(plant)
     editor = _editor("bush", 0)
@@ -218,20 +198,18 @@ def test_duplicate_revert_and_orders():
         number += 1
         assert len(_edited("bush_2_2").orders) == number  # and it is sound
         assert editor.order == str(number - 1)
-    assert number == session.part("tetflora_addon.plants.species").MAX_ORDERS
+    assert number == species.MAX_ORDERS
     while bpy.ops.tetflora.edit_orders(action='REMOVE') == {'FINISHED'}:
         number -= 1
         assert len(_edited("bush_2_2").orders) == number
     assert number == 1
     bpy.ops.tetflora.revert_species()
-    assert "bush_2_2" not in part("species_items").catalogue()
-    assert "bush_2" in part("species_items").catalogue()
+    assert "bush_2_2" not in species_items.catalogue()
+    assert "bush_2" in species_items.catalogue()
     assert not bpy.ops.tetflora.revert_species.poll()
 
 
 def test_saved_species_come_back_as_they_were(own_folder, tmp_path):
-    import bpy
-
     editor = _editor("conifer", 1)
     bpy.ops.tetflora.duplicate_species(name="Łąka fir")
     editor.curvature = 0.5
@@ -244,7 +222,7 @@ def test_saved_species_come_back_as_they_were(own_folder, tmp_path):
     _editor(identifier)
     assert bpy.ops.tetflora.delete_species.poll()
     bpy.ops.tetflora.delete_species()
-    assert identifier not in part("species_items").catalogue()
+    assert identifier not in species_items.catalogue()
     assert bpy.ops.tetflora.load_species(filepath=str(tmp_path / "given.json")) == {'FINISHED'}
     given = _edited("given")
     assert (given.orders, given.leaf, given.name) == (species.orders, species.leaf, "Łąka fir")
@@ -253,18 +231,14 @@ def test_saved_species_come_back_as_they_were(own_folder, tmp_path):
 
 
 def test_shipped_species_cannot_be_deleted(own_folder):
-    import bpy
-
     _editor("bush")
     assert not bpy.ops.tetflora.delete_species.poll()
-    with pytest.raises(errors().SpeciesError, match="shipped"):
-        part("species_files").delete_species_file("bush")
+    with pytest.raises(errors.SpeciesError, match="shipped"):
+        species_files.delete_species_file("bush")
 
 
 @pytest.mark.parametrize("text", ["{", '{"format": 1}', '{"format": 1, "name": "x", "orders": [], "leaf": {}}'])
 def test_broken_files_are_refused_with_the_reason(own_folder, tmp_path, text):
-    import bpy
-
     (tmp_path / "broken.json").write_text(text, encoding="utf-8")
     with pytest.raises(RuntimeError, match=r"broken\.json: "):
         bpy.ops.tetflora.load_species(filepath=str(tmp_path / "broken.json"))
@@ -272,26 +246,21 @@ def test_broken_files_are_refused_with_the_reason(own_folder, tmp_path, text):
 
 
 def test_loading_replaces_only_when_told(own_folder, tmp_path):
-    import bpy
-
-    files = part("species_files")
     _editor("bush")
     bpy.ops.tetflora.export_species(filepath=str(tmp_path / "mine.json"))
-    files.load_species_file(tmp_path / "mine.json")
+    species_files.load_species_file(tmp_path / "mine.json")
     before = (own_folder / "mine.json").read_bytes()
     _editor("conifer")
     bpy.ops.tetflora.export_species(filepath=str(tmp_path / "mine.json"))
-    with pytest.raises(errors().SpeciesError, match="Replace"):
-        files.load_species_file(tmp_path / "mine.json")
+    with pytest.raises(errors.SpeciesError, match="Replace"):
+        species_files.load_species_file(tmp_path / "mine.json")
     assert (own_folder / "mine.json").read_bytes() == before
-    files.load_species_file(tmp_path / "mine.json", replace=True)
+    species_files.load_species_file(tmp_path / "mine.json", replace=True)
     assert (own_folder / "mine.json").read_bytes() == (tmp_path / "mine.json").read_bytes()
-    assert files.load_species_file(own_folder / "mine.json") == "mine"  # the file browser may well stand there
+    assert species_files.load_species_file(own_folder / "mine.json") == "mine"  # the file browser may well stand there
 
 
 def test_a_broken_species_is_not_saved(own_folder):
-    import bpy
-
     _editor("bush", 1).length_variation = 19.0
     with pytest.raises(RuntimeError, match=r"orders\[1\].length"):
         bpy.ops.tetflora.save_species()
@@ -299,19 +268,15 @@ def test_a_broken_species_is_not_saved(own_folder):
 
 
 def test_the_default_folder_belongs_to_the_user():
-    import bpy
-
-    folder = part("preferences").own_species_folder()
+    folder = preferences.own_species_folder()
     try:
         assert bpy.utils.user_resource('EXTENSIONS') in str(folder)
-        assert part("preferences").species_folders() == (folder,)
+        assert preferences.species_folders() == (folder,)
     finally:
         folder.rmdir()
 
 
 def test_undo_takes_an_edit_back():
-    import bpy
-
     _editor("bush")
     bpy.ops.ed.undo_push(message="before")
     bpy.context.scene.tetflora.species_editor.length = 0.3
@@ -324,19 +289,19 @@ def test_undo_takes_an_edit_back():
 
 def test_panels_look_at_folders_once_in_a_while_and_see_own_changes_at_once(monkeypatch, tmp_path):
     """In the window: what TetFlora writes is there at once, what others write a moment later."""
-    edits, looked = part("species_edits"), []
-    real = edits.list_species
-    monkeypatch.setattr(edits, "list_species", lambda folders: looked.append(1) or real(folders))
-    monkeypatch.setattr(edits, "_TRUSTED", 1000.0)
-    edits.look_again()
+    looked = []
+    real = species_edits.list_species
+    monkeypatch.setattr(species_edits, "list_species", lambda folders: looked.append(1) or real(folders))
+    monkeypatch.setattr(species_edits, "_TRUSTED", 1000.0)
+    species_edits.look_again()
     for _ in range(50):
-        part("species_items").catalogue()
-        edits.species_data(None, "oak")
+        species_items.catalogue()
+        species_edits.species_data(None, "oak")
     assert len(looked) == 1
-    edits.tell_listeners()
-    part("species_items").catalogue()
+    species_edits.tell_listeners()
+    species_items.catalogue()
     assert len(looked) == 2
-    monkeypatch.setattr(edits, "_TRUSTED", 0.0)
-    part("species_items").catalogue()
-    part("species_items").catalogue()
+    monkeypatch.setattr(species_edits, "_TRUSTED", 0.0)
+    species_items.catalogue()
+    species_items.catalogue()
     assert len(looked) == 4

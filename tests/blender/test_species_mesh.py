@@ -4,10 +4,12 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 import pytest
 
-from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, part, select
+from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
+from tetflora_addon.blender import plant_mesh
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -26,8 +28,6 @@ def _faces(obj):
 
 
 def test_the_mesh_is_the_plant_that_expanding_everything_gives():
-    import bpy
-
     plant = add_plant(seed=3, location=(4.0, 2.0, 1.0), scale=(1.5, 1.5, 1.5), rotation_euler=(0.3, -0.2, 1.0))
     add_camera()
     select(plant)
@@ -42,12 +42,10 @@ def test_the_mesh_is_the_plant_that_expanding_everything_gives():
 
 
 def test_esc_takes_back_what_was_made():
-    import bpy
-
     plants = [add_plant(f"plant {i}", location=(3.0 * i, 0.0, 0.0)) for i in range(3)]
     plants[0].tetflora.enabled = False
     before = {o.name: o.tetflora.enabled for o in bpy.data.objects}
-    steps = part("plant_mesh").make_plant_mesh_steps(bpy.context.scene, depsgraph(), plants)
+    steps = plant_mesh.make_plant_mesh_steps(bpy.context.scene, depsgraph(), plants)
     told = [next(steps) for _ in range(3)]
     assert [round(p.fraction * 3) for p in told] == [0, 1, 2]
     assert len(bpy.data.objects) == 5
@@ -57,8 +55,6 @@ def test_esc_takes_back_what_was_made():
 
 
 def test_it_is_the_artists_and_survives_clear():
-    import bpy
-
     plant, other = add_plant("Oak", location=(1.0, 0.0, 0.0)), add_plant("other", location=(5.0, 0.0, 0.0))
     add_camera()
     select(plant)
@@ -80,8 +76,6 @@ def test_it_is_the_artists_and_survives_clear():
 
 
 def test_wood_is_smooth_and_leaves_are_flat_with_materials_of_their_own():
-    import bpy
-
     select(add_plant())
     bpy.ops.tetflora.make_plant_mesh()
     mesh = bpy.context.view_layer.objects.active.data
@@ -98,8 +92,6 @@ def test_wood_is_smooth_and_leaves_are_flat_with_materials_of_their_own():
 
 
 def test_plants_of_one_seed_give_separate_meshes_in_their_places():
-    import bpy
-
     carrier = add_mesh("carrier")
     carrier.location = (10.0, 0.0, 0.0)
     plants = [add_plant(f"p{i}", seed=7, location=(3.0 * i, 0.0, 0.0)) for i in range(2)]
@@ -115,8 +107,6 @@ def test_plants_of_one_seed_give_separate_meshes_in_their_places():
 
 
 def test_undo_brings_the_plant_back():
-    import bpy
-
     select(add_plant("Oak"))
     bpy.ops.ed.undo_push(message="before")
     bpy.ops.tetflora.make_plant_mesh()
@@ -127,15 +117,13 @@ def test_undo_brings_the_plant_back():
 
 
 def test_refused_whole_with_a_reason(monkeypatch):
-    import bpy
-
     good, bad = add_plant("good"), add_plant("bad", scale=(0.0, 0.0, 0.0))
     select(good, bad)
     before = len(bpy.data.meshes)
     with pytest.raises(RuntimeError, match='"bad": scale 0'):
         bpy.ops.tetflora.make_plant_mesh()
     select(good)
-    monkeypatch.setattr(part("plant_mesh"), "MOST_POLYGONS", 10)
+    monkeypatch.setattr(plant_mesh, "MOST_POLYGONS", 10)
     with pytest.raises(RuntimeError, match="select fewer"):
         bpy.ops.tetflora.make_plant_mesh()
     assert len(bpy.data.meshes) == before

@@ -4,11 +4,13 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 import pytest
 
 from devtools import session
-from tests.blender.scenes import add_camera, add_plant, datablocks, part, select
+from tests.blender.scenes import add_camera, add_plant, datablocks, select
+from tetflora_addon.blender import scene_reader, species_preview
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -16,18 +18,13 @@ pytestmark = pytest.mark.usefixtures("clean_file")
 @pytest.fixture
 def preview():
     """Timers never fire here, so that the tests do what they would do."""
-    module = part("species_preview")
-    yield module
-    import bpy
-
-    module.show(bpy.context.scene, False)
-    if bpy.app.timers.is_registered(module._on_timer):
-        bpy.app.timers.unregister(module._on_timer)
+    yield species_preview
+    species_preview.show(bpy.context.scene, False)
+    if bpy.app.timers.is_registered(species_preview._on_timer):
+        bpy.app.timers.unregister(species_preview._on_timer)
 
 
 def _switch_on(preview, species="bush"):
-    import bpy
-
     editor = bpy.context.scene.tetflora.species_editor
     editor.species = species
     bpy.ops.tetflora.preview_species()
@@ -36,14 +33,10 @@ def _switch_on(preview, species="bush"):
 
 
 def _objects():
-    import bpy
-
     return [o for o in bpy.context.scene.objects if o.type == 'MESH']
 
 
 def test_shows_the_plant_of_the_editor_at_the_cursor(preview):
-    import bpy
-
     bpy.context.scene.cursor.location = (1.0, 2.0, 3.0)
     _switch_on(preview)
     (shown,) = _objects()
@@ -59,8 +52,6 @@ def test_shows_the_plant_of_the_editor_at_the_cursor(preview):
 
 
 def test_follows_changes_and_keeps_the_last_sound_plant(preview):
-    import bpy
-
     editor = _switch_on(preview)
     timers = bpy.app.timers
     before, name = len(_objects()[0].data.polygons), _objects()[0].name
@@ -97,23 +88,19 @@ def test_a_huge_species_is_cut_off_and_says_so(preview, monkeypatch):
 
 
 def test_takes_no_part_in_refinement_rendering_or_clearing(preview):
-    import bpy
-
     add_camera()
     add_plant()
     _switch_on(preview)
     (shown,) = _objects()
     assert shown.hide_render
     assert shown.hide_select
-    assert not list(o for o in part("scene_reader").renderable_objects(bpy.context.view_layer) if o == shown)
+    assert not list(o for o in scene_reader.renderable_objects(bpy.context.view_layer) if o == shown)
     bpy.ops.tetflora.refine()
     bpy.ops.tetflora.clear()
     assert [o.name for o in _objects()] == [shown.name]
 
 
 def test_is_not_saved(preview, tmp_path):
-    import bpy
-
     _switch_on(preview)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     assert len(_objects()) == 1
@@ -123,8 +110,6 @@ def test_is_not_saved(preview, tmp_path):
 
 
 def test_not_saved_after_undo_either(preview, tmp_path):
-    import bpy
-
     editor = _switch_on(preview)
     bpy.ops.ed.undo_push(message="before")
     editor.length = 0.3
@@ -138,8 +123,6 @@ def test_not_saved_after_undo_either(preview, tmp_path):
 
 
 def test_undo_brings_no_preview_back_that_was_switched_off(preview):
-    import bpy
-
     bpy.ops.ed.undo_push(message="empty")
     _switch_on(preview)
     bpy.ops.ed.undo_push(message="with preview")
@@ -153,8 +136,6 @@ def test_undo_brings_no_preview_back_that_was_switched_off(preview):
 
 
 def test_leaves_nothing_of_itself(preview):
-    import bpy
-
     before = datablocks()
     _switch_on(preview)
     bpy.ops.tetflora.preview_species()
@@ -164,8 +145,6 @@ def test_leaves_nothing_of_itself(preview):
 
 
 def test_loading_another_file_ends_it(preview):
-    import bpy
-
     _switch_on(preview)
     session.clean_file()
     assert not preview.shown_in(bpy.context.scene)

@@ -12,32 +12,30 @@ import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import bpy
 import pytest
 
+import operators
 from devtools import session
 from tests.blender.digests import difference, everything
-from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, part, select
+from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
+from tetflora_addon.blender import erased_places, job, species_files
+from tetflora_addon.plants import catalogue
 
 # Populations of the cases below: they are small, and of species that are quick to compile.
 MIX = "bush:2, conifer"
 
 
 def ops():
-    import bpy
-
     return bpy.ops.tetflora
 
 
 def scene():
-    import bpy
-
     return bpy.context.scene
 
 
 def forest() -> None:
     """Two plants before a small camera, and a ground; the plants are selected."""
-    import bpy
-
     add_mesh("ground", size=8.0)
     add_camera(location=(0.0, -14.0, 3.0), rotation=(1.4, 0.0, 0.0))
     render = scene().render
@@ -49,8 +47,6 @@ def forest() -> None:
 
 
 def ground_active() -> None:
-    import bpy
-
     forest()
     select(bpy.data.objects["ground"])
 
@@ -58,22 +54,18 @@ def ground_active() -> None:
 def refined() -> None:
     forest()
     bpy_update()
-    part("job").refine(scene(), depsgraph())
+    job.refine(scene(), depsgraph())
 
 
 def bpy_update() -> None:
-    import bpy
-
     bpy.context.view_layer.update()
 
 
 def refined_mesh() -> None:
     """A mesh of the artist's is hidden for its results."""
-    import bpy
-
     forest()
     bpy.data.objects["ground"].tetflora.is_explicit = True
-    part("job").refine(scene(), depsgraph())
+    job.refine(scene(), depsgraph())
 
 
 def populated() -> None:
@@ -83,8 +75,6 @@ def populated() -> None:
 
 
 def populated_as_field() -> None:
-    import bpy
-
     ground_active()
     assert ops().populate(count=12, species=MIX, min_distance=0.5, as_field='FIELD') == {'FINISHED'}
     bpy_update()
@@ -98,8 +88,6 @@ def frozen() -> None:
 
 def edges() -> None:
     """A mesh of edges, which can be a plant's form, is active."""
-    import bpy
-
     forest()
     mesh = bpy.data.meshes.new("form")
     mesh.from_pydata([(0, 0, 0), (0, 0, 1), (0.2, 0, 2)], [(0, 1), (1, 2)], [])
@@ -175,8 +163,6 @@ FROM_FILES = {"import_populations", "load_species"}
 
 
 def mark_ground() -> None:
-    import bpy
-
     bpy.data.objects["ground"].tetflora.is_explicit = True
     select(bpy.data.objects["ground"])
 
@@ -187,14 +173,12 @@ def change_population() -> None:
 
 
 def erase_place() -> None:
-    part("erased_places").note_erased(scene().tetflora.populations[0], [(0.0, 0.0)], 2.0)
+    erased_places.note_erased(scene().tetflora.populations[0], [(0.0, 0.0)], 2.0)
 
 
 @pytest.fixture
 def history(clean_file) -> Iterator[None]:
     """An empty file, the memory of undo included."""
-    import bpy
-
     bpy.ops.ed.undo_push(message="Begin")
     yield
     session.clean_file()
@@ -202,8 +186,6 @@ def history(clean_file) -> Iterator[None]:
 
 def check(operator: str, options: dict) -> None:
     """One call is one step: undo takes all of it back, redo brings all of it again."""
-    import bpy
-
     bpy.ops.ed.undo_push(message="Before")
     before = everything()
     assert getattr(ops(), operator)('EXEC_DEFAULT', True, **options) == {'FINISHED'}
@@ -222,11 +204,7 @@ def test_undo_and_redo_restore_everything(history, prepare, operator, options):
 
 
 def test_each_operator_with_an_undo_step_is_tried(blender):
-    declared = {
-        cls.bl_idname.split(".")[1]
-        for cls in session.part("operators").CLASSES
-        if 'UNDO' in getattr(cls, "bl_options", ())
-    }
+    declared = {cls.bl_idname.split(".")[1] for cls in operators.CLASSES if 'UNDO' in getattr(cls, "bl_options", ())}
     assert declared == {case[2] for case in CASES} | FROM_FILES
 
 
@@ -239,22 +217,20 @@ def test_what_comes_from_a_file_of_populations_can_be_undone(history, tmp_path):
 
 def test_a_species_that_was_loaded_can_be_undone(history, tmp_path):
     path = tmp_path / "shrub.json"
-    catalogue = Path(session.part("tetflora_addon.plants.catalogue").__file__).parent.parent / "catalogue"
-    data = json.loads((catalogue / "bush.json").read_text("utf-8"))
+    shipped = Path(catalogue.__file__).parent.parent / "catalogue"
+    data = json.loads((shipped / "bush.json").read_text("utf-8"))
     path.write_text(json.dumps({**data, "name": "Shrub"}), "utf-8")
     forest()
     try:
         check("load_species", {"filepath": str(path)})
         assert scene().tetflora.species_editor.species == "shrub"
     finally:  # the copy in the user's folder is no part of the file, and stays when the step is undone
-        part("species_files").delete_species_file("shrub")
+        species_files.delete_species_file("shrub")
 
 
 @pytest.mark.parametrize("case", ["refine", "populate", "make_field", "remove_plants"])
 def test_a_refusal_changes_nothing_and_is_no_step(history, case):
     """An error of the artist's leaves no undo step behind, whose undo would do nothing."""
-    import bpy
-
     ground_active()
     options: dict = {}
     if case == "refine":
@@ -284,8 +260,6 @@ def test_a_refusal_changes_nothing_and_is_no_step(history, case):
 
 def test_a_chain_of_operators_is_undone_step_by_step(history):
     """From populating to clearing, back to the start and forth again; refined meshes among it."""
-    import bpy
-
     ground_active()
     bpy.ops.ed.undo_push(message="Before")
     states = [everything()]
@@ -310,8 +284,6 @@ def test_a_chain_of_operators_is_undone_step_by_step(history):
 
 def test_a_population_on_a_collection_goes_on_after_undo(history):
     """Grounds within a collection are read again after each undo; Blender's own cache of them does not outlive one."""
-    import bpy
-
     ground_active()
     grounds = bpy.data.collections.new("grounds")
     inner = bpy.data.collections.new("inner")

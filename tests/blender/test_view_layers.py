@@ -4,17 +4,17 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 import pytest
 
-from tests.blender.scenes import add_plant, datablocks, depsgraph, part
+from tests.blender.scenes import add_plant, datablocks, depsgraph
+from tetflora_addon.blender import camera_reader, emit, handlers, kept_results, view_layers
 
 
 @pytest.fixture
 def scene(clean_file):
     """Two plants, each in a collection of its own, left and right of the middle."""
-    import bpy
-
     scene = bpy.context.scene
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     scene.collection.objects.link(camera)
@@ -36,12 +36,10 @@ def scene(clean_file):
 
 
 def groups(scene):
-    return [[layer.name for layer in group] for group in part("view_layers").view_layer_groups(scene)]
+    return [[layer.name for layer in group] for group in view_layers.view_layer_groups(scene)]
 
 
 def alpha(scene, path) -> np.ndarray:
-    import bpy
-
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
     image = bpy.data.images.load(str(path))
@@ -76,13 +74,11 @@ def test_a_layer_renders_its_own_plants(scene, tmp_path, number):
 
 
 def test_layers_with_different_plants_are_refined_one_by_one(scene, tmp_path):
-    import bpy
-
     two_layers(scene)
     before, made = datablocks(), []
 
     def look(_scene, _depsgraph=None):
-        for collection in part("emit").result_collections(scene, 'RENDER'):
+        for collection in emit.result_collections(scene, 'RENDER'):
             shown = [not layer.layer_collection.children[collection.name].exclude for layer in scene.view_layers]
             made.append(shown)
 
@@ -94,11 +90,11 @@ def test_layers_with_different_plants_are_refined_one_by_one(scene, tmp_path):
         bpy.app.handlers.render_pre.remove(look)
     assert made == [[True, False], [False, True]] * 2
     assert datablocks() == before
-    assert part("handlers").render_errors() == []
+    assert handlers.render_errors() == []
 
 
 def test_a_render_region_is_refined_alone(scene, tmp_path):
-    read = part("camera_reader").read_camera
+    read = camera_reader.read_camera
     whole = read(scene, depsgraph())
     scene.render.use_border = True
     scene.render.border_min_x, scene.render.border_max_x = 0.5, 1.0
@@ -124,7 +120,7 @@ def test_both_eyes_lie_within_what_is_refined(scene, mode, pivot):
     stereo = scene.camera.data.stereo
     stereo.interocular_distance, stereo.convergence_distance, stereo.convergence_mode = 0.5, 4.0, mode
     stereo.pivot = pivot
-    camera = part("camera_reader").read_camera(scene, depsgraph())
+    camera = camera_reader.read_camera(scene, depsgraph())
     assert len(camera.shutter) == (2 if pivot == 'CENTER' else 1)
     for eye in camera.shutter:
         away = np.linalg.norm(eye.position - camera.position)
@@ -137,40 +133,36 @@ def test_both_eyes_lie_within_what_is_refined(scene, mode, pivot):
 
 
 def test_cameras_of_multi_view_are_found_by_their_suffix(scene):
-    import bpy
-
     scene.camera.name = "shot_L"
     other = bpy.data.objects.new("shot_R", scene.camera.data)
     scene.collection.objects.link(other)
     other.location, other.rotation_euler = (1.0, -14.0, 1.5), scene.camera.rotation_euler
     scene.render.use_multiview, scene.render.views_format = True, 'MULTIVIEW'
-    (seen,) = part("camera_reader").read_camera(scene, depsgraph()).shutter
+    (seen,) = camera_reader.read_camera(scene, depsgraph()).shutter
     assert seen.position == pytest.approx((1.0, -14.0, 1.5))
 
 
 def test_markers_switch_the_camera_that_is_refined_for(scene, tmp_path):
     """In animations, as ``-b -a`` renders them: frame 2 is seen from the other side."""
-    import bpy
-
     other = bpy.data.objects.new("other", scene.camera.data)
     scene.collection.objects.link(other)
     other.location, other.rotation_euler = (-3.0, 14.0, 1.5), (np.pi / 2, 0.0, np.pi)
     for frame, camera in ((1, scene.camera), (2, other)):
         scene.timeline_markers.new(camera.name, frame=frame).camera = camera
     seen = []
-    real = part("kept_results").read_camera
+    real = kept_results.read_camera
 
     def look(scene, *arguments, **options):
         camera = real(scene, *arguments, **options)
         seen.append((scene.frame_current, round(float(camera.position[1]))))
         return camera
 
-    part("kept_results").read_camera = look
+    kept_results.read_camera = look
     scene.frame_start, scene.frame_end = 1, 2
     scene.render.filepath = str(tmp_path / "frame")
     try:
         bpy.ops.render.render(animation=True)
     finally:
-        part("kept_results").read_camera = real
+        kept_results.read_camera = real
     assert seen == [(1, -14), (2, 14)]
-    assert part("handlers").render_errors() == []
+    assert handlers.render_errors() == []

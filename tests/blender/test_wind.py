@@ -4,17 +4,17 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 import pytest
 
-from devtools import session
-from tests.blender.scenes import add_camera, add_plant, depsgraph, part, tiny_render
+from tests.blender.scenes import add_camera, add_plant, depsgraph, tiny_render
+from tetflora_addon import buffers
+from tetflora_addon.blender import auto_refresh, compat, emit, job, meshes, scene_digest, wind_properties
 
 
 @pytest.fixture
 def scene(clean_file):
-    import bpy
-
     add_camera(location=(0.0, -8.0, 1.0))
     for i in range(2):
         add_plant(f"plant {i}", seed=i, location=(2.0 * i - 1.0, 0.0, 0.0))
@@ -26,14 +26,14 @@ def scene(clean_file):
 
 def made(scene):
     """Objects of the last refinement that have vertices or points."""
-    objects = part("emit").result_collections(scene, 'VIEW')[0].all_objects
+    objects = emit.result_collections(scene, 'VIEW')[0].all_objects
     return sorted((obj for obj in objects if obj.data is not None), key=lambda obj: obj.name)
 
 
 def places(scene, frame, subframe=0.0):
     """All vertices of what is refined at a frame."""
     scene.frame_set(frame, subframe=subframe)
-    part("job").refine(scene, depsgraph())
+    job.refine(scene, depsgraph())
     found = []
     for obj in (obj for obj in made(scene) if obj.type == 'MESH'):
         flat = np.zeros(3 * len(obj.data.vertices), np.float32)
@@ -66,7 +66,7 @@ def test_without_wind_all_frames_are_alike(scene, calm):
         scene.tetflora.wind.speed = 0.0
     first = places(scene, 1)
     np.testing.assert_array_equal(places(scene, 40), first)
-    assert part("wind_properties").wind_of(scene) is None
+    assert wind_properties.wind_of(scene) is None
 
 
 def test_settings_become_a_wind(scene):
@@ -74,25 +74,25 @@ def test_settings_become_a_wind(scene):
     wind.direction, wind.gusts, wind.loop = np.radians(90), 0.25, 48
     scene.render.fps = 24
     scene.frame_set(60)
-    found = part("wind_properties").wind_of(scene)
+    found = wind_properties.wind_of(scene)
     assert (found.speed, found.gusts, found.time, found.loop) == (8.0, 0.25, 0.5, 2.0)
     assert found.direction == pytest.approx(np.pi / 2)
     wind.loop = 0
     scene.frame_set(-6, subframe=0.5)
-    assert part("wind_properties").wind_of(scene).time == pytest.approx(-5.5 / 24)
+    assert wind_properties.wind_of(scene).time == pytest.approx(-5.5 / 24)
 
 
 def test_a_frame_is_the_same_whatever_range_is_rendered(scene):
     """Workers of a farm set the scene's range to the frames that they render."""
     scene.frame_set(20)
-    wind_of = part("wind_properties").wind_of
+    wind_of = wind_properties.wind_of
     film = wind_of(scene)
     scene.frame_start, scene.frame_end = 20, 22
     assert wind_of(scene) == film
 
 
 def test_results_of_another_frame_are_not_taken_for_this_one(scene):
-    digest = part("scene_digest").scene_digest
+    digest = scene_digest.scene_digest
 
     def at(frame):
         scene.frame_set(frame)
@@ -105,9 +105,8 @@ def test_results_of_another_frame_are_not_taken_for_this_one(scene):
 
 
 def test_it_refines_by_itself_at_another_frame(scene, monkeypatch):
-    auto = part("auto_refresh")
     scene.tetflora.auto_refine = True
-    monkeypatch.setattr(auto, "schedule", lambda which: asked.append(which.name))
+    monkeypatch.setattr(auto_refresh, "schedule", lambda which: asked.append(which.name))
     asked = []
     scene.frame_set(7)
     assert asked
@@ -120,15 +119,15 @@ def test_it_refines_by_itself_at_another_frame(scene, monkeypatch):
 
 def test_a_plant_is_made_into_a_mesh_at_rest(scene):
     """Meshes that are made of plants, and previews, do not depend on the frame."""
-    flora = part("job").compile_for(("bush",), scene, depsgraph())
+    flora = job.compile_for(("bush",), scene, depsgraph())
     assert flora.calm is None
-    assert part("job").blown(scene, flora).calm is flora
+    assert job.blown(scene, flora).calm is flora
 
 
 def test_velocities_are_there_where_there_is_motion_blur(scene):
     def kinds(blur):
         scene.render.use_motion_blur = blur
-        part("job").refine(scene, depsgraph())
+        job.refine(scene, depsgraph())
         assert len(made(scene)) > 1
         return ["velocity" in obj.data.attributes for obj in made(scene)]
 
@@ -144,27 +143,23 @@ def test_with_motion_blur_plants_stand_as_in_the_middle_of_the_exposure(scene, p
     scene.render.fps = 24
     scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 0.5
     scene.render.motion_blur_position = position
-    wind = part("wind_properties").wind_of(scene)
+    wind = wind_properties.wind_of(scene)
     assert wind.moving
     assert wind.time == pytest.approx((12 + middle) / 24)
 
 
 def alpha(path):
-    import bpy
-
     image = bpy.data.images.load(str(path), check_existing=False)
     width, height = image.size
     return np.array(image.pixels[:]).reshape(height, width, 4)[:, :, 3]
 
 
 def blurred_render(scene, path, size=128, samples=64):
-    import bpy
-
     tiny_render(samples=samples, size=size)
     scene.render.film_transparent = True
     scene.render.use_motion_blur, scene.render.motion_blur_position = True, 'CENTER'
     scene.render.motion_blur_shutter = 0.5
-    part("compat").set_still_format(scene.render.image_settings, "PNG")
+    compat.set_still_format(scene.render.image_settings, "PNG")
     scene.render.image_settings.color_mode = 'RGBA'
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
@@ -174,9 +169,7 @@ def blurred_render(scene, path, size=128, samples=64):
 @pytest.mark.parametrize("fps", [24, 48])
 def test_cycles_takes_velocities_for_metres_a_second(clean_file, tmp_path, fps):
     """A square of a metre at 12 m/s is smeared by the way that it goes while the shutter is open."""
-    import bpy
-
-    buffers = session.part("tetflora_addon.buffers").MeshBuffers(
+    square = buffers.MeshBuffers(
         positions=np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]], np.float32),
         edge_verts=np.array([[0, 1], [1, 2], [2, 3], [3, 0]], np.int32),
         corner_verts=np.arange(4, dtype=np.int32),
@@ -185,7 +178,7 @@ def test_cycles_takes_velocities_for_metres_a_second(clean_file, tmp_path, fps):
         attributes={"velocity": ("POINT", np.tile(np.array([12.0, 0, 0], np.float32), (4, 1)))},
     )
     scene = bpy.context.scene
-    scene.collection.objects.link(bpy.data.objects.new("square", part("meshes").write_mesh("square", buffers)))
+    scene.collection.objects.link(bpy.data.objects.new("square", meshes.write_mesh("square", square)))
     camera = add_camera(location=(0, 0, 5), rotation=(0, 0, 0))
     camera.data.type, camera.data.ortho_scale = 'ORTHO', 4.0
     scene.render.fps = fps
@@ -204,7 +197,7 @@ def test_a_picture_with_motion_blur_is_the_mean_of_pictures_while_the_shutter_is
     scene.camera.data.lens = 80.0
     scene.render.resolution_x = scene.render.resolution_y = 128
     scene.frame_set(5)
-    part("job").refine(scene, depsgraph())
+    job.refine(scene, depsgraph())
     soft = blurred_render(scene, tmp_path / "soft.png")
     for obj in made(scene):
         obj.data.attributes.remove(obj.data.attributes["velocity"])
@@ -214,7 +207,7 @@ def test_a_picture_with_motion_blur_is_the_mean_of_pictures_while_the_shutter_is
         at = 5 + ((number + 0.5) / 8 - 0.5) * 0.5
         scene.frame_set(int(at), subframe=at % 1.0)
         scene.render.use_motion_blur = False
-        part("job").refine(scene, depsgraph())
+        job.refine(scene, depsgraph())
         exposures.append(blurred_render(scene, tmp_path / "one.png", samples=16))
     truth = np.mean(exposures, axis=0)
     off, still_off = (np.abs(picture - truth).mean() for picture in (soft, sharp))

@@ -4,15 +4,16 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 import pytest
 
-from tests.blender.scenes import depsgraph, part
+from tests.blender.scenes import depsgraph
+from tetflora_addon.blender import scene_reader
 
 
 def _walked(frames: int, of: str) -> np.ndarray:
     """Places of the camera (frames, 3), one a frame."""
-    import bpy
 
     from examples import fly_through
 
@@ -28,7 +29,6 @@ def _walked(frames: int, of: str) -> np.ndarray:
 
 @pytest.mark.parametrize("of", ["row80", "landscape"])
 def test_camera_walks_over_the_ground(clean_file, of):
-    import bpy
 
     from examples import fly_through
 
@@ -43,8 +43,6 @@ def test_camera_walks_over_the_ground(clean_file, of):
 
 
 def test_walk_between_frames_is_straight(clean_file):
-    import bpy
-
     places = _walked(3, "row80")
     scene = bpy.context.scene
     scene.frame_set(1, subframe=0.25)
@@ -53,7 +51,6 @@ def test_walk_between_frames_is_straight(clean_file):
 
 
 def test_first_frame_of_the_row_is_its_still(clean_file):
-    import bpy
 
     from devtools import session
     from examples import row80
@@ -67,10 +64,8 @@ def test_first_frame_of_the_row_is_its_still(clean_file):
 
 
 def test_walk_through_the_landscape_is_clear_of_plants(clean_file):
-    import bpy
-
     places = _walked(25, "landscape")
-    plants = part("scene_reader").read_plants(bpy.context.scene, depsgraph(), bpy.context.view_layer).position
+    plants = scene_reader.read_plants(bpy.context.scene, depsgraph(), bpy.context.view_layer).position
     away = np.linalg.norm(plants[None, :, :2] - places[:, None, :2], axis=2).min()
     from mathutils.kdtree import KDTree
 
@@ -83,7 +78,6 @@ def test_walk_through_the_landscape_is_clear_of_plants(clean_file):
 
 
 def test_unknown_scene_is_named(clean_file):
-    import bpy
 
     from examples import fly_through
 

@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 
-from tests.blender.scenes import depsgraph, part
+from tests.blender.scenes import depsgraph
+from tetflora_addon.blender import scene_reader
 
 
 def test_forest_stands_as_it_is_described(clean_file, tmp_path):
-    import bpy
 
     from examples import million
 
@@ -19,7 +20,7 @@ def test_forest_stands_as_it_is_described(clean_file, tmp_path):
     assert made["polygons"] + made["facets"] > 0
     assert (tmp_path / "forest.png").is_file()
     scene = bpy.context.scene
-    seeds = part("scene_reader").read_plants(scene, depsgraph(), bpy.context.view_layer)
+    seeds = scene_reader.read_plants(scene, depsgraph(), bpy.context.view_layer)
     conifers = np.isin(np.array(seeds.identifiers)[seeds.species], ["spruce", "conifer"])
     ground = scene.objects["Ground"]
     below = [ground.ray_cast((x, y, 1e4), (0, 0, -1))[1].z for x, y, _ in seeds.position.tolist()]

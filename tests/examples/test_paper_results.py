@@ -9,6 +9,7 @@ import json
 import re
 from pathlib import Path
 
+import bpy
 import numpy as np
 import pytest
 from PIL import Image as image  # noqa: N813 (a module)
@@ -76,7 +77,6 @@ def test_figure8_refines_from_picture_to_picture(make, tmp_path):
 
 
 def test_figure9_is_hazy_as_koschmieder_says(make, tmp_path):
-    import bpy
 
     from devtools import session
     from examples.haze import add_haze

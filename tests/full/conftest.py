@@ -12,6 +12,11 @@ from pathlib import Path
 
 import pytest
 
+from devtools import session
+
+# Before collection: the tests import bpy and the extension at the top of the file.
+session.start()
+
 Run = Callable[..., subprocess.CompletedProcess]
 
 

@@ -5,14 +5,20 @@
 It says NOW at the moment, having saved the file there, and goes on until it is killed.
 """
 
-import importlib
 import sys
+from pathlib import Path
 
 import bpy
 
+sys.path.append(str(Path(__file__).resolve().parents[2]))
+
+from devtools.aliases import INSTALLED, alias
+
+alias(INSTALLED)
+from tetflora_addon.blender import job  # noqa: E402  (the same)
+
 what, moment, times = sys.argv[-3:]
 left = int(times)
-job = importlib.import_module("bl_ext.user_default.tetflora.tetflora_addon.blender.job")
 scene = bpy.context.scene
 
 

@@ -13,11 +13,13 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
+import bpy
 import numpy as np
 import pytest
 
 from devtools import session
-from tests.blender.scenes import add_camera, add_plant, part
+from tests.blender.scenes import add_camera, add_plant
+from tetflora_addon.blender import compat
 
 Run = Callable[..., subprocess.CompletedProcess]
 
@@ -29,8 +31,6 @@ MOST_DIFFERENCE = 0
 
 def film(path: Path, persistent: bool = False, blur: bool = False) -> Path:
     """Save a scene of three plants and a camera that passes them."""
-    import bpy
-
     session.clean_file()
     scene = bpy.context.scene
     for n, species in enumerate(("bush", "conifer", "bush")):
@@ -48,7 +48,7 @@ def film(path: Path, persistent: bool = False, blur: bool = False) -> Path:
     render.resolution_x, render.resolution_y = 96, 54
     scene.cycles.samples, scene.cycles.seed = 4, 7
     scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
-    part("compat").set_still_format(render.image_settings, "PNG")
+    compat.set_still_format(render.image_settings, "PNG")
     scene.frame_start, scene.frame_end = 1, FRAMES
     scene.frame_set(1)
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
@@ -63,8 +63,6 @@ def rendered(run: Run, path: Path, output: Path, *arguments: str | int) -> None:
 
 def pixels(folder: Path, frame: int) -> np.ndarray:
     """Channels of a rendered frame, 0 to 255."""
-    import bpy
-
     image = bpy.data.images.load(str(folder / f"frame_{frame:04d}.png"))
     values = np.empty(len(image.pixels), np.float32)
     image.pixels.foreach_get(values)

@@ -12,9 +12,11 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
+import bpy
 import pytest
 
 from devtools import session
+from tetflora_addon.blender import job, kept_results
 
 Run = Callable[..., subprocess.CompletedProcess]
 
@@ -24,7 +26,6 @@ PLANTS = 5
 @pytest.fixture(scope="module")
 def seeds(blender: object, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The file, saved by bpy before anything was refined."""
-    import bpy
 
     from examples import row80
 
@@ -49,9 +50,6 @@ def seeds(blender: object, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def expected(seeds: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Frame 1, refined for the camera of its cell and then rendered by bpy."""
-    import bpy
-
-    job, kept_results = (session.part(f"tetflora_addon.blender.{name}") for name in ("job", "kept_results"))
     bpy.ops.wm.open_mainfile(filepath=str(seeds))
     scene = bpy.context.scene
     scene.tetflora.refine_at_render = False
@@ -85,8 +83,6 @@ def flip(reference: Path, test: Path) -> float:
 
 def contents(path: Path) -> dict[str, list[str]]:
     """Names of what a file holds."""
-    import bpy
-
     session.clean_file()  # Blender refuses to look into the file that it has open
     with bpy.data.libraries.load(str(path)) as (held, _):
         return {kind: sorted(getattr(held, kind)) for kind in ("objects", "meshes", "materials", "collections")}
@@ -171,8 +167,6 @@ def test_command_render_is_the_plain_render(run: Run, seeds: Path, animation: li
 def test_command_errors(
     run: Run, seeds: Path, tmp_path: Path, spoil: str, arguments: list[str], code: int, says: str
 ) -> None:
-    import bpy
-
     bpy.ops.wm.open_mainfile(filepath=str(seeds))
     exec(spoil, {"bpy": bpy})
     bpy.context.scene.render.filepath = str(tmp_path / "never")

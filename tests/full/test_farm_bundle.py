@@ -17,6 +17,7 @@ import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
+import bpy
 import pytest
 
 from devtools import session
@@ -32,8 +33,6 @@ FRAMES = (1, 2)
 @pytest.fixture(scope="module")
 def scene_file(blender: object, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A bush and a camera that moves; pictures that are there already are to be left alone."""
-    import bpy
-
     session.clean_file()
     scene = tiny_render(samples=2, size=48)
     scene.cycles.seed = 7
@@ -140,8 +139,6 @@ def test_a_worker_that_cannot_make_the_plants_fails(
     run: Run, scene_file: Path, full_blender: str, tmp_path: Path
 ) -> None:
     """The job was sound when it was written; then the file changed behind its back."""
-    import bpy
-
     bundle = written(run, scene_file, tmp_path / "job")
     bpy.ops.wm.open_mainfile(filepath=str(scene_file))
     bpy.data.objects["bush"].tetflora.species = "quercus"

@@ -17,10 +17,12 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
+import bpy
 import pytest
 
 from devtools import session
-from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, part, tiny_render
+from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, tiny_render
+from tetflora_addon.blender import emit, job
 
 Run = Callable[..., subprocess.CompletedProcess]
 
@@ -33,8 +35,6 @@ BOUNCES = 8
 @pytest.fixture(scope="module", params=[True, False], ids=["results in the file", "results not in the file"])
 def forest(request: pytest.FixtureRequest, blender: object, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A refined scene of bushes and a mesh that takes part, and is hidden for its results."""
-    import bpy
-
     session.clean_file()
     scene = tiny_render(size=96)
     for n in range(4):
@@ -90,12 +90,10 @@ def victim(run: Run, full_blender: str, forest: Path, tmp_path: Path) -> Iterato
 
 def assert_sound(path: Path) -> None:
     """It opens in the state that the artist left, and refines."""
-    import bpy
-
     session.clean_file()
     bpy.ops.wm.open_mainfile(filepath=str(path))
     scene = bpy.context.scene
-    emit, stone = part("emit"), bpy.data.objects["stone"]
+    stone = bpy.data.objects["stone"]
     assert sum(obj.tetflora.is_plant for obj in scene.objects) == 4
     assert (scene.cycles.transparent_max_bounces, scene.cycles.min_transparent_bounces) == (BOUNCES, BOUNCES)
     assert scene.tetflora.refine_at_render
@@ -104,12 +102,12 @@ def assert_sound(path: Path) -> None:
     assert len(results) == scene.tetflora.output.save_results
     assert not any(collection.hide_render for collection in results)
     assert stone.hide_render == stone.hide_viewport == bool(results)
-    statistics = part("job").refine(scene, depsgraph())
+    statistics = job.refine(scene, depsgraph())
     assert statistics.plants == 4
     assert statistics.complete
     assert len(emit.result_collections(scene, 'VIEW')) == 1
     assert stone.hide_render
-    part("job").clear(scene)
+    job.clear(scene)
     assert not stone.hide_render
     assert not stone.hide_viewport
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import sys
 from types import ModuleType
 
 from devtools import session
@@ -27,5 +28,11 @@ def test_clean_file_is_empty_and_keeps_the_extension(clean_file: ModuleType) -> 
     assert bpy.context.scene.tetflora is not None
 
 
-def test_parts_are_blenders_own(blender: ModuleType) -> None:
-    assert session.part("tetflora_addon.errors").__name__ == f"{session.PACKAGE}.tetflora_addon.errors"
+def test_plain_names_are_blenders_own_modules(blender: ModuleType) -> None:
+    from tetflora_addon import blender as bridge
+    from tetflora_addon.blender import job
+
+    own = sys.modules[f"{session.PACKAGE}.tetflora_addon.blender.job"]
+    assert job is own
+    assert sys.modules["tetflora_addon.blender"] is bridge is blender.blender
+    assert own.__spec__.name == own.__name__
