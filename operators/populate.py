@@ -7,11 +7,12 @@ from math import pi
 import bpy
 from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ..tetflora_addon.blender.population_properties import MOST_EMPTIES, MOST_PLANTS, STORAGE_ITEMS
+from ..tetflora_addon.blender.population_properties import MOST_EMPTIES, STORAGE_ITEMS
 from ..tetflora_addon.blender.population_rules import copy_companion
 from ..tetflora_addon.blender.populations import add_population, make_plants, remove_population
 from ..tetflora_addon.blender.species_items import catalogue, default_species
 from ..tetflora_addon.errors import SceneError, TetFloraError
+from ..tetflora_addon.planting.rules import MOST_PLANTS
 from .base import Reporting, in_object_mode, select_only
 from .populations import ground_selected, report_made, selected_grounds
 

@@ -29,8 +29,8 @@ from .transforms import world_matrix
 PROPERTY = {
     "name": "Refine This Mesh",
     "description": (
-        "The object's own polygons are refined with the plants: kept where they are near, drawn as proxies where they "
-        "are far or hidden. Meant for trees from elsewhere, rocks and scans, and for what instances them"
+        "Refine the object's own polygons with the plants: kept where they are near, drawn as proxies where they are "
+        "far or hidden. Use it for trees from other sources, rocks and scans, and for objects that instance them"
     ),
     "options": set(),
 }

@@ -1,29 +1,29 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of films as properties of a scene: what frames share, and how much of it is kept."""
+"""Settings of animations as properties of a scene: what frames share, and the size of the frame cache."""
 
 import math
 
 from bpy.props import BoolProperty, FloatProperty
 
 
-class FilmProperties:
+class AnimationProperties:
     """Part of the settings of a scene."""
 
     share_frames: BoolProperty(
         name="Share Between Frames",
         description=(
-            "Where the camera is animated, refine once for all frames whose cameras are nearly alike, and somewhat "
-            "finer and wider than one of them needs. A frame looks the same whichever others are rendered before it"
+            "Where the camera is animated, refine once for all frames with similar cameras, slightly finer and wider "
+            "than a single one needs. A frame looks the same whichever frames are rendered before it"
         ),
         default=True,
     )
     cell_length: FloatProperty(
         name="Within Distance",
         description=(
-            "How far the camera goes, along its line of sight, until plants are refined anew. Larger is faster, and "
-            "more is made for each frame; 0.1 m and less are for close-ups of single plants. Where all plants are far "
-            "away it is two, four or more times as far"
+            "How far the camera moves along its line of sight before plants are refined again. Larger values are "
+            "faster, with more geometry per frame; use 0.1 m or less for close-ups of single plants. Doubled, "
+            "quadrupled and so on where all plants are far away"
         ),
         subtype='DISTANCE',
         default=4.0,
@@ -33,7 +33,7 @@ class FilmProperties:
     )
     cell_turn: FloatProperty(
         name="Within Angle",
-        description="How far the camera turns until plants are refined anew. The view is widened by as much",
+        description="How far the camera turns before plants are refined again. The view is widened by the same angle",
         subtype='ANGLE',
         default=math.radians(3.0),
         min=math.radians(0.05),
@@ -41,10 +41,10 @@ class FilmProperties:
         max=math.radians(40.0),
     )
     kept_memory: FloatProperty(
-        name="Keep at Most",
+        name="Frame Cache",
         description=(
-            "Gigabytes of meshes that a render keeps for frames that come back to where the camera was; what has not "
-            "been seen for longest goes first. What the frame itself needs is not limited by it"
+            "Maximum size of the frame cache in gigabytes. A render keeps meshes for frames in which the camera "
+            "returns; the least recently used go first. The current frame itself is not limited"
         ),
         default=1.0,
         min=0.0,

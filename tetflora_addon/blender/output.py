@@ -29,13 +29,25 @@ REPLACED = ("leaf", "blossom", "bark")
 SWITCHES = {
     "camera": {
         "name": "Camera",
-        "description": "The camera sees plants. Without, they only cast shadows and show in mirrors",
+        "description": "Visible to camera rays. Otherwise plants only cast shadows and appear in reflections",
         "default": True,
     },
-    "diffuse": {"name": "Diffuse", "description": "Plants give light to matt surfaces", "default": True},
-    "glossy": {"name": "Glossy", "description": "Plants show in mirrors", "default": True},
-    "transmission": {"name": "Transmission", "description": "Plants show through glass", "default": True},
-    "volume_scatter": {"name": "Volume Scatter", "description": "Plants give light to fog and clouds", "default": True},
+    "diffuse": {
+        "name": "Diffuse",
+        "description": "Visible to diffuse rays, which light matte surfaces",
+        "default": True,
+    },
+    "glossy": {"name": "Glossy", "description": "Visible to glossy rays, as in reflections", "default": True},
+    "transmission": {
+        "name": "Transmission",
+        "description": "Visible to transmission rays, as through glass",
+        "default": True,
+    },
+    "volume_scatter": {
+        "name": "Volume Scatter",
+        "description": "Visible to volume scatter rays, which light fog and clouds",
+        "default": True,
+    },
     "shadow": {"name": "Shadow", "description": "Plants cast shadows", "default": True},
 }
 

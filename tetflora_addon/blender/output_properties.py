@@ -20,8 +20,8 @@ def _replaced(kind: str) -> dict:
     return {
         "name": f"{kind} Material",
         "description": (
-            f"Material of yours for the {kind.lower()} of this species, in place of TetFlora's. It is kept through "
-            "every refinement. Proxies keep the colours of the species"
+            f"Your material for the {kind.lower()} of this species, used instead of TetFlora's and kept when refining. "
+            "Proxies keep the colors of the species"
         ),
         "type": bpy.types.Material,
     }
@@ -32,7 +32,7 @@ class TetFloraSpeciesOutput(bpy.types.PropertyGroup, SpeciesChoice):
 
     pass_index: IntProperty(
         name="Pass Index",
-        description="Object index of this species' meshes and proxies, for masks in compositing",
+        description="Object index of this species' meshes and proxies, for compositing masks",
         default=1,
         min=0,
         max=32767,
@@ -41,7 +41,7 @@ class TetFloraSpeciesOutput(bpy.types.PropertyGroup, SpeciesChoice):
     )
     light_group: StringProperty(
         name="Light Group",
-        description="Light group of this species' meshes and proxies; empty for that of all results",
+        description="Light group of this species' meshes and proxies; if empty, that of all results",
         update=_changed,
         options=set(),
     )
@@ -56,7 +56,7 @@ class TetFloraOutput(bpy.types.PropertyGroup):
     save_results: BoolProperty(
         name="Save Results in File",
         description=(
-            "Write the meshes that Refine made into the file. Without, files stay as small as their plants, and Refine "
+            "Save the meshes made by Refine in the file. Otherwise files stay as small as their plants, and Refine "
             "makes the same meshes again"
         ),
         default=False,
@@ -65,14 +65,14 @@ class TetFloraOutput(bpy.types.PropertyGroup):
     )
     show_viewport: BoolProperty(
         name="Show Results in Viewports",
-        description="Show meshes and proxies in 3D views. Hide them to work with the plants alone, at full speed",
+        description="Show meshes and proxies in 3D viewports. Hide them to work with the plants alone at full speed",
         default=True,
         update=_changed,
         options=set(),
     )
     show_render: BoolProperty(
         name="Show Results in Renders",
-        description="Meshes and proxies appear in renders",
+        description="Show meshes and proxies in renders",
         default=True,
         update=_changed,
         options=set(),
@@ -85,7 +85,7 @@ class TetFloraOutput(bpy.types.PropertyGroup):
     shadow: BoolProperty(**SWITCHES["shadow"], update=_changed, options=set())
     pass_index: IntProperty(
         name="Pass Index",
-        description="Object index of all meshes and proxies but those of species with one of their own",
+        description="Object index of all meshes and proxies, except for species with their own",
         default=0,
         min=0,
         max=32767,
@@ -94,13 +94,13 @@ class TetFloraOutput(bpy.types.PropertyGroup):
     )
     light_group: StringProperty(
         name="Light Group",
-        description="Light group of all meshes and proxies; matters where they emit light, as baked light does",
+        description="Light group of all meshes and proxies; matters where they emit light, as with baked lighting",
         update=_changed,
         options=set(),
     )
     species: CollectionProperty(
         name="Species",
-        description="Species with a pass index, light group or materials of their own",
+        description="Species with their own pass index, light group or materials",
         type=TetFloraSpeciesOutput,
     )
     species_index: IntProperty(name="Active Species", options={'HIDDEN', 'SKIP_SAVE'})

@@ -20,7 +20,7 @@ HECTARE = 10_000.0
 #: What a population is and what became of it; all else are settings, which can be copied and written to files.
 IDENTITY = {
     *("rna_type", "name", "uid", "frozen", "collection", "made", "message", "placed_by", "erased"),
-    *("slope_limit", "mix_index"),
+    "mix_index",
 }
 _ENTRY = ("species", "weight", "companion", "companion_strength", "companion_distance")
 

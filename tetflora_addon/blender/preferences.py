@@ -30,28 +30,28 @@ class TetFloraPreferences(bpy.types.AddonPreferences):
     species_folder: StringProperty(
         name="Species Folder",
         description=(
-            "Folder of your own species files (*.json); without one, a folder beside your Blender settings. "
-            "A file there replaces a shipped species of the same file name. "
-            "Scenes store only the name of a species: whoever renders a scene needs the same files"
+            "Folder of your own species files (*.json); if empty, a folder beside your Blender settings. A file here "
+            "replaces a shipped species of the same file name. Scenes store only the names of species: everyone who "
+            "renders a scene needs the same files"
         ),
         subtype='DIR_PATH',
         default="",
     )
     new_quality: EnumProperty(
         name="Quality of New Scenes",
-        description="Quality of refinement that a scene gets with its first plant; the Refinement panel changes it",
+        description="Refinement quality that a scene gets with its first plant; it can be changed in the sidebar",
         items=(
-            ('DRAFT', "Draft", "Seconds, for placing plants; some 30 times fewer polygons than Final"),
-            ('PREVIEW', "Preview", "For judging light and colours"),
-            ('FINAL', "Final", "For the picture: what is left out cannot be seen"),
+            ('DRAFT', "Draft", "Takes seconds, for placing plants; about 30 times fewer polygons than Final"),
+            ('PREVIEW', "Preview", "For judging light and composition"),
+            ('FINAL', "Final", "For final renders: proxies are indistinguishable from real plants"),
         ),
         default='FINAL',
     )
     new_memory: FloatProperty(
-        name="Memory of New Scenes",
+        name="Max Memory of New Scenes",
         description=(
-            "Gigabytes that refined plants may take in a scene that is new, in Blender and the renderer together: its "
-            "Most Memory. 0 for no limit; with one, plants become coarser where they would not fit"
+            "Max Memory of new scenes: gigabytes that refined plants may take in Blender and the renderer together. "
+            "Plants that would not fit become coarser; 0 for no limit"
         ),
         default=0.0,
         min=0.0,
@@ -59,10 +59,10 @@ class TetFloraPreferences(bpy.types.AddonPreferences):
         precision=1,
     )
     use_cache: BoolProperty(
-        name="Keep What Is Found Out",
+        name="Cache Species Analysis",
         description=(
-            "Keep on disk what takes seconds to find out about a species of your own, so that it is found out once and "
-            "not in every session. Pictures are the same without"
+            "Store the analysis of your own species on disk, so that it runs once instead of in every session. Results "
+            "are the same without the cache"
         ),
         default=True,
         update=_use_cache,
@@ -70,8 +70,8 @@ class TetFloraPreferences(bpy.types.AddonPreferences):
     cache_folder: StringProperty(
         name="Cache Folder",
         description=(
-            "Folder for that, 64 megabytes at most; without one, a folder beside your Blender settings. Several "
-            "Blenders may share it"
+            "Folder of the cache, up to 64 MB; if empty, a folder beside your Blender settings. Several Blender "
+            "instances can share it"
         ),
         subtype='DIR_PATH',
         default="",

@@ -30,8 +30,8 @@ class TetFloraPreview(bpy.types.PropertyGroup):
     level: IntProperty(
         name="Level",
         description=(
-            "Level of refinement that is shown: 0 is the view as two halves and what is around it, each further one a "
-            "pass of the refinement. Beyond the last level the last one is shown"
+            "Level of refinement to show: 0 is the view before any pass, each further level is one pass. Beyond the "
+            "last level, the last one is shown"
         ),
         min=0,
         soft_max=_USUAL_LEVELS,
@@ -41,19 +41,29 @@ class TetFloraPreview(bpy.types.PropertyGroup):
     )
     wires: BoolProperty(
         name="Tetrahedra",
-        description="Draw the edges of the tetrahedra that hold something",
+        description="Draw the edges of tetrahedra that contain plants",
         default=True,
         options=set(),
         update=_redraw,
     )
     colour: EnumProperty(
-        name="Colour By",
-        description="What the colours of tetrahedra tell",
+        name="Color By",
+        description="What the colors of tetrahedra show",
         items=(
-            ('FORM', "Form", "Green becomes polygons, orange proxies, blue is hidden, white will be divided", 0),
-            ('LEVEL', "Level", "How often space was divided: dark rarely, bright often", 1),
-            ('VISIBILITY', "Visibility", "Share that the camera sees: dark is hidden by what is in front", 2),
-            ('CONTRIBUTION', "Contribution", "Pixels that the picture would change: dark few, bright many", 3),
+            (
+                'FORM',
+                "Representation",
+                "Green becomes polygons, orange proxies, blue is hidden, white will be split",
+                0,
+            ),
+            ('LEVEL', "Level", "How often space was split: dark is rarely, bright is often", 1),
+            ('VISIBILITY', "Visibility", "Fraction that the camera sees: dark is hidden", 2),
+            (
+                'CONTRIBUTION',
+                "Contribution",
+                "Number of pixels it affects in the image: dark is few, bright is many",
+                3,
+            ),
         ),
         default='FORM',
         options=set(),
@@ -62,8 +72,8 @@ class TetFloraPreview(bpy.types.PropertyGroup):
     projected: BoolProperty(
         name="Translucent",
         description=(
-            "Draw tetrahedra as clouds of the colour and density of what they hold, made anew for each view from at "
-            "most four triangles each. Those that matter most are drawn first, as many as keep the viewport quick"
+            "Draw tetrahedra as clouds with the color and density of their contents. The most important ones are drawn "
+            "first, as many as keep the viewport responsive"
         ),
         default=False,
         options=set(),
@@ -71,12 +81,12 @@ class TetFloraPreview(bpy.types.PropertyGroup):
     )
     forms: EnumProperty(
         name="Show",
-        description="Tetrahedra that are drawn, by what becomes of them; Shift click for several",
+        description="Tetrahedra to draw, by what they become; Shift-click to select several",
         items=(
-            ('EXPLICIT', "Explicit", "Those in which leaves and branches become polygons", 1),
-            ('PROXY', "Proxies", "Those that are drawn as proxies because they change few pixels", 2),
-            ('HIDDEN', "Hidden", "Those that the camera sees next to nothing of", 4),
-            ('SPLIT', "To Divide", "Those that the next level divides", 8),
+            ('EXPLICIT', "Polygons", "Tetrahedra whose leaves and branches become polygons", 1),
+            ('PROXY', "Proxies", "Tetrahedra drawn as proxies because they affect few pixels", 2),
+            ('HIDDEN', "Hidden", "Tetrahedra that the camera barely sees", 4),
+            ('SPLIT', "To Split", "Tetrahedra that the next level splits", 8),
         ),
         default={'EXPLICIT', 'PROXY', 'HIDDEN', 'SPLIT'},
         options={'ENUM_FLAG'},
@@ -84,19 +94,19 @@ class TetFloraPreview(bpy.types.PropertyGroup):
     )
     plants: EnumProperty(
         name="Plants",
-        description="How plants are shown in viewports. Nothing of it renders, and no object is made",
+        description="How plants appear in viewports. Not rendered, and no objects are created",
         items=(
-            ('NONE', "As They Are", "Only their empties, or the points of their fields", 0),
-            ('LIGHT', "Light Proxies", "A crown and a trunk of some twenty triangles, in the species' colour", 1),
-            ('BOUNDS', "Bounds", "Boxes around what the compiled species reaches", 2),
+            ('NONE', "None", "Only their empties, or the points of their fields", 0),
+            ('LIGHT', "Simple Shapes", "A crown and a trunk of about twenty triangles, in the species' color", 1),
+            ('BOUNDS', "Bounds", "Bounding boxes of the species", 2),
         ),
         default='NONE',
         options=set(),
         update=_plants_changed,
     )
     statistics: BoolProperty(
-        name="Figures",
-        description="Write level, numbers of tetrahedra and polygons into the corner of the viewport",
+        name="Statistics",
+        description="Show the level and the numbers of tetrahedra and polygons in the corner of the viewport",
         default=True,
         options=set(),
         update=_redraw,
@@ -104,8 +114,8 @@ class TetFloraPreview(bpy.types.PropertyGroup):
     freeze: BoolProperty(
         name="Freeze Camera",
         description=(
-            "Keep the camera as it is now for the preview: it stays as it is, also when levels are computed again, "
-            "while you move the scene's camera or fly around. Its view is drawn as a pyramid. Not saved in the file"
+            "Keep the current camera for the preview, even when levels are computed again, while you move the scene's "
+            "camera or navigate. Its view is drawn as a pyramid. Not saved in the file"
         ),
         options=set(),
         update=_freeze_changed,

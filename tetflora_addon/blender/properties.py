@@ -25,7 +25,7 @@ from . import (
     wind_properties,
 )
 from .explicit_objects import PROPERTY as EXPLICIT
-from .film_properties import FilmProperties
+from .film_properties import AnimationProperties
 from .plant_form import FORM_TYPES
 from .refinement_properties import RefinementProperties
 from .runtime import Listeners
@@ -37,8 +37,8 @@ auto_refine_switched = Listeners()
 _FORM = {
     "name": "Form",
     "description": (
-        "Curve, hair curves, or mesh of edges that draws this plant's trunk, and limbs if wanted; the species "
-        "grows the rest on them. Without one, the species grows the whole plant"
+        "Curve, hair curves or edge mesh that defines this plant's trunk, and optionally its limbs; the species grows "
+        "the rest on them. Without one, the species grows the whole plant"
     ),
     "type": bpy.types.Object,
     "poll": lambda _group, candidate: candidate.type in FORM_TYPES,
@@ -64,17 +64,17 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
     version: IntProperty(name="Version", description="Layout of these properties", options={'HIDDEN'})
     is_plant: BoolProperty(
         name="Plant",
-        description="This object stands for a plant: its species and seed say how it grows, its transform where",
+        description="This object is a plant: its species and seed define how it grows, its transform where",
         options=set(),
     )
     seed: IntProperty(
         name="Seed",
-        description="Every seed is another individual of the species; the same seed is the same plant to the last leaf",
+        description="Each seed is a different individual of the species; the same seed always gives the same plant",
         override=_OVERRIDES,
     )
     enabled: BoolProperty(
         name="Enabled",
-        description="The plant takes part in refinement and rendering",
+        description="Include the plant in refinement and renders",
         default=True,
         override=_OVERRIDES,
     )
@@ -82,29 +82,29 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
     is_field: BoolProperty(
         name="Field of Plants",
         description=(
-            "Each point of this mesh or point cloud stands for a plant; the attributes species, seed, rotation and "
-            "scale of the points say which, the list of species what the numbers in species mean"
+            "Each point of this mesh or point cloud is a plant, defined by the attributes species, seed, rotation and "
+            "scale of the points. The attribute species is an index into the list of species"
         ),
         options=set(),
     )
     field_species: CollectionProperty(
         name="Field Species",
-        description="Species that the attribute species of a field's points counts through, from 0 on",
+        description="Species that the attribute species of a field's points refers to, starting at 0",
         type=TetFloraFieldEntry,
     )
     field_species_index: IntProperty(name="Active Field Species", options={'HIDDEN', 'SKIP_SAVE'})
     is_occluder: BoolProperty(
-        name="Hides Plants",
+        name="Occluder",
         description=(
-            "Plants behind this mesh count as hidden, and cost next to nothing. Meant for terrain and buildings; "
-            "transparent or very thin things should not hide plants"
+            "Plants behind this mesh count as hidden and cost next to nothing. Use it for terrain and buildings, not "
+            "for transparent or very thin objects"
         ),
         options=set(),
         override=_OVERRIDES,
     )
     is_explicit: BoolProperty(**EXPLICIT, override=_OVERRIDES)
     population: StringProperty(
-        name="Population", description="Identity of the population that made this", options={'HIDDEN'}
+        name="Population", description="Identity of the population that created this", options={'HIDDEN'}
     )
     population_number: IntProperty(
         name="Number in the Population", description="Copies made by hand share it", options={'HIDDEN'}
@@ -117,8 +117,8 @@ class TetFloraLeafObject(bpy.types.PropertyGroup, SpeciesChoice):
     leaf: PointerProperty(
         name="Leaf",
         description=(
-            "Mesh object used as the leaf of the species: one unit long, its stalk at the origin, along +Y, upper side "
-            "towards +Z. Its polygons count for every leaf, so keep it simple"
+            "Mesh object used as the leaf of the species: one unit long, stalk at the origin, along +Y, upper side "
+            "toward +Z. Every leaf has all its polygons, so keep it simple"
         ),
         type=bpy.types.Object,
         poll=lambda _group, candidate: candidate.type == 'MESH',
@@ -129,7 +129,7 @@ def _tell_auto_refine(self: bpy.types.PropertyGroup, _context: bpy.types.Context
     auto_refine_switched.notify(self.id_data)
 
 
-class TetFloraScene(RefinementProperties, FilmProperties, bpy.types.PropertyGroup):
+class TetFloraScene(RefinementProperties, AnimationProperties, bpy.types.PropertyGroup):
     """Settings of a scene."""
 
     version: IntProperty(name="Version", description="Layout of these properties", options={'HIDDEN'})
@@ -170,25 +170,25 @@ class TetFloraScene(RefinementProperties, FilmProperties, bpy.types.PropertyGrou
         default='AUTOMATIC',
     )
     baked_light: EnumProperty(
-        name="Baked Light",
+        name="Lighting",
         description=(
-            "Work out at refinement how plants are lit, and let them show that. Without noise and fast to render, for "
-            "previews and films; but the light stays as it was: refine again after moving a light or changing the world"
+            "How plants are lit in renders. Baked lighting is computed during Refine. It is noise-free and fast to "
+            "render, but fixed: refine again after moving a light or changing the world"
         ),
         items=(
-            ('OFF', "Lit by the Scene", "The renderer lights everything, as exactly as it can", 'LIGHT_SUN', 0),
+            ('OFF', "Scene", "The renderer lights everything", 'LIGHT_SUN', 0),
             (
                 'PROXIES',
-                "Baked for Proxies",
-                "Proxies show light that was worked out before; real leaves and bark are lit by the renderer",
+                "Baked Proxies",
+                "Proxies show baked lighting; real leaves and bark are lit by the renderer",
                 'LIGHT_SUN',
                 1,
             ),
             (
                 'ALL',
-                "Baked for Proxies and Leaves",
-                "All of the plants shows light that was worked out before. What you changed in materials of leaves and "
-                "bark does not show; meshes from elsewhere stay lit by the renderer",
+                "Baked Proxies and Leaves",
+                "All parts of plants show baked lighting. Your changes to leaf and bark materials do not show; your "
+                "own refined meshes are lit by the renderer",
                 'RENDER_STILL',
                 2,
             ),
@@ -198,17 +198,17 @@ class TetFloraScene(RefinementProperties, FilmProperties, bpy.types.PropertyGrou
     refine_at_render: BoolProperty(
         name="Refine at Render",
         description=(
-            "Refine for the camera of every frame that is rendered, in the background too, and remove the result "
-            "afterwards. Meshes made by Refine are left out of such renders. In the window, Blender's interface is "
-            "locked while it renders (Render > Lock Interface), which TetFlora switches on when plants are added"
+            "Refine for the camera of every rendered frame, also in background renders, and remove the result "
+            "afterwards. Meshes made by Refine are left out of these renders. Blender's interface is locked while "
+            "rendering (Render > Lock Interface), which TetFlora enables when plants are added"
         ),
         default=True,
     )
     auto_refine: BoolProperty(
         name="Refine Automatically",
         description=(
-            "Refine a moment after the camera, plants or settings have changed, in the background of the window. Work "
-            "that is overtaken by another change is dropped. Large forests keep the processor busy with it"
+            "Refine shortly after the camera, plants or settings change, without blocking Blender. A further change "
+            "restarts the work. Large forests keep the processor busy"
         ),
         default=False,
         update=_tell_auto_refine,
@@ -217,15 +217,15 @@ class TetFloraScene(RefinementProperties, FilmProperties, bpy.types.PropertyGrou
     expand_everything: BoolProperty(
         name="Expand Everything",
         description=(
-            "For comparison: make every polygon of every plant. "
-            "Eighty trees are some 4 million polygons; a forest does not fit into memory"
+            "Create every polygon of every plant, for comparison. Eighty trees have about 4 million polygons; a forest "
+            "does not fit into memory"
         ),
     )
 
     populate: PointerProperty(type=population_properties.TetFloraPopulation)
     populations: CollectionProperty(
         name="Populations",
-        description="Plants that were placed together, with the rules by which they can be placed anew",
+        description="Plants that were placed together, with the rules to place them again",
         type=population_properties.TetFloraPopulation,
     )
     populations_index: IntProperty(name="Active Population", options={'HIDDEN', 'SKIP_SAVE'})
@@ -235,13 +235,13 @@ class TetFloraScene(RefinementProperties, FilmProperties, bpy.types.PropertyGrou
     preview: PointerProperty(type=preview_properties.TetFloraPreview)
     leaf_objects: CollectionProperty(
         name="Leaf Objects",
-        description="Meshes of your own in place of a species' leaf",
+        description="Your own meshes in place of a species' leaf",
         type=TetFloraLeafObject,
     )
     leaf_objects_index: IntProperty(name="Active Leaf Object", options={'HIDDEN', 'SKIP_SAVE'})
     species_edits: CollectionProperty(
         name="Species Edits",
-        description="Species that are edited in this file, as JSON; they take the place of the catalogue's",
+        description="Species edited in this file, as JSON; they replace those of the catalog",
         type=species_edits.TetFloraSpeciesEdit,
         options={'HIDDEN'},
     )
@@ -250,7 +250,7 @@ class TetFloraScene(RefinementProperties, FilmProperties, bpy.types.PropertyGrou
     )
     statistics: StringProperty(
         name="Statistics",
-        description="Figures of the last refinement, as JSON",
+        description="Statistics of the last refinement, as JSON",
         options={'HIDDEN'},
     )
 

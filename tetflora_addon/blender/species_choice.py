@@ -17,12 +17,12 @@ class SpeciesChoice:
 
     species: StringProperty(
         name="Species",
-        description="File name of the species in the catalogue, without its ending",
+        description="File name of the species in the catalog, without extension",
         override={'LIBRARY_OVERRIDABLE'},
     )
     species_choice: EnumProperty(
         name="Species",
-        description="Species of the catalogue",
+        description="Species from the catalog",
         items=lambda self, _context: items_for(self.species),
         get=lambda self: number_of(self.species) if self.species else items_for()[0][4],
         set=lambda self, number: _choose(self, number),

@@ -4,15 +4,17 @@
 
 from __future__ import annotations
 
-from math import radians
+from types import SimpleNamespace
 
 import bpy
-from bpy.props import BoolProperty, FloatProperty, IntProperty
+from bpy.props import BoolProperty, IntProperty
 
 from ..plants.wind import Wind
+from .generated import properties_of
 
 #: Where the middle of the exposure lies from the frame, in times that the shutter is open.
 _MIDDLE = {'START': 0.5, 'CENTER': 0.0, 'END': -0.5}
+_WIND = SimpleNamespace(**properties_of(Wind))
 
 
 class TetFloraWind(bpy.types.PropertyGroup):
@@ -21,41 +23,17 @@ class TetFloraWind(bpy.types.PropertyGroup):
     enabled: BoolProperty(
         name="Wind",
         description=(
-            "Plants bend and sway, and their leaves flutter, at the frame that is refined. Results that are made for "
-            "one frame stay as they are: with Refine at Render each frame of a film has its own"
+            "Bend and sway plants, and flutter their leaves, as they are at the refined frame. Results of Refine do "
+            "not move; with Refine at Render, each frame of an animation has its own"
         ),
         options=set(),
     )
-    speed: FloatProperty(
-        name="Speed",
-        description=(
-            "Mean speed at the plants, metres a second: 2 stirs leaves, 4 is a gentle breeze, 10 sways trees, 20 is a "
-            "gale. Animate it slowly: the plants lean at once"
-        ),
-        default=4.0,
-        min=0.0,
-        soft_max=25.0,
-        max=100.0,
-    )
-    direction: FloatProperty(
-        name="Direction",
-        description="Where it blows to: 0 is along X, 90 degrees along Y",
-        subtype='ANGLE',
-        default=0.0,
-        soft_min=radians(-180.0),
-        soft_max=radians(180.0),
-    )
-    gusts: FloatProperty(
-        name="Gusts",
-        description="By what share gusts are stronger than the mean, and lulls weaker; they travel with the wind",
-        subtype='FACTOR',
-        default=0.5,
-        min=0.0,
-        max=1.0,
-    )
+    speed: _WIND.speed
+    direction: _WIND.direction
+    gusts: _WIND.gusts
     loop: IntProperty(
         name="Loop",
-        description="Frames after which all movement repeats exactly; 0 for never",
+        description="Number of frames after which all movement repeats exactly; 0 for never",
         default=0,
         min=0,
         soft_max=1000,

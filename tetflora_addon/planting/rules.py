@@ -5,7 +5,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, pi
+from math import inf, pi, radians
+
+from ..setting import LENGTH, setting
+
+#: Most plants that are placed at once.
+MOST_PLANTS = 10_000_000
+_ANGLE = {"subtype": 'ANGLE'}
+_FACTOR = {"subtype": 'FACTOR', "min": 0.0, "max": 1.0}
+_SCALE = {"min": 0.01, "soft_max": 4.0}
 
 
 @dataclass(frozen=True)
@@ -17,74 +25,153 @@ class Companion:
     species, other : int
         Indices into the shares. Plants of ``other`` may also be older than the population.
     strength : float
-        -1: none grows within the distance of any of the others; 0: they do not care; 1: they grow only there.
+        -1: none grows within the distance of any of the others; 0: indifferent; 1: they grow only there.
     distance : float
-        Metres on the map.
+        Meters on the map.
     """
 
     species: int
     other: int
-    strength: float
-    distance: float
+    strength: float = setting(
+        -1.0,
+        "Attraction",
+        "-1: never within the distance of the companion; 0: indifferent; 1: only within it. Strong values leave room "
+        "for fewer plants",
+        subtype='FACTOR',
+        min=-1.0,
+        max=1.0,
+    )
+    distance: float = setting(
+        5.0,
+        "Reach",
+        "How far the companion's influence extends, measured on the map",
+        min=0.0,
+        soft_max=100.0,
+        **LENGTH,
+    )
 
 
 @dataclass(frozen=True)
 class Rules:
-    """Rules of one population; the defaults leave everything open.
+    """Rules of one population; the defaults leave everything open, those of panels are for a forest.
+
+    Fields with a label are properties of a population, and documented by their tooltips. Lengths are in meters,
+    altitudes z in the world, angles in radians.
 
     Attributes
     ----------
-    count : int
-        Plants wanted, where ``by_density`` is off.
-    by_density : bool
     density : float
-        Plants for each square metre of the map that is wholly suitable; fewer where it is suitable in part.
-    seed : int
-    min_distance : float
-        Least distance of two trunks on the map, metres.
-    slope_min, slope_max : float
-        Inclination of the ground, radians.
+        Plants for each square meter of the map that is wholly suitable; fewer where it is suitable in part.
     altitude_min, altitude_max : float
-        World z of the ground, metres; ``altitude_falloff`` metres inside of both ends plants become rarer.
-    altitude_falloff : float
     aspect : float
-        Direction in which the slope should face, radians clockwise from +Y (north) on the map.
-    aspect_spread : float
-        Largest angle from ``aspect``, radians; π lets it face anywhere. Level ground faces everywhere.
-    edge_falloff : float
-        Metres from the border of the ground within which plants become rarer; 0 for none.
-    clumping : float
-        0: even; 1: in clumps, with bare ground between.
-    clump_size : float
-        Metres from clump to clump.
-    scale_min, scale_max : float
-    scale_at_top : float
-        By what plants are scaled at the highest suitable altitude, relative to the lowest; linear between.
-    tilt : float
-        0: upright; 1: along the normal of the ground.
+        Clockwise from +Y (north) on the map.
     shares : tuple of float
         Relative frequency of each species.
     companions : tuple of Companion
     """
 
-    count: int = 100
-    by_density: bool = False
+    count: int = setting(
+        100,
+        "Plants",
+        "Number of plants to place. Fewer are placed if no more fit, which the report mentions",
+        min=1,
+        soft_max=10_000,
+        max=MOST_PLANTS,
+    )
+    by_density: bool = setting(False, "By Density", "Set the number of plants per hectare instead of in total")
     density: float = 0.01
-    seed: int = 0
-    min_distance: float = 0.0
-    slope_min: float = 0.0
-    slope_max: float = pi / 2
-    altitude_min: float = -inf
-    altitude_max: float = inf
-    altitude_falloff: float = 0.0
-    aspect: float = 0.0
-    aspect_spread: float = pi
-    edge_falloff: float = 0.0
-    clumping: float = 0.0
-    clump_size: float = 20.0
-    scale_min: float = 1.0
-    scale_max: float = 1.0
-    scale_at_top: float = 1.0
-    tilt: float = 0.0
+    seed: int = setting(0, "Seed", "A different seed gives a different arrangement and different plants")
+    min_distance: float = setting(
+        0.0,
+        "Min Distance",
+        "Minimum distance between two trunks, measured on the map; existing plants count",
+        default=2.0,
+        min=0.0,
+        soft_max=50.0,
+        **LENGTH,
+    )
+    slope_min: float = setting(0.0, "Min Slope", "Ground flatter than this stays bare", min=0.0, max=pi / 2, **_ANGLE)
+    slope_max: float = setting(
+        pi / 2,
+        "Max Slope",
+        "Ground steeper than this stays bare",
+        default=radians(40.0),
+        min=0.0,
+        max=pi / 2,
+        **_ANGLE,
+    )
+    altitude_min: float = setting(
+        -inf,
+        "Min Altitude",
+        "Ground lower than this stays bare",
+        default=0.0,
+        soft_min=-1000.0,
+        soft_max=5000.0,
+        **LENGTH,
+    )
+    altitude_max: float = setting(
+        inf,
+        "Max Altitude",
+        "Ground higher than this stays bare: the tree line",
+        default=100.0,
+        soft_min=-1000.0,
+        soft_max=5000.0,
+        **LENGTH,
+    )
+    altitude_falloff: float = setting(
+        0.0,
+        "Altitude Falloff",
+        "Distance inside both altitudes over which plants become sparser; 0 for a sharp line",
+        min=0.0,
+        soft_max=500.0,
+        **LENGTH,
+    )
+    aspect: float = setting(
+        0.0,
+        "Facing",
+        "Direction that slopes should face: 0° is north (+Y), 90° is east (+X). Level ground faces everywhere",
+        **_ANGLE,
+    )
+    aspect_spread: float = setting(
+        pi,
+        "Facing Spread",
+        "Maximum angle between that direction and the one a slope faces; 180° allows any",
+        min=0.0,
+        max=pi,
+        **_ANGLE,
+    )
+    edge_falloff: float = setting(
+        0.0,
+        "Edge Falloff",
+        "Distance from the ground's border over which plants become sparser; 0 for none",
+        min=0.0,
+        soft_max=100.0,
+        **LENGTH,
+    )
+    clumping: float = setting(
+        0.0,
+        "Clumping",
+        "0: evenly spread; 1: in clumps with bare ground between them. The number of plants stays the same while "
+        "there is room",
+        **_FACTOR,
+    )
+    clump_size: float = setting(
+        20.0, "Clump Size", "Approximate distance from one clump to the next", min=0.1, soft_max=500.0, **LENGTH
+    )
+    scale_min: float = setting(
+        1.0, "Min Scale", "Scale of the smallest plants; 1 is the size in the species file", default=0.8, **_SCALE
+    )
+    scale_max: float = setting(
+        1.0, "Max Scale", "Scale of the largest plants; 1 is the size in the species file", default=1.2, **_SCALE
+    )
+    scale_at_top: float = setting(
+        1.0, "Scale at Top", "Scale factor at the highest ground, relative to the lowest; 1 for no change", **_SCALE
+    )
+    tilt: float = setting(
+        0.0,
+        "Follow Ground",
+        "0: upright, as trees grow; 1: perpendicular to the ground, as moss and grass grow",
+        **_FACTOR,
+    )
     shares: tuple[float, ...] = (1.0,)
     companions: tuple[Companion, ...] = ()

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..plants.hashing import child_key, key_of_seed, uniform
+from ..setting import LENGTH, setting
 
 #: Cells that one dab looks at; a wider circle, or a higher density, is refused by `cells_of`.
 MOST_CELLS = 200_000
@@ -39,27 +40,45 @@ class _Draw(IntEnum):
 
 @dataclass(frozen=True)
 class Brush:
-    """What the brush is like.
+    """What the brush is like. Fields with a label are properties of a scene, and documented by their tooltips.
 
     Attributes
     ----------
-    radius : float
-        Metres on the map.
     density : float
-        Plants for each square metre of the map.
-    strength : float
-        0 to 1: share of what is to be done that one dab does.
-    min_distance : float
-        Least distance of two trunks on the map, metres; 0 for none.
+        Plants for each square meter of the map.
     scale_min, scale_max : float
     shares : tuple of float
         Relative frequency of each species.
     """
 
-    radius: float
-    density: float
-    strength: float = 1.0
-    min_distance: float = 0.0
+    radius: float = setting(
+        5.0,
+        "Radius",
+        "Radius of the brush on the map. While painting, use F, [ and ], or Ctrl and the mouse wheel",
+        min=0.05,
+        soft_max=50.0,
+        max=10_000.0,
+        **LENGTH,
+    )
+    density: float = 0.04
+    strength: float = setting(
+        1.0,
+        "Strength",
+        "Fraction of missing or surplus plants that one dab adds or removes; lower pen pressure reduces it",
+        subtype='FACTOR',
+        min=0.01,
+        max=1.0,
+    )
+    min_distance: float = setting(
+        0.0,
+        "Min Distance",
+        "Minimum distance between two trunks, measured on the map; existing plants count, including those of fields. "
+        "Large values limit the density",
+        default=1.0,
+        min=0.0,
+        soft_max=50.0,
+        **LENGTH,
+    )
     scale_min: float = 1.0
     scale_max: float = 1.0
     shares: tuple[float, ...] = (1.0,)

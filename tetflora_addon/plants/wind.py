@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import TetFloraError
+from ..setting import setting
 from .branches import Branches
 from .hashing import Draw, uniform
 from .rows import ROW_DTYPE, SPUR_ORDER
@@ -70,16 +71,12 @@ sine of leaves' turns in a wind without gusts, ``flutter_rate`` their frequency,
 
 @dataclass(frozen=True)
 class Wind:
-    """A wind at a moment.
+    """A wind at a moment. Fields with a label are properties of a scene, and documented by their tooltips.
 
     Attributes
     ----------
-    speed : float
-        Mean at the plants, metres a second: 2 stirs leaves, 4 is a gentle breeze, 10 sways trees, 20 is a gale.
     direction : float
-        Where it blows to, radians from +x towards +y.
-    gusts : float
-        0 for an even wind, to 1 for gusts twice as strong as the mean and lulls without any.
+        Radians from +x toward +y.
     time : float
         Seconds.
     loop : float
@@ -93,9 +90,32 @@ class Wind:
         A number that is none, a negative speed or loop, or gusts outside 0 to 1.
     """
 
-    speed: float
-    direction: float = 0.0
-    gusts: float = 0.5
+    speed: float = setting(
+        4.0,
+        "Speed",
+        "Mean speed in meters per second: 2 stirs leaves, 4 is a gentle breeze, 10 sways trees, 20 is a gale. Animate "
+        "it slowly: plants react at once",
+        min=0.0,
+        soft_max=25.0,
+        max=100.0,
+    )
+    direction: float = setting(
+        0.0,
+        "Direction",
+        "Direction the wind blows toward: 0° is +X, 90° is +Y",
+        subtype='ANGLE',
+        soft_min=-np.pi,
+        soft_max=np.pi,
+    )
+    gusts: float = setting(
+        0.5,
+        "Gusts",
+        "Strength of gusts and lulls relative to the mean speed: 0 is an even wind, 1 makes gusts twice as strong. "
+        "They travel with the wind",
+        subtype='FACTOR',
+        min=0.0,
+        max=1.0,
+    )
     time: float = 0.0
     loop: float = 0.0
     moving: bool = False

@@ -7,71 +7,147 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from ..setting import setting
+
 
 @dataclass(frozen=True)
 class RefinementSettings:
     """Limits of the loop of visibility, refinement and update.
 
+    Fields with a label are properties of a scene, and documented by their tooltips. Sizes are in pixels of the final
+    image. With ``anchored``, tetrahedra begin with `tetrahedra.world_root` instead of the view.
+
     Attributes
     ----------
-    cutoff : float
-        Side, in pixels of the final picture, under which a tetrahedron gains nothing from being split (section 6.4).
-    leaf_limit : float
-        Width in pixels from which on some leaves are real; from 2.5 times that on all are, see `transition`.
-    block : float
-        Side, in pixels, from which on a visible tetrahedron is split further although all in it will become polygons,
-        so that hidden parts can be told from visible ones.
-    few_polygons : int
-        A tetrahedron that holds fewer polygons than this gains nothing from being split.
-    hidden : float
-        Mean visibility, 0 to 1, under which a tetrahedron counts as hidden.
     hidden_block : float
         Longest edge, in pixels at its depth, down to which hidden tetrahedra are divided. Facets take their places from
         the plants, so that they need no such limit; a shell fills its whole tetrahedron and does.
     proxy_block : float
         The same for proxies that are seen.
     margin : float
-        Share of the picture's width and height by which the view is widened on each side: leaves that grow outside but
-        reach in are real leaves.
-    visibility_resolution : int
-        Longer side of the alpha buffer, pixels.
-    max_tetrahedra : int
-        Refinement stops before it makes more.
-    max_levels : int
-        Generations of bisection at most.
-    max_passes : int
-        Passes of the loop at most, to show the state after each; 0 for no limit.
-    facet : float
-        Side of the facets of proxies, pixels.
-    max_polygons : int
-        Polygons that may be made in all, facets included; 0 for no limit.
-    anchored : bool
-        The tetrahedra stay where they are in the world while the camera moves, see `tetrahedra.world_root`; otherwise
-        they begin with the view. Panoramas are always anchored.
-    shadow_cutoff : float
-        Side, in pixels where it falls, under which the shadow of what is hidden gains nothing from being finer, see
-        `lights`; 4 is fine enough. With 0 shadows are as coarse as what is hidden.
-    max_memory : float
-        Gigabytes that they may take in Blender and a renderer together, about; 0 for no limit.
+        Fraction of the image's width and height by which the view is widened on each side: leaves that grow outside
+        but reach in are real leaves.
     """
 
-    cutoff: float = 2.0
-    leaf_limit: float = 0.4
-    block: float = 32.0
-    few_polygons: int = 200
-    hidden: float = 0.02
+    cutoff: float = setting(
+        2.0,
+        "Cutoff",
+        "Tetrahedra smaller than this many pixels are not split further. Smaller values give finer results and take "
+        "longer; 1 to 4 pixels are hard to tell apart",
+        subtype='PIXEL',
+        min=0.25,
+        soft_min=0.5,
+        soft_max=16.0,
+        max=1000.0,
+    )
+    leaf_limit: float = setting(
+        0.4,
+        "Leaf Limit",
+        "Leaves narrower than this become proxies; up to 2.5 times this width, a growing fraction stays real. Larger "
+        "values save polygons; the loss is visible above about half a pixel",
+        subtype='PIXEL',
+        min=0.05,
+        soft_max=4.0,
+        max=1000.0,
+    )
+    block: float = setting(
+        32.0,
+        "Block Size",
+        "Visible tetrahedra larger than this are always split, even where all their contents become polygons, to find "
+        "hidden parts. Smaller values find more of them and take longer",
+        subtype='PIXEL',
+        min=1.0,
+        soft_max=256.0,
+        max=10_000.0,
+    )
+    few_polygons: int = setting(
+        200,
+        "Split Threshold",
+        "Tetrahedra holding fewer polygons than this are not split further",
+        min=0,
+        soft_max=5_000,
+    )
+    hidden: float = setting(
+        0.02,
+        "Hidden Below",
+        "Visibility below which a tetrahedron counts as hidden. Larger values save polygons in thickets",
+        subtype='FACTOR',
+        min=0.0,
+        max=1.0,
+    )
     hidden_block: float = math.inf
     proxy_block: float = math.inf
     margin: float = 0.04
-    visibility_resolution: int = 256
-    max_tetrahedra: int = 400_000
-    max_levels: int = 60
-    max_passes: int = 0
-    facet: float = 0.33
-    max_polygons: int = 0
-    max_memory: float = 0.0
-    anchored: bool = False
-    shadow_cutoff: float = 0.0
+    visibility_resolution: int = setting(
+        256,
+        "Visibility Resolution",
+        "Longer side, in pixels, of the buffer that determines what hides what. Larger values are more exact; time "
+        "grows with the square",
+        subtype='PIXEL',
+        min=16,
+        soft_min=64,
+        soft_max=1024,
+        max=4096,
+    )
+    max_tetrahedra: int = setting(
+        400_000,
+        "Max Tetrahedra",
+        "Refinement stops before exceeding this many tetrahedra, which bounds time and memory",
+        min=100,
+        soft_min=10_000,
+        soft_max=2_000_000,
+    )
+    max_levels: int = setting(60, "Max Levels", "Maximum number of times that space can be halved", min=1, max=200)
+    max_passes: int = setting(
+        0,
+        "Max Passes",
+        "Stop refinement after this many passes, to inspect an intermediate state; 0 for no limit. Tetrahedra that "
+        "would be split further become polygons or proxies as they are",
+        min=0,
+        soft_max=40,
+    )
+    facet: float = setting(
+        0.33,
+        "Facet Size",
+        "Size in pixels of the small facets that proxies are drawn with. Larger values give fewer, coarser facets",
+        subtype='PIXEL',
+        min=0.1,
+        soft_max=4.0,
+        max=100.0,
+    )
+    max_polygons: int = setting(
+        0,
+        "Max Polygons",
+        "Maximum number of polygons in the result, proxies included; 0 for no limit. The most visible plants get "
+        "polygons first, and the rest becomes coarser proxies",
+        min=0,
+        soft_max=100_000_000,
+        step=100_000,
+    )
+    max_memory: float = setting(
+        0.0,
+        "Max Memory",
+        "Approximate maximum memory of the result in gigabytes, in Blender and the renderer together; 0 for no limit",
+        min=0.0,
+        soft_max=256.0,
+        precision=1,
+    )
+    anchored: bool = setting(
+        False,
+        "Anchored",
+        "Divide space the same way in every frame of an animation, whatever the camera does, so that less changes "
+        "between frames. Creates somewhat more geometry. Always on for panoramas",
+    )
+    shadow_cutoff: float = setting(
+        0.0,
+        "Shadow Cutoff",
+        "Size in pixels below which shadows of hidden plants are refined no further; 0 leaves them coarse. About 4 "
+        "pixels sharpens shadows of trees behind the camera, for roughly a quarter more polygons",
+        subtype='PIXEL',
+        min=0.0,
+        soft_max=16.0,
+        max=1000.0,
+    )
 
 
 #: What the qualities of the panel stand for.

@@ -1,0 +1,27 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fields of settings that carry what an interface needs to show them: a label, a tooltip, limits, a unit."""
+
+from __future__ import annotations
+
+from dataclasses import field
+from typing import Any
+
+#: Options of lengths in meters.
+LENGTH = {"subtype": 'DISTANCE', "unit": 'LENGTH'}
+
+
+def setting(default: bool | int | float, label: str, description: str, /, **options: Any) -> Any:
+    """A field of a dataclass of settings; the property of the scene is made from it.
+
+    Parameters
+    ----------
+    default : bool, int or float
+        The field's default; its type is the property's.
+    label, description : str
+        Name in panels, and tooltip.
+    **options
+        What else Blender's properties take: ``min``, ``max``, ``soft_min``, ``soft_max``, ``step``, ``precision``,
+        ``subtype``, ``unit``; and ``default``, where an artist starts with another value than the engine.
+    """
+    return field(default=default, metadata={"name": label, "description": description, **options})
