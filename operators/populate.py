@@ -35,17 +35,19 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
         name="Plants", description="Plants to place", default=100, min=1, max=MOST_PLANTS, options={'SKIP_SAVE'}
     )
     as_field: EnumProperty(
-        name="Make",
-        description="What the plants are made as",
+        name="Create As",
+        description="What the plants are created as",
         items=STORAGE_ITEMS,
         default='AUTOMATIC',
         options={'SKIP_SAVE'},
     )
     seed: IntProperty(
-        name="Seed", description="Another seed is another arrangement and other plants", options={'SKIP_SAVE'}
+        name="Seed",
+        description="A different seed gives a different arrangement and different plants",
+        options={'SKIP_SAVE'},
     )
     slope_limit: FloatProperty(
-        name="Slope Limit",
+        name="Max Slope",
         description="Ground steeper than this stays bare",
         subtype='ANGLE',
         default=pi / 4,
@@ -54,23 +56,23 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
         options={'SKIP_SAVE'},
     )
     min_distance: FloatProperty(
-        name="Distance",
-        description="Least distance between two trunks, measured on the map",
+        name="Min Distance",
+        description="Minimum distance between two trunks, measured on the map",
         subtype='DISTANCE',
         unit='LENGTH',
         min=0.0,
         options={'SKIP_SAVE'},
     )
     scale_min: FloatProperty(
-        name="Scale From",
-        description="Size of the smallest plants; 1 is the size that the species file gives",
+        name="Min Scale",
+        description="Scale of the smallest plants; 1 is the size in the species file",
         default=1.0,
         min=0.01,
         options={'SKIP_SAVE'},
     )
     scale_max: FloatProperty(
-        name="To",
-        description="Size of the largest plants; 1 is the size that the species file gives",
+        name="Max Scale",
+        description="Scale of the largest plants; 1 is the size in the species file",
         default=1.0,
         min=0.01,
         options={'SKIP_SAVE'},

@@ -137,15 +137,15 @@ class TETFLORA_PT_populate_where(_PartOfPopulate, bpy.types.Panel):
     def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
         column = layout.column(align=True)
         column.prop(settings, "slope_min")
-        column.prop(settings, "slope_max", text="To")
+        column.prop(settings, "slope_max", text="Max")
         column = layout.column(align=True)
         column.prop(settings, "aspect")
         column.prop(settings, "aspect_spread", text="Spread")
         layout.prop(settings, "use_altitude")
         if settings.use_altitude:
             column = layout.column(align=True)
-            column.prop(settings, "altitude_min", text="From")
-            column.prop(settings, "altitude_max", text="To")
+            column.prop(settings, "altitude_min", text="Min")
+            column.prop(settings, "altitude_max", text="Max")
             column.prop(settings, "altitude_falloff", text="Falloff")
         layout.prop(settings, "edge_falloff")
         ground = next((entry.object for entry in settings.grounds if entry.object is not None), None)

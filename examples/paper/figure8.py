@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Figure 8: the row of eighty after passes of the loop, its tetrahedra drawn as volumes of microspheres.
 
-After each pass that is shown, all that is not flagged for polygons is drawn as it is: *Stop After* with *Shells*. Edges
+After each pass that is shown, all that is not flagged for polygons is drawn as it is: *Max Passes* with *Shells*. Edges
 of tetrahedra lie over it.
 """
 

@@ -130,7 +130,7 @@ def test_ground_far_away_and_tiny_distances_work():
 
 def test_no_ground_is_an_error():
     wall = SQUARE[..., [0, 2, 1]]
-    with pytest.raises(errors.SceneError, match="flatter than Slope To"):
+    with pytest.raises(errors.SceneError, match="flatter than Max Slope"):
         _place(wall)
     with pytest.raises(errors.SceneError, match="weight above 0"):
         _place(shares=(0.0,))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.blender.scenes import add_mesh, add_plant, datablocks, depsgraph, select
-from tetflora_addon.blender import migration, plant_fields, population_files, populations
+from tetflora_addon.blender import plant_fields, population_files, populations
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -352,17 +352,6 @@ def test_populations_survive_save_and_load(tmp_path):
     assert before[1:] == after[1:]
     _ops().update_population()
     assert len(_own()) == len(_plants()) == 9
-
-
-def test_files_of_before_keep_their_slope_limit(tmp_path):
-    settings = _settings()
-    settings.populate.slope_limit = 0.25
-    settings.populate.slope_max = 1.0  # as a file has it that never knew of the other
-    settings.version = 1
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
-    assert _settings().populate.slope_max == pytest.approx(0.25)
-    assert _settings().version == migration.VERSION
 
 
 @pytest.mark.parametrize("operator", ["update_population", "reroll_population", "freeze_population", "add_population"])

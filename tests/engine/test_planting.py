@@ -367,10 +367,10 @@ def test_the_border_is_where_the_ground_ends():
     ("changes", "says"),
     [
         (dict(shares=(0.0, -1.0)), "weight above 0"),
-        (dict(slope_min=0.8, slope_max=0.2), "Slope From .* is greater"),
-        (dict(altitude_min=3.0, altitude_max=1.0), "Altitude From .3 m. is greater"),
+        (dict(slope_min=0.8, slope_max=0.2), "Min Slope .* is greater"),
+        (dict(altitude_min=3.0, altitude_max=1.0), "Min Altitude .3 m. is greater"),
         (dict(altitude_min=30.0), "altitudes 30 and inf m; the ground extends from"),
-        (dict(slope_max=0.0), r"flatter than Slope To \(0°\)"),
+        (dict(slope_max=0.0), r"flatter than Max Slope \(0°\)"),
         (dict(slope_min=1.55), "slope between 89° and 90°"),
         (dict(aspect_spread=0.0, aspect=0.123), "No slope faces within 0° of 7°"),
         (dict(count=0), "Count must be at least 1, not 0"),

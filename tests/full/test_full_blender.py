@@ -62,7 +62,7 @@ def test_translations_reach_the_interface(run: Run) -> None:
     """Only a full Blender has languages."""
     code = (
         "import bpy; view = bpy.context.preferences.view; view.language = 'de_DE'; "
-        "view.use_translate_interface = True; print('said:', bpy.app.translations.pgettext('Least Distance'))"
+        "view.use_translate_interface = True; print('said:', bpy.app.translations.pgettext('Min Distance'))"
     )
     done = run("-b", "--python-exit-code", "1", "--python-expr", code)
     assert done.returncode == 0, done.stdout + done.stderr

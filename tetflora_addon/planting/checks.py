@@ -27,13 +27,13 @@ def check_rules(rules: Rules) -> None:
         raise SceneError(f"Count must be at least 1, not {rules.count}")
     if not rules.slope_min <= rules.slope_max:
         raise SceneError(
-            f"Slope From ({degrees(rules.slope_min):.3g}°) is greater than Slope To ({degrees(rules.slope_max):.3g}°); "
-            "lower Slope From or raise Slope To"
+            f"Min Slope ({degrees(rules.slope_min):.3g}°) is greater than Max Slope ({degrees(rules.slope_max):.3g}°); "
+            "lower Min Slope or raise Max Slope"
         )
     if not rules.altitude_min <= rules.altitude_max:
         raise SceneError(
-            f"Altitude From ({rules.altitude_min:.5g} m) is greater than Altitude To ({rules.altitude_max:.5g} m); "
-            "lower Altitude From or raise Altitude To"
+            f"Min Altitude ({rules.altitude_min:.5g} m) is greater than Max Altitude ({rules.altitude_max:.5g} m); "
+            "lower Min Altitude or raise Max Altitude"
         )
     if not rules.clumping <= 1.0:
         raise SceneError(f"Clumping must be between 0 and 1, not {rules.clumping:g}")
@@ -41,7 +41,7 @@ def check_rules(rules: Rules) -> None:
         raise SceneError(f"Clump Size must be greater than 0, not {rules.clump_size:g} m; or set Clumping to 0")
     if not min(rules.scale_min, rules.scale_max) > 0.0:
         raise SceneError(
-            f"Scale must be greater than 0, not {rules.scale_min:g} to {rules.scale_max:g}; raise Scale From and To"
+            f"Scale must be greater than 0, not {rules.scale_min:g} to {rules.scale_max:g}; raise Min and Max Scale"
         )
     for rule in rules.companions:
         _check_companion(rule, len(rules.shares))

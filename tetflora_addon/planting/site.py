@@ -45,7 +45,7 @@ class Draw(IntEnum):
 REMEDIES = {
     "weight": "the vertex group leaves almost no ground; paint more weight, or invert or clear the vertex group",
     "image": "the image is black on almost all of the ground; paint it brighter, or invert or clear it",
-    "altitude": "almost no ground lies between Altitude From and To; widen the range or lower Altitude Falloff",
+    "altitude": "almost no ground lies between Min and Max Altitude; widen the range or lower Altitude Falloff",
     "areas": "the Areas curves contain almost no suitable ground; enlarge them, or clear Areas",
     "paths": "the Paths curves leave almost no ground; lower Path Distance, or clear Paths",
     "edge": "all ground is close to the border; lower Edge Falloff",
@@ -103,7 +103,7 @@ class Site:
         if not at_altitude.any():
             raise SceneError(
                 f"No suitable ground lies between altitudes {rules.altitude_min:.5g} and {rules.altitude_max:.5g} m; "
-                f"the ground extends from {low.min():.5g} to {high.max():.5g} m. Change Altitude From and To"
+                f"the ground extends from {low.min():.5g} to {high.max():.5g} m. Change Min and Max Altitude"
             )
         self.lowest = max(float(low[at_altitude].min()), rules.altitude_min)
         self.highest = min(float(high[at_altitude].max()), rules.altitude_max)
@@ -225,15 +225,15 @@ def _by_inclination(triangles: NDArray[np.float64], rules: Rules) -> tuple[NDArr
     flat = (length > 0.0) & (upright > 0.0) & (upright >= length * (np.cos(rules.slope_max) - _ROUNDING))
     if not flat.any():
         raise SceneError(
-            f"No face of the ground is flatter than Slope To ({np.degrees(rules.slope_max):.0f}°); "
-            "raise Slope To or select another mesh"
+            f"No face of the ground is flatter than Max Slope ({np.degrees(rules.slope_max):.0f}°); "
+            "raise Max Slope or select another mesh"
         )
     if rules.slope_min > 0.0:
         flat &= upright <= length * (np.cos(rules.slope_min) + _ROUNDING)
         if not flat.any():
             raise SceneError(
                 f"No face of the ground has a slope between {np.degrees(rules.slope_min):.0f}° and "
-                f"{np.degrees(rules.slope_max):.0f}°; lower Slope From or raise Slope To"
+                f"{np.degrees(rules.slope_max):.0f}°; lower Min Slope or raise Max Slope"
             )
     if rules.aspect_spread < np.pi:
         away = np.abs((np.arctan2(normal[:, 0], normal[:, 1]) - rules.aspect + np.pi) % (2.0 * np.pi) - np.pi)
