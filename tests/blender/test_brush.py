@@ -220,7 +220,7 @@ def test_rays_find_the_nearest_ground_of_many():
 def test_settings_that_cannot_work_are_told_and_change_nothing():
     add_mesh("ground", size=30.0)
     _brush(radius=1000.0, density=1000.0)
-    with pytest.raises(RuntimeError, match="make it smaller or the density lower"):
+    with pytest.raises(RuntimeError, match="lower Radius or Density"):
         _stroke()
     assert not _plants()
     select()

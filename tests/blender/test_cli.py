@@ -122,7 +122,7 @@ def test_frames_below_zero_are_rendered_though_no_range_of_blender_has_them(fore
 def test_a_file_that_blender_could_not_open_is_no_empty_scene(forest, monkeypatch, capfd):
     monkeypatch.setattr("sys.argv", ["blender", "-b", "misspelt.blend", "--command", "tetflora", "stats"])
     assert _run("stats") == 1
-    assert "misspelt.blend could not be opened" in capfd.readouterr().err
+    assert "misspelt.blend cannot be opened" in capfd.readouterr().err
     monkeypatch.setattr("sys.argv", ["blender", "--command", "tetflora", "refine", "--save", "new.blend"])
     assert _run("stats") == 0
 

@@ -286,7 +286,7 @@ def test_what_is_linked_is_refused_because_its_file_keeps_its_flags(tmp_path):
     with bpy.data.libraries.load(path, link=True) as (_, wanted):
         wanted.objects = ["source"]
     scene.collection.objects.link(wanted.objects[0])
-    with pytest.raises(errors.SceneError, match=r'"source" is linked .* library override'):
+    with pytest.raises(errors.SceneError, match=r'"source" is linked.*Library Override'):
         _refine(scene)
 
 

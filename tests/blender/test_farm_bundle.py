@@ -170,7 +170,7 @@ def test_a_file_that_was_never_saved(tmp_path, capfd):
     tiny_render()
     add_camera()
     assert _run(tmp_path / "job") == 1
-    assert "never saved" in _error(capfd)
+    assert "has not been saved" in _error(capfd)
     assert not (tmp_path / "job").exists()
 
 
@@ -190,10 +190,10 @@ def test_what_no_worker_could_render(shot, tmp_path, capfd, spoil, says):
 
 
 def test_no_frames_and_frames_named_twice(shot, tmp_path, capfd):
-    with pytest.raises(errors.SceneError, match="no frames"):
+    with pytest.raises(errors.SceneError, match="No frames"):
         farm_template.frame_expression([(5, 4, 1)])
     assert _run(tmp_path / "job", "--frames", "1-4,3") == 1
-    assert "Frame 3 is named twice" in _error(capfd)
+    assert "Frame 3 occurs twice" in _error(capfd)
     assert _run(tmp_path / "job", "--frames", "9-2") == 2
     assert "9-2" in _error(capfd)
     assert _run(tmp_path / "job", "--chunk", "0") == 2
@@ -209,7 +209,7 @@ def test_folders_that_cannot_be_used(shot, tmp_path, capfd):
     assert _run(full / "mine.txt") == 1
     assert "is a file" in _error(capfd)
     assert _run(full / "mine.txt" / "job") == 1
-    assert "cannot be written to" in _error(capfd)
+    assert "Cannot write to" in _error(capfd)
 
 
 def test_a_failure_leaves_nothing_behind(shot, tmp_path, capfd, monkeypatch):

@@ -204,9 +204,9 @@ def _open_curves(ground):
         (_missing_group, '"ground" has no vertex group "Trees"'),
         (_missing_uv, '"ground" has no UV map for the image'),
         (_missing_layer, '"ground" has no UV map "Other"'),
-        (_missing_file, 'image "lost" cannot be loaded'),
-        (_no_curves, 'collection "Roads" for paths has no curves'),
-        (_open_curves, 'No curve of the collection "Meadows" for areas is closed'),
+        (_missing_file, 'Cannot load the image "lost"'),
+        (_no_curves, 'The Paths collection "Roads" has no curves'),
+        (_open_curves, 'The Areas collection "Meadows" has no closed curves'),
     ],
 )
 def test_what_is_missing_is_named(options, says):
@@ -218,7 +218,7 @@ def test_what_is_missing_is_named(options, says):
 def test_ground_without_faces_is_named():
     with pytest.raises(errors.SceneError, match='"Bare" has no faces'):
         _read(add_mesh("Bare", faces=()))
-    with pytest.raises(errors.SceneError, match="no ground"):
+    with pytest.raises(errors.SceneError, match="No ground"):
         _read()
     with pytest.raises(errors.SceneError, match='"curve" is not a mesh'):
         _read(_curve())

@@ -174,7 +174,7 @@ def test_an_error_is_said_and_earlier_results_are_rendered(stage, stub, tmp_path
     assert covered > 0.0
     assert not made.hide_render
     assert len(handlers.render_errors()) == 1
-    assert 'TetFlora: error: frame 1 rendered without its plants: Unknown species "quercus"' in capfd.readouterr().err
+    assert 'TetFlora: error: frame 1 was rendered without plants: Unknown species "quercus"' in capfd.readouterr().err
     stub.error = None
     _still(stage, tmp_path / "b.png")
     assert handlers.render_errors() == []
@@ -303,7 +303,7 @@ def test_shells_are_rendered_with_enough_transparent_bounces_and_the_settings_co
     scene = bpy.context.scene
     scene.cycles.transparent_max_bounces, scene.cycles.min_transparent_bounces = 8, 2
     scene.tetflora.proxy_form, scene.tetflora.baked_light = 'SHELLS', baked
-    assert "too few" in shell_bounces.few_bounces(scene)
+    assert "renders shells black" in shell_bounces.few_bounces(scene)
     seen = []
 
     def read(*_):

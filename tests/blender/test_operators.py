@@ -154,7 +154,7 @@ def test_what_a_render_could_not_use_is_forgotten_once_refine_can():
     handlers.on_render_pre(scene)
     handlers.on_render_end(scene)
     assert len(handlers.render_errors()) == 1
-    with pytest.raises(RuntimeError, match="scale 0"):
+    with pytest.raises(RuntimeError, match="zero scale"):
         _ops().refine()
     assert len(handlers.render_errors()) == 1
     plant.scale = (1.0, 1.0, 1.0)
@@ -234,9 +234,9 @@ def test_clear_shows_a_mesh_only_when_no_scene_has_results_in_its_place():
 @pytest.mark.parametrize(
     ("break_it", "says"),
     [
-        (lambda: _ops().remove_plants(which='ALL'), "No plants are there"),
+        (lambda: _ops().remove_plants(which='ALL'), "No plants to render"),
         (lambda: add_plant("Odd", "quercus"), 'unknown species "quercus"'),
-        (lambda: add_plant("Flat", scale=(0.0, 0.0, 0.0)), '"Flat": scale 0'),
+        (lambda: add_plant("Flat", scale=(0.0, 0.0, 0.0)), '"Flat": zero scale'),
         (lambda: setattr(add_mesh("Bare", faces=()).tetflora, "is_occluder", True), '"Bare" has no faces'),
     ],
 )

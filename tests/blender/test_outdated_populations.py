@@ -111,7 +111,7 @@ def test_the_panel_tells_the_plants_that_are_there_or_that_an_update_would_place
     population.count = 33
     assert (status(population), waits(population)) == ("33 plants, as empties", True)
     population.by_density = True
-    assert (status(population), waits(population)) == ("As many plants as the ground takes", True)
+    assert (status(population), waits(population)) == ("As many plants as fit on the ground", True)
     bpy.ops.tetflora.forget_erased()
     bpy.ops.tetflora.update_population()
     assert (status(population), waits(population)) == (f"{population.made:,} plants, as empties", False)

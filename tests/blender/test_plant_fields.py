@@ -258,13 +258,13 @@ def test_instanced_collections_hold_fields():
 @pytest.mark.parametrize(
     ("attributes", "says"),
     [
-        (dict(scale=('FLOAT', [1.0, 0.0, -1.0])), '"field": 2 of 3 points .*scale.*the first is point 1;'),
-        (dict(scale=('FLOAT_VECTOR', [1.0] * 6 + [0.0] * 3)), "1 of 3 .* point 2;"),
-        (dict(rotation=('FLOAT_VECTOR', [np.nan] + [0.0] * 8)), "1 of 3 points .*rotation.*point 0;"),
-        (dict(rotation=('QUATERNION', [np.inf] + [0.0] * 11)), "1 of 3 points .*rotation.*point 0;"),
+        (dict(scale=('FLOAT', [1.0, 0.0, -1.0])), '"field": 2 of 3 points .*scale.*the first is point 1\\.'),
+        (dict(scale=('FLOAT_VECTOR', [1.0] * 6 + [0.0] * 3)), "1 of 3 .* point 2\\."),
+        (dict(rotation=('FLOAT_VECTOR', [np.nan] + [0.0] * 8)), "1 of 3 points .*rotation.*point 0\\."),
+        (dict(rotation=('QUATERNION', [np.inf] + [0.0] * 11)), "1 of 3 points .*rotation.*point 0\\."),
         (dict(rotation=('FLOAT', [0.0] * 3)), '"rotation" is FLOAT on POINT; .*FLOAT_VECTOR or QUATERNION'),
-        (dict(position=('FLOAT_VECTOR', [0.0] * 3 + [np.inf] + [0.0] * 5)), "1 of 3 points .*point 1;"),
-        (dict(species=('INT', [0, 2, -1])), "2 of 3 points have a species .*list of 2 .*point 1;"),
+        (dict(position=('FLOAT_VECTOR', [0.0] * 3 + [np.inf] + [0.0] * 5)), "1 of 3 points .*point 1\\."),
+        (dict(species=('INT', [0, 2, -1])), "2 of 3 points have a species .*list of 2 .*point 1\\."),
         (dict(species=('FLOAT', [0.0] * 3)), '"species" is FLOAT'),
     ],
 )
@@ -282,9 +282,9 @@ def test_a_quaternion_of_no_length_turns_nothing():
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        (lambda field: setattr(field.tetflora, "enabled", False), "switched off"),
-        (lambda field: setattr(field, "hide_render", True), "No plants are there"),
-        (lambda field: field.data.clear_geometry(), '"field": a field of plants without points'),
+        (lambda field: setattr(field.tetflora, "enabled", False), "are disabled"),
+        (lambda field: setattr(field, "hide_render", True), "No plants to render"),
+        (lambda field: field.data.clear_geometry(), '"field": the field of plants has no points'),
         (lambda field: setattr(field.tetflora.field_species[0], "species", "nix"), '"field": unknown species "nix"'),
     ],
 )

@@ -198,7 +198,7 @@ def test_equal_forms_are_equal_skeletons():
         (lambda: add_edges(edges=(), name="Dots"), '"Dots".*no edges'),
         (lambda: add_curve(name="Nothing"), '"Nothing".*no edges'),
         (lambda: add_plant("Oak"), '"Oak".*choose a curve'),
-        (lambda: add_edges(radius=(-1, 1, 1, 1), name="Thin"), '"Thin".*negative'),
+        (lambda: add_edges(radius=(-1, 1, 1, 1), name="Thin"), '"Thin".*invalid position or radius'),
     ],
 )
 def test_what_cannot_be_a_form_is_named(make, message):

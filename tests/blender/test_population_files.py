@@ -107,7 +107,7 @@ def test_what_a_file_does_not_say_is_as_in_a_new_scene(tmp_path):
         (lambda d: d.update(populations={}), "populations is dict; it must be a list"),
         (lambda d: d["populations"].append(3), "population 2 is int"),
         (lambda d: d["populations"][0].pop("name"), 'population 1 has no "name"'),
-        (lambda d: d["populations"][0].update(name=5), '"name" is 5; it must be a text'),
+        (lambda d: d["populations"][0].update(name=5), '"name" is 5; it must be a string'),
         (lambda d: d["populations"][0].update(colour=1), 'population 1 has an unknown key "colour"'),
         (lambda d: d["populations"][0].update(uid="a"), 'unknown key "uid"'),
         (lambda d: d["populations"][0].update(count=2.5), '"count" is 2.5; it must be a whole number'),
@@ -116,7 +116,7 @@ def test_what_a_file_does_not_say_is_as_in_a_new_scene(tmp_path):
         (lambda d: d["populations"][0].update(slope_max=91), '"slope_max" is 91; it must be from 0 to 90'),
         (lambda d: d["populations"][0].update(use_altitude=1), '"use_altitude" is 1; it must be true or false'),
         (lambda d: d["populations"][0].update(as_field="TREES"), "it must be one of AUTOMATIC, EMPTIES, FIELD"),
-        (lambda d: d["populations"][0].update(image=7), '"image" is 7; it must be a text'),
+        (lambda d: d["populations"][0].update(image=7), '"image" is 7; it must be a string'),
         (lambda d: d["populations"][0].update(grounds=[None]), '"grounds" is None'),
         (lambda d: d["populations"][0].update(seed=2**40), '"seed" is'),
         (lambda d: d["populations"][0].update(species=[{"weight": 1}]), 'species 1 has no "species"'),
@@ -139,7 +139,7 @@ def test_broken_files_are_refused_by_file_and_key_and_change_nothing(tmp_path, c
 def test_what_is_no_json_is_refused(tmp_path, text):
     path = tmp_path / "broken.json"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    with pytest.raises(errors.SceneError, match=r"broken\.json: is not JSON"):
+    with pytest.raises(errors.SceneError, match=r"broken\.json: is not valid JSON"):
         population_files.read_populations(bpy.context.scene, path)
-    with pytest.raises(errors.SceneError, match=r"none\.json: cannot be read"):
+    with pytest.raises(errors.SceneError, match=r"none\.json: cannot read the file"):
         population_files.read_populations(bpy.context.scene, tmp_path / "none.json")

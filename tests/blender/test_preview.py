@@ -174,8 +174,8 @@ def test_figures_say_what_is_shown():
         text = "\n".join(line for line, _ in preview_overlay.lines_of(scene, preview))
         assert f"Level {level.number} of {preview.levels.levels[-1].number}" in text
         assert f"{level.figures.proxy:,} proxies" in text
-        assert f"{level.figures.split:,} to divide" in text
-        assert f"{level.figures.polygons:,} polygons in" in text
+        assert f"{level.figures.split:,} to split" in text
+        assert f"{level.figures.polygons:,} explicit polygons" in text
     camera.location.x += 1.0
     depsgraph()
     assert "changed" in preview_overlay.lines_of(scene, preview)[-1][0]

@@ -102,9 +102,9 @@ def test_a_parented_and_animated_camera_is_read_where_it_is():
     ("break_it", "says"),
     [
         (lambda scene, obj: setattr(scene, "camera", None), "no active camera"),
-        (lambda scene, obj: setattr(scene, "camera", add_plant("empty")), "but not a camera"),
-        (lambda scene, obj: setattr(obj, "scale", (0.0, 1.0, 1.0)), "scale 0"),
-        (lambda scene, obj: setattr(obj, "location", (float("nan"), 0.0, 0.0)), "no valid position"),
+        (lambda scene, obj: setattr(scene, "camera", add_plant("empty")), "is not a camera object"),
+        (lambda scene, obj: setattr(obj, "scale", (0.0, 1.0, 1.0)), "zero scale"),
+        (lambda scene, obj: setattr(obj, "location", (float("nan"), 0.0, 0.0)), "invalid position"),
         (lambda scene, obj: setattr(obj.data, "clip_start", 5000.0), "Clip End"),
     ],
 )
@@ -224,14 +224,14 @@ def _excluded(plants):
 @pytest.mark.parametrize(
     ("break_it", "says"),
     [
-        (lambda: None, "No plants are there.*Add > TetFlora Plant"),
-        (lambda: setattr(add_plant(), "hide_render", True), "to render; 1 of the scene.s are hidden in renders"),
-        (lambda: _excluded([add_plant(f"x{i}") for i in range(3)]), "3 of the scene.s.*excluded from the view layer"),
-        (lambda: setattr(add_plant().tetflora, "enabled", False), "switched off"),
+        (lambda: None, "No plants to render.*Add > TetFlora Plant"),
+        (lambda: setattr(add_plant(), "hide_render", True), "to render; 1 are hidden in renders"),
+        (lambda: _excluded([add_plant(f"x{i}") for i in range(3)]), "3 are hidden.*excluded from the view layer"),
+        (lambda: setattr(add_plant().tetflora, "enabled", False), "are disabled"),
         (lambda: add_plant("Old oak", "quercus"), '"Old oak": unknown species "quercus".*quercus.json'),
         (lambda: add_plant("Old oak", ""), '"Old oak": unknown species ""'),
-        (lambda: add_plant("Flat", scale=(1.0, 1.0, 0.0)), '"Flat": scale 0'),
-        (lambda: add_plant("Nowhere", location=(0.0, float("nan"), 0.0)), '"Nowhere".*no valid position'),
+        (lambda: add_plant("Flat", scale=(1.0, 1.0, 0.0)), '"Flat": zero scale'),
+        (lambda: add_plant("Nowhere", location=(0.0, float("nan"), 0.0)), '"Nowhere".*invalid position'),
         (lambda: [add_plant(f"x{i}", "nix") for i in range(5)], '"x0", "x1", "x2" and 2 more: unknown species "nix"'),
     ],
 )
@@ -265,5 +265,5 @@ def test_occluders_that_hide_nothing_are_named():
     curve = bpy.data.objects.new("Path", bpy.data.curves.new("Path", 'CURVE'))
     bpy.context.scene.collection.objects.link(curve)
     curve.tetflora.is_occluder = True
-    with pytest.raises(errors.SceneError, match='"Path" is not a mesh; it is marked as hiding plants'):
+    with pytest.raises(errors.SceneError, match='"Path" is not a mesh; an occluder must be'):
         _occluders()

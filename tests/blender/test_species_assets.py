@@ -124,7 +124,7 @@ def test_preferences_change_only_when_asked(tmp_path):
 def test_a_folder_that_cannot_be_written_is_said(tmp_path):
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     before = datablocks()
-    with pytest.raises(RuntimeError, match="asset library cannot be written"):
+    with pytest.raises(RuntimeError, match="Cannot write the asset library"):
         bpy.ops.tetflora.create_asset_library(directory=str(tmp_path / "file"))
     assert datablocks() == before
 
@@ -133,7 +133,7 @@ def test_a_file_of_catalogues_that_is_no_text_is_said_and_stays(tmp_path):
     catalogues = tmp_path / "blender_assets.cats.txt"
     catalogues.write_bytes(b"VERSION 1\n# Geh\xf6lze\n")
     before = datablocks()
-    with pytest.raises(RuntimeError, match=r"blender_assets.cats.txt is no text in UTF-8"):
+    with pytest.raises(RuntimeError, match=r"blender_assets.cats.txt is not a UTF-8 text file"):
         bpy.ops.tetflora.create_asset_library(directory=str(tmp_path))
     assert datablocks() == before
     assert catalogues.read_bytes() == b"VERSION 1\n# Geh\xf6lze\n"

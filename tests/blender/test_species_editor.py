@@ -233,7 +233,7 @@ def test_saved_species_come_back_as_they_were(own_folder, tmp_path):
 def test_shipped_species_cannot_be_deleted(own_folder):
     _editor("bush")
     assert not bpy.ops.tetflora.delete_species.poll()
-    with pytest.raises(errors.SpeciesError, match="shipped"):
+    with pytest.raises(errors.SpeciesError, match="built-in"):
         species_files.delete_species_file("bush")
 
 

@@ -120,7 +120,7 @@ def test_refused_whole_with_a_reason(monkeypatch):
     good, bad = add_plant("good"), add_plant("bad", scale=(0.0, 0.0, 0.0))
     select(good, bad)
     before = len(bpy.data.meshes)
-    with pytest.raises(RuntimeError, match='"bad": scale 0'):
+    with pytest.raises(RuntimeError, match='"bad": zero scale'):
         bpy.ops.tetflora.make_plant_mesh()
     select(good)
     monkeypatch.setattr(plant_mesh, "MOST_POLYGONS", 10)

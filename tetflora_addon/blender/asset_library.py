@@ -66,7 +66,7 @@ def write_asset_library(folder: Path) -> tuple[Path, int]:
             write_blend(path, lambda p: bpy.data.libraries.write(p, set(plants), fake_user=True, compress=True))
             _write_catalog(folder / _CATALOGS_FILE)
         except (OSError, RuntimeError) as error:
-            raise SceneError(f"The asset library cannot be written to {folder}: {error}") from None
+            raise SceneError(f"Cannot write the asset library to {folder}: {error}") from None
         finally:
             bpy.data.batch_remove(plants)
     return path, len(known)
@@ -124,7 +124,7 @@ def _write_catalog(path: Path) -> None:
     try:
         text = path.read_text(encoding="utf-8") if path.exists() else "VERSION 1\n"
     except UnicodeDecodeError:
-        raise SceneError(f"{path} is no text in UTF-8, as Blender's files of catalogues are; mend or move it") from None
+        raise SceneError(f"{path} is not a UTF-8 text file, as asset catalogs must be; repair or move it") from None
     if _CATALOG not in text:
         write_whole(path, f"{text.rstrip()}\n{_CATALOG}:TetFlora:TetFlora\n")
 

@@ -121,7 +121,7 @@ def tick() -> float | None:
     except Exception as error:
         expected = isinstance(error, TetFloraError)
         _state.steps, more = None, False
-        _state.message = str(error) if expected else f"unexpected error, please report it: {error!r}"
+        _state.message = str(error) if expected else f"unexpected error, please report it as a bug: {error!r}"
         redraw()
         if not expected:
             raise

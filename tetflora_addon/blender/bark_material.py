@@ -127,11 +127,11 @@ def bark_group(character: str) -> bpy.types.NodeTree:
     bark = _bark(character)
 
     def build(tree: bpy.types.NodeTree) -> None:
-        add_socket(tree, "Colour", "NodeSocketColor", (0.16, 0.11, 0.07, 1.0), None, "Mean colour")
-        add_socket(tree, "Scale", "NodeSocketFloat", bark.scale, (0.0, 1000.0), "Features to a radius of the branch")
-        add_socket(tree, "Stretch", "NodeSocketFloat", bark.stretch, (0.01, 100.0), "Their length over their width")
-        add_socket(tree, "Contrast", "NodeSocketFloat", bark.contrast, (0.0, 4.0), "Of the colours; the mean stays")
-        add_socket(tree, "Depth", "NodeSocketFloat", bark.depth, (0.0, 1.0), "Of the relief, in perimeters")
+        add_socket(tree, "Colour", "NodeSocketColor", (0.16, 0.11, 0.07, 1.0), None, "Mean color")
+        add_socket(tree, "Scale", "NodeSocketFloat", bark.scale, (0.0, 1000.0), "Number of features per branch radius")
+        add_socket(tree, "Stretch", "NodeSocketFloat", bark.stretch, (0.01, 100.0), "Length to width of the features")
+        add_socket(tree, "Contrast", "NodeSocketFloat", bark.contrast, (0.0, 4.0), "Contrast around the mean color")
+        add_socket(tree, "Depth", "NodeSocketFloat", bark.depth, (0.0, 1.0), "Depth of the relief, in perimeters")
         add_socket(tree, "Smooth Under", "NodeSocketFloat", bark.smooth, (0.0, 10.0), "Perimeter of a young branch (m)")
         add_socket(tree, "Full Over", "NodeSocketFloat", bark.full, (0.0, 10.0), "Perimeter of an old branch (m)")
         tree.interface.new_socket(name="Colour", in_out='OUTPUT', socket_type="NodeSocketColor")
@@ -167,7 +167,7 @@ def bark_version(character: str) -> int:
 
 def _bark(character: str) -> Bark:
     if character not in _CHARACTERS:
-        raise SpeciesError(f'There is no bark "{character}"; choose one of {", ".join(BARKS)}')
+        raise SpeciesError(f'Unknown bark "{character}"; choose one of {", ".join(BARKS)}')
     return _CHARACTERS[character]
 
 

@@ -50,7 +50,7 @@ def brush_of(scene: bpy.types.Scene, pressure: float = 1.0) -> tuple[Brush, tupl
     if settings.source == 'ONE' or not mix:
         mix = [(settings.species if settings.source == 'ONE' and settings.species else default_species(), 1.0)]
     if not sum(weight for _, weight in mix) > 0.0:
-        raise SceneError("No species has a share above 0; raise one in the list of the Populate panel")
+        raise SceneError("No species has a weight above 0; raise a weight in the Populate panel")
     brush = Brush(
         radius=settings.radius,
         density=settings.density / 100.0,
@@ -62,8 +62,8 @@ def brush_of(scene: bpy.types.Scene, pressure: float = 1.0) -> tuple[Brush, tupl
     )
     if strokes.too_many(brush):
         raise SceneError(
-            f"A brush of {settings.radius:g} m radius with {settings.density:g} plants for 100 m² is too much for one "
-            "dab; make it smaller or the density lower, or use Populate"
+            f"A brush with a radius of {settings.radius:g} m and {settings.density:g} plants per 100 m² is too large; "
+            "lower Radius or Density, or use Populate"
         )
     return brush, tuple(identifier for identifier, _ in mix)
 

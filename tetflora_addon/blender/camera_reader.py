@@ -45,21 +45,19 @@ def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, region_o
     if scene.camera is None:
         raise SceneError(
             f'The scene "{scene.name}" has no active camera; add one (Add > Camera) '
-            "or choose one in the scene's properties"
+            "or choose one in the Scene properties"
         )
     evaluated = scene.camera.evaluated_get(depsgraph)
     name, data = scene.camera.name, evaluated.data
     if scene.camera.type != 'CAMERA':
-        raise SceneError(
-            f'"{name}" is the scene\'s active camera but not a camera; choose one in the scene\'s properties'
-        )
+        raise SceneError(f'The active camera "{name}" is not a camera object; choose a camera in the Scene properties')
     if data.type not in {'PERSP', 'ORTHO', 'PANO'}:
         raise SceneError(
-            f'The camera "{name}" is neither perspective nor orthographic nor panoramic; '
-            "change its type under Lens in its properties"
+            f'The camera "{name}" is not perspective, orthographic or panoramic; '
+            "change its Lens Type in the camera properties"
         )
     if not 0.0 < data.clip_start < data.clip_end:
-        raise SceneError(f'The camera "{name}" sees nothing: make its Clip End larger than its Clip Start')
+        raise SceneError(f'The camera "{name}" sees nothing; raise its Clip End above its Clip Start')
     share = scene.render.resolution_percentage / 100.0
     width = max(int(scene.render.resolution_x * share), 1)
     height = max(int(scene.render.resolution_y * share), 1)
@@ -90,7 +88,7 @@ def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, region_o
         matrix,
     )
     if camera is None:
-        raise SceneError(f'The camera "{name}" has scale 0 or no valid position; press Alt S and Alt G on it')
+        raise SceneError(f'The camera "{name}" has zero scale or an invalid position; clear them with Alt S and Alt G')
     others = (*_while_open(scene, camera, window, matrix), *stereo_views(scene, camera, depsgraph))
     return replace(camera, shutter=others)
 

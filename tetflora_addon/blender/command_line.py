@@ -77,51 +77,51 @@ def main(arguments: Sequence[str]) -> int:
                 if key != "steps":  # a line of a dozen figures for each pass: for programs
                     print(f"{key.replace('_', ' '):>22}: {_readable(value)}", flush=True)
     except OSError as error:  # into a file on a full disk, or into a program that has ended
-        return _fail(f"the figures cannot be printed: {error.strerror}", 1)
+        return _fail(f"cannot print the statistics: {error.strerror}", 1)
     return 0
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog=f"blender FILE --command {NAME}",
-        description="Refine and render the plants of a scene. Works on the file that Blender has opened.",
+        description="Refine and render the plants of a scene, in the file that Blender has opened.",
     )
     commands = parser.add_subparsers(title="commands", required=True, metavar="refine|render|stats|farm")
 
-    refine = commands.add_parser("refine", help="turn plants into meshes for the scene's camera")
-    refine.add_argument("--cutoff", type=_positive, metavar="PIXELS", help="overrides the scene's cutoff")
-    refine.add_argument("--save", metavar="PATH", help="write a copy of the file with the result")
+    refine = commands.add_parser("refine", help="create meshes of the plants for the scene camera")
+    refine.add_argument("--cutoff", type=_positive, metavar="PIXELS", help="override the Cutoff of the scene")
+    refine.add_argument("--save", metavar="PATH", help="save a copy of the file with the results")
     refine.set_defaults(run=_refine)
 
     render = commands.add_parser("render", help="refine and render frames")
     which = render.add_mutually_exclusive_group()
     which.add_argument(
-        "--frame", type=_frame, metavar="N", help="frame to render; the scene's current one if not given"
+        "--frame", type=_frame, metavar="N", help="frame to render (default: current frame of the scene)"
     )
-    which.add_argument("--frames", type=_frames, metavar="A-B", help="frames to render, such as 1-24, 1-99:2 or 3,7-9")
-    render.add_argument("--engine", choices=("cycles", "eevee"), help="overrides the scene's render engine")
-    render.add_argument("--samples", type=_whole, metavar="N", help="overrides the samples of a pixel")
-    render.add_argument("--output", metavar="PATH", help="where pictures go, a folder or a name; #### is the frame")
-    about = "render pictures that are there already, even if the scene's Overwrite is off"
+    which.add_argument("--frames", type=_frames, metavar="A-B", help="frames to render, like 1-24, 1-99:2 or 3,7-9")
+    render.add_argument("--engine", choices=("cycles", "eevee"), help="override the render engine of the scene")
+    render.add_argument("--samples", type=_whole, metavar="N", help="override the number of samples per pixel")
+    render.add_argument("--output", metavar="PATH", help="output folder or file name; #### is the frame")
+    about = "render existing images again, even if Overwrite is off in the scene"
     render.add_argument("--overwrite", action="store_true", help=about)
     render.set_defaults(run=_render)
 
-    stats = commands.add_parser("stats", help="count plants and the polygons that they stand for; changes nothing")
+    stats = commands.add_parser("stats", help="count plants and their polygons without changing anything")
     stats.set_defaults(run=_stats)
 
-    farm = commands.add_parser("farm", help="write a job for a render farm (Open Job Description); changes nothing")
-    farm.add_argument("folder", type=Path, metavar="OUT_DIR", help="folder of the job; new or empty")
-    farm.add_argument("--chunk", type=_whole, default=1, metavar="N", help="frames that a worker renders in one go")
-    farm.add_argument("--frames", type=_frames, metavar="A-B", help="frames of the job; the scene's own if not given")
-    farm.add_argument("--copy", action="store_true", help="copy the file and what it uses into the job")
+    farm = commands.add_parser("farm", help="write a job for a render farm (Open Job Description)")
+    farm.add_argument("folder", type=Path, metavar="OUT_DIR", help="new or empty folder for the job")
+    farm.add_argument("--chunk", type=_whole, default=1, metavar="N", help="frames that a worker renders per task")
+    farm.add_argument("--frames", type=_frames, metavar="A-B", help="frames of the job (default: those of the scene)")
+    farm.add_argument("--copy", action="store_true", help="copy the file and its assets into the job")
     farm.set_defaults(run=_farm)
 
     for command in (refine, render):
-        command.add_argument("--form", choices=_choices("proxy_form"), help="overrides the form of proxies")
-        about = "overrides whether plants show light that was worked out at refinement"
+        command.add_argument("--form", choices=_choices("proxy_form"), help="override the proxy form of the scene")
+        about = "override the Lighting of the scene"
         command.add_argument("--baked-light", choices=_choices("baked_light"), help=about)
     for command in (refine, render, stats, farm):
-        command.add_argument("--json", action="store_true", help="print figures as one JSON object, in the last line")
+        command.add_argument("--json", action="store_true", help="print statistics as a JSON object in the last line")
     return parser
 
 
@@ -143,9 +143,9 @@ def _refine(options: argparse.Namespace) -> dict:
 def _check_target(path: Path) -> None:
     """Say before the work what would be said after it."""
     if not path.parent.is_dir():
-        raise SceneError(f"The folder {path.parent} does not exist; make it or choose another")
+        raise SceneError(f"The folder {path.parent} does not exist; create it or choose another")
     if path.is_dir():
-        raise SceneError(f"{path} is a folder; name the file to write in it")
+        raise SceneError(f"{path} is a folder; add a file name")
 
 
 def _render(options: argparse.Namespace) -> dict | None:
@@ -173,7 +173,7 @@ def _render(options: argparse.Namespace) -> dict | None:
         whole = all(whole for _, whole in rendered)
     else:
         if scene.render.is_movie_format:
-            raise SceneError("The scene writes a movie; name its frames with --frames, or choose a format of pictures")
+            raise SceneError("The output format is a movie; set the frames with --frames, or choose an image format")
         if options.frame is not None:
             scene.frame_set(options.frame)
         # Blender leaves #### as it is in stills.
@@ -181,7 +181,7 @@ def _render(options: argparse.Namespace) -> dict | None:
         files = [name]
     paths = [Path(bpy.path.abspath(f)) for f in files]
     for path in damaged(scene, paths):
-        raise SceneError(f"{path} was not written to its end; is the disk full?")
+        raise SceneError(f"{path} is incomplete; check the free disk space")
     if not whole:
         return None  # said on stderr when it happened
     return {"files": list(map(str, paths)), **json.loads(scene.tetflora.statistics or "{}")}
@@ -195,10 +195,10 @@ def _stats(_options: argparse.Namespace) -> dict:
 def _farm(options: argparse.Namespace) -> dict:
     written = farm_bundle.write_bundle(bpy.context.scene, options.folder, options.chunk, options.frames, options.copy)
     for path in written["missing"]:
-        print(f"tetflora: warning: the file uses {path}, which is not there", file=sys.stderr, flush=True)
+        print(f"tetflora: warning: missing file: {path}", file=sys.stderr, flush=True)
     for path in written["absolute_paths"]:
-        about = "other machines may not have it there; File > External Data > Make Paths Relative"
-        print(f"tetflora: warning: the file names {path} from the root: {about}", file=sys.stderr, flush=True)
+        about = "use File > External Data > Make Paths Relative if other machines cannot access it"
+        print(f"tetflora: warning: absolute path: {path}; {about}", file=sys.stderr, flush=True)
     return written
 
 
@@ -212,7 +212,7 @@ def _check_file() -> None:
     """
     named = [text for text in takewhile(lambda text: text != "--command", sys.argv) if re.search(r"\.blend\d*$", text)]
     if named and not bpy.data.filepath:
-        raise SceneError(f"{named[-1]} could not be opened; Blender's reason is above")
+        raise SceneError(f"{named[-1]} cannot be opened; see Blender's message above")
 
 
 def _animation(scene: bpy.types.Scene, run: Run) -> tuple[list[str], bool]:
@@ -273,7 +273,7 @@ def _choices(name: str) -> list[str]:
 def _positive(text: str) -> float:
     value = float(text)
     if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text} is not a number above 0")
+        raise argparse.ArgumentTypeError(f"{text} is not a number greater than 0")
     return value
 
 
@@ -287,7 +287,7 @@ def _whole(text: str) -> int:
 def _frame(text: str) -> int:
     value = int(text)
     if abs(value) > MOST_FRAME:
-        raise argparse.ArgumentTypeError(f"{text} is beyond the frames that Blender has, up to {MOST_FRAME:,}")
+        raise argparse.ArgumentTypeError(f"{text} exceeds the last frame that Blender supports, {MOST_FRAME:,}")
     return value
 
 

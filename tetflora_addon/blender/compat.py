@@ -17,7 +17,9 @@ def eevee_engine() -> str:
     for identifier in EEVEE_ENGINES:
         if identifier in known:
             return identifier
-    raise LookupError(f"this Blender has none of {', '.join(EEVEE_ENGINES)}; it is not supported")
+    raise LookupError(
+        f"This version of Blender has none of the engines {', '.join(EEVEE_ENGINES)} and is not supported"
+    )
 
 
 def shader_tree(owner: bpy.types.Material | bpy.types.World | bpy.types.Light) -> bpy.types.NodeTree:

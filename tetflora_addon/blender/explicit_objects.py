@@ -92,14 +92,14 @@ def read_explicit(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLaye
             found.add(obj)
         else:
             raise SceneError(
-                f'"{obj.name}" has no faces to refine: give it some, or switch off Refine This Mesh in the sidebar\'s '
-                "TetFlora tab"
+                f'"{obj.name}" has no faces to refine; add faces, or turn off Refine This Mesh in the TetFlora '
+                "tab of the sidebar"
             )
     for obj in sorted(found, key=lambda o: o.name_full):
         if obj.library is not None:
             raise SceneError(
-                f'"{obj.name}" is linked from another file, and this file cannot remember that it is hidden while '
-                "results are shown in its place: make it local, or make a library override of it, in the Object menu"
+                f'"{obj.name}" is linked, so it cannot be hidden while results replace it; choose '
+                "Object > Relations > Make Local, or Object > Library Override > Make"
             )
     try:
         meshes = Meshes(reader.surfaces, np.array(reader.surface), np.array(reader.matrices))
@@ -171,7 +171,7 @@ def _surface(name: str, mesh: bpy.types.Mesh, materials: list[bpy.types.Material
     mesh.calc_loop_triangles()
     positions = _read(mesh.attributes["position"].data, "vector", (len(mesh.vertices), 3)).astype(np.float64)
     if not np.isfinite(positions).all():
-        raise SceneError(f'"{name}" has vertices that are no finite numbers; delete them (Mesh > Clean Up may help)')
+        raise SceneError(f'"{name}" has vertices that are not finite numbers; delete them')
     corner_verts = _read(mesh.attributes[".corner_vert"].data, "value", (len(mesh.loops),), np.int32)
     offsets = np.append(_read(mesh.polygons, "loop_start", (len(mesh.polygons),), np.int32), np.int32(len(mesh.loops)))
     triangles = _read(mesh.loop_triangles, "loops", (len(mesh.loop_triangles), 3), np.int32)

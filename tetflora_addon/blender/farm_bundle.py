@@ -121,7 +121,7 @@ def write_bundle(
     except BaseException as error:
         _take_away(folder, made)
         if isinstance(error, OSError):
-            raise SceneError(f"The job {folder} cannot be written: {_reason(error)}; name another folder") from None
+            raise SceneError(f"Cannot write the job {folder}: {_reason(error)}. Choose another folder") from None
         raise
     numbers = farm_template.frame_numbers(runs)
     return {
@@ -205,23 +205,23 @@ def _manifest(root: Path) -> dict[str, Any]:
     try:
         return tomllib.loads((root / MANIFEST).read_text(encoding="utf-8"))
     except OSError:
-        raise SceneError(f"{root} has no {MANIFEST}; install TetFlora as an extension, from its zip") from None
+        raise SceneError(f"{root} has no {MANIFEST}; install TetFlora as an extension from its zip file") from None
 
 
 def _saved_file() -> Path:
     if not bpy.data.filepath:
-        raise SceneError("The file was never saved; save it, and write the job from the saved file")
+        raise SceneError("The file has not been saved; save it before you write the job")
     blend = Path(os.path.normpath(bpy.data.filepath))
     if not blend.is_file():
-        raise SceneError(f"{blend} is not there any more; save the file again")
+        raise SceneError(f"{blend} no longer exists; save the file again")
     return blend
 
 
 def _check_output(scene: bpy.types.Scene) -> None:
     if scene.render.is_movie_format:
         raise SceneError(
-            f"The scene writes a movie ({scene.render.image_settings.file_format}), of which no worker can write a "
-            "part; choose a format of pictures in the Output properties"
+            f"The output format is a movie ({scene.render.image_settings.file_format}), which workers cannot write in "
+            "parts; choose an image format in the Output properties"
         )
     read_camera(scene, bpy.context.evaluated_depsgraph_get())
 
@@ -242,14 +242,14 @@ def _empty_folder(folder: Path) -> bool:
             folder.mkdir(parents=True)
             made = True
         if not folder.is_dir():
-            raise SceneError(f"{folder} is a file; name a folder for the job")
+            raise SceneError(f"{folder} is a file; choose a folder for the job")
         if any(folder.iterdir()):
-            raise SceneError(f"{folder} is not empty; name a new folder for the job")
+            raise SceneError(f"{folder} is not empty; choose an empty folder for the job")
         probe = folder / "template.json"
         probe.touch()
         probe.unlink()
     except OSError as error:
-        raise SceneError(f"{folder} cannot be written to ({error.strerror}); name another folder") from None
+        raise SceneError(f"Cannot write to {folder}: {error.strerror}. Choose another folder") from None
     return made
 
 
@@ -288,7 +288,7 @@ def _places(blend: Path, assets: Assets) -> dict[Path, Path]:
     drives = {path.drive: path for path in reversed(everything)}
     if len(drives) > 1:
         other = next(path for path in everything if path.drive != blend.drive)
-        raise SceneError(f"{other} is on another drive than {blend.name}; pack it into the file, or copy it beside it")
+        raise SceneError(f"{other} is not on the drive of {blend.name}; pack it into the file, or copy it there")
     root = os.path.commonpath([path.parent for path in everything])
     return {path: path.relative_to(root) for path in everything}
 

@@ -25,16 +25,16 @@ def install(folder: Path) -> None:
     """Install the zip of a folder, and the species beside it; exits with a message if that is not possible."""
     home = os.environ.get("BLENDER_USER_RESOURCES")
     if not home:
-        sys.exit("tetflora: error: set BLENDER_USER_RESOURCES to a folder of this job, then run this again")
+        sys.exit("tetflora: error: BLENDER_USER_RESOURCES is not set; set it to a folder of this job and run again")
     zips = sorted(folder.glob("tetflora-*.zip"))
     if len(zips) != 1:
-        sys.exit(f"tetflora: error: {folder} holds {len(zips)} files tetflora-*.zip, not one; write the job again")
+        sys.exit(f"tetflora: error: {folder} must contain one tetflora-*.zip, found {len(zips)}; write the job again")
     # Without the folder Blender falls back to the user's own.
     for name in ("config", "extensions", "scripts", "datafiles"):
         Path(home, name).mkdir(parents=True, exist_ok=True)
     bpy.ops.extensions.package_install_files(filepath=str(zips[0]), repo=REPOSITORY, enable_on_install=True)
     if PACKAGE not in bpy.context.preferences.addons:
-        sys.exit(f"tetflora: error: {zips[0].name} could not be installed; Blender's reason is above")
+        sys.exit(f"tetflora: error: cannot install {zips[0].name}; see Blender's message above")
     _choose_graphics_cards()
     bpy.ops.wm.save_userpref()
     species = Path(bpy.utils.extension_path_user(PACKAGE, path="species", create=True))

@@ -89,7 +89,7 @@ def frame_runs(text: str) -> list[Run]:
         if last < first or step < 1:
             raise ValueError(f"{text} is not a range of frames such as 1-24, 7 or 1-99:2")
         if max(-first, last) > MOST_FRAME:
-            raise ValueError(f"{text} goes beyond the frames that Blender has, up to {MOST_FRAME:,}")
+            raise ValueError(f"{text} exceeds the last frame that Blender supports, {MOST_FRAME:,}")
         runs.append((first, last - (last - first) % step, step))
     return runs
 
@@ -109,10 +109,10 @@ def frame_expression(runs: Sequence[Run]) -> str:
     """
     numbers = frame_numbers(runs)
     if not numbers:
-        raise SceneError("There are no frames to render: raise the scene's End, or name frames with --frames")
+        raise SceneError("No frames to render; raise the End frame of the scene, or use --frames")
     if len(set(numbers)) < len(numbers):
         twice = next(n for n in numbers if numbers.count(n) > 1)
-        raise SceneError(f"Frame {twice} is named twice; name each frame once with --frames")
+        raise SceneError(f"Frame {twice} occurs twice in --frames; list each frame once")
     runs = [(first, last - (last - first) % step, step) for first, last, step in runs if last >= first]
     return ",".join(
         str(first) if first == last else f"{first}-{last}" + (f":{step}" if step > 1 else "")
@@ -146,7 +146,7 @@ def template(job: Job) -> dict[str, Any]:
     render += ["--frames={{Task.Param.Frame}}", "--output", "{{Param.OutputDir}}/{{Param.OutputName}}"]
     environment = {
         "name": "TetFlora",
-        "description": "A Blender home of this session alone, with TetFlora installed from the job.",
+        "description": "Separate Blender user folder for this session, with TetFlora installed from the job",
         "variables": {"BLENDER_USER_RESOURCES": "{{Session.WorkingDirectory}}/blender"},
         "script": {"actions": {"onEnter": {"command": "{{Param.Blender}}", "args": install}}},
     }
@@ -172,29 +172,29 @@ def _parameters(job: Job) -> list[dict[str, Any]]:
     if job.scene is not None:
         # The default of a path is relative to the bundle; absolute ones are refused.
         scene["default"] = f"{SCENE_FOLDER}/{job.scene}"
-        about = "The scene with the files that it uses; only named so that all of it travels"
+        about = "The scene and the files that it uses; listed so that everything is transferred"
         copied.append(_folder("SceneFolder", SCENE_FOLDER, "IN", about))
     chunk = {"name": "ChunkSize", "type": "INT", "default": job.chunk, "minValue": 1}
-    chunk["description"] = "Frames that one worker renders in one go"
+    chunk["description"] = "Frames that a worker renders per task"
     return [
         scene,
-        {"name": "Frames", "type": "STRING", "default": job.frames, "description": "Such as 1-24, 7 or 1-99:2"},
+        {"name": "Frames", "type": "STRING", "default": job.frames, "description": "For example 1-24, 7 or 1-99:2"},
         *([chunk] if job.chunk > 1 else []),
-        _folder("OutputDir", OUTPUT_FOLDER, "OUT", "Folder of the pictures"),
+        _folder("OutputDir", OUTPUT_FOLDER, "OUT", "Folder of the images"),
         {
             "name": "OutputName",
             "type": "STRING",
             "default": job.picture_name,
-            "description": "File name of the pictures; #### is the frame",
+            "description": "File name of the images; #### is the frame",
         },
         {"name": "Blender", "type": "STRING", "default": "blender", "description": "Command that starts Blender"},
         {
             "name": "CondaPackages",
             "type": "STRING",
             "default": "blender",
-            "description": "Read by queues that install software with conda; without meaning elsewhere",
+            "description": "Used by queues that install software with conda, ignored by others",
         },
-        _folder("TetFloraFiles", FILES, "IN", "The extension, its installer, and species of your own"),
+        _folder("TetFloraFiles", FILES, "IN", "The extension, its installer, and your own species"),
         *copied,
     ]
 

@@ -146,11 +146,11 @@ def _scene_for(context: bpy.types.Context) -> tuple[bpy.types.Scene, str]:
     if is_startup(scene):
         for name in ("Cube", "Light"):
             scene.objects[name].hide_viewport = scene.objects[name].hide_render = True
-        return scene, "the startup cube and light are hidden, the camera is kept"
+        return scene, "the default cube and light are hidden, the camera is kept"
     made = bpy.data.scenes.new(NAME)
     if context.window is not None:
         context.window.scene = made
-    return made, f'it is in a new scene, "{scene.name}" is as it was'
+    return made, f'in a new scene; "{scene.name}" is unchanged'
 
 
 def _ground() -> bpy.types.Object:

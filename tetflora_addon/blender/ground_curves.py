@@ -58,7 +58,7 @@ def lines_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[Line
     matrix = world_matrix(obj, depsgraph)
     lines = [((points @ matrix[:3, :3].T + matrix[:3, 3])[:, :2], cyclic) for points, cyclic in found if len(points)]
     if not all(np.isfinite(points).all() for points, _ in lines):
-        raise SceneError(f'The curve "{obj.name}" has points that are no finite numbers; check its transform')
+        raise SceneError(f'The curve "{obj.name}" has points that are not finite numbers; check its transform')
     return [Line(points, cyclic, half_width) for points, cyclic in lines]
 
 
@@ -92,8 +92,7 @@ def _from_spline(spline: bpy.types.Spline, obj: bpy.types.Object) -> tuple[NDArr
         return np.array([p.co[:3] for p in spline.points], dtype=np.float64).reshape(-1, 3), cyclic
     if spline.type != 'BEZIER':
         raise SceneError(
-            f'The NURBS curve "{obj.name}" has a bevel, an extrusion or a fill; remove them, or set its Spline Type to '
-            "Bézier"
+            f'The NURBS curve "{obj.name}" has a bevel, extrusion or fill; remove it, or change its type to Bézier'
         )
     knots = np.array([(p.handle_left, p.co, p.handle_right) for p in spline.bezier_points], dtype=np.float64)
     following = np.roll(knots, -1, axis=0) if cyclic else knots[1:]

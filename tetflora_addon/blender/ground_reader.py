@@ -64,7 +64,7 @@ def read_ground(
     """
     parts = [_read_mesh(obj, depsgraph, vertex_group, uv_layer, image is not None) for obj in objects]
     if not parts:
-        raise SceneError("There is no ground to populate; select a mesh with faces")
+        raise SceneError("No ground to populate; select a mesh with faces")
     triangles, weight, uv, border = zip(*parts, strict=True)
     weights = np.concatenate(weight) if vertex_group else None
     if weights is not None and invert_group:
@@ -78,8 +78,8 @@ def read_ground(
         weight=weights,
         uv=None if image is None else np.concatenate(uv),
         image=grey,
-        areas=() if areas is None else tuple(line.points for line in _lines(areas, depsgraph, "areas", closed=True)),
-        paths=() if paths is None else tuple(_path(line, path_distance) for line in _lines(paths, depsgraph, "paths")),
+        areas=() if areas is None else tuple(line.points for line in _lines(areas, depsgraph, "Areas", closed=True)),
+        paths=() if paths is None else tuple(_path(line, path_distance) for line in _lines(paths, depsgraph, "Paths")),
         border=np.concatenate(border),
     )
 
@@ -95,15 +95,13 @@ def _lines(
     """Curves of a collection, those that are closed or all of them; there is at least one."""
     found = [line for obj in objects_within(collection) for line in lines_of(obj, depsgraph)]
     if not found:
-        raise SceneError(
-            f'The collection "{collection.name}" for {setting} has no curves; draw one, or clear the setting'
-        )
+        raise SceneError(f'The {setting} collection "{collection.name}" has no curves; add one, or clear {setting}')
     if not closed:
         return found
     cyclic = [line for line in found if line.cyclic and len(line.points) > 2]
     if not cyclic:
         raise SceneError(
-            f'No curve of the collection "{collection.name}" for {setting} is closed; in Edit Mode, choose '
+            f'The {setting} collection "{collection.name}" has no closed curves; close one in Edit Mode with '
             "Curve > Toggle Cyclic"
         )
     return cyclic
@@ -155,7 +153,7 @@ def _weights(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, group: str, name
         return _attribute(attribute, "value", 1)
     found = evaluated.vertex_groups.get(group)
     if found is None:
-        raise SceneError(f'"{name}" has no vertex group "{group}"; make one of that name, or clear the Vertex Group')
+        raise SceneError(f'"{name}" has no vertex group "{group}"; add it, or clear Vertex Group')
     index = found.index
     # Weights are lists within lists, which no foreach_get reads.
     each = (next((g.weight for g in v.groups if g.group == index), 0.0) for v in mesh.vertices)
@@ -165,21 +163,23 @@ def _weights(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, group: str, name
 def _uv(mesh: bpy.types.Mesh, layer: str, name: str) -> NDArray[np.float64]:
     """UV of each corner, (c, 2)."""
     if layer and layer not in mesh.uv_layers:
-        raise SceneError(f'"{name}" has no UV map "{layer}"; make one of that name, or clear the UV Map')
+        raise SceneError(f'"{name}" has no UV map "{layer}"; add it, or clear UV Map')
     found = mesh.uv_layers[layer] if layer else next((u for u in mesh.uv_layers if u.active_render), None)
     if found is None:
-        raise SceneError(f'"{name}" has no UV map for the image; unwrap it, or clear the Image')
+        raise SceneError(f'"{name}" has no UV map for the image; unwrap it, or clear Image')
     return _attribute(mesh.attributes[found.name], "vector", 2)
 
 
 def _luminance(image: bpy.types.Image) -> NDArray[np.float32]:
     """Grey values of an image, (h, w), the first row at the bottom."""
     if image.source == 'TILED':
-        raise SceneError(f'The image "{image.name}" has tiles (UDIM), which Populate cannot read; use a single image')
+        raise SceneError(
+            f'The image "{image.name}" has UDIM tiles, which Populate does not support; use a single image'
+        )
     if not (all(image.size) and image.channels):
         raise SceneError(
-            f'The image "{image.name}" cannot be loaded from "{image.filepath}"; find the file with '
-            "File > External Data > Find Missing Files, or clear the Image"
+            f'Cannot load the image "{image.name}" from "{image.filepath}"; find it with '
+            "File > External Data > Find Missing Files, or clear Image"
         )
     pixels = image_pixels(image)
     return pixels[..., :3] @ _LUMINANCE if image.channels >= 3 else pixels[..., 0].copy()

@@ -100,7 +100,7 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     except Exception as error:
         # Blender would print it and render on; the count of errors and the message in the window must not miss it.
         traceback.print_exc()
-        _complain(scene, f"unexpected error, please report it: {error!r}")
+        _complain(scene, f"unexpected error, please report it as a bug: {error!r}")
     finally:
         if not made:
             _take_back(scene)
@@ -238,7 +238,7 @@ def _has_meshes(scene: bpy.types.Scene) -> bool:
 
 def _warn(scene: bpy.types.Scene) -> None:
     """Say, once a session of renders, that the picture will have no plants; nothing is wrong, but it looks so."""
-    text = "nothing is refined, and Refine at Render is off: the render shows no plants"
+    text = "nothing is refined and Refine at Render is off, so the render shows no plants"
     if text in _rendering.warnings:
         return
     _rendering.warnings.append(text)
@@ -247,7 +247,7 @@ def _warn(scene: bpy.types.Scene) -> None:
 
 
 def _complain(scene: bpy.types.Scene, message: str) -> None:
-    text = f"frame {scene.frame_current} rendered without its plants: {message}"
+    text = f"frame {scene.frame_current} was rendered without plants: {message}"
     _rendering.errors.append(text)
     complain(text)
 

@@ -59,15 +59,15 @@ def _resolved(species: Species, form: LeafModel | str, depsgraph: bpy.types.Deps
     found = bpy.data.objects.get(form)
     if found is None:
         raise SpeciesError(
-            f'Species "{species.name}" takes its {kind} from an object "{form}", which this file does not have. '
-            "Add a mesh object of that name, or choose one under Leaf Objects"
+            f'Species "{species.name}" uses the object "{form}" as its {kind}, but this file has no such object. '
+            "Add a mesh object with this name, or choose one under Leaf Objects"
         )
     return _model_of(species, found, depsgraph, kind)
 
 
 def _model_of(species: Species, source: bpy.types.Object, depsgraph: bpy.types.Depsgraph, kind: str) -> LeafModel:
     if source.type != 'MESH':
-        raise SpeciesError(f'"{source.name}" is to be the {kind} of "{species.name}" but is not a mesh object')
+        raise SpeciesError(f'"{source.name}", the {kind} of "{species.name}", is not a mesh object; choose a mesh')
     evaluated = source.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     try:
@@ -75,7 +75,9 @@ def _model_of(species: Species, source: bpy.types.Object, depsgraph: bpy.types.D
     finally:
         evaluated.to_mesh_clear()
     if arrays.polygons == 0:
-        raise SpeciesError(f'"{source.name}" is to be the {kind} of "{species.name}" but its mesh has no faces')
+        raise SpeciesError(
+            f'"{source.name}", the {kind} of "{species.name}", has no faces; add faces or choose another mesh'
+        )
     offsets, corners = arrays.face_offsets, arrays.corner_verts
     faces = [corners[a:b].tolist() for a, b in pairwise(offsets)]
     model = leaf_model(arrays.positions, faces)

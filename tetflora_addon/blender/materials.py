@@ -62,12 +62,12 @@ def scatter_group() -> bpy.types.NodeTree:
     def build(tree: bpy.types.NodeTree) -> None:
         unit = (0.0, 1.0)
         add_socket(tree, "Colour", "NodeSocketColor", (0.1, 0.25, 0.05, 1.0))
-        add_socket(tree, "Transmission", "NodeSocketFloat", 0.0, unit, "Share of the scattered light passing through")
-        add_socket(tree, "Reflected Tint", "NodeSocketColor", WHITE, None, "Multiplies the colour of the other light")
-        add_socket(tree, "Through Tint", "NodeSocketColor", THROUGH_TINT, None, "Multiplies the colour of that light")
-        add_socket(tree, "Gloss", "NodeSocketFloat", GLOSS, unit, "Share of the light that the surface mirrors")
+        add_socket(tree, "Transmission", "NodeSocketFloat", 0.0, unit, "Fraction of scattered light that passes")
+        add_socket(tree, "Reflected Tint", "NodeSocketColor", WHITE, None, "Multiplies the color of reflected light")
+        add_socket(tree, "Through Tint", "NodeSocketColor", THROUGH_TINT, None, "Multiplies the color of passing light")
+        add_socket(tree, "Gloss", "NodeSocketFloat", GLOSS, unit, "Fraction of light that is reflected")
         add_socket(tree, "Gloss Roughness", "NodeSocketFloat", GLOSS_ROUGHNESS, unit)
-        add_socket(tree, "Normal", "NodeSocketVector", None, None, "Always link it, if only to Geometry")
+        add_socket(tree, "Normal", "NodeSocketVector", None, None, "Must be linked, for example to Geometry")
         tree.interface.new_socket(name="Shader", in_out='OUTPUT', socket_type="NodeSocketShader")
         graph = Graph(tree)
         given = graph.node("NodeGroupInput").outputs
@@ -99,10 +99,10 @@ def blade_group() -> bpy.types.NodeTree:
     """
 
     def build(tree: bpy.types.NodeTree) -> None:
-        add_socket(tree, "Colour", "NodeSocketColor", (0.1, 0.25, 0.05, 1.0), None, "Mean colour")
+        add_socket(tree, "Colour", "NodeSocketColor", (0.1, 0.25, 0.05, 1.0), None, "Mean color")
         add_socket(tree, "Transmission", "NodeSocketFloat", 0.4, (0.0, 1.0), "Thick leaves show no veins")
-        add_socket(tree, "Midrib", "NodeSocketFloat", MIDRIB, (0.0, 2.0), "How much lighter it is")
-        add_socket(tree, "Veins", "NodeSocketFloat", VEINS, (0.0, 1.0), "How much lighter they are")
+        add_socket(tree, "Midrib", "NodeSocketFloat", MIDRIB, (0.0, 2.0), "How much lighter the midrib is")
+        add_socket(tree, "Veins", "NodeSocketFloat", VEINS, (0.0, 1.0), "How much lighter the veins are")
         add_socket(tree, "Paler Underside", "NodeSocketFloat", 1.0, (0.0, 4.0))
         for name in ("Colour", "Reflected Tint"):
             tree.interface.new_socket(name=name, in_out='OUTPUT', socket_type="NodeSocketColor")

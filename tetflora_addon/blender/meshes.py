@@ -131,9 +131,11 @@ def check_buffers(buffers: MeshBuffers) -> None:
         if domain not in _DOMAINS:
             raise ValueError(f"Attribute {key}: domain must be one of {', '.join(_DOMAINS)}, not {domain!r}")
         if (values.dtype, values.shape[1:]) not in _TYPES:
-            raise ValueError(f"Attribute {key}: no Blender attribute holds {values.dtype} of shape {values.shape}")
+            raise ValueError(
+                f"Attribute {key}: Blender has no attribute type for {values.dtype} of shape {values.shape}"
+            )
         if len(values) != sizes[domain]:
-            raise ValueError(f"Attribute {key}: {len(values)} values for {sizes[domain]} elements of {domain}")
+            raise ValueError(f"Attribute {key}: has {len(values)} values, but {domain} has {sizes[domain]} elements")
         if key == UV_MAP and (domain != "CORNER" or values.shape[1:] != (2,)):
             raise ValueError(f"Attribute {UV_MAP} must be float32 of shape (corners, 2) on CORNER")
 

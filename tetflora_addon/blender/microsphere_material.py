@@ -48,17 +48,17 @@ def microsphere_group() -> bpy.types.NodeTree:
 
     def build(tree: bpy.types.NodeTree) -> None:
         unit = (0.0, 1.0)
-        add_socket(tree, "Colour", "NodeSocketColor", (0.1, 0.25, 0.05, 1.0), None, "Mean colour of the contents")
-        add_socket(tree, "Transmission", "NodeSocketFloat", 0.0, unit, "Share of the scattered light passing through")
+        add_socket(tree, "Colour", "NodeSocketColor", (0.1, 0.25, 0.05, 1.0), None, "Mean color of the contents")
+        add_socket(tree, "Transmission", "NodeSocketFloat", 0.0, unit, "Fraction of scattered light that passes")
         add_socket(tree, "Normal", "NodeSocketVector", (0.0, 0.0, 1.0), None, "Axis of the planes, of either sign")
         add_socket(tree, "Plane", "NodeSocketFloat", 0.0, unit, "Weight of the plane term; the rest are particles")
-        add_socket(tree, "p", "NodeSocketFloat", 1.0, unit, "Diffuse share of the particle and plane terms")
-        add_socket(tree, "s", "NodeSocketFloat", 0.04, unit, "Specular share of the plane term")
+        add_socket(tree, "p", "NodeSocketFloat", 1.0, unit, "Diffuse weight of the particle and plane terms")
+        add_socket(tree, "s", "NodeSocketFloat", 0.04, unit, "Specular weight of the plane term")
         add_socket(tree, "spear", "NodeSocketFloat", 7.5, (0.0, 1000.0), "Exponent of the plane term's highlight")
-        add_socket(tree, "Through Tint", "NodeSocketColor", THROUGH_TINT, None, "Multiplies the colour of that light")
-        about = "0: particles turn to the viewer as in the paper; 1: they are round, as seen from any side"
+        add_socket(tree, "Through Tint", "NodeSocketColor", THROUGH_TINT, None, "Multiplies the color of passing light")
+        about = "0: particles face the viewer, as in the paper; 1: particles are round from all sides"
         add_socket(tree, "Roundness", "NodeSocketFloat", 1.0, unit, about)
-        about = "Normal of particles that have a surface of their own; left at zero, they turn to the viewer"
+        about = "Normal of particles with their own surface; at zero, particles face the viewer"
         add_socket(tree, "Facing", "NodeSocketVector", (0.0, 0.0, 0.0), None, about)
         for name in ("Cycles", "EEVEE"):
             tree.interface.new_socket(name=name, in_out='OUTPUT', socket_type="NodeSocketShader")

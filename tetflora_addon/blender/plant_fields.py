@@ -125,7 +125,7 @@ def read_field(
     seed = _joined([_seeds(obj, *part, first) for part, first in zip(sized, firsts, strict=False)], (0,))
     kinds = field_kinds(obj)
     species = _joined([_integers(obj, part, "species", size, 0) for part, size in sized], (0,))
-    _refuse(obj, (species < 0) | (species >= len(kinds)), f"a species that its list of {len(kinds)} does not have")
+    _refuse(obj, (species < 0) | (species >= len(kinds)), f"a species number outside the list of {len(kinds)} species")
     if keys is not None:
         seed = child_key(key_of_seed(seed), keys[:, None]).view(np.int64).reshape(-1)
     matrices = matrices.astype(np.float64)  # single precision in some versions of Blender
@@ -134,7 +134,7 @@ def read_field(
         place = (position @ world.transpose(0, 2, 1) + matrices[:, None, :3, 3]).reshape(-1, 3)
         frame, scale, sound = _frames(world, rotation, own_scale)
         sound &= np.isfinite(place.sum(axis=1))
-    _refuse(obj, ~sound.reshape(len(matrices), -1).all(axis=0), "scale 0 or no valid position or rotation")
+    _refuse(obj, ~sound.reshape(len(matrices), -1).all(axis=0), "zero scale or an invalid position or rotation")
     return Plants(obj.name, kinds, np.tile(species.astype(np.int32), len(matrices)), seed, place, frame, scale)
 
 
@@ -223,8 +223,8 @@ def _attribute(obj: bpy.types.Object, points: Points, name: str, kinds: Iterable
         return None
     if found.domain != 'POINT' or found.data_type not in kinds:
         raise SceneError(
-            f'"{obj.name}": its attribute "{found.name}" is {found.data_type} on {found.domain}; a field of plants '
-            f"needs {' or '.join(sorted(kinds))} on POINT. Convert it, or store it as {PREFIX}{name}"
+            f'"{obj.name}": attribute "{found.name}" is {found.data_type} on {found.domain}; a field requires '
+            f"{' or '.join(sorted(kinds))} on POINT. Convert it, or store the values as {PREFIX}{name}"
         )
     return found
 
@@ -279,7 +279,7 @@ def _scales(obj: bpy.types.Object, points: Points, size: int, least: int) -> NDA
         return np.ones((least, size))
     values = _values(attribute, size)
     if values.ndim == 1:
-        _refuse(obj, ~(values > 0.0), "a scale that is not above 0")
+        _refuse(obj, ~(values > 0.0), "a scale that is not greater than 0")
         values = np.broadcast_to(values[:, None], (size, least))
     return np.ascontiguousarray(values.T, np.float64)
 
@@ -333,8 +333,8 @@ def _frames(
 def _refuse(obj: bpy.types.Object, bad: NDArray[np.bool_], what: str) -> None:
     if bad.any():
         raise SceneError(
-            f'"{obj.name}": {int(bad.sum()):,} of {len(bad):,} points have {what}, the first is point '
-            f"{int(np.argmax(bad))}; correct or delete them, or switch the field off in the sidebar's TetFlora tab"
+            f'"{obj.name}": {int(bad.sum()):,} of {len(bad):,} points have {what}; the first is point '
+            f"{int(np.argmax(bad))}. Correct or delete them, or disable the field in the TetFlora tab of the sidebar"
         )
 
 

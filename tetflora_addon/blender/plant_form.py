@@ -50,12 +50,13 @@ def read_skeleton(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skel
     """
     if obj.type not in FORM_TYPES:
         raise SpeciesError(
-            f'"{obj.name}" cannot be the form of a plant: choose a curve, hair curves, or a mesh of edges without faces'
+            f'"{obj.name}" cannot be used as the form of a plant: '
+            "choose a curve, hair curves, or a mesh of edges without faces"
         )
     matrix = world_matrix(obj, depsgraph)
     _, scale, sound = frames_of(matrix[None, :3, :3])
     if not sound[0]:
-        raise SpeciesError(f'"{obj.name}" cannot be the form of a plant: its scale is 0; press Alt S on it')
+        raise SpeciesError(f'"{obj.name}" cannot be used as the form of a plant: its scale is 0; clear it with Alt S')
     if obj.type == 'MESH':
         (points, edges), line = _of_mesh(obj, depsgraph), None
     else:
@@ -79,8 +80,8 @@ def _of_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[NDA
     # A modifier such as Skin clothes the edges with faces: what was modelled is the skeleton.
     if len(obj.data.polygons):
         raise SpeciesError(
-            f'"{obj.name}" cannot be the form of a plant: it has faces. Leave only the edges along the centres of '
-            "branches (in Edit Mode X > Only Faces), or draw them as a curve"
+            f'"{obj.name}" cannot be used as the form of a plant: it has faces. Keep only edges along the centers of '
+            "branches (X > Only Faces in Edit Mode), or use a curve"
         )
     return _mesh_arrays(obj.data)
 

@@ -105,7 +105,7 @@ def plant_mesh(scene: bpy.types.Scene, name: str, species: Species, parts: list[
         materials += materials_of(scene, species, part.kind, part.form)
     whole = concatenate_buffers(numbered)
     if whole is None:
-        raise SceneError(f'A plant of "{species.name}" has neither branches nor leaves')
+        raise SceneError(f'A plant of "{species.name}" has no branches or leaves; edit the species')
     mesh = write_mesh(name, whole, materials)
     sharp = np.repeat([not p.buffers.smooth for p in parts], [p.buffers.polygons for p in parts])
     if sharp.any():
@@ -156,13 +156,13 @@ def make_plant_mesh_steps(
     frame, scale, sound = frames_of(world[:, :3, :3])
     for plant, good in zip(plants, sound, strict=True):
         if not good:
-            raise SceneError(f'"{plant.name}": scale 0 or no valid position; give a scale above 0 (Alt S resets it)')
+            raise SceneError(f'"{plant.name}": zero scale or an invalid position; clear them with Alt S and Alt G')
     floras = {kind_of(p): job.compile_for((kind_of(p),), scene, depsgraph) for p in plants}
     seeds = [single_seed(kind_of(p), p.tetflora.seed, f) for p, f in zip(plants, frame, strict=True)]
     polygons = sum(expected_polygons(floras[s.identifiers[0]], s) for s in seeds)
     if polygons > MOST_POLYGONS:
         raise SceneError(
-            f"{len(plants):,} plants have some {polygons:,.0f} polygons, more than {MOST_POLYGONS:,}; select fewer"
+            f"{len(plants):,} plants have about {polygons:,.0f} polygons; select fewer, the limit is {MOST_POLYGONS:,}"
         )
     made, switched = [], []
     whole = False

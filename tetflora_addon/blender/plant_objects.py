@@ -219,7 +219,7 @@ def plants_from_field(
     if not 0 < len(read) <= most:
         raise SceneError(
             f'"{field.name}" has {len(read):,} plants; '
-            + (f"at most {most:,} can become objects, so split the mesh first" if len(read) else "nothing to make")
+            + (f"the limit for objects is {most:,}. Split the field first" if len(read) else "add points first")
         )
     angles = np.array([Matrix(frame).to_euler() for frame in read.frame])
     species, forms = [species_of(kind) for kind in read.kinds], [form_of(kind) for kind in read.kinds]

@@ -118,7 +118,7 @@ def dots_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: 
     """
     population = shown_population(scene)
     if population.frozen:
-        raise TetFloraError(f'"{population.name}" is frozen; its plants stay where they are')
+        raise TetFloraError(f'"{population.name}" is frozen and keeps its plants; turn off Freeze to preview changes')
     grounds = None
     if not population.uid:  # settings for a new population, which would grow on what is selected
         chosen = [o for o in view_layer.objects if o.select_get(view_layer=view_layer)]
@@ -148,7 +148,7 @@ def status(population: bpy.types.PropertyGroup) -> str:
     if dots is not None and dots.more and not population.by_density:
         number, known = population.count, True
     if not known:
-        return "As many plants as the ground takes"
+        return "As many plants as fit on the ground"
     made_as = "one field" if makes_field(population, number) else "empties"
     more = "more than " if dots is not None and dots.more and population.by_density else ""
     return f"{more}{number:,} plant{'' if number == 1 else 's'}, as {made_as}"

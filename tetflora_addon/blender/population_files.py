@@ -48,7 +48,7 @@ def write_populations(populations: Iterable[TetFloraPopulation], path: Path) -> 
     try:
         write_whole(path, text)
     except OSError as error:
-        raise SceneError(f"{path.name}: cannot be written: {error.strerror}") from None
+        raise SceneError(f"Cannot write {path.name}: {error.strerror}") from None
     return path
 
 
@@ -77,9 +77,9 @@ def read_populations(
     try:
         data = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
     except OSError as error:
-        raise SceneError(f"{path.name}: cannot be read: {error.strerror}") from None
+        raise SceneError(f"{path.name}: cannot read the file: {error.strerror}") from None
     except (ValueError, RecursionError) as error:
-        raise SceneError(f"{path.name}: is not JSON: {error}") from None
+        raise SceneError(f"{path.name}: is not valid JSON: {error}") from None
     try:
         entries = _checked(data)
     except ValueError as error:
@@ -128,7 +128,7 @@ def _value(prop: bpy.types.Property, value: Any) -> Any:
 
 
 def _refuse_constant(name: str) -> float:
-    raise ValueError(f"{name} is no number")
+    raise ValueError(f"{name} is not a number")
 
 
 def _checked(data: Any) -> list[dict[str, Any]]:
@@ -141,9 +141,11 @@ def _checked(data: Any) -> list[dict[str, Any]]:
     """
     _keys("the file", data, {"format", "version", "populations"}, {"format", "version", "populations"})
     if data["format"] != FORMAT:
-        raise ValueError(f'"format" is {data["format"]!r}; this is no file of populations, which has "{FORMAT}"')
+        raise ValueError(f'"format" is {data["format"]!r}; population files have "{FORMAT}"')
     if data["version"] != VERSION or isinstance(data["version"], bool):
-        raise ValueError(f'"version" is {data["version"]!r}; this TetFlora reads {VERSION}, so update the extension')
+        raise ValueError(
+            f'"version" is {data["version"]!r}; this version of TetFlora reads {VERSION}; update the extension'
+        )
     entries = _list_of("populations", data["populations"])
     simple = {p.identifier: p for p in _simple_settings(TetFloraPopulation)}
     mix = {name: TetFloraMixEntry.bl_rna.properties[name] for name in _MIX}
@@ -191,8 +193,8 @@ def _check_number(where: str, prop: bpy.types.Property, value: Any) -> None:
         stored = value if whole else float(np.float32(radians(value) if angle else value))
     if not prop.hard_min <= stored <= prop.hard_max:
         low, high = (degrees(b) if angle else b for b in (prop.hard_min, prop.hard_max))
-        upper = f"to {high:.6g}" if abs(high) < _ENDLESS else "on"
-        raise ValueError(f"{where} is {value!r}; it must be from {low:.6g} {upper}")
+        limits = f"from {low:.6g} to {high:.6g}" if abs(high) < _ENDLESS else f"{low:.6g} or greater"
+        raise ValueError(f"{where} is {value!r}; it must be {limits}")
 
 
 def _keys(where: str, data: Any, needed: set[str], known: set[str]) -> None:
@@ -212,7 +214,7 @@ def _list_of(where: str, value: Any) -> list:
 
 def _text(where: str, value: Any) -> None:
     if not isinstance(value, str):
-        raise ValueError(f"{where} is {value!r}; it must be a text")
+        raise ValueError(f"{where} is {value!r}; it must be a string")
 
 
 def _fill(population: TetFloraPopulation, entry: dict[str, Any], scene: bpy.types.Scene, missing: list[str]) -> None:

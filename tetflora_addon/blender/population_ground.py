@@ -67,13 +67,13 @@ def place_population(
     """
     unknown = unknown_species(population)
     if unknown:
-        raise SceneError(f'Unknown species "{unknown[0]}" to populate with; the catalogue has {", ".join(catalogue())}')
+        raise SceneError(f'Unknown species "{unknown[0]}"; choose one of {", ".join(catalogue())}')
     grounds = grounds_of(scene, population) if grounds is None else grounds
     if not grounds:
         raise SceneError(
-            f'"{population.name}" has no ground in this scene; select meshes and press Use Selected Meshes'
+            f'"{population.name}" has no ground in this scene; select meshes and click Use Selected Meshes'
             if population.uid
-            else "Select the mesh on which plants shall grow"
+            else "Select a mesh to plant on"
         )
     rules, species = rules_from(population)
     if most is not None:

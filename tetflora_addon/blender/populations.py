@@ -139,8 +139,8 @@ def make_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, populati
     placement, species = place_population(scene, depsgraph, population, set(own))
     if population.as_field == 'EMPTIES' and len(placement) > MOST_EMPTIES:
         raise SceneError(
-            f"{len(placement):,} plants are too many for objects of their own, at most {MOST_EMPTIES:,}; "
-            "make a Field, or fewer plants"
+            f"{len(placement):,} plants exceed the limit of {MOST_EMPTIES:,} empties; "
+            "set Make to Field, or use fewer plants"
         )
     returned = max(population.made - own_number(own), 0)
     _release(copies)
@@ -208,7 +208,7 @@ def refuse_frozen(population: TetFloraPopulation) -> None:
         It is frozen.
     """
     if population.frozen:
-        raise SceneError(f'"{population.name}" is frozen and keeps its plants; press Freeze again to go on with it')
+        raise SceneError(f'"{population.name}" is frozen and keeps its plants; turn off Freeze to change it')
 
 
 def _sorted_out(

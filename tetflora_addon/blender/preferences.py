@@ -104,9 +104,9 @@ def own_species_folder() -> Path:
         if folder is not None:
             folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise SpeciesError(f"The species folder cannot be made: {error}; name another in the preferences") from None
+        raise SpeciesError(f"Cannot create the species folder: {error}. Choose another in the preferences") from None
     if folder is None:
-        raise SpeciesError("There is no folder for your own species; name one in TetFlora's preferences")
+        raise SpeciesError("No folder for your own species; set a Species Folder in the TetFlora preferences")
     return folder
 
 

@@ -137,27 +137,27 @@ def lines_of(scene: bpy.types.Scene, preview: Preview) -> list[tuple[str, tuple[
     if preview.levels is not None:
         level = preview.levels.at(settings.level)
         figures, last = level.figures, preview.levels.levels[-1].number
-        lines.append((f"Level {level.number} of {last}   {len(level):,} tetrahedra hold plants", _TEXT))
+        lines.append((f"Level {level.number} of {last}   {len(level):,} tetrahedra with plants", _TEXT))
         parts = (
             (Decision.EXPLICIT, "explicit", figures.explicit),
             (Decision.PROXY, "proxies", figures.proxy),
             (Decision.HIDDEN, "hidden", figures.hidden),
-            (Decision.SPLIT, "to divide", figures.split),
+            (Decision.SPLIT, "to split", figures.split),
         )
         for decision, name, number in parts:
             colour = (*FORMS[decision], 1.0) if settings.colour == 'FORM' else _TEXT
             lines.append((f"    {number:,} {name}", colour))
-        lines.append((f"    {figures.polygons:,} polygons in explicit ones", _TEXT))
+        lines.append((f"    {figures.polygons:,} explicit polygons", _TEXT))
         if settings.colour != 'FORM' and settings.wires:
-            lines.append(("    dark: little    bright: much", _TEXT))
+            lines.append(("    dark: low    bright: high", _TEXT))
     if preview.shapes is not None:
         shapes = preview.shapes
         of = f" of {shapes.of:,}" if shapes.of > shapes.plants else ""
-        lines.append((f"{shapes.plants:,}{of} plants previewed", _TEXT))
+        lines.append((f"{shapes.plants:,}{of} plants shown", _TEXT))
     if preview.frozen is not None:
-        lines.append(("The camera is frozen", _FROZEN))
+        lines.append(("Camera frozen", _FROZEN))
     elif preview_state.is_outdated(scene):
-        lines.append(("The camera has changed: compute the levels again, or freeze it", _COMPLAINT))
+        lines.append(("The camera has changed; compute the levels again, or freeze the camera", _COMPLAINT))
     return lines
 
 
@@ -188,7 +188,7 @@ def _guarded(draw: Callable[[bpy.types.Context, Preview], None]) -> None:
         draw(context, preview)
     except Exception:
         preview.cache["broken"] = preview.made
-        print("TetFlora: the preview cannot be drawn; please report this:", file=sys.stderr)
+        print("TetFlora: cannot draw the preview; please report this as a bug:", file=sys.stderr)
         traceback.print_exc()
     finally:
         gpu.state.blend_set('NONE')

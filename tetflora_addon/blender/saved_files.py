@@ -54,13 +54,13 @@ def write_blend(path: Path, write: Callable[[str], object]) -> None:
     try:
         write(str(part))
         if cut_off(part):
-            raise SceneError(f"{path} cannot be written: the disk is full")
+            raise SceneError(f"Cannot write {path}: the disk is full")
         part.replace(path)
     except (OSError, RuntimeError) as error:
         reason = " ".join(str(error).split()).removeprefix("Error: ")
         # What Blender says of a full disk.
-        reason = "is the disk full?" if reason == "Success" else reason
-        raise SceneError(f"{path} cannot be written: {reason}") from None
+        reason = "check the free disk space" if reason == "Success" else reason
+        raise SceneError(f"Cannot write {path}: {reason}") from None
     finally:
         with suppress(OSError):
             part.unlink(missing_ok=True)
@@ -71,10 +71,10 @@ def _on_save_post(path: str, _other: object = None) -> None:
     saved = Path(path)
     if saved.name.endswith(PART[1]) or not cut_off(saved):
         return
-    text = f"{saved} was not written to its end: the disk is full. Make room and save again, now"
+    text = f"{saved} is incomplete because the disk is full. Free some space and save again now"
     older = saved.with_name(saved.name + "1")
     if older.is_file():
-        text += f"; the state before is in {older.name}, until you save twice"
+        text += f". The previous version is in {older.name} until you save twice"
     complain(text)
 
 

@@ -22,7 +22,7 @@ from .surfaces import mesh_triangles
 from .transforms import frames_of, world_matrix
 
 _OCCLUDER_REMEDY = (
-    "it is marked as hiding plants: make it a mesh with faces, or take the mark away in the sidebar's TetFlora tab"
+    "an occluder must be a mesh with faces. Add faces, or turn off Occluder in the TetFlora tab of the sidebar"
 )
 _NAMED = 3  # objects that a message names before it only counts
 
@@ -72,17 +72,16 @@ def read_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_lay
 
 def _none_left(off: bool, fields: list[str], hidden: int) -> str:
     if off:
-        return "All plants of the scene are switched off; enable some in the sidebar's TetFlora tab"
+        return "All plants in the scene are disabled; enable some in the TetFlora tab of the sidebar"
     if fields:
-        return f"{_listed(fields)}: a field of plants without points; give it vertices, or populate a terrain"
+        return f"{_listed(fields)}: the field of plants has no points; add vertices, or populate a mesh"
     if hidden:
         return (
-            f"No plants are there to render; {hidden:,} of the scene's are hidden in renders or excluded from the view "
-            "layer, by themselves or with their collections, as the outliner shows"
+            f"No plants to render; {hidden:,} are hidden in renders or excluded from the view layer. Enable them "
+            "or their collections in the Outliner"
         )
     return (
-        "No plants are there to render; add some with Add > TetFlora Plant or with Populate in the sidebar's "
-        "TetFlora tab"
+        "No plants to render; add some with Add > TetFlora Plant, or with Populate in the TetFlora tab of the sidebar"
     )
 
 
@@ -127,7 +126,7 @@ def _placed(
     if not sound.all():
         bad = [names[min(i, len(names) - 1)] for i in np.flatnonzero(~sound)[: _NAMED * len(names)].tolist()]
         raise SceneError(
-            f"{_listed(list(dict.fromkeys(bad)))}: scale 0 or no valid position; give a scale above 0 (Alt S resets it)"
+            f"{_listed(list(dict.fromkeys(bad)))}: zero scale or an invalid position; clear them with Alt S and Alt G"
         )
     return Plants(names[0] if names else "", kinds, species, seeds, matrices[:, :3, 3].copy(), frame, scale)
 
@@ -229,8 +228,8 @@ def _check_species(plants: list[tuple[str, str]]) -> None:
         species = bad[0][1]
         raise SceneError(
             f'{_listed([name for name, other in bad if other == species])}: unknown species "{species}"; choose '
-            "another in the sidebar's TetFlora tab, or put "
-            f"{species or 'its file'}{'.json' if species else ''} into your species folder, as Load Species does"
+            "another in the TetFlora tab of the sidebar, or add "
+            f"{species or 'its file'}{'.json' if species else ''} with Load Species"
         )
 
 

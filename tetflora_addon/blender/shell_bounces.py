@@ -41,6 +41,6 @@ def few_bounces(scene: bpy.types.Scene) -> str:
     if cycles.transparent_max_bounces >= FEW_BOUNCES:
         return ""
     return (
-        f"{cycles.transparent_max_bounces} transparent bounces are too few: Cycles draws shells black; raise Render > "
+        f"Cycles renders shells black with {cycles.transparent_max_bounces} transparent bounces; raise Render > "
         f"Light Paths > Max Bounces > Transparent to {SHELL_BOUNCES}"
     )

@@ -40,13 +40,13 @@ def shell_group() -> bpy.types.NodeTree:
 
     def build(tree: bpy.types.NodeTree) -> None:
         unit = (0.0, 1.0)
-        add_socket(tree, "p", "NodeSocketFloat", 1.0, unit, "Diffuse share of the particle and plane terms")
-        add_socket(tree, "s", "NodeSocketFloat", 0.04, unit, "Specular share of the plane term")
+        add_socket(tree, "p", "NodeSocketFloat", 1.0, unit, "Diffuse weight of the particle and plane terms")
+        add_socket(tree, "s", "NodeSocketFloat", 0.04, unit, "Specular weight of the plane term")
         add_socket(tree, "spear", "NodeSocketFloat", 7.5, (0.0, 1000.0), "Exponent of the plane term's highlight")
-        add_socket(tree, "Through Tint", "NodeSocketColor", THROUGH_TINT, None, "Colour of transmitted light")
+        add_socket(tree, "Through Tint", "NodeSocketColor", THROUGH_TINT, None, "Color of transmitted light")
         add_socket(tree, "Roundness", "NodeSocketFloat", 1.0, unit, "0: particles face the viewer; 1: they are round")
-        add_socket(tree, "Variation", "NodeSocketFloat", 0.05, unit, "Lighter and darker cells, by up to this share")
-        add_socket(tree, "Stochastic", "NodeSocketFloat", 1.0, unit, "1: each sample sees all or nothing, far faster")
+        add_socket(tree, "Variation", "NodeSocketFloat", 0.05, unit, "Variation of lightness between cells")
+        add_socket(tree, "Stochastic", "NodeSocketFloat", 1.0, unit, "1: samples are opaque or clear, much faster")
         for name in ("Cycles", "EEVEE"):
             tree.interface.new_socket(name=name, in_out='OUTPUT', socket_type="NodeSocketShader")
         graph = Graph(tree)

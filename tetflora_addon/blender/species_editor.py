@@ -19,7 +19,7 @@ from .species_whole import WholeSpecies
 
 #: Added to a key's name for the property of a range's second number.
 VARIATION = "_variation"
-_VARIES = "By how much single ones differ from the mean, to both sides"
+_VARIES = "Maximum deviation from the mean, in both directions"
 
 
 def order_keys() -> dict[str, Key]:
@@ -28,7 +28,7 @@ def order_keys() -> dict[str, Key]:
 
 
 def _label(name: str) -> str:
-    return name.replace("_", " ").title()
+    return name.replace("_", " ").replace("colour", "color").title()
 
 
 def _description(name: str, key: Key) -> str:

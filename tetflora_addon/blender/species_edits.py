@@ -41,9 +41,9 @@ class TetFloraSpeciesEdit(bpy.types.PropertyGroup):
     """A species as this file has it."""
 
     identifier: StringProperty(
-        name="Identifier", description="Species of the catalogue that the text replaces in this file, or a new one"
+        name="Identifier", description="Catalog species that the text replaces in this file, or a new species"
     )
-    text: StringProperty(name="Text", description="The species as JSON, as in a species file")
+    text: StringProperty(name="Text", description="The species in JSON, as in a species file")
 
 
 def listed() -> dict[str, SpeciesInfo]:
@@ -162,7 +162,7 @@ def species_data(scene: bpy.types.Scene | None, identifier: str) -> dict[str, An
         return _decoded(edit.text, identifier)
     known = listed()
     if identifier not in known:
-        raise SpeciesError(f'Unknown species "{identifier}"; the catalogue has {", ".join(known) or "none"}')
+        raise SpeciesError(f'Unknown species "{identifier}"; available: {", ".join(known) or "none"}')
     if identifier not in _read:
         path = known[identifier].path
         status = path.stat()
@@ -177,7 +177,7 @@ def _decoded(text: str, name: str) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise SpeciesError(f"{name}: is not valid JSON: {error}") from None
     if not isinstance(data, dict):
-        raise SpeciesError(f"{name}: is not a JSON object")
+        raise SpeciesError(f"{name}: must be a JSON object")
     return data
 
 
@@ -186,7 +186,7 @@ def _decoded_file(path: Path, _modified: int, _size: int) -> dict[str, Any]:
     try:
         return _decoded(path.read_text(encoding="utf-8-sig"), path.name)
     except (OSError, UnicodeDecodeError) as error:
-        raise SpeciesError(f"{path.name}: cannot be read: {error}") from None
+        raise SpeciesError(f"{path.name}: cannot read the file: {error}") from None
 
 
 def change_species(scene: bpy.types.Scene, identifier: str, change: Callable[[dict[str, Any]], None]) -> None:

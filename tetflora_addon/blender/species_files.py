@@ -56,7 +56,7 @@ def write_species(scene: bpy.types.Scene, identifier: str, path: Path) -> Path:
     try:
         write_whole(path, as_text(species_data(scene, identifier)))
     except OSError as error:
-        raise SpeciesError(f"{path.name}: cannot be written: {error.strerror}") from None
+        raise SpeciesError(f"Cannot write {path.name}: {error.strerror}") from None
     return path
 
 
@@ -94,11 +94,12 @@ def load_species_file(path: Path, replace: bool = False) -> str:
             return path.stem
         if target.exists() and not replace:
             raise SpeciesError(
-                f'You have another species "{path.stem}" already; switch on Replace in the file browser, or rename it'
+                f'Your species folder already has another "{path.stem}"; turn on Replace in the file browser, or '
+                "rename it"
             )
         write_whole(target, content)
     except OSError as error:
-        raise SpeciesError(f"{target.name}: cannot be written: {error.strerror}") from None
+        raise SpeciesError(f"Cannot write {target.name}: {error.strerror}") from None
     tell_listeners()
     return path.stem
 
@@ -113,10 +114,10 @@ def delete_species_file(identifier: str) -> Path:
     """
     path = own_file(identifier)
     if path is None:
-        raise SpeciesError(f'There is no file of your own for "{identifier}"; shipped species cannot be deleted')
+        raise SpeciesError(f'"{identifier}" has no file in your species folder; built-in species cannot be deleted')
     try:
         path.unlink()
     except OSError as error:
-        raise SpeciesError(f"{path.name}: cannot be deleted: {error.strerror}") from None
+        raise SpeciesError(f"Cannot delete {path.name}: {error.strerror}") from None
     tell_listeners()
     return path

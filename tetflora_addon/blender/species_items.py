@@ -57,9 +57,9 @@ def _items(known: Mapping[str, SpeciesInfo], icons: Mapping[str, int], present: 
         for i in known.values()
     ]
     if present and present not in known:
-        text = "The catalogue does not have this species; refining the scene will fail until it does"
+        text = "This species is not in the catalog; Refine fails until you add it or choose another"
         items.append((present, f"{present} (missing)", text, 'ERROR', number_of(present)))
-    return items or [(NO_SPECIES, "No species found", "The catalogue is empty", 'ERROR', 0)]
+    return items or [(NO_SPECIES, "No species found", "The catalog is empty", 'ERROR', 0)]
 
 
 def operator_items(_operator: bpy.types.OperatorProperties, _context: bpy.types.Context | None) -> list[Item]:
@@ -85,5 +85,5 @@ def default_species() -> str:
     """
     known: Sequence[str] = tuple(catalogue())
     if not known:
-        raise SpeciesError("The catalogue has no species; reinstall TetFlora or name a folder in its preferences")
+        raise SpeciesError("The catalog has no species; reinstall TetFlora, or set a Species Folder in the preferences")
     return known[0]

@@ -94,7 +94,7 @@ def refresh() -> None:
         return  # the last plant that could be grown stays
     _place(scene, mesh)
     _state.seconds = time.perf_counter() - begin
-    cut = f" of the first {orders} orders; all would be too many to follow a slider" if orders else ""
+    cut = f" in the first {orders} orders; the others are omitted to keep the preview interactive" if orders else ""
     _state.message, _state.failed = f"{len(mesh.polygons):,} polygons{cut}", False
     redraw()
 

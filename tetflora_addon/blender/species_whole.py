@@ -44,10 +44,10 @@ def _order_items(editor: bpy.types.PropertyGroup, _context: Any) -> list[tuple[s
 
 _LEAF_ITEMS = [
     *((name, name.capitalize(), f"{m.polygons} faces", i) for i, (name, m) in enumerate(LEAF_MODELS.items())),
-    (OBJECT_LEAF, "Mesh Object", "A mesh object of this file, one unit long, along +Y", len(LEAF_MODELS)),
-    (OWN_LEAF, "Forms of the Species", "Polygons of the species file's own, or several forms", len(LEAF_MODELS) + 1),
+    (OBJECT_LEAF, "Mesh Object", "Mesh object of this file, one unit long along +Y", len(LEAF_MODELS)),
+    (OWN_LEAF, "From Species File", "Polygons from the species file, or several forms", len(LEAF_MODELS) + 1),
 ]  # fmt: skip
-_BLOSSOM_ITEMS = [*_LEAF_ITEMS, (NO_LEAF, "None", "The species has neither blossoms nor fruit", len(_LEAF_ITEMS))]
+_BLOSSOM_ITEMS = [*_LEAF_ITEMS, (NO_LEAF, "None", "The species has no blossoms or fruit", len(_LEAF_ITEMS))]
 
 
 def _forms(editor: bpy.types.PropertyGroup, kind: str) -> dict[str, Any]:
@@ -88,7 +88,7 @@ def _form_property(kind: str, items: list[tuple[str, str, str, int]], name: str,
 def _object_property(kind: str) -> Any:
     return StringProperty(
         name=f"{kind.capitalize()} Object",
-        description=f"Mesh object that is the {kind}: its stalk at the origin, along +Y, its upper side towards +Z",
+        description=f"Mesh object used as the {kind}: stalk at the origin, pointing along +Y, upper side facing +Z",
         get=lambda self: str(_forms(self, kind).get("object", "")),
         set=lambda self, value: set_species_value(self, kind, {"object": value}),
         options={'SKIP_SAVE'},
@@ -99,7 +99,7 @@ def _transmission_property(kind: str) -> Any:
     key = f"{kind}_transmission"
     return FloatProperty(
         name=f"{kind.capitalize()} Translucency",
-        description=f"Share of the light scattered by a {kind} that goes through it",
+        description=f"Fraction of the light scattered by a {kind} that passes through it",
         subtype='FACTOR',
         min=0.0,
         max=1.0,
@@ -115,7 +115,7 @@ class WholeSpecies(SpeciesChoice):
     order_index: IntProperty(name="Active Order", min=0, options={'HIDDEN'})
     order: EnumProperty(
         name="Order",
-        description="Generation of branches that the sliders show: 0 is the trunk, 1 grows on the trunk",
+        description="Generation of branches to edit: 0 is the trunk, 1 grows on the trunk",
         items=_order_items,
         get=present_order,
         set=lambda self, number: setattr(self, "order_index", number),
@@ -123,7 +123,7 @@ class WholeSpecies(SpeciesChoice):
     )
     preview_seed: IntProperty(
         name="Seed",
-        description="Which individual of the species the preview shows",
+        description="Individual of the species to show in the preview",
         default=1,
         min=0,
         update=lambda _self, _context: tell_listeners(),
@@ -131,36 +131,36 @@ class WholeSpecies(SpeciesChoice):
     )
     species_name: StringProperty(
         name="Name",
-        description="What menus show; the identifier that plants refer to stays",
+        description="Name shown in menus; the identifier that plants refer to does not change",
         get=lambda self: str(species_value(self, "name", "")),
         set=lambda self, value: set_species_value(self, "name", value),
         options={'SKIP_SAVE'},
     )
     species_description: StringProperty(
         name="Description",
-        description="One sentence for the tooltip in menus",
+        description="Tooltip of the species in menus, in one sentence",
         get=lambda self: str(species_value(self, "description", "")),
         set=lambda self, value: set_species_value(self, "description", value),
         options={'SKIP_SAVE'},
     )
-    leaf_form: _form_property("leaf", _LEAF_ITEMS, "Leaf Model", "Polygons that are copied to every leaf")
+    leaf_form: _form_property("leaf", _LEAF_ITEMS, "Leaf Model", "Shape of each leaf")
     leaf_object: _object_property("leaf")
     leaf_transmission: _transmission_property("leaf")
     blossom_form: _form_property(
-        "blossom", _BLOSSOM_ITEMS, "Blossom Model", "Polygons of blossoms or fruit, for orders whose Leaf Kind says so"
+        "blossom", _BLOSSOM_ITEMS, "Blossom Model", "Shape of blossoms or fruit, used by orders of this Leaf Kind"
     )
     blossom_object: _object_property("blossom")
     blossom_transmission: _transmission_property("blossom")
     exact: BoolProperty(
         name="Exact Plant",
-        description="All plants of the species are the same: no variation, whatever their seeds",
+        description="Make all plants of the species identical: ignore variation and seeds",
         get=lambda self: species_value(self, "exact", False) is True,
         set=lambda self, value: set_species_value(self, "exact", value),
         options={'SKIP_SAVE'},
     )
     bark: EnumProperty(
         name="Bark",
-        description="Character of the bark's pattern",
+        description="Pattern of the bark",
         items=[(name, name.capitalize(), "", number) for number, name in enumerate(BARKS)],
         get=lambda self: BARKS.index(value) if (value := species_value(self, "bark", BARKS[0])) in BARKS else 0,
         set=lambda self, number: set_species_value(self, "bark", BARKS[number]),
@@ -168,7 +168,7 @@ class WholeSpecies(SpeciesChoice):
     )
     quality: FloatProperty(
         name="Quality",
-        description="Polygons of a plant, of those that are described: fewer and larger leaves, or more and finer ones",
+        description="Polygon multiplier for this species: below 1 fewer, larger leaves; above 1 more, finer ones",
         min=QUALITY_LIMITS[0],
         max=QUALITY_LIMITS[1],
         soft_min=0.02,

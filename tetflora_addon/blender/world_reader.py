@@ -97,14 +97,14 @@ def read_world(scene: bpy.types.Scene) -> WorldLight:
     nodes = list(_upstream(output.inputs["Surface"])) if output else []
     background = next((n for n in nodes if n.type == 'BACKGROUND'), None)
     if background is None:
-        note = "the world has no Background node and counts as black" if nodes else ""
+        note = "the world has no Background node and is treated as black" if nodes else ""
         return WorldLight(BLACK, note=note)
     strength, notes = background.inputs["Strength"], []
     factor = 1.0 if strength.is_linked else float(strength.default_value)
     if strength.is_linked:
-        notes.append("the strength of the world's background comes from nodes and counts as 1")
+        notes.append("the Background strength is linked to nodes and is treated as 1")
     if sum(n.type == 'BACKGROUND' for n in nodes) > 1:
-        notes.append("of the world's backgrounds only the nearest to the output counts")
+        notes.append("the world has several Background nodes; only the one closest to the output is used")
     found = _colour(background.inputs["Color"], factor, notes)
     return WorldLight(*found, note="; ".join(notes))
 
@@ -118,13 +118,13 @@ def _colour(socket: bpy.types.NodeSocket, factor: float, notes: list[str]) -> tu
     for node in above:
         if node.type == 'TEX_ENVIRONMENT' and node.image is not None and all(node.image.size):
             if node.projection != 'EQUIRECTANGULAR':
-                notes.append("the world's image is a mirror ball and counts as its mean")
+                notes.append("the world image is a mirror ball and is replaced with its mean color")
             return _image(node, factor, turn), ()
         if node.type == 'TEX_SKY':
             return _sky(node, factor, turn, notes)
         if node.type == 'RGB':
             return World.plain(np.array(node.outputs[0].default_value[:3]) * factor), ()
-    notes.append("the world's nodes are none that can be read; it counts as an even grey of .5")
+    notes.append("the world nodes are not supported; a uniform gray of 0.5 is used")
     return World.plain(np.full(3, 0.5) * factor), ()
 
 
@@ -152,7 +152,7 @@ def _image(node: bpy.types.Node, factor: float, turn: float) -> World:
 def _sky(node: bpy.types.Node, factor: float, turn: float, notes: list[str]) -> tuple[World, tuple[Light, ...]]:
     kind = sky_model(node)
     if kind not in _SKIES:
-        notes.append(f"skies of the type {node.sky_type} are unknown and count as SINGLE_SCATTERING")
+        notes.append(f"the sky type {node.sky_type} is not supported; SINGLE_SCATTERING is used")
         kind = 'SINGLE_SCATTERING'
     if kind in {'PREETHAM', 'HOSEK_WILKIE'}:
         towards = np.array(node.sun_direction[:], np.float64)
