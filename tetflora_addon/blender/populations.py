@@ -140,7 +140,7 @@ def make_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, populati
     if population.as_field == 'EMPTIES' and len(placement) > MOST_EMPTIES:
         raise SceneError(
             f"{len(placement):,} plants exceed the limit of {MOST_EMPTIES:,} empties; "
-            "set Make to Field, or use fewer plants"
+            "set Create As to Field, or use fewer plants"
         )
     returned = max(population.made - own_number(own), 0)
     _release(copies)
