@@ -28,7 +28,7 @@ class TETFLORA_MT_object(bpy.types.Menu):
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
         layout.operator(TETFLORA_OT_populate.bl_idname, text="Populate with Plants", icon='OUTLINER_OB_POINTCLOUD')
-        layout.operator(TETFLORA_OT_mark_occluder.bl_idname, text="Mark or Unmark as Hiding Plants", icon='MOD_MASK')
+        layout.operator(TETFLORA_OT_mark_occluder.bl_idname, text="Mark or Unmark as Occluder", icon='MOD_MASK')
         layout.operator(TETFLORA_OT_mark_explicit.bl_idname, text="Refine or Leave These Meshes", icon='MESH_ICOSPHERE')
         layout.operator(TETFLORA_OT_use_as_form.bl_idname, icon='CURVE_DATA')
         layout.operator(

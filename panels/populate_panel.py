@@ -90,7 +90,7 @@ class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
         marked = active is not None and active.tetflora.is_occluder
         layout.operator(
             TETFLORA_OT_mark_occluder.bl_idname,
-            text="Hides Plants" if marked else "Mark as Hiding Plants",
+            text="Occluder" if marked else "Mark as Occluder",
             icon='CHECKMARK' if marked else 'MOD_MASK',
             depress=marked,
         )

@@ -40,9 +40,9 @@ class TETFLORA_PT_refinement(SidebarPanel, bpy.types.Panel):
 
 
 class TETFLORA_PT_films(SidebarPanel, bpy.types.Panel):
-    """Films."""
+    """Animation."""
 
-    bl_label = "Films"
+    bl_label = "Animation"
     bl_parent_id = "TETFLORA_PT_refinement"
     bl_options = {'DEFAULT_CLOSED'}
 
