@@ -81,6 +81,7 @@ def test_vertex_groups_are_weights_of_corners():
         group.add([index], weight, 'REPLACE')
     for inverted in (False, True):
         read = _read(ground, vertex_group="Trees", invert_group=inverted)
+        assert read.triangles.shape == (2, 3, 3)
         expected = {(-1, -1): 0.25, (1, -1): 1.0, (1, 1): 0.0, (-1, 1): 0.5}
         for corner, weight in zip(read.triangles.reshape(-1, 3), read.weight.ravel(), strict=True):
             wanted = expected[tuple(corner[:2])]

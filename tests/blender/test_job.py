@@ -110,6 +110,7 @@ def test_shadows_of_what_is_behind_the_camera_are_refined_if_asked_for():
 def test_results_carry_uvs_materials_and_smooth_tubes():
     scene = _forest()
     _refine(scene)
+    assert {made["tetflora_kind"] for made in _made(scene)} == {"leaf", "bark", "proxy"}
     for made in _made(scene):
         mesh = made.data
         assert len(mesh.materials) == 1

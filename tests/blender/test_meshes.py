@@ -83,6 +83,7 @@ def test_attributes_have_the_domains_and_types_of_the_contract():
 
 def test_normals_point_outwards():
     mesh = write_mesh("prism", prism())
+    assert len(mesh.polygons) == 5
     for polygon in mesh.polygons:
         assert polygon.normal.dot(polygon.center - mesh.polygons[0].center.lerp(mesh.polygons[1].center, 0.5)) > 0.0
 

@@ -67,9 +67,10 @@ def test_in_the_background_nothing_is_drawn():
     _populate(count=5)
     try:
         _ops().preview_population()
-        assert point_preview.shown_in(bpy.context.scene) or not bpy.app.background
+        assert bpy.app.background
+        assert point_preview.shown_in(bpy.context.scene)
         assert point_preview._state.handle is None
-        assert not bpy.app.timers.is_registered(point_preview._on_timer) or not bpy.app.background
+        assert not bpy.app.timers.is_registered(point_preview._on_timer)
     finally:
         point_preview.show(bpy.context.scene, False)
     assert point_preview._state.handle is None

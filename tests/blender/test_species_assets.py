@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -50,16 +52,29 @@ def test_pictures_are_small_squares_of_known_species():
         bpy.data.images.remove(image)
 
 
+def _loaded(identifier):
+    """Names of the pictures that Blender has loaded for a species; their icons have numbers only in a window."""
+    thumbnails.icon_of(identifier)
+    return [name for name in thumbnails._pictures if Path(name.partition("|")[0]).stem == identifier]
+
+
 def test_a_species_without_a_picture_gets_an_icon(own_folder):
-    shipped = _shipped()
-    shutil.copy(shipped["bush"].path, own_folder / "mine.json")
-    assert thumbnails.icon_of("mine") == thumbnails.icon_of("") == thumbnails.icon_of("gone") == 0
+    shutil.copy(_shipped()["bush"].path, own_folder / "mine.json")
+    assert [_loaded(identifier) for identifier in ("mine", "", "gone")] == [[], [], []]
     mine = next(i for i in species_items.items_for() if i[0] == "mine")
     assert mine[3] == thumbnails.FALLBACK_ICON
-    shutil.copy(thumbnails.thumbnail_file("bush"), own_folder / "thumbnails" / "mine.png")
-    assert thumbnails.thumbnail_file("mine") == own_folder / "thumbnails" / "mine.png"
-    # In the background Blender hands out numbers too; the same picture keeps its own.
-    assert thumbnails.icon_of("mine") == thumbnails.icon_of("mine")
+
+
+def test_a_picture_is_loaded_once_and_again_when_it_changes(own_folder):
+    picture = own_folder / "thumbnails" / "mine.png"
+    shutil.copy(thumbnails.thumbnail_file("bush"), picture)
+    assert thumbnails.thumbnail_file("mine") == picture
+    (first,) = _loaded("mine")
+    assert tuple(thumbnails._pictures[first].image_size) == (128, 128)
+    assert _loaded("mine") == [first]
+    os.utime(picture, ns=(0, 0))
+    assert set(_loaded("mine")) > {first}
+    assert _loaded("bush")
 
 
 def test_the_library_holds_a_plant_of_each_species(tmp_path):

@@ -83,7 +83,9 @@ def test_tables_of_shipped_species_are_those_of_today() -> None:
     """Run ``python -m devtools.facet_tables`` and raise `_METHOD` after changes of species or of facets."""
     flora = compile_species([load_species("flower")])
     known = subject.shipped()[subject.digest(flora, 0)]
-    for row, (whole, own) in subject.fitted_shares(flora, np.zeros(1, np.int32)).items():
+    fitted = subject.fitted_shares(flora, np.zeros(1, np.int32))
+    assert len(fitted) == len(known["whole"])
+    for row, (whole, own) in fitted.items():
         np.testing.assert_allclose(whole, known["whole"][row], atol=0.05)
         np.testing.assert_allclose(own, known["own"][row], atol=0.05)
 

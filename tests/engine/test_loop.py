@@ -15,6 +15,7 @@ from tests.engine import support
 from tests.engine.test_contents import expanded, measures
 from tetflora_addon.plants.compiled import Flora
 from tetflora_addon.plants.seeds import Seeds
+from tetflora_addon.refinement.amounts import Amounts
 from tetflora_addon.refinement.camera import Camera
 from tetflora_addon.refinement.cells import feature_pixels, mean_extinction
 from tetflora_addon.refinement.contents import Contents, bounding_box
@@ -265,13 +266,14 @@ def test_the_same_scene_twice_is_the_same_result() -> None:
 
 
 def test_mean_extinction() -> None:
-    """A cubic metre with 2 m² of leaves and 4 m² of bark in all directions shows 1 + 1 m² (Cauchy)."""
-    flora = support.small_flora()
-    _, result = run(flora, support.plants(1), support.camera((0, -9, 2), (0, 0, 1.5)))
-    amounts = result.amounts
-    volumes = volume(result.tree.vertices(result.nodes))
-    expected = (amounts.leaf_area / 2 + amounts.wood_area / 4) / volumes
-    np.testing.assert_allclose(mean_extinction(amounts, volumes), expected)
+    """3 m² of leaf and a closed box in 5 m³, against the mean of the shadows that they cast in all directions."""
+    ways = np.random.default_rng(1).normal(size=(100_000, 3))
+    ways = np.abs(ways) / np.linalg.norm(ways, axis=1)[:, None]
+    a, b, c = 0.2, 0.3, 4.0
+    shadows = 3.0 * ways[:, 2] + ways @ [b * c, a * c, a * b]
+    one = np.ones(1)
+    held = Amounts(leaf_area=3.0 * one, wood_area=2.0 * (b * c + a * c + a * b) * one, polygons=one, width=one)
+    assert mean_extinction(held, 5.0 * one) == pytest.approx(shadows.mean() / 5.0, rel=0.01)
 
 
 def test_a_loop_that_is_told_to_stop_returns_what_it_has() -> None:

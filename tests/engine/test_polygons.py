@@ -136,6 +136,7 @@ def test_everything_is_on_the_right_side(seed: int) -> None:
     for slack in (None, 0.1):
         tree, contents = divided(Polygons.everything(placed(thicket(seed, 30), seed)), seed, slack)
         polygons, node = contents.polygons, contents.polygon_cell.astype(np.intp)
+        assert (tree.parent[node] >= 0).any()
         while (tree.parent[node] >= 0).any():
             parent = np.maximum(tree.parent[node], 0)
             low, high = polygons.distances(tree.planes(parent))

@@ -152,6 +152,7 @@ def test_roots_are_the_lowest_ends(skeleton: Skeleton) -> None:
     part = np.arange(len(made.points))
     for i in np.flatnonzero(made.parent >= 0):
         part[i] = part[made.parent[i]]
+    assert (made.parent < 0).any()
     for root in np.flatnonzero(made.parent < 0):
         ends = np.flatnonzero((part == root) & (degree == 1))
         assert degree[root] == 1 and made.points[root, 2] == made.points[ends, 2].min()
