@@ -23,7 +23,7 @@ import numpy as np
 
 from devtools import session
 from examples import fly_through, landscape
-from tetflora_addon.blender import emit, handlers, job, kept_results
+from tetflora_addon.blender import emit, handlers, job, kept_results, scene_contents
 
 from .compare import flip_map, read_picture, render
 from .report import Targets, peak_mb
@@ -97,7 +97,7 @@ def _flight() -> dict[str, int]:
     for frame in (1, FRAMES):
         camera.location.y += FLIGHT_SPEED * (frame - 1) / fly_through.RATE
         camera.keyframe_insert("location", frame=frame)
-    given = job.read_scene(scene, layer.depsgraph, layer)
+    given = scene_contents.read_scene(scene, layer.depsgraph, layer)
     found = {}
     for name, near in (("flight_refinements", given), ("flight_refinements_small_cells", None)):
         eyes = []

@@ -18,7 +18,7 @@ import numpy as np
 
 from examples import landscape
 from tetflora_addon import emission, facet_emission
-from tetflora_addon.blender import job, meshes, scene_reader
+from tetflora_addon.blender import job, meshes, scene_contents, scene_reader
 
 from .report import Targets
 
@@ -69,7 +69,7 @@ def run(quick: bool) -> dict[str, float]:
     depsgraph = bpy.context.evaluated_depsgraph_get()
     seeds = scene_reader.read_plants(scene, depsgraph, depsgraph.view_layer)
     lap("read", held(seeds))
-    flora = job.compile_for(seeds.identifiers, scene, depsgraph)
+    flora = scene_contents.compile_for(seeds.identifiers, scene, depsgraph)
     lap("compile", held([flora.rows, flora.bound]))
     lap("sample", held([flora.samples, flora.orientation]))
     wall = time.perf_counter()

@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from tetflora_addon.blender import job, leaf_forms, materials, meshes, plant_mesh
+from tetflora_addon.blender import leaf_forms, materials, meshes, plant_mesh, scene_contents
 from tetflora_addon.plants import catalogue, expansion, growth, meshing, tubes
 from tetflora_addon.shading import microsurfaces
 
@@ -52,7 +52,7 @@ def opened_cell(identifier: str, orders: int) -> Callable[[], tuple[np.ndarray, 
 
     def build() -> tuple[np.ndarray, str]:
         scene, depsgraph = bpy.context.scene, bpy.context.evaluated_depsgraph_get()
-        flora = job.compile_for((identifier,), scene, depsgraph)
+        flora = scene_contents.compile_for((identifier,), scene, depsgraph)
         single = plant_mesh.single_seed(identifier, SEED)
         closed = growth.trunks(flora.rows, single)
         parts = []

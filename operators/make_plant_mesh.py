@@ -6,8 +6,8 @@ from collections.abc import Generator
 
 import bpy
 
-from ..tetflora_addon.blender.job import Progress
 from ..tetflora_addon.blender.plant_mesh import make_plant_mesh_steps
+from ..tetflora_addon.refinement.statistics import Progress
 from .base import counted, in_object_mode, plants_selected, select_only, selected_plants
 from .modal_job import ModalJob
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import bpy
 
-from ..tetflora_addon.blender.job import Progress
 from ..tetflora_addon.errors import TetFloraError
+from ..tetflora_addon.refinement.statistics import Progress
 from .base import Reporting
 
 # Seconds of work between two looks at the keyboard.

@@ -7,9 +7,10 @@ from collections.abc import Generator
 import bpy
 from mathutils import Matrix
 
-from ..tetflora_addon.blender import job, preview_job, preview_state
+from ..tetflora_addon.blender import preview_job, preview_state
 from ..tetflora_addon.preview.levels import Levels
 from ..tetflora_addon.refinement.camera import Camera
+from ..tetflora_addon.refinement.statistics import Progress
 from .base import counted
 from .modal_job import ModalJob
 
@@ -42,7 +43,7 @@ class TETFLORA_OT_preview_levels(ModalJob, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         return _camera_is_there(cls, context)
 
-    def steps(self, context: bpy.types.Context) -> Generator[job.Progress, bool | None, Levels]:
+    def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, Levels]:
         return preview_job.level_steps(context.scene, context.evaluated_depsgraph_get(), context.view_layer)
 
     def finish(self, context: bpy.types.Context, levels: Levels) -> set[str]:

@@ -12,7 +12,7 @@ from ..tetflora_addon.blender.plant_objects import plants_of, prepare_scene
 from ..tetflora_addon.blender.runtime import redraw
 from ..tetflora_addon.blender.shell_bounces import few_bounces
 from ..tetflora_addon.blender.world_reader import read_world
-from ..tetflora_addon.refinement.statistics import Statistics
+from ..tetflora_addon.refinement.statistics import Progress, Statistics
 from .base import counted
 from .modal_job import ModalJob
 
@@ -40,7 +40,7 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
             return False
         return True
 
-    def steps(self, context: bpy.types.Context) -> Generator[job.Progress, bool | None, Statistics]:
+    def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, Statistics]:
         with auto_refresh.paused():
             depsgraph = context.evaluated_depsgraph_get()
             return (yield from job.refine_steps(context.scene, depsgraph, view_layer=context.view_layer))

@@ -5,6 +5,7 @@
 import bpy
 
 from ..operators.mark_explicit import can_be_explicit
+from ..tetflora_addon.blender.proxy_forms import form_of
 from ..tetflora_addon.blender.shell_bounces import few_bounces
 from .base import SidebarPanel, split_layout
 from .lists import TETFLORA_UL_leaf_objects, draw_list
@@ -28,10 +29,10 @@ class TETFLORA_PT_refinement(SidebarPanel, bpy.types.Panel):
         column.prop(settings, "baked_light")
         column.prop(settings, "max_polygons")
         cycles = getattr(context.scene, "cycles", None)
-        if settings.proxy_form == 'SHELLS' and cycles is not None:
+        if form_of(context.scene).bounces and cycles is not None:
             column.prop(cycles, "transparent_max_bounces", text="Transparent")
             if few_bounces(context.scene):
-                column.label(text="Too few: Cycles draws shells black", icon='ERROR')
+                column.label(text="Too few: Cycles draws proxies black", icon='ERROR')
         active = context.active_object
         if active is not None and (can_be_explicit(active) or active.tetflora.is_explicit):
             layout.prop(active.tetflora, "is_explicit")
@@ -87,13 +88,13 @@ class TETFLORA_PT_proxy_shading(SidebarPanel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return context.scene.tetflora.proxy_form == 'SHELLS'
+        return bool(form_of(context.scene).sockets)
 
     def draw(self, context: bpy.types.Context) -> None:
         settings = context.scene.tetflora
         column = split_layout(self).column()
         column.active = not settings.expand_everything and settings.baked_light == 'OFF'
-        for name in ("shell_diffuse", "shell_gloss", "shell_spear", "shell_roundness", "shell_variation"):
+        for name in form_of(context.scene).sockets.values():
             column.prop(settings, name)
 
 

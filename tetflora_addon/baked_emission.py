@@ -8,7 +8,7 @@ and `BakedLight` answers for facets, spheres, shells and faces of meshes.
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,6 +27,8 @@ from .shading.light_sources import World
 from .shading.microsurfaces import Facets
 from .shading.shadow_pass import shadow_steps
 
+#: Attributes of baked light: linear radiance of the side to which normals point, and of the other side.
+FRONT, BACK = "tf_light_front", "tf_light_back"
 #: Facets and faces whose light is worked out together; some 2 kB each.
 AT_ONCE = 1 << 16
 #: Longer side in pixels of a lamp's buffer at most, with ground in it and without.
@@ -169,6 +171,23 @@ def at_vertices(values: NDArray[np.floating], corner_verts: NDArray, offsets: ND
     of_corner = np.repeat(values, np.diff(offsets), axis=0)
     number = np.maximum(np.bincount(corner_verts, minlength=vertices), 1)
     return np.stack([np.bincount(corner_verts, column, vertices) / number for column in of_corner.T], axis=1)
+
+
+def baked_attributes(
+    domain: str, front: NDArray[np.floating], back: NDArray[np.floating] | None = None
+) -> Mapping[str, tuple[str, NDArray[np.float32]]]:
+    """Attributes for buffers that carry baked light, in the layout of `buffers.MeshBuffers`.
+
+    Parameters
+    ----------
+    domain : {'FACE', 'POINT'}
+    front : (n, 3) float
+        Linear radiance of the side to which the normals point, or of all sides.
+    back : (n, 3) float, optional
+        Of the other side; by default the same.
+    """
+    back = front if back is None else back
+    return {FRONT: (domain, front.astype(np.float32)), BACK: (domain, back.astype(np.float32))}
 
 
 def _middles(corners: NDArray[np.floating]) -> NDArray[np.float64]:

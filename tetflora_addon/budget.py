@@ -43,8 +43,8 @@ def afford(
     result: Refinement,
     camera: Camera,
     settings: RefinementSettings,
-    facets: bool = True,
-    facet_bytes: float = BYTES_PER_POLYGON,
+    faces: float | None = None,
+    primitive_bytes: float = BYTES_PER_POLYGON,
 ) -> tuple[Refinement, float]:
     """Decisions that fit into the budget of the settings.
 
@@ -55,10 +55,10 @@ def afford(
         Of the loop.
     camera : Camera
     settings : RefinementSettings
-    facets : bool
-        Proxies are microsurfaces or microspheres, whose number follows their size; shells have four faces each.
-    facet_bytes : float
-        Memory that one of them takes.
+    faces : float, optional
+        Faces of each proxy tetrahedron; by default proxies are facets or spheres, whose number follows their size.
+    primitive_bytes : float
+        Memory that one facet or sphere takes.
 
     Returns
     -------
@@ -69,39 +69,45 @@ def afford(
     """
     side = settings.facet
     # What counts as a part of a polygon for memory is a whole one for those who limit polygons: a budget for each.
-    memory = replace(settings, max_polygons=0), facet_bytes / BYTES_PER_POLYGON
+    memory = replace(settings, max_polygons=0), primitive_bytes / BYTES_PER_POLYGON
     for limits, weight in ((replace(settings, max_memory=0.0), 1.0), memory):
         allowed = (1 - _RESERVE) * polygons_allowed(limits)
         if np.isfinite(allowed):
-            result, side = _fitted(flora, result, camera, allowed, side, weight, facets)
+            result, side = _fitted(flora, result, camera, allowed, side, weight, faces)
     return result, side
 
 
 def _fitted(
-    flora: Flora, result: Refinement, camera: Camera, allowed: float, side: float, weight: float, facets: bool
+    flora: Flora,
+    result: Refinement,
+    camera: Camera,
+    allowed: float,
+    side: float,
+    weight: float,
+    faces: float | None,
 ) -> tuple[Refinement, float]:
     """Decisions and a side of facets, no less than the one given, where a facet counts as a share of a polygon."""
     explicit = result.decision == Decision.EXPLICIT
     polygons = np.where(explicit, result.amounts.polygons, 0.0)
 
-    count = _Facets(flora, result, camera) if facets else None
-    shells = 4.0 + _large(result)
+    count = _Facets(flora, result, camera) if faces is None else None
+    fixed = None if faces is None else faces + _large(result)
 
     def proxies(factor: float) -> NDArray[np.float64]:
         """Faces (cells,) of all cells as proxies, with facets larger by a factor."""
-        return count.by_cell(factor * side, weight) if count else shells
+        return count.by_cell(factor * side, weight) if count else fixed
 
     as_asked = proxies(1.0)
     if polygons.sum() + as_asked[~explicit].sum() <= allowed:
         return result, side
-    factor = _smallest(lambda f: proxies(f).sum() <= _FACETS_FIRST * allowed) if facets else 1.0
+    factor = _smallest(lambda f: proxies(f).sum() <= _FACETS_FIRST * allowed) if count else 1.0
     cost = polygons - proxies(factor)
     gain = contributions(result.cells, result.transmittance) / np.maximum(cost, 1.0)
     order = np.argsort(np.where(explicit, -gain, np.inf), kind="stable")[: explicit.sum()]
     spent = np.cumsum(np.maximum(cost[order], 0.0)) + proxies(factor).sum()
     kept = np.zeros(len(explicit), bool)
     kept[order[spent <= allowed]] = True
-    if facets:  # what real leaves have left over makes facets finer again
+    if count:  # what real leaves have left over makes facets finer again
         left = allowed - polygons[kept].sum()
         factor = _smallest(lambda f: proxies(f)[~kept].sum() <= left)
     decision = np.where(explicit & ~kept, Decision.PROXY, result.decision).astype(np.int8)

@@ -12,6 +12,7 @@ import pytest
 
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph
 from tetflora_addon.blender import auto_refresh, compat, emit, job
+from tetflora_addon.refinement.statistics import Progress
 
 
 @pytest.fixture
@@ -271,7 +272,7 @@ def test_only_what_is_done_is_kept(scene, monkeypatch):
 
 def test_after_an_unexpected_error_it_says_so_and_can_begin_anew(scene, monkeypatch):
     def broken(*_arguments, **_options):
-        yield job.Progress(0.0, "Reading the scene")
+        yield Progress(0.0, "Reading the scene")
         raise ZeroDivisionError("of another's making")
 
     scene.tetflora.auto_refine = True

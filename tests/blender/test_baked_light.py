@@ -12,6 +12,7 @@ import pytest
 
 from tests.blender.renders import picture, small_scene
 from tests.blender.scenes import add_mesh, add_plant, datablocks, depsgraph
+from tetflora_addon import baked_emission
 from tetflora_addon.blender import baked_material, compat, job, light_reader, node_tools, world_reader
 from tetflora_addon.shading import light_directions, light_sources
 
@@ -138,7 +139,7 @@ def test_what_cannot_be_read_is_said():
 
 def baked_square(front, back, colour=0.5):
     square = add_mesh(size=0.5, z=1.0)
-    attributes = baked_material.baked_attributes('FACE', np.array([front], np.float32), np.array([back], np.float32))
+    attributes = baked_emission.baked_attributes('FACE', np.array([front], np.float32), np.array([back], np.float32))
     attributes = {**attributes, "tf_colour": ('FACE', np.full((1, 3), colour, np.float32))}
     for name, (domain, values) in attributes.items():
         square.data.attributes.new(name, 'FLOAT_VECTOR', domain).data.foreach_set("vector", values.ravel())

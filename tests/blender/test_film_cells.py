@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph
-from tetflora_addon.blender import emit, handlers, job, kept_results
+from tetflora_addon.blender import emit, handlers, kept_results, scene_contents
 
 FRAMES = 9
 
@@ -54,7 +54,7 @@ def rooms(scene):
     found = []
     for frame in range(1, FRAMES + 1):
         scene.frame_set(frame)
-        given = job.read_scene(scene, depsgraph(), depsgraph().view_layer)
+        given = scene_contents.read_scene(scene, depsgraph(), depsgraph().view_layer)
         found.append(kept_results.shared_camera(scene, depsgraph(), given).room)
     return found
 

@@ -12,7 +12,7 @@ import pytest
 
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks
 from tetflora_addon import errors
-from tetflora_addon.blender import compat, job
+from tetflora_addon.blender import compat, job, scene_contents
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -192,7 +192,7 @@ def test_a_leaf_that_cannot_be_used_is_named():
 
 def test_estimates_agree_with_what_is_made():
     scene = _forest()
-    estimate = job.estimate(scene, bpy.context.evaluated_depsgraph_get())
+    estimate = scene_contents.estimate(scene, bpy.context.evaluated_depsgraph_get())
     expanded = _refine(scene, expand_everything=True)
     assert estimate.polygons_full == expanded.polygons_full
     assert expanded.polygons_meshed == pytest.approx(estimate.polygons_full, rel=0.1)

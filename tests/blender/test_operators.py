@@ -16,6 +16,7 @@ from panels import statistics_panel
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, select, tiny_render
 from tetflora_addon import errors
 from tetflora_addon.blender import handlers, job
+from tetflora_addon.refinement.statistics import Progress
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -372,7 +373,7 @@ def test_errors_in_the_middle_are_reported(clean_file, window, monkeypatch):
     window.__init__()
 
     def broken(*_arguments, **_options):
-        progress = job.Progress
+        progress = Progress
         yield progress(0.0, "one")
         yield progress(0.1, "two")
         yield progress(0.2, "three")

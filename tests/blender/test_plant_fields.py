@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
 from tetflora_addon import errors
-from tetflora_addon.blender import job, plant_fields, scene_reader
+from tetflora_addon.blender import plant_fields, scene_contents, scene_reader
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -369,11 +369,11 @@ def test_a_field_alone_is_a_forest_for_renders_and_estimates():
     seeds = [1, 2, 3]
     field = _field(seed=('INT', seeds))
     assert scene_reader.has_contents(scene)
-    of_field = job.estimate(scene, depsgraph())
+    of_field = scene_contents.estimate(scene, depsgraph())
     bpy.data.objects.remove(field)
     for seed, place in zip(seeds, PLACES, strict=True):
         add_plant(f"{seed}", seed=seed, location=place)
-    of_empties = job.estimate(scene, depsgraph())
+    of_empties = scene_contents.estimate(scene, depsgraph())
     assert of_field.plants == of_empties.plants == 3
     assert of_field.polygons_full == of_empties.polygons_full > 0
 

@@ -10,7 +10,7 @@ import bpy
 import pytest
 
 from tests.blender.scenes import add_mesh, add_plant
-from tetflora_addon.blender import migration, preferences, properties, species_items
+from tetflora_addon.blender import leaf_forms, migration, preferences, properties, scene_contents, species_items
 from tetflora_addon.refinement import settings
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -24,12 +24,12 @@ def _reopen(path):
 def test_settings_mirror_the_engine():
     defaults = settings.RefinementSettings()
     scene = bpy.context.scene
-    read = properties.settings_from(scene)
+    read = scene_contents.settings_from(scene)
     for field in fields(defaults):
         assert getattr(read, field.name) == pytest.approx(getattr(defaults, field.name), rel=1e-6), field.name
     scene.tetflora.cutoff = 3.5
     scene.tetflora.max_tetrahedra = 1234
-    read = properties.settings_from(scene)
+    read = scene_contents.settings_from(scene)
     assert (read.cutoff, read.max_tetrahedra) == (3.5, 1234)
 
 
@@ -105,7 +105,7 @@ def test_leaf_objects_are_pointers(tmp_path):
     assert bpy.context.scene.tetflora.leaf_objects.add().species == ""
     leaf.name = "renamed"
     _reopen(tmp_path / "a.blend")
-    found = properties.leaf_objects(bpy.context.scene)
+    found = leaf_forms.leaf_objects(bpy.context.scene)
     assert {k: v.name for k, v in found.items()} == {"bush": "renamed"}
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from devtools import session
 from tests.blender.scenes import add_camera, add_plant, datablocks, depsgraph, select
-from tetflora_addon.blender import asset_library, job, migration, preferences, species_items, thumbnails
+from tetflora_addon.blender import asset_library, migration, preferences, scene_contents, species_items, thumbnails
 from tetflora_addon.plants import catalogue
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -104,7 +104,7 @@ def test_an_asset_becomes_a_working_plant(tmp_path):
     assert plant.tetflora.version == migration.VERSION
     assert scene.render.use_lock_interface
     assert "tetflora_temporary" not in plant
-    assert job.estimate(scene, depsgraph()).polygons_full > 1000
+    assert scene_contents.estimate(scene, depsgraph()).polygons_full > 1000
     select(plant)
     bpy.ops.tetflora.reseed()
     assert plant.tetflora.seed != 1

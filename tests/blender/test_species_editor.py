@@ -13,7 +13,14 @@ import pytest
 from devtools import session
 from tests.blender.scenes import add_camera, add_plant, depsgraph, select
 from tetflora_addon import errors
-from tetflora_addon.blender import job, preferences, species_editor, species_edits, species_files, species_items
+from tetflora_addon.blender import (
+    preferences,
+    scene_contents,
+    species_editor,
+    species_edits,
+    species_files,
+    species_items,
+)
 from tetflora_addon.plants import catalogue, schema, species
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -148,10 +155,10 @@ def test_edits_hold_for_all_scenes_of_the_file_and_are_kept_once():
 def test_refinement_takes_the_edited_species():
     add_camera()
     plant = add_plant()
-    before = job.estimate(bpy.context.scene, depsgraph()).polygons_full
+    before = scene_contents.estimate(bpy.context.scene, depsgraph()).polygons_full
     editor = _editor("bush", 3)
     editor.leaves, editor.leaves_variation = 10.0, 0.0
-    after = job.estimate(bpy.context.scene, depsgraph()).polygons_full
+    after = scene_contents.estimate(bpy.context.scene, depsgraph()).polygons_full
     assert after > before * 1.3
     bpy.ops.tetflora.duplicate_species(name="My Own")
     plant.tetflora.species = "my_own"
@@ -167,7 +174,7 @@ def test_what_breaks_a_rule_is_said_and_stops_refinement():
     assert "orders[1].angle" in problem
     assert "0 to 180" in problem
     with pytest.raises(errors.SpeciesError, match=r"orders\[1\].angle"):
-        job.estimate(bpy.context.scene, depsgraph())
+        scene_contents.estimate(bpy.context.scene, depsgraph())
     assert editor.angle_variation == pytest.approx(math.radians(100.0), rel=1e-5)  # the slider stays where it was put
     editor.angle_variation = 0.1
     assert species_edits.problem_of(bpy.context.scene, "bush") == ""

@@ -10,7 +10,16 @@ import pytest
 
 from tests.blender.scenes import add_camera, add_plant, depsgraph, tiny_render
 from tetflora_addon import buffers
-from tetflora_addon.blender import auto_refresh, compat, emit, job, meshes, scene_digest, wind_properties
+from tetflora_addon.blender import (
+    auto_refresh,
+    compat,
+    emit,
+    job,
+    meshes,
+    scene_contents,
+    scene_digest,
+    wind_properties,
+)
 
 
 @pytest.fixture
@@ -119,9 +128,9 @@ def test_it_refines_by_itself_at_another_frame(scene, monkeypatch):
 
 def test_a_plant_is_made_into_a_mesh_at_rest(scene):
     """Meshes that are made of plants, and previews, do not depend on the frame."""
-    flora = job.compile_for(("bush",), scene, depsgraph())
+    flora = scene_contents.compile_for(("bush",), scene, depsgraph())
     assert flora.calm is None
-    assert job.blown(scene, flora).calm is flora
+    assert scene_contents.blown(scene, flora).calm is flora
 
 
 def test_velocities_are_there_where_there_is_motion_blur(scene):

@@ -23,10 +23,10 @@ from tetflora_addon.refinement.settings import RefinementSettings
 SETTINGS = RefinementSettings()
 
 
-def made(limit: int, facets: bool = True) -> tuple[int, int, float, object]:
+def made(limit: int, faces: float | None = None) -> tuple[int, int, float, object]:
     """Polygons of plants and of proxies that come of a budget, the facets' side, and the decisions."""
     flora, _, camera, result = scene()
-    fitted, side = afford(flora, result, camera, replace(SETTINGS, max_polygons=limit), facets)
+    fitted, side = afford(flora, result, camera, replace(SETTINGS, max_polygons=limit), faces)
     leaves = sum(b.buffers.polygons for b in explicit_blocks(flora, fitted))
     proxies = support.facet_buffers(flora, fitted, camera, side)
     return leaves, proxies.polygons if proxies else 0, side, fitted
@@ -70,7 +70,7 @@ def test_more_is_better() -> None:
 
 def test_shells_are_not_made_larger() -> None:
     flora, _, camera, result = scene()
-    fitted, side = afford(flora, result, camera, replace(SETTINGS, max_polygons=20_000), facets=False)
+    fitted, side = afford(flora, result, camera, replace(SETTINGS, max_polygons=20_000), faces=4.0)
     assert side == SETTINGS.facet
     kept = fitted.decision == Decision.EXPLICIT
     assert fitted.amounts.polygons[kept].sum() + 4 * (~kept).sum() <= 20_000
@@ -89,7 +89,7 @@ def test_spheres_take_less_of_a_budget_of_memory_and_as_much_of_one_of_polygons(
 
     def spheres(**limits: float) -> int:
         settings = replace(SETTINGS, **limits)
-        fitted, side = afford(flora, everything, camera, settings, facet_bytes=BYTES_PER_SPHERE)
+        fitted, side = afford(flora, everything, camera, settings, primitive_bytes=BYTES_PER_SPHERE)
         return sum(block.polygons for block in sphere_blocks(flora, fitted, camera, side))
 
     whole = spheres()
@@ -98,5 +98,5 @@ def test_spheres_take_less_of_a_budget_of_memory_and_as_much_of_one_of_polygons(
     assert 0.6 * 0.2 * whole < spheres(max_memory=memory, max_polygons=whole // 5) <= 0.2 * whole
     assert spheres(max_memory=memory, max_polygons=whole) == spheres(max_memory=memory)
     tight = replace(SETTINGS, max_memory=memory)
-    sides = [afford(flora, everything, camera, tight, True, size)[1] for size in (BYTES_PER_POLYGON, BYTES_PER_SPHERE)]
+    sides = [afford(flora, everything, camera, tight, None, size)[1] for size in (BYTES_PER_POLYGON, BYTES_PER_SPHERE)]
     assert sides[0] > sides[1]

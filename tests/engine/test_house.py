@@ -30,7 +30,7 @@ ROOMS = {
 }
 SHARED = {"buffers", "errors", "cache_folder", "kept_arrays", "setting", "whole_files"}
 # Files beside the rooms that put decisions into buffers may use each other.
-BESIDE = {"baked_emission"}
+BESIDE = {"baked_emission", "budget", "facet_emission", "shell_emission"}
 
 ENGINE = sorted(p for p in ADDON.rglob("*.py") if p.relative_to(ADDON).parts[0] != "blender")
 EXTENSION = sorted(p for folder in (ADDON, ROOT / "operators", ROOT / "panels") for p in folder.rglob("*.py"))

@@ -16,7 +16,7 @@ import bpy
 import pytest
 
 from devtools import session
-from tetflora_addon.blender import job, kept_results
+from tetflora_addon.blender import job, kept_results, scene_contents
 
 Run = Callable[..., subprocess.CompletedProcess]
 
@@ -54,7 +54,7 @@ def expected(seeds: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     scene = bpy.context.scene
     scene.tetflora.refine_at_render = False
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    given = job.read_scene(scene, depsgraph, bpy.context.view_layer)
+    given = scene_contents.read_scene(scene, depsgraph, bpy.context.view_layer)
     camera = kept_results.shared_camera(scene, depsgraph, given)
     job.refine(scene, depsgraph, view_layer=bpy.context.view_layer, camera=camera)
     path = tmp_path_factory.mktemp("expected") / "expected.png"

@@ -20,12 +20,14 @@ from dataclasses import dataclass
 import bpy
 
 from ..errors import TetFloraError
+from ..refinement.statistics import Progress
 from . import job
 from .emit import has_results
+from .leaf_forms import leaf_objects
 from .node_tools import is_ours
 from .plant_objects import prepare_scene
 from .preview_state import camera_now
-from .properties import auto_refine_switched, leaf_objects
+from .properties import auto_refine_switched
 from .runtime import Handlers, call_off, call_soon, redraw
 from .scene_digest import choices, scene_digest
 from .wind_properties import wind_of
@@ -41,7 +43,7 @@ class _State:
     """The job of the session; names instead of datablocks, which do not outlive a load."""
 
     scene: str = ""
-    steps: Generator[job.Progress, bool | None, object] | None = None
+    steps: Generator[Progress, bool | None, object] | None = None
     digest: str = ""  # of the job
     due: float = 0.0
     message: str = ""

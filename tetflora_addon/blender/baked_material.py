@@ -8,20 +8,17 @@ ever. Nothing that it emits lights anything.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import bpy
-import numpy as np
-from numpy.typing import NDArray
 
+from ..baked_emission import BACK, FRONT
 from ..shading.light_scattering import GLOSS
 from .compat import shader_tree
 from .materials import scatter_group
 from .node_tools import Graph, find_socket, get_or_create
 
 BAKED = "TetFlora baked"
-FRONT, BACK = "tf_light_front", "tf_light_back"
 
 # Raise this when what it counts changes: existing files then get the new nodes beside the old ones.
 _VERSION = 1
@@ -31,7 +28,7 @@ def baked_material() -> bpy.types.Material:
     """Material "TetFlora baked": `FRONT` and `BACK` to the camera, to all else as the material of proxies.
 
     Both are FLOAT_VECTOR attributes on FACE or on POINT, of meshes or point clouds: linear radiance as a pixel shows
-    it. What has no front and back carries the same in both, see `baked_attributes`.
+    it. What has no front and back carries the same in both, see `baked_emission.baked_attributes`.
 
     Notes
     -----
@@ -80,20 +77,3 @@ def without_light_sampling(material: bpy.types.Material) -> None:
     cycles = getattr(material, "cycles", None)
     if cycles is not None and hasattr(cycles, "emission_sampling"):
         cycles.emission_sampling = 'NONE'
-
-
-def baked_attributes(
-    domain: str, front: NDArray[np.floating], back: NDArray[np.floating] | None = None
-) -> Mapping[str, tuple[str, NDArray[np.float32]]]:
-    """Attributes that `baked_material` reads, for `MeshBuffers` or point clouds.
-
-    Parameters
-    ----------
-    domain : {'FACE', 'POINT'}
-    front : (n, 3) float
-        Linear radiance of the side to which the normals point, or of all sides.
-    back : (n, 3) float, optional
-        Of the other side; by default the same.
-    """
-    back = front if back is None else back
-    return {FRONT: (domain, front.astype(np.float32)), BACK: (domain, back.astype(np.float32))}

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Baked light in a job: what lights the scene is read, what is drawn is told, and meshes get what the camera sees."""
+"""Baked light in a job: read the lights, collect what is drawn, and give meshes the light that the camera sees."""
 
 from __future__ import annotations
 
@@ -10,12 +10,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..baked_emission import AT_ONCE, BakedLight, SheetList, Sources, at_vertices, baked_light
+from ..baked_emission import AT_ONCE, BakedLight, SheetList, Sources, at_vertices, baked_attributes, baked_light
 from ..buffers import MeshBuffers
-from ..plants.compiled import Flora
-from ..refinement.camera import Camera
-from ..refinement.loop import Refinement
-from .baked_material import baked_attributes
+from ..emission_forms import Refined
 from .compat import tree_in_use
 from .light_reader import read_lights
 from .material_means import Looks
@@ -56,7 +53,7 @@ def _ground_colour(obj: bpy.types.Object) -> NDArray[np.float64]:
 
 
 class Baking:
-    """Baked light of one refinement: first `add` all that is drawn as polygons, then `look`.
+    """Baked light of one refinement: `add` all polygons, then `add_facets`, then `look`.
 
     Parameters
     ----------
@@ -79,12 +76,26 @@ class Baking:
         self.sheets.add_faces(buffers.positions, buffers.corner_verts, buffers.face_offsets)
         self.first_facet = len(self.sheets)
 
-    def look(self, flora: Flora, refinement: Refinement, camera: Camera, facets: bool) -> Generator[float, None, None]:
-        """Find the light; the share that is done. ``facets`` says whether proxies were told as well."""
-        self.light = yield from baked_light(flora, refinement, camera, self.sources, self.sheets, facets)
+    def add_facets(self, refined: Refined) -> Iterator[int]:
+        """Add the facets of all proxies; yields how many there are so far.
+
+        They are made once more for the meshes, not kept: all of them at once may not fit into memory.
+        """
+        count = 0
+        for parts in refined.facet_parts():
+            for facets, _ in parts:
+                self.sheets.add_facets(facets)
+                count += len(facets)
+            yield count
+
+    def look(self, refined: Refined) -> Generator[float, None, None]:
+        """Find the light; yields the fraction that is done."""
+        scene = refined.flora, refined.refinement, refined.camera
+        facets = refined.facet_pixels is not None
+        self.light = yield from baked_light(*scene, self.sources, self.sheets, facets)
 
     def light_meshes(self) -> Iterator[float]:
-        """Give meshes their light, each to itself; the share that is done."""
+        """Give meshes their light, each to itself; yields the fraction that is done."""
         for number, (made, first) in enumerate(self._meshes):
             for part in _light_mesh(made.data, self.light, first, rounded=made["tetflora_kind"] == "bark"):
                 yield (number + part) / len(self._meshes)

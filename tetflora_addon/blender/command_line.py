@@ -27,6 +27,7 @@ from .farm_template import MOST_FRAME, Run, frame_numbers, frame_runs
 from .pictures import damaged
 from .properties import TetFloraScene
 from .saved_files import write_blend
+from .scene_contents import estimate
 
 NAME = "tetflora"
 #: Most samples that Cycles takes.
@@ -188,7 +189,7 @@ def _render(options: argparse.Namespace) -> dict | None:
 
 
 def _stats(_options: argparse.Namespace) -> dict:
-    statistics = job.estimate(bpy.context.scene, bpy.context.evaluated_depsgraph_get())
+    statistics = estimate(bpy.context.scene, bpy.context.evaluated_depsgraph_get())
     return {"plants": statistics.plants, "polygons_full": statistics.polygons_full}
 
 

@@ -25,10 +25,11 @@ from typing import Any
 import bpy
 
 from ..errors import SceneError
-from . import farm_template, job
+from . import farm_template
 from .camera_reader import read_camera
 from .farm_template import Run
 from .preferences import species_folders
+from .scene_contents import estimate
 from .scene_reader import NoPlantsError
 
 #: Root of the extension as it is installed, or of the source tree.
@@ -229,7 +230,7 @@ def _check_output(scene: bpy.types.Scene) -> None:
 def _plants(scene: bpy.types.Scene) -> int:
     """How many there are; an unknown species is found now, not by each worker."""
     try:
-        return job.estimate(scene, bpy.context.evaluated_depsgraph_get()).plants
+        return estimate(scene, bpy.context.evaluated_depsgraph_get()).plants
     except NoPlantsError:
         return 0
 

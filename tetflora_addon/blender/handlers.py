@@ -33,6 +33,7 @@ from .emit import (
 from .migration import migrate
 from .output import KIND, adopt_materials, release_materials
 from .runtime import Handlers, Listeners, complain
+from .scene_contents import read_scene
 from .scene_reader import NoPlantsError, has_contents
 from .shell_bounces import raise_bounces
 from .species_edits import looked_at_once
@@ -180,7 +181,7 @@ def _make(scene: bpy.types.Scene) -> None:
     for layers in groups:
         layers[0].update()  # going to the frame brings only the active layer's depsgraph up to date, if others have any
         depsgraph = layers[0].depsgraph
-        given = job.read_scene(scene, depsgraph, layers[0])
+        given = read_scene(scene, depsgraph, layers[0])
         read = kept_results.shared_camera(scene, depsgraph, given), given
         wanted.append((kept_results.key_of(scene, depsgraph, layers, *read), layers, read))
     kept_results.stow(scene, [key for key, *_ in wanted])

@@ -6,151 +6,39 @@ from __future__ import annotations
 
 import json
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
 from .. import emission, explicit_emission
-from ..baked_emission import Sources
-from ..budget import BYTES_PER_POLYGON, BYTES_PER_SPHERE, afford
-from ..plants.catalogue import list_species, load_species
-from ..plants.compiled import Flora, compile_species
-from ..plants.growth import trunks
-from ..plants.seeds import Seeds
+from ..budget import afford
+from ..emission_forms import Refined
+from ..plants.compiled import Flora
 from ..refinement.camera import Camera
 from ..refinement.decisions import Decision
-from ..refinement.lights import Light
 from ..refinement.loop import Refinement
 from ..refinement.loop import refine as refine_loop
-from ..refinement.polygons import Polygons
 from ..refinement.settings import RefinementSettings
-from ..refinement.statistics import Statistics, Stopwatch
+from ..refinement.statistics import Progress, Statistics, Stopwatch
 from ..refinement.steps import step_of
 from ..refinement.transition import Transition
 from ..shading.facet_shares import facet_shares
 from .baked_material import baked_material
-from .baking import Baking, read_sources
+from .baking import Baking
 from .camera_reader import read_camera
-from .emit import Results, has_results, hide_originals, originals_shown, remove_results, result_collections
-from .explicit_objects import Explicit, read_explicit
-from .leaf_forms import materials_of, resolved_species
-from .light_reader import read_lights
+from .compat import drawn_disc
+from .emit import Results, has_results, hide_originals, remove_results, result_collections
+from .explicit_objects import Explicit
+from .leaf_forms import materials_of
 from .output import adopt_materials, release_materials
-from .properties import settings_from
-from .proxies import tell_facets, write_proxies
-from .scene_reader import NoPlantsError, read_occluders, read_plants
-from .wind_properties import wind_of
+from .proxies import write_proxies
+from .proxy_forms import form_of
+from .scene_contents import Given, blown, compile_for, read_scene, refinement_settings
 
-__all__ = ["Progress", "clear", "compile_for", "estimate", "has_results", "partition", "refine", "refine_steps"]
+__all__ = ["clear", "has_results", "partition", "refine", "refine_steps"]
 
-#: Shells fill their tetrahedra, so that even hidden ones must not be larger than this many pixels.
-SHELL_BLOCK = 16.0
-#: And those that are seen no larger than this many: an even fog has no shape but that of its tetrahedron.
-SEEN_SHELL_BLOCK = 4.0
-#: Share of the progress bar that the loop takes; the rest is for writing meshes.
-_LOOP_SHARE = 0.6
-
-
-@dataclass(frozen=True)
-class Progress:
-    """One step of a job.
-
-    Attributes
-    ----------
-    fraction : float
-        0 to 1, an estimate.
-    message : str
-        What is being done, for the status bar.
-    """
-
-    fraction: float
-    message: str
-
-
-def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Flora:
-    """Load and compile species, leaf objects of the scene included.
-
-    Without any, for meshes alone, it is a shipped one, of which nothing grows: files and edits of the artist's that the
-    scene has no use for must not cost time, or be wrong.
-
-    Raises
-    ------
-    SpeciesError
-        Unknown or broken species, or a leaf object that is missing or not a mesh with faces.
-    """
-    if not identifiers:
-        return compile_species([load_species(min(list_species()))])
-    return compile_species([resolved_species(scene, identifier, depsgraph) for identifier in identifiers])
-
-
-def blown(scene: bpy.types.Scene, flora: Flora) -> Flora:
-    """A flora in the scene's wind at its frame."""
-    wind = wind_of(scene)
-    return flora if wind is None else flora.in_wind(wind)
-
-
-def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statistics:
-    """What the scene would be if it were expanded, without growing anything.
-
-    Raises
-    ------
-    TetFloraError
-        As `refine`.
-    """
-    given = read_scene(scene, depsgraph, depsgraph.view_layer)
-    flora = compile_for(given.species, scene, depsgraph)
-    return Statistics(plants=len(given.seeds), polygons_full=_polygons_full(flora, given))
-
-
-@dataclass(frozen=True)
-class Given:
-    """What a scene holds; ``explicit`` is None where no mesh takes part, ``sources`` where no light is baked."""
-
-    seeds: Seeds
-    explicit: Explicit | None
-    occluders: np.ndarray
-    lights: tuple[Light, ...]
-    sources: Sources | None = None
-
-    @property
-    def species(self) -> tuple[str, ...]:
-        """Species of its plants."""
-        return self.seeds.identifiers
-
-    @property
-    def polygons(self) -> Polygons | None:
-        """All explicit polygons."""
-        return None if self.explicit is None else Polygons.everything(self.explicit.meshes)
-
-
-def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Given:
-    """All that takes part in refinement but the camera.
-
-    Raises
-    ------
-    TetFloraError
-        As `refine_steps`.
-    """
-    with originals_shown(scene, depsgraph):
-        explicit = read_explicit(depsgraph, view_layer)
-        try:
-            seeds = read_plants(scene, depsgraph, view_layer)
-        except NoPlantsError:
-            if explicit is None:
-                raise
-            none = np.zeros(0)
-            frames = none.reshape(0, 3), none.reshape(0, 3, 3)
-            seeds = Seeds((), none.astype(np.int32), none.astype(np.int64), *frames, none)
-        lights = read_lights(depsgraph, view_layer) if scene.tetflora.shadow_cutoff > 0.0 else ()
-        baked = scene.tetflora.baked_light != 'OFF' and not scene.tetflora.expand_everything
-        sources = read_sources(scene, depsgraph, view_layer) if baked else None
-        return Given(seeds, explicit, read_occluders(scene, depsgraph, view_layer), lights, sources)
-
-
-def _polygons_full(flora: Flora, given: Given) -> int:
-    plants = round(flora.polygons[trunks(flora.rows, given.seeds).row].sum())
-    return plants + (given.explicit.meshes.faces if given.explicit else 0)
+#: Fraction of the progress bar that the loop takes; the rest is for writing meshes.
+_LOOP_FRACTION = 0.6
 
 
 def refine_steps(
@@ -198,12 +86,11 @@ def refine_steps(
         camera = read_camera(scene, depsgraph, region_only=for_render)
     if given is None:
         given = read_scene(scene, depsgraph, view_layer or depsgraph.view_layer)
-    settings = refinement_settings(scene)
     clock.lap("read")
     yield Progress(0.02, "Compiling species")
     flora = blown(scene, compile_for(given.species, scene, depsgraph))
     clock.lap("compile")
-    full = _polygons_full(flora, given)
+    full = given.polygons_full(flora)
     statistics = Statistics(plants=len(given.seeds), polygons_full=full, seconds=clock.seconds)
     originals = []
     results = Results(scene, 'RENDER' if for_render else 'VIEW', mark)
@@ -215,33 +102,8 @@ def refine_steps(
             # Explicit objects are what they are; they stay in view by themselves.
             yield from _write_blocks(results, flora, emission.expanded_blocks(flora, given.seeds), statistics, 0.05)
         else:
-            refinement = yield from _run_loop(flora, given, camera, settings, statistics)
-            facets = scene.tetflora.proxy_form != 'SHELLS'
-            facet_bytes = BYTES_PER_SPHERE if scene.tetflora.proxy_form == 'MICROSPHERES' else BYTES_PER_POLYGON
-            refinement, side = afford(flora, refinement, camera, settings, facets, facet_bytes)
-            clock.lap("refine")
-            _count(statistics, refinement)
-            if facets:
-                yield Progress(_LOOP_SHARE, "Looking at how leaves cluster")
-                facet_shares(flora)
-            results.open()
-            baking = None
-            if given.sources is not None:
-                baking = Baking(given.sources, leaves=scene.tetflora.baked_light == 'ALL')
-            transition = Transition(flora, camera, settings.leaf_limit) if facets else None
-            blocks = emission.explicit_blocks(flora, refinement, transition)
-            yield from _write_blocks(results, flora, blocks, statistics, _LOOP_SHARE, baking)
-            if given.explicit is not None:
-                originals = given.explicit.originals
-                kept = explicit_emission.polygon_blocks(refinement, camera, side if facets else None)
-                yield from _write_polygons(results, given.explicit, kept, statistics, baking)
-            if baking is not None:
-                clock.lap("emit")
-                yield from _bake(baking, flora, refinement, camera, side if facets else None, transition)
-                clock.lap("light")
-            yield Progress(0.95, "Making proxies")
-            for done in write_proxies(results, flora, refinement, camera, statistics, side, transition, baking):
-                yield Progress(0.95 + 0.05 * done, f"Making proxies: {statistics.polygons_proxy:,}")
+            originals = given.explicit.originals if given.explicit is not None else []
+            yield from _write_refined(results, flora, given, camera, statistics, clock)
         clock.lap("emit")
     except BaseException:  # an error, Esc (GeneratorExit) or Ctrl+C: nothing of ours may stay behind
         results.discard()
@@ -302,14 +164,6 @@ def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:
     return removed
 
 
-def refinement_settings(scene: bpy.types.Scene) -> RefinementSettings:
-    """The scene's settings, as fine as its form of proxies needs them."""
-    settings = settings_from(scene)
-    if scene.tetflora.proxy_form != 'SHELLS':
-        return settings
-    return replace(settings, hidden_block=SHELL_BLOCK, proxy_block=SEEN_SHELL_BLOCK)
-
-
 def _run_loop(
     flora: Flora, given: Given, camera: Camera, settings: RefinementSettings, statistics: Statistics
 ) -> Generator[Progress, bool | None, Refinement]:
@@ -325,10 +179,44 @@ def _run_loop(
         if last:
             return state
         waiting = int((state.decision == Decision.SPLIT).sum())
-        fraction += 0.15 * (_LOOP_SHARE - fraction)  # nobody knows how many passes will follow
+        fraction += 0.15 * (_LOOP_FRACTION - fraction)  # nobody knows how many passes will follow
         enough = yield Progress(
             fraction, f"Refining, pass {state.passes}: {state.tree.tetrahedra_made:,} tetrahedra, {waiting:,} to divide"
         )
+
+
+def _write_refined(
+    results: Results, flora: Flora, given: Given, camera: Camera, statistics: Statistics, clock: Stopwatch
+) -> Generator[Progress, bool | None, None]:
+    """Refine, and make meshes and proxies of what was decided."""
+    scene, form, settings = results.scene, form_of(results.scene), refinement_settings(results.scene)
+    refinement = yield from _run_loop(flora, given, camera, settings, statistics)
+    own = form.emission
+    refinement, facet_pixels = afford(flora, refinement, camera, settings, own.faces, own.primitive_bytes)
+    clock.lap("refine")
+    _count(statistics, refinement)
+    refined = Refined(flora, refinement, camera)
+    if own.facets:
+        yield Progress(_LOOP_FRACTION, "Analyzing leaf clustering")
+        facet_shares(flora)
+        transition = Transition(flora, camera, settings.leaf_limit)
+        refined = Refined(flora, refinement, camera, facet_pixels, transition, drawn_disc(scene.render.engine))
+    results.open()
+    baking = None
+    if given.sources is not None:
+        baking = Baking(given.sources, leaves=scene.tetflora.baked_light == 'ALL')
+    blocks = emission.explicit_blocks(flora, refinement, refined.transition)
+    yield from _write_blocks(results, flora, blocks, statistics, _LOOP_FRACTION, baking)
+    if given.explicit is not None:
+        kept = explicit_emission.polygon_blocks(refinement, camera, refined.facet_pixels)
+        yield from _write_polygons(results, given.explicit, kept, statistics, baking)
+    if baking is not None:
+        clock.lap("emit")
+        yield from _bake(baking, refined)
+        clock.lap("light")
+    yield Progress(0.95, "Making proxies")
+    for done in write_proxies(results, form, refined, statistics, baking):
+        yield Progress(0.95 + 0.05 * done, f"Making proxies: {statistics.polygons_proxy:,}")
 
 
 def _count(statistics: Statistics, refinement: Refinement) -> None:
@@ -372,19 +260,12 @@ def _write_polygons(
         yield Progress(0.95, f"Keeping polygons: {statistics.polygons_meshed:,}")
 
 
-def _bake(
-    baking: Baking,
-    flora: Flora,
-    refinement: Refinement,
-    camera: Camera,
-    facet_pixels: float | None,
-    transition: Transition | None,
-) -> Generator[Progress, None, None]:
-    """Find the light of all that is drawn, and give it to meshes; facets of so many pixels, none for shells."""
-    if facet_pixels is not None:
-        for count in tell_facets(baking, flora, refinement, camera, facet_pixels, transition):
+def _bake(baking: Baking, refined: Refined) -> Generator[Progress, None, None]:
+    """Find the light of everything that is drawn, and give it to meshes."""
+    if refined.facet_pixels is not None:
+        for count in baking.add_facets(refined):
             yield Progress(0.9, f"Baking light: {count:,} facets")
-    for done in baking.look(flora, refinement, camera, facet_pixels is not None):
+    for done in baking.look(refined):
         yield Progress(0.9 + 0.03 * done, f"Baking light: {done:.0%} of the shadows")
     for done in baking.light_meshes():
         yield Progress(0.93 + 0.02 * done, f"Baking light: {done:.0%} of the leaves")

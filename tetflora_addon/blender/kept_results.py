@@ -20,9 +20,9 @@ from ..refinement.camera import Camera
 from ..refinement.view_cells import Around, ViewCells, cell_camera
 from .camera_reader import read_camera
 from .emit import hidden_originals, hide_originals, remove_collection, result_collections, show_originals
-from .job import Given
 from .plant_kinds import species_of
 from .proxies import shade_again
+from .scene_contents import Given
 from .scene_digest import digest_of, scene_digest
 from .species_edits import species_for
 from .wind_properties import wind_of

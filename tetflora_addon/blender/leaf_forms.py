@@ -18,11 +18,15 @@ from .node_tools import is_ours
 from .output import replaced_material
 from .plant_form import read_skeleton
 from .plant_kinds import form_of, species_of
-from .properties import leaf_objects
 from .species_edits import species_for
 
 _INDEX = "material_index"
 _COLOURED = "tetflora_coloured"  # on materials that have got their viewport colour; another is the artist's choice
+
+
+def leaf_objects(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
+    """Mesh objects that replace the leaves of species, by the species' identifier."""
+    return {entry.species: entry.leaf for entry in scene.tetflora.leaf_objects if entry.species and entry.leaf}
 
 
 def resolved_species(scene: bpy.types.Scene, kind_of_plant: str, depsgraph: bpy.types.Depsgraph) -> Species:

@@ -19,10 +19,11 @@ from ..plants.compiled import Flora
 from ..plants.growth import trunks
 from ..plants.seeds import Seeds
 from ..plants.species import Species
-from . import job
+from ..refinement.statistics import Progress
 from .leaf_forms import materials_of
 from .meshes import write_mesh
 from .plant_kinds import kind_of
+from .scene_contents import compile_for
 from .transforms import frames_of, world_matrix
 
 #: Polygons that are made at once at most; more would fill the memory of most computers.
@@ -127,7 +128,7 @@ def make_plant_meshes(
 
 def make_plant_mesh_steps(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, plants: Iterable[bpy.types.Object]
-) -> Generator[job.Progress, object, list[bpy.types.Object]]:
+) -> Generator[Progress, object, list[bpy.types.Object]]:
     """Make ordinary mesh objects of plants, in their places and collections; the plants are disabled, not deleted.
 
     A step for each plant; closed before its end, it takes back what was made.
@@ -157,7 +158,7 @@ def make_plant_mesh_steps(
     for plant, good in zip(plants, sound, strict=True):
         if not good:
             raise SceneError(f'"{plant.name}": zero scale or an invalid position; clear them with Alt S and Alt G')
-    floras = {kind_of(p): job.compile_for((kind_of(p),), scene, depsgraph) for p in plants}
+    floras = {kind_of(p): compile_for((kind_of(p),), scene, depsgraph) for p in plants}
     seeds = [single_seed(kind_of(p), p.tetflora.seed, f) for p, f in zip(plants, frame, strict=True)]
     polygons = sum(expected_polygons(floras[s.identifiers[0]], s) for s in seeds)
     if polygons > MOST_POLYGONS:
@@ -168,7 +169,7 @@ def make_plant_mesh_steps(
     whole = False
     try:
         for number, (plant, seed) in enumerate(zip(plants, seeds, strict=True)):
-            yield job.Progress(number / len(plants), f"mesh {number + 1:,} of {len(plants):,}")
+            yield Progress(number / len(plants), f"mesh {number + 1:,} of {len(plants):,}")
             flora = floras[kind_of(plant)]
             mesh = plant_mesh(scene, f"{plant.name} mesh", flora.species[0], plant_parts(flora, seed))
             made.append(_placed(mesh, plant, frame[number] * scale[number], world[number, :3, 3]))

@@ -16,10 +16,12 @@ from ..errors import TetFloraError
 from ..preview.levels import Levels, gather
 from ..preview.light_plants import Shapes, bounds_of_plants, light_plants
 from ..refinement.loop import refine as refine_loop
-from . import job, preview_state, species_edits
+from ..refinement.statistics import Progress
+from . import preview_state, species_edits
 from .camera_reader import read_camera
 from .preview_state import camera_now, find, of
 from .runtime import Handlers, call_off, call_soon, redraw
+from .scene_contents import compile_for, read_scene, refinement_settings
 from .scene_reader import NoPlantsError, read_plants
 
 _SOON = 0.2  # seconds from a change of plants to reading them again
@@ -27,7 +29,7 @@ _SOON = 0.2  # seconds from a change of plants to reading them again
 
 def level_steps(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer | None = None
-) -> Generator[job.Progress, None, Levels]:
+) -> Generator[Progress, None, Levels]:
     """Refine a scene without making anything, and keep all levels for viewports; closing it changes nothing.
 
     Raises
@@ -35,14 +37,14 @@ def level_steps(
     TetFloraError
         As `job.refine_steps`.
     """
-    yield job.Progress(0.0, "Reading the scene")
+    yield Progress(0.0, "Reading the scene")
     looked = camera_now(scene)
     before = find(scene)
     camera = before.frozen if before is not None and before.frozen is not None else read_camera(scene, depsgraph)
-    given = job.read_scene(scene, depsgraph, view_layer or depsgraph.view_layer)
-    yield job.Progress(0.02, "Compiling species")
-    flora = job.compile_for(given.species, scene, depsgraph)
-    settings = job.refinement_settings(scene)
+    given = read_scene(scene, depsgraph, view_layer or depsgraph.view_layer)
+    yield Progress(0.02, "Compiling species")
+    flora = compile_for(given.species, scene, depsgraph)
+    settings = refinement_settings(scene)
     states = refine_loop(flora, given.seeds, camera, settings, given.occluders, given.polygons, given.lights)
     loop = gather(states, flora, camera)
     fraction = 0.05
@@ -53,7 +55,7 @@ def level_steps(
             levels = stop.value
             break
         fraction += 0.15 * (1.0 - fraction)  # nobody knows how many passes will follow
-        yield job.Progress(fraction, f"Level {level.number}: {len(level):,} tetrahedra")
+        yield Progress(fraction, f"Level {level.number}: {len(level):,} tetrahedra")
     preview = of(scene)
     preview.levels, preview.looked = levels, looked
     preview.made += 1
@@ -76,7 +78,7 @@ def read_shapes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Shape
         else:
             seeds = read_plants(scene, depsgraph, depsgraph.view_layer)
             make = light_plants if form == 'LIGHT' else bounds_of_plants
-            preview.shapes = make(job.compile_for(seeds.identifiers, scene, depsgraph), seeds)
+            preview.shapes = make(compile_for(seeds.identifiers, scene, depsgraph), seeds)
     except NoPlantsError as error:
         preview.shapes, preview.message = None, str(error)
     except TetFloraError as error:

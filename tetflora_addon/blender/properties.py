@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What TetFlora stores in a file: ``Object.tetflora`` on plants, fields and occluders, ``Scene.tetflora`` otherwise."""
 
-from dataclasses import fields
-
 import bpy
 from bpy.props import (
     BoolProperty,
@@ -14,7 +12,6 @@ from bpy.props import (
     StringProperty,
 )
 
-from ..refinement.settings import RefinementSettings
 from . import (
     brush_properties,
     output_properties,
@@ -27,6 +24,7 @@ from . import (
 from .explicit_objects import PROPERTY as EXPLICIT
 from .film_properties import AnimationProperties
 from .plant_form import FORM_TYPES
+from .proxy_forms import form_property
 from .refinement_properties import RefinementProperties
 from .runtime import Listeners
 from .species_choice import SpeciesChoice
@@ -134,41 +132,7 @@ class TetFloraScene(RefinementProperties, AnimationProperties, bpy.types.Propert
 
     version: IntProperty(name="Version", description="Layout of these properties", options={'HIDDEN'})
 
-    proxy_form: EnumProperty(
-        name="Proxies",
-        description="What stands for plants that are too small or too hidden for polygons of their own",
-        items=(
-            (
-                'MICROSURFACES',
-                "Microsurfaces",
-                "Few small facets with the area, directions and colours of the leaves they stand for",
-                'MESH_GRID',
-                0,
-            ),
-            (
-                'SHELLS',
-                "Shells",
-                "Each piece of space drawn as a translucent volume, as in the paper. Slower to render; good for haze",
-                'MESH_CONE',
-                1,
-            ),
-            (
-                'MICROSPHERES',
-                "Microspheres",
-                "A cloud of opaque spheres of about a pixel, as many as there would be facets. Least memory",
-                'POINTCLOUD_DATA',
-                2,
-            ),
-            (
-                'AUTOMATIC',
-                "Automatic",
-                "Microsurfaces where they are seen, which come closest to the plants; elsewhere microspheres",
-                'SHADERFX',
-                3,
-            ),
-        ),
-        default='AUTOMATIC',
-    )
+    proxy_form: form_property()
     baked_light: EnumProperty(
         name="Lighting",
         description=(
@@ -273,19 +237,6 @@ CLASSES = (
 )
 
 _register, _unregister = bpy.utils.register_classes_factory(CLASSES)
-
-
-def settings_from(scene: bpy.types.Scene) -> RefinementSettings:
-    """The scene's settings as the engine takes them."""
-    group = scene.tetflora
-    # A field that has no property of its own keeps the engine's value.
-    names = [f.name for f in fields(RefinementSettings) if f.name in group.bl_rna.properties]
-    return RefinementSettings(**{name: getattr(group, name) for name in names})
-
-
-def leaf_objects(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
-    """Mesh objects that replace the leaves of species, by the species' identifier."""
-    return {entry.species: entry.leaf for entry in scene.tetflora.leaf_objects if entry.species and entry.leaf}
 
 
 def register() -> None:

@@ -15,10 +15,9 @@ from ..plants.species import Species
 from ..refinement.camera import Camera
 from .camera_reader import read_camera
 from .compat import drawn_disc
-from .job import Given, read_scene
 from .leaf_forms import brought_materials, resolved_species
 from .output import REPLACED
-from .properties import settings_from
+from .scene_contents import Given, read_scene, settings_from
 from .wind_properties import wind_of
 
 #: Digests of species by number of the object, which is held so that no other gets its number.
@@ -43,7 +42,7 @@ def scene_digest(
     camera : Camera, optional
         Which one counts, if it is not the scene's as it stands.
     given : Given, optional
-        What `job.read_scene` has said of the scene.
+        What `read_scene` returned for the scene.
 
     Raises
     ------

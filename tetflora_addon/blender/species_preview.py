@@ -17,10 +17,11 @@ from ..errors import TetFloraError
 from ..plants.compiled import Flora, compile_species
 from ..plants.seeds import Seeds
 from ..plants.species import Range
-from . import job, species_edits, species_values
+from . import species_edits, species_values
 from .node_tools import is_ours, tag
 from .plant_mesh import expected_polygons, plant_mesh, plant_parts, single_seed
 from .runtime import Handlers, call_off, call_soon, redraw
+from .scene_contents import compile_for
 
 NAME = "TetFlora preview"
 #: Polygons that a preview has at most, about: what is rebuilt while a slider moves.
@@ -87,7 +88,7 @@ def refresh() -> None:
     try:
         depsgraph = scene.view_layers[0].depsgraph or bpy.context.evaluated_depsgraph_get()
         seeds = single_seed(identifier, editor.preview_seed)
-        flora, orders = _limited(job.compile_for((identifier,), scene, depsgraph), seeds)
+        flora, orders = _limited(compile_for((identifier,), scene, depsgraph), seeds)
         mesh = plant_mesh(scene, NAME, flora.species[0], plant_parts(flora, seeds))
     except TetFloraError as error:
         _state.message, _state.failed = str(error), True

@@ -91,6 +91,22 @@ class Statistics:
         return asdict(self)
 
 
+@dataclass(frozen=True)
+class Progress:
+    """One step of a job.
+
+    Attributes
+    ----------
+    fraction : float
+        0 to 1, an estimate.
+    message : str
+        What is being done, for the status bar.
+    """
+
+    fraction: float
+    message: str
+
+
 class Stopwatch:
     """Adds up wall clock by stage.
 
