@@ -2,20 +2,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Populate a terrain with plants: a new population, and its plants, in one step."""
 
-from math import pi
+from types import SimpleNamespace
 
 import bpy
-from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import EnumProperty, StringProperty
 
+from ..tetflora_addon.blender.generated import properties_of
 from ..tetflora_addon.blender.population_properties import MOST_EMPTIES, STORAGE_ITEMS
 from ..tetflora_addon.blender.population_rules import copy_companion
 from ..tetflora_addon.blender.populations import add_population, make_plants, remove_population
 from ..tetflora_addon.blender.species_items import catalogue, default_species
 from ..tetflora_addon.errors import SceneError, TetFloraError
-from ..tetflora_addon.planting.rules import MOST_PLANTS
+from ..tetflora_addon.planting.rules import Rules
 from .base import Reporting, in_object_mode, select_only
 from .populations import ground_selected, report_made, selected_grounds
 
+# Of what is not given, the panel's settings are taken: defaults do not matter here.
+_RULES = SimpleNamespace(**properties_of(Rules, options={'SKIP_SAVE'}))
 # Names that the operator shares with the scene's settings for populating.
 _SHARED = ("count", "as_field", "seed", "slope_limit", "min_distance", "scale_min", "scale_max")
 
@@ -31,9 +34,7 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
     )
     bl_options = {'REGISTER', 'UNDO'}
 
-    count: IntProperty(
-        name="Plants", description="Plants to place", default=100, min=1, max=MOST_PLANTS, options={'SKIP_SAVE'}
-    )
+    count: _RULES.count
     as_field: EnumProperty(
         name="Create As",
         description="What the plants are created as",
@@ -41,42 +42,11 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
         default='AUTOMATIC',
         options={'SKIP_SAVE'},
     )
-    seed: IntProperty(
-        name="Seed",
-        description="A different seed gives a different arrangement and different plants",
-        options={'SKIP_SAVE'},
-    )
-    slope_limit: FloatProperty(
-        name="Max Slope",
-        description="Ground steeper than this stays bare",
-        subtype='ANGLE',
-        default=pi / 4,
-        min=0.0,
-        max=pi / 2,
-        options={'SKIP_SAVE'},
-    )
-    min_distance: FloatProperty(
-        name="Min Distance",
-        description="Minimum distance between two trunks, measured on the map",
-        subtype='DISTANCE',
-        unit='LENGTH',
-        min=0.0,
-        options={'SKIP_SAVE'},
-    )
-    scale_min: FloatProperty(
-        name="Min Scale",
-        description="Scale of the smallest plants; 1 is the size in the species file",
-        default=1.0,
-        min=0.01,
-        options={'SKIP_SAVE'},
-    )
-    scale_max: FloatProperty(
-        name="Max Scale",
-        description="Scale of the largest plants; 1 is the size in the species file",
-        default=1.0,
-        min=0.01,
-        options={'SKIP_SAVE'},
-    )
+    seed: _RULES.seed
+    slope_limit: _RULES.slope_max
+    min_distance: _RULES.min_distance
+    scale_min: _RULES.scale_min
+    scale_max: _RULES.scale_max
     species: StringProperty(
         name="Species",
         description="Identifiers of species separated by commas, each with a share if wanted: broadleaf_tree:3, bush:1",

@@ -17,6 +17,7 @@ from ..operators.remove_plants import TETFLORA_OT_remove_plants
 from ..operators.reseed import TETFLORA_OT_reseed
 from ..operators.select_species import TETFLORA_OT_select_species
 from ..operators.use_as_form import TETFLORA_OT_use_as_form
+from .add_menu import TETFLORA_MT_place_plant
 from .plants_panel import TETFLORA_MT_species
 
 
@@ -38,7 +39,7 @@ class TETFLORA_MT_object(bpy.types.Menu):
         layout.operator(TETFLORA_OT_split_field.bl_idname, icon='OUTLINER_OB_EMPTY')
         layout.separator()
         layout.operator(TETFLORA_OT_paint_plants.bl_idname, icon='BRUSH_DATA')
-        layout.menu("TETFLORA_MT_place_plant", icon='RESTRICT_SELECT_OFF')
+        layout.menu(TETFLORA_MT_place_plant.__name__, icon='RESTRICT_SELECT_OFF')
         layout.operator(TETFLORA_OT_drop_to_ground.bl_idname, icon='TRIA_DOWN_BAR')
         layout.separator()
         layout.menu(TETFLORA_MT_species.__name__, text="Change Species", icon='OUTLINER_OB_EMPTY')

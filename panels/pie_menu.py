@@ -11,6 +11,8 @@ from ..operators.keymaps import PIE
 from ..operators.paint_plants import TETFLORA_OT_paint_plants
 from ..operators.populate import TETFLORA_OT_populate
 from ..operators.refine import TETFLORA_OT_refine
+from .add_menu import TETFLORA_MT_place_plant
+from .plants_panel import TETFLORA_MT_species
 
 
 class TETFLORA_MT_pie(bpy.types.Menu):
@@ -25,11 +27,11 @@ class TETFLORA_MT_pie(bpy.types.Menu):
         pie.operator(TETFLORA_OT_paint_plants.bl_idname, icon='BRUSH_DATA')
         pie.operator(TETFLORA_OT_refine.bl_idname, icon='MOD_DECIM')
         pie.operator(TETFLORA_OT_populate.bl_idname, text="Populate with Plants", icon='OUTLINER_OB_POINTCLOUD')
-        pie.menu("TETFLORA_MT_place_plant", icon='RESTRICT_SELECT_OFF')
+        pie.menu(TETFLORA_MT_place_plant.__name__, icon='RESTRICT_SELECT_OFF')
         pie.operator(TETFLORA_OT_drop_to_ground.bl_idname, icon='TRIA_DOWN_BAR')
         pie.operator(TETFLORA_OT_clear.bl_idname, icon='TRASH')
         pie.operator(TETFLORA_OT_first_forest.bl_idname, icon='WORLD')
-        pie.menu("TETFLORA_MT_species", text="Change Species", icon='OUTLINER_OB_EMPTY')
+        pie.menu(TETFLORA_MT_species.__name__, text="Change Species", icon='OUTLINER_OB_EMPTY')
 
 
 CLASSES = (TETFLORA_MT_pie,)

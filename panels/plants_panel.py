@@ -15,6 +15,7 @@ from ..tetflora_addon.blender.plant_copies import has_nodes
 from ..tetflora_addon.blender.plant_fields import FIELD_TYPES, stored_size
 from ..tetflora_addon.blender.plant_form import FORM_TYPES
 from ..tetflora_addon.blender.species_items import catalogue
+from .add_menu import TETFLORA_MT_add_plant
 from .base import SidebarPanel, picture, split_layout
 from .lists import TETFLORA_UL_field_species, draw_list
 
@@ -52,7 +53,7 @@ class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
             _draw_field(column, active)
         else:
             column.label(text="The active object is not a plant", icon='INFO')
-        layout.menu("TETFLORA_MT_add_plant", text="Add Plant", icon='ADD')
+        layout.menu(TETFLORA_MT_add_plant.__name__, text="Add Plant", icon='ADD')
         if active is None or active.tetflora.is_plant:
             return
         # A mesh with faces is ground or something else, as a rule; the Object menu offers these for it too.

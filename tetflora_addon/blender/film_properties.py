@@ -2,9 +2,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Settings of animations as properties of a scene: what frames share, and the size of the frame cache."""
 
-import math
+from types import SimpleNamespace
 
 from bpy.props import BoolProperty, FloatProperty
+
+from ..refinement.view_cells import ViewCells
+from .generated import properties_of
+
+_CELLS = SimpleNamespace(**properties_of(ViewCells))
 
 
 class AnimationProperties:
@@ -18,28 +23,8 @@ class AnimationProperties:
         ),
         default=True,
     )
-    cell_length: FloatProperty(
-        name="Within Distance",
-        description=(
-            "How far the camera moves along its line of sight before plants are refined again. Larger values are "
-            "faster, with more geometry per frame; use 0.1 m or less for close-ups of single plants. Doubled, "
-            "quadrupled and so on where all plants are far away"
-        ),
-        subtype='DISTANCE',
-        default=4.0,
-        min=0.001,
-        soft_min=0.1,
-        soft_max=50.0,
-    )
-    cell_turn: FloatProperty(
-        name="Within Angle",
-        description="How far the camera turns before plants are refined again. The view is widened by the same angle",
-        subtype='ANGLE',
-        default=math.radians(3.0),
-        min=math.radians(0.05),
-        soft_max=math.radians(20.0),
-        max=math.radians(40.0),
-    )
+    cell_length: _CELLS.length
+    cell_turn: _CELLS.turn
     kept_memory: FloatProperty(
         name="Frame Cache",
         description=(

@@ -19,6 +19,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from ..setting import setting
 from .camera import Camera
 
 #: How far beyond a cell, as shares of it in place and angle, its camera still sees enough: while the shutter is open,
@@ -45,19 +46,31 @@ _FRACTIONS = 64.0
 
 @dataclass(frozen=True)
 class ViewCells:
-    """How large the cells are.
+    """How large the cells are. Both are properties of a scene, and documented by their tooltips.
 
-    Attributes
-    ----------
-    length : float
-        Along the line of sight, metres, where something is near. Across it cells are shorter, since there the picture
-        changes faster.
-    turn : float
-        Angle by which a camera turns from one to the next, radians.
+    Across the line of sight cells are shorter than ``length``, since there the image changes faster.
     """
 
-    length: float
-    turn: float
+    length: float = setting(
+        4.0,
+        "Within Distance",
+        "How far the camera moves along its line of sight before plants are refined again. Larger values are faster, "
+        "with more geometry per frame; use 0.1 m or less for close-ups of single plants. Doubled, quadrupled and so on "
+        "where all plants are far away",
+        subtype='DISTANCE',
+        min=0.001,
+        soft_min=0.1,
+        soft_max=50.0,
+    )
+    turn: float = setting(
+        np.radians(3.0).item(),
+        "Within Angle",
+        "How far the camera turns before plants are refined again. The view is widened by the same angle",
+        subtype='ANGLE',
+        min=np.radians(0.05),
+        soft_max=np.radians(20.0),
+        max=np.radians(40.0),
+    )
 
 
 @dataclass(frozen=True)
