@@ -16,7 +16,9 @@ from typing import Any
 
 import numpy as np
 
+from tetflora_addon.arrays import spread
 from tetflora_addon.plants import catalogue, compiled, expansion, foliage, growth, orientation, pieces
+from tetflora_addon.plants.axes import axes
 from tetflora_addon.refinement import amounts
 
 from .plants import Targets
@@ -134,13 +136,13 @@ def grown(flora: Any, wood: Any, oriented: bool) -> tuple[np.ndarray, int]:
     for row in np.unique(bearers.row):
         branches = bearers.take(bearers.row == row)
         counts = growth.leaf_counts(rows, branches)
-        owner, index = growth.spread(counts)
+        owner, index = spread(counts)
         if len(owner) == 0:
             continue
         total += len(owner)
         key = foliage.leaf_keys(branches, owner, index)
         t = foliage.leaf_places(rows, branches, owner, index, counts, key)
-        leaves = foliage.place_leaves(rows, branches, growth.axes(rows, branches), owner, index, key, t)
+        leaves = foliage.place_leaves(rows, branches, axes(rows, branches), owner, index, key, t)
         forms = flora.forms[0][int(rows["leaf_kind"][row])]
         form = foliage.leaf_forms(len(forms), key)
         area = leaves.size**2 * np.array([m.area for m in forms])[form]

@@ -18,7 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
+from tetflora_addon.arrays import spread
 from tetflora_addon.plants import bounds, catalogue, compiled, expansion, foliage, growth, pieces, sides, tubes
+from tetflora_addon.plants.branches import Branches
 
 from .plants import plants as planted
 from .report import Targets
@@ -89,7 +91,7 @@ def placed_leaves(flora: Any, stems: list[Any]) -> Iterator[tuple[Any, Any]]:
             if rows["leaves"][row].sum() > 0:
                 own = some.take(some.branches.row == row)
                 counts = growth.leaf_counts(rows, own.branches)
-                owner, index = growth.spread(counts)
+                owner, index = spread(counts)
                 key = foliage.leaf_keys(own.branches, owner, index)
                 t = foliage.leaf_places(rows, own.branches, owner, index, counts, key)
                 yield own.branches, foliage.place_leaves(rows, own.branches, own.lines, owner, index, key, t)
@@ -146,7 +148,7 @@ def subplants(flora: Any, number: int, polygons: float) -> dict[int, Any]:
         level, *_ = expansion.open_subplants(flora, level)
     out = {}
     for order, found in kinds.items():
-        every = growth.Branches.concatenate(found)
+        every = Branches.concatenate(found)
         faces = flora.polygons[every.row].mean()
         out[order] = every.take(rng.permutation(len(every))[: int(np.clip(polygons / faces, 2, number))])
     return out

@@ -12,7 +12,7 @@ import time
 
 import numpy as np
 
-from tetflora_addon.planting.ground import Ground, Path
+from tetflora_addon.planting.ground import Path, Terrain
 from tetflora_addon.planting.places import place
 from tetflora_addon.planting.rules import Companion, Rules
 
@@ -49,7 +49,7 @@ RULES = Rules(
 )
 
 
-def ground(width: float) -> Ground:
+def ground(width: float) -> Terrain:
     """Hills with a mask that follows the altitude, a chequered image, a lobed area and a winding path."""
     along = np.linspace(0.0, width, CELLS + 1)
     x, y = np.meshgrid(along, along, indexing="ij")
@@ -64,7 +64,7 @@ def ground(width: float) -> Ground:
     path = width * np.stack([way, 0.5 + 0.2 * np.sin(12.0 * way)], axis=1)
     texel = np.arange(512)
     image = np.where((texel[:, None] // 32 + texel // 32) % 2, 0.9, 0.3).astype(np.float32)
-    return Ground(
+    return Terrain(
         triangles,
         weight=np.clip((triangles[..., 2] + 50.0) / 60.0, 0.0, 1.0),
         uv=triangles[..., :2] / width,

@@ -15,7 +15,7 @@ PIE = "TETFLORA_MT_pie"
 
 
 @dataclass(frozen=True)
-class Key:
+class Shortcut:
     """A key of ours.
 
     Attributes
@@ -36,8 +36,8 @@ class Key:
 
 
 KEYS = (
-    Key("wm.call_menu_pie", 'F', alt=True, shift=True, menu=PIE),
-    Key(TETFLORA_OT_refine.bl_idname, 'F', ctrl=True, alt=True, shift=True),
+    Shortcut("wm.call_menu_pie", 'F', alt=True, shift=True, menu=PIE),
+    Shortcut(TETFLORA_OT_refine.bl_idname, 'F', ctrl=True, alt=True, shift=True),
 )
 
 _made: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []

@@ -19,7 +19,7 @@ from ..tetflora_addon.blender.species_edits import (
 from ..tetflora_addon.blender.species_items import catalogue
 from ..tetflora_addon.blender.species_values import orders_of, present_species
 from ..tetflora_addon.plants.schema import DEFAULT_SPUR
-from ..tetflora_addon.plants.species import MAX_ORDERS
+from ..tetflora_addon.plants.skeletons import MAX_ORDERS
 from .base import Reporting, counted, selected_plants
 
 

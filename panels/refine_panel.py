@@ -7,9 +7,9 @@ import bpy
 from ..operators.clear import TETFLORA_OT_clear
 from ..operators.refine import TETFLORA_OT_refine
 from ..tetflora_addon.blender import auto_refresh
-from ..tetflora_addon.blender.emit import KIND
 from ..tetflora_addon.blender.first_forest import is_first_forest
 from ..tetflora_addon.blender.handlers import render_errors
+from ..tetflora_addon.blender.output import KIND
 from ..tetflora_addon.blender.scene_reader import has_contents
 from .base import SidebarPanel, draw_message
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import spread
 from .buffers import BLOCK_POLYGONS, MeshBuffers
 from .plants.expansion import chunks
-from .plants.growth import spread
 from .refinement.camera import Camera
 from .refinement.decisions import Decision
 from .refinement.loop import Refinement

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .buffers import BLOCK_POLYGONS, MeshBuffers, PointBuffers
+from .plants.branches import Branches
 from .plants.compiled import Flora
 from .plants.expansion import chunks, open_subplants
-from .plants.growth import Branches
 from .plants.pieces import Pieces
 from .refinement.camera import Camera
 from .refinement.contents import Contents

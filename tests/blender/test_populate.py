@@ -36,7 +36,7 @@ def _place(triangles=SQUARE, **changes):
     occupied = given.pop("occupied", None)
     limits = rules.Rules(slope_max=given.pop("slope_limit"), scale_min=low, scale_max=high, **given)
     older = None if occupied is None else places.Occupied(occupied)
-    return places.place(ground.Ground(triangles), limits, older)
+    return places.place(ground.Terrain(triangles), limits, older)
 
 
 def _distances(points: np.ndarray) -> np.ndarray:

@@ -21,7 +21,7 @@ from tetflora_addon.blender import (
     species_files,
     species_items,
 )
-from tetflora_addon.plants import catalogue, schema, species
+from tetflora_addon.plants import catalogue, schema, skeletons
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -205,7 +205,7 @@ def test_duplicate_revert_and_orders():
         number += 1
         assert len(_edited("bush_2_2").orders) == number  # and it is sound
         assert editor.order == str(number - 1)
-    assert number == species.MAX_ORDERS
+    assert number == skeletons.MAX_ORDERS
     while bpy.ops.tetflora.edit_orders(action='REMOVE') == {'FINISHED'}:
         number -= 1
         assert len(_edited("bush_2_2").orders) == number

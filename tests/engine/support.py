@@ -12,13 +12,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tetflora_addon.arrays import spread
 from tetflora_addon.buffers import MeshBuffers, concatenate_buffers
 from tetflora_addon.facet_emission import facet_blocks
+from tetflora_addon.plants.axes import axes
+from tetflora_addon.plants.branches import Branches
 from tetflora_addon.plants.catalogue import builtin_folder, load_species
 from tetflora_addon.plants.compiled import Flora, compile_species
 from tetflora_addon.plants.expansion import expand
 from tetflora_addon.plants.foliage import leaf_keys, leaf_places, place_leaves
-from tetflora_addon.plants.growth import Branches, axes, leaf_counts, spread, trunks
+from tetflora_addon.plants.growth import leaf_counts, trunks
 from tetflora_addon.plants.members import expected_polygons
 from tetflora_addon.plants.meshing import leaf_meshes
 from tetflora_addon.plants.pieces import Pieces, whole_pieces

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tetflora_addon.plants.bounds import ring_stretch, unit_bounds, widest_radii
+from tetflora_addon.plants.branches import Branches
 from tetflora_addon.plants.compiled import Flora
 from tetflora_addon.plants.expansion import open_subplants
-from tetflora_addon.plants.growth import Branches
 from tetflora_addon.plants.sides import body_distances, bounding_bodies, crossing
 
 _FLOAT32 = 1e-6  # relative rounding of vertices

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from tests.engine import support
+from tetflora_addon.plants.branches import Branches
 from tetflora_addon.plants.expansion import chunks, open_subplants
-from tetflora_addon.plants.growth import Branches
 from tetflora_addon.plants.orientation import leaf_moments, wood_moments
 from tetflora_addon.plants.pieces import wood_areas
 from tetflora_addon.plants.samples import Points
-from tetflora_addon.refinement.contents import subplant_amounts
+from tetflora_addon.refinement.amounts import subplant_amounts
 
 
 def samples_of_plants(species: int, count: int) -> dict[str, np.ndarray]:

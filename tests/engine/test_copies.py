@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tetflora_addon.plants.copies import Copies
+from tetflora_addon.plants.copies import LeafCopies
 from tetflora_addon.plants.foliage import face_light
 from tetflora_addon.plants.leaf_models import LEAF_MODELS
 
@@ -28,7 +28,7 @@ def test_each_copy_is_the_model(name: str, parts: list[int]) -> None:
     rng = np.random.default_rng(1)
     frame, size = frames(number), rng.uniform(0.01, 0.3, number)
     position, colour = rng.normal(size=(number, 3)) * 10, rng.random((number, 3))
-    copies = Copies(model, number, 0.25)
+    copies = LeafCopies(model, number, 0.25)
     for part in np.split(np.arange(number), np.cumsum(parts)[:-1]):
         copies.add(position[part], frame[part].astype(np.float32), size[part], colour[part])
     mesh = copies.buffers()
@@ -78,6 +78,6 @@ def test_single_precision_turns_leaves_to_the_light(seed: int, light: float, til
 
 def test_no_copies_are_a_mesh_without_faces() -> None:
     """Of several forms of leaf, a chunk may have none of one."""
-    copies = Copies(LEAF_MODELS["ovate"], 0, 0.4)
+    copies = LeafCopies(LEAF_MODELS["ovate"], 0, 0.4)
     copies.add(np.zeros((0, 3)), np.zeros((0, 3, 3), np.float32), np.zeros(0), np.zeros((0, 3)))
     assert copies.buffers().polygons == 0

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tests.engine import support
 from tetflora_addon.refinement.amounts import Amounts
-from tetflora_addon.refinement.cells import Cells, feature_pixels
+from tetflora_addon.refinement.cells import Terminals, feature_pixels
 from tetflora_addon.refinement.decisions import Decision, decide, gains_nothing, without_splits
 from tetflora_addon.refinement.settings import RefinementSettings
 
@@ -42,7 +42,7 @@ def become(
     amounts = Amounts(*(np.array([v], float) for v in (leaf, wood, polygons, width)))
     span = np.array([np.sqrt(2) / (0.001 * depth)])  # of the unit corner, 1 mm a pixel at 1 m
     seen = (np.array([v], float) for v in (pixels, opacity))
-    cells = Cells(
+    cells = Terminals(
         np.array([0]), amounts, *seen, *feature_pixels(cell(depth), amounts.width, CAMERA), span, np.array([True])
     )
     return Decision(decide(cells, np.array([transmittance]), settings)[0])
@@ -119,7 +119,7 @@ def test_a_limit_leaves_what_is_hidden_hidden_and_makes_no_forest_of_leaves() ->
     amounts = Amounts(*(np.array(v, float) for v in ([1] * 4, [0.1] * 4, [1e6, 1e4, 1e6, 1e6], [1] * 4)))
     pixels, feature = np.array([1e6, 1e6, 900.0, 1e6]), np.array([2.0, 2.0, 2.0, 0.1])
     one = np.ones(count)
-    cells = Cells(np.arange(count), amounts, pixels, one, feature, feature, one, np.ones(count, bool))
+    cells = Terminals(np.arange(count), amounts, pixels, one, feature, feature, one, np.ones(count, bool))
     split = np.full(count, Decision.SPLIT, np.int8)
     seen = without_splits(split, cells, np.ones(count), SETTINGS)
     assert seen.tolist() == [Decision.PROXY, Decision.EXPLICIT, Decision.EXPLICIT, Decision.PROXY]
@@ -135,7 +135,7 @@ def test_leaves_that_are_large_only_at_the_near_end_are_told_from_the_rest() -> 
 
     def decided(least: float, polygons: float) -> int:
         holds = replace(amounts, polygons=np.array([polygons]))
-        cells = Cells(np.arange(1), holds, 900.0 * one, one, 5.0 * one, least * one, one, np.ones(1, bool))
+        cells = Terminals(np.arange(1), holds, 900.0 * one, one, 5.0 * one, least * one, one, np.ones(1, bool))
         return int(decide(cells, one, SETTINGS)[0])
 
     assert decided(0.1, 1e6) == Decision.SPLIT
@@ -147,7 +147,7 @@ def test_the_last_few_cells_are_not_worth_a_pass() -> None:
     """Only if they are few among many, change next to nothing of the picture and hold next to nothing."""
     count = 1000
     amounts = Amounts(*(np.full(count, v) for v in (1.0, 0.1, 1000.0, 0.1)))
-    cells = Cells(
+    cells = Terminals(
         np.arange(count), amounts, *(np.full(count, v) for v in (1000.0, 1.0, 0.1, 0.1, 1.0)), np.ones(count, bool)
     )
     seen, splitting = np.ones(count), np.zeros(count, bool)

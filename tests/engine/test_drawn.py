@@ -18,7 +18,8 @@ from tetflora_addon.plants.expansion import open_subplants
 from tetflora_addon.plants.pieces import wood_areas
 from tetflora_addon.plants.schema import species_from_dict
 from tetflora_addon.plants.skeletons import Skeleton, drawn_branches, skeleton_from_edges
-from tetflora_addon.refinement.contents import bounding_cylinders, subplant_amounts
+from tetflora_addon.refinement.amounts import subplant_amounts
+from tetflora_addon.refinement.contents import bounding_cylinders
 
 #: A crooked trunk with three limbs, one of which bears a branch of its own.
 POINTS = np.array(

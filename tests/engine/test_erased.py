@@ -8,12 +8,12 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tetflora_addon.planting.ground import Ground, Path
+from tetflora_addon.planting.ground import Path, Terrain
 from tetflora_addon.planting.places import place, without
 from tetflora_addon.planting.rules import Rules
 
 SQUARE = 20.0 * np.array([[[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [1, 1, 0], [0, 1, 0]]], dtype=np.float64)
-PLACED = place(Ground(SQUARE), Rules(count=200, tilt=0.5))
+PLACED = place(Terrain(SQUARE), Rules(count=200, tilt=0.5))
 COORDINATE = st.floats(-5.0, 25.0)
 
 

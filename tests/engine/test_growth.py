@@ -19,19 +19,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.engine import support
+from tetflora_addon.arrays import spread
+from tetflora_addon.plants.axes import axes
+from tetflora_addon.plants.branches import Branches
 from tetflora_addon.plants.compiled import Flora
 from tetflora_addon.plants.expansion import chunks, open_subplants
 from tetflora_addon.plants.foliage import face_light, leaf_keys, leaf_places, place_leaves
-from tetflora_addon.plants.growth import (
-    Branches,
-    axes,
-    branch_counts,
-    children,
-    chosen_children,
-    leaf_counts,
-    spread,
-    trunks,
-)
+from tetflora_addon.plants.growth import branch_counts, children, chosen_children, leaf_counts, trunks
 from tetflora_addon.plants.pieces import Pieces
 from tetflora_addon.plants.rows import FORK, SPUR
 from tetflora_addon.plants.seeds import Seeds

@@ -28,7 +28,7 @@ ROOMS = {
     "planting": {"plants"},
     "preview": {"plants", "tetrahedra", "refinement"},
 }
-SHARED = {"buffers", "errors", "cache_folder", "kept_arrays", "setting", "whole_files"}
+SHARED = {"arrays", "buffers", "errors", "cache_folder", "kept_arrays", "setting", "whole_files"}
 # Files beside the rooms that put decisions into buffers may use each other.
 BESIDE = {"baked_emission", "budget", "facet_emission", "shell_emission"}
 

@@ -14,7 +14,8 @@ from tetflora_addon.plants.compiled import Flora
 from tetflora_addon.plants.seeds import Seeds
 from tetflora_addon.refinement.camera import Camera
 from tetflora_addon.refinement.decisions import Decision
-from tetflora_addon.refinement.lights import Light, seen_ground
+from tetflora_addon.refinement.light_views import Light
+from tetflora_addon.refinement.lights import seen_ground
 from tetflora_addon.refinement.loop import Refinement, refine
 from tetflora_addon.refinement.settings import RefinementSettings
 

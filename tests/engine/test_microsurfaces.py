@@ -14,9 +14,11 @@ from hypothesis import strategies as st
 from tests.engine import support
 from tests.engine.test_meshing import check_topology
 from tetflora_addon.buffers import MeshBuffers
+from tetflora_addon.plants.branches import Branches
 from tetflora_addon.plants.compiled import Flora
-from tetflora_addon.plants.growth import Branches, trunks
-from tetflora_addon.refinement.contents import Contents, bounding_cylinders, subplant_amounts
+from tetflora_addon.plants.growth import trunks
+from tetflora_addon.refinement.amounts import subplant_amounts
+from tetflora_addon.refinement.contents import Contents, bounding_cylinders
 from tetflora_addon.shading.facet_sizes import COARSE, piece_facet_sizes, subplant_facet_sizes
 from tetflora_addon.shading.microsurfaces import facet_mesh, piece_facets, subplant_facets
 

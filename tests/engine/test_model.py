@@ -13,17 +13,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.engine import support
+from tetflora_addon.arrays import spread
 from tetflora_addon.plants.averages import quadratic
+from tetflora_addon.plants.axes import axes
+from tetflora_addon.plants.branches import Branches
 from tetflora_addon.plants.compiled import Flora
 from tetflora_addon.plants.expansion import open_subplants
 from tetflora_addon.plants.foliage import leaf_keys, leaf_places, outwardness, place_leaves, settled
-from tetflora_addon.plants.growth import Branches, axes, branch_counts, children, leaf_counts, radius_at, spread
+from tetflora_addon.plants.growth import branch_counts, children, leaf_counts, radius_at
 from tetflora_addon.plants.members import expected_members, expected_polygons
 from tetflora_addon.plants.meshing import leaf_meshes
 from tetflora_addon.plants.orientation import leaf_moments, wood_moments
 from tetflora_addon.plants.pieces import Pieces, clipped, wood_areas
 from tetflora_addon.plants.rows import FORK, LATERAL, SPUR, without_variation
-from tetflora_addon.refinement.contents import piece_amounts, subplant_amounts
+from tetflora_addon.refinement.amounts import piece_amounts, subplant_amounts
 
 _UP = np.array([0.0, 0.0, 1.0])
 

@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.engine import support
+from tetflora_addon.arrays import spread
 from tetflora_addon.plants.foliage import leaf_keys, leaf_places, leaf_range
-from tetflora_addon.plants.growth import leaf_counts, spread
+from tetflora_addon.plants.growth import leaf_counts
 from tetflora_addon.plants.pieces import Pieces, along_branches
 
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from tetflora_addon.errors import SceneError
 from tetflora_addon.planting import noise, regions, site
-from tetflora_addon.planting.ground import Ground, Path, border_of, sampled
+from tetflora_addon.planting.ground import Path, Terrain, border_of, sampled
 from tetflora_addon.planting.places import Occupied, Placement, place
 from tetflora_addon.planting.rules import Companion, Rules
 from tetflora_addon.planting.spacing import Neighbours, Spacing
@@ -119,7 +119,7 @@ def test_every_plant_satisfies_every_hard_rule(rules, with_areas, with_paths, wi
     weight = np.repeat((rng.random(len(triangles)) < 0.7).astype(float)[:, None], 3, axis=1)
     older = rng.uniform(0.0, SIZE, (12, 3)) if with_older else np.zeros((0, 3))
     older_species = rng.integers(-1, 3, len(older))
-    ground = Ground(triangles, weight, areas=polygons, paths=(Path(line, 0.8),) if with_paths else ())
+    ground = Terrain(triangles, weight, areas=polygons, paths=(Path(line, 0.8),) if with_paths else ())
     placed = place(ground, rules, Occupied(older, older_species))
     assert bool(placed.reason) == (len(placed) < placed.wanted or not len(placed))
     assert rules.by_density or placed.wanted == rules.count
@@ -188,7 +188,7 @@ RICH = Rules(
 
 @pytest.mark.parametrize("rules", [RICH, replace(RICH, by_density=True, density=3.0), replace(RICH, companions=())])
 def test_the_same_rules_are_the_same_plants_whatever_fits_into_memory(rules, monkeypatch):
-    ground = Ground(_hills(1))
+    ground = Terrain(_hills(1))
     first = place(ground, rules)
     assert _same(first, place(ground, rules))
     for chunk in (64, 1000):
@@ -199,7 +199,7 @@ def test_the_same_rules_are_the_same_plants_whatever_fits_into_memory(rules, mon
 
 def test_arrangements_stay_what_they_were():
     """Pinned by the first version of Populate: seed 1 on a square."""
-    placed = place(Ground(SQUARE), Rules(count=50, seed=1, slope_max=1.0, scale_min=0.5, scale_max=2.0))
+    placed = place(Terrain(SQUARE), Rules(count=50, seed=1, slope_max=1.0, scale_min=0.5, scale_max=2.0))
     assert placed.seed[:3].tolist() == [912118617, 1016292999, 1840525004]
     assert np.allclose(placed.position[0], [8.421445755925212, 2.7810532970046866, 0.0], atol=1e-9)
 
@@ -207,7 +207,7 @@ def test_arrangements_stay_what_they_were():
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 10**6), density=st.floats(5.0, 40.0), grey=st.floats(0.1, 1.0))
 def test_density_is_plants_for_each_suitable_square_metre(seed, density, grey):
-    ground = Ground(SQUARE, weight=np.full((2, 3), grey))
+    ground = Terrain(SQUARE, weight=np.full((2, 3), grey))
     placed = place(ground, Rules(by_density=True, density=density, seed=seed))
     expected = density * 100.0 * grey
     assert abs(len(placed) - expected) < 5.0 * np.sqrt(expected) + 1.0
@@ -216,9 +216,9 @@ def test_density_is_plants_for_each_suitable_square_metre(seed, density, grey):
 
 def test_masks_thin_by_their_grey():
     weight = SQUARE[..., 0] / 10.0
-    by_weight = place(Ground(SQUARE, weight=weight), Rules(count=20_000)).position
+    by_weight = place(Terrain(SQUARE, weight=weight), Rules(count=20_000)).position
     image = np.linspace(0.0, 1.0, 257, dtype=np.float32)[None]
-    by_image = place(Ground(SQUARE, uv=SQUARE[..., :2] / 10.0, image=image), Rules(count=20_000)).position
+    by_image = place(Terrain(SQUARE, uv=SQUARE[..., :2] / 10.0, image=image), Rules(count=20_000)).position
     for points in (by_weight, by_image):
         # The density grows with x: P(x < 5) = 1/4; five standard deviations.
         assert (points[:, 0] < 5.0).mean() == pytest.approx(0.25, abs=0.016)
@@ -228,7 +228,7 @@ def test_masks_thin_by_their_grey():
 def test_black_masks_hold_no_plant():
     image = np.zeros((8, 8), np.float32)
     image[:, :4] = 1.0
-    placed = place(Ground(SQUARE, uv=SQUARE[..., :2] / 10.0, image=image), Rules(count=2000)).position
+    placed = place(Terrain(SQUARE, uv=SQUARE[..., :2] / 10.0, image=image), Rules(count=2000)).position
     assert placed[:, 0].max() <= 10.0 * 4.5 / 8.0
     assert placed[:, 0].max() > 5.0  # linear from texel to texel
 
@@ -240,19 +240,19 @@ def test_images_repeat_and_their_borders_do_not_mix():
 
 
 def test_plants_become_rarer_towards_the_border_and_the_limits():
-    placed = place(Ground(SQUARE), Rules(count=20_000, edge_falloff=4.0)).position
+    placed = place(Terrain(SQUARE), Rules(count=20_000, edge_falloff=4.0)).position
     gap = np.minimum(placed[:, :2], 10.0 - placed[:, :2]).min(axis=1)
     # ∫ of gap / 4 over the frame 4 m wide is 40·4/2 − 8·16/3 = 37.33, inside lie 4 m².
     assert (gap > 4.0).mean() == pytest.approx(4.0 / (4.0 + 112.0 / 3.0), abs=0.02)
     ramp = SQUARE * [1.0, 1.0, 0.0]
     ramp[..., 2] = ramp[..., 0]
     rules = Rules(count=20_000, altitude_min=2.0, altitude_max=8.0, altitude_falloff=2.0)
-    z = place(Ground(ramp), rules).position[:, 2]
+    z = place(Terrain(ramp), rules).position[:, 2]
     assert ((z > 4.0) & (z < 6.0)).mean() == pytest.approx(0.5, abs=0.02)
 
 
 def test_clumps_raise_the_variance_and_leave_bare_ground():
-    far = Ground(SQUARE * 20.0)
+    far = Terrain(SQUARE * 20.0)
     cells = [
         np.histogram2d(*place(far, Rules(count=8000, clumping=c, clump_size=25.0)).position[:, :2].T, bins=40)[0]
         for c in (0.0, 0.5, 1.0)
@@ -276,7 +276,7 @@ def test_clumps_stand_as_far_apart_as_asked():
 
 def test_plants_are_smaller_higher_up():
     triangles = _hills(2)
-    placed = place(Ground(triangles), Rules(count=500, scale_at_top=0.25))
+    placed = place(Terrain(triangles), Rules(count=500, scale_at_top=0.25))
     order = np.argsort(placed.position[:, 2])
     assert (np.diff(placed.scale[order]) <= 0.0).all()
     low, high = triangles[..., 2].min(), triangles[..., 2].max()
@@ -285,18 +285,18 @@ def test_plants_are_smaller_higher_up():
 
 
 def test_rotation_turns_about_the_vertical_and_then_tilts():
-    placed = place(Ground(_hills(3)), Rules(count=50, tilt=0.8))
+    placed = place(Terrain(_hills(3)), Rules(count=50, tilt=0.8))
     w, x, y, z = placed.rotation.T
     assert np.allclose(np.linalg.norm(placed.rotation, axis=1), 1.0)
     up = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)
     assert np.allclose(up, placed.up)
-    level = place(Ground(SQUARE), Rules(count=50))
+    level = place(Terrain(SQUARE), Rules(count=50))
     assert np.allclose(level.rotation[:, [0, 3]].T, [np.cos(level.azimuth / 2), np.sin(level.azimuth / 2)])
 
 
 def test_companions_in_part_thin_and_shares_hold():
     rules = Rules(count=3000, shares=(1.0, 1.0), companions=(Companion(1, 0, -0.5, 0.1),))
-    placed = place(Ground(SQUARE), rules)
+    placed = place(Terrain(SQUARE), rules)
     assert np.bincount(placed.species).tolist() == [1500, 1500]
     hosts, others = placed.position[placed.species == 0], placed.position[placed.species == 1]
     near = (_gaps(others, hosts) < 0.1).any(axis=1).mean()
@@ -306,13 +306,13 @@ def test_companions_in_part_thin_and_shares_hold():
 
 def test_species_that_seek_each_other_find_each_other():
     circle = (Companion(0, 1, 1.0, 0.5), Companion(1, 0, 1.0, 0.5), Companion(2, 2, 1.0, 0.5))
-    placed = place(Ground(SQUARE), Rules(count=600, shares=(1.0, 1.0, 1.0), companions=circle))
+    placed = place(Terrain(SQUARE), Rules(count=600, shares=(1.0, 1.0, 1.0), companions=circle))
     assert (np.bincount(placed.species, minlength=3) > 100).all()
 
 
 def test_small_areas_on_large_ground_are_filled():
     square = np.array([[3000.0, 3000.0], [3002.0, 3000.0], [3002.0, 3002.0], [3000.0, 3002.0]])
-    ground = Ground(SQUARE * 1000.0, areas=(square,))
+    ground = Terrain(SQUARE * 1000.0, areas=(square,))
     placed = place(ground, Rules(count=500))
     assert len(placed) == 500
     counts, *_ = np.histogram2d(*placed.position[:, :2].T, bins=2, range=((3000, 3002), (3000, 3002)))
@@ -384,24 +384,24 @@ def test_the_border_is_where_the_ground_ends():
 )
 def test_rules_that_cannot_be_are_refused_by_name(changes, says):
     with pytest.raises(SceneError, match=says):
-        place(Ground(_hills(0)), Rules(**changes))
+        place(Terrain(_hills(0)), Rules(**changes))
 
 
 def test_ground_that_cannot_be_is_refused_by_name():
     broken = SQUARE.copy()
     broken[0, 0, 2] = np.nan
     with pytest.raises(SceneError, match="1 of 2 triangles"):
-        Ground(broken)
+        Terrain(broken)
     with pytest.raises(SceneError, match="no faces"):
-        Ground(SQUARE[:0])
+        Terrain(SQUARE[:0])
     with pytest.raises(SceneError, match="vertex group has no weight"):
-        place(Ground(SQUARE, weight=np.zeros((2, 3))), Rules())
+        place(Terrain(SQUARE, weight=np.zeros((2, 3))), Rules())
     with pytest.raises(SceneError, match="inside the Areas curves"):
-        place(Ground(SQUARE, areas=(SQUARE[0, :, :2] + 50.0,)), Rules())
+        place(Terrain(SQUARE, areas=(SQUARE[0, :, :2] + 50.0,)), Rules())
     with pytest.raises(SceneError, match="image is black"):
-        place(Ground(SQUARE, uv=SQUARE[..., :2], image=np.zeros((4, 4), np.float32)), Rules())
+        place(Terrain(SQUARE, uv=SQUARE[..., :2], image=np.zeros((4, 4), np.float32)), Rules())
     with pytest.raises(SceneError, match="Paths curves leave almost no ground"):
-        place(Ground(SQUARE, paths=(Path(np.array([[5.0, 5.0]]), 50.0),)), Rules())
+        place(Terrain(SQUARE, paths=(Path(np.array([[5.0, 5.0]]), 50.0),)), Rules())
 
 
 @pytest.mark.parametrize(
@@ -418,6 +418,6 @@ def test_ground_that_cannot_be_is_refused_by_name():
     ],
 )
 def test_fewer_plants_come_with_a_reason(changes, says):
-    placed = place(Ground(SQUARE), Rules(**changes))
+    placed = place(Terrain(SQUARE), Rules(**changes))
     assert says in placed.reason
     assert len(placed) < max(placed.wanted, 1)

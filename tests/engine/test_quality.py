@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tetflora_addon.errors import SpeciesError
+from tetflora_addon.plants.axes import axes
 from tetflora_addon.plants.bounds import unit_bounds
 from tetflora_addon.plants.catalogue import load_species
 from tetflora_addon.plants.compiled import compile_species
-from tetflora_addon.plants.growth import axes
 from tetflora_addon.plants.members import expected_members, expected_polygons
 from tetflora_addon.plants.quality import with_quality
 from tetflora_addon.plants.rows import build_rows

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.plants.drawn import MAX_SEGMENTS, drawn_lines
-from tetflora_addon.plants.skeletons import DrawnBranches, Skeleton, drawn_branches, skeleton_from_edges
-from tetflora_addon.plants.species import MAX_ORDERS
+from tetflora_addon.plants.skeletons import MAX_ORDERS, DrawnBranches, Skeleton, drawn_branches, skeleton_from_edges
 
 
 def _random_tree(points: int, roots: int, bushy: float, seed: int) -> Skeleton:

@@ -26,7 +26,7 @@ from tetflora_addon.plants.crown_shapes import CROWN_SHAPES, crown_ratio
 from tetflora_addon.plants.leaf_models import LEAF_MODELS, MAX_LEAF_POLYGONS, leaf_model
 from tetflora_addon.plants.orientation import leaf_moments
 from tetflora_addon.plants.schema import MAX_FILE_BYTES, ORDER_KEYS, read_species, species_from_dict
-from tetflora_addon.plants.species import MAX_ORDERS
+from tetflora_addon.plants.skeletons import MAX_ORDERS
 
 
 def refusal(data: Any) -> str:

@@ -15,12 +15,14 @@ from hypothesis import strategies as st
 from tests.engine import support
 from tests.engine.test_bounds import LEANS, SHAPES, any_species, check_sides, outside
 from tests.engine.test_drawn import flora as drawn_flora
+from tetflora_addon.arrays import spread
 from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.errors import TetFloraError
+from tetflora_addon.plants.axes import axes
 from tetflora_addon.plants.compiled import Flora
 from tetflora_addon.plants.expansion import expand, open_subplants
 from tetflora_addon.plants.foliage import leaf_keys, leaf_places, place_leaves, settled
-from tetflora_addon.plants.growth import axes, leaf_counts, spread
+from tetflora_addon.plants.growth import leaf_counts
 from tetflora_addon.plants.meshing import leaf_meshes
 from tetflora_addon.plants.pieces import Pieces
 from tetflora_addon.plants.rows import ROW_DTYPE

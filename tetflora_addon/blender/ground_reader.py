@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
-from ..planting.ground import Ground, Path
+from ..planting.ground import Path, Terrain
 from .ground_curves import Line, lines_of
 from .image_pixels import image_pixels
 from .plant_objects import objects_within
@@ -32,7 +32,7 @@ def read_ground(
     areas: bpy.types.Collection | None = None,
     paths: bpy.types.Collection | None = None,
     path_distance: float = 0.0,
-) -> Ground:
+) -> Terrain:
     """The ground as the engine takes it, modifiers applied, in world space.
 
     Parameters
@@ -73,7 +73,7 @@ def read_ground(
     if image is not None:
         grey = _luminance(image)
         grey = 1.0 - grey if invert_image else grey
-    return Ground(
+    return Terrain(
         triangles=np.concatenate(triangles),
         weight=weights,
         uv=None if image is None else np.concatenate(uv),

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..refinement.lights import Light
+from ..refinement.light_views import Light
 from .compat import tree_in_use
 from .scene_reader import renderable_objects
 from .transforms import world_matrix

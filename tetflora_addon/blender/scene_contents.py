@@ -14,7 +14,7 @@ from ..plants.catalogue import list_species, load_species
 from ..plants.compiled import Flora, compile_species
 from ..plants.growth import trunks
 from ..plants.seeds import Seeds
-from ..refinement.lights import Light
+from ..refinement.light_views import Light
 from ..refinement.polygons import Polygons
 from ..refinement.settings import RefinementSettings
 from ..refinement.statistics import Statistics

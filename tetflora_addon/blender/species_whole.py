@@ -9,7 +9,8 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 
 from ..plants.leaf_models import LEAF_MODELS
 from ..plants.schema import QUALITY_LIMITS
-from ..plants.species import BARKS, MAX_ORDERS
+from ..plants.skeletons import MAX_ORDERS
+from ..plants.species import BARKS
 from .species_choice import SpeciesChoice
 from .species_edits import tell_listeners
 from .species_values import (

@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..refinement.lights import Light
+from ..refinement.light_views import Light
 from ..shading.light_sources import World
 from .compat import sky_model, tree_in_use
 from .image_pixels import image_pixels, linear_rgb

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..plants.hashing import uniform
 from .rules import Companion, Rules
-from .site import Draw
+from .site import SiteDraw
 from .spacing import NO_DISTANCE, Neighbours, Spacing
 
 _FOUNDERS = 0.1  # of the plants that seek each other
@@ -56,7 +56,7 @@ class Company:
                 others = self._standing(rule.other)
                 founds = np.zeros(len(points), bool)
                 if self._awaited(rule):
-                    founds = asks & (uniform(keys, Draw.FOUNDER) < _FOUNDERS)
+                    founds = asks & (uniform(keys, SiteDraw.FOUNDER) < _FOUNDERS)
                     others = np.concatenate([others, points[founds]]) if rule.other == species else others
                 fine[asks] = founds[asks] | Neighbours(others, rule.distance).near(points[asks])
         return fine
@@ -104,4 +104,4 @@ class Company:
 
 
 def _takes_to_heart(keys: NDArray[np.uint64], number: int, rule: Companion) -> NDArray[np.bool_]:
-    return uniform(keys, Draw.COMPANION + number) < abs(rule.strength)
+    return uniform(keys, SiteDraw.COMPANION + number) < abs(rule.strength)

@@ -29,7 +29,7 @@ class Path:
 
 
 @dataclass(frozen=True)
-class Ground:
+class Terrain:
     """A terrain with everything that is drawn on it. Only the triangles are needed.
 
     Attributes

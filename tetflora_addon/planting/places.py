@@ -18,9 +18,9 @@ from ..errors import SceneError
 from ..plants.hashing import child_key, key_of_seed, uniform
 from .checks import check_rules
 from .companions import Company
-from .ground import Ground, Path
+from .ground import Path, Terrain
 from .rules import Rules
-from .site import REMEDIES, Draw, Sample, Site, lines_of_paths
+from .site import REMEDIES, Sample, Site, SiteDraw, lines_of_paths
 from .spacing import Spacing
 
 MOST = 10_000_000  # plants of one population
@@ -109,12 +109,12 @@ class Placement:
         return np.stack([w * cos, i * cos + j * sin, j * cos - i * sin, w * sin], axis=1)
 
 
-def place(ground: Ground, rules: Rules, occupied: Occupied | None = None) -> Placement:
+def place(ground: Terrain, rules: Rules, occupied: Occupied | None = None) -> Placement:
     """Scatter plants over the ground as the rules ask, evenly as seen on a map.
 
     Parameters
     ----------
-    ground : Ground
+    ground : Terrain
     rules : Rules
     occupied : Occupied, optional
         Plants that stand already; new ones keep their distance from them, and may seek or shun them.
@@ -155,7 +155,7 @@ def place(ground: Ground, rules: Rules, occupied: Occupied | None = None) -> Pla
         reason = sowing.reason(len(position))
     return Placement(
         position=position,
-        azimuth=2.0 * np.pi * uniform(keys, Draw.AZIMUTH),
+        azimuth=2.0 * np.pi * uniform(keys, SiteDraw.AZIMUTH),
         scale=_scales(position[:, 2], keys, site, rules),
         species=species,
         seed=_positive(keys),
@@ -205,7 +205,7 @@ class _Sowing:
                     f"the limit is {MOST:,}. Lower the density"
                 )
             # What is left of a whole plant comes by chance.
-            places = int(expected + uniform(key, Draw.SUITABLE))
+            places = int(expected + uniform(key, SiteDraw.SUITABLE))
             for first in range(0, places, _LARGEST_ROUND):
                 sample = self.site.draw(key, first, min(places - first, _LARGEST_ROUND))
                 self.wanted += len(sample.key)
@@ -315,13 +315,13 @@ def _mixed(keys: NDArray[np.uint64], shares: tuple[float, ...]) -> NDArray[np.in
     weights = np.maximum(np.asarray(shares, dtype=np.float64), 0.0)
     limits = np.cumsum(weights) / weights.sum()
     # Rounding may leave the last limit below a draw that is just under 1.
-    species = np.minimum(np.searchsorted(limits, uniform(keys, Draw.SPECIES), side="right"), len(weights) - 1)
+    species = np.minimum(np.searchsorted(limits, uniform(keys, SiteDraw.SPECIES), side="right"), len(weights) - 1)
     return species.astype(np.int32)
 
 
 def _scales(z: NDArray[np.float64], keys: NDArray[np.uint64], site: Site, rules: Rules) -> NDArray[np.float64]:
     low, high = sorted((rules.scale_min, rules.scale_max))
-    scale = low + (high - low) * uniform(keys, Draw.SCALE)
+    scale = low + (high - low) * uniform(keys, SiteDraw.SCALE)
     if rules.scale_at_top != 1.0 and site.highest > site.lowest:
         height = np.clip((z - site.lowest) / (site.highest - site.lowest), 0.0, 1.0)
         scale *= 1.0 + (rules.scale_at_top - 1.0) * height
@@ -337,4 +337,4 @@ def _tilted(normal: NDArray[np.float64], tilt: float) -> NDArray[np.float64] | N
 
 
 def _positive(keys: NDArray[np.uint64]) -> NDArray[np.int32]:
-    return (uniform(keys, Draw.SEED) * 2**31).astype(np.int32)
+    return (uniform(keys, SiteDraw.SEED) * 2**31).astype(np.int32)

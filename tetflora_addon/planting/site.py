@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from ..plants.hashing import child_key, key_of_seed, uniform
-from .ground import Ground, Path, border_of, sampled
+from .ground import Path, Terrain, border_of, sampled
 from .noise import clumps
 from .regions import Lines, inside_any
 from .rules import Rules
@@ -26,7 +26,7 @@ _DIVISIONS = 16
 _ROUNDING = 1e-6  # a hair of tolerance: level ground passes a slope limit of 0 although positions are single precision
 
 
-class Draw(IntEnum):
+class SiteDraw(IntEnum):
     """What a number is drawn for; of the first ones, arrangements of earlier versions are made."""
 
     TRIANGLE = 1
@@ -79,7 +79,7 @@ class Sample:
 class Site:
     """Ground that suits the rules, ready to draw places on."""
 
-    def __init__(self, ground: Ground, rules: Rules) -> None:
+    def __init__(self, ground: Terrain, rules: Rules) -> None:
         """Leave out triangles where nothing can grow.
 
         Raises
@@ -150,16 +150,16 @@ class Site:
         return Sample(position, up, keys, drawn, lost)
 
     def _suitable(self, keys: NDArray[np.uint64], lost: dict[str, int]) -> tuple[NDArray, NDArray, NDArray[np.uint64]]:
-        index = np.searchsorted(self.cumulative, uniform(keys, Draw.TRIANGLE) * self.cumulative[-1], side="right")
+        index = np.searchsorted(self.cumulative, uniform(keys, SiteDraw.TRIANGLE) * self.cumulative[-1], side="right")
         index = np.minimum(index, len(self.cumulative) - 1)
         # One row of nine numbers at a time: places are in no order, and each row is a wait for memory.
         corners = np.take(self.triangles.reshape(-1, 9), index, axis=0)
-        root = np.sqrt(uniform(keys, Draw.SIDE))
-        along = uniform(keys, Draw.ALONG)
+        root = np.sqrt(uniform(keys, SiteDraw.SIDE))
+        along = uniform(keys, SiteDraw.ALONG)
         shares = np.stack([1.0 - root, root * (1.0 - along), root * along], axis=1)
         points = _mean(corners, shares)
         left = np.arange(len(keys))
-        wanted = uniform(keys, Draw.SUITABLE) * self.most[index]
+        wanted = uniform(keys, SiteDraw.SUITABLE) * self.most[index]
         suitable = np.ones(len(keys))
         for name, factor in self._factors(index, shares, points):
             suitable[left] *= factor(left)

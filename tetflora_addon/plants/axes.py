@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import gathered
 from .branches import Branches
 from .hashing import Draw, signed
 from .rows import varied
-from .vectors import by_component, columns, cross, gathered
+from .vectors import by_component, columns, cross
 from .wind import axis_and_angle, is_windy, leant, moment, sway, turned_by, turned_vectors
 
 

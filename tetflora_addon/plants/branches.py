@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .vectors import gathered
+from ..arrays import gathered
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .growth import spread
+from ..arrays import spread
 
 #: Planes between the tetrahedra, as whole values of these sums.
 _PLANES = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, -1, 0], [0, 1, -1], [1, 0, -1]], dtype=np.float64)

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from ..errors import SpeciesError
 from .averages import Averages, RowLeaves, average, quadratic, row_leaves
 from .bounds import leaf_boxes, leaf_reaches, sampled_bounds, unit_bounds, widest_radii
+from .branches import Branches
 from .clumping import Clumping, fit_clumping
-from .growth import Branches, fullness
+from .growth import fullness
 from .leaf_models import LeafModel
 from .orientation import Orientation, orientation_of
 from .quality import with_quality

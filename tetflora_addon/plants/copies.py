@@ -13,7 +13,7 @@ from .leaf_models import LeafModel
 _ROWS_AT_ONCE = 4096
 
 
-class Copies:
+class LeafCopies:
     """A mesh of copies under construction.
 
     Parameters

@@ -9,8 +9,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from .axes import axes
+from .branches import Branches
 from .compiled import Flora
-from .growth import Branches, axes, children, drawn_children
+from .growth import children, drawn_children
 from .pieces import Pieces, whole_pieces
 from .stems import Stems
 

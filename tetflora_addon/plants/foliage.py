@@ -9,10 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .growth import Axes, Branches, level_azimuth
+from ..arrays import gathered
+from .axes import Axes
+from .branches import Branches
+from .growth import level_azimuth
 from .hashing import Draw, child_key, signed, uniform
 from .rows import ranged
-from .vectors import cross, dot, gathered
+from .vectors import cross, dot
 from .wind import fluttered, gusts, is_windy
 
 _LEAF_PATH = 1 << 32  # child indices of leaves start here, so that they never meet those of branches

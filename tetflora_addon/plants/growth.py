@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import spread
 from .axes import Axes, axes
 from .branches import Branches, Pose
 from .crown_shapes import crown_ratio
@@ -139,13 +140,6 @@ def leaf_counts(rows: NDArray[np.void], branches: Branches) -> NDArray[np.int64]
 def radius_at(rows: NDArray[np.void], branches: Branches, t: NDArray[np.float64]) -> NDArray[np.float64]:
     """Radius at fractions t (n,) of the branches (n,), metres."""
     return branches.radius * profile(rows, branches.row, branches.key, t)
-
-
-def spread(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Owner (m,) and running index within the owner (m,) for ``counts`` things each; m is their sum."""
-    owner = np.repeat(np.arange(len(counts)), counts)
-    first = np.cumsum(counts) - counts
-    return owner, np.arange(len(owner)) - first[owner]
 
 
 def chosen_children(

@@ -11,9 +11,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import spread
 from ..buffers import MeshBuffers
+from .axes import axes
+from .branches import Branches
 from .compiled import Flora
-from .copies import Copies
+from .copies import LeafCopies
 from .expansion import chunks
 from .foliage import (
     in_wind,
@@ -26,7 +29,7 @@ from .foliage import (
     place_leaves,
     settled,
 )
-from .growth import Branches, axes, leaf_counts, spread
+from .growth import leaf_counts
 from .hashing import Draw, uniform
 from .pieces import Pieces
 from .stems import Stems
@@ -86,7 +89,7 @@ def leaf_meshes(
         numbers = sum(group.numbers(len(forms)) for group in own)
         for form in np.flatnonzero(numbers):
             transmission = float(flora.leaf.transmission[own[0].row[0]])
-            copies = Copies(forms[form], int(numbers[form]), transmission, moment(flora.rows) > 0)
+            copies = LeafCopies(forms[form], int(numbers[form]), transmission, moment(flora.rows) > 0)
             for group in own:
                 group.add(copies, int(form), len(forms))
             yield LeafMesh(kind, int(form), copies.buffers())
@@ -157,7 +160,7 @@ class _Bearers:
             out += np.bincount(leaf_forms(forms, key), minlength=forms)
         return out
 
-    def add(self, copies: Copies, form: int, forms: int) -> None:
+    def add(self, copies: LeafCopies, form: int, forms: int) -> None:
         """Place all leaves of one of the forms."""
         rows = self.flora.rows
         for part in self._chunks(len(copies.model.positions)):

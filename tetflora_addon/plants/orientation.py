@@ -18,18 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .axes import Axes, axes
+from .branches import Branches
 from .foliage import leaf_frames, leaf_keys, leaf_places, outwardness, settled
-from .growth import (
-    Axes,
-    Branches,
-    axes,
-    branch_counts,
-    chosen_children,
-    drawn_children,
-    fullness,
-    leaf_counts,
-    radius_at,
-)
+from .growth import branch_counts, chosen_children, drawn_children, fullness, leaf_counts, radius_at
 from .hashing import Draw, key_of_seed, mix, uniform
 from .leaf_models import LeafModel
 from .rows import FORK, LATERAL, SPUR, ranged

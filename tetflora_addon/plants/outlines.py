@@ -13,10 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import spread
 from .averages import tube_perimeter
+from .axes import Axes, axes
 from .branches import Branches
 from .foliage import leaf_forms, leaf_keys, leaf_places, place_leaves, settled
-from .growth import Axes, axes, children, drawn_children, leaf_counts, radius_at, spread
+from .growth import children, drawn_children, leaf_counts, radius_at
 from .leaf_models import LeafModel
 
 _SKY = np.array([0.0, 0.0, 1.0])
@@ -40,7 +42,7 @@ def _inwards(frame: NDArray[np.floating], direction: NDArray[np.float64]) -> NDA
 
 
 @dataclass(frozen=True)
-class Leaves:
+class LeafOutlines:
     """Leaves of one form: n of them."""
 
     model: LeafModel
@@ -80,7 +82,7 @@ class Leaves:
 
 
 @dataclass(frozen=True)
-class Wood:
+class WoodOutlines:
     """Straight parts of branches with the radii of circles that are as wide as their tubes on the mean."""
 
     ends: NDArray[np.float64]
@@ -124,7 +126,7 @@ class Things:
     ``dense`` (n,) the logarithm of λ of the branch that bears them.
     """
 
-    parts: list[Leaves | Wood]
+    parts: list[LeafOutlines | WoodOutlines]
     middle: NDArray[np.float64]
     radius: NDArray[np.float64]
     group: NDArray[np.intp]
@@ -170,17 +172,17 @@ def things_of(
     return Things(parts, middle, radius, np.concatenate(groups), np.concatenate(dense))
 
 
-def _wood(rows: NDArray[np.void], bodies: Branches, lines: Axes) -> tuple[Wood, NDArray[np.int64]]:
+def _wood(rows: NDArray[np.void], bodies: Branches, lines: Axes) -> tuple[WoodOutlines, NDArray[np.int64]]:
     owner, index = spread(lines.segments)
     some, number = bodies.take(owner), lines.segments[owner]
     ends = np.stack([lines.knot(owner, index + k) for k in (0, 1)], axis=1)
     radii = np.stack([radius_at(rows, some, (index + k) / number) for k in (0, 1)], axis=1)
-    return Wood(ends, radii * (tube_perimeter(rows["sides"][some.row]) / (2 * np.pi))[:, None]), owner
+    return WoodOutlines(ends, radii * (tube_perimeter(rows["sides"][some.row]) / (2 * np.pi))[:, None]), owner
 
 
 def _leaves(
     rows: NDArray[np.void], forms: Sequence[Sequence[LeafModel]], bodies: Branches, lines: Axes
-) -> Iterator[tuple[Leaves, NDArray[np.int64]]]:
+) -> Iterator[tuple[LeafOutlines, NDArray[np.int64]]]:
     counts = leaf_counts(rows, bodies)
     for row in np.unique(bodies.row[counts > 0]):
         some = np.flatnonzero((bodies.row == row) & (counts > 0))
@@ -195,4 +197,4 @@ def _leaves(
         for k, model in enumerate(models):
             of = np.flatnonzero(form == k)
             if len(of):
-                yield Leaves(model, leaves.position[of], frame[of], leaves.size[of]), some[owner[of]]
+                yield LeafOutlines(model, leaves.position[of], frame[of], leaves.size[of]), some[owner[of]]

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import gathered
 from .averages import own_leaf_integrals, tube_perimeter
+from .branches import Branches
 from .compiled import Flora
 from .foliage import leaf_start, outwardness
-from .growth import Branches
 from .profiles import profile_integral
 from .stems import Stems
-from .vectors import gathered
 
 
 @dataclass(frozen=True)

@@ -15,12 +15,15 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import gathered
+from .axes import Axes, axes
+from .branches import Branches
 from .foliage import leaf_keys, leaf_places, outwardness, place_leaves
-from .growth import Axes, Branches, axes, branch_counts, chosen_children, chosen_drawn, leaf_counts, radius_at
+from .growth import branch_counts, chosen_children, chosen_drawn, leaf_counts, radius_at
 from .hashing import child_key, key_of_seed, mix
 from .rows import FORK, LATERAL, SPUR, SPUR_ORDER
 from .stratified import evenly, systematic, thinned
-from .vectors import dot, gathered
+from .vectors import dot
 
 SAMPLES = 1024
 _PATHS = 1536  # branches of each row that are followed

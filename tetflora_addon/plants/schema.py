@@ -20,7 +20,8 @@ from ..errors import SpeciesError
 from .crown_shapes import CROWN_SHAPES
 from .leaf_models import LEAF_MODELS, LeafModel, leaf_model
 from .members import expected_polygons
-from .species import BARKS, LEAF_KINDS, MAX_ORDERS, Colour, Order, Range, Species
+from .skeletons import MAX_ORDERS
+from .species import BARKS, LEAF_KINDS, Colour, Order, Range, Species
 
 FORMAT = 1
 MAX_FILE_BYTES = 4_000_000

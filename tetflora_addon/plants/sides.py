@@ -15,10 +15,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import spread
+from .axes import Axes, axes
 from .bounds import own_leaf_reaches, ring_stretch
+from .branches import Branches
 from .compiled import Flora
 from .foliage import in_wind, leaf_keys, leaf_places, leaf_start, place_leaves, settled
-from .growth import Axes, Branches, axes, branch_counts, chosen_children, leaf_counts, radius_at, sorts_of, spread
+from .growth import branch_counts, chosen_children, leaf_counts, radius_at, sorts_of
 from .hashing import Draw
 from .rows import FORK, LATERAL, SPUR, varied
 

@@ -17,8 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SpeciesError
 from .graphs import breadth_first, coinciding, connected, levels, longest_way, summed_from_root, top
-from .species import MAX_ORDERS
 
+#: Orders of branches that a plant has at most.
+MAX_ORDERS = 6
 MAX_POINTS = 200_000
 MERGED_WITHIN = 1e-6  # of the size; points of splines and edges that an exporter split differ by rounding only
 _AT_ORIGIN = 0.01  # of the size; an artist snaps the foot to the origin, and a file rounds it

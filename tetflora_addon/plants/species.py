@@ -5,14 +5,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from .leaf_models import LeafModel
+from .skeletons import Skeleton
 
-if TYPE_CHECKING:
-    from .skeletons import Skeleton
-
-MAX_ORDERS = 6
 LEAF_KINDS = ("leaf", "blossom")
 BARKS = ("ridged", "plated", "smooth", "banded", "ringed", "fibrous", "jointed")
 """Characters of bark that materials know."""
@@ -174,7 +171,7 @@ class Species:
     identifier, name, description : str
         Identifier is the file's name without its ending.
     orders : tuple of Order
-        From the trunk up; at most `MAX_ORDERS`.
+        From the trunk up; at most `skeletons.MAX_ORDERS`.
     leaf, blossom : tuple of LeafModel or str
         Forms of the sample leaf, and of blossoms or fruit, where there are any; each leaf has one of them by chance. A
         string is the name of a Blender mesh object, which the bridge to Blender replaces by a model.

@@ -9,7 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .growth import Axes, Branches, spread
+from ..arrays import spread
+from .axes import Axes
+from .branches import Branches
 from .rows import flare_rings
 
 

@@ -10,14 +10,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import gathered, spread
 from ..buffers import MeshBuffers
+from .axes import Axes, axes
+from .branches import Branches
 from .compiled import Flora
 from .expansion import chunks
 from .foliage import branch_colours
-from .growth import Axes, Branches, axes, radius_at, spread
+from .growth import radius_at
 from .pieces import Pieces, along_branches
 from .stems import Stems
-from .vectors import gathered, unit
+from .vectors import unit
 from .wind import moment
 
 _AT_JOINT = 1e-6  # fractions of a segment closer to a joint than this are at it

@@ -15,27 +15,8 @@ from numpy.typing import NDArray
 
 def by_component(array: NDArray) -> NDArray:
     """The same values (n, ...), with memory laid out component by component."""
-    return _first_to_front(np.ascontiguousarray(_first_to_back(array)))
-
-
-def _first_to_back(array: NDArray) -> NDArray:
-    """As np.moveaxis, which takes as long as arithmetic on a thousand numbers."""
-    return array.transpose(*range(1, array.ndim), 0)
-
-
-def _first_to_front(array: NDArray) -> NDArray:
-    return array.transpose(-1, *range(array.ndim - 1))
-
-
-def gathered(array: NDArray, index: NDArray | slice) -> NDArray:
-    """``array[index]`` along the first axis, component by component; ``index`` may be integers, a mask or a slice."""
-    if isinstance(index, slice):
-        return array[index]
-    if index.dtype == bool:
-        index = np.flatnonzero(index)
-    if array.ndim == 1:
-        return np.take(array, index)
-    return _first_to_front(np.take(_first_to_back(array), index, axis=-1))
+    by = np.ascontiguousarray(array.transpose(*range(1, array.ndim), 0))  # np.moveaxis would take longer
+    return by.transpose(-1, *range(array.ndim - 1))
 
 
 def columns(x: NDArray, y: NDArray, z: NDArray) -> NDArray:

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..plants.averages import own_leaf_integrals
+from ..plants.branches import Branches
 from ..plants.compiled import Flora
-from ..plants.growth import Branches, fullness
+from ..plants.growth import fullness
 from ..plants.pieces import Pieces, leaf_fraction, outward_ends, wood_areas
 from .polygons import Polygons
 

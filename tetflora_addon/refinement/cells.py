@@ -18,7 +18,7 @@ from .visibility import AlphaBuffer
 
 
 @dataclass(frozen=True)
-class Cells:
+class Terminals:
     """Terminal tetrahedra that hold something.
 
     Attributes
@@ -53,7 +53,7 @@ class Cells:
     @classmethod
     def seen(
         cls, tree: TetrahedralTree, nodes: NDArray[np.intp], amounts: Amounts, camera: Camera, buffer: AlphaBuffer
-    ) -> Cells:
+    ) -> Terminals:
         """Draw tetrahedra into the alpha buffer and keep what it says of each by itself."""
         vertices = tree.vertices(nodes)
         outline = buffer.add(nodes, vertices, mean_extinction(amounts, volume(vertices)))
@@ -61,13 +61,13 @@ class Cells:
         features = feature_pixels(vertices, amounts.width, camera)
         return cls(nodes, amounts, outline.pixels, outline.opacity, *features, span, outline.whole)
 
-    def take(self, index: NDArray) -> Cells:
+    def take(self, index: NDArray) -> Terminals:
         """Selection by indices or mask."""
         own = {f.name: getattr(self, f.name)[index] for f in fields(self) if f.name != "amounts"}
-        return Cells(amounts=self.amounts.take(index), **own)
+        return Terminals(amounts=self.amounts.take(index), **own)
 
     @classmethod
-    def joined(cls, parts: Sequence[Cells]) -> Cells:
+    def joined(cls, parts: Sequence[Terminals]) -> Terminals:
         """All of several together."""
         own = {f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(cls) if f.name != "amounts"}
         return cls(amounts=Amounts.concatenate([p.amounts for p in parts]), **own)

@@ -16,8 +16,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..plants.branches import Branches
 from ..plants.compiled import Flora
-from ..plants.growth import Branches, trunks
+from ..plants.growth import trunks
 from ..plants.pieces import Pieces
 from ..plants.seeds import Seeds
 from ..plants.sides import bounding_bodies

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .camera import Camera
-from .cells import Cells
+from .cells import Terminals
 from .settings import RefinementSettings
 
 #: Longest edge, in sides of a block, from which on what crosses the border of the view is divided for its unseen part.
@@ -38,12 +38,12 @@ class Decision(IntEnum):
     SPLIT = 4
 
 
-def decide(cells: Cells, transmittance: NDArray[np.float64], settings: RefinementSettings) -> NDArray[np.int8]:
+def decide(cells: Terminals, transmittance: NDArray[np.float64], settings: RefinementSettings) -> NDArray[np.int8]:
     """Decide for terminal tetrahedra.
 
     Parameters
     ----------
-    cells : Cells of n
+    cells : Terminals of n
     transmittance : (n,) float64
         Share of each one's light that nothing in front holds up; 0 out of view.
     settings : RefinementSettings
@@ -83,13 +83,13 @@ def decide(cells: Cells, transmittance: NDArray[np.float64], settings: Refinemen
     return out
 
 
-def contributions(cells: Cells, transmittance: NDArray[np.float64]) -> NDArray[np.float64]:
+def contributions(cells: Terminals, transmittance: NDArray[np.float64]) -> NDArray[np.float64]:
     """Pixels (n,) that the contents of tetrahedra change."""
     return cells.pixels * transmittance * cells.opacity
 
 
 def gains_nothing(
-    splitting: NDArray[np.bool_], cells: Cells, transmittance: NDArray[np.float64], camera: Camera
+    splitting: NDArray[np.bool_], cells: Terminals, transmittance: NDArray[np.float64], camera: Camera
 ) -> bool:
     """Whether the picture gains nothing by dividing the last few cells: next to none of its pixels would change.
 
@@ -102,7 +102,7 @@ def gains_nothing(
 
 
 def without_splits(
-    decision: NDArray[np.int8], cells: Cells, transmittance: NDArray[np.float64], settings: RefinementSettings
+    decision: NDArray[np.int8], cells: Terminals, transmittance: NDArray[np.float64], settings: RefinementSettings
 ) -> NDArray[np.int8]:
     """What becomes of tetrahedra that would be divided when a limit forbids it: leaves of a pixel stay leaves.
 

@@ -15,12 +15,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import gathered
+from ..plants.branches import Branches
 from ..plants.compiled import Flora
 from ..plants.expansion import open_subplants
-from ..plants.growth import Branches
 from ..plants.pieces import Pieces, clipped
 from ..plants.sides import body_distances, bounding_bodies, crossing, sampled_bodies
-from ..plants.vectors import gathered
 from ..tetrahedra.tree import TetrahedralTree
 from .amounts import Amounts, polygon_amounts
 from .clipping import cut

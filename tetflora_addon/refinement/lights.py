@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ..tetrahedra.geometry import volume
 from ..tetrahedra.tree import TetrahedralTree
 from .camera import Camera
-from .cells import Cells, mean_extinction
+from .cells import Terminals, mean_extinction
 from .decisions import Decision
 from .light_views import Light, light_views
 from .panorama import face_cameras
@@ -54,7 +54,7 @@ class Shadows:
 
 
 def decide_by_shadows(
-    decision: NDArray[np.int8], shadows: Shadows, cells: Cells, settings: RefinementSettings
+    decision: NDArray[np.int8], shadows: Shadows, cells: Terminals, settings: RefinementSettings
 ) -> NDArray[np.int8]:
     """Decisions (n,) where hidden tetrahedra are divided or made explicit for their shadows."""
     amounts, out = cells.amounts, decision.copy()
@@ -69,7 +69,7 @@ def decide_by_shadows(
 
 def shadows_of(
     tree: TetrahedralTree,
-    cells: Cells,
+    cells: Terminals,
     decision: NDArray[np.int8],
     lights: Sequence[Light],
     camera: Camera,
@@ -81,7 +81,7 @@ def shadows_of(
     Parameters
     ----------
     tree : TetrahedralTree
-    cells : Cells of n
+    cells : Terminals of n
     decision : (n,) int8
         `Decision` for each of them.
     lights : sequence of Light

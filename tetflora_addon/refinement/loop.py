@@ -18,11 +18,12 @@ from ..plants.seeds import Seeds
 from ..tetrahedra.tree import TetrahedralTree
 from .amounts import Amounts
 from .camera import Camera
-from .cells import Cells
+from .cells import Terminals
 from .contents import Contents, Holdings, large_polygons
 from .decisions import Decision, decide, gains_nothing, without_splits
 from .descent import Slack, push_down
-from .lights import Light, decide_by_shadows, seen_ground, shadows_of
+from .light_views import Light
+from .lights import decide_by_shadows, seen_ground, shadows_of
 from .polygons import Polygons
 from .settings import RefinementSettings
 from .silhouette import expected_pixels
@@ -49,7 +50,7 @@ class Refinement:
     tree : TetrahedralTree
     holdings : Holdings
         All plants and polygons, in terminal nodes.
-    cells : Cells of t
+    cells : Terminals of t
         Terminal nodes that hold something.
     transmittance : (t,) float64
         Share of each one's light that nothing in front of it holds up.
@@ -67,7 +68,7 @@ class Refinement:
 
     tree: TetrahedralTree
     holdings: Holdings
-    cells: Cells
+    cells: Terminals
     transmittance: NDArray[np.float64]
     decision: NDArray[np.int8]
     rank: NDArray[np.int32]
@@ -225,18 +226,18 @@ def _drawn(
     tree: TetrahedralTree,
     buffers: Buffers,
     buffer: AlphaBuffer | None,
-    cells: Cells | None,
+    cells: Terminals | None,
     nodes: NDArray[np.intp],
     amounts: Amounts,
-) -> tuple[Cells, AlphaBuffer]:
-    """Cells that are there and new ones, and the buffer into which all of them are drawn."""
+) -> tuple[Terminals, AlphaBuffer]:
+    """Terminals that are there and new ones, and the buffer into which all of them are drawn."""
     old = 0 if cells is None else len(cells)
     finer = buffers.fit(buffer, old + len(nodes))
     if old and finer is not buffer:
         nodes = np.concatenate([cells.nodes, nodes])
         amounts, cells = Amounts.concatenate([cells.amounts, amounts]), None
-    new = Cells.seen(tree, nodes, amounts, buffers.camera, finer)
-    return (Cells.joined([cells, new]) if cells is not None else new), finer
+    new = Terminals.seen(tree, nodes, amounts, buffers.camera, finer)
+    return (Terminals.joined([cells, new]) if cells is not None else new), finer
 
 
 def _slack(camera: Camera, resolution: int) -> Slack:

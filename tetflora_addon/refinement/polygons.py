@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..plants.growth import spread
+from ..arrays import spread
 
 #: Faces and triangles that are measured at a time; bounds what that takes to some hundred megabytes.
 MEASURED_AT_ONCE = 200_000

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..plants.branches import Branches
 from ..plants.compiled import Flora
-from ..plants.growth import Branches
 from ..plants.hashing import Draw, uniform
 from ..plants.pieces import Pieces
 from .camera import Camera

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..plants.branches import Branches
 from ..plants.compiled import Flora
-from ..plants.growth import Branches
 from ..tetrahedra.roots import view_root
 from ..tetrahedra.tree import TetrahedralTree
 from ..tetrahedra.world_root import world_root

@@ -23,12 +23,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import spread
 from ..cache_folder import remembered
+from ..plants.branches import Branches
 from ..plants.cells import basis, covered
 from ..plants.compiled import Flora
 from ..plants.expansion import open_subplants
 from ..plants.fingerprints import fingerprint
-from ..plants.growth import Branches, spread, trunks
+from ..plants.growth import trunks
 from ..plants.hashing import mix
 from ..plants.outlines import Things, things_of
 from ..plants.pieces import Pieces

@@ -15,10 +15,12 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import spread
 from ..buffers import MeshBuffers
+from ..plants.axes import axes
+from ..plants.branches import Branches
 from ..plants.compiled import Flora
 from ..plants.foliage import leaf_start, mean_leaf_colours, outwardness, place_leaves, settled
-from ..plants.growth import Branches, axes, spread
 from ..plants.hashing import Draw, child_key, mix, signed, uniform
 from ..plants.pieces import Pieces
 from ..plants.samples import Points

@@ -15,8 +15,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import spread
 from ..plants.expansion import chunks
-from ..plants.growth import spread
 from ..plants.hashing import child_key, key_of_seed, mix, stepped, uniform
 from ..plants.vectors import unit
 from ..refinement.camera import Camera

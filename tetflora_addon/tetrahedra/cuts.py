@@ -33,7 +33,7 @@ _Labels = tuple[int, ...]
 
 
 @dataclass(frozen=True)
-class Pieces:
+class CutTetrahedra:
     """What planes leave of tetrahedra: pieces in the order of owner, side and place in the chain of that side.
 
     Attributes
@@ -160,7 +160,7 @@ _CASES = (
 )
 
 
-def cut_tetrahedra(vertices: ArrayLike, planes: ArrayLike, tolerance: float = TOLERANCE) -> Pieces:
+def cut_tetrahedra(vertices: ArrayLike, planes: ArrayLike, tolerance: float = TOLERANCE) -> CutTetrahedra:
     """Cut each tetrahedron by its plane.
 
     Parameters
@@ -175,7 +175,7 @@ def cut_tetrahedra(vertices: ArrayLike, planes: ArrayLike, tolerance: float = TO
 
     Returns
     -------
-    Pieces
+    CutTetrahedra
         A tetrahedron that its plane does not divide is one piece, on the side where it is, or on side 1 if all of it
         is within the tolerance. Parents' vertices and points on edges that neighbours share keep their coordinates to
         the last bit.
@@ -207,10 +207,10 @@ def cut_tetrahedra(vertices: ArrayLike, planes: ArrayLike, tolerance: float = TO
             found.append(_cut_case(case, vertices, distance, order, behind, some))
     joined = [np.concatenate(parts) for parts in zip(*found, strict=True)]
     sorting = np.argsort(2 * joined[1] + joined[2], kind="stable")
-    return Pieces(*(values[sorting] for values in joined), divided)
+    return CutTetrahedra(*(values[sorting] for values in joined), divided)
 
 
-#: Vertices, owner, side, step, last and plane, as in `Pieces`.
+#: Vertices, owner, side, step, last and plane, as in `CutTetrahedra`.
 _Found = tuple[
     NDArray[np.float64], NDArray[np.intp], NDArray[np.int8], NDArray[np.int8], NDArray[np.bool_], NDArray[np.float64]
 ]

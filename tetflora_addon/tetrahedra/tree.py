@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .bisection import bisect
-from .cuts import TOLERANCE, Pieces, cut_tetrahedra
+from .cuts import TOLERANCE, CutTetrahedra, cut_tetrahedra
 from .eight import divide_by_shape
 from .geometry import plane_distance
 
@@ -148,7 +148,7 @@ class TetrahedralTree:
 
     def cut(
         self, nodes: ArrayLike, planes: ArrayLike, tolerance: float = TOLERANCE
-    ) -> tuple[NDArray[np.int32], Pieces]:
+    ) -> tuple[NDArray[np.int32], CutTetrahedra]:
         """Divide terminal tetrahedra by given planes, and what these leave into tetrahedra again.
 
         This is for the border of a view or a clipping plane that goes through a tree that was made without it.
@@ -167,7 +167,7 @@ class TetrahedralTree:
         terminals : (m,) int32
             Node of each piece; they inherit `inside`. A node that its plane does not divide stays as it is and stands
             for its one piece.
-        pieces : Pieces of m
+        pieces : CutTetrahedra of m
             Their owners, as places in ``nodes``, sides and tetrahedra.
 
         Raises

@@ -1,0 +1,113 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Structures of arrays: many things of one kind, with an array for each of their properties.
+
+Arrays of vectors (n, 3) and frames (n, 3, 3) are kept component by component in memory, see `plants.vectors`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import field, fields
+from functools import cache
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+
+class Arrays:
+    """Base of dataclasses whose fields are columns: one row for each of n things.
+
+    A column is an array, or another `Arrays` of the same length. One whose default is None may be absent. All other
+    fields belong to the whole and are kept as they are. The first field must be a column.
+    """
+
+    def __len__(self) -> int:
+        return len(getattr(self, _names(type(self))[0]))
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all columns."""
+        columns = (getattr(self, name) for name in _names(type(self)))
+        return sum(c.nbytes for c in columns if isinstance(c, np.ndarray | Arrays))
+
+    def take(self, index: NDArray | slice) -> Self:
+        """Selection by indices, mask or slice; by a mask that leaves nothing out, the same object."""
+        if not isinstance(index, slice) and index.dtype == bool:
+            if index.all():
+                return self
+            index = np.flatnonzero(index)  # once, not for each column
+        columns = (getattr(self, name) for name in _names(type(self)))
+        return type(self)(*(self._rows(c, index) if isinstance(c, np.ndarray | Arrays) else c for c in columns))
+
+    @staticmethod
+    def _rows(column: NDArray | Arrays, index: NDArray | slice) -> NDArray | Arrays:
+        return column.take(index) if isinstance(column, Arrays) else gathered(column, index)
+
+    @classmethod
+    def concatenate(cls, parts: Sequence[Self]) -> Self:
+        """All things of several in one; what is not a column comes from the first part."""
+        if not parts:
+            return cls.empty()
+        some = [p for p in parts if len(p)]  # what is empty lacks columns that are optional
+        return cls(
+            *(_joined([getattr(p, name) for p in (some if name in _optional(cls) else parts)]) for name in _names(cls))
+        )
+
+    @classmethod
+    def empty(cls) -> Self:
+        """No things. Columns are (0,) float64 unless declared with `column` or `nested`."""
+        return cls(*(f.metadata.get("empty", _no_numbers)() for f in fields(cls) if f.name not in _optional(cls)))
+
+
+def column(*shape: int, dtype: DTypeLike = np.float64) -> Any:
+    """Field of a dataclass for an array (n, *shape); needed for `Arrays.empty` only."""
+    return field(metadata={"empty": lambda: np.zeros((0, *shape), dtype)})
+
+
+def nested(kind: type[Arrays]) -> Any:
+    """Field of a dataclass for another structure of arrays of the same length; needed for `Arrays.empty` only."""
+    return field(metadata={"empty": kind.empty})
+
+
+def gathered(array: NDArray, index: NDArray | slice) -> NDArray:
+    """``array[index]`` along the first axis, component by component; ``index`` may be integers, a mask or a slice."""
+    if isinstance(index, slice):
+        return array[index]
+    if index.dtype == bool:
+        index = np.flatnonzero(index)
+    if array.ndim == 1:
+        return np.take(array, index)
+    # As np.moveaxis, which takes as long as arithmetic on a thousand numbers.
+    picked = np.take(array.transpose(*range(1, array.ndim), 0), index, axis=-1)
+    return picked.transpose(-1, *range(array.ndim - 1))
+
+
+def spread(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Owner (m,) and running index within the owner (m,) for ``counts`` things each; m is their sum."""
+    owner = np.repeat(np.arange(len(counts)), counts)
+    first = np.cumsum(counts) - counts
+    return owner, np.arange(len(owner)) - first[owner]
+
+
+def _joined(columns: list[Any]) -> Any:
+    if not columns or columns[0] is None:
+        return None
+    if isinstance(columns[0], Arrays):
+        return type(columns[0]).concatenate(columns)
+    return np.concatenate(columns) if isinstance(columns[0], np.ndarray) else columns[0]
+
+
+def _no_numbers() -> NDArray[np.float64]:
+    return np.zeros(0)
+
+
+@cache
+def _names(kind: type[Arrays]) -> tuple[str, ...]:
+    return tuple(f.name for f in fields(kind))
+
+
+@cache
+def _optional(kind: type[Arrays]) -> frozenset[str]:
+    return frozenset(f.name for f in fields(kind) if f.default is None)
