@@ -5,18 +5,14 @@
 from __future__ import annotations
 
 import json
-from types import SimpleNamespace
 
 import bpy
 import pytest
 
 import operators
-from operators import modal_job, refine
 from panels import statistics_panel
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, select, tiny_render
-from tetflora_addon import errors
 from tetflora_addon.blender import handlers, job
-from tetflora_addon.refinement.statistics import Progress
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -232,6 +228,11 @@ def test_clear_shows_a_mesh_only_when_no_scene_has_results_in_its_place():
     assert "tetflora_hidden" not in rock
 
 
+def _bare_leaf():
+    entry = bpy.context.scene.tetflora.leaf_objects.add()
+    entry.species, entry.leaf = _plants()["p0"].species, add_mesh("Bald", faces=())
+
+
 @pytest.mark.parametrize(
     ("break_it", "says"),
     [
@@ -239,6 +240,7 @@ def test_clear_shows_a_mesh_only_when_no_scene_has_results_in_its_place():
         (lambda: add_plant("Odd", "quercus"), 'unknown species "quercus"'),
         (lambda: add_plant("Flat", scale=(0.0, 0.0, 0.0)), '"Flat": zero scale'),
         (lambda: setattr(add_mesh("Bare", faces=()).tetflora, "is_occluder", True), '"Bare" has no faces'),
+        (_bare_leaf, "Bald.*no faces"),  # found when the work has begun
     ],
 )
 def test_refine_reports_what_is_wrong_and_changes_nothing(break_it, says):
@@ -248,141 +250,3 @@ def test_refine_reports_what_is_wrong_and_changes_nothing(break_it, says):
     with pytest.raises(RuntimeError, match=says):
         _ops().refine()
     assert datablocks() == before
-
-
-class _Window:
-    """As much of a window as the modal operator touches, so that its steps can be taken one by one."""
-
-    def __init__(self):
-        self.progress, self.status, self.timers = [], [], 0
-        self.window_manager = SimpleNamespace(
-            progress_begin=lambda _a, _b: None,
-            progress_update=self.progress.append,
-            progress_end=lambda: None,
-            event_timer_add=self._add,
-            event_timer_remove=self._remove,
-            modal_handler_add=lambda _operator: None,
-        )
-        self.workspace = SimpleNamespace(status_text_set=self.status.append)
-        self.window, self.screen, self.scene = object(), None, bpy.context.scene
-        self.view_layer = bpy.context.view_layer
-        self.evaluated_depsgraph_get = bpy.context.evaluated_depsgraph_get
-
-    def _add(self, _step, window):
-        self.timers += 1
-        return object()
-
-    def _remove(self, _timer):
-        self.timers -= 1
-
-
-class _Operator:
-    """The refine operator's methods on a plain object: Blender makes operators only inside its own event loop."""
-
-    def __init__(self):
-        self.reports = []
-        self._steps = self._timer = None
-        self._enough = False
-        self.kind = refine.TETFLORA_OT_refine
-
-    def __getattr__(self, name):
-        found = getattr(self.kind, name)
-        return found.__get__(self) if callable(found) else found
-
-    def report(self, level, message):
-        self.reports.append((level, message))
-
-
-@pytest.fixture
-def window(blender, monkeypatch):
-    # Not in the background as far as the operator can tell; a slice of no time is one step a tick.
-    monkeypatch.setattr(modal_job, "bpy", SimpleNamespace(app=SimpleNamespace(background=False)))
-    monkeypatch.setattr(modal_job, "_SLICE", 1e-9)
-    return _Window()
-
-
-def _tick(operator, window, kind='TIMER', value='NOTHING'):
-    return operator.modal(window, SimpleNamespace(type=kind, value=value))
-
-
-def test_escape_in_the_middle_leaves_the_scene_as_it_was(clean_file, window):
-    scene = _small_forest()
-    scene.tetflora.expand_everything = True  # objects appear early, so there is something to take back
-    window.__init__()
-    before = datablocks()
-    operator = _Operator()
-    assert operator.invoke(window, None) == {'RUNNING_MODAL'}
-    while datablocks() == before:
-        assert _tick(operator, window) == {'RUNNING_MODAL'}
-    assert _tick(operator, window, 'MOUSEMOVE') == {'RUNNING_MODAL'}
-    assert _tick(operator, window, 'ESC', 'PRESS') == {'CANCELLED'}
-    assert datablocks() == before
-    assert scene.tetflora.statistics == ""
-    assert window.timers == 0
-    assert window.status[-1] is None
-    assert window.progress == sorted(window.progress)
-
-
-def test_return_stops_refining_and_makes_what_there_is(clean_file, window):
-    scene = _small_forest()
-    scene.tetflora.cutoff = 0.5
-    window.__init__()
-    operator = _Operator()
-    assert operator.invoke(window, None) == {'RUNNING_MODAL'}
-    while "Refining" not in (window.status[-1] or ""):
-        assert _tick(operator, window) == {'RUNNING_MODAL'}
-    assert _tick(operator, window, 'RET', 'PRESS') == {'RUNNING_MODAL'}
-    while _tick(operator, window) == {'RUNNING_MODAL'}:
-        assert "Refining, pass" not in window.status[-1] or window.status.count(window.status[-1]) < 3
-    assert job.has_results(scene)
-    assert any("Stopped before" in message for _, message in operator.reports)
-    assert window.status[-1] is None
-
-
-def test_steps_in_the_window_give_what_the_script_gives(clean_file, window):
-    scene = _small_forest()
-    window.__init__()
-    operator = _Operator()
-    result = operator.invoke(window, None)
-    while result == {'RUNNING_MODAL'}:
-        result = _tick(operator, window)
-    assert result == {'FINISHED'}
-    assert window.timers == 0
-    stepped = json.loads(scene.tetflora.statistics)
-    made = datablocks()
-    _ops().refine()
-    at_once = json.loads(scene.tetflora.statistics)
-    timed = {"seconds", "steps"}
-    assert {k: stepped[k] for k in set(stepped) - timed} == {k: at_once[k] for k in set(at_once) - timed}
-    assert {k: len(v) for k, v in datablocks().items()} == {k: len(v) for k, v in made.items()}
-
-
-def test_what_is_wrong_is_said_before_the_window_waits(clean_file, window):
-    _small_forest()
-    add_plant("Odd", "quercus")
-    window.__init__()
-    operator = _Operator()
-    assert operator.invoke(window, None) == {'CANCELLED'}
-    assert operator.reports[0][0] == {'ERROR'}
-    assert "quercus" in operator.reports[0][1]
-    assert window.timers == 0
-
-
-def test_errors_in_the_middle_are_reported(clean_file, window, monkeypatch):
-    _small_forest()
-    window.__init__()
-
-    def broken(*_arguments, **_options):
-        progress = Progress
-        yield progress(0.0, "one")
-        yield progress(0.1, "two")
-        yield progress(0.2, "three")
-        raise errors.SpeciesError("leaf without faces")
-
-    monkeypatch.setattr(job, "refine_steps", broken)
-    operator = _Operator()
-    assert operator.invoke(window, None) == {'RUNNING_MODAL'}
-    assert _tick(operator, window) == {'RUNNING_MODAL'}
-    assert _tick(operator, window) == {'CANCELLED'}
-    assert operator.reports == [({'ERROR'}, "leaf without faces")]
-    assert window.timers == 0

@@ -1,0 +1,47 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Refine between the redraws of the real window: its end, Return, Esc and errors, by modal_steps.py."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from devtools import window
+
+HERE = Path(__file__).parent
+
+
+@pytest.fixture(scope="module")
+def seen(full_blender: str, resources: Path, pictures: Path) -> dict:
+    result = window.run_in_window(full_blender, HERE / "modal_steps.py", pictures / "modal", 240, resources)
+    assert result["ok"], result["error"]
+    return result["values"]
+
+
+def test_steps_in_the_window_give_what_the_script_gives(seen: dict) -> None:
+    assert seen["running"]
+    assert seen["in_window"]["plants"] == 2
+    assert seen["in_window"] == seen["in_script"]
+
+
+def test_escape_in_the_middle_leaves_the_scene_as_it_was(seen: dict) -> None:
+    assert seen["running_before_esc"]
+    assert seen["left_by_esc"] == []
+
+
+def test_return_stops_refining_and_makes_what_there_is(seen: dict) -> None:
+    assert seen["stopped"] == [True, False]
+    assert "Stopped before" in seen["reports"]
+
+
+def test_what_is_wrong_is_said_before_the_window_waits(seen: dict) -> None:
+    assert "quercus" in seen["refused"]
+    assert not seen["running_refused"]
+
+
+def test_errors_in_the_middle_are_reported(seen: dict) -> None:
+    assert seen["running_broken"]
+    assert "leaf without faces" in seen["reports"]
+    assert seen["left_by_error"] == []
