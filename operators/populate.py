@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Populate a terrain with plants: a new population, and its plants, in one step."""
 
-from types import SimpleNamespace
-
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
@@ -18,7 +16,7 @@ from .base import Reporting, in_object_mode, select_only
 from .populations import ground_selected, report_made, selected_grounds
 
 # Of what is not given, the panel's settings are taken: defaults do not matter here.
-_RULES = SimpleNamespace(**properties_of(Rules, options={'SKIP_SAVE'}))
+_RULES = properties_of(Rules, options={'SKIP_SAVE'})
 # Names that the operator shares with the scene's settings for populating.
 _SHARED = ("count", "as_field", "seed", "slope_limit", "min_distance", "scale_min", "scale_max")
 

@@ -73,6 +73,18 @@ def test_keys_are_registered_once_and_open_what_is_there():
             assert operator in _ids()
 
 
+def test_the_page_in_the_preferences_shows_settings_and_the_cache():
+    layout = MagicMock()
+    own = preferences.preferences()
+    preferences.TetFloraPreferences.draw(SimpleNamespace(layout=layout, species_folder="", use_cache=True), bpy.context)
+    assert callable(own.draw)
+    column = layout.column()
+    drawn = {call.args[1] for call in (*layout.prop.call_args_list, *column.prop.call_args_list)}
+    drawn |= {call.args[1] for call in column.row().prop.call_args_list}
+    assert drawn == {p.identifier for p in own.bl_rna.properties if not p.is_readonly} - {"bl_idname", "rna_type"}
+    assert [call.args[0] for call in column.operator.call_args_list] == ["tetflora.clear_cache"]
+
+
 def test_every_operator_is_registered_and_named():
     names = {}
     for identifier in _ids():

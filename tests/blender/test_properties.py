@@ -10,7 +10,19 @@ import bpy
 import pytest
 
 from tests.blender.scenes import add_mesh, add_plant
-from tetflora_addon.blender import leaf_forms, migration, preferences, properties, scene_contents, species_items
+from tetflora_addon.blender import (
+    brush_properties,
+    leaf_forms,
+    migration,
+    population_properties,
+    preferences,
+    properties,
+    scene_contents,
+    species_items,
+    wind_properties,
+)
+from tetflora_addon.planting import rules, strokes
+from tetflora_addon.plants import wind
 from tetflora_addon.refinement import settings
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -31,6 +43,31 @@ def test_settings_mirror_the_engine():
     scene.tetflora.max_tetrahedra = 1234
     read = scene_contents.settings_from(scene)
     assert (read.cutoff, read.max_tetrahedra) == (3.5, 1234)
+
+
+def _without_labels(settings_class):
+    return {field.name for field in fields(settings_class) if not field.metadata}
+
+
+@pytest.mark.parametrize(
+    ("engine", "group", "engine_only"),
+    [
+        (settings.RefinementSettings, properties.TetFloraScene, {"hidden_block", "proxy_block", "margin"}),
+        (rules.Rules, population_properties.TetFloraPopulation, {"density", "shares", "companions"}),
+        (strokes.Brush, brush_properties.TetFloraBrush, {"density", "scale_min", "scale_max", "shares"}),
+        (wind.Wind, wind_properties.TetFloraWind, {"time", "loop", "moving"}),
+    ],
+    ids=lambda value: getattr(value, "__name__", ""),
+)
+def test_properties_are_made_from_the_fields_of_the_engine(engine, group, engine_only):
+    assert _without_labels(engine) == engine_only
+    for field in fields(engine):
+        if field.metadata:
+            made = group.bl_rna.properties[field.name]
+            assert (made.name, made.description) == (field.metadata["name"], field.metadata["description"])
+            assert made.default == pytest.approx(field.metadata.get("default", field.default), rel=1e-6)
+            assert field.type in {"bool", "int", "float"}
+            assert made.type == {"bool": 'BOOLEAN'}.get(field.type, field.type.upper())
 
 
 def test_qualities_set_what_they_say_and_are_recognised():
@@ -63,6 +100,40 @@ def test_everything_the_artist_sees_is_explained():
         and not p.description
     ]
     assert unexplained == []
+
+
+def test_labels_and_tooltips_follow_blenders_guidelines():
+    """Labels in title case; tooltips begin with a capital and end without a full stop."""
+    small = {
+        "a",
+        "an",
+        "and",
+        "as",
+        "at",
+        "by",
+        "for",
+        "from",
+        "in",
+        "into",
+        "of",
+        "on",
+        "or",
+        "per",
+        "the",
+        "to",
+        "with",
+    }
+    classes = [*properties.CLASSES, preferences.TetFloraPreferences]
+    found = [(owner.__name__, p) for owner in classes for p in owner.bl_rna.properties if not p.is_readonly]
+    for name in dir(bpy.types):
+        if name.startswith("TETFLORA_OT_"):
+            found += [(name, p) for p in getattr(bpy.types, name).bl_rna.properties if not p.is_readonly]
+    found = [(owner, p) for owner, p in found if not p.identifier.startswith("bl_")]
+    texts = {(owner, p.name, p.description) for owner, p in found}
+    texts |= {(owner, i.name, i.description) for owner, p in found if p.type == 'ENUM' for i in p.enum_items_static}
+    assert len(texts) > 200
+    assert [t for t in texts if any(word[0].islower() and word not in small for word in t[1].split())] == []
+    assert [t for t in texts if t[2].endswith(".") or t[2][:1].islower()] == []
 
 
 def test_an_unknown_species_survives_the_panel_and_the_file(tmp_path):

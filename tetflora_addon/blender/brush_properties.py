@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Settings of the brush that paints plants: ``Scene.tetflora.brush``."""
 
-from types import SimpleNamespace
-
 import bpy
 from bpy.props import EnumProperty, FloatProperty, IntProperty
 
@@ -25,8 +23,8 @@ MODES = (
         2,
     ),
 )
-_BRUSH = SimpleNamespace(**properties_of(Brush, options=set()))
-_RULES = SimpleNamespace(**properties_of(Rules, options=set()))
+_BRUSH = properties_of(Brush, options=set())
+_RULES = properties_of(Rules, options=set())
 
 
 class TetFloraBrush(bpy.types.PropertyGroup, SpeciesChoice):

@@ -2,14 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Settings of animations as properties of a scene: what frames share, and the size of the frame cache."""
 
-from types import SimpleNamespace
-
 from bpy.props import BoolProperty, FloatProperty
 
 from ..refinement.view_cells import ViewCells
 from .generated import properties_of
 
-_CELLS = SimpleNamespace(**properties_of(ViewCells))
+_CELLS = properties_of(ViewCells)
 
 
 class AnimationProperties:

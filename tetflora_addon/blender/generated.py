@@ -3,6 +3,7 @@
 """Blender's properties, generated from the engine's dataclasses of settings."""
 
 from dataclasses import fields
+from types import SimpleNamespace
 from typing import Any
 
 from bpy.props import BoolProperty, FloatProperty, IntProperty
@@ -10,7 +11,7 @@ from bpy.props import BoolProperty, FloatProperty, IntProperty
 _MAKERS = {bool: BoolProperty, int: IntProperty, float: FloatProperty}
 
 
-def properties_of(settings: type, **common: Any) -> dict[str, Any]:
+def properties_of(settings: type, **common: Any) -> SimpleNamespace:
     """A property for each field of a dataclass that is declared with `setting.setting`.
 
     Parameters
@@ -22,11 +23,11 @@ def properties_of(settings: type, **common: Any) -> dict[str, Any]:
 
     Returns
     -------
-    dict
-        By the fields' names, to be used as annotations of a property group.
+    SimpleNamespace
+        The properties by the fields' names, to be used as annotations of a property group.
     """
-    return {
-        f.name: _MAKERS[type(f.default)](**{"default": f.default, **f.metadata, **common})
-        for f in fields(settings)
-        if f.metadata
-    }
+    made = SimpleNamespace()
+    for f in fields(settings):
+        if f.metadata:
+            setattr(made, f.name, _MAKERS[type(f.default)](**{"default": f.default, **f.metadata, **common}))
+    return made

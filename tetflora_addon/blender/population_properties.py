@@ -5,8 +5,6 @@
 The same group holds the settings for new populations (``Scene.tetflora.populate``). `populations` acts on it.
 """
 
-from types import SimpleNamespace
-
 import bpy
 from bpy.props import (
     BoolProperty,
@@ -47,8 +45,8 @@ def _tell(_group: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
 
 _LIVE = {"options": set(), "update": _tell}
 _HIDDEN = {"options": {'HIDDEN'}}
-_RULES = SimpleNamespace(**properties_of(Rules, **_LIVE))
-_COMPANION = SimpleNamespace(**properties_of(Companion, **_LIVE))
+_RULES = properties_of(Rules, **_LIVE)
+_COMPANION = properties_of(Companion, **_LIVE)
 
 
 def _companion_items(entry: "TetFloraMixEntry", _context: bpy.types.Context | None) -> list:

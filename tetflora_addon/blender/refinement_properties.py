@@ -12,7 +12,7 @@ from .qualities import quality_number, set_quality
 class EngineSettings:
     """The engine's settings, field by field."""
 
-    __annotations__ = properties_of(RefinementSettings)
+    __annotations__ = vars(properties_of(RefinementSettings))
 
 
 class RefinementProperties(EngineSettings):

@@ -167,7 +167,7 @@ def _choice(name: str, key: Key) -> dict[str, Any]:
     made = EnumProperty(
         name=_label(name),
         description=_description(name, key),
-        items=[(choice, choice.capitalize(), "", number) for number, choice in enumerate(choices)],
+        items=[(choice, _label(choice), "", number) for number, choice in enumerate(choices)],
         get=lambda self: choices.index(value) if (value := value_of(self, name)) in choices else 0,
         set=lambda self, number: write(self, name, choices[number]),
         options=set(),

@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import bpy
 from bpy.props import BoolProperty, IntProperty
 
@@ -14,7 +12,7 @@ from .generated import properties_of
 
 #: Where the middle of the exposure lies from the frame, in times that the shutter is open.
 _MIDDLE = {'START': 0.5, 'CENTER': 0.0, 'END': -0.5}
-_WIND = SimpleNamespace(**properties_of(Wind))
+_WIND = properties_of(Wind)
 
 
 class TetFloraWind(bpy.types.PropertyGroup):
