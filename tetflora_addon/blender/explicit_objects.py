@@ -19,7 +19,9 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from ..refinement.mesh_features import mesh_features
 from ..refinement.polygons import Meshes, Surface
+from .attributes import members, read, values_of
 from .material_means import Looks
+from .meshes import face_offsets
 from .node_tools import is_ours
 from .plant_copies import may_instance
 from .scene_reader import renderable_objects
@@ -37,8 +39,7 @@ PROPERTY = {
 SURFACE_TYPES = {'MESH', 'CURVE', 'SURFACE', 'FONT', 'META', 'CURVES'}
 #: Light that goes through sheets whose material does not tell.
 _SHEET_TRANSMISSION = 0.3
-_SIZES = {'FLOAT': ("value", 1), 'FLOAT2': ("vector", 2), 'FLOAT_VECTOR': ("vector", 3)}
-_SIZES |= {'FLOAT_COLOR': ("color", 4), 'BYTE_COLOR': ("color", 4)}
+_TYPES = {'FLOAT', 'FLOAT2', 'FLOAT_VECTOR', 'FLOAT_COLOR', 'BYTE_COLOR'}
 _OWN = {"position", "custom_normal"}
 
 
@@ -169,14 +170,12 @@ class _Reader:
 
 def _surface(name: str, mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None], looks: Looks) -> Surface:
     mesh.calc_loop_triangles()
-    positions = _read(mesh.attributes["position"].data, "vector", (len(mesh.vertices), 3)).astype(np.float64)
+    positions = read(mesh, "position").astype(np.float64)
     if not np.isfinite(positions).all():
         raise SceneError(f'"{name}" has vertices that are not finite numbers; delete them')
-    corner_verts = _read(mesh.attributes[".corner_vert"].data, "value", (len(mesh.loops),), np.int32)
-    offsets = np.append(_read(mesh.polygons, "loop_start", (len(mesh.polygons),), np.int32), np.int32(len(mesh.loops)))
-    triangles = _read(mesh.loop_triangles, "loops", (len(mesh.loop_triangles), 3), np.int32)
-    slot = _read(mesh.polygons, "material_index", (len(mesh.polygons),), np.int32)
-    slot = np.clip(slot, 0, len(materials) - 1)
+    corner_verts, offsets = read(mesh, ".corner_vert"), face_offsets(mesh)
+    triangles = members(mesh.loop_triangles, "loops", 3, np.int32)
+    slot = np.clip(members(mesh.polygons, "material_index", dtype=np.int32), 0, len(materials) - 1)
     attributes = dict(_attributes(mesh, corner_verts, np.diff(offsets)))
     solid, leaf, width = mesh_features(positions, corner_verts, offsets)
     seen = [looks.of(material, attributes) for material in materials]
@@ -186,8 +185,8 @@ def _surface(name: str, mesh: bpy.types.Mesh, materials: list[bpy.types.Material
     transmission = np.where(np.isnan(transmission), np.where(sheets, _SHEET_TRANSMISSION, 0.0), transmission)
     normals = None
     sharp = mesh.attributes.get("sharp_face")
-    if sharp is None or not _read(sharp.data, "value", (len(mesh.polygons),), bool).all():
-        normals = _read(mesh.corner_normals, "vector", (len(mesh.loops), 3))
+    if sharp is None or not values_of(sharp).all():
+        normals = members(mesh.corner_normals, "vector", 3)
     return Surface(
         name=name,
         positions=positions,
@@ -213,20 +212,14 @@ def _attributes(
     layers = mesh.uv_layers
     first = next((layer.name for layer in layers if layer.active_render), "")
     for attribute in sorted(mesh.attributes, key=lambda a: a.name != first):
-        if attribute.name.startswith(".") or attribute.name in _OWN or attribute.data_type not in _SIZES:
+        if attribute.name.startswith(".") or attribute.name in _OWN or attribute.data_type not in _TYPES:
             continue
-        value, size = _SIZES[attribute.data_type]
         if attribute.domain not in {'POINT', 'CORNER', 'FACE'}:
             continue
-        values = _read(attribute.data, value, (len(attribute.data), size))[:, :3]
+        values = values_of(attribute, "color" if "COLOR" in attribute.data_type else "")
+        values = values[:, None] if values.ndim == 1 else values[:, :3]
         if attribute.domain == 'POINT':
             values = values[corner_verts]
         elif attribute.domain == 'FACE':
             values = np.repeat(values, sizes, axis=0)
         yield attribute.name, np.ascontiguousarray(values)
-
-
-def _read(data: object, name: str, shape: tuple[int, ...], dtype: type = np.float32) -> NDArray:
-    values = np.zeros(shape, dtype)
-    data.foreach_get(name, values.reshape(-1))
-    return values

@@ -15,27 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..planting.places import new_seeds
-from .plant_fields import field_kinds, quaternions
+from .attributes import KINDS, read, values_of, write
+from .plant_fields import FIELD_ATTRIBUTES, field_kinds, quaternions
 from .plant_kinds import kind_of_choice
 
 FIELD_MARK = "tetflora_field"  # on the objects of fields that TetFlora made, see `plant_objects`
-
-# Name, width and dtype of what attributes of points store.
-_LAYOUT = {
-    'FLOAT': ("value", 1, np.float32),
-    'INT': ("value", 1, np.int32),
-    'INT8': ("value", 1, np.int8),
-    'BOOLEAN': ("value", 1, np.bool_),
-    'FLOAT_VECTOR': ("vector", 3, np.float32),
-    'FLOAT2': ("vector", 2, np.float32),
-    'QUATERNION': ("value", 4, np.float32),
-    'FLOAT_COLOR': ("color", 4, np.float32),
-    'BYTE_COLOR': ("color_srgb", 4, np.float32),
-    'FLOAT4X4': ("value", 16, np.float32),
-    'INT32_2D': ("value", 2, np.int32),
-    'INT16_2D': ("value", 2, np.int16),
-}
-_OWN = {"rotation": 'QUATERNION', "scale": 'FLOAT', "species": 'INT', "seed": 'INT'}
 
 Points = dict[str, tuple[str, NDArray]]
 
@@ -54,23 +38,20 @@ def editable(obj: bpy.types.Object) -> bool:
         and not obj.data.edges
         and not obj.data.polygons
         and obj.data.shape_keys is None
-        and all(a.data_type in _LAYOUT for a in obj.data.attributes if not a.is_internal)
-        and all(found.data_type == kind for name, kind in _OWN.items() if (found := obj.data.attributes.get(name)))
+        and all(a.data_type in KINDS for a in obj.data.attributes if not a.is_internal)
+        and all(a.data_type == FIELD_ATTRIBUTES.get(a.name, a.data_type) for a in obj.data.attributes)
     )
 
 
 def positions(obj: bpy.types.Object) -> NDArray[np.float64]:
     """Where the points of an editable field are in world space, (n, 3), without reading what grows there."""
-    stored = np.zeros((len(obj.data.vertices), 3), np.float32)
-    if len(stored):
-        obj.data.attributes["position"].data.foreach_get("vector", stored.reshape(-1))
     world = np.array(obj.matrix_world, dtype=np.float64)
-    return stored @ world[:3, :3].T + world[:3, 3]
+    return read(obj.data, "position") @ world[:3, :3].T + world[:3, 3]
 
 
 def take_points(obj: bpy.types.Object, keep: NDArray[np.bool_]) -> None:
     """Keep some of a field's points, (n,) bool, with all their attributes."""
-    points = {name: (kind, values[keep]) for name, (kind, values) in _read(obj.data).items()}
+    points = {name: (kind, values[keep]) for name, (kind, values) in _points(obj.data).items()}
     _write(obj, points, int(keep.sum()))
 
 
@@ -104,18 +85,17 @@ def add_points(
     own = {
         "position": (position - world[:3, 3]) @ np.linalg.inv(world[:3, :3]).T,
         "rotation": quaternions(turn.T @ frame),
-        "scale": np.asarray(scale)[:, None] / size,
-        "species": numbers[kinds][:, None],
-        "seed": np.asarray(seed)[:, None],
+        "scale": np.asarray(scale) / size,
+        "species": numbers[kinds],
+        "seed": np.asarray(seed),
     }
-    points, before = _read(obj.data), len(obj.data.vertices)
-    for name, kind in _OWN.items():
+    points, before = _points(obj.data), len(obj.data.vertices)
+    for name, kind in FIELD_ATTRIBUTES.items():
         if name not in points:
-            empty = np.zeros((before, _LAYOUT[kind][1]), _LAYOUT[kind][2])
-            points[name] = (kind, empty + 1 if name == "scale" else empty)
+            points[name] = (kind, np.full((before, *own[name].shape[1:]), name == "scale", KINDS[kind].dtype))
     joined: Points = {}
     for name, (kind, values) in points.items():
-        new = own.get(name, np.zeros((len(seed), values.shape[1])))
+        new = own.get(name, np.zeros((len(seed), *values.shape[1:])))
         joined[name] = (kind, np.concatenate([values, new.astype(values.dtype)]))
     _write(obj, joined, before + len(seed))
 
@@ -156,13 +136,12 @@ def _join_equal_kinds(obj: bpy.types.Object) -> None:
         return
     to = np.array([unique.index(kind) for kind in kinds], np.int32)
     attribute = own_mesh(obj).attributes["species"]
-    values = np.zeros(len(obj.data.vertices), np.int32)
-    attribute.data.foreach_get("value", values)
+    values = values_of(attribute)
     # Numbers that the list does not have stay wrong: reading the field tells of them.
     known = (values >= 0) & (values < len(to))
     values[known] = to[values[known]]
     values[~known] += np.int32(len(kinds))
-    attribute.data.foreach_set("value", values)
+    write(obj.data, "species", values)
     for index in range(len(kinds) - 1, -1, -1):
         if kinds.index(kinds[index]) != index:
             entries.remove(index)
@@ -177,15 +156,12 @@ def _kind_number(obj: bpy.types.Object, identifier: str) -> int:
     return len(obj.tetflora.field_species) - 1
 
 
-def _read(mesh: bpy.types.Mesh) -> Points:
+def _points(mesh: bpy.types.Mesh) -> Points:
     out: Points = {}
     for attribute in mesh.attributes:
         if attribute.domain != 'POINT' or attribute.is_internal:
             continue
-        key, width, dtype = _LAYOUT[attribute.data_type]
-        values = np.zeros((len(mesh.vertices), width), dtype)
-        attribute.data.foreach_get(key, values.reshape(-1))
-        out[attribute.name] = (attribute.data_type, values)
+        out[attribute.name] = (attribute.data_type, values_of(attribute))
     return out
 
 
@@ -194,7 +170,5 @@ def _write(obj: bpy.types.Object, points: Points, number: int) -> None:
     mesh.clear_geometry()
     mesh.vertices.add(number)
     for name, (kind, values) in points.items():
-        attribute = mesh.attributes.get(name) or mesh.attributes.new(name, kind, 'POINT')
-        if number:
-            attribute.data.foreach_set(_LAYOUT[kind][0], np.ascontiguousarray(values).reshape(-1))
+        write(mesh, name, values, data_type=kind)
     mesh.update()

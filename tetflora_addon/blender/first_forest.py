@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..planting.places import Placement
 from ..planting.strokes import admitted
 from ..plants.hashing import child_key, key_of_seed, uniform
+from .attributes import write
 from .first_materials import meadow, sky
 from .plant_objects import add_plants
 from .species_items import catalogue, default_species
@@ -162,8 +163,7 @@ def _ground() -> bpy.types.Object:
     mesh = bpy.data.meshes.new("Forest ground")
     mesh.from_pydata(points.tolist(), [], faces.tolist(), shade_flat=False)
     mesh.materials.append(meadow("Forest floor"))
-    aside = np.abs(points[:, 0] - path(points[:, 1])).astype(np.float32)
-    mesh.attributes.new("aside", 'FLOAT', 'POINT').data.foreach_set("value", aside)
+    write(mesh, "aside", np.abs(points[:, 0] - path(points[:, 1])).astype(np.float32))
     ground = bpy.data.objects.new("Forest ground", mesh)
     ground.tetflora.is_occluder = True
     return ground

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
+from .attributes import members, read, values_of
 from .transforms import world_matrix
 
 
@@ -69,14 +70,12 @@ def _from_edges(evaluated: bpy.types.Object) -> list[tuple[NDArray[np.float64], 
         if mesh is None or len(mesh.polygons):
             return None
         count = len(mesh.vertices)
-        positions, ends = np.zeros(3 * count, np.float32), np.zeros(2 * len(mesh.edges), np.int32)
-        mesh.vertices.foreach_get("co", positions)
-        mesh.edges.foreach_get("vertices", ends)
+        positions = members(mesh.vertices, "co", 3).astype(np.float64)
+        ends = np.sort(members(mesh.edges, "vertices", 2, np.int32), axis=1)
     finally:
         evaluated.to_mesh_clear()
     if not count:
         return []
-    positions, ends = positions.reshape(-1, 3).astype(np.float64), np.sort(ends.reshape(-1, 2), axis=1)
     # The points of a spline follow each other, and an edge from the last to the first closes it.
     joined = np.zeros(count, bool)
     joined[ends[ends[:, 1] - ends[:, 0] == 1, 0]] = True
@@ -107,13 +106,8 @@ def _from_curves(curves: bpy.types.Curves) -> list[tuple[NDArray[np.float64], bo
     """Lines through the points of hair curves."""
     if not len(curves.curves):
         return []
-    positions = np.zeros(3 * len(curves.points), np.float32)
-    curves.attributes["position"].data.foreach_get("vector", positions)
-    first = np.zeros(len(curves.curve_offset_data), np.int32)
-    curves.curve_offset_data.foreach_get("value", first)
-    cyclic = np.zeros(len(curves.curves), bool)
+    first = members(curves.curve_offset_data, "value", dtype=np.int32)
     attribute = curves.attributes.get("cyclic")
-    if attribute is not None:
-        attribute.data.foreach_get("value", cyclic)
-    parts = np.split(positions.reshape(-1, 3).astype(np.float64), first[1:-1])
+    cyclic = np.zeros(len(curves.curves), bool) if attribute is None else values_of(attribute)
+    parts = np.split(read(curves, "position").astype(np.float64), first[1:-1])
     return list(zip(parts, cyclic.tolist(), strict=True))

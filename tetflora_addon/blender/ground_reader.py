@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from ..planting.ground import Path, Terrain
+from .attributes import members, read, values_of
 from .ground_curves import Line, lines_of
 from .image_pixels import image_pixels
 from .plant_objects import objects_within
@@ -119,30 +120,18 @@ def _read_mesh(
         if not len(mesh.polygons):
             raise SceneError(f'"{obj.name}" has no faces; select a mesh with faces')
         mesh.calc_loop_triangles()
-        vertices = _integers(mesh.loop_triangles, "vertices", 3).reshape(-1, 3)
+        vertices = members(mesh.loop_triangles, "vertices", 3, np.int32)
         matrix = world_matrix(obj, depsgraph)
-        positions = _attribute(mesh.attributes["position"], "vector", 3) @ matrix[:3, :3].T + matrix[:3, 3]
+        positions = read(mesh, "position").astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
         weight = _weights(evaluated, mesh, group, obj.name)[vertices] if group else None
         uv = None
         if with_uv:
-            uv = _uv(mesh, uv_layer, obj.name)[_integers(mesh.loop_triangles, "loops", 3)].reshape(-1, 3, 2)
-        ends = _integers(mesh.edges, "vertices", 2).reshape(-1, 2)
-        faces = np.bincount(_integers(mesh.loops, "edge_index", 1), minlength=len(ends))
+            uv = _uv(mesh, uv_layer, obj.name)[members(mesh.loop_triangles, "loops", 3, np.int32)]
+        ends = read(mesh, ".edge_verts")
+        faces = np.bincount(read(mesh, ".corner_edge"), minlength=len(ends))
     finally:
         evaluated.to_mesh_clear()
     return positions[vertices], weight, uv, positions[ends[faces == 1]]
-
-
-def _integers(rows: bpy.types.bpy_prop_collection, name: str, width: int) -> NDArray[np.int32]:
-    values = np.zeros(width * len(rows), np.int32)
-    rows.foreach_get(name, values)
-    return values
-
-
-def _attribute(attribute: bpy.types.Attribute, name: str, width: int) -> NDArray[np.float64]:
-    values = np.zeros(width * len(attribute.data), np.float32)
-    attribute.data.foreach_get(name, values)
-    return (values.reshape(-1, width) if width > 1 else values).astype(np.float64)
 
 
 def _weights(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, group: str, name: str) -> NDArray[np.float64]:
@@ -150,7 +139,7 @@ def _weights(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, group: str, name
     attribute = mesh.attributes.get(group)
     # Geometry nodes turn vertex groups into attributes.
     if attribute is not None and (attribute.domain, attribute.data_type) == ('POINT', 'FLOAT'):
-        return _attribute(attribute, "value", 1)
+        return values_of(attribute).astype(np.float64)
     found = evaluated.vertex_groups.get(group)
     if found is None:
         raise SceneError(f'"{name}" has no vertex group "{group}"; add it, or clear Vertex Group')
@@ -167,7 +156,7 @@ def _uv(mesh: bpy.types.Mesh, layer: str, name: str) -> NDArray[np.float64]:
     found = mesh.uv_layers[layer] if layer else next((u for u in mesh.uv_layers if u.active_render), None)
     if found is None:
         raise SceneError(f'"{name}" has no UV map for the image; unwrap it, or clear Image')
-    return _attribute(mesh.attributes[found.name], "vector", 2)
+    return read(mesh, found.name).astype(np.float64)
 
 
 def _luminance(image: bpy.types.Image) -> NDArray[np.float32]:

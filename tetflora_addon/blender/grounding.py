@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 
+from .attributes import read, write
 from .field_edits import own_mesh
 from .ground import Ground
 
@@ -39,10 +40,7 @@ def _depth(obj: bpy.types.Object) -> int:
 
 def drop_field(field: bpy.types.Object, ground: Ground) -> tuple[int, int]:
     """Move the points of an editable field; how many moved, and how many have no ground below or above."""
-    number = len(field.data.vertices)
-    positions = np.zeros((number, 3), np.float32)
-    if number:
-        field.data.attributes["position"].data.foreach_get("vector", positions.reshape(-1))
+    positions = read(field.data, "position")
     world = np.array(field.matrix_world, dtype=np.float64)
     places = positions.astype(np.float64) @ world[:3, :3].T + world[:3, 3]
     heights = ground.nearest_heights(places)
@@ -53,6 +51,6 @@ def drop_field(field: bpy.types.Object, ground: Ground) -> tuple[int, int]:
         inverse = np.linalg.inv(world)
         positions[fall] = places[fall] @ inverse[:3, :3].T + inverse[:3, 3]
         mesh = own_mesh(field)
-        mesh.attributes["position"].data.foreach_set("vector", positions.reshape(-1))
+        write(mesh, "position", positions)
         mesh.update()
     return int(fall.sum()), int(np.isnan(heights).sum())

@@ -11,17 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..buffers import MeshBuffers
+from .attributes import members, type_for, write
 
 UV_MAP = "UVMap"
 
 _DOMAINS = ("POINT", "FACE", "CORNER")
-# Type of attribute and name of its value, by the values' dtype and trailing shape.
-_TYPES = {
-    (np.dtype(np.float32), ()): ("FLOAT", "value"),
-    (np.dtype(np.float32), (2,)): ("FLOAT2", "vector"),
-    (np.dtype(np.float32), (3,)): ("FLOAT_VECTOR", "vector"),
-    (np.dtype(np.int32), ()): ("INT", "value"),
-}
 
 
 def write_mesh(name: str, buffers: MeshBuffers, materials: Sequence[bpy.types.Material | None] = ()) -> bpy.types.Mesh:
@@ -69,34 +63,20 @@ def _fill(mesh: bpy.types.Mesh, buffers: MeshBuffers) -> None:
     mesh.edges.add(len(buffers.edge_verts))
     mesh.loops.add(len(buffers.corner_verts))
     mesh.polygons.add(buffers.polygons)
-    for key, values, field in (
-        ("position", buffers.positions, "vector"),
-        (".edge_verts", buffers.edge_verts, "value"),
-        (".corner_vert", buffers.corner_verts, "value"),
-        (".corner_edge", buffers.corner_edges, "value"),
-    ):
-        if len(values):
-            # An empty mesh has no such layers.
-            mesh.attributes[key].data.foreach_set(field, _flat(values))
+    write(mesh, "position", buffers.positions)
+    write(mesh, ".edge_verts", buffers.edge_verts)
+    write(mesh, ".corner_vert", buffers.corner_verts)
+    write(mesh, ".corner_edge", buffers.corner_edges)
     # Offsets are no attribute, but setting the starts of faces writes the very same array.
     mesh.polygons.foreach_set("loop_start", np.ascontiguousarray(buffers.face_offsets[:-1]))
     for key, (domain, values) in buffers.attributes.items():
-        kind, field = _TYPES[values.dtype, values.shape[1:]]
         if key == UV_MAP:
             mesh.uv_layers.new(name=UV_MAP, do_init=False)
-        elif key not in mesh.attributes:
-            mesh.attributes.new(key, kind, domain)
-        if len(values):
-            mesh.attributes[key].data.foreach_set(field, _flat(values))
+        write(mesh, key, values, domain)
     if not buffers.smooth and buffers.polygons:
         # Smooth is what a mesh without this layer is; `shade_flat` does the same far more slowly.
-        sharp = mesh.attributes.new("sharp_face", "BOOLEAN", "FACE")
-        sharp.data.foreach_set("value", np.ones(buffers.polygons, dtype=bool))
+        write(mesh, "sharp_face", np.ones(buffers.polygons, bool), "FACE")
     mesh.update()
-
-
-def _flat(values: NDArray) -> NDArray:
-    return np.ascontiguousarray(values).reshape(-1)
 
 
 def check_buffers(buffers: MeshBuffers) -> None:
@@ -130,7 +110,7 @@ def check_buffers(buffers: MeshBuffers) -> None:
     for key, (domain, values) in buffers.attributes.items():
         if domain not in _DOMAINS:
             raise ValueError(f"Attribute {key}: domain must be one of {', '.join(_DOMAINS)}, not {domain!r}")
-        if (values.dtype, values.shape[1:]) not in _TYPES:
+        if type_for(values) is None:
             raise ValueError(
                 f"Attribute {key}: Blender has no attribute type for {values.dtype} of shape {values.shape}"
             )
@@ -159,26 +139,20 @@ def read_mesh_arrays(mesh: bpy.types.Mesh) -> MeshBuffers:
     MeshBuffers
         Arrays of the caller's own; ``attributes`` may have ``UVMap`` and ``material_index``; ``smooth`` if any face is.
     """
-    positions = np.zeros((len(mesh.vertices), 3), dtype=np.float32)
-    edges = np.zeros((len(mesh.edges), 2), dtype=np.int32)
-    corner_verts = np.zeros(len(mesh.loops), dtype=np.int32)
-    corner_edges = np.zeros(len(mesh.loops), dtype=np.int32)
-    offsets = np.full(len(mesh.polygons) + 1, len(mesh.loops), dtype=np.int32)
-    smooth = np.zeros(len(mesh.polygons), dtype=bool)
-    mesh.vertices.foreach_get("co", positions.reshape(-1))
-    mesh.edges.foreach_get("vertices", edges.reshape(-1))
-    mesh.loops.foreach_get("vertex_index", corner_verts)
-    mesh.loops.foreach_get("edge_index", corner_edges)
-    mesh.polygons.foreach_get("loop_start", offsets[:-1])
-    mesh.polygons.foreach_get("use_smooth", smooth)
+    positions = members(mesh.vertices, "co", 3)
+    edges = members(mesh.edges, "vertices", 2, np.int32)
+    corner_verts = members(mesh.loops, "vertex_index", dtype=np.int32)
+    corner_edges = members(mesh.loops, "edge_index", dtype=np.int32)
+    smooth = members(mesh.polygons, "use_smooth", dtype=bool)
     attributes = {}
     layer = mesh.uv_layers.active
     if layer is not None and len(mesh.loops):
-        uv = np.zeros((len(mesh.loops), 2), dtype=np.float32)
-        layer.uv.foreach_get("vector", uv.reshape(-1))
-        attributes[UV_MAP] = ("CORNER", uv)
+        attributes[UV_MAP] = ("CORNER", members(layer.uv, "vector", 2))
     if "material_index" in mesh.attributes:
-        index = np.zeros(len(mesh.polygons), dtype=np.int32)
-        mesh.polygons.foreach_get("material_index", index)
-        attributes["material_index"] = ("FACE", index)
-    return MeshBuffers(positions, edges, corner_verts, corner_edges, offsets, attributes, bool(smooth.any()))
+        attributes["material_index"] = ("FACE", members(mesh.polygons, "material_index", dtype=np.int32))
+    return MeshBuffers(positions, edges, corner_verts, corner_edges, face_offsets(mesh), attributes, bool(smooth.any()))
+
+
+def face_offsets(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
+    """First corner of each face, and the number of corners: (faces + 1,)."""
+    return np.append(members(mesh.polygons, "loop_start", dtype=np.int32), np.int32(len(mesh.loops)))

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..plants.hashing import child_key, key_of_seed
+from .attributes import read, values_of
 from .transforms import world_matrix
 
 _ONE_BY_ONE = {'VERTS', 'FACES'}  # ways to instance whose places only Blender knows
@@ -176,16 +177,14 @@ class _Walk:
 
 def _read_instances(points: bpy.types.PointCloud) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.int64]]:
     """Reference, columns of the transform (n, 4, 4) and identifier of each instance."""
-    size = len(points.points)
-    reference, number = np.zeros(size, np.int32), np.arange(size)
-    transform = np.zeros((size, 4, 4), np.float32)
-    points.attributes[".reference_index"].data.foreach_get("value", reference)
-    points.attributes["instance_transform"].data.foreach_get("value", transform.reshape(-1))
-    if (own := points.attributes.get("id")) is not None and own.data_type == 'INT':
-        given = np.zeros(size, np.int32)
-        own.data.foreach_get("value", given)
-        number = given.astype(np.int64)
-    return reference, transform.astype(np.float64), number
+    transform = read(points, "instance_transform").reshape(-1, 4, 4).astype(np.float64)
+    own = points.attributes.get("id")
+    known = own is not None and own.data_type == 'INT'
+    return (
+        read(points, ".reference_index"),
+        transform,
+        values_of(own).astype(np.int64) if known else np.arange(len(transform)),
+    )
 
 
 def _one_by_one(instancers: set[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Iterator[Copies]:

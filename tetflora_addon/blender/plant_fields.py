@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from ..planting.places import new_seeds
 from ..plants.hashing import child_key, key_of_seed
+from .attributes import read, values_of, write
 from .plant_copies import geometry_of
 from .plant_kinds import kind_of, kind_of_choice
 from .transforms import frames_of
@@ -26,10 +27,10 @@ from .transforms import frames_of
 FIELD_TYPES = {'MESH', 'POINTCLOUD'}
 #: An attribute of this beginning goes before the one without, where other tools use the short name otherwise.
 PREFIX = "tf_"
+#: Attributes of fields that TetFlora makes, with their types.
+FIELD_ATTRIBUTES = {"rotation": 'QUATERNION', "scale": 'FLOAT', "species": 'INT', "seed": 'INT'}
 
-_INTEGERS = {'INT': np.int32, 'INT8': np.int8, 'BOOLEAN': np.bool_}
-_VECTOR = {'FLOAT_VECTOR': ("vector", 3)}
-_KEYS = {'QUATERNION': ("value", 4), 'FLOAT': ("value", 1), **_VECTOR}
+_INTEGERS = {'INT', 'INT8', 'BOOLEAN'}
 
 Points = bpy.types.Mesh | bpy.types.PointCloud
 
@@ -118,7 +119,7 @@ def read_field(
         parts = [part for part in (geometry.mesh, geometry.pointcloud) if part is not None]
     sizes = [_size(part) for part in parts]
     sized = list(zip(parts, sizes, strict=True))
-    position = _joined([_positions(part, size) for part, size in sized], (0, 3))
+    position = _joined([read(part, "position").astype(np.float64) for part in parts], (0, 3))
     rotation = _joined([_rotations(obj, part, size) for part, size in sized], (3, 3, 0))
     own_scale = _joined([_scales(obj, part, size, 1 if len(parts) == 1 else 3) for part, size in sized], (3, 0))
     firsts = np.cumsum([0, *sizes]).tolist()
@@ -169,14 +170,10 @@ def write_field(
     """
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(len(seed))
-    mesh.attributes["position"].data.foreach_set("vector", _flat(position, np.float32))
-    for attribute, kind, values, dtype in (
-        ("rotation", 'QUATERNION', rotation, np.float32),
-        ("scale", 'FLOAT', scale, np.float32),
-        ("species", 'INT', species, np.int32),
-        ("seed", 'INT', seed, np.int32),
-    ):
-        mesh.attributes.new(attribute, kind, 'POINT').data.foreach_set("value", _flat(values, dtype))
+    write(mesh, "position", position)
+    own = {"rotation": rotation, "scale": scale, "species": species, "seed": seed}
+    for attribute, kind in FIELD_ATTRIBUTES.items():
+        write(mesh, attribute, own[attribute], data_type=kind)
     mesh.update()
     obj = bpy.data.objects.new(name, mesh)
     group = obj.tetflora
@@ -229,28 +226,13 @@ def _attribute(obj: bpy.types.Object, points: Points, name: str, kinds: Iterable
     return found
 
 
-def _values(attribute: bpy.types.Attribute, size: int) -> NDArray[np.float32]:
-    """Values as stored: (n,) or (n, components)."""
-    key, width = _KEYS[attribute.data_type]
-    values = np.zeros((size, width), np.float32)
-    attribute.data.foreach_get(key, values.reshape(-1))
-    return values[:, 0] if width == 1 else values
-
-
-def _positions(points: Points, size: int) -> NDArray[np.float64]:
-    # No points may mean no attribute either.
-    return _values(points.attributes["position"], size).astype(np.float64) if size else np.zeros((0, 3))
-
-
 def _integers(
     obj: bpy.types.Object, points: Points, name: str, size: int, default: NDArray[np.int64] | int
 ) -> NDArray[np.int64]:
     attribute = _attribute(obj, points, name, _INTEGERS)
     if attribute is None:
         return np.broadcast_to(np.asarray(default, np.int64), size)
-    values = np.zeros(size, _INTEGERS[attribute.data_type])
-    attribute.data.foreach_get("value", values)
-    return values.astype(np.int64)
+    return values_of(attribute).astype(np.int64)
 
 
 def _seeds(obj: bpy.types.Object, points: Points, size: int, first: int) -> NDArray[np.int64]:
@@ -268,7 +250,7 @@ def _rotations(obj: bpy.types.Object, points: Points, size: int) -> NDArray[np.f
     attribute = _attribute(obj, points, "rotation", {'QUATERNION', 'FLOAT_VECTOR'})
     if attribute is None:
         return np.repeat(np.eye(3)[:, :, None], size, axis=2)
-    values = np.ascontiguousarray(_values(attribute, size).T, np.float64)
+    values = np.ascontiguousarray(values_of(attribute).T, np.float64)
     return _from_quaternions(values) if len(values) == 4 else _from_eulers(values)
 
 
@@ -277,7 +259,7 @@ def _scales(obj: bpy.types.Object, points: Points, size: int, least: int) -> NDA
     attribute = _attribute(obj, points, "scale", {'FLOAT', 'FLOAT_VECTOR'})
     if attribute is None:
         return np.ones((least, size))
-    values = _values(attribute, size)
+    values = values_of(attribute)
     if values.ndim == 1:
         _refuse(obj, ~(values > 0.0), "a scale that is not greater than 0")
         values = np.broadcast_to(values[:, None], (size, least))
@@ -344,7 +326,3 @@ def _joined(parts: list[NDArray], empty: tuple[int, ...]) -> NDArray:
         return np.zeros(empty, int)
     # Millions of frames are not copied where there is nothing to join.
     return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=empty.index(0))
-
-
-def _flat(values: NDArray, dtype: type) -> NDArray:
-    return np.ascontiguousarray(values, dtype=dtype).reshape(-1)

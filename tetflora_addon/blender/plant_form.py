@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..errors import SpeciesError
 from ..plants.skeletons import Skeleton, skeleton_from_edges
 from ..plants.splines import Chains, bezier_chains, joined_edges, nurbs_chain, smooth_handles
+from .attributes import members, values_of
 from .transforms import frames_of, world_matrix
 
 FORM_TYPES = ('CURVE', 'CURVES', 'MESH')
@@ -91,10 +92,10 @@ def _mesh_arrays(mesh: bpy.types.Mesh) -> tuple[NDArray[np.float64], NDArray[np.
     points[:, :3] = _read(mesh.vertices, "co", 3)
     radius = mesh.attributes.get(RADIUS)
     if radius is not None and radius.domain == 'POINT' and radius.data_type == 'FLOAT':
-        points[:, 3] = _read(radius.data, "value", 1)[:, 0]
+        points[:, 3] = values_of(radius)
     elif len(mesh.skin_vertices):
         points[:, 3] = _read(mesh.skin_vertices[0].data, "radius", 2).mean(axis=1)
-    return points, _read(mesh.edges, "vertices", 2, np.int32).astype(np.int64)
+    return points, members(mesh.edges, "vertices", 2, np.int32).astype(np.int64)
 
 
 def _of_curve(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Chains:
@@ -114,13 +115,13 @@ def _of_spline(spline: bpy.types.Spline) -> Chains:
     cyclic = np.array([spline.use_cyclic_u])
     if spline.type == 'BEZIER':
         knots = spline.bezier_points
-        places = np.column_stack([_read(knots, "co", 3), _read(knots, "radius", 1)])
+        places = np.column_stack([_read(knots, "co", 3), _read(knots, "radius")])
         handles = (_read(knots, side, 3) for side in ("handle_left", "handle_right"))
         control = Chains(places, np.array([0, len(knots)]), cyclic)
         return bezier_chains(control, *handles, np.array([spline.resolution_u]))
     places = _read(spline.points, "co", 4)
     weights = places[:, 3].copy()
-    places[:, 3] = _read(spline.points, "radius", 1)[:, 0]
+    places[:, 3] = _read(spline.points, "radius")
     if spline.type == 'NURBS':
         flags = {"endpoint": spline.use_endpoint_u, "bezier": spline.use_bezier_u, "cyclic": spline.use_cyclic_u}
         return nurbs_chain(places, weights, spline.order_u, spline.resolution_u, **flags)
@@ -148,24 +149,24 @@ def _of_hair(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Chains:
     """Hair curves with their modifiers."""
     curves = obj.evaluated_get(depsgraph).data
     points = np.zeros((len(curves.points), 4))
-    points[:, :3] = _attribute(curves, "position", "vector", np.zeros((len(points), 3)))
-    points[:, 3] = _attribute(curves, RADIUS, "value", points[:, 3])
-    starts = _read(curves.curves, "first_point_index", 1, np.int32)[:, 0]
+    points[:, :3] = _attribute(curves, "position", np.zeros((len(points), 3)))
+    points[:, 3] = _attribute(curves, RADIUS, points[:, 3])
+    starts = members(curves.curves, "first_point_index", dtype=np.int32)
     first = np.append(starts, len(points)).astype(np.int64)
     none = np.zeros(len(starts), np.int32)
-    kind = _attribute(curves, "curve_type", "value", none)
-    control = Chains(points, first, _attribute(curves, "cyclic", "value", none > 0))
-    steps = _attribute(curves, "resolution", "value", none + _DEFAULT_STEPS)
+    kind = _attribute(curves, "curve_type", none)
+    control = Chains(points, first, _attribute(curves, "cyclic", none > 0))
+    steps = _attribute(curves, "resolution", none + _DEFAULT_STEPS)
     left, right = smooth_handles(control)
     bezier = np.repeat(kind == _BEZIER, np.diff(first))[:, None]
-    left = np.where(bezier, _attribute(curves, "handle_left", "vector", left), left)
-    right = np.where(bezier, _attribute(curves, "handle_right", "vector", right), right)
+    left = np.where(bezier, _attribute(curves, "handle_left", left), left)
+    right = np.where(bezier, _attribute(curves, "handle_right", right), right)
     chains = bezier_chains(control, left, right, np.where(kind == _POLY, 1, steps))
     nurbs = np.flatnonzero(kind == _NURBS)
     if len(nurbs):
-        weights = _attribute(curves, "nurbs_weight", "value", np.ones(len(points)))
-        order = _attribute(curves, "nurbs_order", "value", none + 4)
-        mode = _attribute(curves, "knots_mode", "value", none)  # 1 ends at the outer points, 2 Bezier, 3 both
+        weights = _attribute(curves, "nurbs_weight", np.ones(len(points)))
+        order = _attribute(curves, "nurbs_order", none + 4)
+        mode = _attribute(curves, "knots_mode", none)  # 1 ends at the outer points, 2 Bezier, 3 both
         parts = [chains.without(nurbs)]
         for i in nurbs.tolist():
             own = slice(first[i], first[i + 1])
@@ -175,18 +176,12 @@ def _of_hair(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Chains:
     return _meant_radii(chains, 0.0)
 
 
-def _read(collection: bpy.types.bpy_prop_collection, name: str, width: int, dtype: type = np.float32) -> NDArray:
-    """A property of all members of a collection, (n, width); floats as float64."""
-    values = np.zeros(len(collection) * width, dtype)
-    collection.foreach_get(name, values)
-    return values.reshape(-1, width).astype(np.float64 if dtype == np.float32 else dtype)
+def _read(collection: bpy.types.bpy_prop_collection, name: str, width: int = 1) -> NDArray[np.float64]:
+    return members(collection, name, width).astype(np.float64)
 
 
-def _attribute(curves: bpy.types.Curves, name: str, member: str, default: NDArray) -> NDArray:
+def _attribute(curves: bpy.types.Curves, name: str, default: NDArray) -> NDArray:
     """Values of an attribute of hair curves, like ``default`` in shape and type; ``default`` where it is missing."""
     found = curves.attributes.get(name)
-    if found is None or len(found.data) != len(default):
-        return default
-    values = np.zeros(default.size, np.float32 if default.dtype == np.float64 else default.dtype)
-    found.data.foreach_get(member, values)
-    return values.astype(default.dtype).reshape(default.shape)
+    values = None if found is None else values_of(found)
+    return default if values is None or values.shape != default.shape else values.astype(default.dtype)

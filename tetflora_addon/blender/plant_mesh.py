@@ -20,6 +20,7 @@ from ..plants.growth import trunks
 from ..plants.seeds import Seeds
 from ..plants.species import Species
 from ..refinement.statistics import Progress
+from .attributes import write
 from .leaf_forms import materials_of
 from .meshes import write_mesh
 from .plant_kinds import kind_of
@@ -110,7 +111,7 @@ def plant_mesh(scene: bpy.types.Scene, name: str, species: Species, parts: list[
     mesh = write_mesh(name, whole, materials)
     sharp = np.repeat([not p.buffers.smooth for p in parts], [p.buffers.polygons for p in parts])
     if sharp.any():
-        mesh.attributes.new("sharp_face", 'BOOLEAN', 'FACE').data.foreach_set("value", sharp)
+        write(mesh, "sharp_face", sharp, 'FACE')
     return mesh
 
 

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from ..buffers import MeshBuffers, PointBuffers
+from .attributes import write
 from .compat import can_resize_point_clouds
 from .meshes import check_buffers, write_mesh
 from .node_tools import Graph, get_or_create
@@ -72,10 +73,9 @@ def _write_cloud(name: str, vertices: MeshBuffers) -> bpy.types.PointCloud:
     check_buffers(vertices)
     cloud = bpy.data.pointclouds.new(name)
     cloud.resize(len(vertices.positions))
-    for key, values in (("position", vertices.positions), *((k, v) for k, (_, v) in vertices.attributes.items())):
-        kind, field = ("FLOAT", "value") if values.ndim == 1 else ("FLOAT_VECTOR", "vector")
-        layer = cloud.attributes.get(key) or cloud.attributes.new(key, kind, "POINT")
-        layer.data.foreach_set(field, np.ascontiguousarray(values).reshape(-1))
+    write(cloud, "position", vertices.positions)
+    for key, (_, values) in vertices.attributes.items():
+        write(cloud, key, values)
     cloud.update_tag()
     return cloud
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
+from .attributes import members, read
 from .transforms import world_matrix
 
 
@@ -52,11 +53,5 @@ def _triangles(mesh: bpy.types.Mesh) -> tuple[NDArray[np.float64], NDArray[np.in
     if not len(mesh.polygons):
         return np.zeros((0, 3)), np.zeros((0, 3), np.int32)
     mesh.calc_loop_triangles()
-    # Attributes are plain memory; ``foreach_get`` of vertices, be it of the mesh or of triangles, is much slower.
-    loops = np.zeros(3 * len(mesh.loop_triangles), np.int32)
-    mesh.loop_triangles.foreach_get("loops", loops)
-    vertices = np.zeros(len(mesh.loops), np.int32)
-    mesh.attributes[".corner_vert"].data.foreach_get("value", vertices)
-    positions = np.zeros(3 * len(mesh.vertices), np.float32)
-    mesh.attributes["position"].data.foreach_get("vector", positions)
-    return positions.reshape(-1, 3).astype(np.float64), vertices[loops].reshape(-1, 3)
+    vertices = read(mesh, ".corner_vert")[members(mesh.loop_triangles, "loops", 3, np.int32)]
+    return read(mesh, "position").astype(np.float64), vertices
