@@ -4,7 +4,7 @@
 
 import bpy
 
-from ..tetflora_addon.blender import auto_refresh, emit, job
+from ..tetflora_addon.blender import auto_refresh, hiding, job
 from .base import Reporting, counted, in_object_mode
 
 
@@ -26,16 +26,16 @@ class TETFLORA_OT_clear(Reporting, bpy.types.Operator):
         # Results may have been deleted by hand, which leaves hidden what they stood for. Only then are all objects
         # looked through: a panel asks at every movement of the mouse.
         scene = context.scene
-        if not (job.has_results(scene) or (scene.tetflora.statistics and emit.hidden_originals(scene))):
+        if not (job.has_results(scene) or (scene.tetflora.statistics and hiding.hidden_originals(scene))):
             cls.poll_message_set("Refine has made nothing yet")
             return False
         return True
 
     def run(self, context: bpy.types.Context) -> set[str]:
         auto_refresh.stop()
-        hidden = emit.hidden_originals(context.scene, 'VIEW')
+        hidden = hiding.hidden_originals(context.scene, 'VIEW')
         removed = f"{counted(job.clear(context.scene), 'datablock')} removed"
-        shown = sum(emit.HIDDEN['VIEW'] not in original for original in hidden)
+        shown = sum(hiding.HIDDEN['VIEW'] not in original for original in hidden)
         self.report({'INFO'}, f"{removed}, {counted(shown, 'object')} shown again" if shown else removed)
         return {'FINISHED'}
 

@@ -5,7 +5,8 @@
 import bpy
 
 from ..tetflora_addon.blender import auto_refresh
-from ..tetflora_addon.blender.emit import keep_results, result_collections
+from ..tetflora_addon.blender.emit import result_collections
+from ..tetflora_addon.blender.hiding import keep_results
 from ..tetflora_addon.errors import TetFloraError
 from .base import Reporting, counted
 

@@ -12,7 +12,17 @@ import pytest
 
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph, tiny_render
 from tetflora_addon import errors
-from tetflora_addon.blender import camera_reader, compat, emit, handlers, job, node_tools, scene_reader, shell_bounces
+from tetflora_addon.blender import (
+    camera_reader,
+    compat,
+    emit,
+    handlers,
+    hiding,
+    job,
+    node_tools,
+    scene_reader,
+    shell_bounces,
+)
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -133,7 +143,7 @@ def test_a_render_that_will_show_no_plants_says_so_once(stage, tmp_path, capfd):
     assert handlers.render_errors() == []
     job.refine(stage, bpy.context.evaluated_depsgraph_get())
     _still(stage, tmp_path / "b.png")
-    emit.keep_results(stage)
+    hiding.keep_results(stage)
     _still(stage, tmp_path / "c.png")
     assert "nothing is refined" not in capfd.readouterr().err
 

@@ -19,14 +19,12 @@ import bpy
 
 from ..errors import TetFloraError
 from . import job, kept_results
-from .emit import (
-    has_results,
-    leave_out_of_file,
+from .emit import has_results, leave_out_of_file, result_collections
+from .hiding import (
     lift_marks,
     originals_shown,
     pack_override_marks,
     restore_marks,
-    result_collections,
     show_left_over,
     unpack_override_marks,
 )

@@ -27,8 +27,9 @@ from .baked_material import baked_material
 from .baking import Baking
 from .camera_reader import read_camera
 from .compat import drawn_disc
-from .emit import Results, has_results, hide_originals, remove_results, result_collections
+from .emit import Results, has_results, result_collections
 from .explicit_objects import Explicit
+from .hiding import hide_originals, remove_results
 from .leaf_forms import materials_of
 from .output import adopt_materials, release_materials
 from .proxies import write_proxies

@@ -19,8 +19,8 @@ from ..refinement.polygons import Polygons
 from ..refinement.settings import RefinementSettings
 from ..refinement.statistics import Statistics
 from .baking import read_sources
-from .emit import originals_shown
 from .explicit_objects import Explicit, read_explicit
+from .hiding import originals_shown
 from .leaf_forms import resolved_species
 from .light_reader import read_lights
 from .proxy_forms import form_of
