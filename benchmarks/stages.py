@@ -17,8 +17,9 @@ import bpy
 import numpy as np
 
 from examples import landscape
-from tetflora_addon import emission, facet_emission
+from tetflora_addon import emission
 from tetflora_addon.blender import job, meshes, scene_contents, scene_reader
+from tetflora_addon.emission_forms import Refined, facet_blocks
 
 from .report import Targets
 
@@ -85,7 +86,7 @@ def run(quick: bool) -> dict[str, float]:
         lap("polygons", block.buffers.nbytes)
         meshes.write_mesh("block", block.buffers)
         lap("write", block.buffers.nbytes)
-    for facets in facet_emission.facet_blocks(flora, result, camera):
+    for facets in facet_blocks(Refined(flora, result, camera, 0.33)):
         lap("facets", facets.nbytes)
         meshes.write_mesh("facets", facets)
         lap("write", facets.nbytes)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from .baked_emission import BakedLight, baked_attributes
 from .budget import BYTES_PER_POLYGON, BYTES_PER_SPHERE
 from .buffers import MeshBuffers, PointBuffers
-from .facet_emission import Parts, facet_blocks, facet_parts, mixed_blocks, sphere_blocks
+from .facet_emission import Parts, facet_parts
 from .plants.compiled import Flora
 from .refinement.camera import Camera
 from .refinement.loop import Refinement
@@ -90,25 +90,34 @@ class EmissionForm:
         return self.faces is None
 
 
-def _facets(refined: Refined) -> Iterator[Buffers]:
-    return facet_blocks(
-        refined.flora, refined.refinement, refined.camera, refined.facet_pixels, transition=refined.transition
-    )
+def facet_blocks(refined: Refined) -> Iterator[MeshBuffers]:
+    """Proxies as microsurfaces."""
+    for parts in refined.facet_parts():
+        yield replace(facet_mesh(concatenate_facets([facets for facets, _ in parts])), species=parts.species)
 
 
-def _spheres(refined: Refined) -> Iterator[Buffers]:
-    return sphere_blocks(
-        refined.flora, refined.refinement, refined.camera, refined.facet_pixels, refined.disc, refined.transition
-    )
+def sphere_blocks(refined: Refined) -> Iterator[PointBuffers]:
+    """Proxies as microspheres, one for each facet of `facet_blocks`."""
+    for parts in refined.facet_parts():
+        yield replace(spheres(parts, refined.camera, refined.disc), species=parts.species)
 
 
-def _facets_and_spheres(refined: Refined) -> Iterator[Buffers]:
-    return mixed_blocks(
-        refined.flora, refined.refinement, refined.camera, refined.facet_pixels, refined.disc, refined.transition
-    )
+def mixed_blocks(refined: Refined) -> Iterator[Buffers]:
+    """Proxies in the form that suits each: facets where they are seen, spheres where they are not.
+
+    In the fidelity benchmark facets come closer to the plants wherever they are seen. What is hidden only casts
+    shadows and lights other plants, for which spheres serve as well and take a third of the memory.
+    """
+    for parts in refined.facet_parts():
+        facets, hidden = [some for some, seen in parts if seen], [part for part in parts if not part[1]]
+        if facets:
+            yield replace(facet_mesh(concatenate_facets(facets)), species=parts.species)
+        if hidden:
+            yield replace(spheres(hidden, refined.camera, refined.disc), species=parts.species)
 
 
-def _shells(refined: Refined, light: BakedLight | None = None, _first_sheet: int = 0) -> Iterator[Buffers]:
+def shell_blocks(refined: Refined, light: BakedLight | None = None, _first_sheet: int = 0) -> Iterator[MeshBuffers]:
+    """Proxies as shells, in one block."""
     shells = proxy_shells(refined.flora, refined.refinement, light)
     if shells is not None:
         yield shells
@@ -122,23 +131,23 @@ def _numbered(refined: Refined, first_sheet: int) -> Iterator[tuple[Parts, Facet
         first_sheet += len(facets)
 
 
-def _baked_facets(refined: Refined, light: BakedLight, first_sheet: int) -> Iterator[Buffers]:
+def _baked_facets(refined: Refined, light: BakedLight, first_sheet: int) -> Iterator[MeshBuffers]:
     for parts, facets, sheets in _numbered(refined, first_sheet):
         made, values = facet_mesh(facets), baked_attributes('FACE', *light.of_facets(facets, sheets))
         yield replace(made, attributes={**made.attributes, **values}, species=parts.species)
 
 
-def _baked_spheres(refined: Refined, light: BakedLight, first_sheet: int) -> Iterator[Buffers]:
+def _baked_spheres(refined: Refined, light: BakedLight, first_sheet: int) -> Iterator[PointBuffers]:
     for parts, facets, sheets in _numbered(refined, first_sheet):
         made, values = spheres(parts, refined.camera, refined.disc), light.of_spheres(facets, sheets)
         baked = {name: array for name, (_, array) in baked_attributes('POINT', values).items()}
         yield replace(made, attributes={**made.attributes, **baked}, species=parts.species)
 
 
-MICROSURFACES = EmissionForm(_facets, _baked_facets)
-MICROSPHERES = EmissionForm(_spheres, _baked_spheres, primitive_bytes=BYTES_PER_SPHERE)
+MICROSURFACES = EmissionForm(facet_blocks, _baked_facets)
+MICROSPHERES = EmissionForm(sphere_blocks, _baked_spheres, primitive_bytes=BYTES_PER_SPHERE)
 #: Facets where they are seen, spheres elsewhere. Where light is baked, all are facets.
-AUTOMATIC = EmissionForm(_facets_and_spheres, _baked_facets)
+AUTOMATIC = EmissionForm(mixed_blocks, _baked_facets)
 #: Shells fill their tetrahedra evenly, so that hidden ones are divided as well; those that are seen further, because
 #: their shape shows.
-SHELLS = EmissionForm(_shells, _shells, faces=4.0, hidden_block=16.0, proxy_block=4.0)
+SHELLS = EmissionForm(shell_blocks, shell_blocks, faces=4.0, hidden_block=16.0, proxy_block=4.0)

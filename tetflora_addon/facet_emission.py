@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From decisions to buffers: proxies as facets or as microspheres, block by block."""
+"""From decisions to the facets of proxies, block by block; `emission_forms` makes buffers of them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .buffers import BLOCK_POLYGONS, MeshBuffers, PointBuffers
+from .buffers import BLOCK_POLYGONS
 from .plants.branches import Branches
 from .plants.compiled import Flora
 from .plants.expansion import chunks, open_subplants
@@ -23,11 +23,8 @@ from .refinement.loop import SLACK, Refinement
 from .refinement.transition import Transition
 from .shading.facet_shares import facet_shares
 from .shading.facet_sizes import HIDDEN_LEAVES, coarseness, piece_facet_sizes, subplant_facet_sizes
-from .shading.microspheres import spheres
 from .shading.microsurfaces import (
     Facets,
-    concatenate_facets,
-    facet_mesh,
     kept_out_of_view,
     piece_facets,
     subplant_facets,
@@ -39,67 +36,6 @@ FACETS_AT_ONCE = 200_000
 
 #: Pixels down to which sub-plants are opened that are seen. What is smaller, the loop does not open either.
 DETAIL = SLACK
-
-
-def facet_blocks(
-    flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.33, transition: Transition | None = None
-) -> Iterator[MeshBuffers]:
-    """Proxies as microsurfaces: facets of all that is not explicit, and of no polygon that is kept as it is.
-
-    Meshes have about `BLOCK_POLYGONS` facets each, so that only one of them is held at a time beside Blender's own.
-    Each is of one species, or of meshes.
-
-    Parameters
-    ----------
-    flora : Flora
-    result : Refinement
-    camera : Camera
-    facet_pixels : float
-        Side of a facet that is seen, in pixels; see `shading.facet_sizes` for the others.
-    transition : Transition, optional
-        With it, what is too small in explicit tetrahedra gets facets too, and thick wood elsewhere gets none; as
-        `emission.explicit_blocks` with the same makes the rest.
-    """
-    for parts in facet_parts(flora, result, camera, facet_pixels, transition):
-        yield replace(facet_mesh(concatenate_facets([facets for facets, _ in parts])), species=parts.species)
-
-
-def sphere_blocks(
-    flora: Flora,
-    result: Refinement,
-    camera: Camera,
-    facet_pixels: float = 0.33,
-    disc: float = np.pi,
-    transition: Transition | None = None,
-) -> Iterator[PointBuffers]:
-    """Proxies as microspheres, one for each facet of `facet_blocks`; parameters and size of blocks are the same.
-
-    What is drawn of a sphere of radius 1 has the area ``disc``, see `shading.microspheres`.
-    """
-    for parts in facet_parts(flora, result, camera, facet_pixels, transition):
-        yield replace(spheres(parts, camera, disc), species=parts.species)
-
-
-def mixed_blocks(
-    flora: Flora,
-    result: Refinement,
-    camera: Camera,
-    facet_pixels: float = 0.33,
-    disc: float = np.pi,
-    transition: Transition | None = None,
-) -> Iterator[MeshBuffers | PointBuffers]:
-    """Proxies in the form that is best for each: facets where they are seen, spheres where they are not.
-
-    In the benchmark of fidelity facets come closer to the plants wherever they are seen. What is hidden only casts
-    shadows and lights up others, for which spheres serve as well and take a third of the memory. Parameters as for
-    `sphere_blocks`.
-    """
-    for parts in facet_parts(flora, result, camera, facet_pixels, transition):
-        facets, hidden = [some for some, seen in parts if seen], [part for part in parts if not part[1]]
-        if facets:
-            yield replace(facet_mesh(concatenate_facets(facets)), species=parts.species)
-        if hidden:
-            yield replace(spheres(hidden, camera, disc), species=parts.species)
 
 
 #: Some facets, and whether the camera sees them: neither hidden nor beside the view.
@@ -120,7 +56,22 @@ class Parts:
 def facet_parts(
     flora: Flora, result: Refinement, camera: Camera, facet_pixels: float, transition: Transition | None = None
 ) -> Iterator[Parts]:
-    """Facets in blocks of about `BLOCK_POLYGONS`, none of them empty."""
+    """Facets of all that is not explicit, and of no polygon that is kept as it is; no block is empty.
+
+    Blocks have about `BLOCK_POLYGONS` facets each, so that only one of them is held at a time beside Blender's own.
+    Each is of one species, or of meshes.
+
+    Parameters
+    ----------
+    flora : Flora
+    result : Refinement
+    camera : Camera
+    facet_pixels : float
+        Side of a facet that is seen, in pixels; see `shading.facet_sizes` for the others.
+    transition : Transition, optional
+        With it, what is too small in explicit tetrahedra gets facets too, and thick wood elsewhere gets none; as
+        `emission.explicit_blocks` with the same makes the rest.
+    """
     parts: list[Part] = []
     current = None
     for species, *made in _facets(flora, result, camera, facet_pixels, transition):

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tetflora_addon.arrays import spread
 from tetflora_addon.buffers import MeshBuffers, concatenate_buffers
-from tetflora_addon.facet_emission import facet_blocks
+from tetflora_addon.emission_forms import Refined, facet_blocks
 from tetflora_addon.plants.axes import axes
 from tetflora_addon.plants.branches import Branches
 from tetflora_addon.plants.catalogue import builtin_folder, load_species
@@ -241,7 +241,7 @@ def moment(*meshes: MeshBuffers) -> NDArray[np.float64]:
 
 def facet_buffers(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.33) -> MeshBuffers | None:
     """All facets of proxies in one mesh; None where there are none."""
-    return concatenate_buffers(list(facet_blocks(flora, result, camera, facet_pixels)))
+    return concatenate_buffers(list(facet_blocks(Refined(flora, result, camera, facet_pixels))))
 
 
 def face_planes(vertices: NDArray[np.float64]) -> NDArray[np.float64]:

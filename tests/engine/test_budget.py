@@ -16,7 +16,7 @@ from tests.engine import support
 from tests.engine.test_emission import scene, with_decision
 from tetflora_addon.budget import BYTES_PER_POLYGON, BYTES_PER_SPHERE, afford, polygons_allowed
 from tetflora_addon.emission import explicit_blocks
-from tetflora_addon.facet_emission import sphere_blocks
+from tetflora_addon.emission_forms import Refined, sphere_blocks
 from tetflora_addon.refinement.decisions import Decision, contributions
 from tetflora_addon.refinement.settings import RefinementSettings
 
@@ -90,7 +90,7 @@ def test_spheres_take_less_of_a_budget_of_memory_and_as_much_of_one_of_polygons(
     def spheres(**limits: float) -> int:
         settings = replace(SETTINGS, **limits)
         fitted, side = afford(flora, everything, camera, settings, primitive_bytes=BYTES_PER_SPHERE)
-        return sum(block.polygons for block in sphere_blocks(flora, fitted, camera, side))
+        return sum(block.polygons for block in sphere_blocks(Refined(flora, fitted, camera, side)))
 
     whole = spheres()
     memory = 0.3 * whole * BYTES_PER_SPHERE / 1e9

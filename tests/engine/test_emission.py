@@ -16,6 +16,7 @@ from tests.engine.test_loop import run
 from tests.engine.test_meshing import check_topology
 from tetflora_addon import emission, facet_emission
 from tetflora_addon.emission import expanded_blocks, explicit_blocks
+from tetflora_addon.emission_forms import Refined, facet_blocks
 from tetflora_addon.plants.compiled import Flora
 from tetflora_addon.plants.seeds import Seeds
 from tetflora_addon.refinement.camera import Camera
@@ -177,7 +178,7 @@ def test_facets_come_in_blocks_of_bounded_size(monkeypatch: pytest.MonkeyPatch) 
     once = support.facet_buffers(flora, result, camera)
     monkeypatch.setattr(facet_emission, "FACETS_AT_ONCE", 300)
     monkeypatch.setattr(facet_emission, "BLOCK_POLYGONS", 700)
-    blocks = list(facet_emission.facet_blocks(flora, result, camera))
+    blocks = list(facet_blocks(Refined(flora, result, camera, 0.33)))
     sizes = [b.polygons for b in blocks]
     assert sum(sizes) == once.polygons
     assert len(blocks) > 3
@@ -225,7 +226,8 @@ def test_nothing_to_draw() -> None:
     assert support.facet_buffers(flora, explicit, camera) is None
     assert list(explicit_blocks(flora, with_decision(result, Decision.PROXY))) == []
     # Facets so large that none of what there is makes one.
-    assert list(facet_emission.facet_blocks(flora, with_decision(result, Decision.PROXY), camera, 1e9)) == []
+    proxies = with_decision(result, Decision.PROXY)
+    assert list(facet_blocks(Refined(flora, proxies, camera, 1e9))) == []
 
 
 def test_copies_of_a_seed_are_all_made() -> None:

@@ -13,6 +13,7 @@ import pytest
 from tests.engine import support
 from tests.engine.test_emission import scene
 from tetflora_addon import facet_emission
+from tetflora_addon.emission_forms import Refined, facet_blocks, sphere_blocks
 from tetflora_addon.plants.vectors import unit
 from tetflora_addon.refinement.camera import Camera
 from tetflora_addon.shading.microspheres import LEAST_COVER, facing, spheres
@@ -74,17 +75,17 @@ def test_places_and_looks_are_those_of_the_facets() -> None:
 def test_a_refinement_has_a_sphere_for_each_facet(monkeypatch: pytest.MonkeyPatch) -> None:
     """In blocks of bounded size; leaves that lie flat cover less than half of their area for a level view."""
     flora, _, view, result = scene()
-    facets = list(facet_emission.facet_blocks(flora, result, view))
+    facets = list(facet_blocks(Refined(flora, result, view, 0.33)))
     area = sum(support.face_areas(block).sum() for block in facets)
     whole = sum(block.polygons for block in facets)
     monkeypatch.setattr(facet_emission, "FACETS_AT_ONCE", 300)
     monkeypatch.setattr(facet_emission, "BLOCK_POLYGONS", 700)
-    blocks = list(facet_emission.sphere_blocks(flora, result, view))
+    blocks = list(sphere_blocks(Refined(flora, result, view, 0.33)))
     assert sum(block.polygons for block in blocks) == whole
     begun = [a for a, b in pairwise(blocks) if a.species == b.species]
     assert min(block.polygons for block in begun) >= 700
     assert max(block.polygons for block in blocks) < 2 * 700
     cover = sum(discs(block.radius).sum() for block in blocks)
     assert 0.2 * area < cover < 0.5 * area
-    again = list(facet_emission.sphere_blocks(flora, replace(result), view))
+    again = list(sphere_blocks(Refined(flora, replace(result), view, 0.33)))
     assert all((a.radius == b.radius).all() for a, b in zip(blocks, again, strict=True))
