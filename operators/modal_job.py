@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 
 from ..tetflora_addon.errors import TetFloraError
-from ..tetflora_addon.refinement.statistics import Progress
+from ..tetflora_addon.refinement.statistics import Progress, at_once
 from .base import Reporting
 
 # Seconds of work between two looks at the keyboard.
@@ -39,12 +39,7 @@ class ModalJob(Reporting):
         raise NotImplementedError
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        steps = self.steps(context)
-        while True:
-            try:
-                next(steps)
-            except StopIteration as stop:
-                return self.finish(context, stop.value)
+        return self.finish(context, at_once(self.steps(context)))
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if bpy.app.background or context.window is None:

@@ -19,7 +19,7 @@ from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 from ..refinement.loop import refine as refine_loop
 from ..refinement.settings import RefinementSettings
-from ..refinement.statistics import Progress, Statistics, Stopwatch
+from ..refinement.statistics import Progress, Statistics, Stopwatch, at_once
 from ..refinement.steps import step_of
 from ..refinement.transition import Transition
 from ..shading.facet_shares import facet_shares
@@ -120,12 +120,7 @@ def refine_steps(
 
 def refine(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, **options: object) -> Statistics:
     """Refine a scene at once; options and errors as for `refine_steps`."""
-    steps = refine_steps(scene, depsgraph, **options)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as stop:
-            return stop.value
+    return at_once(refine_steps(scene, depsgraph, **options))
 
 
 def partition(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[Camera, Refinement]:
@@ -138,12 +133,7 @@ def partition(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[C
     """
     camera, given = read_camera(scene, depsgraph), read_scene(scene, depsgraph, depsgraph.view_layer)
     flora = blown(scene, compile_for(given.species, scene, depsgraph))
-    loop = _run_loop(flora, given, camera, refinement_settings(scene), Statistics())
-    while True:
-        try:
-            next(loop)
-        except StopIteration as stop:
-            return camera, stop.value
+    return camera, at_once(_run_loop(flora, given, camera, refinement_settings(scene), Statistics()))
 
 
 def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:

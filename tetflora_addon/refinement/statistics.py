@@ -5,7 +5,11 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Generator
 from dataclasses import asdict, dataclass, field
+from typing import TypeVar
+
+_Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True)
@@ -105,6 +109,15 @@ class Progress:
 
     fraction: float
     message: str
+
+
+def at_once(steps: Generator[object, object, _Result]) -> _Result:
+    """Run a job to its end; returns what the job returns."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as stop:
+            return stop.value
 
 
 class Stopwatch:
