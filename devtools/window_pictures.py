@@ -29,13 +29,13 @@ PANELS = {
     "populate": ("TETFLORA_PT_populate", "TETFLORA_PT_populate_species"),
     "populate-where": ("TETFLORA_PT_populate_where", "TETFLORA_PT_populate_arrangement", "TETFLORA_PT_populate_size"),
     "brush": ("TETFLORA_PT_brush",),
-    "refinement": ("TETFLORA_PT_refinement", "TETFLORA_PT_limits", "TETFLORA_PT_leaf_objects"),
+    "refinement": ("TETFLORA_PT_refine", "TETFLORA_PT_proxies", "TETFLORA_PT_visibility", "TETFLORA_PT_limits"),
     "wind": ("TETFLORA_PT_wind",),
-    "films": ("TETFLORA_PT_refinement", "TETFLORA_PT_films"),
+    "films": ("TETFLORA_PT_refine", "TETFLORA_PT_films", "TETFLORA_PT_leaf_objects"),
     "output": ("TETFLORA_PT_output", "TETFLORA_PT_ray_visibility", "TETFLORA_PT_passes"),
     "preview": ("TETFLORA_PT_preview",),
     "statistics": ("TETFLORA_PT_statistics",),
-    "species": ("TETFLORA_PT_plants", "TETFLORA_PT_species", "TETFLORA_PT_species_whole"),
+    "species": ("TETFLORA_PT_species", "TETFLORA_PT_species_whole"),
 }
 
 

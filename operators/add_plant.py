@@ -18,30 +18,30 @@ class TETFLORA_OT_add_plant(Reporting, bpy.types.Operator):
     bl_idname = "tetflora.add_plant"
     bl_label = "Add Plant"
     bl_description = (
-        "Add a plant at the 3D cursor. It is stored as an empty with species and seed; "
-        "its branches and leaves are made when the scene is refined or rendered"
+        "Add a plant at the 3D cursor. It is stored as an empty with a species and seed; Refine or rendering creates "
+        "its branches and leaves"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
-    species: EnumProperty(name="Species", description="Species of the catalogue", items=operator_items)
+    species: EnumProperty(name="Species", description="Species from the catalog", items=operator_items)
     seed: IntProperty(
         name="Seed",
-        description="Which individual of the species; chosen anew for each plant if not given",
+        description="Individual of the species; random for each plant if not set",
         options={'SKIP_SAVE'},
     )
     location: FloatVectorProperty(
         name="Location",
-        description="Where the trunk leaves the ground, world space; the 3D cursor if not given",
+        description="Base of the trunk in world space; the 3D cursor if not set",
         subtype='TRANSLATION',
         unit='LENGTH',
         options={'SKIP_SAVE'},
     )
     azimuth: FloatProperty(
-        name="Azimuth", description="Rotation about the vertical", subtype='ANGLE', options={'SKIP_SAVE'}
+        name="Azimuth", description="Rotation around the vertical axis", subtype='ANGLE', options={'SKIP_SAVE'}
     )
     scale: FloatProperty(
         name="Scale",
-        description="Size; 1 is the size that the species file gives",
+        description="Scale of the plant; 1 is the size in the species file",
         default=1.0,
         min=0.01,
         soft_max=4.0,

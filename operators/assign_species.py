@@ -18,12 +18,12 @@ class TETFLORA_OT_assign_species(Reporting, bpy.types.Operator):
     bl_idname = "tetflora.assign_species"
     bl_label = "Change Species"
     bl_description = (
-        "Make all selected plants, and all plants of selected fields, belong to this species. Their seeds, sizes and "
-        "places stay"
+        "Assign this species to all selected plants and to all plants of selected fields. Seeds, scales and positions "
+        "do not change"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
-    species: EnumProperty(name="Species", description="Species of the catalogue", items=operator_items)
+    species: EnumProperty(name="Species", description="Species from the catalog", items=operator_items)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

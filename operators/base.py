@@ -30,13 +30,12 @@ def in_object_mode(cls: type[bpy.types.Operator], context: bpy.types.Context) ->
     """Poll: objects can be made and deleted now."""
     if context.mode == 'OBJECT':
         return True
-    cls.poll_message_set("Works in Object Mode")
+    cls.poll_message_set("Only available in Object Mode")
     return False
 
 
 LINKED = (
-    "The plants are linked from another file; choose Object > Relations > Make Local, or Object > Library "
-    "Override > Make"
+    "The plants are linked from another file; use Object > Relations > Make Local, or Object > Library Override > Make"
 )
 
 
@@ -54,7 +53,7 @@ def plants_or_fields_selected(cls: type[bpy.types.Operator], context: bpy.types.
     found = [obj for obj in context.selected_objects if obj.tetflora.is_plant or obj.tetflora.is_field]
     if any(obj.library is None for obj in found):
         return True
-    cls.poll_message_set(LINKED if found else "Select plants first, or a field of plants")
+    cls.poll_message_set(LINKED if found else "Select plants or a field of plants first")
     return False
 
 

@@ -14,8 +14,8 @@ class TETFLORA_OT_clear(Reporting, bpy.types.Operator):
     bl_idname = "tetflora.clear"
     bl_label = "Clear"
     bl_description = (
-        "Remove all meshes, materials and proxies that Refine made, and nothing else. The plants stay, and meshes that "
-        "were hidden for their sake are shown again"
+        "Remove all meshes, materials and proxies that Refine created, and nothing else. Plants remain, and hidden "
+        "meshes are shown again"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
@@ -27,7 +27,7 @@ class TETFLORA_OT_clear(Reporting, bpy.types.Operator):
         # looked through: a panel asks at every movement of the mouse.
         scene = context.scene
         if not (job.has_results(scene) or (scene.tetflora.statistics and hiding.hidden_originals(scene))):
-            cls.poll_message_set("Refine has made nothing yet")
+            cls.poll_message_set("No results to clear")
             return False
         return True
 

@@ -14,14 +14,14 @@ class TETFLORA_OT_clear_cache(Reporting, bpy.types.Operator):
     bl_idname = "tetflora.clear_cache"
     bl_label = "Clear Cache"
     bl_description = (
-        "Delete what the cache folder keeps about species, and nothing else in it. It is found out anew when needed"
+        "Delete all cached species analysis, and nothing else in the folder. It is computed again when needed"
     )
     bl_options = {'REGISTER'}
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
         if cache_folder.used() is None:
-            cls.poll_message_set("There is no cache folder")
+            cls.poll_message_set("The cache folder does not exist")
             return False
         return True
 

@@ -17,8 +17,8 @@ class TETFLORA_OT_drop_to_ground(Reporting, bpy.types.Operator):
     bl_idname = "tetflora.drop_to_ground"
     bl_label = "Drop Plants to Ground"
     bl_description = (
-        "Move the selected plants, and the plants of selected fields, along the vertical onto the nearest visible "
-        "mesh, below or above. Plants, results and meshes that are refined are no ground"
+        "Move the selected plants, and the plants of selected fields, vertically to the nearest visible mesh. Plants, "
+        "results and refined meshes do not count as ground"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
@@ -31,7 +31,7 @@ class TETFLORA_OT_drop_to_ground(Reporting, bpy.types.Operator):
         depsgraph = context.evaluated_depsgraph_get()
         ground = Ground(context.view_layer, depsgraph)
         if not len(ground):
-            self.report({'ERROR'}, "The view shows no mesh to fall onto; add ground, or show it")
+            self.report({'ERROR'}, "No mesh is visible below or above the plants; add a ground mesh, or show it")
             return {'CANCELLED'}
         plants = selected_plants(context)
         fields = fields_of(context.selected_objects)
@@ -43,7 +43,7 @@ class TETFLORA_OT_drop_to_ground(Reporting, bpy.types.Operator):
         left = [field.name for field in fields if not editable(field)]
         notes = [f"{counted(missed, 'plant')} had no ground below or above"] if missed else []
         if left:
-            notes.append(f'"{left[0]}" is not a field that TetFlora made, or has modifiers, and stays as it is')
+            notes.append(f'"{left[0]}" was not moved: it has modifiers, or was not created by TetFlora')
         said = f"{counted(moved, 'plant')} moved to the ground"
         self.report({'WARNING' if notes else 'INFO'}, "; ".join([said, *notes]))
         return {'FINISHED'} if moved else {'CANCELLED'}

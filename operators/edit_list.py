@@ -19,19 +19,19 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
 
     which: EnumProperty(
         name="List",
-        description="Which list",
+        description="List to edit",
         items=(
-            ('MIX', "Species", "The species to populate with"),
-            ('LEAVES', "Leaf Objects", "The meshes that replace leaves"),
-            ('OUTPUT', "Output", "Species with a pass index, light group or materials of their own"),
-            ('FIELD', "Field Species", "The species of the active field of plants"),
+            ('MIX', "Species", "Species to populate with"),
+            ('LEAVES', "Leaf Objects", "Meshes that replace leaves"),
+            ('OUTPUT', "Output", "Species with their own pass index, light group or materials"),
+            ('FIELD', "Field Species", "Species of the active field of plants"),
         ),
     )
     action: EnumProperty(
         name="Action",
-        description="What to do",
+        description="Change to make",
         items=(
-            ('ADD', "Add", "Add an entry, with a species that the list does not have yet if there is one"),
+            ('ADD', "Add", "Add an entry, if possible with a species that is not yet in the list"),
             ('REMOVE', "Remove", "Remove the active entry"),
         ),
     )
@@ -43,7 +43,7 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> set[str]:
         owner, name = self._list(context)
         if owner is None:
-            self.report({'ERROR'}, "Make a field of plants active first")
+            self.report({'ERROR'}, "The active object must be a field of plants; select one")
             return {'CANCELLED'}
         entries, index = getattr(owner, name), f"{name}_index"
         if self.action == 'ADD':
@@ -54,7 +54,7 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
             return {'FINISHED'}
         active = getattr(owner, index)
         if not 0 <= active < len(entries):
-            self.report({'WARNING'}, "The list has no active entry; nothing removed")
+            self.report({'WARNING'}, "No active entry to remove")
             return {'CANCELLED'}
         entries.remove(active)
         setattr(owner, index, max(min(active, len(entries) - 1), 0))

@@ -18,8 +18,8 @@ class TETFLORA_OT_mark_field(Reporting, bpy.types.Operator):
     bl_idname = "tetflora.mark_field"
     bl_label = "Use as Field of Plants"
     bl_description = (
-        "Each point of the active mesh or point cloud, as its modifiers leave it, becomes a plant. Attributes species, "
-        "seed, rotation and scale of the points say which. Again to end that"
+        "Use each point of the active mesh or point cloud, after modifiers, as a plant. The attributes species, seed, "
+        "rotation and scale define the plants. Use again to turn it off"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
@@ -28,7 +28,7 @@ class TETFLORA_OT_mark_field(Reporting, bpy.types.Operator):
         active = context.active_object
         if active is not None and (active.type in FIELD_TYPES or active.tetflora.is_field):
             return True
-        cls.poll_message_set("Make a mesh or point cloud active: click on it last")
+        cls.poll_message_set("The active object must be a mesh or point cloud; select it last")
         return False
 
     def run(self, context: bpy.types.Context) -> set[str]:
@@ -36,13 +36,13 @@ class TETFLORA_OT_mark_field(Reporting, bpy.types.Operator):
         field = obj.tetflora
         field.is_field = not field.is_field
         if not field.is_field:
-            self.report({'INFO'}, f'"{obj.name}" is no field of plants any more')
+            self.report({'INFO'}, f'"{obj.name}" is no longer a field of plants')
             return {'FINISHED'}
         field.is_plant = False
         if not field.field_species:
             field.field_species.add().species = field.species or default_species()
         prepare_scene(context.scene)
-        self.report({'INFO'}, f'Points of "{obj.name}" count as plants')
+        self.report({'INFO'}, f'The points of "{obj.name}" are now plants')
         return {'FINISHED'}
 
 
@@ -50,10 +50,10 @@ class TETFLORA_OT_make_field(Reporting, bpy.types.Operator):
     """Make one field of the selected plants."""
 
     bl_idname = "tetflora.make_field"
-    bl_label = "Make Field of Plants"
+    bl_label = "Convert Plants to Field"
     bl_description = (
-        "Replace the selected plants by one object whose vertices are the same individuals at the same places. It "
-        "keeps Blender fast with many plants; parents, constraints and animation of the single plants are lost"
+        "Replace the selected plants with one object whose vertices are the same plants. This keeps Blender fast with "
+        "many plants; parents, constraints and animation of single plants are lost"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
@@ -65,7 +65,10 @@ class TETFLORA_OT_make_field(Reporting, bpy.types.Operator):
         selected = plants_of(context.selected_objects)
         plants = [o for o in selected_plants(context) if o.tetflora.enabled and not o.hide_render]
         if not plants:
-            self.report({'WARNING'}, "The selected plants are disabled, hidden in renders, or linked; nothing changed")
+            self.report(
+                {'WARNING'},
+                "The selected plants are disabled, hidden in renders, or linked; enable them first",
+            )
             return {'CANCELLED'}
         left = len(selected) - len(plants)
         owner = owner_of(context.scene, plants)
@@ -74,8 +77,8 @@ class TETFLORA_OT_make_field(Reporting, bpy.types.Operator):
         if owner:  # or its next update would plant them once more
             adopt(context.scene, owner, [field])
         select_only(context, [field])
-        rest = f"; {counted(left, 'plant')} disabled, hidden in renders, or linked stay objects" if left else ""
-        self.report({'INFO'}, f'{counted(len(plants), "plant")} put into "{field.name}"{rest}')
+        rest = f"; {counted(left, 'plant')} not converted: disabled, hidden in renders, or linked" if left else ""
+        self.report({'INFO'}, f'{counted(len(plants), "plant")} converted to the field "{field.name}"{rest}')
         return {'FINISHED'}
 
 
@@ -83,11 +86,8 @@ class TETFLORA_OT_split_field(Reporting, bpy.types.Operator):
     """Make an empty of each plant of the selected fields."""
 
     bl_idname = "tetflora.split_field"
-    bl_label = "Make Objects of Field"
-    bl_description = (
-        "Replace the selected fields by an empty for each plant: the same individuals at the same places. "
-        f"At most {MOST_EMPTIES:,} plants"
-    )
+    bl_label = "Convert Field to Objects"
+    bl_description = f"Replace the selected fields with one empty per plant. At most {MOST_EMPTIES:,} plants"
     bl_options = {'REGISTER', 'UNDO'}
 
     @classmethod
@@ -110,7 +110,7 @@ class TETFLORA_OT_split_field(Reporting, bpy.types.Operator):
                 adopt(context.scene, owner, plants)
             made += plants
         if not made:
-            self.report({'WARNING'}, "The selected fields are linked; nothing changed")
+            self.report({'WARNING'}, "The selected fields are linked; make them local first")
             return {'CANCELLED'}
         select_only(context, made)
         self.report({'INFO'}, f"{counted(len(made), 'plant')} made")

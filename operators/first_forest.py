@@ -15,12 +15,12 @@ class TETFLORA_OT_first_forest(Reporting, bpy.types.Operator):
     bl_idname = "tetflora.first_forest"
     bl_label = "First Forest"
     bl_description = (
-        "Make a small complete scene: ground, some ninety plants of four species, camera, sun and sky, ready for "
-        "Refine and F12. Nothing of yours is removed: a scene that is not empty gets a new scene beside it"
+        "Create a small complete scene with ground, about ninety plants of four species, camera, sun and sky, ready "
+        "for Refine and F12. Existing objects remain: if the scene is not empty, a new scene is added"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
-    seed: IntProperty(name="Seed", description="Another seed is another forest", options={'SKIP_SAVE'})
+    seed: IntProperty(name="Seed", description="A different seed gives a different forest", options={'SKIP_SAVE'})
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -35,7 +35,9 @@ class TETFLORA_OT_first_forest(Reporting, bpy.types.Operator):
             if area.type == 'VIEW_3D':
                 area.spaces.active.region_3d.view_perspective = 'CAMERA'
         said = f" ({said})" if said else ""
-        self.report({'INFO'}, f"A forest of {plants} plants is planted{said}. Refine shows it, F12 renders it")
+        self.report(
+            {'INFO'}, f"Created a forest of {plants} plants{said}. Click Refine to show it, press F12 to render it"
+        )
         return {'FINISHED'}
 
 

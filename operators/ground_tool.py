@@ -43,11 +43,11 @@ class GroundTool:
     def begin(self, context: bpy.types.Context) -> bool:
         """Start to listen and to draw; False, with a report, where that is impossible."""
         if bpy.app.background or context.window is None or _view_of(context.screen) is None:
-            self.report({'ERROR'}, "This needs a window with a 3D view")
+            self.report({'ERROR'}, "This tool requires a 3D viewport")
             return False
         self._look_around(context)
         if not len(self._ground):
-            self.report({'ERROR'}, "The view shows no mesh to plant on; add ground, or show it")
+            self.report({'ERROR'}, "No mesh is visible to plant on; add a ground mesh, or show it")
             return False
         self._cursor, self._window = GroundCursor(), context.window
         self._steps = self._undone = 0

@@ -17,18 +17,18 @@ class TETFLORA_OT_keep_results(Reporting, bpy.types.Operator):
     bl_idname = "tetflora.keep_results"
     bl_label = "Keep Results as Meshes"
     bl_description = (
-        "Make what Refine made your own: ordinary meshes that are saved in the file and that you can edit. Refine and "
-        "Clear leave them alone. Refine at Render is switched off, so that renders do not show the plants twice"
+        "Turn the results into ordinary meshes that are saved in the file and can be edited. Refine and Clear no "
+        "longer change them. Turns off Refine at Render, to avoid rendering the plants twice"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if context.mode != 'OBJECT':
-            cls.poll_message_set("Works in Object Mode")
+            cls.poll_message_set("Only available in Object Mode")
             return False
         if not result_collections(context.scene, 'VIEW'):
-            cls.poll_message_set("There are no results yet; press Refine first")
+            cls.poll_message_set("No results to keep; click Refine first")
             return False
         return True
 
@@ -36,7 +36,7 @@ class TETFLORA_OT_keep_results(Reporting, bpy.types.Operator):
         scene = context.scene
         auto_refresh.stop()
         if not result_collections(scene, 'VIEW'):
-            raise TetFloraError("Refine Automatically was not done yet; wait until it is, or press Refine")
+            raise TetFloraError("Refine Automatically has not finished; wait, or click Refine")
         kept = keep_results(scene)
         scene.tetflora.refine_at_render = False
         scene.tetflora.statistics = ""

@@ -16,10 +16,10 @@ class TETFLORA_OT_make_plant_mesh(ModalJob, bpy.types.Operator):
     """Turn the selected plants into meshes to edit, export and keep."""
 
     bl_idname = "tetflora.make_plant_mesh"
-    bl_label = "Make Plants Real Meshes"
+    bl_label = "Convert Plants to Meshes"
     bl_description = (
-        "Make an ordinary mesh object of each selected plant, with every branch and leaf, to edit, export or animate. "
-        "The plant itself stays, disabled; Clear leaves the mesh alone. Esc cancels and leaves the scene as it was"
+        "Create an ordinary mesh object of each selected plant, with every branch and leaf, to edit, export or "
+        "animate. The plant remains, but disabled; Clear does not remove the mesh. Esc cancels without changes"
     )
     bl_options = {'REGISTER', 'UNDO'}
 

@@ -21,13 +21,13 @@ class TETFLORA_OT_mark_explicit(Marking, bpy.types.Operator):
     bl_idname = "tetflora.mark_explicit"
     bl_label = "Refine These Meshes"
     bl_description = (
-        "Refine the selected objects' own polygons with the plants: trees from elsewhere, rocks, scans, and what "
-        "instances them. Again to take the mark away"
+        "Refine the polygons of the selected objects together with the plants: imported trees, rocks, scans, and "
+        "objects that instance them. Use again to unmark"
     )
     bl_options = {'REGISTER', 'UNDO'}
-    mark, nothing, marked = "is_explicit", "Select meshes, or what instances them, first", "{} will be refined"
+    mark, nothing, marked = "is_explicit", "Select meshes, or objects that instance them, first", "{} will be refined"
 
-    action: action_property("Their polygons are refined", "They are left as they are")
+    action: action_property("Refine the polygons of the objects", "Leave the objects unchanged")
 
     fits = staticmethod(can_be_explicit)
 

@@ -14,7 +14,7 @@ def action_property(mark: str, unmark: str) -> Any:
     """The property that says what happens to the mark, from descriptions of both outcomes."""
     return EnumProperty(
         name="Action",
-        description="What happens to the mark",
+        description="How to change the mark",
         items=(
             ('TOGGLE', "Toggle", "Mark all, or unmark them if all are marked"),
             ('MARK', "Mark", mark),

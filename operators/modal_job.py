@@ -23,8 +23,8 @@ class ModalJob(Reporting):
     """
 
     #: What is reported after Esc, and what the status bar says of keys.
-    cancelled = "Cancelled; the scene is as it was"
-    keys = "Esc: cancel"
+    cancelled = "Cancelled; the scene is unchanged"
+    keys = "Esc: Cancel"
 
     _steps: Generator[Progress, bool | None, Any] | None = None
     _timer: bpy.types.Timer | None = None

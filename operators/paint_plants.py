@@ -26,10 +26,10 @@ _PIXELS = 0.01  # share of the radius that a pixel of the mouse adds after F
 _COLOURS = {'PAINT': (0.35, 0.95, 0.3, 1.0), 'ERASE': (1.0, 0.3, 0.2, 1.0), 'THIN': (1.0, 0.8, 0.2, 1.0)}
 _MODE_KEYS = {'P': 'PAINT', 'E': 'ERASE', 'T': 'THIN'}
 _KEYS = (
-    "TetFlora {mode}   |   Drag: {does}   |   Shift: erase   |   P, E, T: paint, erase, thin   |   F or [ ]: radius "
-    "{radius:.3g} m   |   Ctrl Z: undo stroke   |   Esc or right click: end   {done}"
+    "TetFlora {mode}   |   Drag: {does}   |   Shift: Erase   |   P, E, T: Paint, Erase, Thin   |   F or [ ]: Radius "
+    "{radius:.3g} m   |   Ctrl Z: Undo Stroke   |   Esc or Right Click: Finish   {done}"
 )
-_DOES = {'PAINT': "set plants", 'ERASE': "remove plants", 'THIN': "remove some"}
+_DOES = {'PAINT': "Add Plants", 'ERASE': "Remove Plants", 'THIN': "Remove Some"}
 _DONE = {'PAINT': "painted", 'ERASE': "erased", 'THIN': "thinned out"}
 
 
@@ -39,22 +39,22 @@ class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
     bl_idname = "tetflora.paint_plants"
     bl_label = "Paint Plants"
     bl_description = (
-        "Paint, erase or thin plants with a brush on the visible meshes. Every stroke is one undo step; "
-        "Esc or a right click ends and keeps what was painted"
+        "Paint, erase or thin plants with a brush on the visible meshes. Each stroke is one undo step; Esc or a right "
+        "click finishes and keeps what was painted"
     )
     bl_options = {'REGISTER'}
 
     mode: EnumProperty(
         name="Mode",
-        description="What dragging the mouse does; the panel's if not given",
+        description="Brush mode; that of the panel if not set",
         items=MODES,
         options={'SKIP_SAVE'},
     )
     stroke: StringProperty(
         name="Stroke",
         description=(
-            "For scripts: places on the ground in world space that the brush goes along, without a window: three "
-            "numbers each, as in 0 0 0, 5 2.5 0"
+            "For scripts: path of the brush on the ground in world space, three numbers per point, for example 0 "
+            "0 0, 5 2.5 0"
         ),
         options={'SKIP_SAVE', 'HIDDEN'},
     )
@@ -69,7 +69,7 @@ class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         if not self.stroke:
-            self.report({'ERROR'}, "This needs a window with a 3D view, or a stroke from a script")
+            self.report({'ERROR'}, "This tool requires a 3D viewport, or a stroke from a script")
             return {'CANCELLED'}
         if self.properties.is_property_set("mode"):
             context.scene.tetflora.brush.mode = self.mode
@@ -229,7 +229,7 @@ def _places(text: str) -> list[tuple[float, float, float]]:
     except ValueError:
         places = []
     if not places or any(len(place) != 3 for place in places):
-        raise SceneError(f'"{text}" is no stroke; write three numbers for each place, as in 0 0 0, 5 2.5 0')
+        raise SceneError(f'"{text}" is not a stroke; use three numbers per point, for example 0 0 0, 5 2.5 0')
     return places
 
 

@@ -29,8 +29,8 @@ _NOTCH = radians(15.0)
 _LARGER = 1.1
 _COLOUR = (0.35, 0.95, 0.3, 1.0)
 _KEYS = (
-    "TetFlora {name}   |   Click: plant   |   Wheel: turn, now {turn:.0f}°   |   Ctrl wheel: size, now {scale:.2f}   "
-    "|   Ctrl Z: undo plant   |   Esc or right click: end"
+    "TetFlora {name}   |   Click: Add Plant   |   Wheel: Rotation {turn:.0f}°   |   Ctrl Wheel: Scale {scale:.2f}   "
+    "|   Ctrl Z: Undo Plant   |   Esc or Right Click: Finish"
 )
 
 
@@ -40,19 +40,19 @@ class TETFLORA_OT_place_plant(GroundTool, bpy.types.Operator):
     bl_idname = "tetflora.place_plant"
     bl_label = "Place Plants by Clicking"
     bl_description = (
-        "Click on the ground to set plants one by one, each another individual. The wheel turns, Ctrl and the wheel "
-        "scale; each plant is one undo step; Esc ends"
+        "Click on the ground to add plants one by one, each a different individual. The wheel rotates, Ctrl and the "
+        "wheel scale; each plant is one undo step; Esc finishes"
     )
     bl_options = {'REGISTER'}
 
-    species: EnumProperty(name="Species", description="Species of the catalogue", items=operator_items)
+    species: EnumProperty(name="Species", description="Species from the catalog", items=operator_items)
 
     _turn = 0.0
     _scale = 1.0
     _height = 1.0
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
-        self.report({'ERROR'}, "This needs a window with a 3D view; scripts use tetflora.add_plant")
+        self.report({'ERROR'}, "This tool requires a 3D viewport; use tetflora.add_plant in scripts")
         return {'CANCELLED'}
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:

@@ -27,8 +27,8 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
     bl_idname = "tetflora.populate"
     bl_label = "Populate"
     bl_description = (
-        "Scatter plants over the selected meshes, as a new population that can be changed afterwards. Each plant is an "
-        "empty, or a vertex of one mesh where there are too many for that"
+        "Scatter plants over the selected meshes as a new population, which can be changed later. Each plant is an "
+        "empty, or a vertex of one mesh if there are many"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
@@ -47,7 +47,7 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
     scale_max: _RULES.scale_max
     species: StringProperty(
         name="Species",
-        description="Identifiers of species separated by commas, each with a share if wanted: broadleaf_tree:3, bush:1",
+        description="Comma-separated identifiers of species with optional weights: broadleaf_tree:3, bush:1",
         options={'SKIP_SAVE'},
     )
 
@@ -63,8 +63,8 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
         shares = _parse_shares(self.species)
         if self.as_field == 'EMPTIES' and self.count > MOST_EMPTIES:
             raise SceneError(
-                f"{self.count:,} plants are too many for objects of their own, at most {MOST_EMPTIES:,}; "
-                "make a Field, or fewer plants"
+                f"{self.count:,} plants exceed the limit of {MOST_EMPTIES:,} empties; "
+                "set Create As to Field, or use fewer plants"
             )
         grounds = selected_grounds(context)
         population = self._population(scene, grounds, shares)
@@ -114,11 +114,11 @@ def _parse_shares(text: str) -> dict[str, float]:
     for part in filter(None, (p.strip() for p in text.split(","))):
         identifier, _, share = (p.strip() for p in part.partition(":"))
         if identifier not in known:
-            raise SceneError(f'Unknown species "{identifier}" to populate with; the catalogue has {", ".join(known)}')
+            raise SceneError(f'Unknown species "{identifier}"; choose one of {", ".join(known)}')
         try:
             shares[identifier] = shares.get(identifier, 0.0) + (float(share) if share else 1.0)
         except ValueError:
-            raise SceneError(f'"{part}" is no species with a share; write for example {identifier}:2') from None
+            raise SceneError(f'"{part}" is not a species with a weight; write for example {identifier}:2') from None
     return shares
 
 

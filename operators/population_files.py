@@ -19,13 +19,14 @@ class TETFLORA_OT_export_populations(Reporting, bpy.types.Operator, ExportHelper
     bl_idname = "tetflora.export_populations"
     bl_label = "Export Populations"
     bl_description = (
-        "Write the settings of this scene's populations to a file, for other scenes. Plants are not written"
+        "Export the settings of the populations in this scene to a file, for use in other scenes. Plants are not "
+        "exported"
     )
     bl_options = {'REGISTER'}
 
     filename_ext = population_files.ENDING
     filter_glob: StringProperty(default="*.json", options={'HIDDEN'})
-    only_active: BoolProperty(name="Only Active", description="Write the active population alone")
+    only_active: BoolProperty(name="Only Active", description="Export the active population only")
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -50,8 +51,8 @@ class TETFLORA_OT_import_populations(Reporting, bpy.types.Operator, ImportHelper
     bl_idname = "tetflora.import_populations"
     bl_label = "Import Populations"
     bl_description = (
-        "Add the populations of a file to this scene, without plants: press Update for each. They grow on meshes of "
-        "the names that the file says, or else on the selected ones"
+        "Import populations from a file, without plants; click Update for each. They grow on meshes with the names in "
+        "the file, or else on the selected meshes"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
@@ -65,10 +66,10 @@ class TETFLORA_OT_import_populations(Reporting, bpy.types.Operator, ImportHelper
         if missing:
             self.report(
                 {'WARNING'},
-                f"{counted(number, 'population')} added; this file does not have {', '.join(missing)}, left empty",
+                f"{counted(number, 'population')} added; missing in this file and left empty: {', '.join(missing)}",
             )
         else:
-            self.report({'INFO'}, f"{counted(number, 'population')} added; press Update to place plants")
+            self.report({'INFO'}, f"{counted(number, 'population')} added; click Update to place plants")
         return {'FINISHED'}
 
 

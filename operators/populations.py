@@ -28,7 +28,7 @@ def ground_selected(cls: type[bpy.types.Operator], context: bpy.types.Context) -
     """Poll: at least one mesh to grow on is selected."""
     if selected_grounds(context):
         return True
-    cls.poll_message_set("Select the mesh on which plants shall grow")
+    cls.poll_message_set("Select a mesh to plant on")
     return False
 
 
@@ -40,8 +40,8 @@ def report_made(operator: bpy.types.Operator, made: Made) -> None:
     if made.reason:
         operator.report({'WARNING'}, f"{counted(made.number, 'plant')} of {made.wanted:,} placed{where}: {made.reason}")
         return
-    returned = f"; {made.returned:,} that you had deleted are back" if made.returned else ""
-    erased = f"; {made.erased:,} stay away, where you erased" if made.erased else ""
+    returned = f"; {made.returned:,} deleted plants restored" if made.returned else ""
+    erased = f"; {made.erased:,} omitted where you erased" if made.erased else ""
     operator.report({'INFO'}, f"{counted(made.number, 'plant')} placed{where}{returned}{erased}")
 
 
@@ -69,7 +69,7 @@ class _Replacing(_OfPopulation):
     @classmethod
     def poll_population(cls, _context: bpy.types.Context, population: bpy.types.PropertyGroup) -> bool:
         if population.frozen:
-            cls.poll_message_set("The population is frozen; press Freeze again to go on with it")
+            cls.poll_message_set("The population is frozen; turn off Freeze to change it")
         return not population.frozen
 
 
@@ -79,8 +79,8 @@ class TETFLORA_OT_add_population(Reporting, bpy.types.Operator):
     bl_idname = "tetflora.add_population"
     bl_label = "Add Population"
     bl_description = (
-        "Add a population on the selected meshes, with the settings of the one that is shown, and no plants yet. "
-        "Set it up, with the preview of points if you like, then press Update"
+        "Add a population without plants on the selected meshes, with the settings of the active one. Adjust the "
+        "settings, then click Update"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
@@ -105,9 +105,8 @@ class TETFLORA_OT_update_population(_Replacing, bpy.types.Operator):
     bl_idname = "tetflora.update_population"
     bl_label = "Update Population"
     bl_description = (
-        "Place the plants of the active population by its settings, in place of those that it has. Plants of it that "
-        "you moved, changed or deleted by hand are placed anew too, except where the brush has erased; other plants "
-        "keep their room"
+        "Place the plants of the active population again according to its settings. Plants that you moved, changed or "
+        "deleted are replaced too, except where you erased with the brush; other plants keep their space"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
@@ -123,7 +122,7 @@ class TETFLORA_OT_reroll_population(_Replacing, bpy.types.Operator):
 
     bl_idname = "tetflora.reroll_population"
     bl_label = "Re-roll Population"
-    bl_description = "Place the plants of the active population by its settings with another seed: another arrangement"
+    bl_description = "Place the plants of the active population with a new seed, for a different arrangement"
     bl_options = {'REGISTER', 'UNDO'}
 
     def run(self, context: bpy.types.Context) -> set[str]:
@@ -137,15 +136,15 @@ class TETFLORA_OT_freeze_population(_OfPopulation, bpy.types.Operator):
     bl_idname = "tetflora.freeze_population"
     bl_label = "Freeze Population"
     bl_description = (
-        "The plants of the active population are yours: no update replaces them, and they stay if the population is "
-        "removed. Pressed again, the next update may replace them, with all that you did to them"
+        "Protect the plants of the active population from updates and removal. Use again to unfreeze: the next update "
+        "then replaces the plants, with all your changes"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
     def run(self, context: bpy.types.Context) -> set[str]:
         population = active_population(context.scene)
         population.frozen = not population.frozen
-        state = "frozen: its plants are yours" if population.frozen else "no longer frozen: Update replaces its plants"
+        state = "frozen and keeps its plants" if population.frozen else "no longer frozen; Update replaces its plants"
         self.report({'INFO'}, f'"{population.name}" is {state}')
         return {'FINISHED'}
 
@@ -155,12 +154,12 @@ class TETFLORA_OT_remove_population(_OfPopulation, bpy.types.Operator):
 
     bl_idname = "tetflora.remove_population"
     bl_label = "Remove Population"
-    bl_description = "Remove the active population and its plants. Plants of a frozen population stay"
+    bl_description = "Remove the active population and its plants. Plants of a frozen population remain"
     bl_options = {'REGISTER', 'UNDO'}
 
     keep_plants: BoolProperty(
         name="Keep Plants",
-        description="Only the settings go; the plants stay as if they had been set by hand",
+        description="Remove only the settings, and keep the plants as individual plants",
         options={'SKIP_SAVE'},
     )
 
@@ -177,14 +176,14 @@ class TETFLORA_OT_select_population(_OfPopulation, bpy.types.Operator):
     """Select a population's plants."""
 
     bl_idname = "tetflora.select_population"
-    bl_label = "Select Plants of Population"
+    bl_label = "Select Population"
     bl_description = "Select the plants of the active population, or its field"
     bl_options = {'REGISTER', 'UNDO'}
 
     def run(self, context: bpy.types.Context) -> set[str]:
         own = own_objects(context.scene, active_population(context.scene))
         if not own:
-            self.report({'WARNING'}, "The population has no plants; press Update")
+            self.report({'WARNING'}, "The population has no plants; click Update")
             return {'CANCELLED'}
         select_only(context, own)
         return {'FINISHED'}
@@ -195,7 +194,7 @@ class TETFLORA_OT_set_population_ground(_OfPopulation, bpy.types.Operator):
 
     bl_idname = "tetflora.set_population_ground"
     bl_label = "Use Selected Meshes"
-    bl_description = "Let the active population grow on the selected meshes instead. Press Update to place its plants"
+    bl_description = "Use the selected meshes as ground of the active population. Click Update to place its plants"
     bl_options = {'REGISTER', 'UNDO'}
 
     @classmethod
@@ -212,23 +211,24 @@ class TETFLORA_OT_forget_erased(_Replacing, bpy.types.Operator):
     """Let plants grow again where they were erased."""
 
     bl_idname = "tetflora.forget_erased"
-    bl_label = "Forget Erased Places"
+    bl_label = "Clear Erased Places"
     bl_description = (
-        "Let plants of the active population grow again where the brush has erased some. Press Update to place them"
+        "Allow plants of the active population to grow again where you erased with the brush. Click Update to place "
+        "them"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
     @classmethod
     def poll_population(cls, context: bpy.types.Context, population: bpy.types.PropertyGroup) -> bool:
         if not population.erased:
-            cls.poll_message_set("The brush has erased nothing of this population")
+            cls.poll_message_set("No plants of this population were erased")
             return False
         return super().poll_population(context, population)
 
     def run(self, context: bpy.types.Context) -> set[str]:
         population = active_population(context.scene)
         population.erased = population.placed_by = ""  # so that the panel asks for an update
-        self.report({'INFO'}, f'"{population.name}" may grow everywhere again; press Update')
+        self.report({'INFO'}, f'"{population.name}" has no erased places any more; click Update to place plants')
         point_preview.schedule()
         return {'FINISHED'}
 
@@ -239,8 +239,8 @@ class TETFLORA_OT_preview_population(Reporting, bpy.types.Operator):
     bl_idname = "tetflora.preview_population"
     bl_label = "Preview Points"
     bl_description = (
-        "Show a dot in the viewport for each plant that the shown settings would place, coloured by species, and "
-        "follow every change of them. Nothing is made"
+        "Show a dot in the viewport for each plant that the current settings would place, colored by species, updated "
+        "with every change. Creates no objects"
     )
     bl_options = {'REGISTER'}
 

@@ -22,7 +22,7 @@ def _camera_is_there(cls: type[bpy.types.Operator], context: bpy.types.Context) 
     preview = preview_state.find(context.scene)
     if context.scene.camera is not None or (preview is not None and preview.frozen is not None):
         return True
-    cls.poll_message_set("The scene has no active camera; add one (Add > Camera)")
+    cls.poll_message_set("The scene has no active camera; add one with Add > Camera")
     return False
 
 
@@ -32,12 +32,12 @@ class TETFLORA_OT_preview_levels(ModalJob, bpy.types.Operator):
     bl_idname = "tetflora.preview_levels"
     bl_label = "Compute Levels"
     bl_description = (
-        "Refine for the scene's camera, or for the frozen one, without making any mesh, and keep every level to step "
-        "through in viewports. Takes as long as the first part of Refine; Esc cancels and keeps the levels of before"
+        "Refine for the scene camera, or the frozen one, without creating meshes, and keep every level to step "
+        "through in viewports. Takes as long as the first part of Refine; Esc cancels and keeps the previous levels"
     )
     bl_options = {'REGISTER'}  # nothing in the file changes but the level that is shown
 
-    cancelled = "Cancelled; levels are as they were"
+    cancelled = "Cancelled; the levels are unchanged"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -51,7 +51,7 @@ class TETFLORA_OT_preview_levels(ModalJob, bpy.types.Operator):
         last = levels.levels[-1]
         self.report(
             {'INFO'},
-            f"{counted(len(levels), 'level')}, {len(last):,} tetrahedra that hold plants, {levels.nbytes / 1e6:.0f} MB",
+            f"{counted(len(levels), 'level')}, {len(last):,} tetrahedra with plants, {levels.nbytes / 1e6:.0f} MB",
         )
         return {'FINISHED'}
 
@@ -60,15 +60,15 @@ class TETFLORA_OT_forget_levels(bpy.types.Operator):
     """Take the levels out of viewports and memory."""
 
     bl_idname = "tetflora.forget_levels"
-    bl_label = "Forget Levels"
-    bl_description = "Take the levels out of the viewports and out of memory. Nothing in the file changes"
+    bl_label = "Clear Levels"
+    bl_description = "Remove the levels from viewports and memory. The file does not change"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         preview = preview_state.find(context.scene)
         if preview is not None and preview.levels is not None:
             return True
-        cls.poll_message_set("No levels are there; press Compute Levels")
+        cls.poll_message_set("No levels to clear; click Compute Levels first")
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -80,15 +80,16 @@ class TETFLORA_OT_look_through(bpy.types.Operator):
     """Look at the preview from where it was made for."""
 
     bl_idname = "tetflora.look_through"
-    bl_label = "Look Through the Camera"
+    bl_label = "Look Through Camera"
     bl_description = (
-        "Look through the scene's camera or, where it is frozen, from the place of the frozen one, in its direction"
+        "Look through the scene camera or, if the camera is frozen, from the position and in the direction of the "
+        "frozen camera"
     )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if context.space_data is None or context.space_data.type != 'VIEW_3D':
-            cls.poll_message_set("Works in a 3D viewport")
+            cls.poll_message_set("Only available in a 3D viewport")
             return False
         return _camera_is_there(cls, context)
 

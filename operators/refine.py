@@ -23,20 +23,20 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
     bl_idname = "tetflora.refine"
     bl_label = "Refine"
     bl_description = (
-        "Make meshes of the plants near the scene's camera and proxies of the others, in place of earlier ones. "
-        "Esc cancels and leaves the scene as it was; Return stops refining and makes what has been decided so far"
+        "Create meshes of plants near the scene camera and proxies of the others, replacing earlier results. Esc "
+        "cancels without changes; Return stops refining and creates what has been decided so far"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
-    keys = "Esc: cancel   |   Return: stop refining, keep what there is"
+    keys = "Esc: Cancel   |   Return: Finish Early"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if context.mode != 'OBJECT':
-            cls.poll_message_set("Works in Object Mode")
+            cls.poll_message_set("Only available in Object Mode")
             return False
         if context.scene.camera is None:
-            cls.poll_message_set("The scene has no active camera; add one (Add > Camera)")
+            cls.poll_message_set("The scene has no active camera; add one with Add > Camera")
             return False
         return True
 
@@ -57,7 +57,7 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
             f"polygons, {statistics.tetrahedra_proxy:,} proxies in {sum(statistics.seconds.values()):.1f} s",
         )
         if not statistics.complete and statistics.levels:
-            self.report({'INFO'}, "Stopped before all was refined; Refine again for the rest")
+            self.report({'INFO'}, "Stopped early; click Refine again to complete the result")
         outside = _cut_off(context.scene) or _unseen(context.scene, statistics)
         for warning in (outside, few_bounces(context.scene), _unread_world(context.scene)):
             if warning:
@@ -78,8 +78,8 @@ def _unseen(scene: bpy.types.Scene, statistics: Statistics) -> str:
     if statistics.levels != 1 or statistics.polygons_meshed or scene.tetflora.max_passes:
         return ""
     return (
-        f'The camera "{scene.camera.name}" sees none of the plants: it looks elsewhere, or stands inside of something. '
-        "Look through it with Numpad 0"
+        f'The camera "{scene.camera.name}" sees no plants. Press Numpad 0 to look through it, and check that it '
+        "points at the plants and is not inside an object"
     )
 
 
@@ -95,8 +95,8 @@ def _cut_off(scene: bpy.types.Scene) -> str:
     if not beyond:
         return ""
     return (
-        f"{beyond:,} of {counted(len(plants), 'plant')} stand beyond the camera's range and will not be seen; "
-        f'raise Clip End of "{camera.name}", now {end:g} m'
+        f"{beyond:,} of {counted(len(plants), 'plant')} are beyond the camera range and invisible; "
+        f'raise the Clip End of "{camera.name}", which is {end:g} m'
     )
 
 

@@ -20,17 +20,15 @@ class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
 
     which: EnumProperty(
         name="Which",
-        description="Which plants go",
+        description="Plants to remove",
         items=(
             ('SELECTED', "Selected", "Delete the selected plants; other selected objects stay"),
-            ('SPECIES', "Species", "Delete all plants of the scene that belong to one species"),
-            ('ALL', "All", "Delete all plants of the scene"),
+            ('SPECIES', "Species", "Delete all plants of one species in the scene"),
+            ('ALL', "All", "Delete all plants in the scene"),
         ),
         default='SELECTED',
     )
-    species: StringProperty(
-        name="Species", description="Identifier of the species whose plants go", options={'SKIP_SAVE'}
-    )
+    species: StringProperty(name="Species", description="Identifier of the species to remove", options={'SKIP_SAVE'})
 
     @classmethod
     def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
@@ -50,7 +48,7 @@ class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
             return {'CANCELLED'}
         if not local:
             none = {
-                'SELECTED': "No plants are selected",
+                'SELECTED': "Select plants first",
                 'SPECIES': f'The scene has no plants of species "{self.species}"',
                 'ALL': "The scene has no plants",
             }

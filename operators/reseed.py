@@ -17,13 +17,13 @@ class TETFLORA_OT_reseed(Reporting, bpy.types.Operator):
     bl_idname = "tetflora.reseed"
     bl_label = "Re-roll Seeds"
     bl_description = (
-        "Turn each selected plant, and each plant of selected fields, into another individual of its species. Copies "
-        "that share a seed become different"
+        "Turn each selected plant, and each plant of selected fields, into a different individual of its species. "
+        "Copies with the same seed become different"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
     roll: IntProperty(
-        name="Roll", description="Another number gives other plants", min=0, soft_max=100, options={'SKIP_SAVE'}
+        name="Roll", description="A different number gives different plants", min=0, soft_max=100, options={'SKIP_SAVE'}
     )
 
     @classmethod

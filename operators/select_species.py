@@ -14,20 +14,20 @@ class TETFLORA_OT_select_species(Reporting, bpy.types.Operator):
 
     bl_idname = "tetflora.select_species"
     bl_label = "Select Species"
-    bl_description = "Select all plants of the active plant's species"
+    bl_description = "Select all plants of the same species as the active plant"
     bl_options = {'REGISTER', 'UNDO'}
 
     species: StringProperty(
         name="Species",
-        description="Identifier of the species, also one that the catalogue lacks; the active plant's if not given",
+        description="Identifier of the species, which need not be in the catalog; that of the active plant if not set",
         options={'SKIP_SAVE'},
     )
-    extend: BoolProperty(name="Extend", description="Keep what is selected already", options={'SKIP_SAVE'})
+    extend: BoolProperty(name="Extend", description="Extend the current selection", options={'SKIP_SAVE'})
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if context.mode != 'OBJECT':
-            cls.poll_message_set("Works in Object Mode")
+            cls.poll_message_set("Only available in Object Mode")
             return False
         return True
 
@@ -35,7 +35,7 @@ class TETFLORA_OT_select_species(Reporting, bpy.types.Operator):
         if not self.species:
             active = context.active_object
             if active is None or not active.tetflora.is_plant:
-                self.report({'ERROR'}, "Make a plant active first, so that its species is known")
+                self.report({'ERROR'}, "The active object must be a plant; select one")
                 return {'CANCELLED'}
             self.species = active.tetflora.species
         found = [o for o in plants_of(context.view_layer.objects) if o.tetflora.species == self.species]

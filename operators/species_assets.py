@@ -17,16 +17,16 @@ class TETFLORA_OT_create_asset_library(Reporting, bpy.types.Operator):
     bl_idname = "tetflora.create_asset_library"
     bl_label = "Create Asset Library"
     bl_description = (
-        "Write a file with one plant of each species, marked as assets with their pictures, into a folder of your "
-        "choice. Assets stand for species by name: who uses them needs TetFlora and the same species"
+        "Create a file with one plant of each species, marked as assets with previews, in a folder of your choice. "
+        "Assets refer to species by name: using them requires TetFlora and the same species"
     )
     bl_options = {'REGISTER'}
 
-    directory: StringProperty(name="Folder", description="Where the library goes", subtype='DIR_PATH')
+    directory: StringProperty(name="Folder", description="Folder of the library", subtype='DIR_PATH')
     filter_folder: BoolProperty(default=True, options={'HIDDEN', 'SKIP_SAVE'})
     add_library: BoolProperty(
         name="Add to Asset Libraries",
-        description="Let Blender's asset browsers show the folder (Preferences > File Paths > Asset Libraries)",
+        description="Add the folder to Preferences > File Paths > Asset Libraries",
         default=False,
         options={'SKIP_SAVE'},
     )
@@ -41,7 +41,7 @@ class TETFLORA_OT_create_asset_library(Reporting, bpy.types.Operator):
             return {'CANCELLED'}
         path, number = write_asset_library(Path(bpy.path.abspath(self.directory)))
         shown = self.add_library and add_to_preferences(path.parent)
-        more = "; Blender's asset libraries have the folder now" if shown else ""
+        more = "; folder added to the asset libraries" if shown else ""
         self.report({'INFO'}, f"{counted(number, 'plant')} written to {path}{more}")
         return {'FINISHED'}
 

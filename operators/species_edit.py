@@ -27,7 +27,7 @@ def species_shown(cls: type[bpy.types.Operator], context: bpy.types.Context) -> 
     """Poll: the editor shows a species that this user or this file has."""
     if present_species(context.scene.tetflora.species_editor) in catalogue():
         return True
-    cls.poll_message_set("Choose a species of the catalogue first")
+    cls.poll_message_set("Choose a species from the catalog first")
     return False
 
 
@@ -36,17 +36,17 @@ class TETFLORA_OT_duplicate_species(Reporting, bpy.types.Operator):
 
     bl_idname = "tetflora.duplicate_species"
     bl_label = "Duplicate as New Species"
-    bl_description = "Make a new species of the shown one. It belongs to this file until you save it for all files"
+    bl_description = "Duplicate the shown species. The copy belongs to this file until you save it to your species"
     bl_options = {'REGISTER', 'UNDO'}
 
     name: StringProperty(
         name="Name",
-        description="Name of the new species; the old one with a number if not given",
+        description="Name of the new species; the old name with a number if empty",
         options={'SKIP_SAVE'},
     )
     assign: BoolProperty(
-        name="Give to Selected Plants",
-        description="Make the selected plants belong to the new species",
+        name="Assign to Selected Plants",
+        description="Assign the new species to the selected plants",
         options={'SKIP_SAVE'},
     )
 
@@ -69,7 +69,7 @@ class TETFLORA_OT_duplicate_species(Reporting, bpy.types.Operator):
         store_species(scene, identifier, data)
         editor.species = identifier
         changed = assign_species(selected_plants(context), identifier) if self.assign else 0
-        given = f", given to {counted(changed, 'plant')}" if self.assign else ""
+        given = f", assigned to {counted(changed, 'plant')}" if self.assign else ""
         self.report({'INFO'}, f'New species "{data["name"]}" ({identifier}){given}')
         return {'FINISHED'}
 
@@ -87,15 +87,15 @@ class TETFLORA_OT_revert_species(Reporting, bpy.types.Operator):
     bl_idname = "tetflora.revert_species"
     bl_label = "Revert"
     bl_description = (
-        "Forget what was changed in this file, and take the catalogue's species again. "
-        "A species that only this file has is deleted"
+        "Discard the changes in this file and restore the species from the catalog. Deletes a species that exists "
+        "only in this file"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if find_edit(context.scene, present_species(context.scene.tetflora.species_editor)) is None:
-            cls.poll_message_set("The species is as the catalogue has it")
+            cls.poll_message_set("The species has no changes to revert")
             return False
         return True
 
@@ -104,7 +104,7 @@ class TETFLORA_OT_revert_species(Reporting, bpy.types.Operator):
         identifier = present_species(editor)
         revert_species(identifier)
         if identifier in catalogue():
-            self.report({'INFO'}, f'"{identifier}" is as the catalogue has it')
+            self.report({'INFO'}, f'"{identifier}" reverted to the catalog')
         else:
             editor.species = ""
             self.report({'INFO'}, f'Species "{identifier}" removed from this file')
@@ -120,11 +120,11 @@ class TETFLORA_OT_edit_orders(Reporting, bpy.types.Operator):
 
     action: EnumProperty(
         name="Action",
-        description="What to do",
+        description="Change to make",
         items=(
-            ('ADD', "Add", "Add an order: branches like those of the last order, half as long, three on each"),
-            ('REMOVE', "Remove", "Remove the last order; the branches before it then bear no branches"),
-            ('SPUR', "Short Shoots", "Add short shoots that bear blossoms, fruit or leaves, or remove them"),
+            ('ADD', "Add", "Add an order with three branches on each branch of the last order, half as long"),
+            ('REMOVE', "Remove", "Remove the last order and its branches"),
+            ('SPUR', "Short Shoots", "Add or remove short shoots with blossoms, fruit or leaves"),
         ),
     )
 
@@ -144,10 +144,10 @@ class TETFLORA_OT_edit_orders(Reporting, bpy.types.Operator):
             change_species(scene, present_species(editor), _toggle_spur)
             return {'FINISHED'}
         if self.action == 'ADD' and not 0 < number < MAX_ORDERS:
-            self.report({'WARNING'}, f"A species has at most {MAX_ORDERS} orders")
+            self.report({'WARNING'}, f"A species cannot have more than {MAX_ORDERS} orders")
             return {'CANCELLED'}
         if self.action == 'REMOVE' and number < 2:
-            self.report({'WARNING'}, "A species has at least one order, the trunk")
+            self.report({'WARNING'}, "The trunk cannot be removed: a species has at least one order")
             return {'CANCELLED'}
         change_species(scene, present_species(editor), _add if self.action == 'ADD' else _remove)
         editor.order_index = number if self.action == 'ADD' else min(editor.order_index, number - 2)

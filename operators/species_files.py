@@ -21,8 +21,8 @@ class TETFLORA_OT_save_species(Reporting, bpy.types.Operator):
     bl_idname = "tetflora.save_species"
     bl_label = "Save to My Species"
     bl_description = (
-        "Save the species into your species folder, for all files. It takes the place of a shipped species of the same "
-        "identifier, and of what you saved before"
+        "Save the species to your species folder, for use in all files. It replaces a built-in species of the same "
+        "identifier, and an earlier version of your own"
     )
     bl_options = {'REGISTER'}
 
@@ -41,19 +41,19 @@ class TETFLORA_OT_load_species(Reporting, bpy.types.Operator, ImportHelper):
 
     bl_idname = "tetflora.load_species"
     bl_label = "Load Species"
-    bl_description = "Copy a species file into your species folder, so that all files have the species"
+    bl_description = "Copy a species file to your species folder, to use it in all files"
     bl_options = {'REGISTER', 'UNDO'}
 
     filename_ext = species_files.ENDING
     filter_glob: StringProperty(default="*.json", options={'HIDDEN'})
     replace: BoolProperty(
-        name="Replace", description="Replace a species of your own that has the same file name", options={'SKIP_SAVE'}
+        name="Replace", description="Replace your own species of the same file name", options={'SKIP_SAVE'}
     )
 
     def run(self, context: bpy.types.Context) -> set[str]:
         identifier = species_files.load_species_file(Path(bpy.path.abspath(self.filepath)), self.replace)
         context.scene.tetflora.species_editor.species = identifier
-        self.report({'INFO'}, f'Species "{catalogue()[identifier].name}" is there now')
+        self.report({'INFO'}, f'Species "{catalogue()[identifier].name}" loaded')
         return {'FINISHED'}
 
 
@@ -61,8 +61,8 @@ class TETFLORA_OT_export_species(Reporting, bpy.types.Operator, ExportHelper):
     """Write the shown species to a file of the artist's choice."""
 
     bl_idname = "tetflora.export_species"
-    bl_label = "Share Species"
-    bl_description = "Write the species to a file, to give it to others. Its file name is the identifier of the species"
+    bl_label = "Export Species"
+    bl_description = "Export the species to a file, to share it. The file name is the identifier of the species"
     bl_options = {'REGISTER'}
 
     filename_ext = species_files.ENDING
@@ -89,7 +89,9 @@ class TETFLORA_OT_delete_species(Reporting, bpy.types.Operator):
 
     bl_idname = "tetflora.delete_species"
     bl_label = "Delete from My Species"
-    bl_description = "Delete the file of the shown species from your species folder. Shipped species stay; no undo"
+    bl_description = (
+        "Delete the file of the species from your species folder. Built-in species remain. This cannot be undone"
+    )
     bl_options = {'REGISTER'}
 
     @classmethod

@@ -15,8 +15,8 @@ class TETFLORA_OT_preview_species(Reporting, bpy.types.Operator):
     bl_idname = "tetflora.preview_species"
     bl_label = "Preview Species"
     bl_description = (
-        "Show one plant of the species at the 3D cursor, and follow every change. "
-        "It is never rendered or saved. Again to take it away"
+        "Show one plant of the species at the 3D cursor, updated with every change. "
+        "It is never rendered or saved. Use again to hide it"
     )
     # No undo: the preview is no part of the file.
     bl_options = {'REGISTER'}

@@ -20,8 +20,8 @@ class TETFLORA_OT_use_as_form(Reporting, bpy.types.Operator):
     bl_idname = "tetflora.use_as_form"
     bl_label = "Make Plant from Form"
     bl_description = (
-        "The active curve, hair curves or mesh of edges becomes trunk and limbs of the selected plants, or, where none "
-        "is selected, of a new plant in its place; the species grows the rest. The form itself is no longer rendered"
+        "Use the active curve, hair curves or mesh of edges as trunk and limbs of the selected plants or, if none is "
+        "selected, of a new plant in its place; the species grows the rest. The form is no longer rendered"
     )
     bl_options = {'REGISTER', 'UNDO'}
 
@@ -31,7 +31,7 @@ class TETFLORA_OT_use_as_form(Reporting, bpy.types.Operator):
             return False
         if context.active_object is not None and context.active_object.type in FORM_TYPES:
             return True
-        cls.poll_message_set("Make a curve, hair curves or a mesh of edges active: click on it last")
+        cls.poll_message_set("The active object must be a curve, hair curves or a mesh of edges; select it last")
         return False
 
     def run(self, context: bpy.types.Context) -> set[str]:
@@ -48,7 +48,7 @@ class TETFLORA_OT_use_as_form(Reporting, bpy.types.Operator):
         form.hide_render = True
         select_only(context, plants)
         made = f"{counted(len(skeleton.points), 'point')} drawn"
-        self.report({'INFO'}, f'"{form.name}" is the form of {counted(len(plants), "plant")}: {made}')
+        self.report({'INFO'}, f'"{form.name}" is now the form of {counted(len(plants), "plant")}: {made}')
         return {'FINISHED'}
 
 

@@ -25,19 +25,19 @@ from . import (
     wind_panel,
 )
 
-# In the order of registration: a panel after its parent, and of panels with the same `bl_order` the upper one first.
+# In the order of registration, which is that of the panels in the tab: as an artist works, a panel after its parent.
 _MODULES = (
     lists,
-    refine_panel,
     first_panel,
+    refine_panel,
+    refinement_panel,
     plants_panel,
-    species_panel,
     populate_panel,
     brush_panel,
-    refinement_panel,
-    preview_panel,
+    species_panel,
     wind_panel,
     output_panel,
+    preview_panel,
     statistics_panel,
     add_menu,
     nothing_refined,

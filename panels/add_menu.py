@@ -22,7 +22,7 @@ class TETFLORA_MT_add_plant(bpy.types.Menu):
             icon = picture(info.identifier)
             self.layout.operator(TETFLORA_OT_add_plant.bl_idname, text=info.name, **icon).species = info.identifier
         if not known:
-            self.layout.label(text="The catalogue has no species", icon='ERROR')
+            self.layout.label(text="The catalog has no species", icon='ERROR')
 
 
 class TETFLORA_MT_place_plant(bpy.types.Menu):

@@ -13,7 +13,6 @@ class TETFLORA_PT_brush(SidebarPanel, bpy.types.Panel):
     """Paint plants."""
 
     bl_label = "Paint Plants"
-    bl_order = 1  # below Populate, above Refinement: of equal numbers the one registered first goes first
     bl_options = {'DEFAULT_CLOSED'}
 
     def draw(self, context: bpy.types.Context) -> None:

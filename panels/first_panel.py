@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""First Forest: where the tab begins as long as the scene has no plants."""
+"""First Forest: at the top of the tab while the scene has no plants."""
 
 import bpy
 
@@ -14,8 +14,7 @@ _FEW = 200  # objects that are looked through at every movement of the mouse; wh
 class TETFLORA_PT_first(SidebarPanel, bpy.types.Panel):
     """First forest."""
 
-    bl_label = "Begin"
-    bl_order = -1
+    bl_label = "Get Started"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -27,7 +26,7 @@ class TETFLORA_PT_first(SidebarPanel, bpy.types.Panel):
         row = column.row()
         row.scale_y = 1.6
         row.operator(TETFLORA_OT_first_forest.bl_idname, icon='WORLD')
-        column.label(text="Then Refine, then F12")
+        column.label(text="Then click Refine and press F12")
 
 
 CLASSES = (TETFLORA_PT_first,)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What pops up when a render shows no plants, because nothing is refined for it: why, and what mends it."""
+"""Popup for a render without plants because nothing is refined: the reason and the remedies."""
 
 import bpy
 

@@ -30,7 +30,9 @@ class TETFLORA_MT_object(bpy.types.Menu):
         layout = self.layout
         layout.operator(TETFLORA_OT_populate.bl_idname, text="Populate with Plants", icon='OUTLINER_OB_POINTCLOUD')
         layout.operator(TETFLORA_OT_mark_occluder.bl_idname, text="Mark or Unmark as Occluder", icon='MOD_MASK')
-        layout.operator(TETFLORA_OT_mark_explicit.bl_idname, text="Refine or Leave These Meshes", icon='MESH_ICOSPHERE')
+        layout.operator(
+            TETFLORA_OT_mark_explicit.bl_idname, text="Refine or Ignore These Meshes", icon='MESH_ICOSPHERE'
+        )
         layout.operator(TETFLORA_OT_use_as_form.bl_idname, icon='CURVE_DATA')
         layout.operator(
             TETFLORA_OT_mark_field.bl_idname, text="Use or Stop Using as Field of Plants", icon='POINTCLOUD_DATA'

@@ -14,7 +14,6 @@ class TETFLORA_PT_output(SidebarPanel, bpy.types.Panel):
     """Output."""
 
     bl_label = "Output"
-    bl_parent_id = "TETFLORA_PT_refinement"
     bl_options = {'DEFAULT_CLOSED'}
 
     def draw(self, context: bpy.types.Context) -> None:

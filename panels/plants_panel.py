@@ -35,7 +35,6 @@ class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
     """Plants."""
 
     bl_label = "Plants"
-    bl_order = 0
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = split_layout(self)
@@ -45,7 +44,7 @@ class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
             plant = active.tetflora
             column.prop(plant, "species_choice")
             if plant.species not in catalogue():
-                column.label(text=f'The catalogue has no "{plant.species}"', icon='ERROR')
+                column.label(text=f'"{plant.species}" is not in the catalog', icon='ERROR')
             column.prop(plant, "seed")
             column.prop(plant, "enabled")
             column.prop(plant, "form")
@@ -73,7 +72,7 @@ class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
 def _draw_field(column: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     field, kinds = obj.tetflora, obj.tetflora.field_species
     # What nodes make of the points is not counted: a panel is drawn at every movement of the mouse.
-    more = ", before its nodes" if has_nodes(obj) else ""
+    more = " before modifiers" if has_nodes(obj) else ""
     column.label(text=f"Field of {stored_size(obj):,} points{more}", icon='POINTCLOUD_DATA')
     draw_list(column, TETFLORA_UL_field_species, field, ("field_species", "field_species_index"), 'FIELD')
     if not kinds:
@@ -82,7 +81,7 @@ def _draw_field(column: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         column.prop(kinds[field.field_species_index], "form")
     for species in {entry.species for entry in kinds} or {field.species}:
         if species not in catalogue():
-            column.label(text=f'The catalogue has no "{species}"', icon='ERROR')
+            column.label(text=f'"{species}" is not in the catalog', icon='ERROR')
     column.prop(field, "seed")
     column.prop(field, "enabled")
 
@@ -101,7 +100,7 @@ class TETFLORA_PT_selected_plants(SidebarPanel, bpy.types.Panel):
         column.operator(
             TETFLORA_OT_select_species.bl_idname, text="Select All of This Species", icon='RESTRICT_SELECT_OFF'
         )
-        column.operator(TETFLORA_OT_make_plant_mesh.bl_idname, text="Make Real Meshes", icon='OUTLINER_OB_MESH')
+        column.operator(TETFLORA_OT_make_plant_mesh.bl_idname, text="Convert to Meshes", icon='OUTLINER_OB_MESH')
         column.operator(TETFLORA_OT_make_field.bl_idname, icon='POINTCLOUD_DATA')
         column.operator(TETFLORA_OT_split_field.bl_idname, icon='OUTLINER_OB_EMPTY')
         column = self.layout.column(align=True)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Populate: populations of plants and the rules by which they are placed, and what hides plants."""
+"""Populate: populations of plants, the rules for placing them, and occluders."""
 
 import bpy
 
@@ -46,7 +46,7 @@ class TETFLORA_MT_populations(bpy.types.Menu):
         layout = self.layout
         layout.operator(TETFLORA_OT_select_population.bl_idname, icon='RESTRICT_SELECT_OFF')
         layout.operator(
-            TETFLORA_OT_remove_population.bl_idname, text="Remove, and Keep Plants", icon='REMOVE'
+            TETFLORA_OT_remove_population.bl_idname, text="Remove but Keep Plants", icon='REMOVE'
         ).keep_plants = True
         layout.operator(TETFLORA_OT_forget_erased.bl_idname, icon='LOOP_BACK')
         layout.separator()
@@ -58,7 +58,6 @@ class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
     """Populate."""
 
     bl_label = "Populate"
-    bl_order = 1
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = split_layout(self)
@@ -119,7 +118,7 @@ class TETFLORA_PT_populate_species(_PartOfPopulate, bpy.types.Panel):
         draw_list(layout, TETFLORA_UL_mix, settings, ("mix", "mix_index"), 'MIX')
         if not settings.mix:
             first = next(iter(catalogue().values()), None)
-            layout.label(text=f"None chosen: {first.name}" if first else "The catalogue has no species", icon='INFO')
+            layout.label(text=f"Default: {first.name}" if first else "The catalog has no species", icon='INFO')
         elif 0 <= settings.mix_index < len(settings.mix):
             entry = settings.mix[settings.mix_index]
             layout.prop(entry, "companion_choice")
@@ -132,7 +131,7 @@ class TETFLORA_PT_populate_species(_PartOfPopulate, bpy.types.Panel):
 class TETFLORA_PT_populate_where(_PartOfPopulate, bpy.types.Panel):
     """On which ground."""
 
-    bl_label = "Where"
+    bl_label = "Placement"
 
     def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
         column = layout.column(align=True)
@@ -172,7 +171,7 @@ class TETFLORA_PT_populate_where(_PartOfPopulate, bpy.types.Panel):
 class TETFLORA_PT_populate_arrangement(_PartOfPopulate, bpy.types.Panel):
     """How far from each other."""
 
-    bl_label = "Arrangement"
+    bl_label = "Spacing"
 
     def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
         layout.prop(settings, "min_distance")

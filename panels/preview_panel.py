@@ -13,7 +13,6 @@ class TETFLORA_PT_preview(SidebarPanel, bpy.types.Panel):
     """Preview."""
 
     bl_label = "Preview"
-    bl_order = 2
     bl_options = {'DEFAULT_CLOSED'}
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -45,7 +44,7 @@ class TETFLORA_PT_preview(SidebarPanel, bpy.types.Panel):
         column.column(align=True).prop(settings, "forms")
         column.prop(settings, "statistics")
         if preview_state.is_outdated(context.scene):
-            draw_message(context, layout, "The camera has changed: compute again, or freeze it before it moves")
+            draw_message(context, layout, "The camera has changed; compute the levels again, or freeze the camera")
 
 
 CLASSES = (TETFLORA_PT_preview,)

@@ -1,90 +1,50 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Refinement: how fine, and in which form."""
+"""Sub-panels of Refine: proxies, visibility, limits, animation and leaf objects."""
 
 import bpy
 
-from ..operators.mark_explicit import can_be_explicit
 from ..tetflora_addon.blender.proxy_forms import form_of
 from ..tetflora_addon.blender.shell_bounces import few_bounces
 from .base import SidebarPanel, split_layout
 from .lists import TETFLORA_UL_leaf_objects, draw_list
 
 
-class TETFLORA_PT_refinement(SidebarPanel, bpy.types.Panel):
-    """Refinement."""
+class _PartOfRefine(SidebarPanel):
+    """Mix-in for sub-panels of Refine, closed at first."""
 
-    bl_label = "Refinement"
-    bl_order = 2
+    bl_parent_id = "TETFLORA_PT_refine"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def column(self, context: bpy.types.Context, *names: str) -> bpy.types.UILayout:
+        """A column with settings of the scene, inactive where everything is expanded."""
+        settings = context.scene.tetflora
+        column = split_layout(self).column()
+        column.active = not settings.expand_everything
+        for name in names:
+            column.prop(settings, name)
+        return column
+
+
+class TETFLORA_PT_proxies(_PartOfRefine, bpy.types.Panel):
+    """Proxies."""
+
+    bl_label = "Proxies"
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = split_layout(self)
-        settings = context.scene.tetflora
-        column = layout.column()
-        column.active = not settings.expand_everything
-        column.prop(settings, "quality")
-        column.prop(settings, "cutoff")
-        column.prop(settings, "shadow_cutoff")
-        column.prop(settings, "proxy_form")
-        column.prop(settings, "baked_light")
-        column.prop(settings, "max_polygons")
+        column = self.column(context, "leaf_limit", "facet")
         cycles = getattr(context.scene, "cycles", None)
         if form_of(context.scene).bounces and cycles is not None:
             column.prop(cycles, "transparent_max_bounces", text="Transparent")
             if few_bounces(context.scene):
-                column.label(text="Too few: Cycles draws proxies black", icon='ERROR')
-        active = context.active_object
-        if active is not None and (can_be_explicit(active) or active.tetflora.is_explicit):
-            layout.prop(active.tetflora, "is_explicit")
-        layout.prop(settings, "refine_at_render")
-        layout.prop(settings, "auto_refine")
+                column.label(text="Too few: Cycles renders proxies black", icon='ERROR')
 
 
-class TETFLORA_PT_films(SidebarPanel, bpy.types.Panel):
-    """Animation."""
-
-    bl_label = "Animation"
-    bl_parent_id = "TETFLORA_PT_refinement"
-    bl_options = {'DEFAULT_CLOSED'}
-
-    def draw_header(self, context: bpy.types.Context) -> None:
-        self.layout.prop(context.scene.tetflora, "share_frames", text="")
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = split_layout(self)
-        settings = context.scene.tetflora
-        column = layout.column()
-        column.active = settings.share_frames and settings.refine_at_render
-        column.prop(settings, "cell_length")
-        column.prop(settings, "cell_turn")
-        column.prop(settings, "kept_memory")
-        column.prop(context.scene.render, "use_persistent_data")  # Cycles then loads what frames share only once
-
-
-class TETFLORA_PT_limits(SidebarPanel, bpy.types.Panel):
-    """Limits."""
-
-    bl_label = "Limits"
-    bl_parent_id = "TETFLORA_PT_refinement"
-    bl_options = {'DEFAULT_CLOSED'}
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = split_layout(self)
-        settings = context.scene.tetflora
-        column = layout.column()
-        column.active = not settings.expand_everything
-        names = ("leaf_limit", "facet", "visibility_resolution", "few_polygons", "block", "hidden")
-        for name in (*names, "max_memory", "max_tetrahedra", "max_levels", "max_passes", "anchored"):
-            column.prop(settings, name)
-        layout.prop(settings, "expand_everything")
-
-
-class TETFLORA_PT_proxy_shading(SidebarPanel, bpy.types.Panel):
+class TETFLORA_PT_proxy_shading(_PartOfRefine, bpy.types.Panel):
     """Proxy shading."""
 
     bl_label = "Proxy Shading"
-    bl_parent_id = "TETFLORA_PT_refinement"
-    bl_options = {'DEFAULT_CLOSED'}
+    bl_parent_id = "TETFLORA_PT_proxies"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -98,12 +58,49 @@ class TETFLORA_PT_proxy_shading(SidebarPanel, bpy.types.Panel):
             column.prop(settings, name)
 
 
-class TETFLORA_PT_leaf_objects(SidebarPanel, bpy.types.Panel):
+class TETFLORA_PT_visibility(_PartOfRefine, bpy.types.Panel):
+    """Visibility."""
+
+    bl_label = "Visibility"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.column(context, "visibility_resolution", "hidden", "block", "few_polygons")
+
+
+class TETFLORA_PT_limits(_PartOfRefine, bpy.types.Panel):
+    """Limits."""
+
+    bl_label = "Limits"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.column(context, "max_memory", "max_tetrahedra", "max_levels", "max_passes")
+        self.layout.prop(context.scene.tetflora, "expand_everything")
+
+
+class TETFLORA_PT_films(_PartOfRefine, bpy.types.Panel):
+    """Animation."""
+
+    bl_label = "Animation"
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        self.layout.prop(context.scene.tetflora, "share_frames", text="")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = split_layout(self)
+        settings = context.scene.tetflora
+        column = layout.column()
+        column.active = settings.share_frames and settings.refine_at_render
+        column.prop(settings, "cell_length")
+        column.prop(settings, "cell_turn")
+        column.prop(settings, "kept_memory")
+        column.prop(context.scene.render, "use_persistent_data")  # Cycles then loads what frames share only once
+        layout.prop(settings, "anchored")
+
+
+class TETFLORA_PT_leaf_objects(_PartOfRefine, bpy.types.Panel):
     """Leaf objects."""
 
     bl_label = "Leaf Objects"
-    bl_parent_id = "TETFLORA_PT_refinement"
-    bl_options = {'DEFAULT_CLOSED'}
 
     def draw(self, context: bpy.types.Context) -> None:
         draw_list(
@@ -116,9 +113,10 @@ class TETFLORA_PT_leaf_objects(SidebarPanel, bpy.types.Panel):
 
 
 CLASSES = (
-    TETFLORA_PT_refinement,
-    TETFLORA_PT_films,
-    TETFLORA_PT_limits,
+    TETFLORA_PT_proxies,
     TETFLORA_PT_proxy_shading,
+    TETFLORA_PT_visibility,
+    TETFLORA_PT_limits,
+    TETFLORA_PT_films,
     TETFLORA_PT_leaf_objects,
 )

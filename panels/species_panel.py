@@ -47,7 +47,6 @@ class TETFLORA_PT_species(SidebarPanel, bpy.types.Panel):
     """Species."""
 
     bl_label = "Species Editor"  # Populate has a panel Species, which chooses them
-    bl_parent_id = "TETFLORA_PT_plants"
     bl_options = {'DEFAULT_CLOSED'}
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -65,7 +64,9 @@ class TETFLORA_PT_species(SidebarPanel, bpy.types.Panel):
         if find_edit(scene, identifier) is not None:
             layout.label(text="Edited in this file", icon='GREASEPENCIL')
         else:
-            layout.label(text="Your own species" if own_file(identifier) else "As shipped", icon='LOCKED')
+            layout.label(
+                text="Saved in your species folder" if own_file(identifier) else "Built-in species", icon='LOCKED'
+            )
         if problem := problem_of(scene, identifier):
             draw_message(context, layout, problem)
         shown = species_preview.shown_in(scene)

@@ -20,19 +20,19 @@ def rows_of(text: str) -> tuple[tuple[str, str], ...]:
         figures = json.loads(text)
         seconds = figures["seconds"]
         full = figures["polygons_full"]
-        share = f"{figures['polygons_meshed'] / full:.1%}" if full else "–"
+        fraction = f"{figures['polygons_meshed'] / full:.1%}" if full else "–"
         return (
             ("Plants", f"{figures['plants']:,}"),
-            ("Polygons if expanded", f"{full:,}"),
-            ("Polygons made", f"{figures['polygons_meshed']:,}"),
-            ("    share of all", share),
-            ("Faces of proxies", f"{figures['polygons_proxy']:,}"),
-            ("    pixels each", f"{figures.get('facet_pixels', 0.0):.2g}"),
-            ("Tetrahedra made", f"{figures['tetrahedra_made']:,}"),
-            ("    not divided", f"{figures['tetrahedra_terminal']:,}"),
-            ("    proxies", f"{figures['tetrahedra_proxy']:,}"),
+            ("Polygons If Expanded", f"{full:,}"),
+            ("Polygons", f"{figures['polygons_meshed']:,}"),
+            ("    Fraction of All", fraction),
+            ("Proxy Faces", f"{figures['polygons_proxy']:,}"),
+            ("    Pixels per Face", f"{figures.get('facet_pixels', 0.0):.2g}"),
+            ("Tetrahedra", f"{figures['tetrahedra_made']:,}"),
+            ("    Terminal", f"{figures['tetrahedra_terminal']:,}"),
+            ("    Proxies", f"{figures['tetrahedra_proxy']:,}"),
             ("Seconds", f"{sum(seconds.values()):.2f}"),
-            ("Memory, estimated", f"{figures['memory_mb']:,.0f} MB"),
+            ("Estimated Memory", f"{figures['memory_mb']:,.0f} MB"),
         )
     except (ValueError, KeyError, TypeError, AttributeError):
         return ()
@@ -42,7 +42,6 @@ class TETFLORA_PT_statistics(SidebarPanel, bpy.types.Panel):
     """Statistics."""
 
     bl_label = "Statistics"
-    bl_order = 3
     bl_options = {'DEFAULT_CLOSED'}
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -61,7 +60,7 @@ class TETFLORA_PT_statistics(SidebarPanel, bpy.types.Panel):
 
 @lru_cache(maxsize=8)
 def steps_of(text: str) -> tuple[tuple[str, ...], ...]:
-    """Rows of the table of passes: number, tetrahedra, those to divide, polygons, seconds; none if there are none."""
+    """Rows of the table of passes: number, tetrahedra, those to split, polygons, seconds; none if there are none."""
     try:
         return tuple(
             (f"{n}", *(f"{s[key]:,}" for key in ("tetrahedra_made", "split", "polygons")), f"{s['seconds']:.1f}")
@@ -84,7 +83,7 @@ class TETFLORA_PT_steps(SidebarPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         grid = self.layout.grid_flow(row_major=True, columns=5, even_columns=False, align=True)
-        for row in (("Pass", "Tetrahedra", "To divide", "Polygons", "s"), *steps_of(context.scene.tetflora.statistics)):
+        for row in (("Pass", "Tetrahedra", "To Split", "Polygons", "s"), *steps_of(context.scene.tetflora.statistics)):
             for text in row:
                 grid.label(text=text)
 

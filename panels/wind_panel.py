@@ -11,7 +11,6 @@ class TETFLORA_PT_wind(SidebarPanel, bpy.types.Panel):
     """Wind."""
 
     bl_label = "Wind"
-    bl_order = 3  # below Preview, which is used more often
     bl_options = {'DEFAULT_CLOSED'}
 
     def draw_header(self, context: bpy.types.Context) -> None:

@@ -258,7 +258,7 @@ def test_refine_is_alone(scene, monkeypatch):
 def test_only_what_is_done_is_kept(scene, monkeypatch):
     scene.tetflora.auto_refine = True
     half_make(scene, monkeypatch, 1)
-    with pytest.raises(RuntimeError, match="not done yet"):
+    with pytest.raises(RuntimeError, match="has not finished"):
         bpy.ops.tetflora.keep_results()
     assert not results(scene)
     settle(monkeypatch)

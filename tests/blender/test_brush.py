@@ -224,9 +224,9 @@ def test_settings_that_cannot_work_are_told_and_change_nothing():
         _stroke()
     assert not _plants()
     select()
-    with pytest.raises(RuntimeError, match="is no stroke"):
+    with pytest.raises(RuntimeError, match="is not a stroke"):
         bpy.ops.tetflora.paint_plants(stroke="1 2, 3")
-    with pytest.raises(RuntimeError, match="needs a window"):
+    with pytest.raises(RuntimeError, match="requires a 3D viewport"):
         bpy.ops.tetflora.paint_plants()
-    with pytest.raises(RuntimeError, match="needs a window"):
+    with pytest.raises(RuntimeError, match="requires a 3D viewport"):
         bpy.ops.tetflora.place_plant()

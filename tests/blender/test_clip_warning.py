@@ -30,7 +30,7 @@ def test_plants_beyond_the_range_are_counted(far_row, clip_end, beyond):
     far_row.data.clip_end = clip_end
     text = refine._cut_off(bpy.context.scene)
     assert text.startswith(f"{beyond} of 3 plants")
-    assert f'raise Clip End of "camera", now {clip_end:g} m' in text
+    assert f'raise the Clip End of "camera", which is {clip_end:g} m' in text
 
 
 def test_no_warning_where_all_are_in_range(far_row):
@@ -46,11 +46,11 @@ def test_a_camera_that_sees_none_of_the_plants_is_told(clean_file, capfd, distan
     bpy.context.scene.tetflora.quality = 'DRAFT'
     depsgraph()
     assert bpy.ops.tetflora.refine() == {'FINISHED'}
-    assert "sees none of the plants" not in capfd.readouterr().out
+    assert "sees no plants" not in capfd.readouterr().out
     camera.rotation_euler.z += 3.0
     depsgraph()
     assert bpy.ops.tetflora.refine() == {'FINISHED'}
-    assert 'The camera "camera" sees none of the plants' in capfd.readouterr().out
+    assert 'The camera "camera" sees no plants' in capfd.readouterr().out
     bpy.context.scene.tetflora.max_passes = 1
     assert bpy.ops.tetflora.refine() == {'FINISHED'}
-    assert "sees none of the plants" not in capfd.readouterr().out
+    assert "sees no plants" not in capfd.readouterr().out

@@ -83,7 +83,7 @@ def test_points_of_a_field_fall_wherever_the_field_is():
 
 def test_without_ground_nothing_happens():
     select(add_plant("alone", location=(0.0, 0.0, 4.0)))
-    with pytest.raises(RuntimeError, match="no mesh to fall onto"):
+    with pytest.raises(RuntimeError, match="No mesh is visible below"):
         bpy.ops.tetflora.drop_to_ground()
 
 

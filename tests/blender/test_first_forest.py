@@ -171,7 +171,7 @@ def test_the_tab_says_what_comes_next_and_stops_when_it_is_done():
     assert hint(scene) == ""
     bpy.ops.tetflora.first_forest()
     scene = bpy.context.scene
-    assert hint(scene) == "Refine, then F12"
+    assert hint(scene) == "Click Refine, then press F12 to render"
     scene.render.resolution_percentage = 5
     bpy.ops.tetflora.refine()
     assert hint(scene) == ""
@@ -179,6 +179,6 @@ def test_the_tab_says_what_comes_next_and_stops_when_it_is_done():
     assert not scene.tetflora.refine_at_render
     assert hint(scene) == ""  # what is kept is rendered
     bpy.data.collections.remove(bpy.data.collections["TetFlora kept"])
-    assert hint(scene) == "Nothing is refined: renders show no plants"
+    assert hint(scene) == "Nothing is refined, so renders show no plants"
     bpy.ops.tetflora.remove_plants(which='ALL')
     assert hint(scene) == ""

@@ -128,12 +128,12 @@ def test_lists_grow_and_shrink():
 @pytest.mark.parametrize(
     ("name", "says"),
     [
-        ("populate", "Select the mesh"),
-        ("reseed", "Select plants first"),
-        ("assign_species", "Select plants first"),
+        ("populate", "Select a mesh"),
+        ("reseed", "Select plants or a field"),
+        ("assign_species", "Select plants or a field"),
         ("mark_occluder", "Select meshes first"),
         ("refine", "no active camera"),
-        ("clear", "made nothing yet"),
+        ("clear", "No results to clear"),
     ],
 )
 def test_disabled_buttons_say_why(name, says):
@@ -171,10 +171,10 @@ def test_refine_makes_meshes_and_figures_and_clear_takes_them_back():
     rows = dict(statistics_panel.rows_of(scene.tetflora.statistics))
     passes = statistics_panel.steps_of(scene.tetflora.statistics)
     assert [int(row[0]) for row in passes] == list(range(1, len(passes) + 1))
-    assert passes[-1][1] == rows["Tetrahedra made"]
+    assert passes[-1][1] == rows["Tetrahedra"]
     assert passes[-1][2] == "0"
     assert rows["Plants"] == "2"
-    assert rows["Polygons if expanded"] == f"{figures['polygons_full']:,}"
+    assert rows["Polygons If Expanded"] == f"{figures['polygons_full']:,}"
     assert len(bpy.data.meshes) > 0
     assert _ops().clear() == {'FINISHED'}
     assert datablocks() == before

@@ -185,7 +185,7 @@ def test_populate_twice_leaves_the_first_plants_their_room():
     ("options", "says"),
     [
         (dict(species="quercus"), 'Unknown species "quercus"'),
-        (dict(species="bush:many"), "no species with a share"),
+        (dict(species="bush:many"), "not a species with a weight"),
         (dict(species="bush:0"), "weight above 0"),
     ],
 )
@@ -234,7 +234,7 @@ def test_many_plants_become_a_field_unasked():
     assert [len(o.data.vertices) for o in fields] == [10_001]
     assert not [o for o in bpy.data.objects if o.tetflora.is_plant]
     assert bpy.context.view_layer.objects.active == ground
-    with pytest.raises(RuntimeError, match="too many for objects of their own, at most 100,000"):
+    with pytest.raises(RuntimeError, match="exceed the limit of 100,000"):
         bpy.ops.tetflora.populate(count=100_001, as_field='EMPTIES')
 
 

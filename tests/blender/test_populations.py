@@ -209,7 +209,7 @@ def test_plants_deleted_by_hand_come_back_and_it_is_said(capfd):
     bpy.data.batch_remove(_own()[:3])
     _ops().update_population()
     assert len(_own()) == 10
-    assert "3 that you had deleted are back" in capfd.readouterr().out
+    assert "3 deleted plants restored" in capfd.readouterr().out
 
 
 def test_copies_in_the_collection_outlive_the_population():

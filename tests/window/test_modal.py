@@ -33,7 +33,7 @@ def test_escape_in_the_middle_leaves_the_scene_as_it_was(seen: dict) -> None:
 
 def test_return_stops_refining_and_makes_what_there_is(seen: dict) -> None:
     assert seen["stopped"] == [True, False]
-    assert "Stopped before" in seen["reports"]
+    assert "Stopped early" in seen["reports"]
 
 
 def test_what_is_wrong_is_said_before_the_window_waits(seen: dict) -> None:
