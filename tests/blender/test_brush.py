@@ -7,6 +7,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 
 from tests.blender.scenes import add_mesh, add_plant, depsgraph, select
 from tetflora_addon.blender import brush_properties, ground, node_tools, plant_fields
@@ -210,7 +211,6 @@ def test_rays_find_the_nearest_ground_of_many():
     bent = bpy.data.objects["step 3"]
     bent.scale, bent.rotation_euler = (1.0, 3.0, 2.0), (0.0, 0.5, 0.0)
     surface = ground.Ground(bpy.context.view_layer, depsgraph())
-    from mathutils import Vector
 
     place, normal = surface.cast(Vector((9.0 + 6.0 * np.sin(0.5), 0.0, 50.0)), Vector((0.0, 0.0, -2.0)))
     assert normal.z > 0.8

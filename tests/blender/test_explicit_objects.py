@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
+from tests.blender.renders import picture
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph, select
 from tetflora_addon import errors
 from tetflora_addon.blender import compat, explicit_objects, handlers, job, material_means, species_items
@@ -307,8 +308,6 @@ def test_plants_meshes_and_occluders_together():
 
 def test_the_refined_picture_is_that_of_the_mesh():
     """Mean radiance over blocks of the picture; the leaf limit makes most of it proxies."""
-
-    from tests.blender.renders import picture
 
     scene = _scene()
     leaves = _leaves(count=30_000, size=0.025, spread=3.0)

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import addon_utils
 import bpy
 import numpy as np
 import pytest
@@ -43,8 +44,6 @@ class Surface:
 def ready(blender_format: str) -> None:
     """Enable what is an add-on among the exporters."""
     if blender_format == "glb":
-        import addon_utils
-
         assert addon_utils.enable("io_scene_gltf2") is not None
 
 

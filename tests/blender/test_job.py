@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 import pytest
 
+from tests.blender.renders import picture
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks
 from tetflora_addon import errors
 from tetflora_addon.blender import compat, job, scene_contents
@@ -201,8 +202,6 @@ def test_estimates_agree_with_what_is_made():
 @pytest.mark.parametrize(("form", "bound"), [('MICROSURFACES', 0.03), ('MICROSPHERES', 0.04), ('SHELLS', 0.06)])
 def test_the_refined_picture_is_that_of_the_plants(form, bound):
     """Mean radiance over blocks of the picture, refined against expanded; the leaf limit makes most of it proxies."""
-
-    from tests.blender.renders import picture
 
     add_camera(location=(2.0, -32.0, 6.0))
     for i in range(3):

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import random
 
 import bpy
@@ -314,8 +315,6 @@ def test_materials_of_leaf_objects_are_noticed(film, made):
     ],
 )
 def test_digests_tell_values_apart(one, other):
-    import hashlib
-
     digests = hashlib.sha256(), hashlib.sha256()
     for digest, value in zip(digests, (one, other), strict=True):
         scene_digest.digest_of(digest, value)

@@ -10,7 +10,8 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.scenes import datablocks
+from tests.blender.renders import picture, small_scene
+from tests.blender.scenes import datablocks, tiny_render
 from tests.blender.test_job import _forest, _made, _refine
 from tetflora_addon.blender import compat, job, materials, point_clouds
 
@@ -66,8 +67,6 @@ def test_spheres_take_the_places_of_facets_and_clear_removes_them():
 
 def test_refine_at_render_takes_spheres_back():
 
-    from tests.blender.scenes import tiny_render
-
     scene = _forest()
     tiny_render(size=160)
     scene.tetflora.proxy_form, scene.tetflora.refine_at_render = 'MICROSPHERES', True
@@ -108,8 +107,6 @@ def test_what_was_written_wrongly_leaves_nothing_behind():
 @pytest.mark.parametrize("transmission", [0.0, 0.5])
 def test_white_spheres_vanish_before_a_white_sky(transmission):
     """What falls on a sphere comes back from it, through it or from its surface, and nothing else does."""
-
-    from tests.blender.renders import picture, small_scene
 
     small_scene(sky=1.0, samples=64)
     white = {"tf_colour": np.ones((1, 3), np.float32), "tf_transmission": np.full(1, transmission, np.float32)}

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from mathutils import Euler, Matrix, Vector
 
+from devtools import session
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
 from tetflora_addon import errors
 from tetflora_addon.blender import plant_fields, scene_contents, scene_reader
@@ -91,8 +93,6 @@ angles = st.tuples(*[st.floats(-3.0, 3.0)] * 3)
     own=st.tuples(angles, st.sampled_from([(1.0, 1.0, 1.0), (2.0, 2.0, 2.0), (-1.0, 1.0, 1.0), (1.0, 3.0, 0.5)])),
 )
 def test_points_are_the_plants_that_empties_would_be(turns, written, scales, stretch, own):
-    from mathutils import Euler, Matrix, Vector
-
     bpy.data.batch_remove(list(bpy.data.objects))
     turns = turns if written else [(0.0, 0.0, 0.0)] * 3
     attributes = {"species": ('INT', [1, 0, 1]), "seed": ('INT', [7, -3, 2**31 - 1])}
@@ -295,8 +295,6 @@ def test_fields_without_plants_say_so(change, says):
 
 
 def test_linked_fields_are_read(tmp_path):
-
-    from devtools import session
 
     _field(seed=('INT', [1, 2, 3])).location = (0.0, 0.0, 7.0)
     path = str(tmp_path / "library.blend")

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 
+import bpy
 import pytest
 
 from devtools import build
@@ -20,8 +21,6 @@ GONE = {"slope_limit"}
 
 @pytest.fixture
 def saved_file(clean_file):
-    import bpy
-
     if bpy.app.version < (5, 2):
         pytest.skip("the file was saved by Blender 5.2")
     bpy.ops.wm.open_mainfile(filepath=str(FOLDER / "saved_before.blend"))
@@ -46,16 +45,12 @@ def _without_gone(saved):
 
 
 def test_every_property_has_the_value_that_was_saved(saved_file):
-    import bpy
-
     assert _plain(saved_file.tetflora, SAVED["scene"]) == _without_gone(SAVED["scene"])
     found = {name: _plain(bpy.data.objects[name].tetflora, saved) for name, saved in SAVED["objects"].items()}
     assert found == SAVED["objects"]
 
 
 def test_it_refines_to_the_same_counts_and_names(saved_file):
-    import bpy
-
     assert bpy.ops.tetflora.refine() == {'FINISHED'}
     counts = json.loads(saved_file.tetflora.statistics)
     saved = SAVED["refined"]["statistics"]

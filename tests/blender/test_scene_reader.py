@@ -7,9 +7,12 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+from bpy_extras.object_utils import world_to_camera_view
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from mathutils import Vector
 
+from devtools import session
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph
 from tetflora_addon import errors
 from tetflora_addon.blender import camera_reader, scene_reader
@@ -43,9 +46,6 @@ def _occluders():
     scale=st.sampled_from([(1.0, 1.0, 1.0), (2.5, 2.5, 2.5), (1.0, 3.0, 0.5)]),
 )
 def test_projections_agree_with_blenders(kind, fit, lens, shift, size, aspect, rotation, scale):
-    from bpy_extras.object_utils import world_to_camera_view
-    from mathutils import Vector
-
     scene = bpy.context.scene
     obj = scene.camera or add_camera()
     obj.rotation_euler, obj.scale, obj.location = rotation, scale, (3.0, -2.0, 5.0)
@@ -198,8 +198,6 @@ def test_instanced_collections_grow_individuals():
 
 
 def test_linked_plants_are_read(tmp_path):
-
-    from devtools import session
 
     add_plant("from the library", location=(2.0, 0.0, 0.0))
     path = str(tmp_path / "library.blend")

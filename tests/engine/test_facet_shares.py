@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tetflora_addon.emission import expanded_blocks
-from tetflora_addon.plants.catalogue import load_species
+from tetflora_addon.plants.catalogue import list_species, load_species
 from tetflora_addon.plants.compiled import Flora, compile_species
 from tetflora_addon.plants.expansion import open_subplants
 from tetflora_addon.plants.growth import trunks
@@ -91,8 +91,6 @@ def test_tables_of_shipped_species_are_those_of_today() -> None:
 
 
 def test_every_shipped_species_has_a_table() -> None:
-    from tetflora_addon.plants.catalogue import list_species
-
     for identifier in list_species():
         assert subject.digest(compile_species([load_species(identifier)]), 0) in subject.shipped(), identifier
 

@@ -11,12 +11,14 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tests.engine.test_loop import run
+from tetflora_addon import facet_emission
 from tetflora_addon.buffers import concatenate_buffers
 from tetflora_addon.emission import explicit_blocks
 from tetflora_addon.facet_emission import facet_parts
 from tetflora_addon.plants.growth import trunks
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.transition import BAND, Transition
+from tetflora_addon.shading.facet_shares import COUNTS, FacetShares
 
 
 def scene(**options):
@@ -55,9 +57,6 @@ def facets_of_leaves(flora, result, camera, transition) -> float:
 
 def test_real_leaves_and_facets_together_are_all_leaves(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever the limit, but for what leaves of a cluster hide of each other."""
-    from tetflora_addon import facet_emission
-    from tetflora_addon.shading.facet_shares import COUNTS, FacetShares
-
     flora, camera, result = scene()
     every = replace(result, decision=np.full_like(result.decision, Decision.EXPLICIT))
     whole = leaf_area(explicit_blocks(flora, every))
@@ -120,8 +119,6 @@ def test_facets_do_not_depend_on_how_space_is_divided() -> None:
 
 
 def test_few_are_opened_at_a_time_and_it_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    from tetflora_addon import facet_emission
-
     flora, camera, result = scene()
     transition, opened, inner = Transition(flora, camera, 50.0), [], facet_emission.open_subplants
 

@@ -7,15 +7,16 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+from mathutils.kdtree import KDTree
 
+from devtools import session
+from examples import fly_through, row80
 from tests.blender.scenes import depsgraph
 from tetflora_addon.blender import scene_reader
 
 
 def _walked(frames: int, of: str) -> np.ndarray:
     """Places of the camera (frames, 3), one a frame."""
-
-    from examples import fly_through
 
     scene = bpy.context.scene
     fly_through.build(scene, frames=frames, of=of)
@@ -29,8 +30,6 @@ def _walked(frames: int, of: str) -> np.ndarray:
 
 @pytest.mark.parametrize("of", ["row80", "landscape"])
 def test_camera_walks_over_the_ground(clean_file, of):
-
-    from examples import fly_through
 
     places = _walked(25, of)
     steps = np.diff(places[:, :2], axis=0)
@@ -52,9 +51,6 @@ def test_walk_between_frames_is_straight(clean_file):
 
 def test_first_frame_of_the_row_is_its_still(clean_file):
 
-    from devtools import session
-    from examples import row80
-
     first = _walked(2, "row80")[0]
     session.clean_file()
     row80.build(bpy.context.scene)
@@ -67,7 +63,6 @@ def test_walk_through_the_landscape_is_clear_of_plants(clean_file):
     places = _walked(25, "landscape")
     plants = scene_reader.read_plants(bpy.context.scene, depsgraph(), bpy.context.view_layer).position
     away = np.linalg.norm(plants[None, :, :2] - places[:, None, :2], axis=2).min()
-    from mathutils.kdtree import KDTree
 
     tree = KDTree(len(plants))
     for number, place in enumerate(plants.tolist()):
@@ -78,8 +73,6 @@ def test_walk_through_the_landscape_is_clear_of_plants(clean_file):
 
 
 def test_unknown_scene_is_named(clean_file):
-
-    from examples import fly_through
 
     with pytest.raises(ValueError, match="no walk through 'sea'"):
         fly_through.build(bpy.context.scene, of="sea")

@@ -7,13 +7,12 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from examples import million
 from tests.blender.scenes import depsgraph
 from tetflora_addon.blender import scene_reader
 
 
 def test_forest_stands_as_it_is_described(clean_file, tmp_path):
-
-    from examples import million
 
     made = million.render_million(tmp_path / "forest.png", plants=600, width=64, samples=1)
     assert made["plants"] == 600

@@ -14,6 +14,13 @@ import numpy as np
 import pytest
 from PIL import Image as image  # noqa: N813 (a module)
 
+from devtools import session
+from examples.haze import add_haze
+from examples.paper import figure8, figure9, tables
+from examples.paper.__main__ import IMAGES, PAGE
+from tests.blender import renders
+from tetflora_addon.blender import compat
+
 
 @pytest.fixture
 def make(clean_file, tmp_path):
@@ -64,8 +71,6 @@ def test_figures_6_and_7_stored_and_deferred_are_all(make, tmp_path):
 
 
 def test_figure8_refines_from_picture_to_picture(make, tmp_path):
-    from examples.paper import figure8
-
     figures = make("figure8")
     early, last = figure8.SMALL_PASSES[0], figures["passes"]
     assert figures[f"tetrahedra_{early}"] < figures[f"tetrahedra_{last}"]
@@ -78,11 +83,6 @@ def test_figure8_refines_from_picture_to_picture(make, tmp_path):
 
 def test_figure9_is_hazy_as_koschmieder_says(make, tmp_path):
 
-    from devtools import session
-    from examples.haze import add_haze
-    from examples.paper import figure9
-    from tests.blender import renders
-
     figures = make("figure9")
     assert figures["plants"] == figure9.SMALL_PLANTS
     assert _shows_something(tmp_path / "images" / "paper-figure9.jpg")
@@ -92,7 +92,7 @@ def test_figure9_is_hazy_as_koschmieder_says(make, tmp_path):
     mesh = bpy.data.meshes.new("Ground")
     mesh.from_pydata([(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [], [(0, 1, 2, 3)])
     glow = bpy.data.materials.new("glow")
-    tree = renders.compat().shader_tree(glow)
+    tree = compat.shader_tree(glow)
     tree.nodes.clear()
     emission, output = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeOutputMaterial")
     tree.links.new(emission.outputs[0], output.inputs[0])
@@ -123,8 +123,6 @@ def _records(folder, figures: dict[str, dict[str, float]]) -> None:
 
 
 def test_tables_hold_what_was_measured_and_nothing_else_changes(tmp_path):
-    from examples.paper import tables
-
     page = tmp_path / "page.md"
     places = [f"<!-- measured: {name} -->\n\n<!-- end -->" for name in (*tables.TABLES, "machine")]
     page.write_text("Before.\n\n" + "\n\nBetween.\n\n".join(places) + "\n\nafter\n")
@@ -165,8 +163,6 @@ def test_tables_hold_what_was_measured_and_nothing_else_changes(tmp_path):
 
 
 def test_page_without_a_place_for_a_table_is_refused(tmp_path):
-    from examples.paper import tables
-
     page = tmp_path / "page.md"
     page.write_text("nothing\n")
     _records(tmp_path, {"figure4": {}})
@@ -176,9 +172,6 @@ def test_page_without_a_place_for_a_table_is_refused(tmp_path):
 
 
 def test_the_documentation_has_a_place_for_each_table_and_all_pictures():
-    from examples.paper import tables
-    from examples.paper.__main__ import IMAGES, PAGE
-
     page = PAGE.read_text(encoding="utf-8")
     for name in (*tables.TABLES, "machine"):
         assert tables._put(page, name, "here") != page

@@ -15,7 +15,9 @@ from pathlib import Path
 import bpy
 import pytest
 
+from benchmarks.compare import difference
 from devtools import session
+from examples import row80
 from tetflora_addon.blender import job, kept_results, scene_contents
 
 Run = Callable[..., subprocess.CompletedProcess]
@@ -26,8 +28,6 @@ PLANTS = 5
 @pytest.fixture(scope="module")
 def seeds(blender: object, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The file, saved by bpy before anything was refined."""
-
-    from examples import row80
 
     session.clean_file()
     scene = bpy.context.scene
@@ -76,8 +76,6 @@ def animation(run: Run, seeds: Path, tmp_path_factory: pytest.TempPathFactory) -
 
 def flip(reference: Path, test: Path) -> float:
     """Mean FLIP of two pictures."""
-    from benchmarks.compare import difference
-
     return difference(reference, test).flip
 
 

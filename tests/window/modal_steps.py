@@ -56,10 +56,7 @@ def steps(ui):
     yield from ui.until(lambda: any("Refining, pass" in message for message in messages), 60, "first pass")
     ui.press('RET')
     yield from ui.until(lambda: not running(ui), 60, "end after Return")
-    ui.values["stopped"] = {
-        "results": job.has_results(scene),
-        "complete": json.loads(scene.tetflora.statistics)["complete"],
-    }
+    ui.values["stopped"] = [job.has_results(scene), json.loads(scene.tetflora.statistics)["complete"]]
     job.clear(scene)
 
     odd = add_plant("odd", "quercus")
