@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Baked light: from what refinement made to what the camera sees of it, without a renderer (paper, section 7).
 
-What will be drawn is told first, as sheets (`SheetList`); then `baked_light` looks at the scene from all of its lights,
-and `BakedLight` answers for facets, spheres, shells and faces of meshes.
+What will be drawn is collected first, as sheets (`SheetList`); then `baked_light` looks at the scene from all its
+lights, and `BakedLight` answers for facets, spheres, shells and faces of meshes.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from .shading.shadow_pass import shadow_steps
 
 #: Attributes of baked light: linear radiance of the side to which normals point, and of the other side.
 FRONT, BACK = "tf_light_front", "tf_light_back"
-#: Facets and faces whose light is worked out together; some 2 kB each.
+#: Facets and faces whose light is computed together; some 2 kB each.
 AT_ONCE = 1 << 16
 #: Longer side in pixels of a lamp's buffer at most, with ground in it and without.
 GROUND_PIXELS, OPEN_PIXELS = 1024, 4096
-#: What is nearer to the camera than these shares of the farthest leaf is seen by suns in views of its own, if so many
-#: sheets are there.
-NEAR_SHARES, NEAR_SHEETS = (1 / 32, 1 / 8), 1000
+#: Suns see what is nearer to the camera than these fractions of the distance to the farthest leaf in views of its
+#: own, if so many sheets are there.
+NEAR_FRACTIONS, NEAR_SHEETS = (1 / 32, 1 / 8), 1000
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Sources:
 
 
 class SheetList:
-    """Small opaque surfaces as they are going to be drawn, in the order in which they are told."""
+    """Small opaque surfaces as they are going to be drawn, in the order in which they are added."""
 
     def __init__(self) -> None:
         self._parts: list[NDArray[np.float32]] = []
@@ -215,7 +215,7 @@ def baked_light(
     Yields
     ------
     float
-        Share that is done.
+        Fraction that is done.
     """
     corners, cell = made.corners(), cell_of_node(refinement)
     replaced = ~np.isin(refinement.decision, (Decision.PROXY, Decision.HIDDEN)) | facets
@@ -235,7 +235,7 @@ def baked_light(
         resolution = sheets.pixels((resolution // 2, most))
         if resolution == most and camera.kind != "ORTHO":
             away = np.linalg.norm(corners[:, 0] - camera.eye, axis=1)
-            radii = (share * away.max() for share in NEAR_SHARES)
+            radii = (fraction * away.max() for fraction in NEAR_FRACTIONS)
             near = Near(camera.eye, tuple(r for r in radii if (away < r).sum() >= NEAR_SHEETS))
     scene = sources.lights, sources.world, sources.occluders
     found = yield from shadow_steps(clouds, *scene, resolution, sources.ground, sheets=sheets, near=near)

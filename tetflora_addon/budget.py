@@ -86,7 +86,7 @@ def _fitted(
     weight: float,
     faces: float | None,
 ) -> tuple[Refinement, float]:
-    """Decisions and a side of facets, no less than the one given, where a facet counts as a share of a polygon."""
+    """Decisions and a side of facets, no less than the one given; a facet counts as ``weight`` polygons."""
     explicit = result.decision == Decision.EXPLICIT
     polygons = np.where(explicit, result.amounts.polygons, 0.0)
 

@@ -97,7 +97,7 @@ def _facets(
         contents = _in_detail(contents, explicit, result.in_view & ~hidden, transition)
     shares, coarse = facet_shares(flora), coarseness(result)
     every = []
-    for things, cell, row, sizes, share_of, make in (
+    for things, cell, row, sizes, fraction_of, make in (
         (
             contents.subplants,
             contents.subplant_cell,
@@ -116,8 +116,8 @@ def _facets(
         ),
     ):
         inside, side = result.in_view[cell], sizes.sides(facet_pixels)
-        share = share_of(row, sizes.whole_optical / np.maximum(side[0], 1e-12) ** 2)
-        wanted = _Wanted(*side, share, explicit[cell], inside & ~sizes.hidden)
+        fraction = fraction_of(row, sizes.whole_optical / np.maximum(side[0], 1e-12) ** 2)
+        wanted = _Wanted(*side, fraction, explicit[cell], inside & ~sizes.hidden)
         of_species = flora.rows["species"][row]
         order = np.argsort(of_species, kind="stable")
         first = np.searchsorted(of_species[order], np.arange(len(flora.species) + 1))
@@ -183,20 +183,20 @@ def _in_detail(
 class _Wanted:
     """What is asked of the facets of sub-plants or pieces (n,).
 
-    ``leaf`` and ``wood`` are the sides of facets, metres; ``share`` is that of the area which they have. ``explicit``
+    ``leaf`` and ``wood`` are the sides of facets, metres; ``fraction`` is that of the area that they have. ``explicit``
     says what is in tetrahedra of which polygons are made, and ``seen`` what the camera looks at.
     """
 
     leaf: NDArray[np.float64]
     wood: NDArray[np.float64]
-    share: NDArray[np.float64]
+    fraction: NDArray[np.float64]
     explicit: NDArray[np.bool_]
     seen: NDArray[np.bool_]
 
     @property
     def sizes(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Sides of facets of leaves and of wood, and the share of the area."""
-        return self.leaf, self.wood, self.share
+        """Sides of facets of leaves and of wood, and the fraction of the area."""
+        return self.leaf, self.wood, self.fraction
 
     def take(self, index: NDArray[np.integer]) -> _Wanted:
         """Selection by indices."""

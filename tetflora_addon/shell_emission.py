@@ -16,7 +16,7 @@ from .shading.shells import shell_buffers
 from .shading.summaries import extinction_matrices, summarise
 from .tetrahedra.geometry import volume
 
-#: By what share of its size a shell is smaller than its tetrahedron, at least and at most.
+#: Fraction of its size by which a shell is smaller than its tetrahedron, at least and at most.
 GAP, MOST_GAP = 1e-3, 0.05
 # Steps between neighbouring numbers of single precision by which faces stand apart at least.
 _STEPS = 8.0
@@ -61,5 +61,5 @@ def set_apart(
     away = vertices - middle
     inwards = np.maximum(np.abs(away).max(axis=(1, 2)) / 8.0, 1e-300)  # a slender one is about so thick
     step = np.abs(vertices).max(axis=(1, 2), initial=0.0) * np.finfo(np.float32).eps
-    share = np.clip(_STEPS * step / inwards, GAP, MOST_GAP)
-    return middle + away * (1.0 - share)[:, None, None], matrices / ((1.0 - share) ** 2)[:, None]
+    fraction = np.clip(_STEPS * step / inwards, GAP, MOST_GAP)
+    return middle + away * (1.0 - fraction)[:, None, None], matrices / ((1.0 - fraction) ** 2)[:, None]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The material of baked light: what the camera sees is emission that was worked out before, noise free.
+"""The material of baked light: the camera sees precomputed emission, free of noise.
 
 For all other rays it is the proxies' own material, so that ground and meshes get the light and the shadows of plants as
 ever. Nothing that it emits lights anything.
@@ -32,7 +32,7 @@ def baked_material() -> bpy.types.Material:
 
     Notes
     -----
-    Rays are told apart by Light Path: Is Camera Ray. EEVEE has only camera rays and shadows; its light probes and
+    Rays are distinguished by Light Path: Is Camera Ray. EEVEE has only camera rays and shadows; its light probes and
     reflections see the emission. Cycles must not sample the faces as lights, which they are not.
     """
 

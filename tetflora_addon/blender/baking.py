@@ -19,7 +19,7 @@ from .material_means import Looks
 from .scene_reader import read_occluders, renderable_objects
 from .world_reader import read_world
 
-#: Colour of ground that cannot be told.
+#: Colour of ground whose material cannot be read.
 _GROUND = (0.2, 0.2, 0.2)
 
 

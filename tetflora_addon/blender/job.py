@@ -72,7 +72,7 @@ def refine_steps(
     camera : Camera, optional
         In place of the scene's as it stands.
     given : Given, optional
-        What `read_scene` has said of it.
+        What `read_scene` returned for it.
     mark : str
         Comes after the names of results.
 

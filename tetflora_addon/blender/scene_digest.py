@@ -82,7 +82,7 @@ def choices(scene: bpy.types.Scene) -> list:
 
 
 def _digest_of_species(species: Species) -> str:
-    """Digest of a species; nothing changes one that is there, so it is worked out once."""
+    """Digest of a species; species never change, so it is computed once."""
     if id(species) not in _of_species:
         content = hashlib.sha256()
         digest_of(content, species)
