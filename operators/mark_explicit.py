@@ -5,7 +5,7 @@
 import bpy
 
 from ..tetflora_addon.blender.explicit_objects import SURFACE_TYPES
-from ..tetflora_addon.blender.plant_copies import may_instance
+from ..tetflora_addon.blender.view_layers import may_instance
 from .marking import Marking, action_property
 
 

@@ -5,7 +5,7 @@
 import bpy
 
 from ..operators.first_forest import TETFLORA_OT_first_forest
-from ..tetflora_addon.blender.scene_reader import has_contents
+from ..tetflora_addon.blender.view_layers import has_contents
 from .base import SidebarPanel
 
 _FEW = 200  # objects that are looked through at every movement of the mouse; who has more has begun

@@ -11,7 +11,7 @@ from ..tetflora_addon.blender import auto_refresh
 from ..tetflora_addon.blender.first_forest import is_first_forest
 from ..tetflora_addon.blender.handlers import render_errors
 from ..tetflora_addon.blender.output import KIND
-from ..tetflora_addon.blender.scene_reader import has_contents
+from ..tetflora_addon.blender.view_layers import has_contents
 from .base import SidebarPanel, draw_message, split_layout
 from .statistics_panel import rows_of
 

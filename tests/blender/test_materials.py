@@ -9,7 +9,7 @@ import pytest
 from devtools import session
 from tests.blender.renders import picture, small_scene
 from tetflora_addon import buffers, errors
-from tetflora_addon.blender import compat, materials, meshes, node_tools
+from tetflora_addon.blender import compat, materials, meshes, microsphere_material, node_tools, shell_material
 from tetflora_addon.plants import species
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -88,7 +88,7 @@ def test_leaves_return_what_they_are_said_to_on_the_mean_of_both_sides(transmiss
     upper = picture().mean(axis=(0, 1))
     made.rotation_euler = (0.0, np.pi, 0.0)
     lower = picture().mean(axis=(0, 1))
-    tint, gloss = np.array(materials.THROUGH_TINT[:3]), materials.GLOSS
+    tint, gloss = np.array(microsphere_material.THROUGH_TINT[:3]), materials.GLOSS
     wanted = (1.0 - gloss) * np.array([0.5, 0.4, 0.6]) * ((1.0 - transmission) + transmission * tint) + gloss
     np.testing.assert_allclose((upper + lower) / 2, wanted, rtol=0.01)
     if transmission < 1.0:
@@ -108,7 +108,7 @@ def test_a_leaf_lit_from_behind_shows_its_transmission_only():
     """The sun from below, S = π W/m²: radiance is colour times tint times share, times what gloss leaves."""
     small_scene(sky=0.0, samples=64, sun=180.0, size=32)
     sheet((0.2, 0.4, 0.1), 0.5, materials.leaf_material("Oak"))
-    tint = np.array(materials.THROUGH_TINT[:3])
+    tint = np.array(microsphere_material.THROUGH_TINT[:3])
     wanted = np.array([0.2, 0.4, 0.1]) * tint * 0.5 * (1.0 - materials.GLOSS)
     seen = picture()
     np.testing.assert_allclose(seen.mean(axis=(0, 1)), wanted, rtol=0.01)
@@ -188,7 +188,7 @@ def test_names_and_marks():
         materials.leaf_material("Oak"),
         materials.bark_material("Oak"),
         materials.proxy_material(),
-        materials.shell_material(),
+        shell_material.shell_material(),
         materials.scatter_group(),
     ]
     names = ["TetFlora Oak leaf", "TetFlora Oak bark", "TetFlora proxy", "TetFlora shell", "TetFlora Scatter"]

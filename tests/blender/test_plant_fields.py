@@ -16,7 +16,7 @@ from mathutils import Euler, Matrix, Vector
 from devtools import session
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
 from tetflora_addon import errors
-from tetflora_addon.blender import plant_fields, scene_contents, scene_reader
+from tetflora_addon.blender import plant_fields, scene_contents, scene_reader, view_layers
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -202,7 +202,7 @@ def test_nodes_instance_plants_and_fields(what):
     assert np.allclose(read.scale, 2.0)
     assert len(set(read.seed.tolist()) - {3}) == 3
     assert _plants().seed.tolist() == read.seed.tolist()
-    assert scene_reader.has_contents(bpy.context.scene)
+    assert view_layers.has_contents(bpy.context.scene)
     plant.hide_render = True
     with pytest.raises(errors.SceneError, match="No plants"):
         _plants()
@@ -363,10 +363,10 @@ def test_marking_and_removing():
 
 def test_a_field_alone_is_a_forest_for_renders_and_estimates():
     scene = bpy.context.scene
-    assert not scene_reader.has_contents(scene)
+    assert not view_layers.has_contents(scene)
     seeds = [1, 2, 3]
     field = _field(seed=('INT', seeds))
-    assert scene_reader.has_contents(scene)
+    assert view_layers.has_contents(scene)
     of_field = scene_contents.estimate(scene, depsgraph())
     bpy.data.objects.remove(field)
     for seed, place in zip(seeds, PLACES, strict=True):

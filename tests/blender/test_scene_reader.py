@@ -15,7 +15,7 @@ from mathutils import Vector
 from devtools import session
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph
 from tetflora_addon import errors
-from tetflora_addon.blender import camera_reader, scene_reader
+from tetflora_addon.blender import camera_reader, scene_reader, surfaces
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -29,7 +29,7 @@ def _plants():
 
 
 def _occluders():
-    return scene_reader.read_occluders(bpy.context.scene, depsgraph())
+    return surfaces.read_occluders(bpy.context.scene, depsgraph())
 
 
 @settings(

@@ -10,7 +10,7 @@ import pytest
 
 from devtools import session
 from tests.blender.scenes import add_camera, add_plant, datablocks, select
-from tetflora_addon.blender import scene_reader, species_preview
+from tetflora_addon.blender import species_preview, view_layers
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -94,7 +94,7 @@ def test_takes_no_part_in_refinement_rendering_or_clearing(preview):
     (shown,) = _objects()
     assert shown.hide_render
     assert shown.hide_select
-    assert not list(o for o in scene_reader.renderable_objects(bpy.context.view_layer) if o == shown)
+    assert not list(o for o in view_layers.renderable_objects(bpy.context.view_layer) if o == shown)
     bpy.ops.tetflora.refine()
     bpy.ops.tetflora.clear()
     assert [o.name for o in _objects()] == [shown.name]

@@ -15,7 +15,7 @@ import bpy
 from ..baked_emission import BACK, FRONT
 from ..shading.light_scattering import GLOSS
 from .compat import shader_tree
-from .materials import scatter_group
+from .microsphere_material import scatter_group
 from .node_tools import Graph, find_socket, get_or_create
 
 BAKED = "TetFlora baked"

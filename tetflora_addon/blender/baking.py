@@ -13,10 +13,13 @@ from numpy.typing import NDArray
 from ..baked_emission import AT_ONCE, BakedLight, SheetList, Sources, at_vertices, baked_attributes, baked_light
 from ..buffers import MeshBuffers
 from ..emission_forms import Refined
+from .attributes import read, write
 from .compat import tree_in_use
 from .light_reader import read_lights
 from .material_means import Looks
-from .scene_reader import read_occluders, renderable_objects
+from .meshes import face_offsets
+from .surfaces import read_occluders
+from .view_layers import renderable_objects
 from .world_reader import read_world
 
 #: Colour of ground whose material cannot be read.
@@ -104,14 +107,8 @@ class Baking:
 def _light_mesh(mesh: bpy.types.Mesh, light: BakedLight, first: int, rounded: bool) -> Iterator[float]:
     """Write the light of a mesh whose faces are the sheets from ``first`` on; at vertices where it is round."""
     faces = len(mesh.polygons)
-    positions = _values(mesh, "position", "vector", (len(mesh.vertices), 3))
-    corner_verts = _values(mesh, ".corner_vert", "value", (len(mesh.loops),), np.int32)
-    offsets = np.empty(faces + 1, np.int32)
-    starts = np.empty(faces, np.int32)
-    mesh.polygons.foreach_get("loop_start", starts)
-    offsets[:-1], offsets[-1] = starts, len(mesh.loops)
-    colour = _values(mesh, "tf_colour", "vector", (faces, 3))
-    transmission = _values(mesh, "tf_transmission", "value", (faces,))
+    positions, corner_verts, offsets = read(mesh, "position"), read(mesh, ".corner_vert"), face_offsets(mesh)
+    colour, transmission = read(mesh, "tf_colour"), read(mesh, "tf_transmission")
     front, back = np.zeros((2, faces, 3), np.float32)
     for start in range(0, faces, AT_ONCE):
         part = slice(start, min(start + AT_ONCE, faces))
@@ -122,11 +119,4 @@ def _light_mesh(mesh: bpy.types.Mesh, light: BakedLight, first: int, rounded: bo
     if rounded:
         front, back = (at_vertices(side, corner_verts, offsets, len(positions)) for side in (front, back))
     for name, (domain, values) in baked_attributes('POINT' if rounded else 'FACE', front, back).items():
-        layer = mesh.attributes.new(name, 'FLOAT_VECTOR', domain)
-        layer.data.foreach_set("vector", np.ascontiguousarray(values).reshape(-1))
-
-
-def _values(mesh: bpy.types.Mesh, name: str, field: str, shape: tuple[int, ...], dtype: type = np.float32) -> NDArray:
-    values = np.empty(int(np.prod(shape)), dtype)
-    mesh.attributes[name].data.foreach_get(field, values)
-    return values.reshape(shape)
+        write(mesh, name, values, domain)

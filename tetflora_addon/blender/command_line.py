@@ -20,12 +20,13 @@ from typing import Any
 import bpy
 
 from ..errors import SceneError, TetFloraError
-from . import farm_bundle, handlers, job
+from . import farm_bundle, job
 from .camera_reader import read_camera
 from .compat import EEVEE_ENGINES, eevee_engine
 from .farm_template import MOST_FRAME, Run, frame_numbers, frame_runs
 from .pictures import damaged
 from .properties import TetFloraScene
+from .runtime import failed_frames
 from .saved_files import write_blend
 from .scene_contents import estimate
 
@@ -228,7 +229,7 @@ def _animation(scene: bpy.types.Scene, run: Run) -> tuple[list[str], bool]:
     if first <= last:
         scene.frame_start, scene.frame_end, scene.frame_step = first, last, step
         bpy.ops.render.render(animation=True)
-        whole = whole and not handlers.render_errors()
+        whole = whole and not failed_frames
         names = [scene.render.frame_path(frame=n) for n in frame_numbers([(first, last, step)])]
         files += dict.fromkeys(names)  # all of a movie are one
     return files, whole
@@ -239,7 +240,7 @@ def _still(scene: bpy.types.Scene, path: str) -> tuple[str, bool]:
     before, scene.render.filepath = scene.render.filepath, path
     bpy.ops.render.render(write_still=True)
     scene.render.filepath = before
-    return bpy.path.ensure_ext(path, scene.render.file_extension), not handlers.render_errors()
+    return bpy.path.ensure_ext(path, scene.render.file_extension), not failed_frames
 
 
 def _named(text: str) -> Path:

@@ -9,15 +9,23 @@ import bpy
 from ..buffers import MeshBuffers, PointBuffers
 from ..plants.species import Species
 from .meshes import write_mesh
-from .node_tools import is_own, tag
-from .output import KIND, PARENT, dress, dress_collection, keep_materials, mark_runtime, parent_of
+from .node_tools import tag
+from .output import (
+    KIND,
+    PURPOSE,
+    dress,
+    dress_collection,
+    keep_materials,
+    mark_runtime,
+    parent_of,
+    remove_collection,
+    result_collections,
+)
 from .point_clouds import point_object
 
-#: Custom property of a result collection: 'VIEW' for what the artist keeps, 'RENDER' for what lives while rendering.
-PURPOSE = "tetflora_purpose"
 #: Bytes of a name that Blender 4.5 takes (5.0 takes more), but for those with which it tells the same names apart.
 _LONGEST = 59
-#: And on those that are being made.
+#: Custom property of those that are being made.
 UNFINISHED = "tetflora_unfinished"
 NAMES = {'VIEW': "TetFlora", 'RENDER': "TetFlora render"}
 
@@ -108,12 +116,6 @@ class Results:
             self.collection = None
 
 
-def result_collections(scene: bpy.types.Scene, purpose: str | None = None) -> list[bpy.types.Collection]:
-    """Result collections of a scene, of one purpose or of all; those that are linked from other files are none."""
-    made = [c for c in scene.collection.children if is_own(c) and PURPOSE in c]
-    return [c for c in made if purpose is None or c[PURPOSE] == purpose]
-
-
 def dress_results(scene: bpy.types.Scene) -> None:
     """Bring the artist's results of a scene in step with its output settings."""
     for collection in result_collections(scene, 'VIEW'):
@@ -138,46 +140,3 @@ def leave_out_of_file() -> None:
             mark_runtime(collection, runtime)
             if runtime and collection[PURPOSE] == 'VIEW':
                 keep_materials(collection)
-
-
-def remove_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) -> int:
-    """Remove results, be they linked to the scene or not; returns the number of datablocks removed."""
-    data, objects, groups = [], [], set()
-    for held in list(collection.objects):
-        if is_own(held) and held.get(KIND) == PARENT and len(held.users_collection) > 1:
-            continue  # other results have it too
-        if is_own(held):
-            objects.append(held)
-            if held.data is not None and is_own(held.data):
-                data.append(held.data)
-            groups |= {m.node_group for m in held.modifiers if m.type == 'NODES' and m.node_group is not None}
-        elif held.name not in scene.collection.objects:
-            scene.collection.objects.link(held)  # the artist put it here; it stays in the scene
-    for child in list(collection.children):
-        if child.name not in scene.collection.children:
-            scene.collection.children.link(child)
-    materials = {m for d in data for m in d.materials if m is not None and is_own(m)}
-    removed = [*objects, *(d for d in data if d.users <= 1), collection]
-    bpy.data.batch_remove(removed)
-    return len(removed) + _remove_unused(materials, groups)
-
-
-def _remove_unused(materials: set[bpy.types.Material], groups: set[bpy.types.NodeTree]) -> int:
-    """Remove groups and materials of ours that nothing uses any more, and the node groups of these."""
-    removed = _remove_groups(groups)  # first: groups of geometry nodes use materials
-    unused = [m for m in materials if m.users == 0]
-    groups = {n.node_tree for m in unused for n in m.node_tree.nodes if n.type == 'GROUP' and n.node_tree is not None}
-    bpy.data.batch_remove(unused)
-    return removed + len(unused) + _remove_groups(groups)
-
-
-def _remove_groups(groups: set[bpy.types.NodeTree]) -> int:
-    removed = 0
-    while True:
-        empty = [g for g in groups if g.users == 0 and is_own(g)]
-        if not empty:
-            return removed
-        inner = {n.node_tree for g in empty for n in g.nodes if n.type == 'GROUP' and n.node_tree is not None}
-        groups = (groups - set(empty)) | inner
-        bpy.data.batch_remove(empty)
-        removed += len(empty)

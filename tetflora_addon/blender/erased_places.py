@@ -10,23 +10,23 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 
+import bpy
 import numpy as np
 from numpy.typing import NDArray
 
 from ..planting.ground import Path
-from .population_properties import TetFloraPopulation
 
 _DIGITS = 4  # tenths of a millimetre
 
 
-def note_erased(population: TetFloraPopulation, middles: NDArray[np.float64] | Sequence, radius: float) -> None:
+def note_erased(population: bpy.types.PropertyGroup, middles: NDArray[np.float64] | Sequence, radius: float) -> None:
     """Let circles on the map, with middles (n, 2) or more columns, stay bare; metres."""
     flat = np.round(np.asarray(middles, dtype=np.float64)[:, :2], _DIGITS).ravel().tolist()
     strokes = [*_strokes(population), [round(radius, _DIGITS), *flat]]
     population.erased = json.dumps(strokes, separators=(",", ":"))
 
 
-def erased_places(population: TetFloraPopulation) -> tuple[Path, ...]:
+def erased_places(population: bpy.types.PropertyGroup) -> tuple[Path, ...]:
     """What stays bare, as lines of one point."""
     return tuple(
         Path(middle[None], stroke[0])
@@ -35,5 +35,5 @@ def erased_places(population: TetFloraPopulation) -> tuple[Path, ...]:
     )
 
 
-def _strokes(population: TetFloraPopulation) -> list[list[float]]:
+def _strokes(population: bpy.types.PropertyGroup) -> list[list[float]]:
     return json.loads(population.erased) if population.erased else []

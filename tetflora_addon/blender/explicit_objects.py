@@ -23,9 +23,8 @@ from .attributes import members, read, values_of
 from .material_means import Looks
 from .meshes import face_offsets
 from .node_tools import is_ours
-from .plant_copies import may_instance
-from .scene_reader import renderable_objects
 from .transforms import world_matrix
+from .view_layers import may_instance, renderable_objects
 
 #: What `is_explicit` looks like to the artist.
 PROPERTY = {

@@ -15,8 +15,8 @@ from ..planting.ground import Path, Terrain
 from .attributes import members, read, values_of
 from .ground_curves import Line, lines_of
 from .image_pixels import image_pixels
-from .plant_objects import objects_within
 from .transforms import world_matrix
+from .view_layers import objects_within
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec. 709
 

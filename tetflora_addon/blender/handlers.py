@@ -30,12 +30,12 @@ from .hiding import (
 )
 from .migration import migrate
 from .output import KIND, adopt_materials, release_materials
-from .runtime import Handlers, Listeners, complain
+from .runtime import Handlers, Listeners, complain, failed_frames
 from .scene_contents import read_scene
-from .scene_reader import NoPlantsError, has_contents
+from .scene_reader import NoPlantsError
 from .shell_bounces import raise_bounces
 from .species_edits import looked_at_once
-from .view_layers import show_in, view_layer_groups
+from .view_layers import has_contents, show_in, view_layer_groups
 
 
 @dataclass
@@ -48,7 +48,6 @@ class _Rendering:
     bounces: dict[str, dict[str, int]] = field(default_factory=dict)  # of Cycles, as they were, by name of the scene
     outer: str = ""  # scene that is rendered; those that its sequencer shows begin and end renders of their own
     scenes: list[str] = field(default_factory=list)  # all of these
-    errors: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
 
@@ -59,19 +58,19 @@ nothing_refined = Listeners()
 
 def render_errors() -> list[str]:
     """Messages of all frames of the last render that went without their plants."""
-    return list(_rendering.errors)
+    return list(failed_frames)
 
 
 def forget_render_errors() -> None:
     """What stood in the way of the last render is gone: Refine has made the plants."""
-    _rendering.errors.clear()
+    failed_frames.clear()
 
 
 def on_render_init(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     """A render starts: earlier errors are past, unless it is part of another one."""
     if _rendering.outer not in {"", scene.name}:
         return
-    _rendering.errors.clear()
+    failed_frames.clear()
     _rendering.warnings.clear()
 
 
@@ -157,7 +156,7 @@ def on_load_post(_path: object, _other: object = None) -> None:
     _rendering.bounces.clear()
     _rendering.hidden.clear()
     _rendering.lifted.clear()
-    _rendering.errors.clear()
+    failed_frames.clear()
     kept_results.forget_names()
     unpack_override_marks()
     show_left_over()
@@ -247,7 +246,7 @@ def _warn(scene: bpy.types.Scene) -> None:
 
 def _complain(scene: bpy.types.Scene, message: str) -> None:
     text = f"frame {scene.frame_current} was rendered without plants: {message}"
-    _rendering.errors.append(text)
+    failed_frames.append(text)
     complain(text)
 
 

@@ -15,9 +15,8 @@ from contextlib import contextmanager
 
 import bpy
 
-from .emit import PURPOSE, remove_collection, result_collections
 from .node_tools import is_own, untag
-from .output import KIND, PARENT, mark_runtime
+from .output import KIND, PARENT, PURPOSE, mark_runtime, remove_collection, result_collections
 
 #: Custom properties of objects that results stand for, as JSON: hide_render and hide_viewport as they were before
 #: ("flags"), and the names of the scenes whose results they are ("scenes"). Results of a render come last and go first.

@@ -19,8 +19,8 @@ import numpy as np
 from ..refinement.camera import Camera
 from ..refinement.view_cells import Around, ViewCells, cell_camera
 from .camera_reader import read_camera
-from .emit import remove_collection, result_collections
 from .hiding import hidden_originals, hide_originals, show_originals
+from .output import remove_collection, result_collections
 from .plant_kinds import species_of
 from .proxies import shade_again
 from .scene_contents import Given

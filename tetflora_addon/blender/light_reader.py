@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from ..refinement.light_views import Light
 from .compat import tree_in_use
-from .scene_reader import renderable_objects
 from .transforms import world_matrix
+from .view_layers import renderable_objects
 
 
 def read_lights(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> tuple[Light, ...]:

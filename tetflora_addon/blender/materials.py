@@ -6,12 +6,11 @@ from __future__ import annotations
 
 import bpy
 
-from ..shading.light_scattering import GLOSS, GLOSS_ROUGHNESS
+from ..shading.light_scattering import GLOSS
 from .bark_material import BARKS, bark_group, bark_version, smooth_step
 from .compat import disable_bump_correction, shader_tree
-from .microsphere_material import THROUGH_TINT
+from .microsphere_material import scatter_group
 from .node_tools import Graph, add_socket, find_socket, get_or_create, new_group
-from .shell_material import shell_material
 
 __all__ = [
     "BARKS",
@@ -19,23 +18,19 @@ __all__ = [
     "leaf_material",
     "proxy_material",
     "scatter_group",
-    "shell_material",
     "sphere_material",
 ]
 
-SCATTER = "TetFlora Scatter"
 BLADE = "TetFlora Leaf Blade"
 PROXY = "TetFlora proxy"
 SPHERE = "TetFlora microsphere"
 
 # Raise these when what they count changes: existing files then get the new nodes beside the old ones.
-_SCATTER_VERSION = 2
 _LEAF_VERSION = 2
 _BLADE_VERSION = 1
 _PROXY_VERSION = 2
 _SPHERE_VERSION = 1
 
-WHITE = (1.0, 1.0, 1.0, 1.0)
 
 # How much more than the mean of both sides a leaf's underside reflects, and the upper side less: fewer pigments lie
 # under its surface, hence most in blue, of which a leaf has least.
@@ -46,44 +41,6 @@ MIDRIB, VEINS = 0.45, 0.2
 _VEIN_COUNT, _VEIN_SLOPE = 9.0, 0.65
 # Transmission under which leaves show no veins (needles, scales), and over which they show all.
 _OPAQUE, _THIN = 0.15, 0.35
-
-
-def scatter_group() -> bpy.types.NodeTree:
-    """The group "TetFlora Scatter": a thin sheet that reflects and transmits, lit from both sides.
-
-    Returns
-    -------
-    bpy.types.NodeTree
-        Inputs Colour, Transmission, Reflected Tint, Through Tint, Gloss, Gloss Roughness, Normal; output Shader. Of the
-        light that arrives, (1 − Gloss) · Colour is scattered, evenly over the side of the light or, for the share
-        Transmission, over the other side, each times its tint; Gloss is mirrored. No more comes out than went in.
-    """
-
-    def build(tree: bpy.types.NodeTree) -> None:
-        unit = (0.0, 1.0)
-        add_socket(tree, "Colour", "NodeSocketColor", (0.1, 0.25, 0.05, 1.0))
-        add_socket(tree, "Transmission", "NodeSocketFloat", 0.0, unit, "Fraction of scattered light that passes")
-        add_socket(tree, "Reflected Tint", "NodeSocketColor", WHITE, None, "Multiplies the color of reflected light")
-        add_socket(tree, "Through Tint", "NodeSocketColor", THROUGH_TINT, None, "Multiplies the color of passing light")
-        add_socket(tree, "Gloss", "NodeSocketFloat", GLOSS, unit, "Fraction of light that is reflected")
-        add_socket(tree, "Gloss Roughness", "NodeSocketFloat", GLOSS_ROUGHNESS, unit)
-        add_socket(tree, "Normal", "NodeSocketVector", None, None, "Must be linked, for example to Geometry")
-        tree.interface.new_socket(name="Shader", in_out='OUTPUT', socket_type="NodeSocketShader")
-        graph = Graph(tree)
-        given = graph.node("NodeGroupInput").outputs
-        colour, normal = given["Colour"], given["Normal"]
-        back = graph.tinted(colour, given["Reflected Tint"])
-        reflected = graph.node("ShaderNodeBsdfDiffuse", {"Color": back, "Normal": normal})
-        through = graph.tinted(colour, given["Through Tint"])
-        transmitted = graph.node("ShaderNodeBsdfTranslucent", {"Color": through, "Normal": normal})
-        sheet = graph.mix(given["Transmission"], reflected, transmitted)
-        roughness = given["Gloss Roughness"]
-        gloss = graph.node("ShaderNodeBsdfAnisotropic", {"Color": WHITE, "Roughness": roughness, "Normal": normal})
-        result = graph.mix(given["Gloss"], sheet, gloss)
-        graph.node("NodeGroupOutput", {"Shader": result})
-        graph.arrange()
-
-    return get_or_create(bpy.data.node_groups, SCATTER, _SCATTER_VERSION, new_group, build)
 
 
 def blade_group() -> bpy.types.NodeTree:

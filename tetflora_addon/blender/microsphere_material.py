@@ -14,12 +14,16 @@ from typing import Any
 import bpy
 
 from ..shading import light_scattering
+from ..shading.light_scattering import GLOSS, GLOSS_ROUGHNESS
 from .node_tools import Graph, add_socket, get_or_create, new_group
 
 MICROSPHERE = "TetFlora Microsphere"
+SCATTER = "TetFlora Scatter"
 
 _VERSION = 1
+_SCATTER_VERSION = 2
 
+WHITE = (1.0, 1.0, 1.0, 1.0)
 #: The engine's, as a colour of a socket.
 THROUGH_TINT = (*light_scattering.THROUGH_TINT.tolist(), 1.0)
 
@@ -204,3 +208,41 @@ def _sum(graph: Graph, shaders: list[Any]) -> bpy.types.NodeSocket:
     for shader in shaders[1:]:
         total = graph.node("ShaderNodeAddShader", {"Shader": total, "Shader_001": shader}).outputs[0]
     return total
+
+
+def scatter_group() -> bpy.types.NodeTree:
+    """The group "TetFlora Scatter": a thin sheet that reflects and transmits, lit from both sides.
+
+    Returns
+    -------
+    bpy.types.NodeTree
+        Inputs Colour, Transmission, Reflected Tint, Through Tint, Gloss, Gloss Roughness, Normal; output Shader. Of the
+        light that arrives, (1 − Gloss) · Colour is scattered, evenly over the side of the light or, for the share
+        Transmission, over the other side, each times its tint; Gloss is mirrored. No more comes out than went in.
+    """
+
+    def build(tree: bpy.types.NodeTree) -> None:
+        unit = (0.0, 1.0)
+        add_socket(tree, "Colour", "NodeSocketColor", (0.1, 0.25, 0.05, 1.0))
+        add_socket(tree, "Transmission", "NodeSocketFloat", 0.0, unit, "Fraction of scattered light that passes")
+        add_socket(tree, "Reflected Tint", "NodeSocketColor", WHITE, None, "Multiplies the color of reflected light")
+        add_socket(tree, "Through Tint", "NodeSocketColor", THROUGH_TINT, None, "Multiplies the color of passing light")
+        add_socket(tree, "Gloss", "NodeSocketFloat", GLOSS, unit, "Fraction of light that is reflected")
+        add_socket(tree, "Gloss Roughness", "NodeSocketFloat", GLOSS_ROUGHNESS, unit)
+        add_socket(tree, "Normal", "NodeSocketVector", None, None, "Must be linked, for example to Geometry")
+        tree.interface.new_socket(name="Shader", in_out='OUTPUT', socket_type="NodeSocketShader")
+        graph = Graph(tree)
+        given = graph.node("NodeGroupInput").outputs
+        colour, normal = given["Colour"], given["Normal"]
+        back = graph.tinted(colour, given["Reflected Tint"])
+        reflected = graph.node("ShaderNodeBsdfDiffuse", {"Color": back, "Normal": normal})
+        through = graph.tinted(colour, given["Through Tint"])
+        transmitted = graph.node("ShaderNodeBsdfTranslucent", {"Color": through, "Normal": normal})
+        sheet = graph.mix(given["Transmission"], reflected, transmitted)
+        roughness = given["Gloss Roughness"]
+        gloss = graph.node("ShaderNodeBsdfAnisotropic", {"Color": WHITE, "Roughness": roughness, "Normal": normal})
+        result = graph.mix(given["Gloss"], sheet, gloss)
+        graph.node("NodeGroupOutput", {"Shader": result})
+        graph.arrange()
+
+    return get_or_create(bpy.data.node_groups, SCATTER, _SCATTER_VERSION, new_group, build)

@@ -21,6 +21,8 @@ KIND = "tetflora_kind"
 SPECIES = "tetflora_species"
 MATERIAL = "tetflora_material"
 PARENT = "species"
+#: Custom property of a result collection: 'VIEW' for what the artist keeps, 'RENDER' for what lives while rendering.
+PURPOSE = "tetflora_purpose"
 _KEPT = "tetflora_kept"  # on materials that a file keeps for the results that it does not hold
 #: Kinds of which a species' materials can be replaced.
 REPLACED = ("leaf", "blossom", "bark")
@@ -150,3 +152,52 @@ def release_materials() -> None:
         if material.library is None and material.get(_KEPT):
             material.use_fake_user = False
             del material[_KEPT]
+
+
+def result_collections(scene: bpy.types.Scene, purpose: str | None = None) -> list[bpy.types.Collection]:
+    """Result collections of a scene, of one purpose or of all; those that are linked from other files are none."""
+    made = [c for c in scene.collection.children if is_own(c) and PURPOSE in c]
+    return [c for c in made if purpose is None or c[PURPOSE] == purpose]
+
+
+def remove_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) -> int:
+    """Remove results, be they linked to the scene or not; returns the number of datablocks removed."""
+    data, objects, groups = [], [], set()
+    for held in list(collection.objects):
+        if is_own(held) and held.get(KIND) == PARENT and len(held.users_collection) > 1:
+            continue  # other results have it too
+        if is_own(held):
+            objects.append(held)
+            if held.data is not None and is_own(held.data):
+                data.append(held.data)
+            groups |= {m.node_group for m in held.modifiers if m.type == 'NODES' and m.node_group is not None}
+        elif held.name not in scene.collection.objects:
+            scene.collection.objects.link(held)  # the artist put it here; it stays in the scene
+    for child in list(collection.children):
+        if child.name not in scene.collection.children:
+            scene.collection.children.link(child)
+    materials = {m for d in data for m in d.materials if m is not None and is_own(m)}
+    removed = [*objects, *(d for d in data if d.users <= 1), collection]
+    bpy.data.batch_remove(removed)
+    return len(removed) + _remove_unused(materials, groups)
+
+
+def _remove_unused(materials: set[bpy.types.Material], groups: set[bpy.types.NodeTree]) -> int:
+    """Remove groups and materials of ours that nothing uses any more, and the node groups of these."""
+    removed = _remove_groups(groups)  # first: groups of geometry nodes use materials
+    unused = [m for m in materials if m.users == 0]
+    groups = {n.node_tree for m in unused for n in m.node_tree.nodes if n.type == 'GROUP' and n.node_tree is not None}
+    bpy.data.batch_remove(unused)
+    return removed + len(unused) + _remove_groups(groups)
+
+
+def _remove_groups(groups: set[bpy.types.NodeTree]) -> int:
+    removed = 0
+    while True:
+        empty = [g for g in groups if g.users == 0 and is_own(g)]
+        if not empty:
+            return removed
+        inner = {n.node_tree for g in empty for n in g.nodes if n.type == 'GROUP' and n.node_tree is not None}
+        groups = (groups - set(empty)) | inner
+        bpy.data.batch_remove(empty)
+        removed += len(empty)

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ..plants.hashing import child_key, key_of_seed
 from .attributes import read, values_of
 from .transforms import world_matrix
+from .view_layers import has_nodes
 
 _ONE_BY_ONE = {'VERTS', 'FACES'}  # ways to instance whose places only Blender knows
 
@@ -48,16 +49,6 @@ class Copies:
 
 class _OneByOne(Exception):
     """Something is instanced in a way that has no arrays."""
-
-
-def has_nodes(obj: bpy.types.Object) -> bool:
-    """Whether geometry nodes may instance something on an object, or make points of it."""
-    return any(modifier.type == 'NODES' for modifier in obj.modifiers)
-
-
-def may_instance(obj: bpy.types.Object) -> bool:
-    """Whether an object may stand for others."""
-    return obj.is_instancer or has_nodes(obj)
 
 
 def copies_of(objects: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> list[Copies]:

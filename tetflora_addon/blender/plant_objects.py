@@ -293,16 +293,6 @@ def reseed(objects: Iterable[bpy.types.Object], roll: int = 0) -> int:
     return len(plants)
 
 
-def objects_within(collection: bpy.types.Collection) -> list[bpy.types.Object]:
-    """Objects of a collection and of those within it, each once.
-
-    What ``Collection.all_objects`` says; but that fills a cache which Blender 4.5 to 5.2 leaves stale at undo, and the
-    next undo, or reading it, may then end in a crash.
-    """
-    homes = [collection, *collection.children_recursive]
-    return list(dict.fromkeys(obj for home in homes for obj in home.objects))
-
-
 def remove_plants(objects: Iterable[bpy.types.Object]) -> int:
     """Delete plants from the file, and the collection for plants if that leaves it empty; how many there were."""
     plants = [o for o in plants_of(objects) if o.library is None]

@@ -16,14 +16,14 @@ from .erased_places import erased_places
 from .ground_reader import read_ground
 from .plant_fields import fields_of, read_field
 from .plant_kinds import species_of
-from .plant_objects import objects_within, plants_of
-from .population_properties import TetFloraPopulation
+from .plant_objects import plants_of
 from .population_rules import rules_from, unknown_species
 from .species_items import catalogue
 from .transforms import world_matrix
+from .view_layers import objects_within
 
 
-def grounds_of(scene: bpy.types.Scene, population: TetFloraPopulation) -> list[bpy.types.Object]:
+def grounds_of(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> list[bpy.types.Object]:
     """Meshes of the scene that a population grows on.
 
     What was deleted from the scene does not count, although the population's pointer keeps it in the file.
@@ -38,7 +38,7 @@ def grounds_of(scene: bpy.types.Scene, population: TetFloraPopulation) -> list[b
 def place_population(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
-    population: TetFloraPopulation,
+    population: bpy.types.PropertyGroup,
     own: Collection[bpy.types.Object],
     grounds: Sequence[bpy.types.Object] | None = None,
     most: int | None = None,

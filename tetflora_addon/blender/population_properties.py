@@ -19,14 +19,13 @@ from bpy.props import (
 from ..planting.rules import Companion, Rules
 from ..setting import LENGTH
 from .generated import properties_of
+from .population_rules import EMPTIES_UNASKED
 from .runtime import Listeners
 from .species_choice import SpeciesChoice
 from .species_items import items_for, number_of
 
 #: Most plants that Populate creates as objects.
 MOST_EMPTIES = 100_000
-#: Up to this many become empties if nobody says otherwise; beyond, Blender becomes slow.
-EMPTIES_UNASKED = 10_000
 STORAGE_ITEMS = (
     ('AUTOMATIC', "Automatic", f"Empties up to {EMPTIES_UNASKED:,} plants, a field for more", 0),
     ('EMPTIES', "Empties", "One object per plant. Each can be moved on its own; many slow Blender down", 1),

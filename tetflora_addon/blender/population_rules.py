@@ -12,9 +12,10 @@ from typing import Any
 import bpy
 
 from ..planting.rules import Companion, Rules
-from .population_properties import EMPTIES_UNASKED, TetFloraMixEntry, TetFloraPopulation
 from .species_items import catalogue, default_species
 
+#: Up to this many become empties if nobody says otherwise; beyond, Blender becomes slow.
+EMPTIES_UNASKED = 10_000
 #: Square metres of the area that densities are counted on: foresters count trees by the hectare.
 HECTARE = 10_000.0
 #: What a population is and what became of it; all else are settings, which can be copied and written to files.
@@ -30,14 +31,14 @@ def settings_of(group: type[bpy.types.PropertyGroup] | bpy.types.PropertyGroup) 
     return [p for p in group.bl_rna.properties if p.identifier not in IDENTITY]
 
 
-def fingerprint(population: TetFloraPopulation) -> str:
+def fingerprint(population: bpy.types.PropertyGroup) -> str:
     """A short text that is another one when settings are; what is left at its default does not count.
 
     So a setting that comes with another version changes nothing of populations that do not use it.
     """
     values: list[Any] = [[e.object.name_full for e in population.grounds if e.object is not None]]
     values += [[getattr(entry, name) for name in _ENTRY] for entry in population.mix]
-    for name, default in _defaults():
+    for name, default in _defaults(type(population)):
         value = getattr(population, name)
         if isinstance(value, bpy.types.ID):
             value = value.name_full
@@ -47,25 +48,25 @@ def fingerprint(population: TetFloraPopulation) -> str:
 
 
 @lru_cache(maxsize=1)
-def _defaults() -> tuple[tuple[str, Any], ...]:
+def _defaults(kind: type[bpy.types.PropertyGroup]) -> tuple[tuple[str, Any], ...]:
     """Names and defaults of settings that are single values; kept, because panels ask at every redraw."""
-    simple = [p for p in settings_of(TetFloraPopulation) if p.type != 'COLLECTION']
+    simple = [p for p in settings_of(kind) if p.type != 'COLLECTION']
     return tuple((p.identifier, None if p.type == 'POINTER' else p.default) for p in simple)
 
 
-def is_outdated(population: TetFloraPopulation) -> bool:
+def is_outdated(population: bpy.types.PropertyGroup) -> bool:
     """Whether an update would place by other settings than those by which the plants stand; grounds are not read."""
     return bool(population.placed_by) and not population.frozen and population.placed_by != fingerprint(population)
 
 
-def awaits_update(population: TetFloraPopulation) -> bool:
+def awaits_update(population: bpy.types.PropertyGroup) -> bool:
     """Whether a population has no plants yet, or others than an update would give it."""
     if not population.uid or population.frozen:
         return False
     return not population.made or not population.placed_by or is_outdated(population)
 
 
-def copy_settings(source: TetFloraPopulation, target: TetFloraPopulation) -> None:
+def copy_settings(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
     """Give a population the settings of another; identity, grounds and plants stay its own."""
     for prop in settings_of(source):
         if prop.type != 'COLLECTION':
@@ -77,25 +78,25 @@ def copy_settings(source: TetFloraPopulation, target: TetFloraPopulation) -> Non
         copy_companion(entry, new)
 
 
-def copy_companion(source: TetFloraMixEntry, target: TetFloraMixEntry) -> None:
+def copy_companion(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
     """Let one species stand to others as another entry says."""
     for name in ("companion", "companion_strength", "companion_distance"):
         setattr(target, name, getattr(source, name))
 
 
-def active_population(scene: bpy.types.Scene) -> TetFloraPopulation | None:
+def active_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None:
     """The population that buttons act on; None where there is none."""
     settings = scene.tetflora
     number = settings.populations_index
     return settings.populations[number] if 0 <= number < len(settings.populations) else None
 
 
-def shown_population(scene: bpy.types.Scene) -> TetFloraPopulation:
+def shown_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup:
     """What the panel shows: the active population, or the settings for new ones where there is none."""
     return active_population(scene) or scene.tetflora.populate
 
 
-def rules_from(population: TetFloraPopulation) -> tuple[Rules, tuple[str, ...]]:
+def rules_from(population: bpy.types.PropertyGroup) -> tuple[Rules, tuple[str, ...]]:
     """A population's settings as the engine takes them, and the species that its shares count through.
 
     Companions that are none of the mixture's species follow it with a share of 0.
@@ -129,12 +130,12 @@ def rules_from(population: TetFloraPopulation) -> tuple[Rules, tuple[str, ...]]:
     return rules, species
 
 
-def makes_field(population: TetFloraPopulation, number: int) -> bool:
+def makes_field(population: bpy.types.PropertyGroup, number: int) -> bool:
     """Whether so many plants of a population are made as one field."""
     return population.as_field == 'FIELD' or (population.as_field == 'AUTOMATIC' and number > EMPTIES_UNASKED)
 
 
-def unknown_species(population: TetFloraPopulation) -> list[str]:
+def unknown_species(population: bpy.types.PropertyGroup) -> list[str]:
     """Species of a population that the catalogue does not have."""
     known = catalogue()
     return [e.species for e in population.mix if e.species and e.species not in known]

@@ -10,6 +10,9 @@ from collections.abc import Callable
 import bpy
 from bpy.app.handlers import persistent
 
+#: Errors of the last render: a text for each frame that was rendered without its plants.
+failed_frames: list[str] = []
+
 
 class Handlers:
     """Functions that Blender calls, which stay when another file is loaded.

@@ -24,7 +24,8 @@ from .hiding import originals_shown
 from .leaf_forms import resolved_species
 from .light_reader import read_lights
 from .proxy_forms import form_of
-from .scene_reader import NoPlantsError, read_occluders, read_plants
+from .scene_reader import NoPlantsError, read_plants
+from .surfaces import read_occluders
 from .wind_properties import wind_of
 
 

@@ -5,8 +5,6 @@
 Only here and in `plant_copies` does TetFlora loop over objects; what comes out are plain arrays.
 """
 
-from collections.abc import Iterator
-
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -14,16 +12,13 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from ..plants.hashing import child_key, key_of_seed
 from ..plants.seeds import Seeds
-from .plant_copies import Copies, copies_of, may_instance
+from .plant_copies import Copies, copies_of
 from .plant_fields import Plants, read_field
 from .plant_kinds import kind_of, species_of
 from .species_items import catalogue
-from .surfaces import mesh_triangles
 from .transforms import frames_of, world_matrix
+from .view_layers import may_instance, renderable_objects
 
-_OCCLUDER_REMEDY = (
-    "an occluder must be a mesh with faces. Add faces, or turn off Occluder in the TetFlora tab of the sidebar"
-)
 _NAMED = 3  # objects that a message names before it only counts
 
 
@@ -158,66 +153,6 @@ def _merged(read: list[Plants]) -> Seeds:
 def _one(arrays: list[NDArray]) -> NDArray:
     # Millions of frames are not copied where there is nothing to join.
     return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
-
-
-def read_occluders(
-    _scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer | None = None
-) -> NDArray[np.float64]:
-    """Triangles of all meshes of a view layer that are marked as hiding plants and render.
-
-    Parameters
-    ----------
-    view_layer : bpy.types.ViewLayer or None
-        None takes the one that the depsgraph was made for.
-
-    Returns
-    -------
-    (t, 3, 3) float64
-        Corners in world space, metres; ``(0, 3, 3)`` if there are none.
-
-    Raises
-    ------
-    SceneError
-        One of them has no faces or is no longer a mesh.
-    """
-    marked = [o for o in renderable_objects(view_layer or depsgraph.view_layer) if o.tetflora.is_occluder]
-    marked.sort(key=lambda o: o.name_full)
-    return np.concatenate([np.zeros((0, 3, 3)), *(mesh_triangles(o, depsgraph, _OCCLUDER_REMEDY) for o in marked)])
-
-
-def renderable_objects(view_layer: bpy.types.ViewLayer) -> Iterator[bpy.types.Object]:
-    """Objects of a view layer that render: neither they nor all of their collections are hidden in renders."""
-    seen: set[int] = set()
-    open_layers = [view_layer.layer_collection]
-    while open_layers:
-        layer = open_layers.pop()
-        if layer.exclude or layer.collection.hide_render:
-            # Children of an excluded collection can be included again, those of a hidden one cannot be shown.
-            open_layers += [] if layer.collection.hide_render else list(layer.children)
-            continue
-        open_layers += list(layer.children)
-        for obj in layer.collection.objects:
-            if not obj.hide_render and (pointer := obj.as_pointer()) not in seen:
-                seen.add(pointer)
-                yield obj
-
-
-def takes_part(obj: bpy.types.Object) -> bool:
-    """Whether an object is a plant, a field of plants, or a mesh that takes part in refinement."""
-    return obj.tetflora.is_plant or obj.tetflora.is_field or obj.tetflora.is_explicit
-
-
-def may_take_part(obj: bpy.types.Object) -> bool:
-    """Whether an object takes part in refinement, or may instance some that do; cheap."""
-    return takes_part(obj) or may_instance(obj)
-
-
-def has_contents(scene: bpy.types.Scene) -> bool:
-    """Whether a scene may hold something to refine; cheap, and never wrong where there is something."""
-    if any(takes_part(o) for o in scene.objects):
-        return True
-    # What is instanced need not lie in the scene, but somewhere.
-    return any(takes_part(o) for o in bpy.data.objects) and any(may_instance(o) for o in scene.objects)
 
 
 def _check_species(plants: list[tuple[str, str]]) -> None:

@@ -9,6 +9,11 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from .attributes import members, read
 from .transforms import world_matrix
+from .view_layers import renderable_objects
+
+_OCCLUDER_REMEDY = (
+    "an occluder must be a mesh with faces. Add faces, or turn off Occluder in the TetFlora tab of the sidebar"
+)
 
 
 def mesh_triangles(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, remedy: str) -> NDArray[np.float64]:
@@ -55,3 +60,28 @@ def _triangles(mesh: bpy.types.Mesh) -> tuple[NDArray[np.float64], NDArray[np.in
     mesh.calc_loop_triangles()
     vertices = read(mesh, ".corner_vert")[members(mesh.loop_triangles, "loops", 3, np.int32)]
     return read(mesh, "position").astype(np.float64), vertices
+
+
+def read_occluders(
+    _scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer | None = None
+) -> NDArray[np.float64]:
+    """Triangles of all meshes of a view layer that are marked as hiding plants and render.
+
+    Parameters
+    ----------
+    view_layer : bpy.types.ViewLayer or None
+        None takes the one that the depsgraph was made for.
+
+    Returns
+    -------
+    (t, 3, 3) float64
+        Corners in world space, metres; ``(0, 3, 3)`` if there are none.
+
+    Raises
+    ------
+    SceneError
+        One of them has no faces or is no longer a mesh.
+    """
+    marked = [o for o in renderable_objects(view_layer or depsgraph.view_layer) if o.tetflora.is_occluder]
+    marked.sort(key=lambda o: o.name_full)
+    return np.concatenate([np.zeros((0, 3, 3)), *(mesh_triangles(o, depsgraph, _OCCLUDER_REMEDY) for o in marked)])
