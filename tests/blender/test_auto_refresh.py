@@ -5,12 +5,11 @@
 from __future__ import annotations
 
 import json
-from types import SimpleNamespace
 
 import bpy
 import pytest
 
-from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph
+from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks
 from tetflora_addon.blender import auto_refresh, compat, emit, job
 from tetflora_addon.refinement.statistics import Progress
 
@@ -37,6 +36,12 @@ def settle(monkeypatch) -> int:
         slices += 1
         assert slices < 10_000
     return slices
+
+
+def changed(scene):
+    """Have Blender tell its handlers that the scene has changed, and no object in it."""
+    scene.render.resolution_percentage = scene.render.resolution_percentage
+    bpy.context.view_layer.update()
 
 
 def results(scene):
@@ -80,8 +85,6 @@ def test_what_changes_is_refined_again(scene, monkeypatch, change):
     else:
         add_plant("another", seed=9, location=(0.0, 5.0, 0.0))
     bpy.context.view_layer.update()
-    auto_refresh.on_change(scene, depsgraph())
-    auto_refresh.schedule(scene)
     assert settle(monkeypatch) > 0
     assert len(results(scene)) == 1
     assert results(scene)[0].session_uid != uid, made
@@ -96,9 +99,9 @@ def test_settings_that_results_depend_on_are_heard(scene, monkeypatch, change):
     settle(monkeypatch)
     heard = []
     monkeypatch.setattr(auto_refresh, "schedule", heard.append)
-    auto_refresh.on_change(scene, SimpleNamespace(updates=[]))
+    changed(scene)
     heard.clear()
-    auto_refresh.on_change(scene, SimpleNamespace(updates=[]))
+    changed(scene)
     assert not heard
     if change == "percentage":
         scene.render.resolution_percentage = 50
@@ -112,7 +115,7 @@ def test_settings_that_results_depend_on_are_heard(scene, monkeypatch, change):
     else:
         entry = scene.tetflora.leaf_objects.add()
         entry.species, entry.leaf = "bush", leaf
-    auto_refresh.on_change(scene, SimpleNamespace(updates=[]))
+    changed(scene)
     assert heard == [scene]
 
 
@@ -169,21 +172,18 @@ def test_what_cannot_be_refined_is_said(scene, monkeypatch):
 @pytest.mark.parametrize("moved", [False, True])
 def test_only_a_change_of_plants_stops_the_job_not_the_flags_that_results_update(scene, monkeypatch, moved):
     scene.tetflora.auto_refine = True
-    auto_refresh.on_change(scene, SimpleNamespace(updates=[]))  # settings as they are
+    changed(scene)  # settings as they are
     monkeypatch.setattr(auto_refresh, "SLICE", 0.0)
     auto_refresh._state.due = 0.0
     for _ in range(5):
         auto_refresh.tick()
     job = auto_refresh._state.steps
     assert job is not None
-    # What Blender tells of every object when a collection of results is linked.
-    update = SimpleNamespace(
-        id=SimpleNamespace(original=bpy.data.objects["tree 1"]),
-        is_updated_transform=moved,
-        is_updated_geometry=False,
-        is_updated_shading=True,
-    )
-    auto_refresh.on_change(scene, SimpleNamespace(updates=[update]))
+    if moved:
+        bpy.data.objects["tree 1"].location.x += 1.0
+    else:  # Blender then updates flags of every object, as it does for results
+        scene.collection.children.link(bpy.data.collections.new("other"))
+    bpy.context.view_layer.update()
     assert (auto_refresh._state.steps is job) == (not moved)
     settle(monkeypatch)
     assert len(results(scene)) == 1
@@ -191,17 +191,13 @@ def test_only_a_change_of_plants_stops_the_job_not_the_flags_that_results_update
 
 def test_a_plant_hidden_while_it_works_is_heard_afterwards(scene, monkeypatch):
     scene.tetflora.auto_refine = True
-    auto_refresh.on_change(scene, SimpleNamespace(updates=[]))
+    changed(scene)
     monkeypatch.setattr(auto_refresh, "SLICE", 0.0)
     auto_refresh._state.due = 0.0
     for _ in range(5):
         auto_refresh.tick()
-    plant = bpy.data.objects["tree 1"]
-    plant.hide_render = True
-    flags = {"is_updated_transform": False, "is_updated_geometry": False}
-    auto_refresh.on_change(
-        scene, SimpleNamespace(updates=[SimpleNamespace(id=SimpleNamespace(original=plant), **flags)])
-    )
+    bpy.data.objects["tree 1"].hide_render = True
+    bpy.context.view_layer.update()
     settle(monkeypatch)
     assert json.loads(scene.tetflora.statistics)["plants"] == 2
 
@@ -209,7 +205,7 @@ def test_a_plant_hidden_while_it_works_is_heard_afterwards(scene, monkeypatch):
 def half_make(scene, monkeypatch, collections):
     """Have it work until so many collections have results, the last of which is not done."""
     monkeypatch.setattr(auto_refresh, "SLICE", 0.0)
-    auto_refresh.on_change(scene, SimpleNamespace(updates=[]))  # settings as they are
+    changed(scene)  # settings as they are
     auto_refresh.schedule(scene)
     auto_refresh._state.due = 0.0
     while len(results(scene)) < collections or not results(scene)[-1].objects:
