@@ -16,7 +16,6 @@ from . import (
     field_plants,
     first_forest,
     keep_results,
-    keymaps,
     make_plant_mesh,
     mark_explicit,
     mark_occluder,
@@ -39,16 +38,4 @@ from . import (
 
 CLASSES = tuple(cls for module in tuple(vars().values()) for cls in getattr(module, "CLASSES", ()))
 
-_register, _unregister = bpy.utils.register_classes_factory(CLASSES)
-
-
-def register() -> None:
-    """Register all operators, then the keys that call them."""
-    _register()
-    keymaps.register()
-
-
-def unregister() -> None:
-    """Unregister keys and operators."""
-    keymaps.unregister()
-    _unregister()
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -55,7 +55,7 @@ def items() -> list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]]:
     ]
 
 
-def register() -> None:
+def add_keys() -> None:
     """Add the keys, where there is a configuration for add-ons (not in every background Blender)."""
     config = bpy.context.window_manager.keyconfigs.addon
     if config is None:
@@ -70,7 +70,7 @@ def register() -> None:
         _made.append((keymap, item))
 
 
-def unregister() -> None:
+def remove_keys() -> None:
     """Take the keys back."""
     for keymap, item in reversed(_made):
         keymap.keymap_items.remove(item)

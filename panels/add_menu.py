@@ -5,10 +5,22 @@
 import bpy
 
 from ..operators.add_plant import TETFLORA_OT_add_plant
+from ..operators.assign_species import TETFLORA_OT_assign_species
 from ..operators.first_forest import TETFLORA_OT_first_forest
 from ..operators.place_plant import TETFLORA_OT_place_plant
 from ..tetflora_addon.blender.species_items import catalogue
 from .base import picture
+
+
+class TETFLORA_MT_species(bpy.types.Menu):
+    """Species to give to the selected plants."""
+
+    bl_label = "Change Species"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        for info in catalogue().values():
+            icon = picture(info.identifier)
+            self.layout.operator(TETFLORA_OT_assign_species.bl_idname, text=info.name, **icon).species = info.identifier
 
 
 class TETFLORA_MT_add_plant(bpy.types.Menu):
@@ -46,4 +58,4 @@ def draw_in_add_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     menu.layout.menu(TETFLORA_MT_add_plant.__name__, icon='OUTLINER_OB_FORCE_FIELD')
 
 
-CLASSES = (TETFLORA_MT_add_plant, TETFLORA_MT_place_plant)
+CLASSES = (TETFLORA_MT_species, TETFLORA_MT_add_plant, TETFLORA_MT_place_plant)

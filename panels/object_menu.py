@@ -17,8 +17,7 @@ from ..operators.remove_plants import TETFLORA_OT_remove_plants
 from ..operators.reseed import TETFLORA_OT_reseed
 from ..operators.select_species import TETFLORA_OT_select_species
 from ..operators.use_as_form import TETFLORA_OT_use_as_form
-from .add_menu import TETFLORA_MT_place_plant
-from .plants_panel import TETFLORA_MT_species
+from .add_menu import TETFLORA_MT_place_plant, TETFLORA_MT_species
 
 
 class TETFLORA_MT_object(bpy.types.Menu):

@@ -11,8 +11,7 @@ from ..operators.keymaps import PIE
 from ..operators.paint_plants import TETFLORA_OT_paint_plants
 from ..operators.populate import TETFLORA_OT_populate
 from ..operators.refine import TETFLORA_OT_refine
-from .add_menu import TETFLORA_MT_place_plant
-from .plants_panel import TETFLORA_MT_species
+from .add_menu import TETFLORA_MT_place_plant, TETFLORA_MT_species
 
 
 class TETFLORA_MT_pie(bpy.types.Menu):

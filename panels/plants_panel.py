@@ -4,7 +4,6 @@
 
 import bpy
 
-from ..operators.assign_species import TETFLORA_OT_assign_species
 from ..operators.field_plants import TETFLORA_OT_make_field, TETFLORA_OT_mark_field, TETFLORA_OT_split_field
 from ..operators.make_plant_mesh import TETFLORA_OT_make_plant_mesh
 from ..operators.remove_plants import TETFLORA_OT_remove_plants
@@ -15,20 +14,9 @@ from ..tetflora_addon.blender.plant_copies import has_nodes
 from ..tetflora_addon.blender.plant_fields import FIELD_TYPES, stored_size
 from ..tetflora_addon.blender.plant_form import FORM_TYPES
 from ..tetflora_addon.blender.species_items import catalogue
-from .add_menu import TETFLORA_MT_add_plant
-from .base import SidebarPanel, picture, split_layout
+from .add_menu import TETFLORA_MT_add_plant, TETFLORA_MT_species
+from .base import SidebarPanel, split_layout
 from .lists import TETFLORA_UL_field_species, draw_list
-
-
-class TETFLORA_MT_species(bpy.types.Menu):
-    """Species to give to the selected plants."""
-
-    bl_label = "Change Species"
-
-    def draw(self, _context: bpy.types.Context) -> None:
-        for info in catalogue().values():
-            icon = picture(info.identifier)
-            self.layout.operator(TETFLORA_OT_assign_species.bl_idname, text=info.name, **icon).species = info.identifier
 
 
 class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
@@ -108,4 +96,4 @@ class TETFLORA_PT_selected_plants(SidebarPanel, bpy.types.Panel):
         column.operator(TETFLORA_OT_remove_plants.bl_idname, text="Remove All Plants", icon='TRASH').which = 'ALL'
 
 
-CLASSES = (TETFLORA_MT_species, TETFLORA_PT_plants, TETFLORA_PT_selected_plants)
+CLASSES = (TETFLORA_PT_plants, TETFLORA_PT_selected_plants)

@@ -48,10 +48,12 @@ def _draw_keys(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
 
 
 def register() -> None:
-    """Draw the page; its class, which lies below the operators, only stores the settings."""
+    """Draw the page, whose class below the operators only stores the settings, and add the keys."""
     TetFloraPreferences.draw = _draw
+    keymaps.add_keys()
 
 
 def unregister() -> None:
-    """Draw it no longer."""
+    """Remove the keys, and draw the page no longer."""
+    keymaps.remove_keys()
     del TetFloraPreferences.draw

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Baked light in a job: read the lights, collect what is drawn, and give meshes the light that the camera sees."""
+"""Baked light in a job: collect what is drawn, and give meshes the light that the camera sees."""
 
 from __future__ import annotations
 
@@ -8,51 +8,12 @@ from collections.abc import Generator, Iterator
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ..baked_emission import AT_ONCE, BakedLight, SheetList, Sources, at_vertices, baked_attributes, baked_light
 from ..buffers import MeshBuffers
 from ..emission_forms import Refined
 from .attributes import read, write
-from .compat import tree_in_use
-from .light_reader import read_lights
-from .material_means import Looks
 from .meshes import face_offsets
-from .surfaces import read_occluders
-from .view_layers import renderable_objects
-from .world_reader import read_world
-
-#: Colour of ground whose material cannot be read.
-_GROUND = (0.2, 0.2, 0.2)
-
-
-def read_sources(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer | None = None
-) -> Sources:
-    """Lights, world, and meshes that are marked as hiding plants, which throw shadows and send light up."""
-    view_layer = view_layer or depsgraph.view_layer
-    world = read_world(scene)
-    colours = [_ground_colour(o) for o in renderable_objects(view_layer) if o.tetflora.is_occluder]
-    ground = np.mean(colours, axis=0) if colours else np.zeros(3)
-    lights = (*read_lights(depsgraph, view_layer), *world.suns)
-    return Sources(lights, world.world, read_occluders(scene, depsgraph, view_layer), ground)
-
-
-def _ground_colour(obj: bpy.types.Object) -> NDArray[np.float64]:
-    """Mean colour of a mesh's first material."""
-    material = obj.active_material
-    if material is None:
-        return np.array(Looks().of(None, {}).colour)
-    tree = tree_in_use(material)
-    nodes = tree.nodes if tree else ()
-    if not any(n.type == 'TEX_IMAGE' and n.image is not None for n in nodes):
-        # What nodes make of noise nobody can tell but by their ramps.
-        stops = [stop.color[:3] for n in nodes if n.type == 'VALTORGB' for stop in n.color_ramp.elements]
-        if stops:
-            return np.mean(stops, axis=0)
-        if any(n.type.startswith(("BSDF", "EMISSION")) and n.inputs[0].is_linked for n in nodes):
-            return np.array(_GROUND)
-    return np.array(Looks().of(material, {}).colour)
 
 
 class Baking:

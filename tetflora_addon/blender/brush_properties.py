@@ -24,7 +24,7 @@ MODES = (
     ),
 )
 _BRUSH = properties_of(Brush, options=set())
-_RULES = properties_of(Rules, options=set())
+_SIZES = properties_of(Rules, options=set())
 
 
 class TetFloraBrush(bpy.types.PropertyGroup, SpeciesChoice):
@@ -55,8 +55,8 @@ class TetFloraBrush(bpy.types.PropertyGroup, SpeciesChoice):
         ),
         options=set(),
     )
-    scale_min: _RULES.scale_min
-    scale_max: _RULES.scale_max
+    scale_min: _SIZES.scale_min
+    scale_max: _SIZES.scale_max
     store: EnumProperty(
         name="Create As",
         description="What painted plants are created as. Erase and Thin affect both kinds",

@@ -18,7 +18,6 @@ from ..refinement.light_views import Light
 from ..refinement.polygons import Polygons
 from ..refinement.settings import RefinementSettings
 from ..refinement.statistics import Statistics
-from .baking import read_sources
 from .explicit_objects import Explicit, read_explicit
 from .hiding import originals_shown
 from .leaf_forms import resolved_species
@@ -27,6 +26,7 @@ from .proxy_forms import form_of
 from .scene_reader import NoPlantsError, read_plants
 from .surfaces import read_occluders
 from .wind_properties import wind_of
+from .world_reader import read_sources
 
 
 @dataclass(frozen=True)

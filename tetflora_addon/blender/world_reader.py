@@ -16,10 +16,15 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..baked_emission import Sources
 from ..refinement.light_views import Light
 from ..shading.light_sources import World
 from .compat import sky_model, tree_in_use
 from .image_pixels import image_pixels, linear_rgb
+from .light_reader import read_lights
+from .material_means import Looks
+from .surfaces import read_occluders
+from .view_layers import renderable_objects
 
 #: What a scene without a world shows.
 BLACK = World.plain((0.0, 0.0, 0.0))
@@ -105,11 +110,11 @@ def read_world(scene: bpy.types.Scene) -> WorldLight:
         notes.append("the Background strength is linked to nodes and is treated as 1")
     if sum(n.type == 'BACKGROUND' for n in nodes) > 1:
         notes.append("the world has several Background nodes; only the one closest to the output is used")
-    found = _colour(background.inputs["Color"], factor, notes)
+    found = _surroundings(background.inputs["Color"], factor, notes)
     return WorldLight(*found, note="; ".join(notes))
 
 
-def _colour(socket: bpy.types.NodeSocket, factor: float, notes: list[str]) -> tuple[World, tuple[Light, ...]]:
+def _surroundings(socket: bpy.types.NodeSocket, factor: float, notes: list[str]) -> tuple[World, tuple[Light, ...]]:
     """Sky and suns of what feeds a background's colour."""
     if not socket.is_linked:
         return World.plain(np.array(socket.default_value[:3]) * factor), ()
@@ -195,3 +200,36 @@ def _upstream(socket: bpy.types.NodeSocket) -> Iterator[bpy.types.Node]:
                 seen.add(link.from_node)
                 yield link.from_node
                 waiting += list(link.from_node.inputs)
+
+
+#: Colour of ground whose material cannot be read.
+_GROUND = (0.2, 0.2, 0.2)
+
+
+def read_sources(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer | None = None
+) -> Sources:
+    """Lights, world, and meshes that are marked as hiding plants, which throw shadows and send light up."""
+    view_layer = view_layer or depsgraph.view_layer
+    world = read_world(scene)
+    colours = [_ground_colour(o) for o in renderable_objects(view_layer) if o.tetflora.is_occluder]
+    ground = np.mean(colours, axis=0) if colours else np.zeros(3)
+    lights = (*read_lights(depsgraph, view_layer), *world.suns)
+    return Sources(lights, world.world, read_occluders(scene, depsgraph, view_layer), ground)
+
+
+def _ground_colour(obj: bpy.types.Object) -> NDArray[np.float64]:
+    """Mean colour of a mesh's first material."""
+    material = obj.active_material
+    if material is None:
+        return np.array(Looks().of(None, {}).colour)
+    tree = tree_in_use(material)
+    nodes = tree.nodes if tree else ()
+    if not any(n.type == 'TEX_IMAGE' and n.image is not None for n in nodes):
+        # What nodes make of noise nobody can tell but by their ramps.
+        stops = [stop.color[:3] for n in nodes if n.type == 'VALTORGB' for stop in n.color_ramp.elements]
+        if stops:
+            return np.mean(stops, axis=0)
+        if any(n.type.startswith(("BSDF", "EMISSION")) and n.inputs[0].is_linked for n in nodes):
+            return np.array(_GROUND)
+    return np.array(Looks().of(material, {}).colour)
