@@ -17,7 +17,7 @@ class TETFLORA_OT_mark_occluder(Marking, bpy.types.Operator):
         "cost next to nothing. Use again to unmark"
     )
     bl_options = {'REGISTER', 'UNDO'}
-    mark, nothing, marked = "is_occluder", "Select meshes first", "{} marked as occluders"
+    mark, nothing, marked = "is_occluder", "Select meshes first", "{} marked as occluder"
 
     action: action_property("Plants behind the meshes count as hidden", "The meshes do not affect refinement")
 

@@ -228,7 +228,7 @@ class TETFLORA_OT_forget_erased(_Replacing, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> set[str]:
         population = active_population(context.scene)
         population.erased = population.placed_by = ""  # so that the panel asks for an update
-        self.report({'INFO'}, f'"{population.name}" has no erased places any more; click Update to place plants')
+        self.report({'INFO'}, f'"{population.name}" has no more erased places; click Update to place plants')
         point_preview.schedule()
         return {'FINISHED'}
 

@@ -66,11 +66,11 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
 
 
 def _unread_world(scene: bpy.types.Scene) -> str:
-    """What of the world's light could not be read for baked light, else an empty text."""
+    """Parts of the world that baked lighting could not read, else an empty text."""
     if scene.tetflora.baked_light == 'OFF' or scene.tetflora.expand_everything:
         return ""
     note = read_world(scene).note
-    return f"Baked light: {note}" if note else ""
+    return f"Baked lighting: {note}" if note else ""
 
 
 def _unseen(scene: bpy.types.Scene, statistics: Statistics) -> str:

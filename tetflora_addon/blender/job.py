@@ -172,7 +172,7 @@ def _run_loop(
         waiting = int((state.decision == Decision.SPLIT).sum())
         fraction += 0.15 * (_LOOP_FRACTION - fraction)  # nobody knows how many passes will follow
         enough = yield Progress(
-            fraction, f"Refining, pass {state.passes}: {state.tree.tetrahedra_made:,} tetrahedra, {waiting:,} to divide"
+            fraction, f"Refining, pass {state.passes}: {state.tree.tetrahedra_made:,} tetrahedra, {waiting:,} to split"
         )
 
 

@@ -31,7 +31,7 @@ class TetFloraPreferences(bpy.types.AddonPreferences):
         name="Species Folder",
         description=(
             "Folder of your own species files (*.json); if empty, a folder beside your Blender settings. A file here "
-            "replaces a shipped species of the same file name. Scenes store only the names of species: everyone who "
+            "replaces a built-in species of the same file name. Scenes store only the names of species: everyone who "
             "renders a scene needs the same files"
         ),
         subtype='DIR_PATH',
