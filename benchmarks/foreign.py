@@ -217,7 +217,7 @@ def run(quick: bool) -> dict[str, float]:
         job.clear(scene)
         _aim(scene, DISTANCES[1])
         _, refinement = job.partition(scene, bpy.context.evaluated_depsgraph_get())
-        held = refinement.contents.polygons
+        held = refinement.contents.polygons.items
         figures["fragments"] = int((held.part >= 0).sum())
         figures["area_error"] = abs(held.areas().sum() / area - 1)
     return {

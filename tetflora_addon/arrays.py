@@ -7,8 +7,8 @@ Arrays of vectors (n, 3) and frames (n, 3, 3) are kept component by component in
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import field, fields
+from collections.abc import Callable, Sequence
+from dataclasses import fields
 from functools import cache
 from typing import Any, Self
 
@@ -42,8 +42,8 @@ class Arrays:
         return type(self)(*(self._rows(c, index) if isinstance(c, np.ndarray | Arrays) else c for c in columns))
 
     @staticmethod
-    def _rows(column: NDArray | Arrays, index: NDArray | slice) -> NDArray | Arrays:
-        return column.take(index) if isinstance(column, Arrays) else gathered(column, index)
+    def _rows(own: NDArray | Arrays, index: NDArray | slice) -> NDArray | Arrays:
+        return own.take(index) if isinstance(own, Arrays) else gathered(own, index)
 
     @classmethod
     def concatenate(cls, parts: Sequence[Self]) -> Self:
@@ -57,18 +57,18 @@ class Arrays:
 
     @classmethod
     def empty(cls) -> Self:
-        """No things. Columns are (0,) float64 unless declared with `column` or `nested`."""
+        """No things. Columns are (0,) float64 unless their fields have metadata by `column` or `nested`."""
         return cls(*(f.metadata.get("empty", _no_numbers)() for f in fields(cls) if f.name not in _optional(cls)))
 
 
-def column(*shape: int, dtype: DTypeLike = np.float64) -> Any:
-    """Field of a dataclass for an array (n, *shape); needed for `Arrays.empty` only."""
-    return field(metadata={"empty": lambda: np.zeros((0, *shape), dtype)})
+def column(*shape: int, dtype: DTypeLike = np.float64) -> dict[str, Callable]:
+    """Metadata of a field that is an array (n, *shape), for `Arrays.empty`."""
+    return {"empty": lambda: np.zeros((0, *shape), dtype)}
 
 
-def nested(kind: type[Arrays]) -> Any:
-    """Field of a dataclass for another structure of arrays of the same length; needed for `Arrays.empty` only."""
-    return field(metadata={"empty": kind.empty})
+def nested(kind: type[Arrays]) -> dict[str, Callable]:
+    """Metadata of a field that is another structure of arrays, for `Arrays.empty`."""
+    return {"empty": kind.empty}
 
 
 def gathered(array: NDArray, index: NDArray | slice) -> NDArray:

@@ -117,8 +117,8 @@ def _fitted(
 def _large(result: Refinement) -> NDArray[np.float64]:
     """Polygons (cells,) that stay as they are although their cell is a proxy."""
     contents = result.contents
-    large = np.isinf(contents.polygon_amounts.width)
-    return np.bincount(contents.polygon_cell[large], minlength=len(result.tree))[result.nodes].astype(np.float64)
+    large = np.isinf(contents.polygons.amounts.width)
+    return np.bincount(contents.polygons.cell[large], minlength=len(result.tree))[result.nodes].astype(np.float64)
 
 
 class _Facets:
@@ -130,11 +130,11 @@ class _Facets:
         index[result.nodes] = np.arange(len(result.nodes))
         self.number = len(result.nodes)
         self.plants = [
-            (subplant_facet_sizes(flora, contents, camera, coarse), index[contents.subplant_cell]),
-            (piece_facet_sizes(flora, contents, camera, coarse), index[contents.piece_cell]),
+            (subplant_facet_sizes(flora, contents, camera, coarse), index[contents.subplants.cell]),
+            (piece_facet_sizes(flora, contents, camera, coarse), index[contents.pieces.cell]),
         ]
         self.polygons = polygon_facet_sizes(contents, camera, result.chosen(Decision.HIDDEN))
-        self.polygon_cell = index[contents.polygon_cell]
+        self.polygon_cell = index[contents.polygons.cell]
 
     def by_cell(self, pixels: float, weight: float = 1.0) -> NDArray[np.float64]:
         """Facets (cells,) where those that are seen have so many pixels; each counts as much as the weight says."""

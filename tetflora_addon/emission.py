@@ -62,10 +62,10 @@ def explicit_blocks(flora: Flora, result: Refinement, transition: Transition | N
     """
     explicit = result.decision == Decision.EXPLICIT
     nodes, rank, polygons = result.nodes, result.rank, np.where(explicit, result.amounts.polygons, 0.0)
-    wood = Contents.empty() if transition is None else _thick_wood(result, transition)
+    wood = Contents() if transition is None else _thick_wood(result, transition)
     number_of = np.full(len(result.tree), -1, dtype=np.int64)
     number_of[nodes] = np.arange(len(nodes))
-    tubes = np.bincount(number_of[wood.piece_cell], flora.rows["sides"][wood.pieces.branches.row], len(nodes))
+    tubes = np.bincount(number_of[wood.pieces.cell], flora.rows["sides"][wood.pieces.items.branches.row], len(nodes))
     polygons = polygons + tubes
     order = np.argsort(rank, kind="stable")
     order = order[explicit[order] | (tubes[order] > 0)]
@@ -74,19 +74,19 @@ def explicit_blocks(flora: Flora, result: Refinement, transition: Transition | N
     for number, run in enumerate(runs):
         block_of_node[nodes[order[run]]] = number
     contents = result.contents.within(result.chosen(Decision.EXPLICIT))
-    of_subplant, of_piece = block_of_node[contents.subplant_cell], block_of_node[contents.piece_cell]
-    of_wood = block_of_node[wood.piece_cell]
+    of_subplant, of_piece = block_of_node[contents.subplants.cell], block_of_node[contents.pieces.cell]
+    of_wood = block_of_node[wood.pieces.cell]
     for number in range(len(runs)):
-        cut, whole = contents.pieces.take(of_piece == number), contents.subplants.take(of_subplant == number)
-        bare = wood.pieces.take(of_wood == number)
+        cut = contents.pieces.items.take(of_piece == number)
+        whole = contents.subplants.items.take(of_subplant == number)
+        bare = wood.pieces.items.take(of_wood == number)
         yield from _block(flora, cut, list(expand(flora, whole)), number, (number + 1) / len(runs), bare, transition)
 
 
 def _thick_wood(result: Refinement, transition: Transition) -> Contents:
     """Pieces of branches that are wide enough to be seen where all else is drawn as proxies."""
     contents = result.contents.within(result.chosen(Decision.PROXY) & result.in_view)
-    none = np.zeros(len(contents.subplants), bool), np.zeros(len(contents.polygons), bool)
-    return contents.take(none[0], transition.of_wood(contents.pieces, among_leaves=False), none[1])
+    return Contents(pieces=contents.pieces.take(transition.of_wood(contents.pieces.items, among_leaves=False)))
 
 
 def expanded_blocks(flora: Flora, seeds: Seeds) -> Iterator[Block]:

@@ -63,16 +63,16 @@ def polygon_blocks(result: Refinement, camera: Camera, facet_pixels: float | Non
     contents = result.contents
     if not len(contents.polygons):
         return
-    cell = contents.polygon_cell
+    cell = contents.polygons.cell
     kept = ~result.chosen(Decision.PROXY, Decision.HIDDEN)[cell]
     if facet_pixels is None:
-        kept |= ~np.isfinite(contents.polygon_amounts.width)
+        kept |= ~np.isfinite(contents.polygons.amounts.width)
     else:
         sizes = polygon_facet_sizes(contents, camera, result.chosen(Decision.HIDDEN))
         kept |= sizes.kept(facet_pixels)
     rank = np.zeros(len(result.tree), np.int64)
     rank[result.nodes] = result.rank
-    polygons, rank = contents.polygons.take(kept), rank[cell[kept]]
+    polygons, rank = contents.polygons.items.take(kept), rank[cell[kept]]
     order = np.argsort(rank, kind="stable")
     polygons = mended(polygons.take(order))
     runs = list(chunks(np.ones(len(polygons)), BLOCK_POLYGONS))

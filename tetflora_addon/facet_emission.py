@@ -5,11 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Arrays
 from .buffers import BLOCK_POLYGONS
 from .plants.branches import Branches
 from .plants.compiled import Flora
@@ -99,17 +100,17 @@ def _facets(
     every = []
     for things, cell, row, sizes, fraction_of, make in (
         (
-            contents.subplants,
-            contents.subplant_cell,
-            contents.subplants.row,
+            contents.subplants.items,
+            contents.subplants.cell,
+            contents.subplants.items.row,
             subplant_facet_sizes(flora, contents, camera, coarse),
             shares.of_subplants,
             _of_subplants,
         ),
         (
-            contents.pieces,
-            contents.piece_cell,
-            contents.pieces.branches.row,
+            contents.pieces.items,
+            contents.pieces.cell,
+            contents.pieces.items.branches.row,
             piece_facet_sizes(flora, contents, camera, coarse),
             shares.of_pieces,
             _of_pieces,
@@ -147,8 +148,8 @@ def _in_detail(
     stay the same while the division of space changes. Explicit tetrahedra are not divided as far as others anyway.
     """
     flora, camera = transition.flora, transition.camera
-    some, cell = contents.subplants, contents.subplant_cell
-    pieces, piece_cell = [contents.pieces], [contents.piece_cell]
+    some, cell = contents.subplants.items, contents.subplants.cell
+    pieces, piece_cell = [contents.pieces.items], [contents.pieces.cell]
     placed, placed_cell = [], []
     while len(some):
         inside = explicit[cell]
@@ -171,16 +172,15 @@ def _in_detail(
     made = Contents.of(
         flora,
         Branches.concatenate(placed or [Branches.empty()]),
-        np.concatenate(placed_cell or [contents.subplant_cell]),
+        np.concatenate(placed_cell or [contents.subplants.cell]),
         Pieces.concatenate(pieces),
         np.concatenate(piece_cell),
     )
-    polygons = {name: getattr(contents, name) for name in ("polygons", "polygon_cell", "polygon_amounts")}
-    return replace(made, **polygons)
+    return replace(made, polygons=contents.polygons)
 
 
 @dataclass(frozen=True)
-class _Wanted:
+class _Wanted(Arrays):
     """What is asked of the facets of sub-plants or pieces (n,).
 
     ``leaf`` and ``wood`` are the sides of facets, metres; ``fraction`` is that of the area that they have. ``explicit``
@@ -197,10 +197,6 @@ class _Wanted:
     def sizes(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Sides of facets of leaves and of wood, and the fraction of the area."""
         return self.leaf, self.wood, self.fraction
-
-    def take(self, index: NDArray[np.integer]) -> _Wanted:
-        """Selection by indices."""
-        return _Wanted(*(getattr(self, field.name)[index] for field in fields(self)))
 
 
 def _of_subplants(flora: Flora, transition: Transition | None, subplants: Branches, wanted: _Wanted) -> Facets:

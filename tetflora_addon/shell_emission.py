@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,9 +38,9 @@ def proxy_shells(flora: Flora, result: Refinement, light: BakedLight | None = No
     index[nodes] = np.arange(len(nodes))
     contents = result.contents
     # Large polygons are drawn as they are; a fog in their place would be no wall.
-    fine = np.isfinite(contents.polygon_amounts.width)
+    fine = np.isfinite(contents.polygons.amounts.width)
     if not fine.all():
-        contents = contents.take(*(np.ones(len(c), bool) for c in contents.cells[:2]), fine)
+        contents = replace(contents, polygons=contents.polygons.take(fine))
     summaries = summarise(flora, contents, index, len(nodes))
     vertices = result.tree.vertices(nodes)
     matrices, normal, plane = extinction_matrices(summaries, volume(vertices))

@@ -194,8 +194,8 @@ def test_summaries_weigh_factors_by_area() -> None:
     contents = Contents.of_plants(flora, support.plants([1, 2]))
     both = summarise(flora, contents, np.zeros(1, np.int64), 1)
     volumes = np.array([8.0])
-    found = flora.clumping.coefficients(contents.subplants, flora.clumping.whole)
-    amounts = contents.subplant_amounts
+    found = flora.clumping.coefficients(contents.subplants.items, flora.clumping.whole)
+    amounts = contents.subplants.amounts
     weight = amounts.leaf_area + amounts.wood_area / 2
     np.testing.assert_allclose(both.clumping[0], weight @ found / weight.sum())
     assert both.optical_area[0] == pytest.approx(weight.sum())

@@ -31,7 +31,7 @@ def divided(
     eye = rng.uniform(-12, 12, 3) * [1, 1, 0.3] + [0, 0, 2]  # beside, among, above and below the plants
     camera = support.camera(eye, rng.uniform(-3, 3, 3), kind=kind, view=0.8 if kind == "PERSP" else 6.0)
     contents = Contents.of_plants(flora, seeds)
-    tree = view_root(camera, bounding_box(flora, contents.subplants))
+    tree = view_root(camera, bounding_box(flora, contents.subplants.items))
     contents = push_down(flora, tree, contents, slack)
     for _ in range(rounds):
         every = contents.sums(len(tree))
@@ -44,7 +44,7 @@ def divided(
 
 
 def expanded(flora: Flora, contents: Contents) -> Pieces:
-    return Pieces.concatenate([contents.pieces, support.expanded(flora, contents.subplants)])
+    return Pieces.concatenate([contents.pieces.items, support.expanded(flora, contents.subplants.items)])
 
 
 def measures(flora: Flora, pieces: Pieces) -> tuple[float, float, int, int]:
@@ -67,8 +67,8 @@ def test_nothing_is_lost_or_held_twice(view: tuple[int, str]) -> None:
     seeds = support.grove(6, 2.0, [0, 1, 0, 0, 1, 0])
     tree, contents = divided(flora, seeds, *view)
     assert len(tree) > 50
-    assert (tree.children[contents.subplant_cell, 0] < 0).all()
-    assert (tree.children[contents.piece_cell, 0] < 0).all()
+    assert (tree.children[contents.subplants.cell, 0] < 0).all()
+    assert (tree.children[contents.pieces.cell, 0] < 0).all()
     parts = expanded(flora, contents)
     _, whole = support.grown(flora, seeds)
     leaf_area, wood_area, leaf_faces, tube_faces = measures(flora, parts)
@@ -93,7 +93,7 @@ def test_everything_is_on_the_right_side(view: tuple[int, str]) -> None:
     """Ends of pieces and vertices of sub-plants, against every plane from their terminal up to the root."""
     flora = support.small_flora()
     tree, contents = divided(flora, support.grove(5, 2.5), *view)
-    scale = np.abs(bounding_box(flora, contents.subplants)).max()
+    scale = np.abs(bounding_box(flora, contents.subplants.items)).max()
 
     def walk(cells: np.ndarray, signed: object) -> None:
         node = cells.astype(np.intp)
@@ -108,19 +108,21 @@ def test_everything_is_on_the_right_side(view: tuple[int, str]) -> None:
             node = np.where(up, parent, node)
 
     def of_pieces(planes: np.ndarray, side: np.ndarray) -> np.ndarray:
-        ends = (np.einsum("ni,ni->n", planes[:, :3], p) for p in (contents.pieces.start, contents.pieces.end))
+        ends = (
+            np.einsum("ni,ni->n", planes[:, :3], p) for p in (contents.pieces.items.start, contents.pieces.items.end)
+        )
         return np.minimum(*(side * (d + planes[:, 3]) for d in ends))
 
-    walk(contents.piece_cell, of_pieces)
+    walk(contents.pieces.cell, of_pieces)
     some = np.random.default_rng(0).permutation(len(contents.subplants))[:40]
     for one in some:
-        tubes, leaves = support.meshes(flora, support.expanded(flora, contents.subplants.take(one[None])))
+        tubes, leaves = support.meshes(flora, support.expanded(flora, contents.subplants.items.take(one[None])))
         points = np.concatenate([mesh.positions for mesh in (*tubes, *leaves)]).astype(np.float64)
 
         def of_vertices(planes: np.ndarray, side: np.ndarray, points: np.ndarray = points) -> np.ndarray:
             return side * (np.einsum("ni,ni->n", planes[:, :3], points) + planes[:, 3]) + 1e-6 * scale  # float32
 
-        walk(np.full(len(points), contents.subplant_cell[one]), of_vertices)
+        walk(np.full(len(points), contents.subplants.cell[one]), of_vertices)
 
 
 @given(views)
@@ -131,7 +133,7 @@ def test_terminals_fill_the_root(view: tuple[int, str]) -> None:
     rng = np.random.default_rng(view[0])
     camera = support.camera(rng.uniform(-9, 9, 3), rng.uniform(-2, 2, 3), kind=view[1], view=2.0)
     contents = Contents.of_plants(flora, support.grove(3, 2.0))
-    tree = view_root(camera, bounding_box(flora, contents.subplants))
+    tree = view_root(camera, bounding_box(flora, contents.subplants.items))
     before = volume(tree.vertices(tree.terminals())).sum()
     divided_at = tree.terminals()
     for _ in range(6):
@@ -145,10 +147,10 @@ def test_expected_amounts_do_not_depend_on_how_contents_are_cut() -> None:
     """Sums over nodes are sums over things; opening sub-plants moves them only by chance, over many plants."""
     flora = support.small_flora()
     seeds = support.grove(300, 1.5)
-    whole = subplant_amounts(flora, Contents.of_plants(flora, seeds).subplants)
+    whole = subplant_amounts(flora, Contents.of_plants(flora, seeds).subplants.items)
     tree, contents = divided(flora, seeds, 3, "PERSP", rounds=3)
     every = contents.sums(len(tree))
-    things = [subplant_amounts(flora, contents.subplants), piece_amounts(flora, contents.pieces)]
+    things = [subplant_amounts(flora, contents.subplants.items), piece_amounts(flora, contents.pieces.items)]
     for name in ("leaf_area", "wood_area", "polygons"):
         total = getattr(every, name).sum()
         assert total == pytest.approx(sum(getattr(t, name).sum() for t in things))
@@ -179,10 +181,10 @@ def test_selection_and_joining() -> None:
     chosen = np.random.default_rng(0).random(len(tree)) < 0.5
     a, b = contents.within(chosen), contents.within(~chosen)
     both = Contents.joined([a, b])
-    assert len(both.pieces) == len(contents.pieces)
-    assert sorted(both.subplants.key) == sorted(contents.subplants.key)
-    assert chosen[a.piece_cell].all()
-    assert not chosen[b.subplant_cell].any()
+    assert len(both.pieces.items) == len(contents.pieces)
+    assert sorted(both.subplants.items.key) == sorted(contents.subplants.items.key)
+    assert chosen[a.pieces.cell].all()
+    assert not chosen[b.subplants.cell].any()
     assert len(Contents.joined([]).pieces) == 0
 
 
@@ -197,14 +199,14 @@ def test_holdings_give_and_take(seed: int) -> None:
     for _ in range(5):
         chosen = rng.random(len(tree)) < rng.choice([0.05, 0.5, 0.95])
         out = held.take_out(chosen)
-        assert chosen[out.subplant_cell].all()
-        assert chosen[out.piece_cell].all()
+        assert chosen[out.subplants.cell].all()
+        assert chosen[out.pieces.cell].all()
         left = held.contents
-        assert not chosen[left.subplant_cell].any()
-        assert not chosen[left.piece_cell].any()
+        assert not chosen[left.subplants.cell].any()
+        assert not chosen[left.pieces.cell].any()
         held.put(out)
     for name in ("subplants", "pieces"):
-        whole, found = ((getattr(c, name), getattr(c, f"{name[:-1]}_amounts")) for c in (contents, held.contents))
+        whole, found = ((k.items, k.amounts) for k in (getattr(c, name) for c in (contents, held.contents)))
         key = [(c[0] if name == "subplants" else c[0].branches).key for c in (whole, found)]
         order = [np.lexsort([c[1].polygons, c[1].wood_area, k]) for c, k in zip((whole, found), key, strict=True)]
         assert (key[0][order[0]] == key[1][order[1]]).all()
@@ -225,15 +227,15 @@ def test_what_reaches_a_little_beyond_a_plane_stays_whole(view: tuple[int, str],
     parts = [measures(flora, expanded(flora, contents)) for _, contents in (exact, loose)]
     assert parts[1] == pytest.approx(parts[0], rel=1e-6)
     tree, contents = loose
-    vertices = tree.vertices(contents.piece_cell)
-    middle = (contents.pieces.start + contents.pieces.end) / 2
+    vertices = tree.vertices(contents.pieces.cell)
+    middle = (contents.pieces.items.start + contents.pieces.items.end) / 2
     outside = (support.face_planes(vertices)[..., :3] * middle[:, None]).sum(-1) + support.face_planes(vertices)[..., 3]
     # A piece goes where most of it is; what is left of it beyond is within the slack at each of few planes.
     assert (outside.max(axis=1, initial=-1) <= 3 * far).all()
     for one in np.random.default_rng(view[0]).permutation(len(contents.subplants))[:20]:
-        meshes = support.meshes(flora, support.expanded(flora, contents.subplants.take(one[None])))
+        meshes = support.meshes(flora, support.expanded(flora, contents.subplants.items.take(one[None])))
         points = np.concatenate([m.positions for group in meshes for m in group]).astype(np.float64)
-        planes = support.face_planes(tree.vertices(contents.subplant_cell[one][None]))[0]
+        planes = support.face_planes(tree.vertices(contents.subplants.cell[one][None]))[0]
         beyond = (points @ planes[:, :3].T + planes[:, 3]).max(axis=1)
         assert np.quantile(beyond, 0.9) <= 3 * far
 
@@ -260,4 +262,4 @@ def test_less_is_opened_and_cut_where_a_little_beyond_a_plane_is_allowed() -> No
         for far in (0.05, 0.15, 0.45)
     ]
     assert numbers == sorted(numbers, reverse=True)
-    assert numbers[-1] < 0.7 * len(exact.pieces)
+    assert numbers[-1] < 0.7 * len(exact.pieces.items)

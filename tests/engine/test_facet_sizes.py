@@ -68,8 +68,8 @@ def test_shadows_from_beside_the_view_keep_their_area(clearance: float) -> None:
     """However far a plant is, some facets of it are left, and they cover what it covers."""
     flora = support.small_flora()
     beside, contents = sizes(clearance, COARSE)
-    mesh = facet_mesh(subplant_facets(flora, contents.subplants, *beside.sides(PIXELS)))
-    amounts = contents.subplant_amounts
+    mesh = facet_mesh(subplant_facets(flora, contents.subplants.items, *beside.sides(PIXELS)))
+    amounts = contents.subplants.amounts
     optical = (amounts.leaf_area + amounts.wood_area / 2).sum()
     assert support.face_areas(mesh).sum() == pytest.approx(optical, rel=0.05)
     assert mesh.polygons == pytest.approx(beside.counts(PIXELS).sum(), rel=0.05)

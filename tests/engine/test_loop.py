@@ -48,7 +48,7 @@ def check(flora: Flora, result: Refinement) -> None:
     assert (tree.children[result.nodes, 0] < 0).all()
     assert np.isin(result.decision, [Decision.PROXY, Decision.HIDDEN, Decision.EXPLICIT]).all()
     assert len(np.unique(result.rank)) == len(result.rank)
-    held = np.concatenate([result.contents.subplant_cell, result.contents.piece_cell])
+    held = np.concatenate([result.contents.subplants.cell, result.contents.pieces.cell])
     assert np.isin(held, result.nodes).all()
     assert volume(tree.vertices(tree.terminals())).min() > 0
     for array in (result.cells.pixels, result.transmittance, result.amounts.leaf_area, result.amounts.width):
@@ -201,7 +201,7 @@ def test_generations_are_limited(limit: int) -> None:
     flora = support.small_flora()
     seeds = support.grove(9, 2.0)
     camera = support.camera((0, -14, 3), (0, 0, 1.5), pixels=600)
-    root = view_root(camera, bounding_box(flora, Contents.of_plants(flora, seeds).subplants))
+    root = view_root(camera, bounding_box(flora, Contents.of_plants(flora, seeds).subplants.items))
     _, result = run(flora, seeds, camera, max_levels=limit, cutoff=0.5, few_polygons=0, block=4)
     check(flora, result)
     assert not result.complete
@@ -262,7 +262,7 @@ def test_the_same_scene_twice_is_the_same_result() -> None:
     assert (a.decision == b.decision).all()
     assert (a.nodes == b.nodes).all()
     assert (a.rank == b.rank).all()
-    assert (a.contents.pieces.end == b.contents.pieces.end).all()
+    assert (a.contents.pieces.items.end == b.contents.pieces.items.end).all()
 
 
 def test_mean_extinction() -> None:

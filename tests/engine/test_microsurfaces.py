@@ -130,14 +130,14 @@ def test_hidden_wood_gets_no_more_facets_than_it_has_faces() -> None:
             subplant_facets,
             plants,
             100 * (flora.polygons[0] - flora.leaf_count[0] * flora.leaf.polygons[0]),
-            contents.subplant_amounts,
+            contents.subplants.amounts,
         ),
         (
             piece_facet_sizes,
             piece_facets,
             pieces,
             flora.rows["sides"][pieces.branches.row].sum(),
-            contents.piece_amounts,
+            contents.pieces.amounts,
         ),
     ):
         sizes = sizes_of(flora, contents, camera, np.array([COARSE]))

@@ -19,7 +19,7 @@ from tetflora_addon.shading.polygon_facets import chosen_facets
 def test_facets_do_not_depend_on_what_else_is_held(seed: int, side: float) -> None:
     """Without one of many polygons, in any order, all others have the facets that they had; all lie on their faces."""
     _, contents = divided(Polygons.everything(placed(thicket(seed, 30), seed)), seed, None)
-    polygons = contents.polygons
+    polygons = contents.polygons.items
     rng = np.random.default_rng(seed)
     optical, sides = polygons.areas(), np.full(len(polygons), side)
 

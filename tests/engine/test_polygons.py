@@ -105,7 +105,7 @@ def divided(polygons: Polygons, seed: int, slack: float | None, rounds: int = 4)
     loose = None if slack is None else lambda points: np.full(len(points), slack)
     contents = push_down(flora, tree, contents, loose)
     for _ in range(rounds):
-        nodes = np.unique(contents.polygon_cell)
+        nodes = np.unique(contents.polygons.cell)
         nodes = nodes[rng.random(len(nodes)) < 0.7]
         for _ in range(2):
             nodes = tree.split(nodes).ravel()
@@ -119,8 +119,8 @@ def test_area_colour_and_moment_are_exact_under_any_cuts(seed: int, slack: float
     """To 1e-6, as sums over all tetrahedra; amounts are those of the fragments, and all is in terminal nodes."""
     polygons = Polygons.everything(placed(thicket(seed), seed))
     tree, contents = divided(polygons, seed, slack)
-    parts = contents.polygons
-    assert (tree.children[contents.polygon_cell, 0] < 0).all()
+    parts = contents.polygons.items
+    assert (tree.children[contents.polygons.cell, 0] < 0).all()
     assert len(parts) > len(polygons)
     assert parts.areas().sum() == pytest.approx(polygons.areas().sum(), rel=1e-9)
     assert sums(parts) == pytest.approx(sums(polygons), rel=1e-6, abs=1e-9)
@@ -135,7 +135,7 @@ def test_everything_is_on_the_right_side(seed: int) -> None:
     """Every corner of every polygon lies within its tetrahedron's planes, up to the root; within the slack if any."""
     for slack in (None, 0.1):
         tree, contents = divided(Polygons.everything(placed(thicket(seed, 30), seed)), seed, slack)
-        polygons, node = contents.polygons, contents.polygon_cell.astype(np.intp)
+        polygons, node = contents.polygons.items, contents.polygons.cell.astype(np.intp)
         assert (tree.parent[node] >= 0).any()
         while (tree.parent[node] >= 0).any():
             parent = np.maximum(tree.parent[node], 0)
@@ -152,7 +152,7 @@ def test_texture_coordinates_and_attributes_are_interpolated(seed: int) -> None:
     one = thicket(seed, 30, fans=False)
     meshes = Meshes([one], np.zeros(1, int), np.eye(4)[None])
     _, contents = divided(Polygons.everything(meshes), seed, None)
-    mesh = polygon_buffers(contents.polygons)
+    mesh = polygon_buffers(contents.polygons.items)
     sound(mesh)
     expected = mesh.positions[mesh.corner_verts].astype(np.float64) @ AFFINE.T
     assert mesh.attributes["UVMap"][0] == "CORNER"
@@ -182,11 +182,11 @@ def test_a_cut_face_of_which_all_is_there_is_mended() -> None:
     polygons = Polygons.everything(meshes)
     _, contents = divided(polygons, 1, None)
     assert len(contents.polygons) > 2 * len(polygons)
-    whole = mended(contents.polygons)
+    whole = mended(contents.polygons.items)
     assert (whole.part == -1).all()
     key = np.sort(whole.instance.astype(np.int64) * 1000 + whole.face)
     assert (key == np.sort(polygons.instance.astype(np.int64) * 1000 + polygons.face)).all()
-    some = contents.polygons.take(np.random.default_rng(0).random(len(contents.polygons)) < 0.8)
+    some = contents.polygons.items.take(np.random.default_rng(0).random(len(contents.polygons)) < 0.8)
     assert mended(some).areas().sum() == pytest.approx(some.areas().sum(), rel=1e-9)
 
 
@@ -254,19 +254,19 @@ def test_near_polygons_stay_and_far_ones_become_facets_of_the_same_area(anchored
     meshes, camera = grove()
     result = refined(meshes, camera, anchored=anchored)
     whole = Polygons.everything(meshes)
-    assert result.contents.polygons.areas().sum() == pytest.approx(whole.areas().sum(), rel=1e-9)
+    assert result.contents.polygons.items.areas().sum() == pytest.approx(whole.areas().sum(), rel=1e-9)
     assert {Decision.PROXY, Decision.EXPLICIT} <= set(result.decision.tolist())
     blocks = [b.buffers for b in polygon_blocks(result, camera, 0.4)]
     kept = sum(support.face_areas(b).sum() for b in blocks)
     proxies = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN))
-    beside = ~result.in_view[proxies.polygon_cell]
+    beside = ~result.in_view[proxies.polygons.cell]
     facets = np.concatenate([f.side**2 for f, _ in polygon_facets(proxies, result, camera, 0.4)])
     drawn = facets.sum()
     chance = 2 * np.sqrt((facets**2).sum())  # facets are there or not; of a mesh, not independently
     assert chance < 0.1 * drawn
     assert 0.1 < kept / (kept + drawn) < 0.95
     # Facets beside the view may have been made smaller, so that they do not reach into it.
-    loss = 0.5 * proxies.polygon_amounts.area[beside].sum()
+    loss = 0.5 * proxies.polygons.amounts.area[beside].sum()
     assert whole.areas().sum() - loss - chance <= kept + drawn <= whole.areas().sum() + chance
     assert sum(b.polygons for b in blocks) + len(facets) < 0.7 * len(whole)
     near = whole.take(np.linalg.norm(whole.centre - camera.position, axis=1) < 7)
@@ -295,7 +295,7 @@ def test_facets_of_polygons_come_in_runs_that_are_bounded_and_the_same() -> None
 def test_explicit_everywhere_is_the_original() -> None:
     meshes, camera = grove(6)
     result = refined(meshes, camera, leaf_limit=1e-6, hidden=-1.0, cutoff=1e-3, few_polygons=100)
-    seen = result.tree.inside[result.contents.polygon_cell]
+    seen = result.tree.inside[result.contents.polygons.cell]
     assert np.isin(result.decision, [Decision.EXPLICIT, Decision.HIDDEN]).all()
     blocks = list(polygon_blocks(result, camera, 1e-4))
     assert sum(b.buffers.polygons for b in blocks) == len(Polygons.everything(meshes))
@@ -308,7 +308,7 @@ def test_explicit_everywhere_is_the_original() -> None:
 def test_lens_and_shutter_widen_the_view_for_polygons_alone() -> None:
     meshes, camera = grove(6)
     flora, polygons = support.small_flora(), Polygons.everything(meshes)
-    nobody = Contents.empty().subplants
+    nobody = Contents().subplants.items
     sharp = widened_for(camera, 0.04, flora, nobody, polygons)
     assert sharp.window == camera.widened(0.04).window
     blurred = widened_for(replace(camera, lens_radius=0.2, focus=20.0), 0.04, flora, nobody, polygons)

@@ -77,7 +77,7 @@ def test_summaries_of_any_division(seed: int, kind: str) -> None:
     flora = support.small_flora()
     tree, contents = divided(flora, support.grove(4, 2.0), seed, kind)
     index = np.full(len(tree), -1)
-    nodes = np.unique(np.concatenate([contents.subplant_cell, contents.piece_cell]))
+    nodes = np.unique(np.concatenate([contents.subplants.cell, contents.pieces.cell]))
     index[nodes] = np.arange(len(nodes))
     each = summarise(flora, contents, index, len(nodes))
     whole = of_everything(flora, contents, len(tree))
@@ -106,7 +106,7 @@ def test_sums_do_not_depend_on_how_contents_are_cut() -> None:
     tree, contents = divided(flora, seeds, 5, "PERSP", rounds=3)
     shreds = expanded(flora, contents)
     none = contents.within(np.zeros(len(tree), bool))
-    shredded = Contents.of(flora, none.subplants, none.subplant_cell, shreds, np.zeros(len(shreds), np.int32))
+    shredded = Contents.of(flora, none.subplants.items, none.subplants.cell, shreds, np.zeros(len(shreds), np.int32))
     for other in (of_everything(flora, contents, len(tree)), of_everything(flora, shredded, 1)):
         assert other.optical_area[0] == pytest.approx(whole.optical_area[0], rel=0.03)
         np.testing.assert_allclose(other.colour, whole.colour, rtol=0.03)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import gathered
+from ..arrays import Arrays, gathered
 from .branches import Branches
 from .hashing import Draw, signed
 from .rows import varied
@@ -18,7 +18,7 @@ from .wind import axis_and_angle, is_windy, leant, moment, sway, turned_by, turn
 
 
 @dataclass(frozen=True)
-class Axes:
+class Axes(Arrays):
     """Centre lines of branches: straight segments.
 
     Attributes
@@ -41,11 +41,9 @@ class Axes:
     skies: NDArray[np.float64] | None = None
     later: Axes | None = None
 
-    def take(self, index: NDArray | slice) -> Axes:
-        """Selection by indices or slice."""
-        later = None if self.later is None else self.later.take(index)
-        skies = None if self.skies is None else _selected(self.skies, index)
-        return Axes(_selected(self.knots, index), _selected(self.frames, index), self.segments[index], skies, later)
+    @staticmethod
+    def _rows(own: NDArray | Arrays, index: NDArray | slice) -> NDArray | Arrays:
+        return own.take(index) if isinstance(own, Arrays) else _selected(own, index)
 
     def at(self, branch: NDArray[np.integer], t: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
         """Positions (m, 3) and frames (m, 3, 3) at the fractions t (m,) of the axes of branches (m,)."""
@@ -74,7 +72,7 @@ class Axes:
 
 def _selected(array: NDArray, index: NDArray | slice) -> NDArray:
     """``array[index]`` of an array whose first axis is the last in memory and whose second the one before."""
-    if isinstance(index, slice):
+    if isinstance(index, slice) or array.ndim == 1:
         return array[index]
     return _to_front(np.take(_to_back(array), index, axis=-1))
 

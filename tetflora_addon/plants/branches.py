@@ -4,17 +4,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import gathered
+from ..arrays import Arrays, column
 
 
 @dataclass(frozen=True)
-class Pose:
+class Pose(Arrays):
     """Where branches are.
 
     Attributes
@@ -28,13 +27,9 @@ class Pose:
     frame: NDArray[np.float64]
     sky: NDArray[np.float64]
 
-    def take(self, index: NDArray | slice) -> Pose:
-        """Selection by indices, mask or slice."""
-        return Pose(*(gathered(getattr(self, f.name), index) for f in fields(self)))
-
 
 @dataclass(frozen=True)
-class Branches:
+class Branches(Arrays):
     """Branches (or sub-plants) as a structure of arrays.
 
     Attributes
@@ -66,11 +61,11 @@ class Branches:
         Position and frame a moment later, where it is asked how plants move.
     """
 
-    row: NDArray[np.int32]
-    plant: NDArray[np.int32]
-    key: NDArray[np.uint64]
-    position: NDArray[np.float64]
-    frame: NDArray[np.float64]
+    row: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
+    plant: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
+    key: NDArray[np.uint64] = field(metadata=column(dtype=np.uint64))
+    position: NDArray[np.float64] = field(metadata=column(3))
+    frame: NDArray[np.float64] = field(metadata=column(3, 3))
     length: NDArray[np.float64]
     radius: NDArray[np.float64]
     scale: NDArray[np.float64]
@@ -79,36 +74,6 @@ class Branches:
     sky: NDArray[np.float64] | None = None
     later: Pose | None = None
 
-    def __len__(self) -> int:
-        return len(self.row)
-
-    def take(self, index: NDArray | slice) -> Branches:
-        """Selection by indices, mask or slice."""
-        now = (gathered(getattr(self, name), index) for name in _ARRAYS)
-        sky = None if self.sky is None else gathered(self.sky, index)
-        return Branches(*now, sky, None if self.later is None else self.later.take(index))
-
     def moved(self) -> Branches:
         """The same a moment later; only where that is known."""
         return replace(self, **vars(self.later), later=None)
-
-    @classmethod
-    def concatenate(cls, parts: Sequence[Branches]) -> Branches:
-        """All branches of several in one."""
-        now = (np.concatenate([getattr(p, name) for p in parts]) for name in _ARRAYS)
-        some = [p for p in parts if len(p)]  # no branches know nothing of the wind, and need not
-        sky = later = None
-        if some and some[0].sky is not None:
-            sky = np.concatenate([p.sky for p in some])
-        if some and some[0].later is not None:
-            later = Pose(*(np.concatenate([getattr(p.later, f.name) for p in some]) for f in fields(Pose)))
-        return cls(*now, sky, later)
-
-    @classmethod
-    def empty(cls) -> Branches:
-        """No branches."""
-        floats = [np.zeros(s) for s in ((0, 3), (0, 3, 3), 0, 0, 0, 0, 0)]
-        return cls(np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros(0, np.uint64), *floats)
-
-
-_ARRAYS = tuple(f.name for f in fields(Branches) if f.name not in ("sky", "later"))

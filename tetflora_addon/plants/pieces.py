@@ -4,13 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import gathered
+from ..arrays import Arrays, column, gathered, nested
 from .averages import own_leaf_integrals, tube_perimeter
 from .branches import Branches
 from .compiled import Flora
@@ -20,7 +19,7 @@ from .stems import Stems
 
 
 @dataclass(frozen=True)
-class Pieces:
+class Pieces(Arrays):
     """Parts of branches, each within one straight segment.
 
     Attributes
@@ -33,34 +32,11 @@ class Pieces:
         The same ends in space, metres.
     """
 
-    branches: Branches
+    branches: Branches = field(metadata=nested(Branches))
     t0: NDArray[np.float64]
     t1: NDArray[np.float64]
-    start: NDArray[np.float64]
-    end: NDArray[np.float64]
-
-    def __len__(self) -> int:
-        return len(self.t0)
-
-    def take(self, index: NDArray | slice) -> Pieces:
-        """Selection by indices, mask or slice; by a mask that leaves nothing out, the pieces themselves."""
-        if not isinstance(index, slice) and index.dtype == bool:
-            if index.all():
-                return self
-            index = np.flatnonzero(index)  # once, not for each field
-        ends = gathered(self.start, index), gathered(self.end, index)
-        return Pieces(self.branches.take(index), self.t0[index], self.t1[index], *ends)
-
-    @classmethod
-    def concatenate(cls, parts: Sequence[Pieces]) -> Pieces:
-        """All pieces of several in one."""
-        rest = (np.concatenate([getattr(p, name) for p in parts]) for name in ("t0", "t1", "start", "end"))
-        return cls(Branches.concatenate([p.branches for p in parts]), *rest)
-
-    @classmethod
-    def empty(cls) -> Pieces:
-        """No pieces."""
-        return cls(Branches.empty(), np.zeros(0), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
+    start: NDArray[np.float64] = field(metadata=column(3))
+    end: NDArray[np.float64] = field(metadata=column(3))
 
     def runs(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """First and last piece (k,), (k,) of each longest row of pieces that follow one another on a branch."""

@@ -10,12 +10,12 @@ Kahn and Harris, "Estimation of particle transmission by random sampling", 1951)
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import gathered
+from ..arrays import Arrays, gathered
 from .axes import Axes, axes
 from .branches import Branches
 from .foliage import leaf_keys, leaf_places, outwardness, place_leaves
@@ -131,7 +131,7 @@ def _at_least_some(counts: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 @dataclass
-class _Points:
+class _Points(Arrays):
     """Sample points on branches of one row or several; shapes as in `Points`.
 
     ``line`` (n, slots) says on which branches the point is, see `_Walk`; ``offset`` (n, 3) is the part of the position
@@ -148,11 +148,6 @@ class _Points:
     area: NDArray[np.float64]
 
     @classmethod
-    def joined(cls, parts: list[_Points]) -> _Points:
-        """All points of several in one."""
-        return cls(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(cls)))
-
-    @classmethod
     def on(
         cls, rows: NDArray[np.void], one: _Arrived, branch: NDArray[np.int64], position: NDArray, *rest: NDArray
     ) -> _Points:
@@ -162,10 +157,6 @@ class _Points:
         offset = position - gathered(one.branches.position, branch) if short.all() else np.zeros_like(position)
         frame, *others = rest
         return cls(one.line[:, branch].T, position, offset, frame, row, *others)
-
-    def take(self, index: NDArray[np.int64]) -> _Points:
-        """Selection by indices."""
-        return _Points(*(gathered(getattr(self, f.name), index) for f in fields(self)))
 
 
 @dataclass
@@ -221,8 +212,8 @@ class _Walk:
                     arrived[child - first].append(_one_child_each(rows, one, lines, sort))
             for number, child in enumerate(range(*rows["drawn_rows"][row])):
                 arrived[child - first].append(_drawn_child(rows, one, number, self._number(child)))
-        self.wood = _Points.joined(wood)
-        self.leaves = _Points.joined(leaves) if leaves else None
+        self.wood = _Points.concatenate(wood)
+        self.leaves = _Points.concatenate(leaves) if leaves else None
 
     def _number(self, row: int) -> int:
         return int((_CLASSES * _CLASS_PATHS if self.rows["worldly"][row] else _PATHS) * self.share[row - self.first])

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import spread
+from ..arrays import Arrays, spread
 from .axes import Axes
 from .branches import Branches
 from .rows import flare_rings
 
 
 @dataclass(frozen=True)
-class Stems:
+class Stems(Arrays):
     """Whole branches and their axes.
 
     Attributes
@@ -27,17 +27,6 @@ class Stems:
 
     branches: Branches
     lines: Axes
-
-    def __len__(self) -> int:
-        return len(self.branches)
-
-    def take(self, index: NDArray | slice) -> Stems:
-        """Selection by indices, mask or slice; by a mask that leaves nothing out, the stems themselves."""
-        if not isinstance(index, slice) and index.dtype == bool:
-            if index.all():
-                return self
-            index = np.flatnonzero(index)
-        return Stems(self.branches.take(index), self.lines.take(index))
 
     def knots(self, rows: NDArray[np.void]) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
         """Where segments begin and end; a flared base has some more.

@@ -180,20 +180,20 @@ def mean_colours(flora: Flora, contents: Contents, nodes: NDArray[np.integer], s
 
     Unlike `shading.summaries` without orientation and clumping, which a preview does not show.
     """
-    row, piece_row = contents.subplants.row, contents.pieces.branches.row
+    row, piece_row = contents.subplants.items.row, contents.pieces.items.branches.row
     parts = []
     for cells, amounts, leaf, wood in (
-        (contents.subplant_cell, contents.subplant_amounts, flora.leaf_colours, flora.wood_colour[row]),
-        (contents.piece_cell, contents.piece_amounts, None, flora.rows["branch_colour"][piece_row, 0]),
+        (contents.subplants.cell, contents.subplants.amounts, flora.leaf_colours, flora.wood_colour[row]),
+        (contents.pieces.cell, contents.pieces.amounts, None, flora.rows["branch_colour"][piece_row, 0]),
     ):
         if len(cells) == 0:
             continue
-        leaves = leaf(contents.subplants) if leaf else piece_leaf_colours(flora, contents.pieces)
+        leaves = leaf(contents.subplants.items) if leaf else piece_leaf_colours(flora, contents.pieces.items)
         parts += [(cells, amounts.leaf_area, leaves), (cells, amounts.wood_area / 2, wood)]
-    if len(contents.polygon_cell):
-        polygons, amounts = contents.polygons, contents.polygon_amounts
+    if len(contents.polygons.cell):
+        polygons, amounts = contents.polygons.items, contents.polygons.amounts
         colours = polygons.meshes.colours[polygons.meshes.slot[polygons.face]]
-        parts.append((contents.polygon_cell, amounts.optical_area, colours))
+        parts.append((contents.polygons.cell, amounts.optical_area, colours))
     sums, area = np.zeros((size, 3)), np.zeros(size)
     for cells, weight, colours in parts:
         area += np.bincount(cells, weight, size)

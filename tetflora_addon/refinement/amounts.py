@@ -4,12 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Arrays
 from ..plants.averages import own_leaf_integrals
 from ..plants.branches import Branches
 from ..plants.compiled import Flora
@@ -19,7 +19,7 @@ from .polygons import Polygons
 
 
 @dataclass(frozen=True)
-class Amounts:
+class Amounts(Arrays):
     """How much each thing (sub-plant or piece) or each tetrahedron holds.
 
     Attributes
@@ -41,9 +41,6 @@ class Amounts:
     polygons: NDArray[np.float64]
     width: NDArray[np.float64]
 
-    def __len__(self) -> int:
-        return len(self.leaf_area)
-
     @property
     def area(self) -> NDArray[np.float64]:
         """Leaves and wood together (n,), m²."""
@@ -53,20 +50,6 @@ class Amounts:
     def optical_area(self) -> NDArray[np.float64]:
         """What can hold up light (n,), m²: leaves, and half of the wood, as closed branches show no more than that."""
         return self.leaf_area + self.wood_area / 2
-
-    def take(self, index: NDArray | slice) -> Amounts:
-        """Selection by indices, mask or slice."""
-        return Amounts(*(getattr(self, f.name)[index] for f in fields(self)))
-
-    @classmethod
-    def concatenate(cls, parts: Sequence[Amounts]) -> Amounts:
-        """All of several in one."""
-        return cls(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(cls)))
-
-    @classmethod
-    def empty(cls) -> Amounts:
-        """Of nothing."""
-        return cls(*np.zeros((4, 0)))
 
 
 def subplant_amounts(flora: Flora, subplants: Branches) -> Amounts:

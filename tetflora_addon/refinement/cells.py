@@ -4,12 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Arrays
 from ..tetrahedra.geometry import squared_edges, volume
 from ..tetrahedra.tree import TetrahedralTree
 from .amounts import Amounts
@@ -18,7 +18,7 @@ from .visibility import AlphaBuffer
 
 
 @dataclass(frozen=True)
-class Terminals:
+class Terminals(Arrays):
     """Terminal tetrahedra that hold something.
 
     Attributes
@@ -47,9 +47,6 @@ class Terminals:
     span: NDArray[np.float64]
     whole: NDArray[np.bool_]
 
-    def __len__(self) -> int:
-        return len(self.nodes)
-
     @classmethod
     def seen(
         cls, tree: TetrahedralTree, nodes: NDArray[np.intp], amounts: Amounts, camera: Camera, buffer: AlphaBuffer
@@ -60,17 +57,6 @@ class Terminals:
         span = np.sqrt(squared_edges(vertices).max(axis=1)) / camera.extent_around(vertices.mean(axis=1))
         features = feature_pixels(vertices, amounts.width, camera)
         return cls(nodes, amounts, outline.pixels, outline.opacity, *features, span, outline.whole)
-
-    def take(self, index: NDArray) -> Terminals:
-        """Selection by indices or mask."""
-        own = {f.name: getattr(self, f.name)[index] for f in fields(self) if f.name != "amounts"}
-        return Terminals(amounts=self.amounts.take(index), **own)
-
-    @classmethod
-    def joined(cls, parts: Sequence[Terminals]) -> Terminals:
-        """All of several together."""
-        own = {f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(cls) if f.name != "amounts"}
-        return cls(amounts=Amounts.concatenate([p.amounts for p in parts]), **own)
 
 
 def mean_extinction(amounts: Amounts, volumes: NDArray[np.float64]) -> NDArray[np.float64]:

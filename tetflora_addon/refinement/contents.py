@@ -10,12 +10,13 @@ modelled elsewhere.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, is_dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Arrays
 from ..plants.branches import Branches
 from ..plants.compiled import Flora
 from ..plants.growth import trunks
@@ -29,7 +30,30 @@ from .polygons import Polygons
 #: Side in pixels from which on a polygon is large: more than facets have, even where nobody looks.
 LARGE = 2.0
 _NONE = np.zeros(0, np.int32)
-_KINDS = ("subplant", "piece", "polygon")
+
+Kind = TypeVar("Kind", Branches, Pieces, Polygons)
+
+
+@dataclass(frozen=True)
+class Held(Arrays, Generic[Kind]):
+    """Things of one kind (n), each in one node of the tree.
+
+    Attributes
+    ----------
+    items : Branches, Pieces or Polygons of n
+    cell : (n,) int32
+        Node that holds each.
+    amounts : Amounts of n
+    """
+
+    items: Kind
+    cell: NDArray[np.int32]
+    amounts: Amounts
+
+    @classmethod
+    def none(cls, kind: type[Kind]) -> Held[Kind]:
+        """Nothing of a kind."""
+        return cls(kind.empty(), _NONE, Amounts.empty())
 
 
 @dataclass(frozen=True)
@@ -38,35 +62,24 @@ class Contents:
 
     Attributes
     ----------
-    subplants : Branches of n
-    subplant_cell : (n,) int32
-        Node of the tree that holds each.
-    subplant_amounts : Amounts of n
-    pieces : Pieces of m
-    piece_cell : (m,) int32
-    piece_amounts : Amounts of m
-    polygons : Polygons of k
-    polygon_cell : (k,) int32
-    polygon_amounts : Amounts of k
+    subplants : Held of Branches
+    pieces : Held of Pieces
+    polygons : Held of Polygons
     """
 
-    subplants: Branches
-    subplant_cell: NDArray[np.int32]
-    subplant_amounts: Amounts
-    pieces: Pieces
-    piece_cell: NDArray[np.int32]
-    piece_amounts: Amounts
-    polygons: Polygons = field(default_factory=Polygons.empty)
-    polygon_cell: NDArray[np.int32] = field(default_factory=_NONE.copy)
-    polygon_amounts: Amounts = field(default_factory=Amounts.empty)
+    subplants: Held[Branches] = field(default_factory=lambda: Held.none(Branches))
+    pieces: Held[Pieces] = field(default_factory=lambda: Held.none(Pieces))
+    polygons: Held[Polygons] = field(default_factory=lambda: Held.none(Polygons))
 
     @classmethod
     def of(
         cls, flora: Flora, subplants: Branches, subplant_cell: NDArray, pieces: Pieces, piece_cell: NDArray
     ) -> Contents:
         """Parts of plants in cells, with their amounts."""
-        amounts = subplant_amounts(flora, subplants), piece_amounts(flora, pieces)
-        return cls(subplants, subplant_cell, amounts[0], pieces, piece_cell, amounts[1])
+        return cls(
+            Held(subplants, subplant_cell, subplant_amounts(flora, subplants)),
+            Held(pieces, piece_cell, piece_amounts(flora, pieces)),
+        )
 
     @classmethod
     def of_plants(cls, flora: Flora, seeds: Seeds) -> Contents:
@@ -79,70 +92,42 @@ class Contents:
         amounts = polygon_amounts(polygons)
         if large is not None:
             amounts = replace(amounts, width=np.where(large, np.inf, amounts.width))
-        return replace(
-            cls.empty(), polygons=polygons, polygon_cell=np.zeros(len(polygons), np.int32), polygon_amounts=amounts
-        )
-
-    @classmethod
-    def empty(cls) -> Contents:
-        """Nothing."""
-        return cls(Branches.empty(), _NONE, Amounts.empty(), Pieces.empty(), _NONE, Amounts.empty())
+        return cls(polygons=Held(polygons, np.zeros(len(polygons), np.int32), amounts))
 
     @property
-    def cells(self) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
-        """Nodes of sub-plants, of pieces and of polygons."""
-        return self.subplant_cell, self.piece_cell, self.polygon_cell
+    def kinds(self) -> tuple[Held[Branches], Held[Pieces], Held[Polygons]]:
+        """Sub-plants, pieces and polygons."""
+        return self.subplants, self.pieces, self.polygons
 
-    @cached_property
+    @property
     def nbytes(self) -> int:
         """Bytes of all arrays."""
-        return _nbytes(self)
+        return sum(kind.nbytes for kind in self.kinds)
 
     def within(self, chosen: NDArray[np.bool_]) -> Contents:
         """The part that lies in chosen nodes; ``chosen`` is (nodes,) bool."""
-        return self.take(*(chosen[c] for c in self.cells))
+        return self.take(*(chosen[kind.cell] for kind in self.kinds))
 
     def take(self, subplants: NDArray[np.bool_], pieces: NDArray[np.bool_], polygons: NDArray[np.bool_]) -> Contents:
         """Selection by masks (n,), (m,) and (k,)."""
-        s, p, q = (np.flatnonzero(mask) for mask in (subplants, pieces, polygons))
-        return Contents(
-            self.subplants.take(s),
-            self.subplant_cell[s],
-            self.subplant_amounts.take(s),
-            self.pieces.take(p),
-            self.piece_cell[p],
-            self.piece_amounts.take(p),
-            self.polygons.take(q),
-            self.polygon_cell[q],
-            self.polygon_amounts.take(q),
-        )
+        return Contents(*(kind.take(m) for kind, m in zip(self.kinds, (subplants, pieces, polygons), strict=True)))
 
     @classmethod
     def joined(cls, parts: Sequence[Contents]) -> Contents:
         """All of several together."""
         if len(parts) < 2:
-            return parts[0] if parts else cls.empty()
-        return cls(
-            Branches.concatenate([p.subplants for p in parts]),
-            np.concatenate([p.subplant_cell for p in parts]),
-            Amounts.concatenate([p.subplant_amounts for p in parts]),
-            Pieces.concatenate([p.pieces for p in parts]),
-            np.concatenate([p.piece_cell for p in parts]),
-            Amounts.concatenate([p.piece_amounts for p in parts]),
-            Polygons.concatenate([p.polygons for p in parts]),
-            np.concatenate([p.polygon_cell for p in parts]),
-            Amounts.concatenate([p.polygon_amounts for p in parts]),
-        )
+            return parts[0] if parts else cls()
+        return cls(*(Held.concatenate(kinds) for kinds in zip(*(p.kinds for p in parts), strict=True)))
 
     def sums(self, nodes: int) -> Amounts:
         """What each of a number of nodes holds."""
-        amounts = [getattr(self, f"{kind}_amounts") for kind in _KINDS]
-        return sums(Amounts.concatenate(amounts), np.concatenate(self.cells), nodes)
+        amounts = Amounts.concatenate([kind.amounts for kind in self.kinds])
+        return sums(amounts, np.concatenate([kind.cell for kind in self.kinds]), nodes)
 
     def bounding_box(self, flora: Flora) -> NDArray[np.float64]:
         """Axis-aligned box (2, 3) of all that is there, metres."""
-        boxes = [bounding_box(flora, self.subplants)] if len(self.subplants) else []
-        boxes += [self.polygons.bounding_box()] if len(self.polygons) else []
+        boxes = [bounding_box(flora, self.subplants.items)] if len(self.subplants) else []
+        boxes += [self.polygons.items.bounding_box()] if len(self.polygons) else []
         return np.stack([np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)])
 
 
@@ -167,7 +152,8 @@ class Holdings:
     @property
     def sizes(self) -> tuple[int, ...]:
         """Numbers of sub-plants, pieces and polygons."""
-        return tuple(int(sum((part.cells[kind] >= 0).sum() for part in self._parts)) for kind in range(len(_KINDS)))
+        every = zip(*(part.kinds for part in self._parts), strict=True)
+        return tuple(int(sum((kind.cell >= 0).sum() for kind in kinds)) for kinds in every)
 
     @property
     def nbytes(self) -> int:
@@ -182,31 +168,24 @@ class Holdings:
         """Remove and return what lies in chosen nodes; ``chosen`` is (nodes,) bool."""
         out, kept = [], []
         for part in self._parts:
-            masks = [chosen[np.maximum(c, 0)] & (c >= 0) for c in part.cells]
+            masks = [chosen[np.maximum(kind.cell, 0)] & (kind.cell >= 0) for kind in part.kinds]
             if not any(m.any() for m in masks):
                 kept.append(part)
                 continue
             out.append(part.take(*masks))
             # What is taken is only marked here; copying what stays would cost more than all else that moves.
-            cells = [np.where(m, np.int32(-1), c) for m, c in zip(masks, part.cells, strict=True)]
-            part = replace(part, **{f"{kind}_cell": c for kind, c in zip(_KINDS, cells, strict=True)})
-            if 2 * sum((c < 0).sum() for c in cells) > sum(map(len, cells)):
+            kinds = zip(masks, part.kinds, strict=True)
+            part = Contents(*(replace(kind, cell=np.where(m, np.int32(-1), kind.cell)) for m, kind in kinds))
+            if 2 * sum((kind.cell < 0).sum() for kind in part.kinds) > sum(map(len, part.kinds)):
                 part = _living(part)
             kept.append(part)
         self._parts = kept
         return Contents.joined(out)
 
 
-def _nbytes(thing: object) -> int:
-    if isinstance(thing, np.ndarray):
-        return thing.nbytes
-    return sum(_nbytes(getattr(thing, f.name)) for f in fields(thing)) if is_dataclass(thing) else 0
-
-
 def _living(part: Contents) -> Contents:
     """Without what has been taken out."""
-    masks = [c >= 0 for c in part.cells]
-    return part if all(m.all() for m in masks) else part.take(*masks)
+    return part.take(*(kind.cell >= 0 for kind in part.kinds))
 
 
 def large_polygons(polygons: Polygons, camera: Camera) -> NDArray[np.bool_]:

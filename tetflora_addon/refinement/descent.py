@@ -24,7 +24,7 @@ from ..plants.sides import body_distances, bounding_bodies, crossing, sampled_bo
 from ..tetrahedra.tree import TetrahedralTree
 from .amounts import Amounts, polygon_amounts
 from .clipping import cut
-from .contents import Contents
+from .contents import Contents, Held
 from .polygons import Polygons
 
 #: Metres (n,) at points (n, 3) that the picture cannot tell.
@@ -57,8 +57,8 @@ def push_down(flora: Flora, tree: TetrahedralTree, contents: Contents, slack: Sl
         The same plants and polygons in terminal nodes; nothing is lost or held twice.
     """
     placed, placed_cells = [Branches.empty()], [np.zeros(0, np.int32)]
-    loose, loose_cells = [contents.pieces], [contents.piece_cell]
-    subplants, cells = contents.subplants, contents.subplant_cell
+    loose, loose_cells = [contents.pieces.items], [contents.pieces.cell]
+    subplants, cells = contents.subplants.items, contents.subplants.cell
     while len(subplants):
         cells, opened = _lowered(flora, tree, subplants, cells, slack)
         placed.append(subplants.take(~opened))
@@ -74,9 +74,9 @@ def push_down(flora: Flora, tree: TetrahedralTree, contents: Contents, slack: Sl
     pieces, piece_cells = _push_down_pieces(tree, Pieces.concatenate(loose), np.concatenate(loose_cells), slack)
     plants = Contents.of(flora, Branches.concatenate(placed), np.concatenate(placed_cells), pieces, piece_cells)
     polygons, cells, amounts = _push_down_polygons(
-        tree, contents.polygons, contents.polygon_cell, contents.polygon_amounts, slack
+        tree, contents.polygons.items, contents.polygons.cell, contents.polygons.amounts, slack
     )
-    return replace(plants, polygons=polygons, polygon_cell=cells, polygon_amounts=amounts)
+    return replace(plants, polygons=Held(polygons, cells, amounts))
 
 
 def _lowered(

@@ -138,7 +138,7 @@ def refine(
     """
     clock = Stopwatch()
     contents = Contents.of_plants(flora, seeds)
-    camera = widened_for(camera, settings.margin, flora, contents.subplants, polygons)
+    camera = widened_for(camera, settings.margin, flora, contents.subplants.items, polygons)
     slack = _slack(camera, settings.visibility_resolution)
     if polygons is not None:
         contents = Contents.joined([contents, Contents.of_polygons(polygons, large_polygons(polygons, camera))])
@@ -237,7 +237,7 @@ def _drawn(
         nodes = np.concatenate([cells.nodes, nodes])
         amounts, cells = Amounts.concatenate([cells.amounts, amounts]), None
     new = Terminals.seen(tree, nodes, amounts, buffers.camera, finer)
-    return (Terminals.joined([cells, new]) if cells is not None else new), finer
+    return (Terminals.concatenate([cells, new]) if cells is not None else new), finer
 
 
 def _slack(camera: Camera, resolution: int) -> Slack:

@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import spread
+from ..arrays import Arrays, spread
 
 #: Faces and triangles that are measured at a time; bounds what that takes to some hundred megabytes.
 MEASURED_AT_ONCE = 200_000
@@ -204,7 +204,7 @@ class Meshes:
 
 
 @dataclass(frozen=True)
-class Polygons:
+class Polygons(Arrays):
     """Whole faces and fragments of faces, n in all, m of them fragments.
 
     Attributes

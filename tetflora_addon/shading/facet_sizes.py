@@ -151,13 +151,13 @@ def coarseness(result: Refinement) -> NDArray[np.float64]:
 
 def polygon_facet_sizes(contents: Contents, camera: Camera, hidden: NDArray[np.bool_]) -> PolygonFacetSizes:
     """Facets of the polygons of contents; ``hidden`` (nodes,) says in which nodes nobody looks."""
-    own, amounts = contents.polygons, contents.polygon_amounts
+    own, amounts = contents.polygons.items, contents.polygons.amounts
     meshes = own.meshes
     return PolygonFacetSizes(
         camera.extent_around(own.centre),
         meshes.face_areas(own.face, own.instance),
         meshes.leaf[own.face],
-        hidden[contents.polygon_cell],
+        hidden[contents.polygons.cell],
         amounts.optical_area,
         meshes.solid[own.face],
     )
@@ -165,19 +165,19 @@ def polygon_facet_sizes(contents: Contents, camera: Camera, hidden: NDArray[np.b
 
 def subplant_facet_sizes(flora: Flora, contents: Contents, camera: Camera, coarse: NDArray[np.float64]) -> FacetSizes:
     """Facets of the sub-plants of contents; ``coarse`` (nodes,) as `coarseness` gives it."""
-    own = contents.subplants
-    amounts, faces = contents.subplant_amounts, flora.branch_faces(own)
+    own = contents.subplants.items
+    amounts, faces = contents.subplants.amounts, flora.branch_faces(own)
     least = np.sqrt(amounts.wood_area / 2 / np.maximum(faces, 1))
-    place, coarse = bounding_cylinders(flora, own)[0], coarse[contents.subplant_cell]
+    place, coarse = bounding_cylinders(flora, own)[0], coarse[contents.subplants.cell]
     extent, away = camera.extent_around(place), camera.clearance(place)
     return FacetSizes(extent, flora.one_leaf_area(own), least, coarse, away, amounts, np.ones(len(own)))
 
 
 def piece_facet_sizes(flora: Flora, contents: Contents, camera: Camera, coarse: NDArray[np.float64]) -> FacetSizes:
     """Facets of the pieces of contents; parameters as for `subplant_facet_sizes`."""
-    own = contents.pieces
-    amounts, faces = contents.piece_amounts, flora.rows["sides"][own.branches.row]
+    own = contents.pieces.items
+    amounts, faces = contents.pieces.amounts, flora.rows["sides"][own.branches.row]
     least = np.sqrt(amounts.wood_area / 2 / np.maximum(faces, 1))
-    place, coarse = (own.start + own.end) / 2, coarse[contents.piece_cell]
+    place, coarse = (own.start + own.end) / 2, coarse[contents.pieces.cell]
     extent, away = camera.extent_around(place), camera.clearance(place)
     return FacetSizes(extent, flora.one_leaf_area(own.branches), least, coarse, away, amounts, own.t1 - own.t0)

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -63,9 +63,9 @@ class Clouds:
         """
         nodes, contents = refinement.nodes, refinement.contents
         # Large polygons are walls, not fog: they come as occluders.
-        fine = np.isfinite(contents.polygon_amounts.width)
+        fine = np.isfinite(contents.polygons.amounts.width)
         if not fine.all():
-            contents = contents.take(*(np.ones(len(c), bool) for c in contents.cells[:2]), fine)
+            contents = replace(contents, polygons=contents.polygons.take(fine))
         summaries = summarise(flora, contents, cell_of_node(refinement), len(nodes))
         vertices = refinement.tree.vertices(nodes)
         matrices, normal, plane = extinction_matrices(summaries, volume(vertices))

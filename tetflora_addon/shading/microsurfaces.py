@@ -10,12 +10,12 @@ average.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import spread
+from ..arrays import Arrays, spread
 from ..buffers import MeshBuffers
 from ..plants.axes import axes
 from ..plants.branches import Branches
@@ -43,7 +43,7 @@ CIRCUMRADIUS = 2 / 27**0.25
 
 
 @dataclass(frozen=True)
-class Facets:
+class Facets(Arrays):
     """Equilateral triangles as a structure of arrays.
 
     Attributes
@@ -67,9 +67,6 @@ class Facets:
     transmission: NDArray[np.float64]
     velocity: NDArray[np.float64] | None = None
 
-    def __len__(self) -> int:
-        return len(self.side)
-
     @property
     def normal(self) -> NDArray[np.float64]:
         """Unit vectors (n, 3) that facets are perpendicular to."""
@@ -80,12 +77,9 @@ def concatenate_facets(parts: Sequence[Facets]) -> Facets:
     """Facets of one or more parts, in their order."""
     if len(parts) == 1:
         return parts[0]
-    names = [field.name for field in fields(Facets) if field.name != "velocity"]
-    velocity = None
     if any(part.velocity is not None for part in parts):  # meshes from elsewhere stand still beside plants that move
-        still = (np.zeros((len(part), 3)) if part.velocity is None else part.velocity for part in parts)
-        velocity = np.concatenate(list(still))
-    return Facets(*(np.concatenate([getattr(part, name) for part in parts]) for name in names), velocity)
+        parts = [replace(p, velocity=np.zeros((len(p), 3))) if p.velocity is None else p for p in parts]
+    return Facets.concatenate(parts)
 
 
 def subplant_facets(

@@ -46,7 +46,7 @@ def polygon_facets(
         Some of them, and whether they are seen: neither hidden nor beside the view.
     """
     sizes = polygon_facet_sizes(contents, camera, result.chosen(Decision.HIDDEN))
-    side, inside = sizes.sides(facet_pixels), result.in_view[contents.polygon_cell]
+    side, inside = sizes.sides(facet_pixels), result.in_view[contents.polygons.cell]
     left, expected = ~sizes.kept(facet_pixels), sizes.counts(facet_pixels) + 1  # polygons take memory too
     for alike, seen, beside in (
         (inside & ~sizes.hidden, True, False),
@@ -56,7 +56,7 @@ def polygon_facets(
         chosen = np.flatnonzero(left & alike)
         for run in chunks(expected[chosen], at_once):
             some = chosen[run]
-            made = chosen_facets(contents.polygons.take(some), sizes.optical[some], side[some])
+            made = chosen_facets(contents.polygons.items.take(some), sizes.optical[some], side[some])
             yield kept_out_of_view(made, camera.clearance, HIDDEN_FACES**-0.5) if beside else made, seen
 
 

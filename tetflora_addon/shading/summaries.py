@@ -67,11 +67,11 @@ def summarise(flora: Flora, contents: Contents, index: NDArray[np.integer], coun
         Number of summaries.
     """
     sums = np.zeros((count, 16))  # area, then times area: colour, transmission, moment, clumping
-    subplants, pieces = contents.subplants, contents.pieces
+    subplants, pieces = contents.subplants.items, contents.pieces.items
     rows = flora.rows
     for cells, branches, own, every in (
-        (contents.subplant_cell, subplants, None, contents.subplant_amounts),
-        (contents.piece_cell, pieces.branches, pieces, contents.piece_amounts),
+        (contents.subplants.cell, subplants, None, contents.subplants.amounts),
+        (contents.pieces.cell, pieces.branches, pieces, contents.pieces.amounts),
     ):
         to = index[cells]
         keep = np.flatnonzero(to >= 0)
@@ -113,11 +113,11 @@ def _add(sums: NDArray[np.float64], to: NDArray[np.integer], values: NDArray[np.
 
 def _add_polygons(sums: NDArray[np.float64], contents: Contents, index: NDArray[np.integer]) -> None:
     """Polygons are summed up triangle by triangle, which is exact under any sequence of cuts."""
-    chosen = np.flatnonzero(index[contents.polygon_cell] >= 0)
-    meshes = contents.polygons.meshes
+    chosen = np.flatnonzero(index[contents.polygons.cell] >= 0)
+    meshes = contents.polygons.items.meshes
     for start in range(0, len(chosen), MEASURED_AT_ONCE):
         some = chosen[start : start + MEASURED_AT_ONCE]
-        polygons = contents.polygons.take(some)
+        polygons = contents.polygons.items.take(some)
         owner, triangle, share = polygons.triangles()
         face = polygons.face[owner]
         slot, solid = meshes.slot[face], meshes.solid[face]
@@ -130,7 +130,7 @@ def _add_polygons(sums: NDArray[np.float64], contents: Contents, index: NDArray[
         seen = np.concatenate(
             [np.ones_like(optical), meshes.colours[slot], meshes.transmission[slot][:, None], moment, even], axis=1
         )
-        _add(sums, index[contents.polygon_cell[some]][owner], optical * seen)
+        _add(sums, index[contents.polygons.cell[some]][owner], optical * seen)
 
 
 def _moments(sums: NDArray[np.float64]) -> NDArray[np.float64]:
