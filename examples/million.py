@@ -91,7 +91,7 @@ def _plant(scene: bpy.types.Scene, surface: bpy.types.Object, land: Terrain, pla
             shares=tuple(HEIGHTS.values()),
             **common,
         ),
-        places.Occupied(valleys.position),
+        valleys.position,
     )
     add_field(scene, valleys, tuple(VALLEYS))
     add_field(scene, heights, tuple(HEIGHTS))

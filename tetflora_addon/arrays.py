@@ -20,11 +20,11 @@ class Arrays:
     """Base of dataclasses whose fields are columns: one row for each of n things.
 
     A column is an array, or another `Arrays` of the same length. One whose default is None may be absent. All other
-    fields belong to the whole and are kept as they are. The first field must be a column.
+    fields belong to the whole and are kept as they are.
     """
 
     def __len__(self) -> int:
-        return len(getattr(self, _names(type(self))[0]))
+        return next(len(c) for c in vars(self).values() if isinstance(c, np.ndarray | Arrays))
 
     @property
     def nbytes(self) -> int:

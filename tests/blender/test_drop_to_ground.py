@@ -95,7 +95,7 @@ def test_the_species_of_fields_changes_with_that_of_plants():
     after = _read(field)
     assert plant.tetflora.species == "fern"
     assert [entry.species for entry in field.tetflora.field_species] == ["fern"]
-    assert {after.kinds[i] for i in after.species} == {"fern"}
+    assert {after.identifiers[i] for i in after.species} == {"fern"}
     assert np.array_equal(after.seed, before.seed)
     assert np.array_equal(after.position, before.position)
 

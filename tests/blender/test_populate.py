@@ -35,8 +35,7 @@ def _place(triangles=SQUARE, **changes):
     low, high = given.pop("scale_range")
     occupied = given.pop("occupied", None)
     limits = rules.Rules(slope_max=given.pop("slope_limit"), scale_min=low, scale_max=high, **given)
-    older = None if occupied is None else places.Occupied(occupied)
-    return places.place(ground.Terrain(triangles), limits, older)
+    return places.place(ground.Terrain(triangles), limits, occupied)
 
 
 def _distances(points: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from tetflora_addon.errors import SceneError
 from tetflora_addon.planting import noise, regions, site
 from tetflora_addon.planting.ground import Path, Terrain, border_of, sampled
-from tetflora_addon.planting.places import Occupied, Placement, place
+from tetflora_addon.planting.places import Placement, place
 from tetflora_addon.planting.rules import Companion, Rules
 from tetflora_addon.planting.spacing import Neighbours, Spacing
 from tetflora_addon.plants.hashing import key_of_seed
@@ -120,7 +120,7 @@ def test_every_plant_satisfies_every_hard_rule(rules, with_areas, with_paths, wi
     older = rng.uniform(0.0, SIZE, (12, 3)) if with_older else np.zeros((0, 3))
     older_species = rng.integers(-1, 3, len(older))
     ground = Terrain(triangles, weight, areas=polygons, paths=(Path(line, 0.8),) if with_paths else ())
-    placed = place(ground, rules, Occupied(older, older_species))
+    placed = place(ground, rules, older, older_species)
     assert bool(placed.reason) == (len(placed) < placed.wanted or not len(placed))
     assert rules.by_density or placed.wanted == rules.count
     assert len(placed) <= placed.wanted

@@ -9,7 +9,6 @@ writes them will do. Nothing here goes from plant to plant.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from ..planting.places import new_seeds
 from ..plants.hashing import child_key, key_of_seed
+from ..plants.seeds import Seeds
 from .attributes import read, values_of, write
 from .plant_copies import geometry_of
 from .plant_kinds import kind_of, kind_of_choice
@@ -33,35 +33,6 @@ FIELD_ATTRIBUTES = {"rotation": 'QUATERNION', "scale": 'FLOAT', "species": 'INT'
 _INTEGERS = {'INT', 'INT8', 'BOOLEAN'}
 
 Points = bpy.types.Mesh | bpy.types.PointCloud
-
-
-@dataclass(frozen=True)
-class Plants:
-    """Plants as read from one object, in world space.
-
-    Attributes
-    ----------
-    name : str
-        Of the object.
-    kinds : tuple of str
-        That ``species`` counts through.
-    species : (n,) int32
-    seed : (n,) int64
-    position : (n, 3) float64
-    frame : (n, 3, 3) float64
-    scale : (n,) float64
-    """
-
-    name: str
-    kinds: tuple[str, ...]
-    species: NDArray[np.int32]
-    seed: NDArray[np.int64]
-    position: NDArray[np.float64]
-    frame: NDArray[np.float64]
-    scale: NDArray[np.float64]
-
-    def __len__(self) -> int:
-        return len(self.seed)
 
 
 def field_kinds(obj: bpy.types.Object) -> tuple[str, ...]:
@@ -85,7 +56,7 @@ def read_field(
     matrices: NDArray[np.float64],
     keys: NDArray[np.uint64] | None = None,
     geometry: bpy.types.GeometrySet | None = None,
-) -> Plants:
+) -> Seeds:
     """Plants of a field, once for each of its places.
 
     Of each point's transform the same is kept as of a plant that is an object.
@@ -136,7 +107,7 @@ def read_field(
         frame, scale, sound = _frames(world, rotation, own_scale)
         sound &= np.isfinite(place.sum(axis=1))
     _refuse(obj, ~sound.reshape(len(matrices), -1).all(axis=0), "zero scale or an invalid position or rotation")
-    return Plants(obj.name, kinds, np.tile(species.astype(np.int32), len(matrices)), seed, place, frame, scale)
+    return Seeds(kinds, np.tile(species.astype(np.int32), len(matrices)), seed, place, frame, scale)
 
 
 def write_field(

@@ -187,7 +187,7 @@ def field_from_plants(
     """
     plants = sorted(plants, key=lambda o: o.name_full)
     read = single_plants(plants, depsgraph)
-    species, forms = [species_of(kind) for kind in read.kinds], [form_of(kind) for kind in read.kinds]
+    species, forms = [species_of(kind) for kind in read.identifiers], [form_of(kind) for kind in read.identifiers]
     rows = (read.position, quaternions(read.frame), read.scale, read.species, read.seed)
     made = _link_field(scene, write_field(FIELD, *rows, species, forms), collection)
     remove_plants(plants)
@@ -222,7 +222,7 @@ def plants_from_field(
             + (f"the limit for objects is {most:,}. Split the field first" if len(read) else "add points first")
         )
     angles = np.array([Matrix(frame).to_euler() for frame in read.frame])
-    species, forms = [species_of(kind) for kind in read.kinds], [form_of(kind) for kind in read.kinds]
+    species, forms = [species_of(kind) for kind in read.identifiers], [form_of(kind) for kind in read.identifiers]
     made = _empties(scene, (read.position, angles, read.scale, read.species, read.seed), species, forms, collection)
     remove_fields([field])
     return made

@@ -9,9 +9,10 @@ from dataclasses import replace
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import SceneError
-from ..planting.places import Occupied, Placement, place, without
+from ..planting.places import Placement, place, without
 from .erased_places import erased_places
 from .ground_reader import read_ground
 from .plant_fields import fields_of, read_field
@@ -90,7 +91,7 @@ def place_population(
         paths=population.paths,
         path_distance=population.path_distance,
     )
-    found = place(ground, rules, standing(scene, depsgraph, own, species))
+    found = place(ground, rules, *standing(scene, depsgraph, own, species))
     return without(found, erased_places(population)), species
 
 
@@ -99,8 +100,8 @@ def standing(
     depsgraph: bpy.types.Depsgraph,
     without: Collection[bpy.types.Object],
     species: Sequence[str],
-) -> Occupied:
-    """Plants of a scene, those that are objects and those of fields.
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Places (m, 3) and species (m,) of the plants of a scene, those that are objects and those of fields.
 
     Parameters
     ----------
@@ -117,6 +118,6 @@ def standing(
     for field in fields_of(objects):
         read = read_field(field, depsgraph, world_matrix(field, depsgraph)[None])
         position.append(read.position)
-        own_numbers = np.array([numbers.get(species_of(kind), -1) for kind in read.kinds], dtype=np.int32)
+        own_numbers = np.array([numbers.get(species_of(kind), -1) for kind in read.identifiers], dtype=np.int32)
         kinds.append(own_numbers[read.species])
-    return Occupied(np.concatenate(position), np.concatenate(kinds))
+    return np.concatenate(position), np.concatenate(kinds)

@@ -5,6 +5,8 @@
 Only here and in `plant_copies` does TetFlora loop over objects; what comes out are plain arrays.
 """
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +15,7 @@ from ..errors import SceneError
 from ..plants.hashing import child_key, key_of_seed
 from ..plants.seeds import Seeds
 from .plant_copies import Copies, copies_of
-from .plant_fields import Plants, read_field
+from .plant_fields import read_field
 from .plant_kinds import kind_of, species_of
 from .species_items import catalogue
 from .transforms import frames_of, world_matrix
@@ -45,18 +47,23 @@ def read_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_lay
     """
     objects = sorted(renderable_objects(view_layer), key=lambda o: o.name_full)
     own = [o for o in objects if o.tetflora.is_plant or o.tetflora.is_field]
-    read = [single_plants([o for o in own if o.tetflora.is_plant and o.tetflora.enabled], depsgraph)]
+    single = [o for o in own if o.tetflora.is_plant and o.tetflora.enabled]
+    read = [(single[0].name if single else "", single_plants(single, depsgraph))]
     copies = copies_of([o for o in objects if may_instance(o)], depsgraph)
-    read += [_copied_plants(c) for c in copies if c.owner.tetflora.is_plant and c.geometry is None and _enabled(c)]
+    read += [
+        (c.owner.name, _copied_plants(c))
+        for c in copies
+        if c.owner.tetflora.is_plant and c.geometry is None and _enabled(c)
+    ]
     for obj in own:
         if obj.tetflora.is_field and obj.tetflora.enabled:
-            read.append(read_field(obj, depsgraph, world_matrix(obj, depsgraph)[None]))
+            read.append((obj.name, read_field(obj, depsgraph, world_matrix(obj, depsgraph)[None])))
     read += [
-        read_field(c.owner, depsgraph, c.matrices, c.keys, c.geometry)
+        (c.owner.name, read_field(c.owner, depsgraph, c.matrices, c.keys, c.geometry))
         for c in copies
         if c.owner.tetflora.is_field and _enabled(c)
     ]
-    read = [plants for plants in read if len(plants)]
+    read = [(name, seeds) for name, seeds in read if len(seeds)]
     if not read:
         found = own or copies
         off = found and not any(o.tetflora.enabled for o in (*own, *(c.owner for c in copies)))
@@ -84,7 +91,7 @@ def _enabled(copies: Copies) -> bool:
     return copies.owner.tetflora.enabled
 
 
-def single_plants(plants: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Plants:
+def single_plants(plants: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Seeds:
     """Plants that are objects, in their order.
 
     Raises
@@ -102,7 +109,7 @@ def single_plants(plants: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph
     return _placed(names, tuple(number), species, seeds, matrices)
 
 
-def _copied_plants(copies: Copies) -> Plants:
+def _copied_plants(copies: Copies) -> Seeds:
     """A plant that is instanced. Copies shall not be the same individual: each instance's key joins the seed."""
     plant = copies.owner
     seeds = child_key(key_of_seed(plant.tetflora.seed), copies.keys).view(np.int64)
@@ -115,7 +122,7 @@ def _placed(
     species: NDArray[np.int32],
     seeds: NDArray[np.int64],
     matrices: NDArray[np.float64],
-) -> Plants:
+) -> Seeds:
     frame, scale, sound = frames_of(matrices[:, :3, :3])
     sound &= np.isfinite(matrices).all(axis=(1, 2))
     if not sound.all():
@@ -123,36 +130,25 @@ def _placed(
         raise SceneError(
             f"{_listed(list(dict.fromkeys(bad)))}: zero scale or an invalid position; clear them with Alt S and Alt G"
         )
-    return Plants(names[0] if names else "", kinds, species, seeds, matrices[:, :3, 3].copy(), frame, scale)
+    return Seeds(kinds, species, seeds, matrices[:, :3, 3].copy(), frame, scale)
 
 
-def _merged(read: list[Plants]) -> Seeds:
-    """Plants of all objects as one, with the kinds that occur."""
+def _merged(read: list[tuple[str, Seeds]]) -> Seeds:
+    """Plants of all objects, each with its name, as one, with the kinds that occur."""
     tables = []
-    for plants in read:
-        occurring = np.bincount(plants.species, minlength=len(plants.kinds)) > 0
-        tables.append({i: plants.kinds[i] for i in np.flatnonzero(occurring).tolist()})
-    _check_species([(plants.name, kind) for plants, table in zip(read, tables, strict=True) for kind in table.values()])
+    for _, seeds in read:
+        occurring = np.bincount(seeds.species, minlength=len(seeds.identifiers)) > 0
+        tables.append({i: seeds.identifiers[i] for i in np.flatnonzero(occurring).tolist()})
+    _check_species([(name, kind) for (name, _), table in zip(read, tables, strict=True) for kind in table.values()])
     identifiers = tuple(sorted({kind for table in tables for kind in table.values()}))
     number = {kind: i for i, kind in enumerate(identifiers)}
-    species = []
-    for plants, table in zip(read, tables, strict=True):
-        to_all = np.zeros(len(plants.kinds), np.int32)
+    parts = []
+    for (_, seeds), table in zip(read, tables, strict=True):
+        to_all = np.zeros(len(seeds.identifiers), np.int32)
         to_all[list(table)] = [number[kind] for kind in table.values()]
-        species.append(to_all[plants.species])
-    return Seeds(
-        identifiers=identifiers,
-        species=_one(species),
-        seed=_one([plants.seed for plants in read]),
-        position=_one([plants.position for plants in read]),
-        frame=_one([plants.frame for plants in read]),
-        scale=_one([plants.scale for plants in read]),
-    )
-
-
-def _one(arrays: list[NDArray]) -> NDArray:
+        parts.append(replace(seeds, identifiers=identifiers, species=to_all[seeds.species]))
     # Millions of frames are not copied where there is nothing to join.
-    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
+    return parts[0] if len(parts) == 1 else Seeds.concatenate(parts)
 
 
 def _check_species(plants: list[tuple[str, str]]) -> None:

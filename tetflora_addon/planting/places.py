@@ -9,7 +9,7 @@ so that a seed means the same arrangement in every version of Blender.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,27 +32,6 @@ _RAREST = 1.0 / 256.0  # share of suitable places that a round counts on at leas
 _HOPELESS = 1_000_000  # places without a suitable one
 _FULL = 5_000  # suitable places of which not one can be taken: the ground is full
 _SPECIES = 2**32  # keys of species that are placed one after the other, away from those of plants
-
-
-@dataclass(frozen=True)
-class Occupied:
-    """Plants that stand already.
-
-    Attributes
-    ----------
-    position : (m, 2) or (m, 3) float64
-        Metres, world space.
-    species : (m,) int32, optional
-        Index into the shares of the rules, -1 for other species and where nothing is known.
-    """
-
-    position: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
-    species: NDArray[np.int32] | None = None
-
-    def __post_init__(self) -> None:
-        """Plants whose species nobody named are of other species."""
-        if self.species is None:
-            object.__setattr__(self, "species", np.full(len(self.position), -1, np.int32))
 
 
 @dataclass(frozen=True)
@@ -109,15 +88,22 @@ class Placement:
         return np.stack([w * cos, i * cos + j * sin, j * cos - i * sin, w * sin], axis=1)
 
 
-def place(ground: Terrain, rules: Rules, occupied: Occupied | None = None) -> Placement:
+def place(
+    ground: Terrain,
+    rules: Rules,
+    older: NDArray[np.float64] | None = None,
+    older_species: NDArray[np.int32] | None = None,
+) -> Placement:
     """Scatter plants over the ground as the rules ask, evenly as seen on a map.
 
     Parameters
     ----------
     ground : Terrain
     rules : Rules
-    occupied : Occupied, optional
-        Plants that stand already; new ones keep their distance from them, and may seek or shun them.
+    older : (m, 2) or (m, 3) float64, optional
+        Places of plants that stand already, meters; new ones keep their distance from them, and may seek or shun them.
+    older_species : (m,) int32, optional
+        Their species as index into the shares of the rules; -1 for others, which all are if not given.
 
     Raises
     ------
@@ -133,12 +119,13 @@ def place(ground: Terrain, rules: Rules, occupied: Occupied | None = None) -> Pl
     the other, each with its share of the count.
     """
     check_rules(rules)
-    occupied = occupied or Occupied()
-    older = np.asarray(occupied.position, dtype=np.float64)[:, :2]
+    older = np.zeros((0, 2)) if older is None else np.asarray(older, dtype=np.float64)[:, :2]
+    if older_species is None:
+        older_species = np.full(len(older), -1, np.int32)
     site = Site(ground, rules)
     key = key_of_seed(rules.seed)
     spacing = Spacing(rules.min_distance, older)
-    company = Company(rules, older, occupied.species)
+    company = Company(rules, older, older_species)
     sowing = _Sowing(site, rules, spacing, company)
     if not company.rules:
         sowing.sow(key, None, 1.0)
@@ -149,7 +136,7 @@ def place(ground: Terrain, rules: Rules, occupied: Occupied | None = None) -> Pl
     position, up, keys, species = sowing.result()
     reason = sowing.reason(len(position))
     if company.rules:
-        stay = ~company.lonely(position[:, :2], species, keys, Company(rules, older, occupied.species))
+        stay = ~company.lonely(position[:, :2], species, keys, Company(rules, older, older_species))
         sowing.refused["companions"] += int((~stay).sum())
         position, up, keys, species = position[stay], up[stay], keys[stay], species[stay]
         reason = sowing.reason(len(position))

@@ -9,15 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Arrays
+
 
 @dataclass(frozen=True)
-class Seeds:
-    """Plants of a scene as a structure of arrays.
+class Seeds(Arrays):
+    """Plants at places: those of a scene, of a field, or of single objects.
 
     Attributes
     ----------
     identifiers : tuple of str
-        Identifiers of the species that occur, as in the catalogue.
+        Species that ``species`` counts through, as in the catalogue; in a scene, kinds (`blender.plant_kinds`).
     species : (n,) int32
         Index into ``identifiers``.
     seed : (n,) int64
@@ -36,6 +38,3 @@ class Seeds:
     position: NDArray[np.float64]
     frame: NDArray[np.float64]
     scale: NDArray[np.float64]
-
-    def __len__(self) -> int:
-        return len(self.seed)

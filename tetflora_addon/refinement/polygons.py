@@ -232,9 +232,6 @@ class Polygons(Arrays):
     centre: NDArray[np.float64]
     reach: NDArray[np.float64]
 
-    def __len__(self) -> int:
-        return len(self.face)
-
     @classmethod
     def everything(cls, meshes: Meshes) -> Polygons:
         """All faces of all instances, whole."""
