@@ -68,7 +68,7 @@ def test_a_subplant_alone_is_the_same_as_inside_the_whole(species: int, seed: in
     for order in range(2):
         counts = branch_counts(flora.rows, one)
         if counts[0] == 0:
-            return
+            break
         index = np.array([(pick >> (8 * order)) % counts[0]])
         lines = axes(flora.rows, one)
         one_child = chosen_children(flora.rows, one, lines, np.zeros(1, np.int64), index, counts)
