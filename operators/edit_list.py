@@ -6,7 +6,8 @@ import bpy
 from bpy.props import EnumProperty
 
 from ..tetflora_addon.blender.population_rules import shown_population
-from ..tetflora_addon.blender.species_items import catalogue, default_species
+from ..tetflora_addon.blender.species_edits import catalogue
+from ..tetflora_addon.blender.species_items import default_species
 from .base import Reporting
 
 

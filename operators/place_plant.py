@@ -13,13 +13,8 @@ from bpy.props import EnumProperty
 from ..tetflora_addon.blender.ground_cursor import circle
 from ..tetflora_addon.blender.plant_objects import add_plants, plants_of
 from ..tetflora_addon.blender.runtime import redraw
-from ..tetflora_addon.blender.species_items import (
-    NO_SPECIES,
-    catalogue,
-    default_species,
-    display_height,
-    operator_items,
-)
+from ..tetflora_addon.blender.species_edits import catalogue
+from ..tetflora_addon.blender.species_items import NO_SPECIES, default_species, display_height, operator_items
 from ..tetflora_addon.errors import TetFloraError
 from ..tetflora_addon.planting.places import Placement, new_seeds
 from .base import select_only

@@ -9,7 +9,8 @@ from ..tetflora_addon.blender.generated import properties_of
 from ..tetflora_addon.blender.population_properties import MOST_EMPTIES, STORAGE_ITEMS
 from ..tetflora_addon.blender.population_rules import copy_companion
 from ..tetflora_addon.blender.populations import add_population, make_plants, remove_population
-from ..tetflora_addon.blender.species_items import catalogue, default_species
+from ..tetflora_addon.blender.species_edits import catalogue
+from ..tetflora_addon.blender.species_items import default_species
 from ..tetflora_addon.errors import SceneError, TetFloraError
 from ..tetflora_addon.planting.rules import Rules
 from .base import Reporting, in_object_mode, select_only

@@ -9,6 +9,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..tetflora_addon.blender.plant_objects import assign_species
 from ..tetflora_addon.blender.species_edits import (
+    catalogue,
     change_species,
     find_edit,
     new_identifier,
@@ -16,7 +17,6 @@ from ..tetflora_addon.blender.species_edits import (
     species_data,
     store_species,
 )
-from ..tetflora_addon.blender.species_items import catalogue
 from ..tetflora_addon.blender.species_values import orders_of, present_species
 from ..tetflora_addon.plants.schema import DEFAULT_SPUR
 from ..tetflora_addon.plants.skeletons import MAX_ORDERS

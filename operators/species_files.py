@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ..tetflora_addon.blender import species_files
-from ..tetflora_addon.blender.species_items import catalogue
+from ..tetflora_addon.blender.species_edits import catalogue
 from ..tetflora_addon.blender.species_values import present_species
 from .base import Reporting
 from .species_edit import species_shown

@@ -7,7 +7,8 @@ import numpy as np
 
 from ..tetflora_addon.blender.plant_form import FORM_TYPES, read_skeleton, upright_turn
 from ..tetflora_addon.blender.plant_objects import add_plants, plants_of
-from ..tetflora_addon.blender.species_items import catalogue, default_species
+from ..tetflora_addon.blender.species_edits import catalogue
+from ..tetflora_addon.blender.species_items import default_species
 from ..tetflora_addon.blender.species_values import present_species
 from ..tetflora_addon.blender.transforms import world_matrix
 from ..tetflora_addon.planting.places import Placement, new_seeds

@@ -8,7 +8,7 @@ from ..operators.add_plant import TETFLORA_OT_add_plant
 from ..operators.assign_species import TETFLORA_OT_assign_species
 from ..operators.first_forest import TETFLORA_OT_first_forest
 from ..operators.place_plant import TETFLORA_OT_place_plant
-from ..tetflora_addon.blender.species_items import catalogue
+from ..tetflora_addon.blender.species_edits import catalogue
 from .base import picture
 
 

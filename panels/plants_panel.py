@@ -13,7 +13,7 @@ from ..operators.use_as_form import TETFLORA_OT_use_as_form
 from ..tetflora_addon.blender.plant_copies import has_nodes
 from ..tetflora_addon.blender.plant_fields import FIELD_TYPES, stored_size
 from ..tetflora_addon.blender.plant_form import FORM_TYPES
-from ..tetflora_addon.blender.species_items import catalogue
+from ..tetflora_addon.blender.species_edits import catalogue
 from .add_menu import TETFLORA_MT_add_plant, TETFLORA_MT_species
 from .base import SidebarPanel, split_layout
 from .lists import TETFLORA_UL_field_species, draw_list

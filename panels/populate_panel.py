@@ -20,7 +20,7 @@ from ..operators.populations import (
 )
 from ..tetflora_addon.blender import point_preview
 from ..tetflora_addon.blender.population_rules import awaits_update, is_outdated, shown_population
-from ..tetflora_addon.blender.species_items import catalogue
+from ..tetflora_addon.blender.species_edits import catalogue
 from .base import SidebarPanel, draw_message, split_layout
 from .lists import TETFLORA_UL_mix, draw_list
 

@@ -11,7 +11,7 @@ import pytest
 from tests.blender.renders import picture
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph, select
 from tetflora_addon import errors
-from tetflora_addon.blender import compat, explicit_objects, handlers, job, material_means, species_items
+from tetflora_addon.blender import compat, explicit_objects, handlers, job, material_means, species_edits
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -82,7 +82,7 @@ def test_near_meshes_come_out_as_they_are_without_any_plant():
     scene = _scene()
     leaves = _leaves()
     broken = scene.tetflora.species_edits.add()  # none of the scene's business
-    broken.identifier, broken.text = min(species_items.catalogue()), "{"
+    broken.identifier, broken.text = min(species_edits.catalogue()), "{"
     statistics = _refine(scene)
     made = _made(scene)
     assert sum(len(o.data.polygons) for o in made) == 400 == statistics.polygons_meshed == statistics.polygons_full

@@ -18,6 +18,7 @@ from tetflora_addon.blender import (
     preferences,
     properties,
     scene_contents,
+    species_edits,
     species_items,
     wind_properties,
 )
@@ -156,13 +157,13 @@ def test_items_keep_their_numbers_when_the_catalogue_grows(tmp_path):
 
 
 def test_species_of_the_users_own_folder(tmp_path):
-    shipped = species_items.catalogue()
+    shipped = species_edits.catalogue()
     own = bpy.context.preferences.addons[preferences.ROOT_PACKAGE].preferences
     (tmp_path / "mine.json").write_text(shipped["bush"].path.read_text(encoding="utf-8"), encoding="utf-8")
     try:
         own.species_folder = str(tmp_path)
         assert preferences.species_folders() == (tmp_path,)
-        assert set(species_items.catalogue()) == {*shipped, "mine"}
+        assert set(species_edits.catalogue()) == {*shipped, "mine"}
         own.species_folder = str(tmp_path / "missing")
         assert preferences.species_folders() == ()
     finally:

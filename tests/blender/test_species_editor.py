@@ -13,14 +13,7 @@ import pytest
 from devtools import session
 from tests.blender.scenes import add_camera, add_plant, depsgraph, select
 from tetflora_addon import errors
-from tetflora_addon.blender import (
-    preferences,
-    scene_contents,
-    species_editor,
-    species_edits,
-    species_files,
-    species_items,
-)
+from tetflora_addon.blender import preferences, scene_contents, species_editor, species_edits, species_files
 from tetflora_addon.plants import catalogue, schema, skeletons
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -136,7 +129,7 @@ def test_edits_live_in_the_file_and_override_the_catalogue(tmp_path):
     species = _edited()
     assert species.orders[2].leaf_size.mean == pytest.approx(0.2)
     assert (species.leaf[0].polygons, species.leaf_transmission, species.name) == (1, 0.1, "Broad Bush")
-    assert species_items.catalogue()["bush"].name == "Broad Bush"
+    assert species_edits.catalogue()["bush"].name == "Broad Bush"
     assert _shipped().name == "Bush"
     session.clean_file()
     assert _edited() == _shipped()
@@ -188,7 +181,7 @@ def test_a_broken_text_breaks_no_panel(text):
     for prop in editor.bl_rna.properties:
         getattr(editor, prop.identifier)
     assert species_edits.problem_of(bpy.context.scene, "bush")
-    assert "bush" in species_items.catalogue()
+    assert "bush" in species_edits.catalogue()
 
 
 def test_duplicate_revert_and_orders():
@@ -211,8 +204,8 @@ def test_duplicate_revert_and_orders():
         assert len(_edited("bush_2_2").orders) == number
     assert number == 1
     bpy.ops.tetflora.revert_species()
-    assert "bush_2_2" not in species_items.catalogue()
-    assert "bush_2" in species_items.catalogue()
+    assert "bush_2_2" not in species_edits.catalogue()
+    assert "bush_2" in species_edits.catalogue()
     assert not bpy.ops.tetflora.revert_species.poll()
 
 
@@ -229,7 +222,7 @@ def test_saved_species_come_back_as_they_were(own_folder, tmp_path):
     _editor(identifier)
     assert bpy.ops.tetflora.delete_species.poll()
     bpy.ops.tetflora.delete_species()
-    assert identifier not in species_items.catalogue()
+    assert identifier not in species_edits.catalogue()
     assert bpy.ops.tetflora.load_species(filepath=str(tmp_path / "given.json")) == {'FINISHED'}
     given = _edited("given")
     assert (given.orders, given.leaf, given.name) == (species.orders, species.leaf, "Łąka fir")
@@ -302,13 +295,13 @@ def test_panels_look_at_folders_once_in_a_while_and_see_own_changes_at_once(monk
     monkeypatch.setattr(species_edits, "_TRUSTED", 1000.0)
     species_edits.look_again()
     for _ in range(50):
-        species_items.catalogue()
+        species_edits.catalogue()
         species_edits.species_data(None, "oak")
     assert len(looked) == 1
     species_edits.tell_listeners()
-    species_items.catalogue()
+    species_edits.catalogue()
     assert len(looked) == 2
     monkeypatch.setattr(species_edits, "_TRUSTED", 0.0)
-    species_items.catalogue()
-    species_items.catalogue()
+    species_edits.catalogue()
+    species_edits.catalogue()
     assert len(looked) == 4

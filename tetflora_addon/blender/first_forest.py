@@ -22,7 +22,8 @@ from ..plants.hashing import child_key, key_of_seed, uniform
 from .attributes import write
 from .first_materials import meadow, sky
 from .plant_objects import add_plants
-from .species_items import catalogue, default_species
+from .species_edits import catalogue
+from .species_items import default_species
 
 NAME = "First forest"
 EYE_HEIGHT = 1.7  # metres

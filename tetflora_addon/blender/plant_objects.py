@@ -16,7 +16,8 @@ from .migration import VERSION
 from .plant_fields import fields_of, quaternions, read_field, stored_size, write_field
 from .plant_kinds import form_of, species_of
 from .scene_reader import single_plants
-from .species_items import catalogue, display_height
+from .species_edits import catalogue
+from .species_items import display_height
 from .transforms import world_matrix
 
 COLLECTION = "TetFlora plants"

@@ -19,7 +19,7 @@ from .plant_fields import fields_of, read_field
 from .plant_kinds import species_of
 from .plant_objects import plants_of
 from .population_rules import rules_from, unknown_species
-from .species_items import catalogue
+from .species_edits import catalogue
 from .transforms import world_matrix
 from .view_layers import objects_within
 

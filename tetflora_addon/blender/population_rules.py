@@ -12,7 +12,8 @@ from typing import Any
 import bpy
 
 from ..planting.rules import Companion, Rules
-from .species_items import catalogue, default_species
+from .species_edits import catalogue
+from .species_items import default_species
 
 #: Up to this many become empties if nobody says otherwise; beyond, Blender becomes slow.
 EMPTIES_UNASKED = 10_000

@@ -17,7 +17,7 @@ from ..plants.seeds import Seeds
 from .plant_copies import Copies, copies_of
 from .plant_fields import read_field
 from .plant_kinds import kind_of, species_of
-from .species_items import catalogue
+from .species_edits import catalogue
 from .transforms import frames_of, world_matrix
 from .view_layers import may_instance, renderable_objects
 

@@ -251,6 +251,13 @@ def new_identifier(name: str, taken: Callable[[str], bool]) -> str:
     return identifier
 
 
+def catalogue() -> dict[str, SpeciesInfo]:
+    """All species that this user or this file has, by identifier, sorted by name."""
+    known = listed()
+    edited = edited_infos()
+    return dict(sorted((known | edited).items(), key=lambda item: item[1].name.lower())) if edited else known
+
+
 def edited_infos() -> dict[str, SpeciesInfo]:
     """What menus show of the species that this file has; the first scene's where scenes disagree."""
     found: dict[str, SpeciesInfo] = {}

@@ -9,7 +9,7 @@ import bpy
 
 from ..errors import SpeciesError
 from ..plants.catalogue import SpeciesInfo
-from .species_edits import edited_infos, listed, species_for
+from .species_edits import catalogue, species_for
 from .thumbnails import FALLBACK_ICON, icon_of
 
 # What an enumeration says when there is nothing to choose.
@@ -20,13 +20,6 @@ Item = tuple[str, str, str, str | int, int]
 
 # Blender keeps no copy of the strings of dynamic items, so somebody has to.
 _kept: dict[tuple, list[Item]] = {}
-
-
-def catalogue() -> dict[str, SpeciesInfo]:
-    """All species that this user or this file has, by identifier, sorted by name."""
-    known = listed()
-    edited = edited_infos()
-    return dict(sorted((known | edited).items(), key=lambda item: item[1].name.lower())) if edited else known
 
 
 def number_of(identifier: str) -> int:

@@ -11,8 +11,7 @@ import bpy
 
 from ..errors import SpeciesError
 from ..plants.schema import ORDER_KEYS
-from .species_edits import change_species, species_data, species_for
-from .species_items import catalogue
+from .species_edits import catalogue, change_species, species_data, species_for
 
 _SIGNIFICANT = 6  # digits of a slider's float32 that are meant
 
