@@ -7,6 +7,7 @@ from __future__ import annotations
 from math import pi
 
 import bpy
+import gpu
 
 EEVEE_ENGINES = ("BLENDER_EEVEE", "BLENDER_EEVEE_NEXT")
 
@@ -92,8 +93,6 @@ def drawn_disc(engine: str) -> float:
 
 def dot_shader() -> str:
     """Built-in shader for coloured points: before 5.0, the one for everything of flat colours draws them as well."""
-    import gpu
-
     try:
         gpu.shader.from_builtin('POINT_FLAT_COLOR')
     except ValueError:

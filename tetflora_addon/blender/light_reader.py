@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..refinement.light_views import Light
 from .compat import tree_in_use
+from .node_tools import active_output
 from .transforms import world_matrix
 from .view_layers import renderable_objects
 
@@ -77,8 +78,7 @@ def _colour(data: bpy.types.Light) -> NDArray[np.float64]:
 
 def _emissions(data: bpy.types.Light) -> Iterator[bpy.types.Node]:
     """The emission that a light's own nodes lead to its output."""
-    tree = tree_in_use(data)
-    output = next((n for n in tree.nodes if n.type == 'OUTPUT_LIGHT' and n.is_active_output), None) if tree else None
+    output = active_output(tree_in_use(data), 'OUTPUT_LIGHT')
     if output is not None and output.inputs["Surface"].is_linked:
         node = output.inputs["Surface"].links[0].from_node
         if node.type == 'EMISSION':

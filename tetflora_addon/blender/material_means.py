@@ -9,7 +9,6 @@ colours are passed over.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import bpy
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from .compat import tree_in_use
 from .image_pixels import image_pixels, linear_rgb
+from .node_tools import active_output, upstream
 
 #: What Blender shows where there is no material.
 GREY = (0.8, 0.8, 0.8)
@@ -56,12 +56,10 @@ class Looks:
         if material is None:
             return Look(transmission=0.0)
         tree = tree_in_use(material)
-        output = (
-            next((n for n in tree.nodes if n.type == 'OUTPUT_MATERIAL' and n.is_active_output), None) if tree else None
-        )
+        output = active_output(tree, 'OUTPUT_MATERIAL')
         if output is None:
             return Look(tuple(material.diffuse_color[:3]))
-        shaders = [n for n in _upstream(output.inputs["Surface"]) if _colour_input(n) and n.type not in _TRANSPARENT]
+        shaders = [n for n in upstream(output.inputs["Surface"]) if _colour_input(n) and n.type not in _TRANSPARENT]
         if not shaders:
             return Look(tuple(material.diffuse_color[:3]))
         first = shaders[0]
@@ -75,7 +73,7 @@ class Looks:
         covered = 1.0
         if (alpha := shader.inputs.get("Alpha")) is not None:
             covered = self._share(alpha, attributes)
-        for node in _upstream(output.inputs["Surface"]):
+        for node in upstream(output.inputs["Surface"]):
             if node.type == 'MIX_SHADER':
                 sides = [socket.links[0].from_node.type if socket.is_linked else "" for socket in node.inputs[1:3]]
                 factor = self._share(node.inputs[0], attributes)
@@ -94,7 +92,7 @@ class Looks:
 
     def _mean(self, socket: bpy.types.NodeSocket, attributes: dict[str, NDArray]) -> tuple[NDArray, float]:
         """Mean colour and alpha of what feeds a socket."""
-        for node in _upstream(socket):
+        for node in upstream(socket):
             if node.type == 'TEX_IMAGE' and node.image is not None:
                 if (mean := self._image(node.image)) is not None:
                     return mean
@@ -125,18 +123,6 @@ def image_mean(image: bpy.types.Image) -> tuple[NDArray[np.float64], float] | No
     alpha, colour = pixels[:, 3] if channels == 4 else np.ones(len(pixels)), linear_rgb(image, pixels)
     weight = alpha if alpha.sum() > 0 else np.ones(len(alpha))
     return (colour * weight[:, None]).sum(axis=0) / weight.sum(), float(alpha.mean())
-
-
-def _upstream(socket: bpy.types.NodeSocket) -> Iterator[bpy.types.Node]:
-    """Nodes that feed a socket, nearest first, each once."""
-    waiting, seen = [socket], set()
-    while waiting:
-        for link in waiting.pop(0).links:
-            node = link.from_node
-            if node not in seen:
-                seen.add(node)
-                yield node
-                waiting += list(node.inputs)
 
 
 def _colour_input(node: bpy.types.Node) -> bpy.types.NodeSocket | None:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
 import bpy
@@ -179,6 +179,22 @@ class Graph:
         for node, place in column.items():
             node.location = (-220.0 * place, -200.0 * rows.get(place, 0))
             rows[place] = rows.get(place, 0) + 1
+
+
+def active_output(tree: bpy.types.NodeTree | None, kind: str) -> bpy.types.Node | None:
+    """The output of a type, such as 'OUTPUT_MATERIAL', that counts in a tree, if there is one."""
+    return next((n for n in tree.nodes if n.type == kind and n.is_active_output), None) if tree else None
+
+
+def upstream(socket: bpy.types.NodeSocket) -> Iterator[bpy.types.Node]:
+    """Nodes that feed a socket, nearest first, each once."""
+    waiting, seen = [socket], set()
+    while waiting:
+        for link in waiting.pop(0).links:
+            if link.from_node not in seen:
+                seen.add(link.from_node)
+                yield link.from_node
+                waiting += list(link.from_node.inputs)
 
 
 def find_socket(sockets: Any, key: str) -> bpy.types.NodeSocket:

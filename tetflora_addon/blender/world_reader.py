@@ -9,7 +9,6 @@ that were measured in renders.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import bpy
@@ -23,6 +22,7 @@ from .compat import sky_model, tree_in_use
 from .image_pixels import image_pixels, linear_rgb
 from .light_reader import read_lights
 from .material_means import Looks
+from .node_tools import active_output, upstream
 from .surfaces import read_occluders
 from .view_layers import renderable_objects
 
@@ -98,8 +98,8 @@ def read_world(scene: bpy.types.Scene) -> WorldLight:
     tree = tree_in_use(world)
     if tree is None:
         return WorldLight(World.plain(world.color[:]))
-    output = next((n for n in tree.nodes if n.type == 'OUTPUT_WORLD' and n.is_active_output), None)
-    nodes = list(_upstream(output.inputs["Surface"])) if output else []
+    output = active_output(tree, 'OUTPUT_WORLD')
+    nodes = list(upstream(output.inputs["Surface"])) if output else []
     background = next((n for n in nodes if n.type == 'BACKGROUND'), None)
     if background is None:
         note = "the world has no Background node and is treated as black" if nodes else ""
@@ -118,7 +118,7 @@ def _surroundings(socket: bpy.types.NodeSocket, factor: float, notes: list[str])
     """Sky and suns of what feeds a background's colour."""
     if not socket.is_linked:
         return World.plain(np.array(socket.default_value[:3]) * factor), ()
-    above = list(_upstream(socket))
+    above = list(upstream(socket))
     turn = sum(_turn(n) for n in above if n.type == 'MAPPING')
     for node in above:
         if node.type == 'TEX_ENVIRONMENT' and node.image is not None and all(node.image.size):
@@ -189,17 +189,6 @@ def _sky(node: bpy.types.Node, factor: float, turn: float, notes: list[str]) -> 
 def _turn(node: bpy.types.Node) -> float:
     rotation = node.inputs.get("Rotation")
     return 0.0 if rotation is None or rotation.is_linked else float(rotation.default_value[2])
-
-
-def _upstream(socket: bpy.types.NodeSocket) -> Iterator[bpy.types.Node]:
-    """Nodes that feed a socket, nearest first, each once."""
-    waiting, seen = [socket], set()
-    while waiting:
-        for link in waiting.pop(0).links:
-            if link.from_node not in seen:
-                seen.add(link.from_node)
-                yield link.from_node
-                waiting += list(link.from_node.inputs)
 
 
 #: Colour of ground whose material cannot be read.
