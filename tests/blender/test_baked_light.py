@@ -133,7 +133,7 @@ def test_what_cannot_be_read_is_said():
     small_scene(sky=0.0, samples=1)
     feed_background("ShaderNodeTexNoise")
     found = world_reader.read_world(bpy.context.scene)
-    assert "grey" in found.note
+    assert "gray" in found.note
     assert not found.world.dark
 
 
