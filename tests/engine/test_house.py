@@ -13,24 +13,11 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from devtools import house
+from devtools import house, rooms
 
 ROOT = house.ROOT
 ADDON = ROOT / "tetflora_addon"
 BLENDER_MODULES = {"bpy", "bmesh", "mathutils", "gpu", "gpu_extras", "bpy_extras", "bl_ui", "addon_utils"}
-
-# The table of docs/architecture.md: what each room of the engine may import besides numpy and itself.
-ROOMS = {
-    "plants": set(),
-    "tetrahedra": set(),
-    "refinement": {"plants", "tetrahedra"},
-    "shading": {"plants", "tetrahedra", "refinement"},
-    "planting": {"plants"},
-    "preview": {"plants", "tetrahedra", "refinement"},
-}
-SHARED = {"arrays", "buffers", "errors", "cache_folder", "kept_arrays", "setting", "whole_files"}
-# Files beside the rooms that put decisions into buffers may use each other.
-BESIDE = {"baked_emission", "budget", "facet_emission", "shell_emission"}
 
 ENGINE = sorted(p for p in ADDON.rglob("*.py") if p.relative_to(ADDON).parts[0] != "blender")
 EXTENSION = sorted(p for folder in (ADDON, ROOT / "operators", ROOT / "panels") for p in folder.rglob("*.py"))
@@ -65,18 +52,79 @@ def test_engine_runs_where_there_is_no_blender() -> None:
 
 
 @pytest.mark.parametrize("path", ENGINE, ids=_name)
-def test_engine_file(path: Path) -> None:
-    """Numpy and the standard library only, neighbours as the architecture allows, and a docstring."""
-    inside = path.relative_to(ADDON).parts
-    room = inside[0] if len(inside) > 1 else None
-    allowed = SHARED | ({room} | ROOMS[room] if room else set(ROOMS) | BESIDE)
+def test_engine_imports_numpy_and_the_standard_library_only(path: Path) -> None:
     for level, module in _imports(path):
         first = module.split(".")[0]
-        if level == 0:
-            assert first == "numpy" or first in sys.stdlib_module_names, f"imports {module}"
-        elif level == len(inside):
-            assert first in allowed, f"{room} imports {module}"
-    assert ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))), "says nothing of what it is for"
+        assert level or first == "numpy" or first in sys.stdlib_module_names, f"imports {module}"
+
+
+@pytest.mark.parametrize("path", EXTENSION, ids=_name)
+def test_every_file_says_what_it_is_for(path: Path) -> None:
+    assert ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
+
+
+def test_rules_of_the_rooms() -> None:
+    assert rooms.problems() == []
+
+
+def test_arrows_between_rooms_point_downward() -> None:
+    heights = rooms.heights()  # ends only where there is no circle
+    assert all(heights[other] < heights[room] for room, others in rooms.ARROWS.items() for other in others)
+
+
+def test_tests_mirror_the_rooms() -> None:
+    folders = {
+        folder.relative_to(ROOT / "tests").as_posix()
+        for kind in ("engine", "blender")
+        for folder in (ROOT / "tests" / kind).rglob("*")
+        if folder.is_dir() and folder.name != "__pycache__"
+    }
+    expected = {name if name.startswith("blender/") else f"engine/{name}" for name in rooms.ARROWS if name}
+    assert folders <= expected | {"blender/operators", "blender/panels"}
+    assert {f"engine/{room}" for room in rooms.ENGINE if room} <= folders
+
+
+@pytest.fixture
+def toy_house(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """An empty product in a folder of its own, which the rules of the rooms are applied to."""
+    for folder in ("tetflora_addon/species", "tetflora_addon/growth", "tetflora_addon/blender", "operators"):
+        (tmp_path / folder).mkdir(parents=True)
+        (tmp_path / folder / "__init__.py").touch()
+    for name in ("__init__.py", "tetflora_addon/__init__.py"):
+        (tmp_path / name).touch()
+    monkeypatch.setattr(rooms, "ROOT", tmp_path)
+    for cached in (rooms.sources, rooms.imports):
+        cached.cache_clear()
+    yield tmp_path / "tetflora_addon"
+    for cached in (rooms.sources, rooms.imports):
+        cached.cache_clear()
+
+
+def test_toy_house_is_in_order(toy_house: Path) -> None:
+    (toy_house / "growth" / "roots.py").write_text("from ..species import leaves")
+    (toy_house / "species" / "leaves.py").write_text("class Leaf: pass")
+    (toy_house / "blender" / "props.py").touch()
+    assert rooms.problems() == []
+
+
+@pytest.mark.parametrize(
+    ("files", "problem"),
+    [
+        ({"species/a.py": "from ..growth import b", "growth/b.py": ""}, "may not import tetflora_addon.growth.b"),
+        ({"species/a.py": "def f():\n    from .b import x", "species/b.py": "from . import a"}, "in a circle"),
+        ({"species/a.py": "class Leaf: pass", "growth/b.py": "class Leaf: pass"}, "class Leaf is defined in"),
+        ({"species/a.py": "x = 1\n" * (rooms.MAX_ROOM_LINES + 1)}, "room species: 3501 lines"),
+        ({f"growth/a{i}.py": "" for i in range(rooms.MAX_FILES)}, "files; 180 is the limit"),
+        ({f"blender/a{i}.py": f"from . import a{i + 1}" for i in range(10)}, "10 levels of imports"),
+        ({"attic/a.py": ""}, "room attic is not in devtools/rooms.py"),
+    ],
+)
+def test_rules_of_the_rooms_can_fail(toy_house: Path, files: dict[str, str], problem: str) -> None:
+    for name, text in {"blender/props.py": "", **files}.items():
+        (toy_house / name).parent.mkdir(exist_ok=True)
+        (toy_house / name).write_text(text)
+    (found,) = rooms.problems()
+    assert problem in found
 
 
 @pytest.mark.parametrize("path", EXTENSION, ids=_name)
