@@ -23,7 +23,9 @@ import numpy as np
 
 from devtools import session
 from examples import fly_through, landscape
-from tetflora_addon.blender import emit, handlers, job, kept_results, scene_contents
+from tetflora_addon.blender.job import contents, frame_cache, refine
+from tetflora_addon.blender.job import render as handlers
+from tetflora_addon.blender.results import collection as emit
 
 from .compare import flip_map, read_picture, render
 from .report import Targets, peak_mb
@@ -97,13 +99,13 @@ def _flight() -> dict[str, int]:
     for frame in (1, FRAMES):
         camera.location.y += FLIGHT_SPEED * (frame - 1) / fly_through.RATE
         camera.keyframe_insert("location", frame=frame)
-    given = scene_contents.read_scene(scene, layer.depsgraph, layer)
+    given = contents.read_scene(scene, layer.depsgraph, layer)
     found = {}
     for name, near in (("flight_refinements", given), ("flight_refinements_small_cells", None)):
         eyes = []
         for frame in range(1, FRAMES + 1):
             scene.frame_set(frame)
-            eyes.append(tuple(kept_results.shared_camera(scene, layer.depsgraph, near).position))
+            eyes.append(tuple(frame_cache.shared_camera(scene, layer.depsgraph, near).position))
         found[name] = len(set(eyes))
     return found
 
@@ -178,7 +180,7 @@ def _flicker(changes_at: int, around: int) -> dict[str, float]:
     with tempfile.TemporaryDirectory() as folder:
         refined = _pictures(scene, frames, Path(folder))
         scene.tetflora.refine_at_render, scene.tetflora.expand_everything = False, True
-        job.refine(scene, bpy.context.evaluated_depsgraph_get())
+        refine.refine(scene, bpy.context.evaluated_depsgraph_get())
         expanded = _pictures(scene, frames, Path(folder))
     steps = np.array([_steps(refined), _steps(expanded)])
     beyond = steps[0] - steps[1]

@@ -17,9 +17,14 @@ from typing import Any
 import numpy as np
 
 from tetflora_addon.arrays import spread
-from tetflora_addon.plants import catalogue, compiled, expansion, foliage, growth, orientation, pieces
-from tetflora_addon.plants.axes import axes
-from tetflora_addon.refinement import amounts
+from tetflora_addon.compiled import flora as compiled
+from tetflora_addon.compiled import orientation
+from tetflora_addon.growth import foliage, growth
+from tetflora_addon.growth.axes import axes
+from tetflora_addon.refinement import contents
+from tetflora_addon.species import catalogue
+from tetflora_addon.subplants import pieces
+from tetflora_addon.subplants import pieces as expansion
 
 from .plants import Targets
 from .plants import plants as planted
@@ -116,7 +121,7 @@ def summed_up(error: np.ndarray, each: np.ndarray) -> dict[str, float]:
 
 def foretold(flora: Any, subplants: Any, oriented: bool) -> np.ndarray:
     """Expected sums over sub-plants."""
-    expected = amounts.subplant_amounts(flora, subplants)
+    expected = contents.subplant_amounts(flora, subplants)
     out = np.zeros(_FIELDS)
     out[0], out[1] = expected.leaf_area.sum(), expected.wood_area.sum()
     out[2:5] = expected.leaf_area @ flora.leaf_colours(subplants)

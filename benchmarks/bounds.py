@@ -19,8 +19,12 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 from tetflora_addon.arrays import spread
-from tetflora_addon.plants import bounds, catalogue, compiled, expansion, foliage, growth, pieces, sides, tubes
-from tetflora_addon.plants.branches import Branches
+from tetflora_addon.compiled import bounds
+from tetflora_addon.compiled import flora as compiled
+from tetflora_addon.growth import foliage, growth
+from tetflora_addon.growth.branches import Branches
+from tetflora_addon.species import catalogue
+from tetflora_addon.subplants import pieces, sides, tubes
 
 from .plants import plants as planted
 from .report import Targets
@@ -68,7 +72,7 @@ def run(quick: bool) -> dict[str, float]:
 
 def grown(flora: Any, branches: Any) -> NDArray[np.float64]:
     """All vertices (v, 3) of sub-plants of one species."""
-    stems = list(expansion.expand(flora, branches))
+    stems = list(pieces.expand(flora, branches))
     bark = tubes.tube_buffers(flora, pieces.Pieces.empty(), stems)
     out = [] if bark is None else [bark.positions]
     for own, leaves in placed_leaves(flora, stems):
@@ -106,10 +110,10 @@ def vertices_outside(flora: Any, seeds: int) -> int:
     trunks = growth.trunks(flora.rows, planted(flora, seeds * float(flora.polygons[0])))
     wide = np.maximum(1 + flora.rows["flare"], bounds.ring_stretch(flora.rows))
     out = 0
-    for chunk in expansion.chunks(flora.polygons[trunks.row], AT_ONCE):
+    for chunk in pieces.chunks(flora.polygons[trunks.row], AT_ONCE):
         whole = trunks.take(chunk)
         bodies, first = bodies_of(flora, whole), whole.plant[0]
-        stems = list(expansion.expand(flora, whole))
+        stems = list(pieces.expand(flora, whole))
         doubtful = np.zeros(len(whole), bool)
         for some in stems:
             owner, _, position = some.knots(flora.rows)
@@ -145,7 +149,7 @@ def subplants(flora: Any, number: int, polygons: float) -> dict[int, Any]:
         for order in np.unique(orders):
             kinds.setdefault(int(order), []).append(level.take(orders == order))
         level = level.take(rng.permutation(len(level))[:120])
-        level, *_ = expansion.open_subplants(flora, level)
+        level, *_ = pieces.open_subplants(flora, level)
     out = {}
     for order, found in kinds.items():
         every = Branches.concatenate(found)

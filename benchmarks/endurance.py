@@ -45,7 +45,7 @@ def run(quick: bool) -> dict[str, float]:
     import bpy
 
     from examples import row80
-    from tetflora_addon.blender import handlers
+    from tetflora_addon.blender.job import render
 
     scene = bpy.context.scene
     row80.build(scene, count=6)
@@ -88,7 +88,7 @@ def run(quick: bool) -> dict[str, float]:
         "polygons_mean": float(np.mean(polygons)),
         "different_frames": len(set(polygons)),
         "datablocks_left": _datablocks() - before,
-        "errors": len(handlers.render_errors()),
+        "errors": len(render.render_errors()),
     }
 
 

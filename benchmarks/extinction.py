@@ -21,8 +21,12 @@ from typing import Any
 
 import numpy as np
 
-from tetflora_addon.plants import catalogue, cells, clumping, compiled, expansion, growth, meshing, pieces, seeds, tubes
-from tetflora_addon.refinement import amounts
+from tetflora_addon.compiled import clumping, rays
+from tetflora_addon.compiled import flora as compiled
+from tetflora_addon.growth import growth, seeds
+from tetflora_addon.refinement import contents
+from tetflora_addon.species import catalogue
+from tetflora_addon.subplants import leaf_meshes, pieces, tubes
 
 from .plants import Targets
 
@@ -95,13 +99,13 @@ def grown(flora: Any, seed: int) -> tuple[list[tuple], np.ndarray, np.ndarray, n
     plant = seeds.Seeds(("",), np.zeros(1, np.int32), np.array([seed]), np.zeros((1, 3)), np.eye(3)[None], np.ones(1))
     surfaces, places, weights, coefficients = [], [], [], []
     none = pieces.Pieces.empty()
-    for stems in expansion.expand(flora, growth.trunks(flora.rows, plant)):
+    for stems in pieces.expand(flora, growth.trunks(flora.rows, plant)):
         own, _ = pieces.whole_pieces(flora.rows, stems)
-        held = amounts.piece_amounts(flora, own)
+        held = contents.piece_amounts(flora, own)
         places.append((own.start + own.end) / 2)
         weights.append(held.leaf_area + held.wood_area / 2)
         coefficients.append(flora.clumping.coefficients(own.branches, flora.clumping.own))
-        leaves = meshing.leaf_meshes(flora, none, 0, [stems])
+        leaves = leaf_meshes.leaf_meshes(flora, none, 0, [stems])
         surfaces += [polygons(leaf.buffers, 1.0) for leaf in leaves]
         surfaces.append(polygons(tubes.tube_buffers(flora, none, [stems]), 0.5))
     return surfaces, np.concatenate(places), np.concatenate(weights), np.concatenate(coefficients)
@@ -123,7 +127,7 @@ def polygons(buffers: Any, weight: float) -> tuple:
 
 def seen(surfaces: list[tuple], direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Origins (k, 3) of parallel rays over polygons, and whether each meets any (k,)."""
-    across = np.stack(cells.basis(direction), axis=1)
+    across = np.stack(rays.basis(direction), axis=1)
     flat = [corners @ across for corners, *_ in surfaces]
     low, high = np.min([f.min(axis=0) for f in flat], axis=0), np.max([f.max(axis=0) for f in flat], axis=0)
     spacing = float(np.sqrt((high - low).prod())) / RAYS
@@ -131,7 +135,7 @@ def seen(surfaces: list[tuple], direction: np.ndarray) -> tuple[np.ndarray, np.n
     shape = np.ceil(high / spacing - low + 1).astype(np.int64)
     met = np.zeros(shape.prod(), bool)
     for one, (_, first, number, *_) in zip(flat, surfaces, strict=True):
-        _, ray = cells.covered(one / spacing - low, first, number)
+        _, ray = rays.covered(one / spacing - low, first, number)
         inside = ((ray >= 0) & (ray < shape)).all(axis=1)
         met[ray[inside, 0] * shape[1] + ray[inside, 1]] = True
     i = np.arange(len(met))
@@ -155,14 +159,14 @@ def depths(
     count = 6 * int(shape.prod())
     kappa = np.zeros(count)
     for _, _, _, centre, vector, weight in surfaces:
-        cell = cells.cell_numbers((centre - corner).T / side, shape)
+        cell = rays.cell_numbers((centre - corner).T / side, shape)
         kappa += np.bincount(cell, weight * np.abs(vector @ direction), count) / size**3
-    cell = cells.cell_numbers((places - corner).T / side, shape)
+    cell = rays.cell_numbers((places - corner).T / side, shape)
     area = np.bincount(cell, weights, count)
     sums = np.stack([np.bincount(cell, weights * coefficients[:, k], count) for k in (0, 1)], axis=1)
     usual = weights @ coefficients / weights.sum()  # leaves reach into cells that hold no branch
     mean_coefficients = np.where(area[:, None] > 0, sums / np.where(area > 0, area, 1)[:, None], usual)
     factor = clumping.factors(mean_coefficients, np.full(count, size**3))
-    ray, at, length = cells.path_lengths((origin - corner) / side, direction, shape)
+    ray, at, length = rays.path_lengths((origin - corner) / side, direction, shape)
     depth = kappa[at] * length * side
     return np.bincount(ray, depth, len(origin)), np.bincount(ray, depth * factor[at], len(origin))

@@ -17,7 +17,8 @@ from mathutils import Vector
 from numpy.typing import NDArray
 
 from examples.row80 import add_daylight
-from tetflora_addon.blender import compat, job
+from tetflora_addon.blender import compat
+from tetflora_addon.blender.job import refine
 
 from .compare import difference, plant_mask
 from .report import Targets, peak_mb
@@ -200,7 +201,7 @@ def run(quick: bool) -> dict[str, float]:
         for distance in DISTANCES:
             _aim(scene, distance)
             name = f"{distance:g}m"
-            job.clear(scene)
+            refine.clear(scene)
             original_s = timed_render(scene, out / "original.png", samples)
             if distance == DISTANCES[1]:
                 timed_render(scene, out / "again.png", samples, seed=1)
@@ -214,9 +215,9 @@ def run(quick: bool) -> dict[str, float]:
             if distance == DISTANCES[1]:
                 figures["flip_noise"] = difference(out / "original.png", out / "again.png", mask).flip
             seconds.append((original_s, refined_s))
-        job.clear(scene)
+        refine.clear(scene)
         _aim(scene, DISTANCES[1])
-        _, refinement = job.partition(scene, bpy.context.evaluated_depsgraph_get())
+        _, refinement = refine.partition(scene, bpy.context.evaluated_depsgraph_get())
         held = refinement.contents.polygons.items
         figures["fragments"] = int((held.part >= 0).sum())
         figures["area_error"] = abs(held.areas().sum() / area - 1)

@@ -13,7 +13,8 @@ from math import pi, tau
 
 import bpy
 
-from tetflora_addon.blender import compat, materials
+from tetflora_addon.blender import compat
+from tetflora_addon.blender.materials import materials
 
 from .report import Targets
 

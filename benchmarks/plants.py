@@ -19,9 +19,11 @@ from typing import Any
 import bpy
 import numpy as np
 
-from tetflora_addon import emission
-from tetflora_addon.blender import meshes
-from tetflora_addon.plants import catalogue, compiled, seeds
+from tetflora_addon.blender.results import meshes
+from tetflora_addon.compiled import flora as compiled
+from tetflora_addon.emission import plants as emission
+from tetflora_addon.growth import seeds
+from tetflora_addon.species import catalogue
 
 from .report import Targets
 

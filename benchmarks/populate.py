@@ -12,9 +12,9 @@ import time
 
 import numpy as np
 
-from tetflora_addon.planting.ground import Path, Terrain
 from tetflora_addon.planting.places import place
 from tetflora_addon.planting.rules import Companion, Rules
+from tetflora_addon.planting.terrain import Path, Terrain
 
 from .report import Targets, peak_mb
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import bpy
 
 from examples import row80
-from tetflora_addon.blender import job
+from tetflora_addon.blender.job import refine
 
 from .compare import difference, plant_mask, render
 from .report import Targets, peak_mb
@@ -33,7 +33,7 @@ def timed_refine(scene: bpy.types.Scene, **settings: object) -> tuple[object, fl
     for name, value in settings.items():
         setattr(scene.tetflora, name, value)
     start = time.perf_counter()
-    statistics = job.refine(scene, bpy.context.evaluated_depsgraph_get())
+    statistics = refine.refine(scene, bpy.context.evaluated_depsgraph_get())
     return statistics, time.perf_counter() - start
 
 

@@ -17,9 +17,12 @@ import bpy
 import numpy as np
 
 from examples import landscape
-from tetflora_addon import emission
-from tetflora_addon.blender import job, meshes, scene_contents, scene_reader
-from tetflora_addon.emission_forms import Refined, facet_blocks
+from tetflora_addon.blender.job import contents as scene_contents
+from tetflora_addon.blender.job import refine
+from tetflora_addon.blender.results import meshes
+from tetflora_addon.blender.scene import plants as scene_reader
+from tetflora_addon.emission import plants as emission
+from tetflora_addon.emission.forms import Refined, facet_blocks
 
 from .report import Targets
 
@@ -74,7 +77,7 @@ def run(quick: bool) -> dict[str, float]:
     lap("compile", held([flora.rows, flora.bound]))
     lap("sample", held([flora.samples, flora.orientation]))
     wall = time.perf_counter()
-    camera, result = job.partition(scene, depsgraph)
+    camera, result = refine.partition(scene, depsgraph)
     wall = time.perf_counter() - wall
     taken, begun = time.process_time() - begun, time.process_time()
     contents = result.contents

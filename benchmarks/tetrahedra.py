@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tetflora_addon.refinement import camera
-from tetflora_addon.tetrahedra import bisection, eight, geometry, roots
+from tetflora_addon.camera import camera
+from tetflora_addon.tetrahedra import geometry, roots, subdivision
 
 from .report import Targets
 
@@ -44,14 +44,14 @@ def run(quick: bool) -> dict[str, float]:
     """Divide by each way; no targets for time."""
 
     def along(choose: Callable[[NDArray[np.float64]], NDArray[np.intp]]) -> Divide:
-        return lambda v: eight.divide_in_eight(v, choose(squared_diagonals(v), axis=1))[1]
+        return lambda v: subdivision.divide_in_eight(v, choose(squared_diagonals(v), axis=1))[1]
 
     ways: dict[str, tuple[Divide, int]] = {
-        "shape": (lambda v: eight.divide_by_shape(v)[1], LEVELS),
-        "eight": (lambda v: eight.divide_in_eight(v)[1], LEVELS),
+        "shape": (lambda v: subdivision.divide_by_shape(v)[1], LEVELS),
+        "eight": (lambda v: subdivision.divide_in_eight(v)[1], LEVELS),
         "shortest": (along(np.argmin), LEVELS),
         "longest": (along(np.argmax), LEVELS),
-        "bisection": (lambda v: bisection.bisect(v)[1], GENERATIONS),
+        "bisection": (lambda v: subdivision.bisect(v)[1], GENERATIONS),
     }
     most = QUICK_MOST if quick else MOST
     pyramid, pieces = halves(), around_views(QUICK_VIEWS if quick else VIEWS)

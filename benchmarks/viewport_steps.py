@@ -24,7 +24,7 @@ SPECIES = ("birch", "conifer", "bush", "oak")
 def steps(ui):
     """See devtools/window_driver.py."""
     session.start()
-    from tetflora_addon.blender import preview_state
+    from tetflora_addon.blender.viewport import state as preview_state
 
     wanted = json.loads((ui.out_dir / "wanted.json").read_text(encoding="utf-8"))
     scene = bpy.context.scene

@@ -12,7 +12,7 @@ import time
 import bpy
 
 from examples import row80
-from tetflora_addon.blender import job
+from tetflora_addon.blender.job import refine
 
 from .report import Targets
 
@@ -50,5 +50,5 @@ def _refined(scene: bpy.types.Scene, speed: float) -> tuple[float, object]:
     """Seconds of a refinement in a wind, and its statistics."""
     scene.tetflora.wind.enabled, scene.tetflora.wind.speed = speed > 0, speed
     begun = time.process_time()
-    statistics = job.refine(scene, bpy.context.evaluated_depsgraph_get())
+    statistics = refine.refine(scene, bpy.context.evaluated_depsgraph_get())
     return time.process_time() - begun, statistics

@@ -6,27 +6,27 @@ from __future__ import annotations
 
 import json
 
-from tetflora_addon.plants.catalogue import list_species, load_species
-from tetflora_addon.plants.compiled import compile_species
-from tetflora_addon.shading import facet_shares
+from tetflora_addon.compiled.flora import compile_species
+from tetflora_addon.proxies import facet_weights
+from tetflora_addon.species.catalogue import list_species, load_species
 
 
 def main() -> None:
     """Fit all species and write them in the order of the catalogue."""
-    facet_shares.TABLE.parent.mkdir(exist_ok=True)
-    facet_shares.TABLE.unlink(missing_ok=True)
-    facet_shares.shipped.cache_clear()
+    facet_weights.TABLE.parent.mkdir(exist_ok=True)
+    facet_weights.TABLE.unlink(missing_ok=True)
+    facet_weights.shipped.cache_clear()
     table = {}
     for identifier in sorted(list_species()):
         flora = compile_species([load_species(identifier)])
-        found = facet_shares.facet_shares(flora)
-        table[facet_shares.digest(flora, 0)] = {
+        found = facet_weights.facet_shares(flora)
+        table[facet_weights.digest(flora, 0)] = {
             "species": identifier,
             "whole": found.whole.round(3).tolist(),
             "own": found.own.round(3).tolist(),
         }
         print(identifier, flush=True)
-    facet_shares.TABLE.write_text(json.dumps(table, separators=(",", ":")).replace('},"', '},\n"') + "\n")
+    facet_weights.TABLE.write_text(json.dumps(table, separators=(",", ":")).replace('},"', '},\n"') + "\n")
 
 
 if __name__ == "__main__":

@@ -71,10 +71,10 @@ def start() -> ModuleType:
         forget()
         raise RuntimeError(f"Blender could not enable {PACKAGE} from {ROOT}") from next(iter(failures), None)
     _home = home
-    from tetflora_addon import cache_folder
+    from tetflora_addon import storage
 
     # Inside a full Blender it would be the user's own.
-    cache_folder.use(home / "cache")
+    storage.use(home / "cache")
     # Blender 4.5's wheel hangs at exit while a callback of an add-on is registered.
     atexit.register(stop)
     return sys.modules[PACKAGE]

@@ -10,10 +10,9 @@ from __future__ import annotations
 import json
 import re
 
-from tetflora_addon.plants.crown_shapes import CROWN_SHAPES
-from tetflora_addon.plants.leaf_models import LEAF_MODELS
-from tetflora_addon.plants.schema import FOLLOWS, LENGTH_HIGH, ORDER_KEYS, Key
-from tetflora_addon.plants.species import LEAF_KINDS
+from tetflora_addon.species.leaf_models import LEAF_MODELS
+from tetflora_addon.species.schema import FOLLOWS, LENGTH_HIGH, ORDER_KEYS, Key
+from tetflora_addon.species.species import CROWN_SHAPES, LEAF_KINDS
 
 from .house import ROOT
 

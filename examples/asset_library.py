@@ -17,10 +17,10 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("out") / "assets", help="folder of the library")
     options = parser.parse_args()
     session.start()
-    from tetflora_addon.blender import asset_library
+    from tetflora_addon.blender.placing import assets
 
     session.clean_file()
-    path, number = asset_library.write_asset_library(options.out.absolute())
+    path, number = assets.write_asset_library(options.out.absolute())
     print(f"{path}: {number} plants, {path.stat().st_size / 1000:.0f} kB")
     session.stop()
     return 0

@@ -30,7 +30,8 @@ def run(out: Path, width: int) -> dict:
     """Build, save, refine and render; returns what ``stats.json`` holds."""
     import bpy
 
-    from tetflora_addon.blender import compat, job
+    from tetflora_addon.blender import compat
+    from tetflora_addon.blender.job import refine
 
     from . import row80
     from .top_view import render_top_view
@@ -52,7 +53,7 @@ def run(out: Path, width: int) -> dict:
 
     # The demo times refinement and rendering apart; a plain `blender -b demo.blend -f 1` does both by itself.
     scene.tetflora.refine_at_render = False
-    steps = job.refine_steps(scene, bpy.context.evaluated_depsgraph_get())
+    steps = refine.refine_steps(scene, bpy.context.evaluated_depsgraph_get())
     while True:
         try:
             progress = next(steps)

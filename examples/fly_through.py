@@ -12,7 +12,7 @@ from bpy_extras import anim_utils
 from mathutils import Vector
 from numpy.typing import NDArray
 
-from tetflora_addon.blender import scene_reader
+from tetflora_addon.blender.scene import plants as scene_reader
 
 from . import landscape, row80
 

@@ -14,7 +14,8 @@ import numpy as np
 from mathutils import Vector
 
 from devtools import session
-from tetflora_addon.blender import ground_reader, job, plant_objects
+from tetflora_addon.blender.job import refine
+from tetflora_addon.blender.placing import plant_objects, terrain
 from tetflora_addon.planting import places, rules
 
 from .row80 import add_daylight
@@ -91,7 +92,7 @@ def render_landscape(path: Path, width: int = 960, samples: int = 64) -> None:
     render.engine, render.image_settings.file_format, render.filepath = 'CYCLES', 'PNG', str(path)
     scene.cycles.samples, scene.cycles.use_denoising = samples, False
     scene.tetflora.refine_at_render = False
-    job.refine(scene, bpy.context.evaluated_depsgraph_get())
+    refine.refine(scene, bpy.context.evaluated_depsgraph_get())
     bpy.ops.render.render(write_still=True)
 
 
@@ -107,6 +108,6 @@ def plant(scene: bpy.types.Scene, surface: bpy.types.Object, plants: int) -> bpy
         scale_max=1.35,
         shares=tuple(SPECIES.values()),
     )
-    ground = ground_reader.read_ground([surface], depsgraph)
+    ground = terrain.read_ground([surface], depsgraph)
     found = places.place(ground, scattered)
     return plant_objects.add_field(scene, found, tuple(SPECIES))

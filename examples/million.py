@@ -21,7 +21,8 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from tetflora_addon.blender import ground_reader, job, plant_objects
+from tetflora_addon.blender.job import refine
+from tetflora_addon.blender.placing import plant_objects, terrain
 from tetflora_addon.planting import places, rules
 
 from .haze import add_haze
@@ -64,7 +65,7 @@ def build(scene: bpy.types.Scene, plants: int = PLANTS, width: int = 960) -> Non
 def _plant(scene: bpy.types.Scene, surface: bpy.types.Object, land: Terrain, plants: int) -> None:
     """Broadleaved trees up to two thirds of the height, conifers from the middle on, both in stands and glades."""
     add_field = plant_objects.add_field
-    ground = ground_reader.read_ground([surface], bpy.context.evaluated_depsgraph_get())
+    ground = terrain.read_ground([surface], bpy.context.evaluated_depsgraph_get())
     low, high = float(land.heights.min()), float(land.heights.max())
     common = {"min_distance": 2.0, "scale_min": 0.75, "scale_max": 1.4, "clump_size": 110.0}
     valleys = places.place(
@@ -116,7 +117,7 @@ def render_million(
     scene.tetflora.refine_at_render = False
     scene.tetflora.max_memory = memory
     begin = time.perf_counter()
-    statistics = job.refine(scene, bpy.context.evaluated_depsgraph_get())
+    statistics = refine.refine(scene, bpy.context.evaluated_depsgraph_get())
     refined = time.perf_counter()
     bpy.ops.render.render(write_still=True)
     return {

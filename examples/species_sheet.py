@@ -10,9 +10,14 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from tetflora_addon.blender import leaf_forms, materials, meshes, plant_mesh, scene_contents
-from tetflora_addon.plants import catalogue, expansion, growth, meshing, tubes
-from tetflora_addon.shading import microsurfaces
+from tetflora_addon.blender.job import contents, plant_mesh
+from tetflora_addon.blender.materials import materials
+from tetflora_addon.blender.results import leaf_objects, meshes
+from tetflora_addon.growth import growth
+from tetflora_addon.proxies import microsurfaces
+from tetflora_addon.species import catalogue
+from tetflora_addon.subplants import leaf_meshes, tubes
+from tetflora_addon.subplants import pieces as expansion
 
 from .studio import render_cells, save_sheet
 
@@ -52,21 +57,21 @@ def opened_cell(identifier: str, orders: int) -> Callable[[], tuple[np.ndarray, 
 
     def build() -> tuple[np.ndarray, str]:
         scene, depsgraph = bpy.context.scene, bpy.context.evaluated_depsgraph_get()
-        flora = scene_contents.compile_for((identifier,), scene, depsgraph)
+        flora = contents.compile_for((identifier,), scene, depsgraph)
         single = plant_mesh.single_seed(identifier, SEED)
         closed = growth.trunks(flora.rows, single)
         parts = []
         for _ in range(orders):
             closed, _, pieces, _ = expansion.open_subplants(flora, closed)
             parts.append(("bark", 0, tubes.tube_buffers(flora, pieces)))
-            parts += [("leaf", leaf.form, leaf.buffers) for leaf in meshing.leaf_meshes(flora, pieces, 0)]
+            parts += [("leaf", leaf.form, leaf.buffers) for leaf in leaf_meshes.leaf_meshes(flora, pieces, 0)]
         points = []
         if len(closed):
             facets = microsurfaces.subplant_facets(flora, closed, np.full(len(closed), FACET))
             parts.append(("proxy", 0, microsurfaces.facet_mesh(facets)))
         for number, (kind, form, buffers) in enumerate(p for p in parts if p[2] is not None):
             proxy = materials.proxy_material
-            own = [proxy()] if kind == "proxy" else leaf_forms.materials_of(scene, flora.species[0], kind, form)
+            own = [proxy()] if kind == "proxy" else leaf_objects.materials_of(scene, flora.species[0], kind, form)
             mesh = meshes.write_mesh(f"{kind} {number}", buffers, own)
             scene.collection.objects.link(bpy.data.objects.new(mesh.name, mesh))
             points.append(_points(mesh))

@@ -13,9 +13,11 @@ from math import pi, radians, tan
 import bpy
 import numpy as np
 
-from tetflora_addon import emission
 from tetflora_addon.blender import compat
-from tetflora_addon.plants import catalogue, compiled, seeds
+from tetflora_addon.compiled import flora as compiled
+from tetflora_addon.emission import plants
+from tetflora_addon.growth import seeds
+from tetflora_addon.species import catalogue
 
 SPECIES = ("oak", "birch", "spruce", "aspen")
 #: Directions of the sun's light as its azimuth over the direction of view, degrees: 0 shines over the viewer's
@@ -147,7 +149,7 @@ def _height(identifier: str) -> float:
     one = seeds.Seeds(
         (identifier,), np.zeros(1, np.int32), np.zeros(1, np.int64), np.zeros((1, 3)), np.eye(3)[None], np.ones(1)
     )
-    return float(max(block.buffers.positions[:, 2].max() for block in emission.expanded_blocks(flora, one)))
+    return float(max(block.buffers.positions[:, 2].max() for block in plants.expanded_blocks(flora, one)))
 
 
 def _add_ground(scene: bpy.types.Scene, side: float) -> None:

@@ -28,7 +28,8 @@ def render_thumbnail(identifier: str, path: Path) -> None:
     import numpy as np
     from mathutils import Vector
 
-    from tetflora_addon.blender import compat, plant_mesh
+    from tetflora_addon.blender import compat
+    from tetflora_addon.blender.job import plant_mesh
 
     from .row80 import add_daylight
 
@@ -97,7 +98,7 @@ def _shrink(source: Path, target: Path) -> None:
 def main(wanted: list[str]) -> int:
     """Make the pictures that are asked for, or all; exit code 1 if one is too large."""
     session.start()
-    from tetflora_addon.plants import catalogue
+    from tetflora_addon.species import catalogue
 
     known = catalogue.list_species()
     FOLDER.mkdir(exist_ok=True)

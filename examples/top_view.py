@@ -11,7 +11,8 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from tetflora_addon.blender import job, scene_reader
+from tetflora_addon.blender.job import refine
+from tetflora_addon.blender.scene import plants as scene_reader
 from tetflora_addon.refinement import decisions
 
 #: Colours of the lines by decision, linear RGB, and the height at which they lie, so that the rarer are on top.
@@ -37,7 +38,7 @@ def render_top_view(scene: bpy.types.Scene, path: Path, width: int = 1600, sampl
         Pixels; the height follows from the partition's shape.
     """
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    camera, result = job.partition(scene, depsgraph)
+    camera, result = refine.partition(scene, depsgraph)
     decision = decisions.Decision
     drawing = bpy.data.scenes.new("Top view")
     try:

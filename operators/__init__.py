@@ -6,35 +6,7 @@
 
 import bpy
 
-from . import (
-    add_plant,
-    assign_species,
-    clear,
-    clear_cache,
-    drop_to_ground,
-    edit_list,
-    field_plants,
-    first_forest,
-    keep_results,
-    make_plant_mesh,
-    mark_explicit,
-    mark_occluder,
-    paint_plants,
-    place_plant,
-    populate,
-    population_files,
-    populations,
-    preview_levels,
-    refine,
-    remove_plants,
-    reseed,
-    select_species,
-    species_assets,
-    species_edit,
-    species_files,
-    species_preview,
-    use_as_form,
-)
+from . import add, brush, ground_tools, marks, plants, populations, preview, refine, species
 
 CLASSES = tuple(cls for module in tuple(vars().values()) for cls in getattr(module, "CLASSES", ()))
 

@@ -1,13 +1,18 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an artist does with populations: make them, change them, let them go."""
+"""What an artist does with populations: make them, change them, let them go.
+
+Populations written to files and read from them.
+"""
+
+from pathlib import Path
 
 import bpy
-from bpy.props import BoolProperty
+from bpy.props import BoolProperty, StringProperty
+from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from ..tetflora_addon.blender import point_preview
-from ..tetflora_addon.blender.population_rules import active_population, copy_settings
-from ..tetflora_addon.blender.populations import (
+from ..tetflora_addon.blender.placing import population_files
+from ..tetflora_addon.blender.placing.populations import (
     Made,
     add_population,
     make_plants,
@@ -16,6 +21,8 @@ from ..tetflora_addon.blender.populations import (
     reroll,
     set_grounds,
 )
+from ..tetflora_addon.blender.placing.rules import active_population, copy_settings
+from ..tetflora_addon.blender.viewport import points
 from .base import Reporting, counted, in_object_mode, select_only
 
 
@@ -95,7 +102,7 @@ class TETFLORA_OT_add_population(Reporting, bpy.types.Operator):
         if number is not None:
             # Fetched again: adding to a list moves what is in it.
             copy_settings(settings.populations[number], population)
-        point_preview.schedule()
+        points.schedule()
         return {'FINISHED'}
 
 
@@ -168,7 +175,7 @@ class TETFLORA_OT_remove_population(_OfPopulation, bpy.types.Operator):
         name = active_population(context.scene).name
         number = remove_population(context.scene, index, self.keep_plants)
         self.report({'INFO'}, f'"{name}" removed with {counted(number, "plant")}')
-        point_preview.schedule()
+        points.schedule()
         return {'FINISHED'}
 
 
@@ -203,7 +210,7 @@ class TETFLORA_OT_set_population_ground(_OfPopulation, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> set[str]:
         set_grounds(active_population(context.scene), selected_grounds(context))
-        point_preview.schedule()
+        points.schedule()
         return {'FINISHED'}
 
 
@@ -229,7 +236,7 @@ class TETFLORA_OT_forget_erased(_Replacing, bpy.types.Operator):
         population = active_population(context.scene)
         population.erased = population.placed_by = ""  # so that the panel asks for an update
         self.report({'INFO'}, f'"{population.name}" has no more erased places; click Update to place plants')
-        point_preview.schedule()
+        points.schedule()
         return {'FINISHED'}
 
 
@@ -245,7 +252,67 @@ class TETFLORA_OT_preview_population(Reporting, bpy.types.Operator):
     bl_options = {'REGISTER'}
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        point_preview.show(context.scene, not point_preview.shown_in(context.scene))
+        points.show(context.scene, not points.shown_in(context.scene))
+        return {'FINISHED'}
+
+
+class TETFLORA_OT_export_populations(Reporting, bpy.types.Operator, ExportHelper):
+    """Write populations to a file."""
+
+    bl_idname = "tetflora.export_populations"
+    bl_label = "Export Populations"
+    bl_description = (
+        "Export the settings of the populations in this scene to a file, for use in other scenes. Plants are not "
+        "exported"
+    )
+    bl_options = {'REGISTER'}
+
+    filename_ext = population_files.ENDING
+    filter_glob: StringProperty(default="*.json", options={'HIDDEN'})
+    only_active: BoolProperty(name="Only Active", description="Export the active population only")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not context.scene.tetflora.populations:
+            cls.poll_message_set("Add a population first")
+            return False
+        return True
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        settings = context.scene.tetflora
+        chosen = list(settings.populations)
+        if self.only_active:
+            chosen = chosen[settings.populations_index :][:1]
+        path = population_files.write_populations(chosen, Path(bpy.path.abspath(self.filepath)))
+        self.report({'INFO'}, f"{counted(len(chosen), 'population')} written to {path}")
+        return {'FINISHED'}
+
+
+class TETFLORA_OT_import_populations(Reporting, bpy.types.Operator, ImportHelper):
+    """Add the populations of a file."""
+
+    bl_idname = "tetflora.import_populations"
+    bl_label = "Import Populations"
+    bl_description = (
+        "Import populations from a file, without plants; click Update for each. They grow on meshes with the names in "
+        "the file, or else on the selected meshes"
+    )
+    bl_options = {'REGISTER', 'UNDO'}
+
+    filename_ext = population_files.ENDING
+    filter_glob: StringProperty(default="*.json", options={'HIDDEN'})
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        path = Path(bpy.path.abspath(self.filepath))
+        number, missing = population_files.read_populations(context.scene, path, selected_grounds(context))
+        points.schedule()
+        if missing:
+            self.report(
+                {'WARNING'},
+                f"{counted(number, 'population')} added; missing in this file and left empty: {', '.join(missing)}",
+            )
+        else:
+            self.report({'INFO'}, f"{counted(number, 'population')} added; click Update to place plants")
         return {'FINISHED'}
 
 
@@ -259,4 +326,6 @@ CLASSES = (
     TETFLORA_OT_set_population_ground,
     TETFLORA_OT_forget_erased,
     TETFLORA_OT_preview_population,
+    TETFLORA_OT_export_populations,
+    TETFLORA_OT_import_populations,
 )

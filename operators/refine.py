@@ -1,20 +1,35 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Refine the scene: at once in scripts, step by step with progress and Esc in the window."""
+"""Refine the scene: at once in scripts, step by step with progress and Esc in the window.
+
+Clear what refinement made.
+
+Turn results into ordinary meshes of the artist's.
+
+Make ordinary meshes of the selected plants.
+
+Empty the cache folder.
+"""
 
 from collections.abc import Generator
 
 import bpy
 
-from ..tetflora_addon.blender import auto_refresh, job
-from ..tetflora_addon.blender.handlers import forget_render_errors
-from ..tetflora_addon.blender.plant_objects import plants_of, prepare_scene
+from ..tetflora_addon import storage
+from ..tetflora_addon.blender.job import refine
+from ..tetflora_addon.blender.job.plant_mesh import make_plant_mesh_steps
+from ..tetflora_addon.blender.job.render import forget_render_errors
+from ..tetflora_addon.blender.placing.plant_objects import plants_of, prepare_scene
+from ..tetflora_addon.blender.results import hiding
+from ..tetflora_addon.blender.results.collection import result_collections
+from ..tetflora_addon.blender.results.forms import few_bounces
+from ..tetflora_addon.blender.results.hiding import keep_results
 from ..tetflora_addon.blender.runtime import redraw
-from ..tetflora_addon.blender.shell_bounces import few_bounces
-from ..tetflora_addon.blender.world_reader import read_world
+from ..tetflora_addon.blender.scene.lights import read_world
+from ..tetflora_addon.blender.viewport import auto
+from ..tetflora_addon.errors import TetFloraError
 from ..tetflora_addon.refinement.statistics import Progress, Statistics
-from .base import counted
-from .modal_job import ModalJob
+from .base import ModalJob, Reporting, counted, in_object_mode, plants_selected, select_only, selected_plants
 
 
 class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
@@ -41,14 +56,14 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
         return True
 
     def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, Statistics]:
-        with auto_refresh.paused():
+        with auto.paused():
             depsgraph = context.evaluated_depsgraph_get()
-            return (yield from job.refine_steps(context.scene, depsgraph, view_layer=context.view_layer))
+            return (yield from refine.refine_steps(context.scene, depsgraph, view_layer=context.view_layer))
 
     def finish(self, context: bpy.types.Context, statistics: Statistics) -> set[str]:
         prepare_scene(context.scene)
         if statistics.complete:
-            auto_refresh.refined(context.scene)
+            auto.refined(context.scene)
         forget_render_errors()
         redraw()
         self.report(
@@ -100,4 +115,123 @@ def _cut_off(scene: bpy.types.Scene) -> str:
     )
 
 
-CLASSES = (TETFLORA_OT_refine,)
+class TETFLORA_OT_clear(Reporting, bpy.types.Operator):
+    """Remove what Refine made."""
+
+    bl_idname = "tetflora.clear"
+    bl_label = "Clear"
+    bl_description = (
+        "Remove all meshes, materials and proxies that Refine created, and nothing else. Plants remain, and hidden "
+        "meshes are shown again"
+    )
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not in_object_mode(cls, context):
+            return False
+        # Results may have been deleted by hand, which leaves hidden what they stood for. Only then are all objects
+        # looked through: a panel asks at every movement of the mouse.
+        scene = context.scene
+        if not (refine.has_results(scene) or (scene.tetflora.statistics and hiding.hidden_originals(scene))):
+            cls.poll_message_set("No results to clear")
+            return False
+        return True
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        auto.stop()
+        hidden = hiding.hidden_originals(context.scene, 'VIEW')
+        removed = f"{counted(refine.clear(context.scene), 'datablock')} removed"
+        shown = sum(hiding.HIDDEN['VIEW'] not in original for original in hidden)
+        self.report({'INFO'}, f"{removed}, {counted(shown, 'object')} shown again" if shown else removed)
+        return {'FINISHED'}
+
+
+class TETFLORA_OT_keep_results(Reporting, bpy.types.Operator):
+    """Make ordinary meshes of what Refine made."""
+
+    bl_idname = "tetflora.keep_results"
+    bl_label = "Keep Results as Meshes"
+    bl_description = (
+        "Turn the results into ordinary meshes that are saved in the file and can be edited. Refine and Clear no "
+        "longer change them. Turns off Refine at Render, to avoid rendering the plants twice"
+    )
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.mode != 'OBJECT':
+            cls.poll_message_set("Only available in Object Mode")
+            return False
+        if not result_collections(context.scene, 'VIEW'):
+            cls.poll_message_set("No results to keep; click Refine first")
+            return False
+        return True
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        scene = context.scene
+        auto.stop()
+        if not result_collections(scene, 'VIEW'):
+            raise TetFloraError("Refine Automatically has not finished; wait, or click Refine")
+        kept = keep_results(scene)
+        scene.tetflora.refine_at_render = False
+        scene.tetflora.statistics = ""
+        self.report({'INFO'}, f"{counted(kept, 'object')} kept as meshes; Refine at Render is off")
+        return {'FINISHED'}
+
+
+class TETFLORA_OT_make_plant_mesh(ModalJob, bpy.types.Operator):
+    """Turn the selected plants into meshes to edit, export and keep."""
+
+    bl_idname = "tetflora.make_plant_mesh"
+    bl_label = "Convert Plants to Meshes"
+    bl_description = (
+        "Create an ordinary mesh object of each selected plant, with every branch and leaf, to edit, export or "
+        "animate. The plant remains, but disabled; Clear does not remove the mesh. Esc cancels without changes"
+    )
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return in_object_mode(cls, context) and plants_selected(cls, context)
+
+    def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, list[bpy.types.Object]]:
+        return make_plant_mesh_steps(context.scene, context.evaluated_depsgraph_get(), selected_plants(context))
+
+    def finish(self, context: bpy.types.Context, made: list[bpy.types.Object]) -> set[str]:
+        context.view_layer.update()
+        select_only(context, made)
+        polygons = sum(len(obj.data.polygons) for obj in made)
+        self.report({'INFO'}, f"{counted(len(made), 'mesh object')} of {polygons:,} polygons made")
+        return {'FINISHED'}
+
+
+class TETFLORA_OT_clear_cache(Reporting, bpy.types.Operator):
+    """Delete what was kept about species."""
+
+    bl_idname = "tetflora.clear_cache"
+    bl_label = "Clear Cache"
+    bl_description = (
+        "Delete all cached species analysis, and nothing else in the folder. It is computed again when needed"
+    )
+    bl_options = {'REGISTER'}
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        if storage.used() is None:
+            cls.poll_message_set("The cache folder does not exist")
+            return False
+        return True
+
+    def run(self, _context: bpy.types.Context) -> set[str]:
+        self.report({'INFO'}, f"{counted(storage.clear(), 'file')} deleted from {storage.used()}")
+        return {'FINISHED'}
+
+
+CLASSES = (
+    TETFLORA_OT_refine,
+    TETFLORA_OT_clear,
+    TETFLORA_OT_keep_results,
+    TETFLORA_OT_make_plant_mesh,
+    TETFLORA_OT_clear_cache,
+)

@@ -4,46 +4,11 @@
 
 import bpy
 
-from ..tetflora_addon.blender import handlers
-from . import (
-    add_menu,
-    brush_panel,
-    first_panel,
-    lists,
-    nothing_refined,
-    object_menu,
-    output_panel,
-    pie_menu,
-    plants_panel,
-    populate_panel,
-    preferences_page,
-    preview_panel,
-    refine_panel,
-    refinement_panel,
-    species_panel,
-    statistics_panel,
-    wind_panel,
-)
+from ..tetflora_addon.blender.job import render
+from . import base, menus, plants, populate, preferences, refine, results, species
 
 # In the order of registration, which is that of the panels in the tab: as an artist works, a panel after its parent.
-_MODULES = (
-    lists,
-    first_panel,
-    refine_panel,
-    refinement_panel,
-    plants_panel,
-    populate_panel,
-    brush_panel,
-    species_panel,
-    wind_panel,
-    output_panel,
-    preview_panel,
-    statistics_panel,
-    add_menu,
-    nothing_refined,
-    object_menu,
-    pie_menu,
-)
+_MODULES = (base, refine, plants, populate, species, results, menus)
 CLASSES = tuple(cls for module in _MODULES for cls in module.CLASSES)
 
 _register, _unregister = bpy.utils.register_classes_factory(CLASSES)
@@ -52,16 +17,16 @@ _register, _unregister = bpy.utils.register_classes_factory(CLASSES)
 def register() -> None:
     """Register panels and menus."""
     _register()
-    preferences_page.register()
-    bpy.types.VIEW3D_MT_add.append(add_menu.draw_in_add_menu)
-    bpy.types.VIEW3D_MT_object.append(object_menu.draw_in_object_menu)
-    handlers.nothing_refined.append(nothing_refined.open_nothing_refined)
+    preferences.register()
+    bpy.types.VIEW3D_MT_add.append(menus.draw_in_add_menu)
+    bpy.types.VIEW3D_MT_object.append(menus.draw_in_object_menu)
+    render.nothing_refined.append(menus.open_nothing_refined)
 
 
 def unregister() -> None:
     """Unregister panels and menus."""
-    handlers.nothing_refined.remove(nothing_refined.open_nothing_refined)
-    bpy.types.VIEW3D_MT_object.remove(object_menu.draw_in_object_menu)
-    bpy.types.VIEW3D_MT_add.remove(add_menu.draw_in_add_menu)
-    preferences_page.unregister()
+    render.nothing_refined.remove(menus.open_nothing_refined)
+    bpy.types.VIEW3D_MT_object.remove(menus.draw_in_object_menu)
+    bpy.types.VIEW3D_MT_add.remove(menus.draw_in_add_menu)
+    preferences.unregister()
     _unregister()

@@ -17,7 +17,9 @@ import bpy
 import numpy as np
 
 from devtools import session
-from tetflora_addon.blender import compat, emit, job
+from tetflora_addon.blender import compat
+from tetflora_addon.blender.job import refine
+from tetflora_addon.blender.results import collection as emit
 
 from .. import fly_through
 from .pictures import save_sheet
@@ -121,7 +123,7 @@ def divided_anew(small: bool) -> tuple[list[int], int]:
 
 def _divided(scene: bpy.types.Scene) -> set[tuple[int, ...]]:
     """Tetrahedra that a frame divides, by centre (tenths of a millimetre) and level."""
-    tree = job.partition(scene, bpy.context.evaluated_depsgraph_get())[1].tree
+    tree = refine.partition(scene, bpy.context.evaluated_depsgraph_get())[1].tree
     nodes = np.flatnonzero(tree.children[:, 0] >= 0)
     centres = tree.vertices(nodes).mean(axis=1)
     whole = np.isfinite(centres).all(axis=1)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tetflora_addon.plants import catalogue
+from tetflora_addon.species import catalogue
 
 from ..species_sheet import render_sheet
 

@@ -10,7 +10,8 @@ from pathlib import Path
 import bpy
 
 from devtools import session
-from tetflora_addon.blender import compat, job
+from tetflora_addon.blender import compat
+from tetflora_addon.blender.job import refine
 
 from .. import row80
 
@@ -32,7 +33,7 @@ def row(small: bool, size: tuple[int, int] = SIZE) -> bpy.types.Scene:
 def refined(scene: bpy.types.Scene) -> object:
     """Refine the scene for its frame; returns the statistics."""
     bpy.context.view_layer.update()
-    return job.refine(scene, bpy.context.evaluated_depsgraph_get())
+    return refine.refine(scene, bpy.context.evaluated_depsgraph_get())
 
 
 def choose_cycles(scene: bpy.types.Scene, samples: int) -> None:

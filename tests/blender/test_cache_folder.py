@@ -8,9 +8,10 @@ import bpy
 import pytest
 
 from tests.blender.scenes import add_camera, add_plant, depsgraph
-from tetflora_addon import cache_folder
-from tetflora_addon.blender import job, preferences
-from tetflora_addon.shading import facet_shares
+from tetflora_addon import storage
+from tetflora_addon.blender import preferences
+from tetflora_addon.blender.job import refine
+from tetflora_addon.proxies import facet_weights
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -18,11 +19,11 @@ pytestmark = pytest.mark.usefixtures("clean_file")
 @pytest.fixture
 def cache():
     """The engine's module; afterwards it uses the folder that it used before."""
-    before = cache_folder.used()
-    yield cache_folder
+    before = storage.used()
+    yield storage
     own = preferences.preferences()
     own.use_cache, own.cache_folder = True, ""
-    cache_folder.use(before)
+    storage.use(before)
 
 
 def test_it_lies_where_blender_keeps_what_belongs_to_the_extension(cache, monkeypatch):
@@ -57,15 +58,15 @@ def test_an_edited_species_is_looked_at_once(cache, tmp_path, monkeypatch):
     editor = scene.tetflora.species_editor
     editor.species, editor.order = "fern", "0"
     editor.length = 0.05
-    monkeypatch.setattr(facet_shares, "_found", {})
-    job.refine(scene, depsgraph())
+    monkeypatch.setattr(facet_weights, "_found", {})
+    refine.refine(scene, depsgraph())
     (kept,) = (tmp_path / "cache").iterdir()
     (tmp_path / "cache" / "notes.txt").write_text("mine")
 
-    monkeypatch.setattr(facet_shares, "_found", {})
-    facet_shares._shares.cache_clear()
-    monkeypatch.setattr(facet_shares, "fitted_shares", lambda *_: pytest.fail("looked at again"))
-    job.refine(scene, depsgraph())
+    monkeypatch.setattr(facet_weights, "_found", {})
+    facet_weights._shares.cache_clear()
+    monkeypatch.setattr(facet_weights, "fitted_shares", lambda *_: pytest.fail("looked at again"))
+    refine.refine(scene, depsgraph())
     assert bpy.ops.tetflora.clear_cache() == {'FINISHED'}
     assert [p.name for p in (tmp_path / "cache").iterdir()] == ["notes.txt"]
     assert not kept.exists()

@@ -14,8 +14,9 @@ import pytest
 from devtools import session
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, select, tiny_render
 from tests.limits import full_disk
-from tetflora_addon.blender import command_line, compat, preferences
-from tetflora_addon.plants import catalogue
+from tetflora_addon.blender import compat, preferences
+from tetflora_addon.blender.cli import command
+from tetflora_addon.species import catalogue
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -140,7 +141,7 @@ def _assert_saved(path: Path, results: bool) -> None:
 
 
 def _command(*arguments: object) -> int:
-    return command_line.main([*map(str, arguments)])
+    return command.main([*map(str, arguments)])
 
 
 def _error(capfd: pytest.CaptureFixture) -> str:

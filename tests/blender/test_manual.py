@@ -10,16 +10,13 @@ import re
 import pytest
 
 from devtools import build
-from tetflora_addon.blender import (
-    brush_properties,
-    command_line,
-    output_properties,
-    population_properties,
-    preferences,
-    preview_properties,
-    properties,
-    wind_properties,
-)
+from tetflora_addon.blender import preferences, properties
+from tetflora_addon.blender import settings as wind_properties
+from tetflora_addon.blender.cli import command as command_line
+from tetflora_addon.blender.placing import properties as brush_properties
+from tetflora_addon.blender.placing import properties as population_properties
+from tetflora_addon.blender.results import output_properties
+from tetflora_addon.blender.viewport import state
 
 MANUAL = (build.ROOT / "docs" / "manual.md").read_text(encoding="utf-8")
 
@@ -35,7 +32,7 @@ GROUPS = (
     population_properties.TetFloraMixEntry,
     output_properties.TetFloraOutput,
     output_properties.TetFloraSpeciesOutput,
-    preview_properties.TetFloraPreview,
+    state.TetFloraPreview,
     brush_properties.TetFloraBrush,
     wind_properties.TetFloraWind,
     preferences.TetFloraPreferences,

@@ -10,20 +10,15 @@ import bpy
 import pytest
 
 from tests.blender.scenes import add_mesh, add_plant
-from tetflora_addon.blender import (
-    brush_properties,
-    leaf_forms,
-    migration,
-    population_properties,
-    preferences,
-    properties,
-    scene_contents,
-    species_edits,
-    species_items,
-    wind_properties,
-)
+from tetflora_addon.blender import preferences, properties, saved_files
+from tetflora_addon.blender import settings as wind_properties
+from tetflora_addon.blender.job import contents
+from tetflora_addon.blender.placing import properties as brush_properties
+from tetflora_addon.blender.placing import properties as population_properties
+from tetflora_addon.blender.results import leaf_objects
+from tetflora_addon.blender.species import catalogue, edits
+from tetflora_addon.growth import wind
 from tetflora_addon.planting import rules, strokes
-from tetflora_addon.plants import wind
 from tetflora_addon.refinement import settings
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -37,12 +32,12 @@ def _reopen(path):
 def test_settings_mirror_the_engine():
     defaults = settings.RefinementSettings()
     scene = bpy.context.scene
-    read = scene_contents.settings_from(scene)
+    read = contents.settings_from(scene)
     for field in fields(defaults):
         assert getattr(read, field.name) == pytest.approx(getattr(defaults, field.name), rel=1e-6), field.name
     scene.tetflora.cutoff = 3.5
     scene.tetflora.max_tetrahedra = 1234
-    read = scene_contents.settings_from(scene)
+    read = contents.settings_from(scene)
     assert (read.cutoff, read.max_tetrahedra) == (3.5, 1234)
 
 
@@ -149,21 +144,21 @@ def test_an_unknown_species_survives_the_panel_and_the_file(tmp_path):
 
 
 def test_items_keep_their_numbers_when_the_catalogue_grows(tmp_path):
-    items = species_items.items_for("gone")
+    items = catalogue.items_for("gone")
     numbers = {item[0]: item[4] for item in items}
     assert len(set(numbers.values())) == len(numbers)
-    assert numbers["gone"] == species_items.number_of("gone")
-    assert {i[0]: i[4] for i in species_items.items_for()} == {k: v for k, v in numbers.items() if k != "gone"}
+    assert numbers["gone"] == catalogue.number_of("gone")
+    assert {i[0]: i[4] for i in catalogue.items_for()} == {k: v for k, v in numbers.items() if k != "gone"}
 
 
 def test_species_of_the_users_own_folder(tmp_path):
-    shipped = species_edits.catalogue()
+    shipped = edits.catalogue()
     own = bpy.context.preferences.addons[preferences.ROOT_PACKAGE].preferences
     (tmp_path / "mine.json").write_text(shipped["bush"].path.read_text(encoding="utf-8"), encoding="utf-8")
     try:
         own.species_folder = str(tmp_path)
         assert preferences.species_folders() == (tmp_path,)
-        assert set(species_edits.catalogue()) == {*shipped, "mine"}
+        assert set(edits.catalogue()) == {*shipped, "mine"}
         own.species_folder = str(tmp_path / "missing")
         assert preferences.species_folders() == ()
     finally:
@@ -177,18 +172,18 @@ def test_leaf_objects_are_pointers(tmp_path):
     assert bpy.context.scene.tetflora.leaf_objects.add().species == ""
     leaf.name = "renamed"
     _reopen(tmp_path / "a.blend")
-    found = leaf_forms.leaf_objects(bpy.context.scene)
+    found = leaf_objects.leaf_objects(bpy.context.scene)
     assert {k: v.name for k, v in found.items()} == {"bush": "renamed"}
 
 
 def test_files_are_stamped_and_those_of_a_newer_version_left_alone(tmp_path, capsys):
     add_plant("old")
     newer = add_plant("newer")
-    newer.tetflora.version = migration.VERSION + 1
+    newer.tetflora.version = saved_files.VERSION + 1
     add_mesh("other")
     bpy.context.scene.tetflora.cutoff = 5.0
     _reopen(tmp_path / "a.blend")
     versions = {o.name: o.tetflora.version for o in bpy.data.objects}
-    assert versions == {"old": migration.VERSION, "newer": migration.VERSION + 1, "other": 0}
-    assert bpy.context.scene.tetflora.version == migration.VERSION
+    assert versions == {"old": saved_files.VERSION, "newer": saved_files.VERSION + 1, "other": 0}
+    assert bpy.context.scene.tetflora.version == saved_files.VERSION
     assert "a newer version saved 1 of" in capsys.readouterr().err

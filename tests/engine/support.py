@@ -14,23 +14,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from tetflora_addon.arrays import spread
 from tetflora_addon.buffers import MeshBuffers, concatenate_buffers
-from tetflora_addon.emission_forms import Refined, facet_blocks
-from tetflora_addon.plants.axes import axes
-from tetflora_addon.plants.branches import Branches
-from tetflora_addon.plants.catalogue import builtin_folder, load_species
-from tetflora_addon.plants.compiled import Flora, compile_species
-from tetflora_addon.plants.expansion import expand
-from tetflora_addon.plants.foliage import leaf_keys, leaf_places, place_leaves
-from tetflora_addon.plants.growth import leaf_counts, trunks
-from tetflora_addon.plants.members import expected_polygons
-from tetflora_addon.plants.meshing import leaf_meshes
-from tetflora_addon.plants.pieces import Pieces, whole_pieces
-from tetflora_addon.plants.quality import with_quality
-from tetflora_addon.plants.schema import species_from_dict
-from tetflora_addon.plants.seeds import Seeds
-from tetflora_addon.plants.tubes import tube_buffers
-from tetflora_addon.refinement.camera import Camera
+from tetflora_addon.camera.camera import Camera
+from tetflora_addon.compiled.flora import Flora, compile_species
+from tetflora_addon.emission.forms import Refined, facet_blocks
+from tetflora_addon.growth.axes import axes
+from tetflora_addon.growth.branches import Branches
+from tetflora_addon.growth.foliage import leaf_keys, leaf_places, place_leaves
+from tetflora_addon.growth.growth import leaf_counts, trunks
+from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.refinement.loop import Refinement
+from tetflora_addon.species.catalogue import builtin_folder, load_species
+from tetflora_addon.species.members import expected_polygons
+from tetflora_addon.species.quality import with_quality
+from tetflora_addon.species.schema import species_from_dict
+from tetflora_addon.subplants.leaf_meshes import leaf_meshes
+from tetflora_addon.subplants.pieces import Pieces, expand, whole_pieces
+from tetflora_addon.subplants.tubes import tube_buffers
 from tetflora_addon.tetrahedra.geometry import FACES, barycentric, face_area_vectors
 
 SPECIES = tuple(sorted(path.stem for path in builtin_folder().glob("*.json")))

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tetflora_addon.kept_arrays import keeping
+from tetflora_addon.storage import keeping
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from mathutils.kdtree import KDTree
 from devtools import session
 from examples import fly_through, row80
 from tests.blender.scenes import depsgraph
-from tetflora_addon.blender import scene_reader
+from tetflora_addon.blender.scene import plants as scene_reader
 
 
 def _walked(frames: int, of: str) -> np.ndarray:

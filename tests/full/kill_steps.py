@@ -15,7 +15,7 @@ sys.path.append(str(Path(__file__).resolve().parents[2]))
 from devtools.aliases import INSTALLED, alias
 
 alias(INSTALLED)
-from tetflora_addon.blender import job  # noqa: E402  (the same)
+from tetflora_addon.blender.job import refine as job  # noqa: E402  (the same)
 
 what, moment, times = sys.argv[-3:]
 left = int(times)

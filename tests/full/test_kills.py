@@ -22,7 +22,8 @@ import pytest
 
 from devtools import session
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, tiny_render
-from tetflora_addon.blender import emit, job
+from tetflora_addon.blender.job import refine
+from tetflora_addon.blender.results import collection as emit
 
 Run = Callable[..., subprocess.CompletedProcess]
 
@@ -102,12 +103,12 @@ def assert_sound(path: Path) -> None:
     assert len(results) == scene.tetflora.output.save_results
     assert not any(collection.hide_render for collection in results)
     assert stone.hide_render == stone.hide_viewport == bool(results)
-    statistics = job.refine(scene, depsgraph())
+    statistics = refine.refine(scene, depsgraph())
     assert statistics.plants == 4
     assert statistics.complete
     assert len(emit.result_collections(scene, 'VIEW')) == 1
     assert stone.hide_render
-    job.clear(scene)
+    refine.clear(scene)
     assert not stone.hide_render
     assert not stone.hide_viewport
 

@@ -30,9 +30,9 @@ def test_clean_file_is_empty_and_keeps_the_extension(clean_file: ModuleType) -> 
 
 def test_plain_names_are_blenders_own_modules(blender: ModuleType) -> None:
     from tetflora_addon import blender as bridge
-    from tetflora_addon.blender import job
+    from tetflora_addon.blender.job import refine
 
     own = sys.modules[f"{session.PACKAGE}.tetflora_addon.blender.job"]
-    assert job is own
+    assert refine is own
     assert sys.modules["tetflora_addon.blender"] is bridge is blender.blender
     assert own.__spec__.name == own.__name__

@@ -14,7 +14,7 @@ from devtools.aliases import INSTALLED, alias
 
 alias(INSTALLED)
 from tests.blender.scenes import add_plant, datablocks  # noqa: E402  (found only now)
-from tetflora_addon.blender import job  # noqa: E402
+from tetflora_addon.blender.job import refine  # noqa: E402
 from tetflora_addon.errors import SpeciesError  # noqa: E402
 from tetflora_addon.refinement.statistics import Progress  # noqa: E402
 
@@ -37,7 +37,7 @@ def steps(ui):
     with ui.override():
         bpy.ops.tetflora.refine()
     ui.values["in_script"] = figures(scene)
-    job.clear(scene)
+    refine.clear(scene)
 
     # Objects appear early, so there is something to take back.
     scene.tetflora.expand_everything = True
@@ -56,8 +56,8 @@ def steps(ui):
     yield from ui.until(lambda: any("Refining, pass" in message for message in messages), 60, "first pass")
     ui.press('RET')
     yield from ui.until(lambda: not running(ui), 60, "end after Return")
-    ui.values["stopped"] = [job.has_results(scene), json.loads(scene.tetflora.statistics)["complete"]]
-    job.clear(scene)
+    ui.values["stopped"] = [refine.has_results(scene), json.loads(scene.tetflora.statistics)["complete"]]
+    refine.clear(scene)
 
     odd = add_plant("odd", "quercus")
     bare = datablocks()
@@ -69,7 +69,7 @@ def steps(ui):
     bpy.data.objects.remove(odd)
 
     bare = datablocks()
-    job.refine_steps = broken
+    refine.refine_steps = broken
     begin(ui)
     ui.values["running_broken"] = running(ui)
     yield from ui.until(lambda: not running(ui), 30, "end after an error")
@@ -103,7 +103,7 @@ def changes(before):
 
 def listen():
     """Messages of the steps, as they come."""
-    messages, refine_steps = [], job.refine_steps
+    messages, refine_steps = [], refine.refine_steps
 
     def noted(*arguments, **options):
         running, enough = refine_steps(*arguments, **options), None
@@ -117,7 +117,7 @@ def listen():
         finally:
             running.close()
 
-    job.refine_steps = noted
+    refine.refine_steps = noted
     return messages
 
 

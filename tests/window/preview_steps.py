@@ -14,7 +14,7 @@ sys.path.append(str(Path(__file__).resolve().parents[2]))
 from devtools.aliases import INSTALLED, alias
 
 alias(INSTALLED)
-from tetflora_addon.blender import preview_state  # noqa: E402  (the same)
+from tetflora_addon.blender.viewport import state  # noqa: E402  (the same)
 
 STEP = 10  # pixels between two looks for a button
 SPECIES = ("broadleaf_tree", "conifer", "bush")
@@ -62,7 +62,7 @@ def steps(ui):
     yield from press_button(ui, "tetflora.preview_levels")
     ui.values["running"] = running(ui)
     yield from ui.until(lambda: not running(ui), 90, "levels")
-    levels = preview_state.find(scene).levels
+    levels = state.find(scene).levels
     ui.values["levels"] = [[level.number, len(level)] for level in levels.levels]
     ui.values["forms"] = np.bincount(levels.levels[-1].decision, minlength=5).tolist()
     settings.projected = False
@@ -89,7 +89,7 @@ def steps(ui):
     ui.values["running_before_esc"] = running(ui)
     ui.press('ESC')
     yield from ui.until(lambda: not running(ui), 30, "end after Esc")
-    ui.values["kept"] = preview_state.find(scene).levels is levels
+    ui.values["kept"] = state.find(scene).levels is levels
 
     # Frozen, and seen from above (figure 5).
     settings.freeze = True
@@ -101,21 +101,21 @@ def steps(ui):
     yield from ui.picture("frozen")
     scene.camera.location = (60.0, 0.0, 3.0)
     yield 0.5
-    ui.values["outdated_frozen"] = preview_state.is_outdated(scene)
+    ui.values["outdated_frozen"] = state.is_outdated(scene)
     yield from press_button(ui, "tetflora.look_through")
     eye = space.region_3d.view_matrix.inverted().translation
     ui.values["looks_from"] = [round(value, 3) for value in eye]
     yield from ui.picture("frozen_view")
     settings.freeze = False
     yield 0.5
-    ui.values["outdated"] = preview_state.is_outdated(scene)
+    ui.values["outdated"] = state.is_outdated(scene)
     yield from ui.picture("outdated")
     yield from press_button(ui, "tetflora.forget_levels")
     yield 0.5
-    ui.values["forgotten"] = preview_state.find(scene).levels is None
+    ui.values["forgotten"] = state.find(scene).levels is None
     yield from ui.picture("forgotten")
     ui.values["after"] = names()
-    ui.values["broken"] = "broken" in preview_state.find(scene).cache
+    ui.values["broken"] = "broken" in state.find(scene).cache
 
 
 def build(scene):
@@ -168,7 +168,7 @@ def press_button(ui, operator):
 
 def shapes(scene):
     """The plants that are shown."""
-    preview = preview_state.find(scene)
+    preview = state.find(scene)
     return None if preview is None else preview.shapes
 
 

@@ -2,36 +2,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Everything below the operators that touches bpy: what the scene stores, reading it, writing results, rendering."""
 
-from . import (
-    asset_library,
-    auto_refresh,
-    command_line,
-    handlers,
-    point_preview,
-    preferences,
-    preview_job,
-    preview_overlay,
-    properties,
-    saved_files,
-    species_preview,
-    thumbnails,
-    translations,
-)
+from . import preferences, properties, saved_files, translations
+from .cli import command
+from .job import render
+from .placing import assets
+from .species import catalogue
+from .viewport import auto, levels, overlay, points, species
 
 # Handlers and commands read properties, so those come first.
 _PARTS = (
     preferences,
-    thumbnails,
+    catalogue,
     properties,
-    handlers,
+    render,
     saved_files,
-    auto_refresh,
-    preview_job,
-    preview_overlay,
-    species_preview,
-    point_preview,
-    asset_library,
-    command_line,
+    auto,
+    levels,
+    overlay,
+    species,
+    points,
+    assets,
+    command,
     translations,
 )
 

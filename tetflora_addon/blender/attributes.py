@@ -4,6 +4,10 @@
 
 Attributes are plain memory. ``foreach_get`` of a mesh's vertices, edges or corners is many times slower, but still
 holds what there was when edit mode was entered, where attributes are empty.
+
+Where objects are, and what rotation and scale their matrices amount to.
+
+Pixels of images as arrays of numbers, which they are not always: a sun in an EXR may be infinite.
 """
 
 from __future__ import annotations
@@ -121,3 +125,77 @@ def members(
 
 def _empty(kind: Kind, size: int) -> NDArray:
     return np.zeros(size if kind.width == 1 else (size, kind.width), kind.dtype)
+
+
+_TINY = 1e-9  # of an axis: no scale that anybody means
+
+
+def world_matrix(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> NDArray[np.float64]:
+    """An object's matrix in world space, (4, 4) float64, as the dependency graph evaluates it.
+
+    Objects that are switched off in viewports but render are not evaluated there, and their stored matrix may be old.
+    It is worked out from the transforms of the object and its parents then; constraints do not count.
+    """
+    evaluated = obj.evaluated_get(depsgraph)
+    if evaluated.is_evaluated:
+        return np.array(evaluated.matrix_world)
+    own = np.array(obj.matrix_basis)
+    if obj.parent is None:
+        return own
+    return world_matrix(obj.parent, depsgraph) @ np.array(obj.matrix_parent_inverse) @ own
+
+
+def frames_of(linear: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Rotations and uniform scales of linear maps.
+
+    Parameters
+    ----------
+    linear : (n, 3, 3) float64
+        Upper left part of object matrices, with any scale, shear and mirroring.
+
+    Returns
+    -------
+    frame : (n, 3, 3) float64
+        Proper rotations that keep the direction of z and the azimuth of x; shear and mirroring go.
+    scale : (n,) float64
+        Mean length of the three axes.
+    sound : (n,) bool
+        False where an axis has no length or is no number; the frame then means nothing.
+    """
+    lengths = np.linalg.norm(linear, axis=1)  # (n, 3): of the columns
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        z = linear[:, :, 2] / lengths[:, 2:]
+        x = linear[:, :, 0] / lengths[:, :1]
+        x = x - z * np.sum(x * z, axis=1, keepdims=True)
+        rest = np.linalg.norm(x, axis=1, keepdims=True)
+        x = x / rest
+        frame = np.stack([x, np.cross(z, x), z], axis=2)
+        sound = (lengths > _TINY).all(axis=1) & (rest[:, 0] > _TINY) & np.isfinite(frame).all(axis=(1, 2))
+    return frame, lengths.mean(axis=1), sound
+
+
+def image_pixels(image: bpy.types.Image) -> NDArray[np.float32]:
+    """Pixels (height, width, channels) of an image that has some, row 0 lowest, in its own colour space.
+
+    One with a channel that is infinite or no number is black and transparent, as in Cycles.
+    """
+    width, height, channels = *image.size, image.channels
+    pixels = np.zeros(width * height * channels, np.float32)
+    image.pixels.foreach_get(pixels)
+    pixels = pixels.reshape(height, width, channels)
+    if image.is_float:
+        pixels[~np.isfinite(pixels).all(axis=2)] = 0.0
+    return pixels
+
+
+def linear_rgb(image: bpy.types.Image, pixels: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Linear RGB (..., 3) of some pixels (..., channels) of an image."""
+    colour = pixels[..., :3] if pixels.shape[-1] >= 3 else np.repeat(pixels[..., :1], 3, axis=-1)
+    if image.colorspace_settings.name == "sRGB" and not image.is_float:
+        colour = np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
+    return colour
+
+
+def face_offsets(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
+    """First corner of each face, and the number of corners: (faces + 1,)."""
+    return np.append(members(mesh.polygons, "loop_start", dtype=np.int32), np.int32(len(mesh.loops)))

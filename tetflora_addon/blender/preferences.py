@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
-from .. import cache_folder
+from .. import storage
 from ..errors import SpeciesError
 
 # Blender files preferences under the name of the extension's root package, two levels above this one. Only the name
@@ -19,7 +19,7 @@ CACHE_VARIABLE = "TETFLORA_CACHE"
 
 
 def _use_cache(_preferences: object = None, _context: object = None) -> None:
-    cache_folder.use(_cache_folder())
+    storage.use(_cache_folder())
 
 
 class TetFloraPreferences(bpy.types.AddonPreferences):
@@ -148,5 +148,5 @@ def register() -> None:
 
 def unregister() -> None:
     """Unregister the preferences."""
-    cache_folder.use(None)
+    storage.use(None)
     bpy.utils.unregister_class(TetFloraPreferences)

@@ -12,22 +12,17 @@ from bpy.props import (
     StringProperty,
 )
 
-from . import (
-    brush_properties,
-    output_properties,
-    population_properties,
-    preview_properties,
-    species_editor,
-    species_edits,
-    wind_properties,
-)
-from .explicit_objects import PROPERTY as EXPLICIT
-from .film_properties import AnimationProperties
-from .plant_form import FORM_TYPES
-from .proxy_forms import form_property
-from .refinement_properties import RefinementProperties
+from . import settings
+from .placing import properties as placing_properties
+from .results import output_properties
+from .results.forms import form_property
 from .runtime import Listeners
-from .species_choice import SpeciesChoice
+from .scene.explicit import PROPERTY as EXPLICIT
+from .scene.skeletons import FORM_TYPES
+from .settings import AnimationProperties, RefinementProperties
+from .species import editor, edits
+from .species.catalogue import SpeciesChoice
+from .viewport import state
 
 #: Notified with a scene when Refine Automatically is switched on or off there.
 auto_refine_switched = Listeners()
@@ -186,17 +181,17 @@ class TetFloraScene(RefinementProperties, AnimationProperties, bpy.types.Propert
         ),
     )
 
-    populate: PointerProperty(type=population_properties.TetFloraPopulation)
+    populate: PointerProperty(type=placing_properties.TetFloraPopulation)
     populations: CollectionProperty(
         name="Populations",
         description="Plants that were placed together, with the rules to place them again",
-        type=population_properties.TetFloraPopulation,
+        type=placing_properties.TetFloraPopulation,
     )
     populations_index: IntProperty(name="Active Population", options={'HIDDEN', 'SKIP_SAVE'})
     output: PointerProperty(type=output_properties.TetFloraOutput)
-    brush: PointerProperty(type=brush_properties.TetFloraBrush)
-    wind: PointerProperty(type=wind_properties.TetFloraWind)
-    preview: PointerProperty(type=preview_properties.TetFloraPreview)
+    brush: PointerProperty(type=placing_properties.TetFloraBrush)
+    wind: PointerProperty(type=settings.TetFloraWind)
+    preview: PointerProperty(type=state.TetFloraPreview)
     leaf_objects: CollectionProperty(
         name="Leaf Objects",
         description="Your own meshes in place of a species' leaf",
@@ -206,12 +201,10 @@ class TetFloraScene(RefinementProperties, AnimationProperties, bpy.types.Propert
     species_edits: CollectionProperty(
         name="Species Edits",
         description="Species edited in this file, as JSON; they replace those of the catalog",
-        type=species_edits.TetFloraSpeciesEdit,
+        type=edits.TetFloraSpeciesEdit,
         options={'HIDDEN'},
     )
-    species_editor: PointerProperty(
-        name="Species Editor", type=species_editor.TetFloraSpeciesEditor, options={'HIDDEN'}
-    )
+    species_editor: PointerProperty(name="Species Editor", type=editor.TetFloraSpeciesEditor, options={'HIDDEN'})
     statistics: StringProperty(
         name="Statistics",
         description="Statistics of the last refinement, as JSON",
@@ -219,15 +212,7 @@ class TetFloraScene(RefinementProperties, AnimationProperties, bpy.types.Propert
     )
 
 
-_MODULES = (
-    brush_properties,
-    output_properties,
-    population_properties,
-    preview_properties,
-    species_editor,
-    species_edits,
-    wind_properties,
-)
+_MODULES = (placing_properties, output_properties, state, editor, edits, settings)
 CLASSES = (
     *(cls for module in _MODULES for cls in module.CLASSES),
     TetFloraFieldEntry,

@@ -7,18 +7,27 @@ for saved and puts it in place of the earlier one (tried on 4.5 and 5.2). Here s
 
 Source: Zstandard seekable format (github.com/facebook/zstd, contrib/seekable_format), which Blender writes: the file
 ends with the magic number of the table of its frames.
+
+Whether pictures that Blender wrote are whole.
+
+Blender renders on where a disk is full: PNG and OpenEXR files end in the middle, and nobody is told (tried on 5.2).
+
+Which version of the layout of properties a file has. A later version adds steps from earlier ones here.
 """
 
 from __future__ import annotations
 
 import os
+import sys
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 
+import bpy
+
 from ..errors import SceneError
-from ..whole_files import PART
+from ..storage import PART
 from .runtime import Handlers, complain
 
 _COMPRESSED = b"\x28\xb5\x2f\xfd"
@@ -80,3 +89,46 @@ def _on_save_post(path: str, _other: object = None) -> None:
 
 _HANDLERS = Handlers(save_post=_on_save_post)
 register, unregister = _HANDLERS.register, _HANDLERS.unregister
+
+
+def damaged(scene: bpy.types.Scene, files: Iterable[Path]) -> list[Path]:
+    """Those of a scene's pictures that cannot be read; OpenEXR of several layers and films are not looked at."""
+    render = scene.render
+    # Blender reads no more of the former than their names until a layer is shown.
+    if render.is_movie_format or render.image_settings.file_format == 'OPEN_EXR_MULTILAYER':
+        return []
+    return [path for path in files if path.is_file() and not _whole(path)]
+
+
+def _whole(path: Path) -> bool:
+    try:
+        image = bpy.data.images.load(str(path))
+    except RuntimeError:
+        return False
+    try:
+        return image.size[0] > 0
+    finally:
+        bpy.data.images.remove(image)
+
+
+VERSION = 2
+
+
+def migrate() -> None:
+    """Stamp all plants, fields, occluders and scenes of the open file with the version of this layout.
+
+    What a newer TetFlora saved is left alone and reported on stderr. Linked data belongs to another file.
+    """
+    owners = [o for o in bpy.data.objects if o.tetflora.is_plant or o.tetflora.is_field or o.tetflora.is_occluder]
+    owners += [s for s in bpy.data.scenes if s.is_property_set("tetflora")]
+    newer = 0
+    for owner in owners:
+        if owner.tetflora.version > VERSION:
+            newer += 1
+        elif owner.library is None and owner.tetflora.version < VERSION:
+            owner.tetflora.version = VERSION
+    if newer:
+        print(
+            f"TetFlora: a newer version saved {newer} of this file's objects and scenes; update the extension",
+            file=sys.stderr,
+        )

@@ -7,10 +7,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..plants.hashing import uniform
+from ..growth.hashing import uniform
+from .plane import NO_DISTANCE, Neighbours, Spacing
 from .rules import Companion, Rules
 from .site import SiteDraw
-from .spacing import NO_DISTANCE, Neighbours, Spacing
 
 _FOUNDERS = 0.1  # of the plants that seek each other
 

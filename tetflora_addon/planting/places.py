@@ -15,13 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
-from ..plants.hashing import child_key, key_of_seed, uniform
-from .checks import check_rules
+from ..growth.hashing import child_key, key_of_seed, uniform
 from .companions import Company
-from .ground import Path, Terrain
-from .rules import Rules
+from .plane import Spacing
+from .rules import Rules, check_rules
 from .site import REMEDIES, Sample, Site, SiteDraw, lines_of_paths
-from .spacing import Spacing
+from .terrain import Path, Terrain
 
 MOST = 10_000_000  # plants of one population
 _ROUNDS = 24

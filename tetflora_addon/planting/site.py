@@ -12,12 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
-from ..plants.hashing import child_key, key_of_seed, uniform
-from .ground import Path, Terrain, border_of, sampled
-from .noise import clumps
-from .regions import Lines, inside_any
+from ..growth.hashing import child_key, key_of_seed, uniform
+from .plane import NO_DISTANCE, Lines, clumps, inside_any
 from .rules import Rules
-from .spacing import NO_DISTANCE
+from .terrain import Path, Terrain, border_of, sampled
 
 CHUNK = 131_072  # places looked at together: what fits into a cache
 _CLUMPS = 2**33  # the key of clumps, away from those of plants

@@ -18,7 +18,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from ..plants.hashing import child_key, key_of_seed, uniform
+from ..growth.hashing import child_key, key_of_seed, uniform
 from ..setting import LENGTH, setting
 
 #: Cells that one dab looks at; a wider circle, or a higher density, is refused by `cells_of`.

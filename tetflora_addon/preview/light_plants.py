@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..plants.compiled import Flora
-from ..plants.growth import trunks
-from ..plants.samples import Points
-from ..plants.seeds import Seeds
-from .colours import as_shown
+from ..compiled.flora import Flora
+from ..compiled.samples import Points
+from ..growth.growth import trunks
+from ..growth.seeds import Seeds
+from .levels import as_shown
 
 #: Plants that a preview shows; of more, every second, third and so on.
 MOST_PLANTS = 50_000

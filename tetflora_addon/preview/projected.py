@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..refinement.camera import Camera
+from ..camera.camera import Camera
 from ..tetrahedra.geometry import barycentric_gradients
 
 #: Corner of the thick point among the five corners of a projected tetrahedron.

@@ -3,6 +3,8 @@
 """The main loop: visibility, refinement, update, until the picture gains nothing more (paper, section 6.2).
 
 A pass costs what it changes: only divided tetrahedra give their contents away, only new ones are drawn and summed up.
+
+The state of the loop after a pass in figures, as statistics keep them.
 """
 
 from __future__ import annotations
@@ -13,21 +15,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..plants.compiled import Flora
-from ..plants.seeds import Seeds
+from ..camera.camera import Camera
+from ..camera.silhouette import expected_pixels
+from ..compiled.flora import Flora
+from ..growth.seeds import Seeds
 from ..tetrahedra.tree import TetrahedralTree
-from .amounts import Amounts
-from .camera import Camera
-from .cells import Terminals
-from .contents import Contents, Holdings, large_polygons
-from .decisions import Decision, decide, gains_nothing, without_splits
+from .contents import Amounts, Contents, Holdings, large_polygons
+from .decisions import Decision, Terminals, decide, gains_nothing, without_splits
 from .descent import Slack, push_down
-from .light_views import Light
-from .lights import decide_by_shadows, seen_ground, shadows_of
+from .lights import Light, decide_by_shadows, seen_ground, shadows_of
 from .polygons import Polygons
 from .settings import RefinementSettings
-from .silhouette import expected_pixels
-from .statistics import Stopwatch
+from .statistics import Step, Stopwatch
 from .views import buffers_for, is_anchored, pixels_of_buffer, root_for, widened_for
 from .visibility import AlphaBuffer, Buffers
 
@@ -275,3 +274,24 @@ def _split(
         large = (pixels * share > settings.cutoff**2) | (~whole & (share == 0.0))
         large &= tree.level[nodes] < deepest
         nodes, share = nodes[large], share[large]
+
+
+def step_of(state: Refinement) -> Step:
+    """Figures of a state; has to be asked for before the loop goes on."""
+    numbers = np.bincount(state.decision, minlength=len(Decision))
+    explicit = state.decision == Decision.EXPLICIT
+    subplants, pieces, polygons = state.holdings.sizes
+    return Step(
+        tetrahedra_made=int(state.tree.tetrahedra_made),
+        levels=int(state.tree.levels),
+        split=int(numbers[Decision.SPLIT]),
+        proxy=int(numbers[Decision.PROXY]),
+        hidden=int(numbers[Decision.HIDDEN]),
+        explicit=int(numbers[Decision.EXPLICIT]),
+        subplants=subplants,
+        pieces=pieces,
+        foreign=polygons,
+        polygons=round(float(state.amounts.polygons[explicit].sum())),
+        seconds=sum(state.seconds.values()),
+        memory_mb=(state.tree.nbytes + state.holdings.nbytes) / 1e6,
+    )

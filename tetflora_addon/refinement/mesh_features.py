@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kept_arrays import keeping
+from ..storage import keeping
 
 #: Bytes that are kept of what is known of meshes, ten a face: each frame of a film asks for the same again.
 MOST_BYTES = 128 << 20

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..camera.camera import Camera
+from ..camera.silhouette import silhouette_area, window_bounds
 from ..tetrahedra.geometry import face_area_vectors, projected_area, volume
-from .camera import Camera
-from .silhouette import silhouette_area, window_bounds
 
 #: Pairs of a primitive and a pixel of its bounding box that are looked at together; some 100 bytes each.
 PAIRS_AT_ONCE = 1 << 19

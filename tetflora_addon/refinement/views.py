@@ -1,6 +1,12 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the loop starts from: how wide the view is, the root of space, and the buffers into which it is drawn.
+"""Visibility all around the eye: six square views, the faces of a cube, with an alpha buffer each.
+
+The views share the eye, so that the tree's front-to-back order is that of all of them. What a tetrahedron affects is
+summed over the faces: the solid angle of each fragment times the pixels that the picture has for a solid angle there,
+which in an equirectangular panorama grow with one over the cosine of the latitude.
+
+What the loop starts from: how wide the view is, the root of space, and the buffers into which it is drawn.
 
 All that depends on the sort of camera, so that the loop itself need not know it.
 """
@@ -8,21 +14,155 @@ All that depends on the sort of camera, so that the loop itself need not know it
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ..plants.branches import Branches
-from ..plants.compiled import Flora
-from ..tetrahedra.roots import view_root
+from ..camera.camera import LEAST_COSINE, Camera, blur_margins
+from ..compiled.flora import Flora
+from ..growth.branches import Branches
+from ..tetrahedra.roots import view_root, world_root
 from ..tetrahedra.tree import TetrahedralTree
-from ..tetrahedra.world_root import world_root
-from .blur import blur_margins
-from .camera import Camera
 from .contents import bounding_cylinders
-from .panorama import PanoramaBuffers, face_side
 from .polygons import Polygons
-from .rasterise import buffer_size
+from .rasterise import buffer_size, occluder_depth, pixel_rays
 from .settings import RefinementSettings
-from .visibility import Buffers
+from .visibility import AlphaBuffer, Buffers, Outline, fitting, hiding
+
+#: Side of a face for the longer side of a buffer. A face spans a quarter of the way round; in its corners its pixels
+#: are several times as dense as in the middle.
+FACE_SHARE = 0.5
+
+#: Directions and upward directions of the six faces in camera space (x right, y up, z back).
+_FACES = (
+    ((0, 0, -1), (0, 1, 0)),
+    ((1, 0, 0), (0, 1, 0)),
+    ((0, 0, 1), (0, 1, 0)),
+    ((-1, 0, 0), (0, 1, 0)),
+    ((0, 1, 0), (0, 0, 1)),
+    ((0, -1, 0), (0, 0, -1)),
+)
+
+
+def face_cameras(camera: Camera, side: int) -> list[Camera]:
+    """Six perspective cameras at the eye of a panorama, whose square pictures fill the sphere.
+
+    Their near planes are closer than the panorama's near sphere, which they touch from within at the corners.
+    """
+    cameras = []
+    for ahead, up in _FACES:
+        turn = np.stack([np.cross(ahead, up), up, np.negative(ahead)], axis=1).astype(np.float64)
+        frame, near = camera.frame @ turn, camera.near / np.sqrt(3.0)
+        window, room = (-1, 1, -1, 1), camera.room
+        cameras.append(Camera("PERSP", camera.position, frame, window, near, camera.far, side, side, room=room))
+    return cameras
+
+
+def pixels_per_solid_angle(camera: Camera, directions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Pixels (n,) of a panorama for each steradian around directions (n, 3) in world space; 0 beside the picture."""
+    local = (directions @ camera.frame) * np.array([1.0, 1.0, -1.0])
+    longitude, latitude = camera.longitude_latitude(local)
+    left, right, bottom, top = camera.window
+    seen = (longitude >= left) & (longitude <= right) & (latitude >= bottom) & (latitude <= top)
+    return np.where(seen, 1.0 / (camera.pixel_size**2 * np.maximum(np.cos(latitude), LEAST_COSINE)), 0.0)
+
+
+class PanoramaBuffer:
+    """The fragments of all tetrahedra around the eye; to be used as an `AlphaBuffer`.
+
+    Parameters
+    ----------
+    camera : Camera
+        A panorama, with the size of the final picture.
+    side : int
+        Of each of the six faces, pixels.
+    occluders : (t, 3, 3) float64, optional
+        Triangles of explicit polygons that hide what is behind them, metres.
+    """
+
+    def __init__(self, camera: Camera, side: int, occluders: NDArray[np.float64] | None = None) -> None:
+        self.camera = camera
+        self.width = self.height = side
+        self.faces: list[AlphaBuffer] = []
+        for face in face_cameras(camera, side):
+            directions = pixel_rays(face, side, side)[1]
+            # Seen from the eye, a pixel at the side of a face is smaller than one in the middle.
+            solid = (2.0 / side) ** 2 * (directions @ -face.frame[:, 2]) ** 3
+            worth = solid * pixels_per_solid_angle(camera, directions)
+            if worth.any():
+                some = occluders is not None and len(occluders)
+                end = occluder_depth(occluders, hiding(face), side, side) if some else None
+                self.faces.append(AlphaBuffer(face, side, end, worth))
+        self._weight = np.zeros((len(self.faces), 0))
+
+    def add(self, cells: NDArray[np.integer], vertices: NDArray[np.float64], extinction: ArrayLike) -> Outline:
+        """Draw tetrahedra; as `AlphaBuffer.add`."""
+        count, extinction = len(vertices), np.asarray(extinction, np.float64)
+        pixels, opacity = np.zeros((2, count))
+        if count:
+            self._make_room(int(np.max(cells)) + 1)
+        for number, face in enumerate(self.faces):
+            some = np.flatnonzero(_may_be_in(vertices, face.camera))
+            outline = face.add(cells[some], vertices[some], extinction[some])
+            self._weight[number, cells[some]] = outline.pixels
+            pixels[some] += outline.pixels
+            opacity[some] += outline.pixels * outline.opacity
+        beside = self.camera.clearance(vertices.reshape(-1, 3)).reshape(-1, 4)
+        whole = (beside <= 0.0).all(axis=1)
+        return Outline(pixels, opacity / np.where(pixels > 0.0, pixels, 1.0), whole)
+
+    def remove(self, chosen: NDArray[np.bool_]) -> None:
+        """Take away tetrahedra; ``chosen`` is a mask by their numbers."""
+        for face in self.faces:
+            face.remove(chosen)
+
+    def transmittance(self, rank: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Share of each tetrahedron's light that nothing in front holds up; as `AlphaBuffer.transmittance`."""
+        self._make_room(len(rank))
+        weight = self._weight[:, : len(rank)]
+        seen = sum(w * face.transmittance(rank) for w, face in zip(weight, self.faces, strict=True))
+        total = weight.sum(axis=0)
+        return seen / np.where(total > 0.0, total, 1.0)
+
+    def _make_room(self, numbers: int) -> None:
+        if numbers > self._weight.shape[1]:
+            grown = np.zeros((len(self.faces), max(numbers, 2 * self._weight.shape[1])))
+            grown[:, : self._weight.shape[1]] = self._weight
+            self._weight = grown
+
+
+class PanoramaBuffers:
+    """Buffers as fine as what is drawn into them; to be used as `visibility.Buffers`.
+
+    Parameters
+    ----------
+    camera : Camera
+    resolution : int
+        Longer side of the finest buffer of a flat picture, pixels.
+    occluders : (t, 3, 3) float64, optional
+        Triangles of explicit polygons that hide what is behind them, metres.
+    """
+
+    def __init__(self, camera: Camera, resolution: int, occluders: NDArray[np.float64] | None = None) -> None:
+        self.camera, self.occluders = camera, occluders
+        self.side = face_side(resolution)
+
+    def fit(self, buffer: PanoramaBuffer | None, cells: int) -> PanoramaBuffer:
+        """The buffer itself if it is fine enough for a number of tetrahedra, or a finer one that is empty."""
+        wanted = fitting(cells // 2, self.side)
+        if buffer is not None and buffer.width >= wanted:
+            return buffer
+        return PanoramaBuffer(self.camera, wanted, self.occluders)
+
+
+def face_side(resolution: int) -> int:
+    """Side in pixels of the faces for the longer side of a flat picture's buffer."""
+    return max(1, round(FACE_SHARE * resolution))
+
+
+def _may_be_in(vertices: NDArray[np.float64], camera: Camera) -> NDArray[np.bool_]:
+    """Tetrahedra (n,) that are not wholly beside one of the walls of a face's pyramid."""
+    x, y, depth = np.moveaxis(camera.to_camera_space(vertices), -1, 0)
+    walls = (depth - x, depth + x, depth - y, depth + y)
+    return np.logical_and.reduce([(wall > 0.0).any(axis=1) for wall in walls])
 
 
 def widened_for(

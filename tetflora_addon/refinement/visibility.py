@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .camera import Camera
+from ..camera.camera import Camera
+from ..camera.silhouette import silhouette_pixels
 from .rasterise import buffer_size, occluder_depth, tetrahedron_fragments
-from .silhouette import silhouette_pixels
 
 #: Optical depth of one fragment at most. e^−60 is no light at all, and larger numbers, or infinite ones, would take
 #: the precision from the cumulative sum over the whole image.

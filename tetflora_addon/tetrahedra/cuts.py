@@ -22,8 +22,8 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .bisection import TIE
 from .geometry import plane_distance, plane_through, quality, signed_volume
+from .subdivision import TIE
 
 #: Vertices nearer to a plane than this, in metres, count as on it. It is absolute, so that neighbours of different size
 #: agree; much more than rounding tens of kilometres from the origin, and much less than any leaf.

@@ -11,10 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .bisection import bisect
 from .cuts import TOLERANCE, CutTetrahedra, cut_tetrahedra
-from .eight import divide_by_shape
 from .geometry import plane_distance
+from .subdivision import bisect, divide_by_shape
 
 #: Points that `TetrahedralTree.locate` takes down the tree at a time; bounds its memory to some tens of megabytes.
 POINTS_AT_ONCE = 1 << 18

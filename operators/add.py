@@ -1,0 +1,306 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Add one plant.
+
+Make a curve or skeleton that the artist drew the form of plants.
+
+A small complete forest to begin with.
+
+Populate a terrain with plants: a new population, and its plants, in one step.
+"""
+
+import bpy
+import numpy as np
+from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
+
+from ..tetflora_addon.blender.attributes import world_matrix
+from ..tetflora_addon.blender.placing.first_forest import build
+from ..tetflora_addon.blender.placing.plant_objects import add_plants, plants_of
+from ..tetflora_addon.blender.placing.populations import add_population, make_plants, remove_population
+from ..tetflora_addon.blender.placing.properties import MOST_EMPTIES, STORAGE_ITEMS
+from ..tetflora_addon.blender.placing.rules import copy_companion
+from ..tetflora_addon.blender.scene.skeletons import FORM_TYPES, read_skeleton, upright_turn
+from ..tetflora_addon.blender.settings import properties_of
+from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, default_species, operator_items
+from ..tetflora_addon.blender.species.edits import catalogue
+from ..tetflora_addon.blender.species.values import present_species
+from ..tetflora_addon.errors import SceneError, TetFloraError
+from ..tetflora_addon.planting.places import Placement, new_seeds
+from ..tetflora_addon.planting.rules import Rules
+from .base import Reporting, counted, in_object_mode, select_only, selected_plants
+from .populations import ground_selected, report_made, selected_grounds
+
+
+class TETFLORA_OT_add_plant(Reporting, bpy.types.Operator):
+    """Add an empty that stands for a plant at the 3D cursor."""
+
+    bl_idname = "tetflora.add_plant"
+    bl_label = "Add Plant"
+    bl_description = (
+        "Add a plant at the 3D cursor. It is stored as an empty with a species and seed; Refine or rendering creates "
+        "its branches and leaves"
+    )
+    bl_options = {'REGISTER', 'UNDO'}
+
+    species: EnumProperty(name="Species", description="Species from the catalog", items=operator_items)
+    seed: IntProperty(
+        name="Seed",
+        description="Individual of the species; random for each plant if not set",
+        options={'SKIP_SAVE'},
+    )
+    location: FloatVectorProperty(
+        name="Location",
+        description="Base of the trunk in world space; the 3D cursor if not set",
+        subtype='TRANSLATION',
+        unit='LENGTH',
+        options={'SKIP_SAVE'},
+    )
+    azimuth: FloatProperty(
+        name="Azimuth", description="Rotation around the vertical axis", subtype='ANGLE', options={'SKIP_SAVE'}
+    )
+    scale: FloatProperty(
+        name="Scale",
+        description="Scale of the plant; 1 is the size in the species file",
+        default=1.0,
+        min=0.01,
+        soft_max=4.0,
+        options={'SKIP_SAVE'},
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return in_object_mode(cls, context)
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        properties = self.properties
+        if not properties.is_property_set("location"):
+            self.location = context.scene.cursor.location
+        if not properties.is_property_set("seed"):
+            # The n-th plant of a scene: another one each time, but the same when the script runs again.
+            self.seed = int(new_seeds(np.array([len(plants_of(context.scene.objects))]))[0])
+        species = default_species() if self.species in {"", NO_SPECIES} else self.species
+        placement = Placement(
+            position=np.array([self.location]),
+            azimuth=np.array([self.azimuth]),
+            scale=np.array([self.scale]),
+            species=np.zeros(1, np.int32),
+            seed=np.array([self.seed]),
+            wanted=1,
+        )
+        select_only(context, add_plants(context.scene, placement, [species]))
+        return {'FINISHED'}
+
+
+class TETFLORA_OT_use_as_form(Reporting, bpy.types.Operator):
+    """Make the active curve or mesh of edges the form of the selected plants, or of a new one in its place."""
+
+    bl_idname = "tetflora.use_as_form"
+    bl_label = "Make Plant from Form"
+    bl_description = (
+        "Use the active curve, hair curves or mesh of edges as trunk and limbs of the selected plants or, if none is "
+        "selected, of a new plant in its place; the species grows the rest. The form is no longer rendered"
+    )
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not in_object_mode(cls, context):
+            return False
+        if context.active_object is not None and context.active_object.type in FORM_TYPES:
+            return True
+        cls.poll_message_set("The active object must be a curve, hair curves or a mesh of edges; select it last")
+        return False
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        form, depsgraph = context.active_object, context.evaluated_depsgraph_get()
+        skeleton = read_skeleton(form, depsgraph)  # refuses what cannot be one before anything changes
+        plants = selected_plants(context)
+        if not plants:
+            plants = add_plants(context.scene, _in_place_of(form, context.scene, depsgraph), [_species(context.scene)])
+        height = float(skeleton.points[:, 2].max())
+        for plant in plants:
+            plant.tetflora.form = form
+            if plant.type == 'EMPTY' and height > 0.0:
+                plant.empty_display_size = height  # the arrow was as tall as the species grows by itself
+        form.hide_render = True
+        select_only(context, plants)
+        made = f"{counted(len(skeleton.points), 'point')} drawn"
+        self.report({'INFO'}, f'"{form.name}" is now the form of {counted(len(plants), "plant")}: {made}')
+        return {'FINISHED'}
+
+
+def _in_place_of(form: bpy.types.Object, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Placement:
+    matrix = world_matrix(form, depsgraph)
+    return Placement(
+        position=matrix[None, :3, 3],
+        azimuth=np.array([upright_turn(matrix)]),
+        scale=np.ones(1),
+        species=np.zeros(1, np.int32),
+        seed=new_seeds(np.array([len(plants_of(scene.objects))])),
+        wanted=1,
+    )
+
+
+def _species(scene: bpy.types.Scene) -> str:
+    """The species that the editor shows."""
+    present = present_species(scene.tetflora.species_editor)
+    return present if present in catalogue() else default_species()
+
+
+class TETFLORA_OT_first_forest(Reporting, bpy.types.Operator):
+    """Make a small complete forest."""
+
+    bl_idname = "tetflora.first_forest"
+    bl_label = "First Forest"
+    bl_description = (
+        "Create a small complete scene with ground, about ninety plants of four species, camera, sun and sky, ready "
+        "for Refine and F12. Existing objects remain: if the scene is not empty, a new scene is added"
+    )
+    bl_options = {'REGISTER', 'UNDO'}
+
+    seed: IntProperty(name="Seed", description="A different seed gives a different forest", options={'SKIP_SAVE'})
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return in_object_mode(cls, context)
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        scene, said = build(context, self.seed)
+        _activate_ground(scene)
+        plants = sum(o.tetflora.is_plant for o in scene.objects)
+        screen = context.screen
+        for area in screen.areas if screen and not bpy.app.background else ():
+            if area.type == 'VIEW_3D':
+                area.spaces.active.region_3d.view_perspective = 'CAMERA'
+        said = f" ({said})" if said else ""
+        self.report(
+            {'INFO'}, f"Created a forest of {plants} plants{said}. Click Refine to show it, press F12 to render it"
+        )
+        return {'FINISHED'}
+
+
+def _activate_ground(scene: bpy.types.Scene) -> None:
+    """Select the ground, so that Populate and the brush go on from there, and not the startup's hidden cube."""
+    layer = scene.view_layers[0]
+    layer.update()  # what was just linked is not in it before
+    ground = next((obj for obj in layer.objects if obj.tetflora.is_occluder), None)
+    if ground is not None:
+        for obj in layer.objects.selected:
+            obj.select_set(False, view_layer=layer)
+        ground.select_set(True, view_layer=layer)
+        layer.objects.active = ground
+
+
+# Of what is not given, the panel's settings are taken: defaults do not matter here.
+_RULES = properties_of(Rules, options={'SKIP_SAVE'})
+# Names that the operator shares with the scene's settings for populating.
+_SHARED = ("count", "as_field", "seed", "slope_limit", "min_distance", "scale_min", "scale_max")
+
+
+class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
+    """Scatter plants over the selected meshes."""
+
+    bl_idname = "tetflora.populate"
+    bl_label = "Populate"
+    bl_description = (
+        "Scatter plants over the selected meshes as a new population, which can be changed later. Each plant is an "
+        "empty, or a vertex of one mesh if there are many"
+    )
+    bl_options = {'REGISTER', 'UNDO'}
+
+    count: _RULES.count
+    as_field: EnumProperty(
+        name="Create As",
+        description="What the plants are created as",
+        items=STORAGE_ITEMS,
+        default='AUTOMATIC',
+        options={'SKIP_SAVE'},
+    )
+    seed: _RULES.seed
+    slope_limit: _RULES.slope_max
+    min_distance: _RULES.min_distance
+    scale_min: _RULES.scale_min
+    scale_max: _RULES.scale_max
+    species: StringProperty(
+        name="Species",
+        description="Comma-separated identifiers of species with optional weights: broadleaf_tree:3, bush:1",
+        options={'SKIP_SAVE'},
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not in_object_mode(cls, context):
+            return False
+        return ground_selected(cls, context)
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        scene = context.scene
+        self._complete_from(scene)
+        shares = _parse_shares(self.species)
+        if self.as_field == 'EMPTIES' and self.count > MOST_EMPTIES:
+            raise SceneError(
+                f"{self.count:,} plants exceed the limit of {MOST_EMPTIES:,} empties; "
+                "set Create As to Field, or use fewer plants"
+            )
+        grounds = selected_grounds(context)
+        population = self._population(scene, grounds, shares)
+        try:
+            made = make_plants(scene, context.evaluated_depsgraph_get(), population)
+        except TetFloraError:
+            remove_population(scene, scene.tetflora.populations_index)
+            raise
+        select_only(context, [*made.objects, *grounds])
+        # The terrain stays selected and active, so that Populate can follow Populate.
+        context.view_layer.objects.active = grounds[0]
+        report_made(self, made)
+        return {'FINISHED'}
+
+    def _population(
+        self, scene: bpy.types.Scene, grounds: list[bpy.types.Object], shares: dict[str, float]
+    ) -> bpy.types.PropertyGroup:
+        """A new population with the settings for new ones, and over them what was given."""
+        population = add_population(scene, grounds)
+        for name in _SHARED:
+            setattr(population, "slope_max" if name == "slope_limit" else name, getattr(self, name))
+        population.by_density = False
+        population.mix.clear()
+        given = {entry.species: entry for entry in scene.tetflora.populate.mix}
+        for identifier, share in shares.items():
+            entry = population.mix.add()
+            entry.species, entry.weight = identifier, share
+            if identifier in given:
+                copy_companion(given[identifier], entry)
+        return population
+
+    def _complete_from(self, scene: bpy.types.Scene) -> None:
+        """Take what was not given from the panel; the redo panel then shows what was really used."""
+        settings = scene.tetflora.populate
+        for name in _SHARED:
+            if not self.properties.is_property_set(name):
+                setattr(self, name, getattr(settings, "slope_max" if name == "slope_limit" else name))
+        if not self.species:
+            mix = [(entry.species, entry.weight) for entry in settings.mix if entry.species]
+            self.species = ", ".join(f"{name}:{share:g}" for name, share in mix) or default_species()
+
+
+def _parse_shares(text: str) -> dict[str, float]:
+    """``oak:3, spruce`` to shares by identifier; a species named twice gets both shares."""
+    known = catalogue()
+    shares: dict[str, float] = {}
+    for part in filter(None, (p.strip() for p in text.split(","))):
+        identifier, _, share = (p.strip() for p in part.partition(":"))
+        if identifier not in known:
+            raise SceneError(f'Unknown species "{identifier}"; choose one of {", ".join(known)}')
+        try:
+            shares[identifier] = shares.get(identifier, 0.0) + (float(share) if share else 1.0)
+        except ValueError:
+            raise SceneError(f'"{part}" is not a species with a weight; write for example {identifier}:2') from None
+    return shares
+
+
+CLASSES = (
+    TETFLORA_OT_add_plant,
+    TETFLORA_OT_use_as_form,
+    TETFLORA_OT_first_forest,
+    TETFLORA_OT_populate,
+)

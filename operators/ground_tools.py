@@ -1,0 +1,258 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What modal tools on the ground have in common: where the mouse points, keys that others keep, undo, leaving.
+
+Set plants one by one by clicking on the ground.
+"""
+
+from __future__ import annotations
+
+from math import radians, tau
+
+import bpy
+import numpy as np
+from bpy.props import EnumProperty
+from bpy_extras import view3d_utils
+
+from ..tetflora_addon.blender.placing.ground import Ground, Hit
+from ..tetflora_addon.blender.placing.plant_objects import add_plants, plants_of
+from ..tetflora_addon.blender.runtime import redraw
+from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, default_species, display_height, operator_items
+from ..tetflora_addon.blender.species.edits import catalogue
+from ..tetflora_addon.blender.viewport.points import GroundCursor, circle
+from ..tetflora_addon.errors import TetFloraError
+from ..tetflora_addon.planting.places import Placement, new_seeds
+from .base import in_object_mode, select_only
+
+# Turning and moving the view, which goes on while a tool runs.
+NAVIGATION = {
+    'MIDDLEMOUSE',
+    'WHEELUPMOUSE',
+    'WHEELDOWNMOUSE',
+    'TRACKPADPAN',
+    'TRACKPADZOOM',
+    'MOUSEROTATE',
+    'MOUSESMARTZOOM',
+    'NDOF_MOTION',
+    *(f'NUMPAD_{n}' for n in (*range(10), 'PERIOD', 'PLUS', 'MINUS')),
+}
+
+
+class GroundTool:
+    """Mix-in for modal operators in a 3D view that point at the ground."""
+
+    _cursor: GroundCursor | None = None
+    _ground: Ground | None = None
+    _window: bpy.types.Window | None = None
+    _steps: int = 0  # undo steps of this run that are done
+    _undone: int = 0
+    _hit: Hit | None = None
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return in_object_mode(cls, context)
+
+    def begin(self, context: bpy.types.Context) -> bool:
+        """Start to listen and to draw; False, with a report, where that is impossible."""
+        if bpy.app.background or context.window is None or _view_of(context.screen) is None:
+            self.report({'ERROR'}, "This tool requires a 3D viewport")
+            return False
+        self._look_around(context)
+        if not len(self._ground):
+            self.report({'ERROR'}, "No mesh is visible to plant on; add a ground mesh, or show it")
+            return False
+        self._cursor, self._window = GroundCursor(), context.window
+        self._steps = self._undone = 0
+        self._cursor.start(context.window)
+        context.window_manager.modal_handler_add(self)
+        context.window.cursor_modal_set('PAINT_CROSS')
+        return True
+
+    def end(self, context: bpy.types.Context) -> None:
+        """Leave nothing behind but what was planted."""
+        if self._cursor is not None:
+            self._cursor.stop()
+            self._cursor = None
+        if self._window is not None:
+            self._window.cursor_modal_restore()
+            self._window = None
+        self._ground = self._hit = None
+        if context.workspace is not None:
+            context.workspace.status_text_set(None)
+        redraw()
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Blender ends the tool."""
+        self.end(context)
+
+    def point(self, context: bpy.types.Context, event: bpy.types.Event) -> bool:
+        """Find the ground under the mouse; False where the mouse is not in a 3D view's picture."""
+        found = _region_at(context.screen, event.mouse_x, event.mouse_y)
+        if found is None:
+            self._hit = None
+            return False
+        region, view = found
+        place = (event.mouse_x - region.x, event.mouse_y - region.y)
+        origin = view3d_utils.region_2d_to_origin_3d(region, view, place)
+        direction = view3d_utils.region_2d_to_vector_3d(region, view, place)
+        self._hit = self._ground.cast(origin, direction)
+        return True
+
+    def pushed(self, context: bpy.types.Context, message: str) -> None:
+        """One undo step is done."""
+        bpy.ops.ed.undo_push(message=message)
+        self._steps, self._undone = self._steps + 1, 0
+        self._look_around(context)
+
+    def undo(self, context: bpy.types.Context, event: bpy.types.Event) -> bool:
+        """Undo and redo within what the tool did; whether the key was for that."""
+        if event.type != 'Z' or event.value != 'PRESS' or not (event.ctrl or event.oskey):
+            return False
+        if event.shift and self._undone:
+            bpy.ops.ed.redo()
+            self._steps, self._undone = self._steps + 1, self._undone - 1
+        elif not event.shift and self._steps:
+            bpy.ops.ed.undo()
+            self._steps, self._undone = self._steps - 1, self._undone + 1
+        self._look_around(bpy.context)  # objects of before are no more
+        redraw()
+        return True
+
+    def _look_around(self, context: bpy.types.Context) -> None:
+        self._ground = Ground(context.view_layer, context.evaluated_depsgraph_get())
+
+
+def _view_of(screen: bpy.types.Screen | None) -> bpy.types.Area | None:
+    return next((area for area in screen.areas if area.type == 'VIEW_3D'), None) if screen else None
+
+
+def _region_at(screen: bpy.types.Screen, x: int, y: int) -> tuple[bpy.types.Region, bpy.types.RegionView3D] | None:
+    """The picture of a 3D view at a place of the window, unless a sidebar, a header or a gizmo lies over it there."""
+    for area in screen.areas:
+        if area.type != 'VIEW_3D' or not _in(area, x, y):
+            continue
+        if any(r.type not in {'WINDOW', 'HUD', 'XR'} and r.height > 1 and _in(r, x, y) for r in area.regions):
+            return None
+        for region in area.regions:
+            if region.type == 'WINDOW' and _in(region, x, y):
+                return region, region.data or area.spaces.active.region_3d
+    return None
+
+
+def _in(part: bpy.types.Area | bpy.types.Region, x: int, y: int) -> bool:
+    return part.x <= x < part.x + part.width and part.y <= y < part.y + part.height
+
+
+_NOTCH = radians(15.0)
+_LARGER = 1.1
+_COLOUR = (0.35, 0.95, 0.3, 1.0)
+_KEYS = (
+    "TetFlora {name}   |   Click: Add Plant   |   Wheel: Rotation {turn:.0f}°   |   Ctrl Wheel: Scale {scale:.2f}   "
+    "|   Ctrl Z: Undo Plant   |   Esc or Right Click: Finish"
+)
+
+
+class TETFLORA_OT_place_plant(GroundTool, bpy.types.Operator):
+    """Click on the ground to set plants."""
+
+    bl_idname = "tetflora.place_plant"
+    bl_label = "Place Plants by Clicking"
+    bl_description = (
+        "Click on the ground to add plants one by one, each a different individual. The wheel rotates, Ctrl and the "
+        "wheel scale; each plant is one undo step; Esc finishes"
+    )
+    bl_options = {'REGISTER'}
+
+    species: EnumProperty(name="Species", description="Species from the catalog", items=operator_items)
+
+    _turn = 0.0
+    _scale = 1.0
+    _height = 1.0
+
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        self.report({'ERROR'}, "This tool requires a 3D viewport; use tetflora.add_plant in scripts")
+        return {'CANCELLED'}
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        try:
+            chosen = default_species() if self.species in {"", NO_SPECIES} else self.species
+        except TetFloraError as error:
+            self.report({'ERROR'}, str(error))
+            return {'CANCELLED'}
+        if not self.begin(context):
+            return {'CANCELLED'}
+        self._chosen, self._turn, self._scale, self._height = chosen, 0.0, 1.0, display_height(chosen)
+        self._changed = False
+        self.point(context, event)
+        self._show(context)
+        return {'RUNNING_MODAL'}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        try:
+            return self._handle(context, event)
+        except BaseException:
+            self.end(context)
+            raise
+
+    def _handle(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if event.type in {'ESC', 'RIGHTMOUSE', 'RET', 'NUMPAD_ENTER'}:
+            if event.value != 'PRESS':
+                return {'RUNNING_MODAL'}
+            self.end(context)
+            return {'FINISHED'} if self._changed else {'CANCELLED'}
+        over = self.point(context, event)
+        handled = over and event.value == 'PRESS' and self._key(context, event)
+        self._show(context)
+        passes = not over or event.type in NAVIGATION or event.type == 'TIMER'
+        return {'PASS_THROUGH'} if passes and not handled else {'RUNNING_MODAL'}
+
+    def _key(self, context: bpy.types.Context, event: bpy.types.Event) -> bool:
+        wheel = {'WHEELUPMOUSE': 1, 'WHEELDOWNMOUSE': -1}.get(event.type, 0)
+        if event.type == 'LEFTMOUSE':
+            if self._hit is not None:
+                self._plant(context)
+        elif wheel and event.ctrl:
+            self._scale = float(np.clip(self._scale * _LARGER**wheel, 0.05, 20.0))
+        elif wheel and not event.shift and not event.alt:
+            self._turn = (self._turn + wheel * _NOTCH) % tau
+        else:
+            return self.undo(context, event)
+        return True
+
+    def _plant(self, context: bpy.types.Context) -> None:
+        # The n-th plant of a scene, as Add > TetFlora Plant has it.
+        seed = new_seeds(np.array([len(plants_of(context.scene.objects))]))
+        placement = Placement(
+            position=np.array([self._hit[0]], dtype=np.float64),
+            azimuth=np.array([self._turn]),
+            scale=np.array([self._scale]),
+            species=np.zeros(1, np.int32),
+            seed=seed,
+            wanted=1,
+        )
+        made = add_plants(context.scene, placement, [self._chosen])
+        context.view_layer.update()
+        select_only(context, made)
+        self._changed = True
+        self.pushed(context, "Place Plant")
+
+    def _show(self, context: bpy.types.Context) -> None:
+        self._cursor.lines = []
+        if self._hit is not None:
+            foot = np.array(self._hit[0], dtype=np.float64)
+            height = self._height * self._scale
+            forward = np.array([np.cos(self._turn), np.sin(self._turn), 0.0])
+            width = max(0.12 * height, 0.15)
+            self._cursor.lines = [
+                (circle(foot, width), _COLOUR),
+                (np.array([foot, foot + [0.0, 0.0, height]]), _COLOUR),
+                (np.array([foot, foot + 1.6 * width * forward]), _COLOUR),
+            ]
+        known = catalogue()
+        name = known[self._chosen].name if self._chosen in known else self._chosen
+        turn = np.degrees(self._turn)
+        context.workspace.status_text_set(_KEYS.format(name=name, turn=turn, scale=self._scale))
+        redraw()
+
+
+CLASSES = (TETFLORA_OT_place_plant,)

@@ -1,0 +1,222 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Change the species of plants.
+
+Re-roll the seeds of plants.
+
+Select plants by species.
+
+Remove plants.
+
+Let plants fall onto the ground.
+"""
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
+
+from ..tetflora_addon.blender.placing.field_edits import assign_field_species, editable, reseed_field
+from ..tetflora_addon.blender.placing.ground import Ground, drop_field, drop_plants
+from ..tetflora_addon.blender.placing.plant_objects import (
+    assign_species,
+    plants_of,
+    remove_fields,
+    remove_plants,
+    reseed,
+)
+from ..tetflora_addon.blender.placing.populations import recount
+from ..tetflora_addon.blender.scene.fields import fields_of, stored_size
+from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, operator_items
+from .base import LINKED, Reporting, counted, in_object_mode, plants_or_fields_selected, selected_plants
+
+
+class TETFLORA_OT_assign_species(Reporting, bpy.types.Operator):
+    """Give the selected plants, and those of selected fields, another species."""
+
+    bl_idname = "tetflora.assign_species"
+    bl_label = "Change Species"
+    bl_description = (
+        "Assign this species to all selected plants and to all plants of selected fields. Seeds, scales and positions "
+        "do not change"
+    )
+    bl_options = {'REGISTER', 'UNDO'}
+
+    species: EnumProperty(name="Species", description="Species from the catalog", items=operator_items)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return plants_or_fields_selected(cls, context)
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        if self.species in {"", NO_SPECIES}:
+            self.report({'ERROR'}, "Choose a species")
+            return {'CANCELLED'}
+        changed = assign_species(selected_plants(context), self.species)
+        for field in fields_of(context.selected_objects):
+            if assign_field_species(field, self.species):
+                changed += stored_size(field)
+        self.report({'INFO'}, f"{counted(changed, 'plant')} changed")
+        return {'FINISHED'}
+
+
+class TETFLORA_OT_reseed(Reporting, bpy.types.Operator):
+    """Make other individuals of the selected plants."""
+
+    bl_idname = "tetflora.reseed"
+    bl_label = "Re-roll Seeds"
+    bl_description = (
+        "Turn each selected plant, and each plant of selected fields, into a different individual of its species. "
+        "Copies with the same seed become different"
+    )
+    bl_options = {'REGISTER', 'UNDO'}
+
+    roll: IntProperty(
+        name="Roll", description="A different number gives different plants", min=0, soft_max=100, options={'SKIP_SAVE'}
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return plants_or_fields_selected(cls, context)
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        number = reseed(selected_plants(context), self.roll)
+        fields = sorted((o for o in fields_of(context.selected_objects) if o.library is None), key=lambda o: o.name)
+        for place, field in enumerate(fields):
+            reseed_field(field, place, self.roll)
+            number += stored_size(field)
+        self.report({'INFO'}, f"{counted(number, 'plant')} re-rolled")
+        return {'FINISHED'}
+
+
+class TETFLORA_OT_select_species(Reporting, bpy.types.Operator):
+    """Select all plants of a species."""
+
+    bl_idname = "tetflora.select_species"
+    bl_label = "Select Species"
+    bl_description = "Select all plants of the same species as the active plant"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    species: StringProperty(
+        name="Species",
+        description="Identifier of the species, which need not be in the catalog; that of the active plant if not set",
+        options={'SKIP_SAVE'},
+    )
+    extend: BoolProperty(name="Extend", description="Extend the current selection", options={'SKIP_SAVE'})
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.mode != 'OBJECT':
+            cls.poll_message_set("Only available in Object Mode")
+            return False
+        return True
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        if not self.species:
+            active = context.active_object
+            if active is None or not active.tetflora.is_plant:
+                self.report({'ERROR'}, "The active object must be a plant; select one")
+                return {'CANCELLED'}
+            self.species = active.tetflora.species
+        found = [o for o in plants_of(context.view_layer.objects) if o.tetflora.species == self.species]
+        if not self.extend:
+            for obj in context.selected_objects:
+                obj.select_set(False)
+        for obj in found:
+            obj.select_set(True)
+        self.report({'INFO'}, f'{counted(len(found), "plant")} of species "{self.species}" selected')
+        return {'FINISHED'}
+
+
+class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
+    """Delete plants from the scene."""
+
+    bl_idname = "tetflora.remove_plants"
+    bl_label = "Remove Plants"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    which: EnumProperty(
+        name="Which",
+        description="Plants to remove",
+        items=(
+            ('SELECTED', "Selected", "Delete the selected plants; other selected objects stay"),
+            ('SPECIES', "Species", "Delete all plants of one species in the scene"),
+            ('ALL', "All", "Delete all plants in the scene"),
+        ),
+        default='SELECTED',
+    )
+    species: StringProperty(name="Species", description="Identifier of the species to remove", options={'SKIP_SAVE'})
+
+    @classmethod
+    def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+        return properties.bl_rna.properties["which"].enum_items[properties.which].description
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return in_object_mode(cls, context)
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        objects = context.selected_objects if self.which == 'SELECTED' else context.scene.objects
+        plants = [o for o in plants_of(objects) if self.which != 'SPECIES' or o.tetflora.species == self.species]
+        fields = [] if self.which == 'SPECIES' else fields_of(objects)
+        local = [o for o in (*plants, *fields) if o.library is None]
+        if (plants or fields) and not local:
+            self.report({'WARNING'}, f"{LINKED}; nothing removed")
+            return {'CANCELLED'}
+        if not local:
+            none = {
+                'SELECTED': "Select plants first",
+                'SPECIES': f'The scene has no plants of species "{self.species}"',
+                'ALL': "The scene has no plants",
+            }
+            self.report({'WARNING'}, f"{none[self.which]}; nothing removed")
+            return {'CANCELLED'}
+        number = remove_plants(plants) + remove_fields(fields)
+        recount(context.scene)
+        self.report({'INFO'}, f"{counted(number, 'plant')} removed")
+        return {'FINISHED'}
+
+
+class TETFLORA_OT_drop_to_ground(Reporting, bpy.types.Operator):
+    """Move the selected plants up or down onto the ground."""
+
+    bl_idname = "tetflora.drop_to_ground"
+    bl_label = "Drop Plants to Ground"
+    bl_description = (
+        "Move the selected plants, and the plants of selected fields, vertically to the nearest visible mesh. Plants, "
+        "results and refined meshes do not count as ground"
+    )
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return in_object_mode(cls, context) and plants_or_fields_selected(cls, context)
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        context.view_layer.update()
+        depsgraph = context.evaluated_depsgraph_get()
+        ground = Ground(context.view_layer, depsgraph)
+        if not len(ground):
+            self.report({'ERROR'}, "No mesh is visible below or above the plants; add a ground mesh, or show it")
+            return {'CANCELLED'}
+        plants = selected_plants(context)
+        fields = fields_of(context.selected_objects)
+        moved, missed = drop_plants(plants, ground)
+        for field in fields:
+            if editable(field):
+                more, none = drop_field(field, ground)
+                moved, missed = moved + more, missed + none
+        left = [field.name for field in fields if not editable(field)]
+        notes = [f"{counted(missed, 'plant')} had no ground below or above"] if missed else []
+        if left:
+            notes.append(f'"{left[0]}" was not moved: it has modifiers, or was not created by TetFlora')
+        said = f"{counted(moved, 'plant')} moved to the ground"
+        self.report({'WARNING' if notes else 'INFO'}, "; ".join([said, *notes]))
+        return {'FINISHED'} if moved else {'CANCELLED'}
+
+
+CLASSES = (
+    TETFLORA_OT_assign_species,
+    TETFLORA_OT_reseed,
+    TETFLORA_OT_select_species,
+    TETFLORA_OT_remove_plants,
+    TETFLORA_OT_drop_to_ground,
+)

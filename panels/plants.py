@@ -1,0 +1,96 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The tab's first panels: species and seed of the active plant, and what can be done to selected ones."""
+
+import bpy
+
+from ..operators.add import TETFLORA_OT_use_as_form
+from ..operators.marks import TETFLORA_OT_make_field, TETFLORA_OT_mark_field, TETFLORA_OT_split_field
+from ..operators.plants import TETFLORA_OT_remove_plants, TETFLORA_OT_reseed, TETFLORA_OT_select_species
+from ..operators.refine import TETFLORA_OT_make_plant_mesh
+from ..tetflora_addon.blender.scene.fields import FIELD_TYPES, stored_size
+from ..tetflora_addon.blender.scene.objects import has_nodes
+from ..tetflora_addon.blender.scene.skeletons import FORM_TYPES
+from ..tetflora_addon.blender.species.edits import catalogue
+from .base import SidebarPanel, TETFLORA_UL_field_species, draw_list, split_layout
+from .menus import TETFLORA_MT_add_plant, TETFLORA_MT_species
+
+
+class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
+    """Plants."""
+
+    bl_label = "Plants"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = split_layout(self)
+        active = context.active_object
+        column = layout.column()
+        if active is not None and active.tetflora.is_plant:
+            plant = active.tetflora
+            column.prop(plant, "species_choice")
+            if plant.species not in catalogue():
+                column.label(text=f'"{plant.species}" is not in the catalog', icon='ERROR')
+            column.prop(plant, "seed")
+            column.prop(plant, "enabled")
+            column.prop(plant, "form")
+        elif active is not None and active.tetflora.is_field:
+            _draw_field(column, active)
+        else:
+            column.label(text="The active object is not a plant", icon='INFO')
+        layout.menu(TETFLORA_MT_add_plant.__name__, text="Add Plant", icon='ADD')
+        if active is None or active.tetflora.is_plant:
+            return
+        # A mesh with faces is ground or something else, as a rule; the Object menu offers these for it too.
+        faces = active.type == 'MESH' and len(active.data.polygons) > 0
+        if active.type in FORM_TYPES and not faces:
+            layout.operator(TETFLORA_OT_use_as_form.bl_idname, icon='CURVE_DATA')
+        field = active.tetflora.is_field
+        if active.type in FIELD_TYPES and (field or not faces or has_nodes(active)):
+            layout.operator(
+                TETFLORA_OT_mark_field.bl_idname,
+                text="Field of Plants" if field else "Use as Field of Plants",
+                icon='CHECKMARK' if field else 'POINTCLOUD_DATA',
+                depress=field,
+            )
+
+
+def _draw_field(column: bpy.types.UILayout, obj: bpy.types.Object) -> None:
+    field, kinds = obj.tetflora, obj.tetflora.field_species
+    # What nodes make of the points is not counted: a panel is drawn at every movement of the mouse.
+    more = " before modifiers" if has_nodes(obj) else ""
+    column.label(text=f"Field of {stored_size(obj):,} points{more}", icon='POINTCLOUD_DATA')
+    draw_list(column, TETFLORA_UL_field_species, field, ("field_species", "field_species_index"), 'FIELD')
+    if not kinds:
+        column.prop(field, "species_choice")
+    elif 0 <= field.field_species_index < len(kinds):
+        column.prop(kinds[field.field_species_index], "form")
+    for species in {entry.species for entry in kinds} or {field.species}:
+        if species not in catalogue():
+            column.label(text=f'"{species}" is not in the catalog', icon='ERROR')
+    column.prop(field, "seed")
+    column.prop(field, "enabled")
+
+
+class TETFLORA_PT_selected_plants(SidebarPanel, bpy.types.Panel):
+    """What can be done to many plants at once; closed at first, so that the panels below stay in sight."""
+
+    bl_label = "Selected Plants"
+    bl_parent_id = "TETFLORA_PT_plants"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        column = self.layout.column(align=True)
+        column.menu(TETFLORA_MT_species.__name__, text="Change Species", icon='OUTLINER_OB_EMPTY')
+        column.operator(TETFLORA_OT_reseed.bl_idname, icon='FILE_REFRESH')
+        column.operator(
+            TETFLORA_OT_select_species.bl_idname, text="Select All of This Species", icon='RESTRICT_SELECT_OFF'
+        )
+        column.operator(TETFLORA_OT_make_plant_mesh.bl_idname, text="Convert to Meshes", icon='OUTLINER_OB_MESH')
+        column.operator(TETFLORA_OT_make_field.bl_idname, icon='POINTCLOUD_DATA')
+        column.operator(TETFLORA_OT_split_field.bl_idname, icon='OUTLINER_OB_EMPTY')
+        column = self.layout.column(align=True)
+        column.operator(TETFLORA_OT_remove_plants.bl_idname, text="Remove Selected", icon='X').which = 'SELECTED'
+        column.operator(TETFLORA_OT_remove_plants.bl_idname, text="Remove All Plants", icon='TRASH').which = 'ALL'
+
+
+CLASSES = (TETFLORA_PT_plants, TETFLORA_PT_selected_plants)

@@ -1,0 +1,288 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Populate: populations of plants, the rules for placing them, and occluders.
+
+Paint Plants: the brush's settings, and the buttons that take it up.
+"""
+
+import bpy
+
+from ..operators.add import TETFLORA_OT_populate
+from ..operators.brush import TETFLORA_OT_paint_plants
+from ..operators.marks import TETFLORA_OT_mark_occluder
+from ..operators.populations import (
+    TETFLORA_OT_add_population,
+    TETFLORA_OT_export_populations,
+    TETFLORA_OT_forget_erased,
+    TETFLORA_OT_freeze_population,
+    TETFLORA_OT_import_populations,
+    TETFLORA_OT_preview_population,
+    TETFLORA_OT_remove_population,
+    TETFLORA_OT_reroll_population,
+    TETFLORA_OT_select_population,
+    TETFLORA_OT_set_population_ground,
+    TETFLORA_OT_update_population,
+)
+from ..tetflora_addon.blender.placing.properties import MODES
+from ..tetflora_addon.blender.placing.rules import awaits_update, is_outdated, shown_population
+from ..tetflora_addon.blender.species.edits import catalogue
+from ..tetflora_addon.blender.viewport import points
+from .base import SidebarPanel, TETFLORA_UL_mix, draw_list, draw_message, split_layout
+
+
+class TETFLORA_UL_populations(bpy.types.UIList):
+    """A population's name, how many plants it has, and whether it is frozen or an update would change it."""
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, _index, _flag) -> None:
+        row = layout.row(align=True)
+        row.prop(item, "name", text="", emboss=False, icon='OUTLINER_OB_POINTCLOUD')
+        right = row.row()
+        right.alignment = 'RIGHT'
+        icon = 'FREEZE' if item.frozen else 'FILE_REFRESH' if is_outdated(item) else 'NONE'
+        right.label(text=f"{item.made:,}", icon=icon)
+
+
+class TETFLORA_MT_populations(bpy.types.Menu):
+    """Rarer things to do with populations."""
+
+    bl_label = "Populations"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.operator(TETFLORA_OT_select_population.bl_idname, icon='RESTRICT_SELECT_OFF')
+        layout.operator(
+            TETFLORA_OT_remove_population.bl_idname, text="Remove but Keep Plants", icon='REMOVE'
+        ).keep_plants = True
+        layout.operator(TETFLORA_OT_forget_erased.bl_idname, icon='LOOP_BACK')
+        layout.separator()
+        layout.operator(TETFLORA_OT_import_populations.bl_idname, text="Import...", icon='IMPORT')
+        layout.operator(TETFLORA_OT_export_populations.bl_idname, text="Export...", icon='EXPORT')
+
+
+class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
+    """Populate."""
+
+    bl_label = "Populate"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = split_layout(self)
+        group, settings = context.scene.tetflora, shown_population(context.scene)
+        _draw_populations(layout, group)
+        if settings.uid:
+            row = layout.row(align=True)
+            row.operator(TETFLORA_OT_update_population.bl_idname, text="Update", icon='FILE_REFRESH')
+            row.operator(TETFLORA_OT_reroll_population.bl_idname, text="Re-roll", icon='MOD_NOISE')
+            row.operator(TETFLORA_OT_freeze_population.bl_idname, text="Freeze", icon='FREEZE', depress=settings.frozen)
+        else:
+            layout.operator(
+                TETFLORA_OT_populate.bl_idname, text="Populate Selected Meshes", icon='OUTLINER_OB_POINTCLOUD'
+            )
+        _draw_status(context, layout, settings)
+        column = layout.column()
+        column.active = not settings.frozen
+        if settings.uid:
+            _draw_grounds(column, settings)
+        row = column.row(heading="Amount")
+        row.prop(settings, "by_density")
+        if settings.by_density:
+            column.prop(settings, "density", text="Per Hectare")  # the whole name is wider than labels are
+        else:
+            column.prop(settings, "count")
+        column.prop(settings, "as_field")
+        column.prop(settings, "seed")
+        active = context.active_object
+        marked = active is not None and active.tetflora.is_occluder
+        layout.operator(
+            TETFLORA_OT_mark_occluder.bl_idname,
+            text="Occluder" if marked else "Mark as Occluder",
+            icon='CHECKMARK' if marked else 'MOD_MASK',
+            depress=marked,
+        )
+
+
+class _PartOfPopulate(SidebarPanel):
+    """Mix-in for panels within Populate, closed at first."""
+
+    bl_parent_id = "TETFLORA_PT_populate"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = split_layout(self)
+        settings = shown_population(context.scene)
+        layout.active = not settings.frozen
+        self.draw_settings(layout, settings)
+
+
+class TETFLORA_PT_populate_species(_PartOfPopulate, bpy.types.Panel):
+    """Which species, and how they stand to each other."""
+
+    bl_label = "Species"
+    bl_options = set()  # open: what to plant is the first question
+
+    def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+        draw_list(layout, TETFLORA_UL_mix, settings, ("mix", "mix_index"), 'MIX')
+        if not settings.mix:
+            first = next(iter(catalogue().values()), None)
+            layout.label(text=f"Default: {first.name}" if first else "The catalog has no species", icon='INFO')
+        elif 0 <= settings.mix_index < len(settings.mix):
+            entry = settings.mix[settings.mix_index]
+            layout.prop(entry, "companion_choice")
+            if entry.companion:
+                column = layout.column(align=True)
+                column.prop(entry, "companion_strength")
+                column.prop(entry, "companion_distance")
+
+
+class TETFLORA_PT_populate_where(_PartOfPopulate, bpy.types.Panel):
+    """On which ground."""
+
+    bl_label = "Placement"
+
+    def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+        column = layout.column(align=True)
+        column.prop(settings, "slope_min")
+        column.prop(settings, "slope_max", text="Max")
+        column = layout.column(align=True)
+        column.prop(settings, "aspect")
+        column.prop(settings, "aspect_spread", text="Spread")
+        layout.prop(settings, "use_altitude")
+        if settings.use_altitude:
+            column = layout.column(align=True)
+            column.prop(settings, "altitude_min", text="Min")
+            column.prop(settings, "altitude_max", text="Max")
+            column.prop(settings, "altitude_falloff", text="Falloff")
+        layout.prop(settings, "edge_falloff")
+        ground = next((entry.object for entry in settings.grounds if entry.object is not None), None)
+        row = layout.row(align=True)
+        if ground is not None:
+            row.prop_search(settings, "vertex_group", ground, "vertex_groups")
+        else:
+            row.prop(settings, "vertex_group")
+        row.prop(settings, "invert_group", text="", icon='ARROW_LEFTRIGHT')
+        row = layout.row(align=True)
+        row.prop(settings, "image")
+        row.prop(settings, "invert_image", text="", icon='ARROW_LEFTRIGHT')
+        if settings.image is not None:
+            if ground is not None and ground.type == 'MESH':
+                layout.prop_search(settings, "uv_layer", ground.data, "uv_layers")
+            else:
+                layout.prop(settings, "uv_layer")
+        layout.prop(settings, "areas")
+        layout.prop(settings, "paths")
+        if settings.paths is not None:
+            layout.prop(settings, "path_distance")
+
+
+class TETFLORA_PT_populate_arrangement(_PartOfPopulate, bpy.types.Panel):
+    """How far from each other."""
+
+    bl_label = "Spacing"
+
+    def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+        layout.prop(settings, "min_distance")
+        layout.prop(settings, "clumping")
+        if settings.clumping:
+            layout.prop(settings, "clump_size")
+
+
+class TETFLORA_PT_populate_size(_PartOfPopulate, bpy.types.Panel):
+    """How large, and how upright."""
+
+    bl_label = "Size"
+
+    def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+        column = layout.column(align=True)
+        column.prop(settings, "scale_min")
+        column.prop(settings, "scale_max")
+        layout.prop(settings, "scale_at_top")
+        layout.prop(settings, "tilt")
+
+
+def _draw_populations(layout: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
+    row = layout.row()
+    row.template_list(
+        TETFLORA_UL_populations.__name__,
+        "",
+        group,
+        "populations",
+        group,
+        "populations_index",
+        rows=3 if group.populations else 1,
+    )
+    column = row.column(align=True)
+    column.operator(TETFLORA_OT_add_population.bl_idname, text="", icon='ADD')
+    if group.populations:
+        column.operator(TETFLORA_OT_remove_population.bl_idname, text="", icon='REMOVE')
+    column.menu(TETFLORA_MT_populations.__name__, text="", icon='DOWNARROW_HLT')
+
+
+def _draw_status(context: bpy.types.Context, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    """How many plants as what, and why not more; the switch of the preview."""
+    shown = points.shown_in(context.scene)
+    row = layout.row(align=True)
+    waiting = awaits_update(settings)
+    # In the place of the other text: a line that comes and goes would move the slider away from under the mouse.
+    text = points.status(settings)
+    row.label(text=f"Update: {text}" if waiting else text, icon='FILE_REFRESH' if waiting else 'INFO')
+    row.operator(
+        TETFLORA_OT_preview_population.bl_idname, text="", icon='HIDE_OFF' if shown else 'HIDE_ON', depress=shown
+    )
+    for text in points.complaints(settings):
+        draw_message(context, layout, text)
+
+
+def _draw_grounds(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    names = [entry.object.name for entry in settings.grounds[:3] if entry.object is not None]
+    more = len(settings.grounds) - 3
+    row = layout.split(factor=0.4)
+    left = row.row()
+    left.alignment = 'RIGHT'
+    left.label(text="Ground")
+    row.label(text=", ".join(names) + (f" and {more:,} more" if more > 0 else "") or "None")
+    layout.operator(TETFLORA_OT_set_population_ground.bl_idname, icon='MESH_GRID')
+    layout.prop(settings, "ground_collection", text="Collection")
+
+
+class TETFLORA_PT_brush(SidebarPanel, bpy.types.Panel):
+    """Paint plants."""
+
+    bl_label = "Paint Plants"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = split_layout(self)
+        settings = context.scene.tetflora.brush
+        row = layout.row(align=True)
+        row.scale_y = 1.4
+        for mode, name, _, icon, _ in MODES:
+            button = row.operator(
+                TETFLORA_OT_paint_plants.bl_idname, text=name, icon=icon, depress=settings.mode == mode
+            )
+            button.mode = mode
+        column = layout.column(align=True)
+        column.prop(settings, "radius")
+        column.prop(settings, "density")
+        column.prop(settings, "strength", slider=True)
+        column.prop(settings, "min_distance")
+        column = layout.column()
+        column.prop(settings, "source")
+        if settings.source == 'ONE':
+            column.prop(settings, "species_choice", text=" ")
+        column = layout.column(align=True)
+        column.prop(settings, "scale_min")
+        column.prop(settings, "scale_max")
+        column = layout.column()
+        column.prop(settings, "store")
+        column.prop(settings, "seed")
+
+
+CLASSES = (
+    TETFLORA_UL_populations,
+    TETFLORA_MT_populations,
+    TETFLORA_PT_populate,
+    TETFLORA_PT_populate_species,
+    TETFLORA_PT_populate_where,
+    TETFLORA_PT_populate_arrangement,
+    TETFLORA_PT_populate_size,
+    TETFLORA_PT_brush,
+)

@@ -1,0 +1,130 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The page in Preferences > Add-ons > TetFlora.
+
+Keys: few, free in Blender's own keymaps, changed in Preferences > Keymap or > Add-ons > TetFlora.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+import bpy
+
+from ..operators.refine import TETFLORA_OT_clear_cache, TETFLORA_OT_refine
+from ..tetflora_addon import storage
+from ..tetflora_addon.blender.preferences import CACHE_VARIABLE, TetFloraPreferences, species_folders
+
+KEYMAP = "Object Mode"
+PIE = "TETFLORA_MT_pie"
+
+
+@dataclass(frozen=True)
+class Shortcut:
+    """A key of ours.
+
+    Attributes
+    ----------
+    operator : str
+    key : str
+    ctrl, alt, shift : bool
+    menu : str
+        What the operator opens, if it is one that opens menus.
+    """
+
+    operator: str
+    key: str
+    ctrl: bool = False
+    alt: bool = False
+    shift: bool = False
+    menu: str = ""
+
+
+KEYS = (
+    Shortcut("wm.call_menu_pie", 'F', alt=True, shift=True, menu=PIE),
+    Shortcut(TETFLORA_OT_refine.bl_idname, 'F', ctrl=True, alt=True, shift=True),
+)
+
+_made: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []
+
+
+def items() -> list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]]:
+    """Our keys as the user has them now, each with its keymap; empty where Blender has no keymaps."""
+    user = bpy.context.window_manager.keyconfigs.user
+    keymap = user.keymaps.get(KEYMAP) if user is not None else None
+    if keymap is None:
+        return []
+    wanted = {(key.operator, key.menu) for key in KEYS}
+    return [
+        (keymap, item) for item in keymap.keymap_items if (item.idname, getattr(item.properties, "name", "")) in wanted
+    ]
+
+
+def add_keys() -> None:
+    """Add the keys, where there is a configuration for add-ons (not in every background Blender)."""
+    config = bpy.context.window_manager.keyconfigs.addon
+    if config is None:
+        return
+    keymap = config.keymaps.new(name=KEYMAP, space_type='EMPTY')
+    for key in KEYS:
+        item = keymap.keymap_items.new(
+            key.operator, key.key, 'PRESS', ctrl=int(key.ctrl), alt=int(key.alt), shift=int(key.shift)
+        )
+        if key.menu:
+            item.properties.name = key.menu
+        _made.append((keymap, item))
+
+
+def remove_keys() -> None:
+    """Take the keys back."""
+    for keymap, item in reversed(_made):
+        keymap.keymap_items.remove(item)
+    _made.clear()
+
+
+def _draw(self: TetFloraPreferences, context: bpy.types.Context) -> None:
+    layout = self.layout
+    layout.use_property_split = True
+    layout.prop(self, "species_folder")
+    if self.species_folder and not species_folders():
+        layout.label(text="This folder does not exist", icon='ERROR')
+    layout.prop(self, "new_quality")
+    layout.prop(self, "new_memory")
+    _draw_cache(layout.column(), self)
+    _draw_keys(layout.column(), context)
+
+
+def _draw_cache(column: bpy.types.UILayout, own: TetFloraPreferences) -> None:
+    if CACHE_VARIABLE in os.environ:
+        column.label(text=f"{CACHE_VARIABLE} is set: {os.environ[CACHE_VARIABLE]}", icon='INFO')
+    column.prop(own, "use_cache")
+    row = column.row()
+    row.active = own.use_cache
+    row.prop(own, "cache_folder")
+    column.operator(TETFLORA_OT_clear_cache.bl_idname)
+    if storage.trouble():
+        column.label(text=storage.trouble(), icon='ERROR')
+
+
+def _draw_keys(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Our keys as in Preferences > Keymap, to be changed here."""
+    import rna_keymap_ui  # Blender's own; only there while its interface is
+
+    column.label(text=f"Keys in {KEYMAP}")
+    config = context.window_manager.keyconfigs.user
+    for keymap, item in items():
+        column.context_pointer_set("keymap", keymap)
+        rna_keymap_ui.draw_kmi([], config, keymap, item, column, 0)
+
+
+def register() -> None:
+    """Draw the page, whose class below the operators only stores the settings, and add the keys."""
+    TetFloraPreferences.draw = _draw
+    add_keys()
+
+
+def unregister() -> None:
+    """Remove the keys, and draw the page no longer."""
+    remove_keys()
+    del TetFloraPreferences.draw

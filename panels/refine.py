@@ -1,0 +1,203 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Refine: the buttons, what the last run made, and the settings that matter most.
+
+Sub-panels of Refine: proxies, visibility, limits, animation and leaf objects.
+
+First Forest: at the top of the tab while the scene has no plants.
+"""
+
+import bpy
+
+from ..operators.add import TETFLORA_OT_first_forest
+from ..operators.marks import can_be_explicit
+from ..operators.refine import TETFLORA_OT_clear, TETFLORA_OT_refine
+from ..tetflora_addon.blender.job.render import render_errors
+from ..tetflora_addon.blender.placing.first_forest import is_first_forest
+from ..tetflora_addon.blender.results.forms import few_bounces, form_of
+from ..tetflora_addon.blender.results.output import KIND
+from ..tetflora_addon.blender.scene.objects import has_contents
+from ..tetflora_addon.blender.viewport import auto
+from .base import SidebarPanel, TETFLORA_UL_leaf_objects, draw_list, draw_message, split_layout
+from .results import rows_of
+
+
+class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
+    """Refine: always on top, because the tab is longer than most screens are tall."""
+
+    bl_label = "Refine"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, settings = self.layout, context.scene.tetflora
+        row = layout.row(align=True)
+        row.scale_y = 1.4
+        row.operator(TETFLORA_OT_refine.bl_idname, icon='MOD_DECIM')
+        row.operator(TETFLORA_OT_clear.bl_idname, icon='TRASH')
+        if settings.auto_refine:  # a line of its own also while nothing is done: what comes and goes moves all below
+            draw_message(context, layout, auto.message() or "Refine Automatically is on", 'SORTTIME')
+        for error in render_errors()[-1:]:
+            draw_message(context, layout, error)
+        if context.scene.camera is None:
+            draw_message(context, layout, "The scene has no camera; add one, and make it active with Ctrl Numpad 0")
+        elif text := hint(context.scene):
+            draw_message(context, layout, text, 'INFO')
+        elif rows := dict(rows_of(settings.statistics)):
+            draw_message(context, layout, f"{rows['Polygons']} polygons made in {rows['Seconds']} s", 'INFO')
+        layout = split_layout(self)
+        column = layout.column()
+        column.active = not settings.expand_everything
+        for name in ("quality", "cutoff", "shadow_cutoff", "proxy_form", "baked_light", "max_polygons"):
+            column.prop(settings, name)
+        active = context.active_object
+        if active is not None and (can_be_explicit(active) or active.tetflora.is_explicit):
+            layout.prop(active.tetflora, "is_explicit")
+        layout.prop(settings, "refine_at_render")
+        layout.prop(settings, "auto_refine")
+
+
+def hint(scene: bpy.types.Scene) -> str:
+    """Text for a scene with plants of which nothing is refined; otherwise empty. Cheap as a rule."""
+    settings = scene.tetflora
+    if settings.statistics:
+        return ""
+    if settings.refine_at_render:
+        return "Click Refine, then press F12 to render" if is_first_forest(scene) and has_contents(scene) else ""
+    # Of results that were kept as meshes, the first of a collection tells: a panel cannot look through all objects.
+    first = (next(iter(collection.objects), None) for collection in scene.collection.children_recursive)
+    kept = any(obj is not None and KIND in obj for obj in first)
+    return "" if kept or not has_contents(scene) else "Nothing is refined, so renders show no plants"
+
+
+class _PartOfRefine(SidebarPanel):
+    """Mix-in for sub-panels of Refine, closed at first."""
+
+    bl_parent_id = "TETFLORA_PT_refine"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def column(self, context: bpy.types.Context, *names: str) -> bpy.types.UILayout:
+        """A column with settings of the scene, inactive where everything is expanded."""
+        settings = context.scene.tetflora
+        column = split_layout(self).column()
+        column.active = not settings.expand_everything
+        for name in names:
+            column.prop(settings, name)
+        return column
+
+
+class TETFLORA_PT_proxies(_PartOfRefine, bpy.types.Panel):
+    """Proxies."""
+
+    bl_label = "Proxies"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        column = self.column(context, "leaf_limit", "facet")
+        cycles = getattr(context.scene, "cycles", None)
+        if form_of(context.scene).bounces and cycles is not None:
+            column.prop(cycles, "transparent_max_bounces", text="Transparent")
+            if few_bounces(context.scene):
+                column.label(text="Too few: Cycles renders proxies black", icon='ERROR')
+
+
+class TETFLORA_PT_proxy_shading(_PartOfRefine, bpy.types.Panel):
+    """Proxy shading."""
+
+    bl_label = "Proxy Shading"
+    bl_parent_id = "TETFLORA_PT_proxies"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return bool(form_of(context.scene).sockets)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        settings = context.scene.tetflora
+        column = split_layout(self).column()
+        column.active = not settings.expand_everything and settings.baked_light == 'OFF'
+        for name in form_of(context.scene).sockets.values():
+            column.prop(settings, name)
+
+
+class TETFLORA_PT_visibility(_PartOfRefine, bpy.types.Panel):
+    """Visibility."""
+
+    bl_label = "Visibility"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.column(context, "visibility_resolution", "hidden", "block", "few_polygons")
+
+
+class TETFLORA_PT_limits(_PartOfRefine, bpy.types.Panel):
+    """Limits."""
+
+    bl_label = "Limits"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.column(context, "max_memory", "max_tetrahedra", "max_levels", "max_passes")
+        self.layout.prop(context.scene.tetflora, "expand_everything")
+
+
+class TETFLORA_PT_films(_PartOfRefine, bpy.types.Panel):
+    """Animation."""
+
+    bl_label = "Animation"
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        self.layout.prop(context.scene.tetflora, "share_frames", text="")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = split_layout(self)
+        settings = context.scene.tetflora
+        column = layout.column()
+        column.active = settings.share_frames and settings.refine_at_render
+        column.prop(settings, "cell_length")
+        column.prop(settings, "cell_turn")
+        column.prop(settings, "kept_memory")
+        column.prop(context.scene.render, "use_persistent_data")  # Cycles then loads what frames share only once
+        layout.prop(settings, "anchored")
+
+
+class TETFLORA_PT_leaf_objects(_PartOfRefine, bpy.types.Panel):
+    """Leaf objects."""
+
+    bl_label = "Leaf Objects"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        draw_list(
+            self.layout,
+            TETFLORA_UL_leaf_objects,
+            context.scene.tetflora,
+            ("leaf_objects", "leaf_objects_index"),
+            'LEAVES',
+        )
+
+
+_FEW = 200  # objects that are looked through at every movement of the mouse; who has more has begun
+
+
+class TETFLORA_PT_first(SidebarPanel, bpy.types.Panel):
+    """First forest."""
+
+    bl_label = "Get Started"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        scene = context.scene
+        return len(scene.objects) <= _FEW and not has_contents(scene)
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        column = self.layout.column()
+        row = column.row()
+        row.scale_y = 1.6
+        row.operator(TETFLORA_OT_first_forest.bl_idname, icon='WORLD')
+        column.label(text="Then click Refine and press F12")
+
+
+CLASSES = (
+    TETFLORA_PT_refine,
+    TETFLORA_PT_proxies,
+    TETFLORA_PT_proxy_shading,
+    TETFLORA_PT_visibility,
+    TETFLORA_PT_limits,
+    TETFLORA_PT_films,
+    TETFLORA_PT_leaf_objects,
+    TETFLORA_PT_first,
+)

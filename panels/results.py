@@ -1,0 +1,220 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Wind: how strong, where to, and how gusty.
+
+Output: where results live, what sees them, and how they are told apart in compositing.
+
+Preview: levels of refinement and plants in the viewport, without making anything.
+
+Statistics of the last refinement, from the figures that it left in the scene.
+"""
+
+import json
+from functools import lru_cache
+
+import bpy
+
+from ..operators.preview import TETFLORA_OT_forget_levels, TETFLORA_OT_look_through, TETFLORA_OT_preview_levels
+from ..operators.refine import TETFLORA_OT_keep_results
+from ..tetflora_addon.blender.placing.plant_objects import plant_collections
+from ..tetflora_addon.blender.viewport import state
+from .base import SidebarPanel, TETFLORA_UL_output_species, draw_list, draw_message, split_layout
+
+
+class TETFLORA_PT_wind(SidebarPanel, bpy.types.Panel):
+    """Wind."""
+
+    bl_label = "Wind"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        self.layout.prop(context.scene.tetflora.wind, "enabled", text="")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        wind = context.scene.tetflora.wind
+        column = split_layout(self).column()
+        column.active = wind.enabled
+        column.use_property_decorate = True  # they can be animated
+        for name in ("speed", "direction", "gusts", "loop"):
+            column.prop(wind, name)
+
+
+class TETFLORA_PT_output(SidebarPanel, bpy.types.Panel):
+    """Output."""
+
+    bl_label = "Output"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = split_layout(self)
+        output = context.scene.tetflora.output
+        layout.prop(output, "save_results")
+        column = layout.column(heading="Results")  # one below the other: two in a row are cut off
+        column.prop(output, "show_viewport", text="Viewports")
+        column.prop(output, "show_render", text="Renders")
+        for collection in plant_collections(context.scene):
+            column = layout.column(heading=collection.name)
+            column.prop(collection, "hide_viewport", text="Viewports", toggle=False, invert_checkbox=True)
+            column.prop(collection, "hide_render", text="Renders", toggle=False, invert_checkbox=True)
+        layout.operator(TETFLORA_OT_keep_results.bl_idname, icon='MESH_DATA')
+
+
+class TETFLORA_PT_ray_visibility(SidebarPanel, bpy.types.Panel):
+    """Ray visibility."""
+
+    bl_label = "Ray Visibility"
+    bl_parent_id = "TETFLORA_PT_output"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        column = split_layout(self).column()
+        for name in ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow"):
+            column.prop(context.scene.tetflora.output, name)
+
+
+class TETFLORA_PT_passes(SidebarPanel, bpy.types.Panel):
+    """Pass index, light groups and materials, of all and by species."""
+
+    bl_label = "Passes and Materials"
+    bl_parent_id = "TETFLORA_PT_output"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = split_layout(self)
+        output, layer = context.scene.tetflora.output, context.view_layer
+        layout.prop(output, "pass_index")
+        layout.prop_search(output, "light_group", layer, "lightgroups")
+        draw_list(layout, TETFLORA_UL_output_species, output, ("species", "species_index"), 'OUTPUT')
+        if 0 <= output.species_index < len(output.species):
+            entry = output.species[output.species_index]
+            layout.prop(entry, "pass_index")
+            layout.prop_search(entry, "light_group", layer, "lightgroups")
+            for name in ("leaf", "blossom", "bark"):
+                layout.prop(entry, name, text=name.capitalize())  # the field itself says Material
+
+
+class TETFLORA_PT_preview(SidebarPanel, bpy.types.Panel):
+    """Preview."""
+
+    bl_label = "Preview"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = split_layout(self)
+        settings = context.scene.tetflora.preview
+        preview = state.find(context.scene)
+        column = layout.column()
+        column.prop(settings, "plants")
+        if settings.plants != 'NONE':
+            # Blender's own setting of this viewport: thousands of empties cost more than the plants that are drawn.
+            column.prop(context.space_data, "show_object_viewport_empty", text="Empties")
+            if preview is not None and preview.message:
+                draw_message(context, column, preview.message)
+        row = layout.row(align=True)
+        row.operator(TETFLORA_OT_preview_levels.bl_idname, icon='MOD_REMESH')
+        row.operator(TETFLORA_OT_forget_levels.bl_idname, text="", icon='X')
+        layout.prop(settings, "freeze")
+        layout.operator(TETFLORA_OT_look_through.bl_idname, icon='VIEW_CAMERA')
+        if preview is None or preview.levels is None:
+            return
+        column = layout.column()
+        last = preview.levels.levels[-1].number
+        column.prop(settings, "level", text=f"Level of {last}", slider=True)
+        column.prop(settings, "wires")
+        row = column.row()
+        row.active = settings.wires
+        row.prop(settings, "colour")
+        column.prop(settings, "projected")
+        column.column(align=True).prop(settings, "forms")
+        column.prop(settings, "statistics")
+        if state.is_outdated(context.scene):
+            draw_message(context, layout, "The camera has changed; compute the levels again, or freeze the camera")
+
+
+@lru_cache(maxsize=8)
+def rows_of(text: str) -> tuple[tuple[str, str], ...]:
+    """Rows of the table, (name, value), from the stored JSON; none if there is none or it is not ours.
+
+    Cached, because a panel is drawn at every movement of the mouse.
+    """
+    try:
+        figures = json.loads(text)
+        seconds = figures["seconds"]
+        full = figures["polygons_full"]
+        fraction = f"{figures['polygons_meshed'] / full:.1%}" if full else "–"
+        return (
+            ("Plants", f"{figures['plants']:,}"),
+            ("Polygons If Expanded", f"{full:,}"),
+            ("Polygons", f"{figures['polygons_meshed']:,}"),
+            ("    Fraction of All", fraction),
+            ("Proxy Faces", f"{figures['polygons_proxy']:,}"),
+            ("    Pixels per Face", f"{figures.get('facet_pixels', 0.0):.2g}"),
+            ("Tetrahedra", f"{figures['tetrahedra_made']:,}"),
+            ("    Terminal", f"{figures['tetrahedra_terminal']:,}"),
+            ("    Proxies", f"{figures['tetrahedra_proxy']:,}"),
+            ("Seconds", f"{sum(seconds.values()):.2f}"),
+            ("Estimated Memory", f"{figures['memory_mb']:,.0f} MB"),
+        )
+    except (ValueError, KeyError, TypeError, AttributeError):
+        return ()
+
+
+class TETFLORA_PT_statistics(SidebarPanel, bpy.types.Panel):
+    """Statistics."""
+
+    bl_label = "Statistics"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        rows = rows_of(context.scene.tetflora.statistics)
+        if not rows:
+            layout.label(text="Nothing refined yet", icon='INFO')
+            return
+        split = layout.split(factor=0.58)
+        names, values = split.column(align=True), split.column(align=True)
+        values.alignment = 'RIGHT'
+        for name, value in rows:
+            names.label(text=name)
+            values.label(text=value)
+
+
+@lru_cache(maxsize=8)
+def steps_of(text: str) -> tuple[tuple[str, ...], ...]:
+    """Rows of the table of passes: number, tetrahedra, those to split, polygons, seconds; none if there are none."""
+    try:
+        return tuple(
+            (f"{n}", *(f"{s[key]:,}" for key in ("tetrahedra_made", "split", "polygons")), f"{s['seconds']:.1f}")
+            for n, s in enumerate(json.loads(text)["steps"], start=1)
+        )
+    except (ValueError, KeyError, TypeError):
+        return ()
+
+
+class TETFLORA_PT_steps(SidebarPanel, bpy.types.Panel):
+    """Passes."""
+
+    bl_label = "Passes"
+    bl_parent_id = "TETFLORA_PT_statistics"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return bool(steps_of(context.scene.tetflora.statistics))
+
+    def draw(self, context: bpy.types.Context) -> None:
+        grid = self.layout.grid_flow(row_major=True, columns=5, even_columns=False, align=True)
+        for row in (("Pass", "Tetrahedra", "To Split", "Polygons", "s"), *steps_of(context.scene.tetflora.statistics)):
+            for text in row:
+                grid.label(text=text)
+
+
+CLASSES = (
+    TETFLORA_PT_wind,
+    TETFLORA_PT_output,
+    TETFLORA_PT_ray_visibility,
+    TETFLORA_PT_passes,
+    TETFLORA_PT_preview,
+    TETFLORA_PT_statistics,
+    TETFLORA_PT_steps,
+)

@@ -1,0 +1,175 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The species editor: a species, its orders as a list, and a slider for everything that the species file says."""
+
+import bpy
+
+from ..operators.species import (
+    TETFLORA_OT_create_asset_library,
+    TETFLORA_OT_delete_species,
+    TETFLORA_OT_duplicate_species,
+    TETFLORA_OT_edit_orders,
+    TETFLORA_OT_export_species,
+    TETFLORA_OT_load_species,
+    TETFLORA_OT_preview_species,
+    TETFLORA_OT_revert_species,
+    TETFLORA_OT_save_species,
+)
+from ..tetflora_addon.blender.species.catalogue import own_file
+from ..tetflora_addon.blender.species.editor import VARIATION, order_keys
+from ..tetflora_addon.blender.species.edits import find_edit, problem_of
+from ..tetflora_addon.blender.species.values import NO_LEAF, OBJECT_LEAF, orders_of, present_order, present_species
+from ..tetflora_addon.blender.viewport import species
+from ..tetflora_addon.species.species import LEAF_KINDS
+from .base import SidebarPanel, draw_message, split_layout
+
+# Keys of an order that say how its leaves are; the others are about its branches.
+_LEAVES = ("leaf", "leaves")
+
+
+class TETFLORA_MT_species_files(bpy.types.Menu):
+    """Saving, loading, sharing and deleting species."""
+
+    bl_label = "Species Files"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.operator_context = 'INVOKE_DEFAULT'
+        layout.operator(TETFLORA_OT_save_species.bl_idname, icon='FILE_TICK')
+        layout.operator(TETFLORA_OT_load_species.bl_idname, icon='IMPORT')
+        layout.operator(TETFLORA_OT_export_species.bl_idname, icon='EXPORT')
+        layout.separator()
+        layout.operator(TETFLORA_OT_delete_species.bl_idname, icon='TRASH')
+        layout.separator()
+        layout.operator(TETFLORA_OT_create_asset_library.bl_idname, icon='ASSET_MANAGER')
+
+
+class TETFLORA_PT_species(SidebarPanel, bpy.types.Panel):
+    """Species."""
+
+    bl_label = "Species Editor"  # Populate has a panel Species, which chooses them
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = split_layout(self)
+        scene = context.scene
+        editor = scene.tetflora.species_editor
+        identifier = present_species(editor)
+        layout.template_icon_view(editor, "species_choice", show_labels=True, scale=5.0, scale_popup=5.0)
+        row = layout.row(align=True)
+        row.use_property_split = False
+        row.prop(editor, "species_choice", text="")
+        row.operator(TETFLORA_OT_duplicate_species.bl_idname, text="", icon='DUPLICATE')
+        row.operator(TETFLORA_OT_revert_species.bl_idname, text="", icon='LOOP_BACK')
+        row.menu(TETFLORA_MT_species_files.__name__, text="", icon='DOWNARROW_HLT')
+        if find_edit(scene, identifier) is not None:
+            layout.label(text="Edited in this file", icon='GREASEPENCIL')
+        else:
+            layout.label(
+                text="Saved in your species folder" if own_file(identifier) else "Built-in species", icon='LOCKED'
+            )
+        if problem := problem_of(scene, identifier):
+            draw_message(context, layout, problem)
+        shown = species.shown_in(scene)
+        row = layout.row(align=True)
+        row.use_property_split = False
+        row.operator(
+            TETFLORA_OT_preview_species.bl_idname,
+            text="Preview",
+            icon='HIDE_OFF' if shown else 'HIDE_ON',
+            depress=shown,
+        )
+        row.prop(editor, "preview_seed")
+        text, failed = species.message()
+        if shown and text and text != problem:
+            draw_message(context, layout, text, 'ERROR' if failed else 'BLANK1')
+
+
+class _SpeciesPart(SidebarPanel):
+    """Mix-in for the editor's sub-panels."""
+
+    bl_parent_id = "TETFLORA_PT_species"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return bool(orders_of(context.scene.tetflora.species_editor))
+
+
+class TETFLORA_PT_species_whole(_SpeciesPart, bpy.types.Panel):
+    """Name, leaf and what else holds for the whole species."""
+
+    bl_label = "Name, Leaf and Bark"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = split_layout(self)
+        editor = context.scene.tetflora.species_editor
+        column = layout.column()
+        column.prop(editor, "species_name")
+        column.prop(editor, "species_description")
+        for kind in LEAF_KINDS:
+            form = getattr(editor, f"{kind}_form")
+            column.prop(editor, f"{kind}_form")
+            if form == OBJECT_LEAF:
+                column.prop_search(editor, f"{kind}_object", bpy.data, "objects")
+            if form != NO_LEAF:
+                column.prop(editor, f"{kind}_transmission", text="Translucency")
+        column.prop(editor, "bark")
+        column.prop(editor, "quality")
+        column.prop(editor, "exact")
+
+
+class TETFLORA_PT_species_orders(_SpeciesPart, bpy.types.Panel):
+    """The orders as a list, and the branches of the active one."""
+
+    bl_label = "Branches by Order"
+    bl_options = set()
+
+    def draw(self, context: bpy.types.Context) -> None:
+        editor = context.scene.tetflora.species_editor
+        row = self.layout.row()
+        row.column(align=True).prop(editor, "order", expand=True)
+        buttons = row.column(align=True)
+        for action, icon in (('ADD', 'ADD'), ('REMOVE', 'REMOVE'), ('SPUR', 'OUTLINER_OB_FORCE_FIELD')):
+            buttons.operator(TETFLORA_OT_edit_orders.bl_idname, text="", icon=icon).action = action
+        _draw_keys(split_layout(self), editor, leaves=False)
+
+
+class TETFLORA_PT_species_leaves(_SpeciesPart, bpy.types.Panel):
+    """Leaves of the active order."""
+
+    bl_label = "Leaves of This Order"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        _draw_keys(split_layout(self), context.scene.tetflora.species_editor, leaves=True)
+
+
+def _draw_keys(layout: bpy.types.UILayout, editor: bpy.types.PropertyGroup, leaves: bool) -> None:
+    column = layout.column(align=True)
+    last = present_order(editor) >= len(orders_of(editor)) - 1
+    split = column.split(factor=0.4)
+    split.label(text="")
+    head = split.row(align=True)
+    head.label(text="Mean")
+    head.label(text="±")
+    bare = editor.leaves + editor.leaves_variation <= 0.0
+    for name, key in order_keys().items():
+        if name.startswith(_LEAVES) != leaves:
+            continue
+        row = column.row(align=True)
+        # Still there to be changed, but it does nothing as things are.
+        row.active = not (bare and leaves and name != "leaves") and not (name == "branches" and last)
+        row.prop(editor, name)
+        if name + VARIATION in editor.bl_rna.properties:
+            row.prop(editor, name + VARIATION, text="")
+        if key.kind == "colour":
+            column.separator()
+
+
+CLASSES = (
+    TETFLORA_MT_species_files,
+    TETFLORA_PT_species,
+    TETFLORA_PT_species_whole,
+    TETFLORA_PT_species_orders,
+    TETFLORA_PT_species_leaves,
+)

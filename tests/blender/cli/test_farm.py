@@ -1,0 +1,252 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``blender --command tetflora farm``: what is written, what is refused, and that the open file stays as it is."""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+from pathlib import Path
+
+import bpy
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, tiny_render
+from tetflora_addon import errors
+from tetflora_addon.blender import compat
+from tetflora_addon.blender.cli import command, farm, farm_template
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+
+@pytest.fixture
+def shot(tmp_path: Path) -> Path:
+    """A saved file of one bush, frames 1, 3, 5, 7."""
+    scene = tiny_render()
+    add_camera(location=(0.0, -60.0, 2.0))
+    add_plant()
+    scene.frame_start, scene.frame_end, scene.frame_step = 1, 8, 2
+    scene.render.filepath = "//pictures/shot_###"
+    path = tmp_path / "project" / "shots" / "shot.blend"
+    path.parent.mkdir(parents=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def _run(*arguments) -> int:
+    return command.main(["farm", *map(str, arguments)])
+
+
+def _read(folder: Path, title: str) -> dict:
+    return json.loads((folder / f"{title}.json").read_text(encoding="utf-8"))
+
+
+def _parameters(folder: Path) -> dict[str, object]:
+    return {p["name"]: p.get("default") for p in _read(folder, "template")["parameterDefinitions"]}
+
+
+def _error(capfd) -> str:
+    lines = [line for line in capfd.readouterr().err.splitlines() if line.startswith("tetflora: error:")]
+    assert len(lines) == 1
+    return lines[0]
+
+
+def test_frames_and_chunks_are_those_of_the_scene(shot, tmp_path, capfd):
+    job = tmp_path / "job"
+    assert _run(job, "--chunk", 3, "--json") == 0
+    figures = json.loads(capfd.readouterr().out.strip().splitlines()[-1])
+    assert (figures["frames"], figures["tasks"], figures["plants"]) == (4, 2, 1)
+    parameters = _parameters(job)
+    assert (parameters["Frames"], parameters["ChunkSize"], parameters["OutputName"]) == ("1-7:2", 3, "shot_###")
+    assert _read(job, "template")["extensions"] == ["TASK_CHUNKING"]
+    assert _run(tmp_path / "single", "--frames=-2-1,9") == 0
+    assert _parameters(tmp_path / "single")["Frames"] == "-2-1,9"
+    assert "extensions" not in _read(tmp_path / "single", "template")  # any scheduler of the specification takes it
+
+
+def test_every_parameter_of_a_command_is_defined(shot, tmp_path):
+    assert _run(tmp_path / "job", "--copy") == 0
+    template = _read(tmp_path / "job", "template")
+    text = json.dumps([template["steps"], template["jobEnvironments"]])
+    used = {piece.split("}}")[0].removeprefix("Param.") for piece in text.split("{{")[1:] if piece.startswith("Param.")}
+    assert used <= set(_parameters(tmp_path / "job"))
+    assert used >= {"Blender", "Frames", "SceneFile", "OutputDir", "OutputName", "TetFloraFiles"}
+
+
+def test_nothing_of_the_artist_is_changed(shot, tmp_path):
+    before, content = datablocks(), shot.read_bytes()
+    scene = bpy.context.scene
+    settings = (scene.frame_start, scene.frame_end, scene.frame_step, scene.frame_current, scene.render.filepath)
+    assert _run(tmp_path / "job", "--copy", "--frames", "20-30") == 0
+    assert datablocks() == before
+    now = (scene.frame_start, scene.frame_end, scene.frame_step, scene.frame_current, scene.render.filepath)
+    assert now == settings
+    assert bpy.data.filepath == str(shot)
+    assert [path.name for path in shot.parent.iterdir()] == ["shot.blend"]
+    assert shot.read_bytes() == content
+
+
+def test_the_zip_holds_the_extension_and_nothing_else(shot, tmp_path):
+    assert _run(tmp_path / "job") == 0
+    (path,) = (tmp_path / "job" / "tetflora").glob("tetflora-*.zip")
+    with zipfile.ZipFile(path) as archive:
+        names = archive.namelist()
+    assert {"blender_manifest.toml", "__init__.py", "tetflora_addon/blender/farm_installer.py"} <= set(names)
+    assert [n for n in names if "__pycache__" in n or n.startswith(("tests/", "docs/", ".", "benchmarks/"))] == []
+    farm.write_zip(tmp_path / "again.zip")
+    assert (tmp_path / "again.zip").read_bytes() == path.read_bytes()
+
+
+def _with_assets(shot: Path) -> dict[str, Path]:
+    """Give the scene a picture, a sequence of pictures, and a library that uses a picture itself."""
+    project = shot.parents[1]
+    files = {"leaf": "textures/leaf.png", "1": "plates/p_01.png", "2": "plates/p_02.png", "bark": "props/bark.png"}
+    paths = {key: project / name for key, name in files.items()}
+    for path in paths.values():
+        path.parent.mkdir(exist_ok=True)
+        image = bpy.data.images.new("made", 1, 1)
+        image.filepath_raw, image.file_format = str(path), 'PNG'
+        image.save()
+        bpy.data.images.remove(image)
+    paths["library"] = project / "props" / "props.blend"
+    prop = add_mesh("prop")
+    material = bpy.data.materials.new("bark")
+    node = compat.shader_tree(material).nodes.new("ShaderNodeTexImage")
+    node.image = bpy.data.images.load(str(paths["bark"]))
+    node.image.filepath = f"//{os.path.relpath(paths['bark'], paths['library'].parent)}"
+    prop.data.materials.append(material)
+    bpy.data.libraries.write(str(paths["library"]), {prop}, path_remap='NONE')
+    bpy.data.objects.remove(prop)
+    bpy.data.batch_remove([material, *bpy.data.images])
+    with bpy.data.libraries.load(str(paths["library"]), link=True, relative=True) as (_, wanted):
+        wanted.objects = ["prop"]
+    bpy.context.scene.collection.objects.link(wanted.objects[0])
+    leaf = bpy.data.images.load(str(paths["leaf"]))
+    leaf.filepath, leaf.use_fake_user = "//../textures/leaf.png", True
+    plate = bpy.data.images.load(str(paths["1"]))
+    plate.source, plate.filepath, plate.use_fake_user = 'SEQUENCE', "//../plates/p_01.png", True
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    return paths
+
+
+def test_files_of_the_scene_are_named(shot, tmp_path):
+    paths = _with_assets(shot)
+    assert _run(tmp_path / "job") == 0
+    inputs = _read(tmp_path / "job", "asset_references")["assetReferences"]["inputs"]
+    assert sorted(inputs["filenames"]) == sorted(map(str, (shot, *paths.values())))
+    assert _read(tmp_path / "job", "parameter_values")["parameterValues"] == [{"name": "SceneFile", "value": str(shot)}]
+
+
+def test_a_copied_scene_finds_its_files_elsewhere(shot, tmp_path):
+    paths = _with_assets(shot)
+    assert _run(tmp_path / "job", "--copy") == 0
+    bundle = (tmp_path / "job").rename(tmp_path / "moved")
+    assert _read(bundle, "asset_references")["assetReferences"]["inputs"]["filenames"] == []
+    copied = bundle / str(_parameters(bundle)["SceneFile"])
+    assert copied.read_bytes() == shot.read_bytes()
+    bpy.ops.wm.open_mainfile(filepath=str(copied))
+    found = {os.path.normpath(p) for p in bpy.utils.blend_paths(absolute=True)}
+    assert found
+    assert all(path.startswith(str(bundle)) and Path(path).is_file() for path in found)
+    names = {path.name for path in (bundle / "scene").rglob("*") if path.is_file()}
+    assert names == {"shot.blend", *(path.name for path in paths.values())}
+
+
+def test_files_that_are_not_there_and_absolute_paths_are_told(shot, tmp_path, capfd):
+    paths = _with_assets(shot)
+    paths["leaf"].unlink()
+    bpy.data.images["p_01.png"].filepath = str(paths["1"])
+    assert _run(tmp_path / "job", "--json") == 0
+    said = capfd.readouterr()
+    figures = json.loads(said.out.strip().splitlines()[-1])
+    assert figures["missing"] == [str(paths["leaf"])]
+    assert figures["absolute_paths"] == [str(paths["1"])]
+    assert said.err.count("tetflora: warning:") == 2
+
+
+def test_a_file_that_was_never_saved(tmp_path, capfd):
+    tiny_render()
+    add_camera()
+    assert _run(tmp_path / "job") == 1
+    assert "has not been saved" in _error(capfd)
+    assert not (tmp_path / "job").exists()
+
+
+@pytest.mark.parametrize(
+    ("spoil", "says"),
+    [
+        (lambda scene: setattr(scene, "camera", None), "no active camera"),
+        (lambda scene: setattr(scene.objects["plant"].tetflora, "species", "quercus"), "quercus"),
+    ],
+    ids=["no camera", "unknown species"],
+)
+def test_what_no_worker_could_render(shot, tmp_path, capfd, spoil, says):
+    spoil(bpy.context.scene)
+    assert _run(tmp_path / "job") == 1
+    assert says in _error(capfd)
+    assert not (tmp_path / "job").exists()
+
+
+def test_no_frames_and_frames_named_twice(shot, tmp_path, capfd):
+    with pytest.raises(errors.SceneError, match="No frames"):
+        farm_template.frame_expression([(5, 4, 1)])
+    assert _run(tmp_path / "job", "--frames", "1-4,3") == 1
+    assert "Frame 3 occurs twice" in _error(capfd)
+    assert _run(tmp_path / "job", "--frames", "9-2") == 2
+    assert "9-2" in _error(capfd)
+    assert _run(tmp_path / "job", "--chunk", "0") == 2
+
+
+def test_folders_that_cannot_be_used(shot, tmp_path, capfd):
+    full = tmp_path / "full"
+    full.mkdir()
+    (full / "mine.txt").write_text("keep")
+    assert _run(full) == 1
+    assert f"{full} is not empty" in _error(capfd)
+    assert (full / "mine.txt").read_text() == "keep"
+    assert _run(full / "mine.txt") == 1
+    assert "is a file" in _error(capfd)
+    assert _run(full / "mine.txt" / "job") == 1
+    assert "Cannot write to" in _error(capfd)
+
+
+def test_a_failure_leaves_nothing_behind(shot, tmp_path, capfd, monkeypatch):
+    def no_space(*_):
+        raise OSError(28, "No space left on device", "x.zip")
+
+    monkeypatch.setattr(farm, "write_zip", no_space)
+    assert _run(tmp_path / "job") == 1
+    assert "No space left" in _error(capfd)
+    assert not (tmp_path / "job").exists()
+    (tmp_path / "job").mkdir()
+    assert _run(tmp_path / "job") == 1
+    assert list((tmp_path / "job").iterdir()) == []
+
+
+RUNS = st.lists(
+    st.tuples(st.integers(-99, 999), st.integers(0, 50), st.integers(1, 9)).map(lambda r: (r[0], r[0] + r[1], r[2])),
+    min_size=1,
+    max_size=4,
+)
+
+
+@given(RUNS)
+def test_an_expression_names_the_frames_that_it_was_made_of(runs):
+    numbers = farm_template.frame_numbers(runs)
+    if len(set(numbers)) < len(numbers):
+        return
+    assert farm_template.frame_numbers(farm_template.frame_runs(farm_template.frame_expression(runs))) == numbers
+
+
+@pytest.mark.parametrize("text", ["", "a", "1-", "3-1", "1-9:0", "1..4", "1-9:-1", "1,,2"])
+def test_other_expressions_are_refused(text):
+    with pytest.raises(ValueError, match="not a range of frames"):
+        farm_template.frame_runs(text)
+
+
+def test_a_name_is_no_variable():
+    assert farm_template.job_name("a{{Param.X}}\n") == "a Param.X (TetFlora)"
+    assert len(farm_template.job_name("x" * 500)) == 128

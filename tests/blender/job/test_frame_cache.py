@@ -1,0 +1,403 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Frames of a film share their results, and each of them is the frame alone."""
+
+from __future__ import annotations
+
+import hashlib
+import random
+
+import bpy
+import numpy as np
+import pytest
+
+from tests.blender.digests import everything
+from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph
+from tetflora_addon.blender import compat
+from tetflora_addon.blender.job import frame_cache, render
+from tetflora_addon.blender.job import refine as job
+from tetflora_addon.blender.results import collection as emit
+from tetflora_addon.blender.scene import camera as camera_reader
+
+FRAMES = 12
+
+
+@pytest.fixture
+def film(clean_file):
+    """Two bushes and a camera that walks past them, 12 frames in which it goes through several cells."""
+    scene = bpy.context.scene
+    scene.render.resolution_x, scene.render.resolution_y = 64, 36
+    camera = add_camera(location=(-1.5, -9.0, 1.0))
+    camera.keyframe_insert("location", frame=1)
+    camera.location = (1.5, -5.0, 1.3)
+    camera.keyframe_insert("location", frame=FRAMES)
+    add_plant("one", seed=1, location=(-1.0, 0.0, 0.0))
+    add_plant("two", seed=2, location=(1.5, 3.0, 0.0))
+    settings = scene.tetflora
+    settings.leaf_limit, settings.cutoff, settings.visibility_resolution = 1.0, 6.0, 64
+    settings.cell_length = 1.0
+    depsgraph()
+    yield scene
+    render.on_render_end(scene)
+
+
+@pytest.fixture
+def made(monkeypatch):
+    """Frames for which something was refined."""
+    frames, real = [], job.refine
+
+    def refine(scene, *arguments, **options):
+        frames.append(scene.frame_current)
+        return real(scene, *arguments, **options)
+
+    monkeypatch.setattr(job, "refine", refine)
+    return frames
+
+
+def results(scene):
+    """What a frame is rendered with, datablock by datablock."""
+    (collection,) = emit.result_collections(scene, 'RENDER')
+    every = everything()
+    kept = {"objects": {o.name for o in collection.objects}}
+    kept["meshes"] = {o.data.name for o in collection.objects if o.type == 'MESH'}
+    kept["pointclouds"] = {o.data.name for o in collection.objects if o.type == 'POINTCLOUD'}
+    kept["materials"] = {m.name for o in collection.objects if o.data for m in o.data.materials if m}
+    found = {kind: {name: every[kind][name] for name in names} for kind, names in kept.items()}
+    assert found["objects"]
+    return collection.name, found
+
+
+def at(scene, frame):
+    """Go to a frame as a render does."""
+    scene.frame_set(frame)
+    render.on_render_pre(scene)
+    assert render.render_errors() == []
+    return results(scene)
+
+
+def alone(scene, frame):
+    """A frame of a render of its own."""
+    render.on_render_end(scene)
+    render.on_render_init(scene)
+    found = at(scene, frame)
+    render.on_render_end(scene)
+    return found
+
+
+def test_neighbouring_frames_share_and_each_is_the_frame_alone(film, made):
+    sequence = {n: at(film, n) for n in range(1, FRAMES + 1)}
+    cells = len({name for name, _ in sequence.values()})
+    assert made[0] == 1
+    assert 2 <= cells == len(made) <= FRAMES // 2
+    order = list(range(1, FRAMES + 1))
+    random.Random(5).shuffle(order)
+    again = {n: at(film, n) for n in order}
+    assert again == sequence
+    assert {n: alone(film, n) for n in order} == sequence
+
+
+def test_what_is_seen_again_comes_back_without_being_made_again(film, made):
+    first = at(film, 1)
+    at(film, FRAMES)
+    count = len(made)
+    assert at(film, 1) == first
+    assert len(made) == count
+
+
+def test_without_memory_only_the_frame_itself_is_there_and_comes_back_identical(film, made):
+    film.tetflora.kept_memory = 0.0
+    first = at(film, 1)
+    before = {kind: len(names) for kind, names in datablocks().items()}
+    for n in (FRAMES, 1, FRAMES):
+        at(film, n)
+    assert {kind: len(names) for kind, names in datablocks().items()}["collections"] == before["collections"]
+    assert len(made) == 4
+    assert at(film, 1) == first
+
+
+def test_what_was_not_seen_for_longest_goes_first(film, made):
+    sizes = []
+    for n in (1, FRAMES // 2, FRAMES):
+        at(film, n)
+        sizes.append(sum(entry.megabytes for entry in frame_cache._kept.values()))
+    render.on_render_end(film)
+    made.clear()
+    film.tetflora.kept_memory = (sizes[-1] - sizes[0] / 2.0) / 1e3  # room for two of three
+    for n in (1, FRAMES // 2, 1, FRAMES):  # the one in the middle is the oldest now
+        at(film, n)
+    assert made == [1, FRAMES // 2, FRAMES]
+    at(film, 1)
+    assert made == [1, FRAMES // 2, FRAMES]
+    at(film, FRAMES // 2)
+    assert made[3:] == [FRAMES // 2]
+
+
+def test_nothing_is_left_when_the_render_ends(film):
+    before = datablocks()
+    for n in range(1, FRAMES + 1):
+        at(film, n)
+    render.on_render_end(film)
+    assert datablocks() == before
+    assert frame_cache._kept == {}
+
+
+def test_nothing_that_is_kept_goes_into_a_file(film, tmp_path):
+    at(film, 1)
+    at(film, FRAMES)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "film.blend"), copy=True)
+    with bpy.data.libraries.load(str(tmp_path / "film.blend")) as (inside, _):
+        assert not [name for name in (*inside.collections, *inside.meshes) if "TetFlora" in name or "leaf" in name]
+
+
+@pytest.mark.parametrize(
+    "change",
+    ["plant", "seed", "lens", "settings", "terrain", "camera", "species", "form", "material", "pass index", "engine"],
+)
+def test_what_changes_is_noticed(film, made, change):
+    ground = add_mesh("ground", size=20.0)
+    ground.tetflora.is_occluder = True
+    film.tetflora.output.species.add().species = "fern"
+    depsgraph()
+    at(film, 1)
+    at(film, 1)
+    assert made == [1]
+    if change == "plant":
+        bpy.data.objects["one"].location.x += 0.01
+    elif change == "seed":
+        bpy.data.objects["one"].tetflora.seed += 1
+    elif change == "lens":
+        film.camera.data.lens *= 1.5
+    elif change == "settings":
+        film.tetflora.facet *= 2.0
+    elif change == "terrain":
+        ground.data.vertices[0].co.z += 0.5
+        ground.data.update()
+    elif change == "camera":  # a cut
+        other = bpy.data.objects.new("other", film.camera.data)
+        film.collection.objects.link(other)
+        other.location, other.rotation_euler = (0.0, 12.0, 1.0), (np.pi / 2, 0.0, np.pi)
+        film.camera = other
+    elif change == "species":
+        bpy.data.objects["one"].tetflora.species = "fern"
+    elif change == "form":
+        film.tetflora.proxy_form = 'MICROSPHERES'
+    elif change == "material":
+        film.tetflora.output.species.add().species = "bush"
+        film.tetflora.output.species[1].leaf = bpy.data.materials.new("mine")
+    elif change == "pass index":
+        film.tetflora.output.species[0].pass_index = 7
+    elif change == "engine":  # which draws points in another size
+        film.render.engine = 'CYCLES' if film.render.engine != 'CYCLES' else compat.eevee_engine()
+    depsgraph()
+    at(film, 1)
+    assert made == [1, 1]
+
+
+def test_animated_lenses_share_while_they_change_little(film, made):
+    film.camera.animation_data_clear()
+    data = film.camera.data
+    for frame, lens in ((1, 50.0), (FRAMES, 56.0)):
+        data.lens = lens
+        data.keyframe_insert("lens", frame=frame)
+    for n in range(1, FRAMES + 1):
+        at(film, n)
+    assert 2 <= len(made) <= 4
+
+
+def test_a_camera_that_stands_still_is_refined_for_exactly(film, made):
+    film.camera.animation_data_clear()
+    film.camera.location = (0.0, -8.0, 1.0)
+    depsgraph()
+    exact = camera_reader.read_camera(film, depsgraph(), region_only=True)
+    shared = frame_cache.shared_camera(film, depsgraph())
+    assert shared.position.tolist() == exact.position.tolist()
+    assert (shared.window, shared.width, shared.setback) == (exact.window, exact.width, 0.0)
+    for n in (1, 2, 3):
+        at(film, n)
+    assert made == [1]  # nothing changes, so nothing is made again
+
+
+@pytest.mark.parametrize("mover", ["parent", "constraint", "driver", "parent's parent"])
+def test_whatever_moves_the_camera_counts_as_animation(film, mover):
+    film.camera.animation_data_clear()
+    moves = frame_cache.camera_moves
+    assert not moves(film)
+    carrier = bpy.data.objects.new("carrier", None)
+    film.collection.objects.link(carrier)
+    if mover == "constraint":
+        film.camera.constraints.new('COPY_LOCATION').target = carrier
+    elif mover == "driver":
+        film.camera.driver_add("location", 0).driver.expression = "frame * .1"
+    else:
+        film.camera.parent = carrier
+        assert not moves(film)
+        if mover == "parent's parent":
+            carrier.parent = carrier = bpy.data.objects.new("outer", None)
+            film.collection.objects.link(carrier)
+        carrier.keyframe_insert("location", frame=1)
+    assert moves(film)
+
+
+def test_switched_off_each_frame_is_refined_for_its_own_camera(film, made):
+    film.tetflora.share_frames = False
+    names = {at(film, n)[0] for n in (1, 2, 3)}
+    assert made == [1, 2, 3]
+    assert len(names) == 3
+
+
+def test_explicit_objects_are_hidden_for_what_is_shown_and_shown_at_the_end(film, made):
+    bush = add_mesh("foreign", size=0.5, z=0.3)
+    bush.tetflora.is_explicit = True
+    depsgraph()
+    for n in (1, FRAMES, 1, 2):
+        at(film, n)
+        assert bush.hide_render
+    render.on_render_end(film)
+    assert not bush.hide_render
+    assert "tetflora_hidden_for_render" not in bpy.data.objects["foreign"]
+
+
+def test_a_frame_that_fails_leaves_nothing_and_the_next_one_is_right(film, made):
+    good = at(film, 1)
+    camera, film.camera = film.camera, None
+    render.on_render_pre(film)
+    assert len(render.render_errors()) == 1
+    assert emit.result_collections(film, 'RENDER') == []
+    film.camera = camera
+    render.on_render_init(film)
+    assert at(film, 1) == good
+
+
+@pytest.mark.parametrize("change", ["attribute", "material"])
+def test_what_changes_of_explicit_objects_is_noticed(film, made, change):
+    count = 400  # corners; numbers print short where there are more than a thousand
+    foreign = add_mesh("foreign", size=0.5)
+    foreign.data.clear_geometry()
+    foreign.data.from_pydata(
+        [(i % 20 / 20.0, i // 20 / 20.0, 0.0) for i in range(count)],
+        [],
+        [(i, i + 1, i + 21, i + 20) for i in range(count - 21) if i % 20 < 19],
+    )
+    tint = foreign.data.attributes.new("tint", 'FLOAT', 'POINT')
+    foreign.data.materials.append(bpy.data.materials.new("one"))
+    foreign.tetflora.is_explicit = True
+    depsgraph()
+    at(film, 1)
+    if change == "attribute":
+        tint.data[count // 2].value = 1.0
+        foreign.data.update()
+    else:
+        foreign.data.materials[0] = bpy.data.materials.new("two")
+    depsgraph()
+    at(film, 1)
+    assert made == [1, 1]
+
+
+def test_materials_of_leaf_objects_are_noticed(film, made):
+    leaf = add_mesh("blade", size=0.5)
+    leaf.hide_render = True
+    film.tetflora.leaf_limit = 0.05  # real ones in so small a picture
+    leaf.data.materials.append(bpy.data.materials.new("one"))
+    entry = film.tetflora.leaf_objects.add()
+    entry.species, entry.leaf = "bush", leaf
+    depsgraph()
+    at(film, 1)
+    leaf.data.materials[0] = bpy.data.materials.new("two")
+    depsgraph()
+    assert "two" in at(film, 1)[1]["materials"]
+    assert made == [1, 1]
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ((1, 11), (11, 1)),
+        ((1.0, 12.0), (1.01, 2.0)),
+        ({"many": np.zeros(2000)}, {"many": np.eye(2000)[1000]}),
+        ({"exact": np.ones(20)}, {"exact": np.ones(20) + 1e-12}),
+        (np.arange(6).reshape(2, 3).T, np.arange(6).reshape(3, 2)),
+    ],
+)
+def test_digests_tell_values_apart(one, other):
+    digests = hashlib.sha256(), hashlib.sha256()
+    for digest, value in zip(digests, (one, other), strict=True):
+        frame_cache.digest_of(digest, value)
+    assert digests[0].digest() != digests[1].digest()
+
+
+def test_shells_that_come_back_are_shaded_as_they_were(film, made):
+    film.tetflora.proxy_form = 'SHELLS'
+    first = at(film, 1)
+    film.tetflora.shell_diffuse = 0.5
+    assert at(film, 1)[1]["materials"] != first[1]["materials"]
+    film.tetflora.shell_diffuse = 1.0
+    assert at(film, 1) == first
+    assert made == [1, 1]
+
+
+def test_materials_put_on_the_artists_results_do_not_change_the_next_frame(film, made):
+    film.tetflora.leaf_limit = 0.05
+    job.refine(film, depsgraph())
+    made.clear()
+    (results_of_artist,) = emit.result_collections(film, 'VIEW')
+    leaves = next(o for o in results_of_artist.objects if o.get("tetflora_kind") == "leaf")
+    leaves.material_slots[0].material = bpy.data.materials.new("mine")
+    first = at(film, 1)
+    assert "mine" in first[1]["materials"]
+    assert at(film, 1) == first
+    assert made == [1]
+
+
+def test_view_layers_go_together_as_if_nothing_were_hidden(film, made):
+    foreign = add_mesh("foreign", size=0.5)
+    foreign.tetflora.is_explicit = True
+    apart = bpy.data.collections.new("apart")
+    film.collection.children.link(apart)
+    apart.objects.link(foreign)
+    film.collection.objects.unlink(foreign)
+    second = film.view_layers.new("second")
+    second.layer_collection.children["apart"].exclude = True
+
+    def shown():
+        render.on_render_pre(film)
+        assert render.render_errors() == []
+        return [
+            sorted(c.collection.name for c in layer.layer_collection.children if not c.exclude)
+            for layer in film.view_layers
+        ]
+
+    first = shown()
+    assert first[0] != first[1]
+    assert shown() == first
+    assert made == [1, 1]
+
+
+def test_scenes_that_are_rendered_within_a_render_leave_its_results_alone(film, made):
+    first = at(film, 1)
+    other = bpy.data.scenes.new("other")
+    for obj in film.objects:
+        other.collection.objects.link(obj)
+    other.camera = film.camera
+    for prop in ("leaf_limit", "cutoff", "visibility_resolution", "cell_length"):
+        setattr(other.tetflora, prop, getattr(film.tetflora, prop))
+    other.render.resolution_x, other.render.resolution_y = 64, 36
+    names = {collection.name for collection in emit.result_collections(film)}
+    render.on_render_pre(other)
+    assert render.render_errors() == []
+    theirs = {collection.name for collection in emit.result_collections(other)}
+    assert theirs
+    assert not theirs & names
+    render.on_render_end(other)
+    assert at(film, 1) == first
+    assert made == [1, 1]
+
+
+def test_names_that_are_too_long_still_tell_cells_apart(film, made):
+    foreign = add_mesh("x" * 60, size=0.5)
+    foreign.tetflora.is_explicit = True
+    depsgraph()
+    at(film, 1)
+    _, last = at(film, FRAMES)
+    assert len(made) == 2
+    assert last == alone(film, FRAMES)[1]
+    assert not [name for kind in ("objects", "meshes") for name in last[kind] if name[-4] == "."]

@@ -1,0 +1,244 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Materials return no more light than they get, look alike at a distance, and leave the artist's work alone."""
+
+import bpy
+import numpy as np
+import pytest
+
+from devtools import session
+from tests.blender.renders import picture, small_scene
+from tetflora_addon import buffers, errors
+from tetflora_addon.blender import compat
+from tetflora_addon.blender.materials import materials, microsphere, nodes, shell
+from tetflora_addon.blender.results import meshes
+from tetflora_addon.species import species
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+
+def tube(radius, colour, material, turns=0):
+    """A branch along x, seven perimeters long, in the middle of the view; u starts at `turns`."""
+    sides, rings = 16, 8
+    step, angle = np.arange(rings + 1) / rings, 2 * np.pi * np.arange(sides) / sides
+    length = 7 * 2 * np.pi * radius
+    ring = np.stack([np.zeros(sides), radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+    along = np.stack([length * (step - 0.5), 0 * step, 0 * step], axis=1)
+    i, k = (a.ravel() for a in np.meshgrid(np.arange(rings), np.arange(sides), indexing="ij"))
+    corners = np.stack([i * sides + k, i * sides + (k + 1) % sides], axis=1)
+    corners = np.concatenate([corners, corners[:, ::-1] + sides], axis=1)
+    u, v = np.stack([k, k + 1, k + 1, k], axis=1) / sides + turns, 7 * np.stack([i, i, i + 1, i + 1], axis=1) / rings
+    pairs = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    edges, edge_of_corner = np.unique(pairs, axis=0, return_inverse=True)
+    polygons = buffers.MeshBuffers(
+        (along[:, None] + ring).reshape(-1, 3).astype(np.float32),
+        edges.astype(np.int32),
+        corners.reshape(-1).astype(np.int32),
+        edge_of_corner.reshape(-1).astype(np.int32),
+        np.arange(0, 4 * len(corners) + 1, 4, dtype=np.int32),
+        {
+            "UVMap": ("CORNER", np.stack([u, v], axis=2).reshape(-1, 2).astype(np.float32)),
+            "tf_colour": ("FACE", np.tile(np.float32(colour), (len(corners), 1))),
+            "tf_transmission": ("FACE", np.zeros(len(corners), np.float32)),
+        },
+        smooth=True,
+    )
+    return added("tube", polygons, material)
+
+
+def bark_seen(character, radius, engine="CYCLES", turns=0, colour=(0.4, 0.3, 0.2)):
+    """Picture of the middle half of a branch, five perimeters of it, under an even sky of 1."""
+    session.clean_file()
+    engine = compat.eevee_engine() if engine == "EEVEE" else engine
+    small_scene(sky=1.0, samples=16, size=96, engine=engine, width=4 * 2 * np.pi * radius)
+    tube(radius, colour, materials.bark_material("Oak", character), turns)
+    seen = picture()
+    tall = len(seen)
+    reach = int(0.8 * tall / (8 * np.pi))  # from the axis, of the radius
+    return seen[tall // 2 - reach : tall // 2 + reach]
+
+
+def sheet(colour, transmission, material):
+    """A square of 8 m across the view, facing up; the leaf's length is that of the view."""
+    corners = np.array([[-4, -4, 0], [4, -4, 0], [4, 4, 0], [-4, 4, 0]], dtype=np.float32)
+    polygons = buffers.MeshBuffers(
+        corners,
+        np.array([[0, 1], [1, 2], [2, 3], [3, 0]], dtype=np.int32),
+        np.arange(4, dtype=np.int32),
+        np.arange(4, dtype=np.int32),
+        np.array([0, 4], dtype=np.int32),
+        {
+            "UVMap": ("CORNER", corners[:, :2] / 2 + np.float32(0.5)),
+            "tf_colour": ("FACE", np.array([colour], dtype=np.float32)),
+            "tf_transmission": ("FACE", np.array([transmission], dtype=np.float32)),
+        },
+    )
+    return added("sheet", polygons, material)
+
+
+def added(name, buffers, material):
+    mesh = meshes.write_mesh(name, buffers, [material])
+    made = bpy.data.objects.new(name, mesh)
+    bpy.context.scene.collection.objects.link(made)
+    return made
+
+
+@pytest.mark.parametrize("transmission", [0.0, 0.4, 1.0])
+def test_leaves_return_what_they_are_said_to_on_the_mean_of_both_sides(transmission):
+    small_scene(sky=1.0, samples=64, size=32)
+    made = sheet((0.5, 0.4, 0.6), transmission, materials.leaf_material("Oak"))
+    upper = picture().mean(axis=(0, 1))
+    made.rotation_euler = (0.0, np.pi, 0.0)
+    lower = picture().mean(axis=(0, 1))
+    tint, gloss = np.array(microsphere.THROUGH_TINT[:3]), materials.GLOSS
+    wanted = (1.0 - gloss) * np.array([0.5, 0.4, 0.6]) * ((1.0 - transmission) + transmission * tint) + gloss
+    np.testing.assert_allclose((upper + lower) / 2, wanted, rtol=0.01)
+    if transmission < 1.0:
+        assert (lower > 1.03 * upper).all()
+
+
+@pytest.mark.parametrize("transmission", [0.0, 0.4, 1.0])
+def test_a_white_leaf_in_a_white_world_returns_no_more_than_it_gets(transmission):
+    small_scene(sky=1.0, samples=64)
+    sheet((1.0, 1.0, 1.0), transmission, materials.leaf_material("Oak"))
+    seen = picture()
+    assert (seen.mean(axis=(0, 1)) <= 1.002).all()
+    assert (seen <= 1.02).all()
+
+
+def test_a_leaf_lit_from_behind_shows_its_transmission_only():
+    """The sun from below, S = π W/m²: radiance is colour times tint times share, times what gloss leaves."""
+    small_scene(sky=0.0, samples=64, sun=180.0, size=32)
+    sheet((0.2, 0.4, 0.1), 0.5, materials.leaf_material("Oak"))
+    tint = np.array(microsphere.THROUGH_TINT[:3])
+    wanted = np.array([0.2, 0.4, 0.1]) * tint * 0.5 * (1.0 - materials.GLOSS)
+    seen = picture()
+    np.testing.assert_allclose(seen.mean(axis=(0, 1)), wanted, rtol=0.01)
+    assert np.ptp(seen[..., 1]) > 0.05 * wanted[1], "no veins"
+
+
+def test_leaves_that_let_little_light_through_have_no_veins():
+    small_scene(sky=0.0, samples=64, sun=180.0, size=32)
+    sheet((0.2, 0.4, 0.1), 0.12, materials.leaf_material("Pine"))
+    seen = picture()
+    assert np.ptp(seen[..., 1]) < 0.03 * seen[..., 1].mean()
+
+
+@pytest.mark.parametrize("engine", ["CYCLES", "EEVEE"])
+@pytest.mark.parametrize("character", ["ridged", "plated", "smooth", "banded", "ringed", "fibrous", "jointed"])
+def test_bark_keeps_the_mean_colour(character, engine):
+    """Proxies have the flat colour; 3 % is what eyes pass over."""
+    seen = bark_seen(character, 0.05 if character == "jointed" else 0.4, engine)
+    np.testing.assert_allclose(seen.mean(axis=(0, 1)), (0.4, 0.3, 0.2), rtol=0.03)
+    assert seen.std(axis=(0, 1))[0] > 0.005, "no pattern"
+
+
+def test_young_twigs_are_smooth():
+    """But for the few pixels where a ray slips past so thin a tube, seen from 50 m."""
+    flat = (np.abs(bark_seen("ridged", 0.01) - (0.4, 0.3, 0.2)) < 1e-3).all(axis=2)
+    assert flat.mean() > 0.9
+    trunk = (np.abs(bark_seen("ridged", 0.4) - (0.4, 0.3, 0.2)) < 1e-3).all(axis=2)
+    assert trunk.mean() < 0.1
+
+
+def test_bark_has_no_seam():
+    """Where u goes over from 1 to 0, as where it goes on to 1 and further."""
+    np.testing.assert_allclose(bark_seen("plated", 0.4, turns=1), bark_seen("plated", 0.4), atol=0.01)
+
+
+def test_branches_of_other_colours_have_other_patterns():
+    one, other = (bark_seen("ridged", 0.4, colour=np.full(3, c))[..., 0] for c in (0.3, 0.36))
+    assert abs(np.corrcoef(one.ravel(), other.ravel())[0, 1]) < 0.5
+
+
+def test_another_bark_is_another_material_and_the_old_one_is_kept():
+    old = materials.bark_material("Oak", "ridged")
+    new = materials.bark_material("Oak", "banded")
+    assert new != old
+    assert new.name == "TetFlora Oak bark"
+    assert materials.bark_material("Oak", "banded") == new
+
+
+def test_a_bark_that_is_not_there_is_named():
+    with pytest.raises(errors.SpeciesError, match='"wooly"; choose one of ridged'):
+        materials.bark_material("Oak", "wooly")
+
+
+def test_bark_lets_no_light_through():
+    small_scene(sky=0.0, samples=16, sun=180.0)
+    sheet((0.3, 0.2, 0.1), 0.0, materials.bark_material("Oak"))
+    assert picture().max() == 0.0
+
+
+def test_microsurfaces_match_leaves_and_bark():
+    """From afar all that is left of bark is its mean; so small a piece of it is a tenth off, and leaves show veins."""
+    colour = (0.3, 0.2, 0.1)
+    seen = {}
+    for name, transmission in (("leaf", 0.4), ("bark", 0.0)):
+        for kind in (name, "proxy"):
+            session.clean_file()
+            small_scene(sky=0.5, samples=64, sun=30.0)
+            made = materials.proxy_material() if kind == "proxy" else getattr(materials, f"{name}_material")("Oak")
+            sheet(colour, transmission, made)
+            seen[name, kind] = picture().mean(axis=(0, 1))
+    np.testing.assert_allclose(seen["leaf", "proxy"], seen["leaf", "leaf"], rtol=0.15)
+    np.testing.assert_allclose(seen["bark", "proxy"], seen["bark", "bark"], rtol=0.1)
+
+
+def test_names_and_marks():
+    made = [
+        materials.leaf_material("Oak"),
+        materials.bark_material("Oak"),
+        materials.proxy_material(),
+        shell.shell_material(),
+        materials.scatter_group(),
+    ]
+    names = ["TetFlora Oak leaf", "TetFlora Oak bark", "TetFlora proxy", "TetFlora shell", "TetFlora Scatter"]
+    assert [m.name for m in made] == names
+    assert all(nodes.is_ours(m) for m in made)
+    assert materials.leaf_material("Oak") == made[0]
+
+
+def test_an_edited_material_stays_as_it_is():
+    made = materials.leaf_material("Oak")
+    made.node_tree.nodes.clear()
+    assert materials.leaf_material("Oak") == made
+    assert len(made.node_tree.nodes) == 0
+
+
+def test_copies_and_renamed_materials_are_the_artists():
+    made = materials.leaf_material("Oak")
+    copy = made.copy()
+    assert not nodes.is_ours(copy)
+    made.name = "My oak"
+    assert not nodes.is_ours(made)
+    assert materials.leaf_material("Oak") != made
+
+
+def test_an_outdated_material_is_kept_beside_the_new_one():
+    old = materials.leaf_material("Oak")
+    old[nodes.VERSION] = 0
+    new = materials.leaf_material("Oak")
+    assert new != old
+    assert new.name == "TetFlora Oak leaf"
+    assert old.name == "TetFlora Oak leaf (version 0)"
+    assert not nodes.is_ours(old)
+
+
+def test_a_material_that_the_artist_made_under_our_name_is_used():
+    theirs = bpy.data.materials.new("TetFlora Oak bark")
+    assert materials.bark_material("Oak") == theirs
+    assert not nodes.is_ours(theirs)
+
+
+def test_every_link_is_valid_and_every_species_shares_the_group():
+    for made in (materials.leaf_material("Oak"), materials.bark_material("Fir"), materials.proxy_material()):
+        groups = [n.node_tree for n in made.node_tree.nodes if n.bl_idname == "ShaderNodeGroup"]
+        assert bpy.data.node_groups["TetFlora Scatter"] in groups
+        assert all(link.is_valid for link in made.node_tree.links)
+    assert len([g for g in bpy.data.node_groups if g.name.startswith("TetFlora Scatter")]) == 1
+
+
+def test_every_bark_that_species_may_name_is_there():
+    """In the same order: the number of a character is part of its materials' version."""
+    assert materials.BARKS == species.BARKS

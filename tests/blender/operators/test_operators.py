@@ -1,0 +1,252 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What each operator does, what it refuses and that a refusal changes nothing."""
+
+from __future__ import annotations
+
+import json
+
+import bpy
+import pytest
+
+import operators
+from panels import results
+from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, select, tiny_render
+from tetflora_addon.blender.job import refine, render
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+
+def _ops():
+    return bpy.ops.tetflora
+
+
+def _plants():
+    return {o.name: o.tetflora for o in bpy.data.objects if o.tetflora.is_plant}
+
+
+def _small_forest():
+    add_camera(location=(0.0, -60.0, 2.0))
+    for i in range(2):
+        add_plant(f"p{i}", seed=i, location=(3.0 * i, 3.0 * i, 0.0))
+    select()
+    return tiny_render()
+
+
+def test_every_class_of_operators_is_registered_under_its_own_name(blender):
+    classes = operators.CLASSES
+    registered = {name for name in dir(bpy.types) if name.startswith("TETFLORA_OT_")}
+    assert {cls.__name__ for cls in classes} == registered
+    assert all(cls.bl_idname == cls.__name__.replace("TETFLORA_OT_", "tetflora.") for cls in classes)
+
+
+def test_add_plant_stands_at_the_cursor_with_another_seed_each_time():
+    bpy.context.scene.cursor.location = (1.0, 2.0, 3.0)
+    _ops().add_plant(species="conifer")
+    _ops().add_plant(species="conifer")
+    _ops().add_plant(species="bush", seed=9, location=(4.0, 0.0, 0.0), scale=2.0, azimuth=1.0)
+    objects = [o for o in bpy.data.objects if o.tetflora.is_plant]
+    assert sorted(o.tetflora.species for o in objects) == ["bush", "conifer", "conifer"]
+    bush = next(o for o in objects if o.tetflora.species == "bush")
+    assert tuple(bush.location) == (4.0, 0.0, 0.0)
+    assert (bush.tetflora.seed, bush.scale.z, bush.rotation_euler.z) == (9, 2.0, 1.0)
+    assert bpy.context.view_layer.objects.active == bush
+    assert bpy.context.selected_objects == [bush]
+    conifers = [o for o in objects if o != bush]
+    assert all(tuple(o.location) == (1.0, 2.0, 3.0) for o in conifers)
+    assert conifers[0].tetflora.seed != conifers[1].tetflora.seed
+    assert all(o.empty_display_size > 1.0 for o in conifers)
+    assert bpy.context.scene.render.use_lock_interface
+
+
+def test_reseed_parts_copies_and_leaves_others_alone():
+    plants = [add_plant(f"p{i}", seed=5) for i in range(4)]
+    select(*plants[:3])
+    _ops().reseed()
+    first = {name: p.seed for name, p in _plants().items()}
+    assert len(set(first.values())) == 4
+    assert first["p3"] == 5
+    _ops().reseed(roll=1)
+    assert not {p.seed for p in _plants().values()} & set(first.values()) - {5}
+
+
+def test_species_are_selected_assigned_and_removed():
+    add_plant("a", "bush")
+    add_plant("b", "conifer")
+    add_plant("c", "gone")
+    mesh = add_mesh("terrain")
+    select(bpy.data.objects["a"])
+    _ops().select_species()
+    assert [o.name for o in bpy.context.selected_objects] == ["a"]
+    _ops().select_species(species="gone", extend=True)
+    assert {o.name for o in bpy.context.selected_objects} == {"a", "c"}
+    _ops().assign_species(species="conifer")
+    assert {n: p.species for n, p in _plants().items()} == {"a": "conifer", "b": "conifer", "c": "conifer"}
+    select(bpy.data.objects["a"], mesh)
+    _ops().remove_plants()
+    assert sorted(o.name for o in bpy.data.objects) == ["b", "c", "terrain"]
+    assert _ops().remove_plants(which='SPECIES', species="bush") == {'CANCELLED'}
+    _ops().remove_plants(which='ALL')
+    assert [o.name for o in bpy.data.objects] == ["terrain"]
+
+
+def test_removing_the_last_plant_takes_the_empty_collection_along():
+    _ops().add_plant(species="bush")
+    assert [c.name for c in bpy.data.collections] == ["TetFlora plants"]
+    _ops().remove_plants(which='ALL')
+    assert not bpy.data.collections
+
+
+def test_mark_occluder_toggles_meshes_only():
+    first, second = add_mesh("first"), add_mesh("second")
+    plant = add_plant()
+    select(first, second, plant)
+    first.tetflora.is_occluder = True
+    _ops().mark_occluder()
+    assert first.tetflora.is_occluder
+    assert second.tetflora.is_occluder
+    assert not plant.tetflora.is_occluder
+    _ops().mark_occluder()
+    assert not any(o.tetflora.is_occluder for o in bpy.data.objects)
+
+
+def test_lists_grow_and_shrink():
+    settings = bpy.context.scene.tetflora
+    assert _ops().edit_list(which='MIX', action='REMOVE') == {'CANCELLED'}
+    for _ in range(3):
+        _ops().edit_list(which='MIX', action='ADD')
+    species = [entry.species for entry in settings.populate.mix]
+    assert len(set(species)) == 3
+    assert settings.populate.mix_index == 2
+    settings.populate.mix_index = 0
+    _ops().edit_list(which='MIX', action='REMOVE')
+    assert [entry.species for entry in settings.populate.mix] == species[1:]
+    _ops().edit_list(which='LEAVES', action='ADD')
+    assert len(settings.leaf_objects) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("populate", "Select a mesh"),
+        ("reseed", "Select plants or a field"),
+        ("assign_species", "Select plants or a field"),
+        ("mark_occluder", "Select meshes first"),
+        ("refine", "no active camera"),
+        ("clear", "No results to clear"),
+    ],
+)
+def test_disabled_buttons_say_why(name, says):
+    select()
+    with pytest.raises(RuntimeError, match=says):
+        getattr(_ops(), name)()
+
+
+def test_what_a_render_could_not_use_is_forgotten_once_refine_can():
+    scene = _small_forest()
+    plant = next(o for o in scene.objects if o.tetflora.is_plant)
+    plant.scale = (0.0, 0.0, 0.0)
+    bpy.context.view_layer.update()
+    render.on_render_init(scene)
+    render.on_render_pre(scene)
+    render.on_render_end(scene)
+    assert len(render.render_errors()) == 1
+    with pytest.raises(RuntimeError, match="zero scale"):
+        _ops().refine()
+    assert len(render.render_errors()) == 1
+    plant.scale = (1.0, 1.0, 1.0)
+    bpy.context.view_layer.update()
+    _ops().refine()
+    assert render.render_errors() == []
+
+
+def test_refine_makes_meshes_and_figures_and_clear_takes_them_back():
+    scene = _small_forest()
+    before = datablocks()
+    assert _ops().refine() == {'FINISHED'}
+    assert refine.has_results(scene)
+    figures = json.loads(scene.tetflora.statistics)
+    assert figures["plants"] == 2
+    assert figures["polygons_meshed"] + figures["polygons_proxy"] > 0
+    rows = dict(results.rows_of(scene.tetflora.statistics))
+    passes = results.steps_of(scene.tetflora.statistics)
+    assert [int(row[0]) for row in passes] == list(range(1, len(passes) + 1))
+    assert passes[-1][1] == rows["Tetrahedra"]
+    assert passes[-1][2] == "0"
+    assert rows["Plants"] == "2"
+    assert rows["Polygons If Expanded"] == f"{figures['polygons_full']:,}"
+    assert len(bpy.data.meshes) > 0
+    assert _ops().clear() == {'FINISHED'}
+    assert datablocks() == before
+    assert results.rows_of(scene.tetflora.statistics) == ()
+    assert results.steps_of(scene.tetflora.statistics) == ()
+
+
+def _refined_rock():
+    """A square that was refined by the button."""
+    add_camera(location=(0.0, -60.0, 2.0))
+    rock = add_mesh("rock")
+    rock.tetflora.is_explicit = True
+    tiny_render()
+    _ops().refine()
+    assert (rock.hide_render, rock.hide_viewport) == (True, True)
+    return rock
+
+
+@pytest.mark.parametrize("unlinked", [False, True])
+def test_clear_shows_what_results_that_were_deleted_by_hand_hid(unlinked):
+    """Also where the mesh was unlinked from the scene, or the scene was renamed meanwhile."""
+    rock, scene = _refined_rock(), bpy.context.scene
+    (made,) = (c for c in bpy.data.collections if "tetflora_purpose" in c)
+    bpy.data.batch_remove([*made.objects, made])
+    if unlinked:
+        rock.use_fake_user = True
+        scene.collection.objects.unlink(rock)
+        scene.name = "renamed"
+    assert not refine.has_results(scene)
+    assert _ops().clear() == {'FINISHED'}
+    assert (rock.hide_render, rock.hide_viewport) == (False, False)
+    assert not _ops().clear.poll()
+
+
+def test_clear_shows_a_mesh_only_when_no_scene_has_results_in_its_place():
+    """A scene that is renamed keeps its claim."""
+    rock, first = _refined_rock(), bpy.context.scene
+    second = bpy.data.scenes.new("second")
+    for obj in (rock, first.camera):
+        second.collection.objects.link(obj)
+    second.camera = first.camera
+    with bpy.context.temp_override(scene=second, view_layer=second.view_layers[0]):
+        refine.refine(second, bpy.context.evaluated_depsgraph_get())
+    assert refine.has_results(second)
+    second.name = "other"
+    _ops().clear()
+    assert (rock.hide_render, rock.hide_viewport) == (True, True)
+    assert not _ops().clear.poll()
+    refine.clear(second)
+    assert (rock.hide_render, rock.hide_viewport) == (False, False)
+    assert "tetflora_hidden" not in rock
+
+
+def _bare_leaf():
+    entry = bpy.context.scene.tetflora.leaf_objects.add()
+    entry.species, entry.leaf = _plants()["p0"].species, add_mesh("Bald", faces=())
+
+
+@pytest.mark.parametrize(
+    ("break_it", "says"),
+    [
+        (lambda: _ops().remove_plants(which='ALL'), "No plants to render"),
+        (lambda: add_plant("Odd", "quercus"), 'unknown species "quercus"'),
+        (lambda: add_plant("Flat", scale=(0.0, 0.0, 0.0)), '"Flat": zero scale'),
+        (lambda: setattr(add_mesh("Bare", faces=()).tetflora, "is_occluder", True), '"Bare" has no faces'),
+        (_bare_leaf, "Bald.*no faces"),  # found when the work has begun
+    ],
+)
+def test_refine_reports_what_is_wrong_and_changes_nothing(break_it, says):
+    _small_forest()
+    break_it()
+    before = datablocks()
+    with pytest.raises(RuntimeError, match=says):
+        _ops().refine()
+    assert datablocks() == before

@@ -1,0 +1,309 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Undo after each operator that changes the file brings all of it back, datablock by datablock, and redo the change.
+
+Operators are called as buttons call them, so that Blender pushes the undo step, or not, by what they declare. What is
+compared is in `digests`: everything but what Blender's memory of undo does not hold.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import bpy
+import pytest
+
+import operators
+from devtools import session
+from tests.blender.digests import difference, everything
+from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
+from tetflora_addon.blender.job import refine
+from tetflora_addon.blender.placing import rules
+from tetflora_addon.blender.species import catalogue as species_files
+from tetflora_addon.species import catalogue
+
+# Populations of the cases below: they are small, and of species that are quick to compile.
+MIX = "bush:2, conifer"
+
+
+def ops():
+    return bpy.ops.tetflora
+
+
+def scene():
+    return bpy.context.scene
+
+
+def forest() -> None:
+    """Two plants before a small camera, and a ground; the plants are selected."""
+    add_mesh("ground", size=8.0)
+    add_camera(location=(0.0, -14.0, 3.0), rotation=(1.4, 0.0, 0.0))
+    render = scene().render
+    render.resolution_x = render.resolution_y = 48
+    plants = [add_plant(s, s, seed=n, location=(3.0 * n - 1.5, 0.0, 1.0)) for n, s in enumerate(("bush", "conifer"))]
+    scene().tetflora.populate.count = 12
+    bpy.context.view_layer.update()
+    select(*plants)
+
+
+def ground_active() -> None:
+    forest()
+    select(bpy.data.objects["ground"])
+
+
+def refined() -> None:
+    forest()
+    bpy_update()
+    refine.refine(scene(), depsgraph())
+
+
+def bpy_update() -> None:
+    bpy.context.view_layer.update()
+
+
+def refined_mesh() -> None:
+    """A mesh of the artist's is hidden for its results."""
+    forest()
+    bpy.data.objects["ground"].tetflora.is_explicit = True
+    refine.refine(scene(), depsgraph())
+
+
+def populated() -> None:
+    ground_active()
+    assert ops().populate(count=12, species=MIX, min_distance=0.5) == {'FINISHED'}
+    bpy_update()
+
+
+def populated_as_field() -> None:
+    ground_active()
+    assert ops().populate(count=12, species=MIX, min_distance=0.5, as_field='FIELD') == {'FINISHED'}
+    bpy_update()
+    select(next(o for o in bpy.data.objects if o.tetflora.is_field))
+
+
+def frozen() -> None:
+    populated()
+    assert ops().freeze_population() == {'FINISHED'}
+
+
+def edges() -> None:
+    """A mesh of edges, which can be a plant's form, is active."""
+    forest()
+    mesh = bpy.data.meshes.new("form")
+    mesh.from_pydata([(0, 0, 0), (0, 0, 1), (0.2, 0, 2)], [(0, 1), (1, 2)], [])
+    obj = bpy.data.objects.new("form", mesh)
+    scene().collection.objects.link(obj)
+    select(obj)
+
+
+def species_chosen() -> None:
+    forest()
+    scene().tetflora.species_editor.species = "bush"
+
+
+def species_edited() -> None:
+    species_chosen()
+    assert ops().edit_orders(action='ADD') == {'FINISHED'}
+
+
+def listed() -> None:
+    forest()
+    assert ops().edit_list(which='MIX', action='ADD') == {'FINISHED'}
+
+
+Case = tuple[str, Callable[[], None], str, dict]
+
+CASES: list[Case] = [
+    ("add_plant", forest, "add_plant", {"species": "bush"}),
+    ("populate", ground_active, "populate", {"count": 12, "species": MIX}),
+    ("populate as a field", ground_active, "populate", {"count": 12, "species": MIX, "as_field": 'FIELD'}),
+    ("populate again", populated, "populate", {"count": 5, "species": MIX, "seed": 3}),
+    ("first_forest", lambda: None, "first_forest", {}),
+    ("drop_to_ground", forest, "drop_to_ground", {}),
+    ("use_as_form", edges, "use_as_form", {}),
+    ("assign_species", forest, "assign_species", {"species": "fern"}),
+    ("assign_species to a field", populated_as_field, "assign_species", {"species": "fern"}),
+    ("reseed", forest, "reseed", {}),
+    ("select_species", populated, "select_species", {"species": "bush"}),
+    ("remove_plants selected", forest, "remove_plants", {}),
+    ("remove_plants all", populated, "remove_plants", {"which": 'ALL'}),
+    ("mark_occluder", ground_active, "mark_occluder", {}),
+    ("mark_explicit", ground_active, "mark_explicit", {}),
+    ("edit_list add", forest, "edit_list", {"which": 'MIX', "action": 'ADD'}),
+    ("edit_list remove", listed, "edit_list", {"which": 'MIX', "action": 'REMOVE'}),
+    ("refine", forest, "refine", {}),
+    ("refine again", refined, "refine", {}),
+    ("refine a mesh", lambda: (ground_active(), mark_ground()), "refine", {}),
+    ("clear", refined, "clear", {}),
+    ("clear a mesh", refined_mesh, "clear", {}),
+    ("keep_results", refined, "keep_results", {}),
+    ("mark_field", ground_active, "mark_field", {}),
+    ("make_field", forest, "make_field", {}),
+    ("make_field of a population", populated, "make_field", {}),
+    ("split_field", populated_as_field, "split_field", {}),
+    ("duplicate_species", species_chosen, "duplicate_species", {"name": "Shrub"}),
+    ("revert_species", species_edited, "revert_species", {}),
+    ("edit_orders", species_chosen, "edit_orders", {"action": 'ADD'}),
+    ("edit_orders spur", species_chosen, "edit_orders", {"action": 'SPUR'}),
+    ("make_plant_mesh", forest, "make_plant_mesh", {}),
+    ("add_population", ground_active, "add_population", {}),
+    ("update_population", lambda: (populated(), change_population()), "update_population", {}),
+    ("update_population of a field", lambda: (populated_as_field(), change_population()), "update_population", {}),
+    ("reroll_population", populated, "reroll_population", {}),
+    ("freeze_population", populated, "freeze_population", {}),
+    ("release a population", frozen, "freeze_population", {}),
+    ("remove_population", populated, "remove_population", {}),
+    ("remove_population, plants stay", populated, "remove_population", {"keep_plants": True}),
+    ("select_population", lambda: (populated(), select()), "select_population", {}),
+    ("forget_erased", lambda: (populated(), erase_place()), "forget_erased", {}),
+    ("set_population_ground", lambda: (populated(), select(add_mesh("other"))), "set_population_ground", {}),
+]
+#: Operators with an undo step that cannot be called without a file from outside; their own case is below.
+FROM_FILES = {"import_populations", "load_species"}
+
+
+def mark_ground() -> None:
+    bpy.data.objects["ground"].tetflora.is_explicit = True
+    select(bpy.data.objects["ground"])
+
+
+def change_population() -> None:
+    scene().tetflora.populations[0].count = 7
+    scene().tetflora.populations[0].seed = 5
+
+
+def erase_place() -> None:
+    rules.note_erased(scene().tetflora.populations[0], [(0.0, 0.0)], 2.0)
+
+
+@pytest.fixture
+def history(clean_file) -> Iterator[None]:
+    """An empty file, the memory of undo included."""
+    bpy.ops.ed.undo_push(message="Begin")
+    yield
+    session.clean_file()
+
+
+def check(operator: str, options: dict) -> None:
+    """One call is one step: undo takes all of it back, redo brings all of it again."""
+    bpy.ops.ed.undo_push(message="Before")
+    before = everything()
+    assert getattr(ops(), operator)('EXEC_DEFAULT', True, **options) == {'FINISHED'}
+    after = everything()
+    assert difference(before, after), "the operator changes nothing: there is nothing to undo"
+    assert bpy.ops.ed.undo() == {'FINISHED'}
+    assert difference(before, everything()) == []
+    assert bpy.ops.ed.redo() == {'FINISHED'}
+    assert difference(after, everything()) == []
+
+
+@pytest.mark.parametrize(("prepare", "operator", "options"), [c[1:] for c in CASES], ids=[c[0] for c in CASES])
+def test_undo_and_redo_restore_everything(history, prepare, operator, options):
+    prepare()
+    check(operator, options)
+
+
+def test_each_operator_with_an_undo_step_is_tried(blender):
+    declared = {cls.bl_idname.split(".")[1] for cls in operators.CLASSES if 'UNDO' in getattr(cls, "bl_options", ())}
+    assert declared == {case[2] for case in CASES} | FROM_FILES
+
+
+def test_what_comes_from_a_file_of_populations_can_be_undone(history, tmp_path):
+    path = tmp_path / "forest.json"
+    populated()
+    assert ops().export_populations(filepath=str(path)) == {'FINISHED'}
+    check("import_populations", {"filepath": str(path)})
+
+
+def test_a_species_that_was_loaded_can_be_undone(history, tmp_path):
+    path = tmp_path / "shrub.json"
+    shipped = Path(catalogue.__file__).parent.parent / "catalogue"
+    data = json.loads((shipped / "bush.json").read_text("utf-8"))
+    path.write_text(json.dumps({**data, "name": "Shrub"}), "utf-8")
+    forest()
+    try:
+        check("load_species", {"filepath": str(path)})
+        assert scene().tetflora.species_editor.species == "shrub"
+    finally:  # the copy in the user's folder is no part of the file, and stays when the step is undone
+        species_files.delete_species_file("shrub")
+
+
+@pytest.mark.parametrize("case", ["refine", "populate", "make_field", "remove_plants"])
+def test_a_refusal_changes_nothing_and_is_no_step(history, case):
+    """An error of the artist's leaves no undo step behind, whose undo would do nothing."""
+    ground_active()
+    options: dict = {}
+    if case == "refine":
+        bpy.data.objects["bush"].tetflora.species = "quercus"
+    elif case == "populate":
+        options = {"count": 12, "species": "quercus"}
+    elif case == "make_field":
+        for name in ("bush", "conifer"):
+            bpy.data.objects[name].tetflora.enabled = False
+        select(bpy.data.objects["bush"], bpy.data.objects["conifer"])
+    else:
+        options = {"which": 'SPECIES', "species": "fern"}
+    bpy.ops.ed.undo_push(message="Before")
+    before = everything()
+    bpy.data.objects["ground"].location.x = 1.0
+    bpy.ops.ed.undo_push(message="Moved")
+    moved = everything()
+    try:
+        result = getattr(ops(), case)('EXEC_DEFAULT', True, **options)
+    except RuntimeError:  # errors of operators are Python's in scripts
+        result = {'CANCELLED'}
+    assert result == {'CANCELLED'}
+    assert difference(moved, everything()) == []
+    assert bpy.ops.ed.undo() == {'FINISHED'}
+    assert difference(before, everything()) == []
+
+
+def test_a_chain_of_operators_is_undone_step_by_step(history):
+    """From populating to clearing, back to the start and forth again; refined meshes among it."""
+    ground_active()
+    bpy.ops.ed.undo_push(message="Before")
+    states = [everything()]
+    steps = (
+        ("populate", {"count": 12, "species": MIX}),
+        ("refine", {}),
+        ("reroll_population", {}),
+        ("refine", {}),
+        ("clear", {}),
+        ("remove_population", {}),
+    )
+    for operator, options in steps:
+        assert getattr(ops(), operator)('EXEC_DEFAULT', True, **options) == {'FINISHED'}
+        states.append(everything())
+    for state in reversed(states[:-1]):
+        bpy.ops.ed.undo()
+        assert difference(state, everything()) == []
+    for state in states[1:]:
+        bpy.ops.ed.redo()
+        assert difference(state, everything()) == []
+
+
+def test_a_population_on_a_collection_goes_on_after_undo(history):
+    """Grounds within a collection are read again after each undo; Blender's own cache of them does not outlive one."""
+    ground_active()
+    grounds = bpy.data.collections.new("grounds")
+    inner = bpy.data.collections.new("inner")
+    scene().collection.children.link(grounds)
+    grounds.children.link(inner)
+    inner.objects.link(bpy.data.objects["ground"])
+    populated_on = {"count": 12, "species": MIX}
+    assert ops().populate('EXEC_DEFAULT', True, **populated_on) == {'FINISHED'}
+    scene().tetflora.populations[0].grounds.clear()
+    scene().tetflora.populations[0].ground_collection = grounds
+    bpy.ops.ed.undo_push(message="On a collection")
+    for _ in range(3):
+        assert ops().reroll_population('EXEC_DEFAULT', True) == {'FINISHED'}
+        assert ops().refine('EXEC_DEFAULT', True) == {'FINISHED'}
+        before = everything()
+        assert ops().update_population('EXEC_DEFAULT', True) == {'FINISHED'}
+        bpy.ops.ed.undo()
+        assert difference(before, everything()) == []
+        for _step in range(2):
+            bpy.ops.ed.undo()
+        assert scene().tetflora.populations[0].made == 12

@@ -1,0 +1,273 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Refine made goes through Blender's own exporters, and its importers bring back the same faces in the same place.
+
+Formats differ in what they hold. All four hold faces, UV maps and places; USD, OBJ and glTF the names of materials; USD
+attributes, so the colour of each leaf. glTF holds triangles, and a vertex for each normal that meets in it. Points,
+which microspheres are made of, come back from USD alone, and only where Blender lets add-ons fill point clouds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import addon_utils
+import bpy
+import numpy as np
+import pytest
+
+from devtools import session
+from tests.blender.scenes import add_camera, add_plant, depsgraph
+from tetflora_addon.blender import compat
+from tetflora_addon.blender.job import refine
+
+FORMATS = ("usdc", "abc", "obj", "glb")
+FORMS = ('MICROSURFACES', 'SHELLS')
+
+
+@dataclass
+class Surface:
+    """One mesh in world space, as far as any format can tell it."""
+
+    faces: int
+    triangles: int
+    vertices: int
+    area: float
+    low: np.ndarray
+    high: np.ndarray
+    materials: list[str]
+    uv: np.ndarray | None
+    attributes: dict[str, np.ndarray]
+
+
+def ready(blender_format: str) -> None:
+    """Enable what is an add-on among the exporters."""
+    if blender_format == "glb":
+        assert addon_utils.enable("io_scene_gltf2") is not None
+
+
+def is_absent(suffix: str) -> bool:
+    """Whether this Blender is built without the library of a format; then it has no exporter for it either."""
+    libraries = {"usdc": bpy.app.build_options.usd, "abc": bpy.app.build_options.alembic}
+    if libraries.get(suffix, True):
+        return False
+    names = {"usdc": "usd_export", "abc": "alembic_export"}
+    with pytest.raises(AttributeError):
+        getattr(bpy.ops.wm, names[suffix])()
+    return True
+
+
+def export(path: Path, **options: object) -> None:
+    ready(path.suffix[1:])
+    call: Callable = {
+        ".usdc": bpy.ops.wm.usd_export,
+        ".abc": bpy.ops.wm.alembic_export,
+        ".obj": bpy.ops.wm.obj_export,
+        ".glb": bpy.ops.export_scene.gltf,
+    }[path.suffix]
+    assert call(filepath=str(path), **options) == {'FINISHED'}
+
+
+def read_back(path: Path) -> None:
+    """Import into an empty file."""
+    session.clean_file()
+    ready(path.suffix[1:])
+    call: Callable = {
+        ".usdc": bpy.ops.wm.usd_import,
+        ".abc": bpy.ops.wm.alembic_import,
+        ".obj": bpy.ops.wm.obj_import,
+        ".glb": bpy.ops.import_scene.gltf,
+    }[path.suffix]
+    assert call(filepath=str(path)) == {'FINISHED'}
+    bpy.context.view_layer.update()
+
+
+def refined(form: str):
+    """Two plants of different species before a small camera, refined: real leaves, bark and proxies."""
+    session.clean_file()
+    scene = bpy.context.scene
+    add_camera(location=(0.0, -14.0, 3.0), rotation=(1.4, 0.0, 0.0))
+    scene.render.resolution_x = scene.render.resolution_y = 48
+    for n, species in enumerate(("bush", "conifer")):
+        add_plant(species, species, seed=n, location=(3.0 * n - 1.5, 0.0, 0.0))
+    scene.tetflora.proxy_form, scene.tetflora.leaf_limit = form, 0.3
+    refine.refine(scene, depsgraph())
+    bpy.context.view_layer.update()
+    return scene
+
+
+def plain(name: str) -> str:
+    """A name as every format spells it: some have underscores for spaces and brackets."""
+    return "".join(c if c.isalnum() else "_" for c in name)
+
+
+def surfaces() -> dict[str, Surface]:
+    """All meshes with faces by name, in world space."""
+    return {plain(o.name): measure(o) for o in bpy.context.scene.objects if o.type == 'MESH' and o.data.polygons}
+
+
+def measure(obj) -> Surface:
+    mesh = obj.data
+    places = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("co", places)
+    matrix = np.array(obj.matrix_world)
+    places = places.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
+    mesh.calc_loop_triangles()
+    corners = np.empty(3 * len(mesh.loop_triangles), np.int32)
+    mesh.loop_triangles.foreach_get("vertices", corners)
+    a, b, c = (places[corners.reshape(-1, 3)[:, i]] for i in range(3))
+    uv = None
+    if mesh.uv_layers:
+        uv = np.empty(2 * len(mesh.loops), np.float32)
+        mesh.uv_layers[0].uv.foreach_get("vector", uv)
+        uv = uv.reshape(-1, 2)
+    attributes = {}
+    for layer in mesh.attributes:
+        if layer.name.startswith("tf_"):
+            width = 3 if layer.data_type == 'FLOAT_VECTOR' else 1
+            values = np.empty(width * len(layer.data), np.float32)
+            layer.data.foreach_get("vector" if width == 3 else "value", values)
+            attributes[layer.name] = values
+    return Surface(
+        faces=len(mesh.polygons),
+        triangles=len(mesh.loop_triangles),
+        vertices=len(mesh.vertices),
+        area=float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2.0),
+        low=places.min(0),
+        high=places.max(0),
+        materials=[plain(m.name) for m in mesh.materials if m is not None],
+        uv=uv,
+        attributes=attributes,
+    )
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_what_was_refined_comes_back(blender, tmp_path, suffix, form):
+    if is_absent(suffix):
+        return
+    refined(form)
+    expected = surfaces()
+    assert {name.split("_")[-2] for name in expected} == {"bark", "leaf", "proxies"}
+    path = tmp_path / f"forest.{suffix}"
+    export(path)
+    read_back(path)
+    found = surfaces()
+    assert set(found) == set(expected)
+    for name, before in expected.items():
+        after = found[name]
+        assert after.triangles == before.triangles, name
+        if suffix != "glb":
+            assert (after.faces, after.vertices) == (before.faces, before.vertices), name
+        assert after.area == pytest.approx(before.area, rel=1e-4), name
+        np.testing.assert_allclose(after.low, before.low, atol=1e-4, err_msg=name)
+        np.testing.assert_allclose(after.high, before.high, atol=1e-4, err_msg=name)
+        if suffix != "abc":  # Alembic holds names of groups of faces, and Blender reads them only beside materials
+            assert after.materials == before.materials, name
+        assert (after.uv is None) == (before.uv is None), name
+        if before.uv is not None:
+            np.testing.assert_allclose(np.sort(after.uv, 0)[[0, -1]], np.sort(before.uv, 0)[[0, -1]], atol=1e-5)
+
+
+def test_usd_holds_the_colour_of_each_leaf(blender, tmp_path):
+    if is_absent("usdc"):
+        return
+    refined('MICROSURFACES')
+    expected = surfaces()
+    export(tmp_path / "forest.usdc")
+    read_back(tmp_path / "forest.usdc")
+    for name, after in surfaces().items():
+        before = expected[name].attributes
+        assert {"tf_colour", "tf_transmission"} <= set(before)
+        for key, values in before.items():
+            np.testing.assert_array_equal(after.attributes[key], values, err_msg=f"{name} {key}")
+
+
+def test_obj_holds_the_viewport_colour_of_each_material(blender, tmp_path):
+    refined('MICROSURFACES')
+    colours = {plain(m.name): tuple(m.diffuse_color)[:3] for m in bpy.data.materials}
+    export(tmp_path / "forest.obj")
+    read_back(tmp_path / "forest.obj")
+    read = {plain(m.name): tuple(m.diffuse_color)[:3] for m in bpy.data.materials}
+    assert read
+    for name, colour in read.items():
+        assert colour == pytest.approx(colours[name], abs=1e-3), name
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_parents_of_species_come_along(blender, tmp_path, suffix):
+    if is_absent(suffix):
+        return
+    refined('MICROSURFACES')
+    expected = {plain(o.name): plain(o.parent.name) for o in bpy.context.scene.objects if o.parent is not None}
+    assert set(expected.values()) == {"Bush__TetFlora_", "Conifer__TetFlora_"}
+    export(tmp_path / f"forest.{suffix}")
+    read_back(tmp_path / f"forest.{suffix}")
+    found = {plain(o.name): plain(o.parent.name) for o in bpy.context.scene.objects if o.parent is not None}
+    # OBJ knows no parents; USD has one more where materials are kept.
+    assert {name: found.get(name) for name in expected} == (dict.fromkeys(expected) if suffix == "obj" else expected)
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_microspheres_come_back_from_usd_alone(blender, tmp_path, suffix):
+    if is_absent(suffix):
+        return
+    refined('MICROSPHERES')
+    clouds = [o for o in bpy.context.scene.objects if o.get("tetflora_kind") == "proxy"]
+    points = sum(len(o.data.points if o.type == 'POINTCLOUD' else o.data.vertices) for o in clouds)
+    assert points > 100
+    expected = surfaces()
+    export(tmp_path / f"forest.{suffix}")
+    read_back(tmp_path / f"forest.{suffix}")
+    read = [o for o in bpy.context.scene.objects if o.type in {'POINTCLOUD', 'MESH'} and "proxies" in o.name]
+    found = sum(len(o.data.points if o.type == 'POINTCLOUD' else o.data.vertices) for o in read)
+    by_usd = suffix == "usdc" and compat.can_resize_point_clouds()
+    assert found == (points if by_usd else 0)
+    assert set(surfaces()) == set(expected)  # the rest is there all the same
+    if by_usd:
+        assert all({"radius", "tf_colour", "tf_transmission"} <= set(o.data.attributes.keys()) for o in read)
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_results_are_exported_by_themselves(blender, tmp_path, suffix):
+    """Nothing but results: as a selection once they are kept, since before nothing of them can be selected."""
+    if is_absent(suffix):
+        return
+    refined('MICROSURFACES')
+    expected = surfaces()
+    ground = bpy.data.objects.new("ground", bpy.data.meshes.new("ground"))
+    ground.data.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    bpy.context.scene.collection.objects.link(ground)
+    bpy.ops.object.select_all(action='SELECT')
+    assert ground.select_get()
+    assert not any(o.select_get() for o in bpy.data.collections["TetFlora"].objects)
+    assert bpy.ops.tetflora.keep_results() == {'FINISHED'}
+    bpy.ops.object.select_all(action='DESELECT')
+    for obj in bpy.data.collections["TetFlora kept"].objects:
+        obj.select_set(True)
+    option = {
+        "usdc": "selected_objects_only",
+        "abc": "selected",
+        "obj": "export_selected_objects",
+        "glb": "use_selection",
+    }[suffix]
+    export(tmp_path / f"selected.{suffix}", **{option: True})
+    read_back(tmp_path / f"selected.{suffix}")
+    assert set(surfaces()) == set(expected)
+
+
+@pytest.mark.parametrize(("suffix", "option"), [("usdc", "collection"), ("obj", "collection"), ("glb", "collection")])
+def test_the_collection_is_exported_by_name(blender, tmp_path, suffix, option):
+    """The exporters of a collection's own panel, which nothing has to be selected for."""
+    if is_absent(suffix):
+        return
+    refined('MICROSURFACES')
+    expected = surfaces()
+    ground = bpy.data.objects.new("ground", bpy.data.meshes.new("ground"))
+    ground.data.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    bpy.context.scene.collection.objects.link(ground)
+    export(tmp_path / f"collection.{suffix}", **{option: "TetFlora"})
+    read_back(tmp_path / f"collection.{suffix}")
+    assert set(surfaces()) == set(expected)

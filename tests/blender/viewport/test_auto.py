@@ -1,0 +1,285 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Refine Automatically: it follows changes, drops what is overtaken, and does nothing where nothing has changed."""
+
+from __future__ import annotations
+
+import json
+
+import bpy
+import pytest
+
+from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks
+from tetflora_addon.blender import compat
+from tetflora_addon.blender.job import refine
+from tetflora_addon.blender.results import collection
+from tetflora_addon.blender.viewport import auto
+from tetflora_addon.refinement.statistics import Progress
+
+
+@pytest.fixture
+def scene(clean_file):
+    add_camera(location=(0.0, -30.0, 3.0))
+    for i in range(3):
+        add_plant(f"tree {i}", seed=i, location=(4.0 * i - 4.0, 0.0, 0.0))
+    scene = bpy.context.scene
+    scene.render.resolution_x, scene.render.resolution_y = 120, 90
+    bpy.context.view_layer.update()
+    yield scene
+    scene.tetflora.auto_refine = False
+
+
+def settle(monkeypatch) -> int:
+    """Let time pass until nothing is left to do; the number of slices of work."""
+    monkeypatch.setattr(auto, "QUIET", 0.0)
+    monkeypatch.setattr(auto, "SLICE", 0.0)
+    auto._state.due = 0.0
+    slices = 0
+    while auto.tick() is not None:
+        slices += 1
+        assert slices < 10_000
+    return slices
+
+
+def changed(scene):
+    """Have Blender tell its handlers that the scene has changed, and no object in it."""
+    scene.render.resolution_percentage = scene.render.resolution_percentage
+    bpy.context.view_layer.update()
+
+
+def results(scene):
+    return collection.result_collections(scene, 'VIEW')
+
+
+def test_it_refines_when_it_is_switched_on(scene, monkeypatch):
+    assert not results(scene)
+    scene.tetflora.auto_refine = True
+    assert settle(monkeypatch) > 5
+    assert len(results(scene)) == 1
+    assert auto.message() == ""
+
+
+def test_nothing_is_done_where_nothing_has_changed(scene, monkeypatch):
+    scene.tetflora.auto_refine = True
+    settle(monkeypatch)
+    made = results(scene)[0]
+    auto.schedule(scene)
+    assert settle(monkeypatch) == 0
+    assert results(scene) == [made]
+
+
+@pytest.mark.parametrize("change", ["camera", "plant", "cutoff", "seed", "new", "form"])
+def test_what_changes_is_refined_again(scene, monkeypatch, change):
+    scene.tetflora.auto_refine = True
+    settle(monkeypatch)
+    made = results(scene)[0].name_full
+    uid = results(scene)[0].session_uid
+    plant = bpy.data.objects["tree 1"]
+    if change == "camera":
+        scene.camera.location.x += 1.0
+    elif change == "plant":
+        plant.location.x += 1.0
+    elif change == "cutoff":
+        scene.tetflora.cutoff *= 2.0
+    elif change == "seed":
+        plant.tetflora.seed += 1
+    elif change == "form":
+        scene.tetflora.proxy_form = 'MICROSURFACES'
+    else:
+        add_plant("another", seed=9, location=(0.0, 5.0, 0.0))
+    bpy.context.view_layer.update()
+    assert settle(monkeypatch) > 0
+    assert len(results(scene)) == 1
+    assert results(scene)[0].session_uid != uid, made
+
+
+@pytest.mark.parametrize("change", ["percentage", "aspect", "engine", "material", "leaf"])
+def test_settings_that_results_depend_on_are_heard(scene, monkeypatch, change):
+    """Blender says no more of them than that the scene has changed."""
+    scene.render.engine = 'CYCLES'
+    material, leaf = bpy.data.materials.new("own"), add_mesh("leaf")
+    scene.tetflora.auto_refine = True
+    settle(monkeypatch)
+    heard = []
+    monkeypatch.setattr(auto, "schedule", heard.append)
+    changed(scene)
+    heard.clear()
+    changed(scene)
+    assert not heard
+    if change == "percentage":
+        scene.render.resolution_percentage = 50
+    elif change == "aspect":
+        scene.render.pixel_aspect_x = 2.0
+    elif change == "engine":
+        scene.render.engine = compat.eevee_engine()
+    elif change == "material":
+        entry = scene.tetflora.output.species.add()
+        entry.species, entry.leaf = "bush", material
+    else:
+        entry = scene.tetflora.leaf_objects.add()
+        entry.species, entry.leaf = "bush", leaf
+    changed(scene)
+    assert heard == [scene]
+
+
+def test_what_has_nothing_to_do_with_plants_starts_nothing(scene, monkeypatch):
+    scene.tetflora.auto_refine = True
+    settle(monkeypatch)
+    made = results(scene)[0]
+    add_mesh("box")
+    bpy.data.materials.new("paint")
+    bpy.context.view_layer.update()
+    auto.schedule(scene)
+    assert settle(monkeypatch) == 0
+    assert results(scene) == [made]
+
+
+def test_a_change_in_the_middle_drops_what_is_half_made(scene, monkeypatch):
+    before = datablocks()
+    scene.tetflora.auto_refine = True
+    monkeypatch.setattr(auto, "SLICE", 0.0)
+    auto._state.due = 0.0
+    for _ in range(400):
+        auto.tick()
+        if results(scene) and results(scene)[0].objects:
+            break
+    assert results(scene)
+    auto.on_interruption()
+    assert datablocks() == before
+    assert settle(monkeypatch) > 5
+    assert results(scene)
+
+
+def test_switched_off_it_keeps_what_is_there_and_stops(scene, monkeypatch):
+    scene.tetflora.auto_refine = True
+    settle(monkeypatch)
+    scene.tetflora.auto_refine = False
+    scene.camera.location.x += 3.0
+    assert auto.tick() is None
+    assert len(results(scene)) == 1
+
+
+def test_what_cannot_be_refined_is_said(scene, monkeypatch):
+    bpy.data.objects["tree 0"].tetflora.species = "quercus"
+    scene.tetflora.auto_refine = True
+    settle(monkeypatch)
+    assert "quercus" in auto.message()
+    assert not results(scene)
+    bpy.data.objects["tree 0"].tetflora.species = "bush"
+    auto.schedule(scene)
+    settle(monkeypatch)
+    assert auto.message() == ""
+    assert results(scene)
+
+
+@pytest.mark.parametrize("moved", [False, True])
+def test_only_a_change_of_plants_stops_the_job_not_the_flags_that_results_update(scene, monkeypatch, moved):
+    scene.tetflora.auto_refine = True
+    changed(scene)  # settings as they are
+    monkeypatch.setattr(auto, "SLICE", 0.0)
+    auto._state.due = 0.0
+    for _ in range(5):
+        auto.tick()
+    job = auto._state.steps
+    assert job is not None
+    if moved:
+        bpy.data.objects["tree 1"].location.x += 1.0
+    else:  # Blender then updates flags of every object, as it does for results
+        scene.collection.children.link(bpy.data.collections.new("other"))
+    bpy.context.view_layer.update()
+    assert (auto._state.steps is job) == (not moved)
+    settle(monkeypatch)
+    assert len(results(scene)) == 1
+
+
+def test_a_plant_hidden_while_it_works_is_heard_afterwards(scene, monkeypatch):
+    scene.tetflora.auto_refine = True
+    changed(scene)
+    monkeypatch.setattr(auto, "SLICE", 0.0)
+    auto._state.due = 0.0
+    for _ in range(5):
+        auto.tick()
+    bpy.data.objects["tree 1"].hide_render = True
+    bpy.context.view_layer.update()
+    settle(monkeypatch)
+    assert json.loads(scene.tetflora.statistics)["plants"] == 2
+
+
+def half_make(scene, monkeypatch, collections):
+    """Have it work until so many collections have results, the last of which is not done."""
+    monkeypatch.setattr(auto, "SLICE", 0.0)
+    changed(scene)  # settings as they are
+    auto.schedule(scene)
+    auto._state.due = 0.0
+    while len(results(scene)) < collections or not results(scene)[-1].objects:
+        assert auto.tick() is not None
+
+
+def test_clear_takes_away_what_is_half_made_too(scene, monkeypatch):
+    before = datablocks()
+    scene.tetflora.auto_refine = True
+    settle(monkeypatch)
+    scene.tetflora.cutoff *= 2.0
+    half_make(scene, monkeypatch, 2)
+    assert bpy.ops.tetflora.clear() == {'FINISHED'}
+    assert datablocks() == before
+    assert auto.message() == ""
+    assert settle(monkeypatch) > 0  # it works on
+
+
+def test_what_refine_has_made_is_not_made_again(scene, monkeypatch):
+    scene.tetflora.auto_refine = True
+    settle(monkeypatch)
+    scene.tetflora.cutoff *= 2.0
+    assert bpy.ops.tetflora.refine() == {'FINISHED'}
+    made = results(scene)
+    auto.schedule(scene)
+    assert settle(monkeypatch) == 0
+    assert results(scene) == made
+    scene.tetflora.cutoff /= 2.0
+    auto.schedule(scene)
+    assert settle(monkeypatch) > 0
+
+
+def test_refine_is_alone(scene, monkeypatch):
+    scene.tetflora.auto_refine = True
+    half_make(scene, monkeypatch, 1)
+    assert bpy.ops.tetflora.refine() == {'FINISHED'}
+    assert len(results(scene)) == 1
+    scene.tetflora.cutoff *= 2.0
+    half_make(scene, monkeypatch, 2)
+    with auto.paused():  # as the operator does between redraws
+        assert auto.tick() == auto._BUSY
+        assert len(results(scene)) == 1
+    assert settle(monkeypatch) > 0
+
+
+def test_only_what_is_done_is_kept(scene, monkeypatch):
+    scene.tetflora.auto_refine = True
+    half_make(scene, monkeypatch, 1)
+    with pytest.raises(RuntimeError, match="has not finished"):
+        bpy.ops.tetflora.keep_results()
+    assert not results(scene)
+    settle(monkeypatch)
+    made = {obj.name for obj in results(scene)[0].objects}
+    scene.tetflora.cutoff *= 2.0
+    half_make(scene, monkeypatch, 2)
+    assert bpy.ops.tetflora.keep_results() == {'FINISHED'}
+    assert not results(scene)
+    assert {obj.name for obj in scene.objects if "tetflora_kind" in obj} == made
+
+
+def test_after_an_unexpected_error_it_says_so_and_can_begin_anew(scene, monkeypatch):
+    def broken(*_arguments, **_options):
+        yield Progress(0.0, "Reading the scene")
+        raise ZeroDivisionError("of another's making")
+
+    scene.tetflora.auto_refine = True
+    with monkeypatch.context() as patch:
+        patch.setattr(refine, "refine_steps", broken)
+        with pytest.raises(ZeroDivisionError):
+            settle(monkeypatch)
+    assert "another's making" in auto.message()
+    auto.schedule(scene)
+    assert settle(monkeypatch) > 0
+    assert results(scene) and auto.message() == ""

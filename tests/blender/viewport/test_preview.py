@@ -1,0 +1,240 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What viewports preview, as far as it is known without a window: levels, plants, a frozen camera; and what stays."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from tests.blender.scenes import add_camera, add_plant, datablocks, depsgraph
+from tetflora_addon import errors
+from tetflora_addon.blender.job import refine
+from tetflora_addon.blender.viewport import levels as preview_job
+from tetflora_addon.blender.viewport import overlay, state
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+
+def scene_of_plants(number=4):
+    camera = add_camera((0.0, -40.0, 4.0))
+    scene = bpy.context.scene
+    scene.render.resolution_x = scene.render.resolution_y = 160
+    scene.tetflora.cutoff, scene.tetflora.leaf_limit = 6.0, 2.0
+    plants = [add_plant(f"plant {i}", seed=i, location=(3.0 * i - 5.0, 0.0, 0.0)) for i in range(number)]
+    return scene, camera, plants
+
+
+def compute():
+    assert bpy.ops.tetflora.preview_levels() == {'FINISHED'}
+    return state.find(bpy.context.scene)
+
+
+def test_levels_are_those_of_refinement_and_leave_no_trace():
+    scene, _, _ = scene_of_plants()
+    before, statistics = datablocks(), scene.tetflora.statistics
+    preview = compute()
+    assert datablocks() == before
+    assert scene.tetflora.statistics == statistics
+    _, refinement = refine.partition(scene, depsgraph())
+    levels = preview.levels
+    assert len(levels) == refinement.passes > 1
+    assert levels.levels[-1].nodes.tolist() == refinement.nodes.tolist()
+    assert levels.levels[-1].decision.tolist() == refinement.decision.tolist()
+    assert scene.tetflora.preview.level == levels.levels[-1].number
+
+
+def test_shells_are_refined_as_refine_does():
+    scene, _, _ = scene_of_plants()
+    coarse = len(compute().levels.levels[-1])
+    scene.tetflora.proxy_form = 'SHELLS'
+    fine = compute().levels.levels[-1]
+    _, refinement = refine.partition(scene, depsgraph())
+    assert fine.nodes.tolist() == refinement.nodes.tolist()
+    assert len(fine) > coarse
+
+
+def test_stopped_halfway_nothing_changes():
+    scene, _, _ = scene_of_plants()
+    kept = compute().levels
+    steps = preview_job.level_steps(scene, depsgraph())
+    for _ in range(3):
+        next(steps)
+    steps.close()
+    assert state.find(scene).levels is kept
+
+
+def test_levels_are_outdated_when_the_camera_has_moved():
+    scene, camera, _ = scene_of_plants()
+    assert not state.is_outdated(scene)
+    compute()
+    assert not state.is_outdated(scene)
+    camera.location.x += 2.0
+    bpy.context.view_layer.update()
+    assert state.is_outdated(scene)
+    camera.location.x -= 2.0
+    bpy.context.view_layer.update()
+    assert not state.is_outdated(scene)
+    scene.render.resolution_x = 200
+    assert state.is_outdated(scene)
+
+
+@pytest.mark.parametrize(
+    ("owner", "name", "value"),
+    [
+        ("lens", "sensor_width", 20.0),
+        ("lens", "clip_start", 0.2),
+        ("focus", "use_dof", True),
+        ("picture", "pixel_aspect_x", 2.0),
+        ("picture", "use_multiview", True),
+    ],
+)
+def test_levels_are_outdated_when_lens_or_picture_are_others(owner, name, value):
+    scene, camera, _ = scene_of_plants()
+    compute()
+    setattr({"lens": camera.data, "focus": camera.data.dof, "picture": scene.render}[owner], name, value)
+    assert state.is_outdated(scene)
+
+
+def test_a_frozen_camera_stays_while_the_scenes_moves():
+    scene, camera, _ = scene_of_plants()
+    before = compute().levels
+    scene.tetflora.preview.freeze = True
+    assert state.find(scene).frozen is before.camera
+    camera.location = (0.0, 30.0, 2.0)
+    bpy.context.view_layer.update()
+    assert not state.is_outdated(scene)
+    again = compute().levels
+    assert again is not before
+    np.testing.assert_array_equal(again.camera.position, before.camera.position)
+    assert again.levels[-1].nodes.tolist() == before.levels[-1].nodes.tolist()
+    scene.tetflora.preview.freeze = False
+    np.testing.assert_allclose(compute().levels.camera.position, (0.0, 30.0, 2.0))
+
+
+def test_freezing_before_anything_is_computed_takes_the_camera_of_that_moment():
+    scene, camera, _ = scene_of_plants()
+    scene.tetflora.preview.freeze = True
+    camera.location = (0.0, 30.0, 2.0)
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(compute().levels.camera.position, (0.0, -40.0, 4.0), atol=1e-6)
+
+
+def test_without_a_camera_the_button_says_so():
+    add_plant()
+    assert not bpy.ops.tetflora.preview_levels.poll()
+    assert not bpy.ops.tetflora.forget_levels.poll()
+    bpy.context.scene.tetflora.preview.freeze = True  # nothing to freeze: said in the panel
+    assert state.find(bpy.context.scene).frozen is None
+    assert "camera" in state.find(bpy.context.scene).message
+
+
+def test_what_is_wrong_is_told():
+    scene, _, plants = scene_of_plants()
+    plants[0].tetflora.species = "gone"
+    with pytest.raises(errors.SceneError, match="gone"):
+        list(preview_job.level_steps(scene, depsgraph()))
+    scene.tetflora.preview.plants = 'LIGHT'
+    preview_job.read_shapes(scene, depsgraph())
+    assert "gone" in state.find(scene).message
+
+
+def test_levels_can_be_forgotten():
+    scene, _, _ = scene_of_plants()
+    preview = compute()
+    made = preview.made
+    assert bpy.ops.tetflora.forget_levels() == {'FINISHED'}
+    assert preview.levels is None
+    assert preview.made > made
+    assert not state.is_outdated(scene)
+
+
+@pytest.mark.parametrize(("form", "corners"), [('LIGHT', 3), ('BOUNDS', 2)])
+def test_plants_are_shown_where_they_stand(form, corners):
+    scene, _, plants = scene_of_plants()
+    plants[0].tetflora.enabled = False
+    before = datablocks()
+    scene.tetflora.preview.plants = form
+    shapes = preview_job.read_shapes(scene, depsgraph())
+    assert shapes.plants == shapes.of == len(plants) - 1
+    assert shapes.indices.shape[1] == corners
+    middles = shapes.positions.reshape(shapes.plants, -1, 3).mean(axis=1)
+    expected = sorted(plant.location.x for plant in plants[1:])
+    np.testing.assert_allclose(np.sort(middles[:, 0]), expected, atol=0.5)
+    assert datablocks() == before
+    scene.tetflora.preview.plants = 'NONE'
+    assert state.find(scene).shapes is None
+
+
+def test_figures_say_what_is_shown():
+    scene, camera, _ = scene_of_plants()
+    preview = compute()
+    settings = scene.tetflora.preview
+    for level in preview.levels.levels:
+        settings.level = level.number
+        text = "\n".join(line for line, _ in overlay.lines_of(scene, preview))
+        assert f"Level {level.number} of {preview.levels.levels[-1].number}" in text
+        assert f"{level.figures.proxy:,} proxies" in text
+        assert f"{level.figures.split:,} to split" in text
+        assert f"{level.figures.polygons:,} explicit polygons" in text
+    camera.location.x += 1.0
+    depsgraph()
+    assert "changed" in overlay.lines_of(scene, preview)[-1][0]
+    settings.freeze = True
+    assert "frozen" in overlay.lines_of(scene, preview)[-1][0]
+    colours = {colour for _, colour in overlay.lines_of(scene, preview)}
+    settings.colour = 'VISIBILITY'
+    assert {colour for _, colour in overlay.lines_of(scene, preview)} < colours
+
+
+def test_undo_keeps_levels_and_lets_go_of_what_was_frozen():
+    scene, _, _ = scene_of_plants()
+    levels = compute().levels
+    bpy.ops.ed.undo_push(message="before")
+    scene.tetflora.preview.plants = 'LIGHT'
+    preview_job.read_shapes(scene, depsgraph())
+    scene.tetflora.preview.freeze = True
+    bpy.ops.ed.undo_push(message="frozen")
+    bpy.ops.ed.undo()
+    scene = bpy.context.scene
+    state.bring_in_step(scene)  # as the handler does where there is a window
+    preview = state.find(scene)
+    assert preview.levels is levels
+    assert (preview.frozen, preview.shapes) == (None, None)
+    bpy.ops.ed.redo()
+    state.bring_in_step(bpy.context.scene)
+    assert preview.frozen is levels.camera
+
+
+def test_settings_survive_the_file_and_what_is_shown_does_not(tmp_path):
+    scene, _, _ = scene_of_plants()
+    settings = scene.tetflora.preview
+    compute()
+    settings.plants, settings.colour, settings.forms, settings.freeze = 'BOUNDS', 'LEVEL', {'PROXY'}, True
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    assert state.find(scene).levels is not None
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
+    scene = bpy.context.scene
+    settings = scene.tetflora.preview
+    assert (settings.plants, settings.colour, set(settings.forms), settings.freeze) == (
+        'BOUNDS',
+        'LEVEL',
+        {'PROXY'},
+        False,
+    )
+    found = state.find(scene)
+    assert found is None or (found.levels, found.shapes, found.frozen) == (None, None, None)
+
+
+def test_nothing_draws_or_waits_in_the_background():
+    scene, _, _ = scene_of_plants()
+    scene.tetflora.preview.plants = 'LIGHT'
+    assert overlay._handles == []
+    assert not bpy.app.timers.is_registered(preview_job._on_timer)
+
+
+def test_every_setting_has_a_name_of_its_own():
+    properties = state.TetFloraPreview.bl_rna.properties
+    names = [p.name for p in properties if p.identifier not in {"rna_type", "name"}]
+    assert len(names) == len(set(names)) == 8

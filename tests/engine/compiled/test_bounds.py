@@ -1,0 +1,239 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bounds of sub-plants against plants that are grown: no vertex of any seed is outside, and little else is inside."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.engine import support
+from tetflora_addon.compiled.bounds import ring_stretch, unit_bounds, widest_radii
+from tetflora_addon.compiled.flora import Flora
+from tetflora_addon.growth.branches import Branches
+from tetflora_addon.subplants.pieces import open_subplants
+from tetflora_addon.subplants.sides import body_distances, bounding_bodies, crossing
+
+_FLOAT32 = 1e-6  # relative rounding of vertices
+
+
+def vertices(flora: Flora, subplant: Branches) -> np.ndarray:
+    """All vertices (v, 3) of one sub-plant."""
+    tubes, leaves = support.meshes(flora, support.expanded(flora, subplant))
+    return np.concatenate([mesh.positions for mesh in (*tubes, *leaves)]).astype(np.float64)
+
+
+def outside(flora: Flora, subplants: Branches) -> float:
+    """How far the farthest vertex of any sub-plant lies outside its body, as a fraction of the body's size."""
+    worst = -1.0
+    bodies = bounding_bodies(flora, subplants)
+    for i, (*_, radius, half, pad) in enumerate(bodies.T):
+        centre, axis = bodies[:3, i], bodies[3:6, i]
+        points = vertices(flora, subplants.take(np.array([i]))) - centre
+        along = points @ axis
+        across = np.linalg.norm(points - along[:, None] * axis, axis=1)
+        beyond = np.hypot(np.maximum(np.abs(along) - half, 0), np.maximum(across - radius, 0)) - pad
+        worst = max(worst, beyond.max() / (radius + half + pad + np.abs(centre).max()))
+    return worst
+
+
+def check_sides(flora: Flora, subplants: Branches, seed: int, directions: int = 6) -> None:
+    """What `crossing` promises, at planes that just touch the vertices and at such that keep off them.
+
+    A plane that cuts off a vertex is crossed, whatever the vertex belongs to. One that keeps off by no more than what
+    the box of a leaf or the sphere around a ring has room for is not. Either way round, the side is that of the base.
+    """
+    rng = np.random.default_rng(seed)
+    rows = flora.rows
+    boxes = np.linalg.norm(flora.leaf_box[:, 1], axis=1)
+    leaf = (rows["leaf_size"].sum(axis=1) * np.maximum(rows["leaf_size_tip"], 1) * boxes).max()
+    for i in range(len(subplants)):
+        one = subplants.take(np.full(directions, i))
+        points = vertices(flora, one.take(np.s_[:1]))
+        size = np.abs(points).max()
+        normal = rng.normal(size=(directions, 3))
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        support_of = (points @ normal.T).max(axis=0)
+        room = leaf * one.scale[0] + 2 * one.radius[0] * flora.widest[one.row[0]] + _FLOAT32 * size
+        turn = rng.choice([-1.0, 1.0], directions)
+
+        def planes(offset: np.ndarray, normal: np.ndarray = normal, turn: np.ndarray = turn) -> np.ndarray:
+            return turn[:, None] * np.column_stack([normal, -offset])
+
+        base = np.einsum("ni,ni->n", normal, one.position)
+        cutting = support_of - 10 * _FLOAT32 * size
+        crosses, side = crossing(flora, one, planes(cutting))
+        told = cutting > base + _FLOAT32 * size  # else the base itself is what is cut off, and the rest lies on a side
+        assert crosses[told].all()
+        np.testing.assert_array_equal(side[told], (turn < 0)[told])
+        crosses, side = crossing(flora, one, planes(support_of + room))
+        assert not crosses.any()
+        np.testing.assert_array_equal(side, turn < 0)
+
+
+@pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
+def test_every_vertex_of_many_plants_is_inside_the_bound(species: int) -> None:
+    """As many as half a million polygons make, at most 100; `benchmarks bounds` takes a thousand of each."""
+    flora = support.flora()
+    number = min(100, max(1, int(5e5 / flora.polygons[flora.first_row[species]])))
+    trunk = support.trunks(flora.rows, support.plants(np.arange(number), species))
+    assert outside(flora, trunk) < _FLOAT32
+
+
+@pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
+def test_subplants_of_all_orders(species: int) -> None:
+    """Every vertex is inside their bounds, and what they cross is what their vertices cross."""
+    flora = support.flora()
+    level = support.trunks(flora.rows, support.plants([1, 2], species))
+    check_sides(flora, level.take(np.s_[:1]), species, 12)
+    while len(level):
+        level, *_ = open_subplants(flora, level.take(np.s_[:: max(1, len(level) // 12)]))
+        some = level.take(np.s_[:: max(1, len(level) // 8)])
+        assert outside(flora, some) < _FLOAT32
+        check_sides(flora, some, species)
+
+
+def ranges(low: float, high: float, most: float) -> st.SearchStrategy[list[float]]:
+    """Mean and variation, both within limits."""
+    return st.floats(0, most).flatmap(lambda v: st.tuples(st.floats(low + v, high - v), st.just(v))).map(list)
+
+
+SHAPES = st.fixed_dictionaries(
+    {
+        "curvature": ranges(-360, 360, 60),
+        "curvature_tip": st.floats(-300, 300),
+        "attraction": st.one_of(st.just([0, 0]), ranges(-300, 300, 90)),
+        "segments": st.integers(1, 12),
+        "taper": st.floats(0, 1),
+        "flare": st.sampled_from([0.0, 0.0, 1.0, 4.0]),
+        "pipe": st.sampled_from([0.0, 1.5, 2.0, 3.0]),
+        "branch_start": ranges(0, 0.99, 0.2),
+        "crown": st.sampled_from(["conical", "flame", "inverse conical", "tend flame", "spherical", "receding"]),
+        "count_by_length": st.floats(0, 1),
+        "forks": st.sampled_from([[0, 0], [0, 0], [2, 1], [3, 0]]),
+        "fork_at": st.floats(0.05, 0.95),
+        "fork_angle": ranges(0, 120, 40),
+        "fork_levels": st.integers(1, 2),
+        "spurs": st.sampled_from([[0, 0], [3, 2]]),
+        "leaf_droop": st.sampled_from([0.0, 0.6, 1.0]),
+        "leaf_spray": st.sampled_from([0.0, 1.0]),
+        "leaf_size_tip": st.sampled_from([1.0, 0.3, 3.0]),
+        "leaf_whorl": st.integers(1, 3),
+        "leaf_start": ranges(0, 0.99, 0.2),
+    }
+)
+LEANS = st.fixed_dictionaries(
+    {
+        "angle": ranges(0, 180, 40),
+        "angle_tip": st.floats(0, 180),
+        "spray": st.sampled_from([0.0, 1.0]),
+    }
+)
+SPUR: dict[str, Any] = {
+    "length": [0.3, 0.2], "thickness": [0.05, 0.02], "flare": 2.0, "segments": 3, "curvature": [90, 60],
+    "angle": [60, 40], "leaves": [4, 2], "leaf_size": [0.15, 0.05], "leaf_droop": 0.5,
+}  # fmt: skip
+
+
+def any_species(first: dict, second: dict, leans: list[dict]) -> Flora:
+    """Branches that curl, fork, hang, flare and lean back: the extremes of the keys, not of the shipped species."""
+    data = support.small(order0=first, order1={**second, **leans[0]}, order2=leans[1], spur=SPUR)
+    keys = (
+        "curvature",
+        "curvature_tip",
+        "attraction",
+        "segments",
+        "leaf_droop",
+        "leaf_size_tip",
+        "leaf_whorl",
+        "flare",
+    )
+    data["orders"][2].update({key: first[key] for key in keys})
+    # Forks multiply: three times three stems and what they bear would be slow to grow, not harder to bound.
+    data["orders"][1]["fork_levels"] = 1
+    for order in data["orders"]:
+        order["branches"] = [min(order.get("branches", [0])[0], 3), 0]
+    return support.compiled(data)
+
+
+@given(SHAPES, SHAPES, st.lists(LEANS, min_size=2, max_size=2), st.integers(0, 10**6))
+@settings(deadline=None, max_examples=20)
+def test_bounds_and_sides_hold_for_any_species(first: dict, second: dict, leans: list[dict], seed: int) -> None:
+    """Attraction, forks, short shoots, flares, the pipe model, leaves that hang; trunks, limbs and twigs."""
+    flora = any_species(first, second, leans)
+    trunk = support.trunks(flora.rows, support.plants(seed, scale=1.7, position=(1, 2, 3)))
+    limbs, *_ = open_subplants(flora, trunk)
+    twigs, *_ = open_subplants(flora, limbs.take(np.s_[:4]))
+    for some in (trunk, limbs.take(np.s_[:: max(1, len(limbs) // 3)]), twigs.take(np.s_[:3])):
+        assert outside(flora, some) < _FLOAT32
+        check_sides(flora, some, seed, 4)
+
+
+@pytest.mark.parametrize("whorl", [2, 3])
+def test_whorls_are_told_to_the_last_leaf(whorl: int) -> None:
+    """Branches and leaves that share their places."""
+    change = {"whorl": whorl, "leaf_whorl": whorl, "branches": [6, 0], "leaves": [6, 0]}
+    flora = support.compiled(
+        support.small(order0={"branches": [6, 0]}, order1=change, order2={**change, "branches": [0, 0]})
+    )
+    trunk = support.trunks(flora.rows, support.plants(np.arange(3)))
+    limbs, *_ = open_subplants(flora, trunk)
+    for some in (trunk, limbs.take(np.s_[:6])):
+        check_sides(flora, some, whorl)
+
+
+@given(ranges(-360, 360, 180), st.floats(-360, 360), st.integers(1, 6), st.integers(0, 10**6))
+@settings(deadline=None, max_examples=60)
+def test_rings_at_joints_are_no_wider_than_said(curvature: list, tip: float, segments: int, seed: int) -> None:
+    bare = {"curvature": curvature, "curvature_tip": tip, "segments": segments, "taper": 1, "sides": 32}
+    data = support.small(order0={**bare, "branches": [0, 0]})
+    flora = support.compiled({**data, "orders": data["orders"][:1]})
+    trunk, pieces = support.grown(flora, support.plants(seed))
+    [tube], _ = support.meshes(flora, pieces)
+    rings = tube.positions.reshape(segments + 1, 32, 3).astype(float)
+    widest = np.linalg.norm(rings - rings.mean(axis=1, keepdims=True), axis=2).max()
+    assert widest <= trunk.radius[0] * ring_stretch(flora.rows)[0] * (1 + 1e-5)
+
+
+def test_a_right_angle_makes_wide_rings() -> None:
+    """Two frames a right angle apart, turned about the diagonal between their axes: the worst that is said."""
+    cosine = 0.0
+    diagonal = np.array([1.0, 1.0, 0.0]) / np.sqrt(2)
+    cross = np.cross(np.eye(3), diagonal)
+    turned = cosine * np.eye(3) - cross + (1 - cosine) * np.outer(diagonal, diagonal)
+    x, y = (v / np.linalg.norm(v) for v in (np.eye(3)[:, :2] + turned[:, :2]).T)
+    rows = support.compiled(support.small(order0={"segments": 2, "curvature": [0, 0], "curvature_tip": 180})).rows
+    assert np.sqrt(1 + abs(x @ y)) == pytest.approx(ring_stretch(rows)[0])
+    assert ring_stretch(rows)[0] == pytest.approx(2 / np.sqrt(3))
+
+
+def test_a_flare_of_children_widens_their_parents() -> None:
+    flora = support.compiled(support.small(order1={"thickness": [0.9, 0.1], "flare": 4.0}))
+    assert widest_radii(flora.rows)[0] == pytest.approx(5.0)
+    assert outside(flora, support.trunks(flora.rows, support.plants(np.arange(20)))) < _FLOAT32
+
+
+def test_what_is_longer_has_the_larger_bound() -> None:
+    short, long = (
+        unit_bounds(support.compiled(support.small(order1={"length": [length, 0.05]})).rows)[0] for length in (0.3, 0.6)
+    )
+    assert (np.abs(long) >= np.abs(short)).all()
+    assert long[0] > 1.5 * short[0]
+
+
+def test_bodies_and_planes() -> None:
+    """A body reaches to the sides of planes as far as a cylinder with rounded edges does."""
+    body = np.array([[1.0, 2.0, 3.0, 0.0, 0.0, 1.0, 0.5, 2.0, 0.25]]).T
+    for normal, reach in (((0, 0, 1), 2.25), ((1, 0, 0), 0.75), ((0, 0.6, 0.8), 0.3 + 1.6 + 0.25)):
+        distance, found = body_distances(body, np.array([[*normal, -1.0]]))
+        assert distance[0] == pytest.approx(np.dot(normal, [1, 2, 3]) - 1)
+        assert found[0] == pytest.approx(reach)
+
+
+def test_no_subplants_cross_nothing() -> None:
+    crosses, side = crossing(support.small_flora(), Branches.empty(), np.zeros((0, 4)))
+    assert crosses.shape == side.shape == (0,)

@@ -1,0 +1,91 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Microspheres stand for facets: one each, in the same place, covering as much of the picture, in the same colours."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from tests.engine import support
+from tests.engine.emission.test_emission import scene
+from tetflora_addon.arrays import unit
+from tetflora_addon.camera.camera import Camera
+from tetflora_addon.emission import facets as facet_emission
+from tetflora_addon.emission.facets import LEAST_COVER, facing, spheres
+from tetflora_addon.emission.forms import Refined, facet_blocks, sphere_blocks
+from tetflora_addon.proxies.microsurfaces import Facets, facet_mesh
+
+EYE = np.array([2.0, -30.0, 4.0])
+
+
+def squares(n: int = 20_000) -> Facets:
+    """Facets turned at random, of several sizes and colours, in a box of two metres."""
+    random = np.random.default_rng(3)
+    across, along = np.linalg.qr(random.normal(size=(n, 3, 2)))[0].transpose(2, 0, 1)
+    centre, side = random.uniform(-1, 1, (n, 3)), random.uniform(0.01, 0.05, n)
+    return Facets(centre, across, along, side, random.random((n, 3)), random.random(n))
+
+
+def camera(kind: str = "PERSP") -> Camera:
+    frame = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    return Camera(kind, EYE, frame, (-0.4, 0.4, -0.3, 0.3), 0.1, 100.0, 200, 150)
+
+
+def discs(radius: np.ndarray) -> np.ndarray:
+    return np.pi * radius.astype(np.float64) ** 2
+
+
+@pytest.mark.parametrize("kind", ["PERSP", "ORTHO", "PANO"])
+def test_what_a_facet_covers_for_the_camera_its_sphere_covers(kind: str) -> None:
+    """By the corners of the facets themselves, projected; but for those that are seen from their edge."""
+    facets, view = squares(), camera(kind)
+    made = spheres([(facets, True)], view)
+    vectors = support.face_vectors(facet_mesh(facets))
+    sight = np.array([0.0, 1.0, 0.0]) if kind == "ORTHO" else unit(facets.centre - EYE)
+    shown = np.abs((vectors * sight).sum(axis=1))
+    edge = facing(facets, view) < LEAST_COVER
+    assert discs(made.radius)[~edge] == pytest.approx(shown[~edge], rel=1e-3, abs=1e-7)
+    assert edge.mean() < 1.2 * LEAST_COVER
+    assert discs(made.radius).sum() == pytest.approx(shown.sum(), rel=0.02)
+
+
+def test_what_nobody_sees_casts_the_same_shadow_on_average_over_all_lights() -> None:
+    facets = squares()
+    made = spheres([(facets, False)], camera())
+    vectors = support.face_vectors(facet_mesh(facets))
+    lights = unit(np.random.default_rng(5).normal(size=(400, 3)))
+    shadow = np.abs(vectors[:300] @ lights.T).mean(axis=1)
+    assert discs(made.radius)[:300] == pytest.approx(shadow, rel=0.25)
+    assert discs(made.radius).sum() == pytest.approx((facets.side**2).sum() / 2, rel=1e-5)
+
+
+def test_places_and_looks_are_those_of_the_facets() -> None:
+    some, others = squares(50), squares(30)
+    made = spheres([(some, True), (others, False)], camera())
+    assert made.polygons == 80
+    for values, name in ((made.positions, "centre"), *((v, k.removeprefix("tf_")) for k, v in made.attributes.items())):
+        expected = np.concatenate([getattr(part, name) for part in (some, others)])
+        assert (values == expected.astype(np.float32)).all()
+
+
+def test_a_refinement_has_a_sphere_for_each_facet(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In blocks of bounded size; leaves that lie flat cover less than half of their area for a level view."""
+    flora, _, view, result = scene()
+    facets = list(facet_blocks(Refined(flora, result, view, 0.33)))
+    area = sum(support.face_areas(block).sum() for block in facets)
+    whole = sum(block.polygons for block in facets)
+    monkeypatch.setattr(facet_emission, "FACETS_AT_ONCE", 300)
+    monkeypatch.setattr(facet_emission, "BLOCK_POLYGONS", 700)
+    blocks = list(sphere_blocks(Refined(flora, result, view, 0.33)))
+    assert sum(block.polygons for block in blocks) == whole
+    begun = [a for a, b in pairwise(blocks) if a.species == b.species]
+    assert min(block.polygons for block in begun) >= 700
+    assert max(block.polygons for block in blocks) < 2 * 700
+    cover = sum(discs(block.radius).sum() for block in blocks)
+    assert 0.2 * area < cover < 0.5 * area
+    again = list(sphere_blocks(Refined(flora, replace(result), view, 0.33)))
+    assert all((a.radius == b.radius).all() for a, b in zip(blocks, again, strict=True))

@@ -1,0 +1,160 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shells keep what the shader relies on: closed, outward faces and exact thickness, wherever the cells are."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tetflora_addon.emission.shells import barycentric_gradients, mean_extinction, shell_buffers
+
+
+def cells(seed: int, count: int = 20, origin: float = 0.0) -> np.ndarray:
+    return np.random.default_rng(seed).normal(size=(count, 4, 3)) + origin
+
+
+def build(vertices: np.ndarray, **changes):
+    count = len(vertices)
+    values = {
+        "colour": np.full((count, 3), 0.2),
+        "transmission": np.full(count, 0.3),
+        "S": np.tile([4.0, 1.0, 9.0, 0.0, 0.0, 0.0], (count, 1)),
+        "normal": np.tile([0.0, 0.0, 2.0], (count, 1)),
+        "plane": np.full(count, 0.5),
+    }
+    return shell_buffers(vertices, **{**values, **changes})
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 5000.0]))
+def test_faces_point_outwards_and_enclose_the_volume(seed, origin):
+    vertices = cells(seed, origin=origin)
+    buffers = build(vertices)
+    local = buffers.positions.astype(np.float64).reshape(-1, 4, 3)
+    corners = buffers.positions.astype(np.float64)[buffers.corner_verts].reshape(-1, 4, 3, 3)
+    relative = corners - local.mean(axis=1)[:, None, None]
+    signed = np.einsum("nfi,nfi->n", relative[:, :, 0], np.cross(relative[:, :, 1], relative[:, :, 2])) / 6.0
+    spans = vertices[:, 1:] - vertices[:, :1]
+    volume = np.abs(np.linalg.det(spans)) / 6.0
+    # Doubles minus the rounding of positions to 32 bits, which at 5 km is .25 mm.
+    np.testing.assert_allclose(signed, volume, atol=1e-5 + origin * 2e-6)
+
+
+def test_edges_belong_to_their_corners():
+    buffers = build(cells(1, 3))
+    following = buffers.corner_verts.reshape(-1, 3)[:, [1, 2, 0]].ravel()
+    wanted = np.sort(np.stack([buffers.corner_verts, following], axis=1), axis=1)
+    np.testing.assert_array_equal(np.sort(buffers.edge_verts[buffers.corner_edges], axis=1), wanted)
+    assert len(np.unique(buffers.edge_verts, axis=0)) == 18
+    assert np.bincount(buffers.corner_edges).tolist() == [2] * 18
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 5000.0]))
+def test_exit_distance_from_the_attributes_is_the_true_one(seed, origin):
+    """From a point on a face into the cell: the least λ / −(∇λ·ω) equals the intersection with the other faces."""
+    rng = np.random.default_rng(seed)
+    vertices = cells(seed, 8, origin)
+    buffers = build(vertices)
+    gradients = np.stack([buffers.attributes[f"tf_g{k}"][1][::4] for k in (1, 2, 3)], axis=1).astype(np.float64)
+    local = buffers.positions.astype(np.float64).reshape(-1, 4, 3)
+    weights = rng.dirichlet([1.0, 1.0, 1.0], size=8)
+    inside = rng.dirichlet([2.0, 2.0, 2.0, 2.0], size=8)
+    # Enter through the face opposite vertex 0, towards an inner point.
+    entry_weights = np.concatenate([np.zeros((8, 1)), weights], axis=1)
+    # Undo the rounding of positions: thickness must not depend on where the cell is.
+    exact = np.where(
+        (np.abs(local - vertices).max(axis=(1, 2)) < 1e-2)[:, None, None], vertices, vertices[:, [0, 2, 1, 3]]
+    )
+    entry = np.einsum("nk,nki->ni", entry_weights, exact)
+    direction = np.einsum("nk,nki->ni", inside, exact) - entry
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    coordinates = np.concatenate([1.0 - weights.sum(axis=1, keepdims=True), weights], axis=1)
+    slopes = np.einsum("nki,ni->nk", gradients, direction)
+    slopes = np.concatenate([-slopes.sum(axis=1, keepdims=True), slopes], axis=1)
+    falling = slopes[:, 1:] < 0
+    exits = np.where(falling, coordinates[:, 1:] / np.where(falling, -slopes[:, 1:], 1.0), np.inf).min(axis=1)
+    system = np.concatenate([exact.transpose(0, 2, 1), np.ones((8, 1, 4))], axis=1)
+    at_exit = np.concatenate([entry + exits[:, None] * direction, np.ones((8, 1))], axis=1)
+    left = np.linalg.solve(system, at_exit[..., None])[..., 0]
+    assert np.abs(left.min(axis=1)).max() < 1e-4
+    assert (exits > 0).all()
+
+
+def test_gradients_are_those_of_barycentric_coordinates():
+    vertices = cells(3, 50)
+    gradients, flat = barycentric_gradients(vertices)
+    spans = vertices[:, 1:] - vertices[:, :1]
+    np.testing.assert_allclose(np.einsum("nki,nji->nkj", gradients, spans), np.tile(np.eye(3), (50, 1, 1)), atol=1e-9)
+    assert not flat.any()
+
+
+def test_flat_cells_hold_nothing():
+    vertices = cells(4, 2)
+    vertices[1, 3] = vertices[1, :3].mean(axis=0)
+    buffers = build(vertices)
+    for name, (_, values) in buffers.attributes.items():
+        assert np.isfinite(values).all(), name
+    assert buffers.attributes["tf_kappa"][1][4:].tolist() == [0.0] * 4
+    assert (buffers.attributes["tf_kappa"][1][:4] > 0).all()
+
+
+def test_mean_extinction():
+    np.testing.assert_allclose(mean_extinction([[4.0, 4.0, 4.0, 0.0, 0.0, 0.0]]), 2.0, rtol=1e-12)
+    # Flakes of one orientation: the mean of |cos| over the sphere is one half, whatever the orientation.
+    axes = np.random.default_rng(0).normal(size=(20, 3))
+    x, y, z = (axes / np.linalg.norm(axes, axis=1)[:, None]).T
+    np.testing.assert_allclose(
+        mean_extinction(np.stack([x * x, y * y, z * z, x * y, x * z, y * z], axis=1)), 0.5, rtol=0.02
+    )
+
+
+def test_no_cells_and_wrong_shapes():
+    assert build(np.zeros((0, 4, 3))).polygons == 0
+    with pytest.raises(ValueError, match="normal must have shape"):
+        build(cells(1), normal=np.zeros((3, 3)))
+    with pytest.raises(ValueError, match="vertices must have shape"):
+        shell_buffers(np.zeros((5, 3)), *[np.zeros(5)] * 5)
+
+
+def test_rank_writes_cells_back_to_front():
+    """Whoever blends faces in their order then sees the farthest first; all attributes go with their cells."""
+    vertices = cells(5, 30)
+    rank = np.random.default_rng(6).permutation(30)
+    light = np.random.default_rng(7).random((30, 4, 3))
+    colour = np.random.default_rng(8).random((30, 3))
+    plain = build(vertices, colour=colour, light=light)
+    ranked = build(vertices, colour=colour, light=light, rank=rank)
+    order = np.argsort(-rank)
+    for name, (domain, values) in plain.attributes.items():
+        moved = values.reshape(30, 4, *values.shape[1:])[order].reshape(values.shape)
+        assert ranked.attributes[name][0] == domain
+        np.testing.assert_array_equal(ranked.attributes[name][1], moved, err_msg=name)
+    np.testing.assert_array_equal(ranked.positions, plain.positions.reshape(30, 4, 3)[order].reshape(-1, 3))
+    np.testing.assert_array_equal(ranked.corner_verts, plain.corner_verts)
+
+
+def test_light_stays_with_its_corner():
+    """Cells of either orientation: the radiance that is written is that of the position beside it."""
+    vertices = cells(9, 40)
+    light = vertices @ np.array([[1.0, 0.0, 2.0], [0.5, 1.0, 0.0], [0.0, 3.0, 1.0]])
+    buffers = build(vertices, light=light)
+    written = np.stack([buffers.attributes[f"tf_light{k}"][1][::4] for k in range(4)], axis=1)
+    places = buffers.positions.reshape(40, 4, 3).astype(np.float64)
+    expected = places @ np.array([[1.0, 0.0, 2.0], [0.5, 1.0, 0.0], [0.0, 3.0, 1.0]])
+    np.testing.assert_allclose(written, expected, atol=1e-5)
+    assert not any(name.startswith("tf_light") for name in build(vertices).attributes)
+    with pytest.raises(ValueError, match="light must have shape"):
+        build(vertices, light=light[:, :3])
+
+
+def test_the_noise_of_a_cell_is_even_and_its_own():
+    vertices = cells(10, 4000, 5000.0)
+    noise = build(vertices).attributes["tf_random"][1][::4]
+    assert 0.0 <= noise.min() <= noise.max() < 1.0
+    # Standard deviation of the mean of 4,000 even numbers: .0046.
+    assert abs(noise.mean() - 0.5) < 0.02
+    assert np.histogram(noise, 8, (0.0, 1.0))[0].min() > 400
+    turned = np.random.default_rng(1).permuted(np.arange(4))
+    np.testing.assert_array_equal(build(vertices[::-1][:, turned]).attributes["tf_random"][1][::4][::-1], noise)

@@ -1,0 +1,99 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sizes of facets: as asked for where they are seen; larger the deeper they are hidden and the farther off the view."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import settings as examples
+from hypothesis import strategies as st
+
+from tests.engine import support
+from tests.engine.emission.test_emission import scene
+from tetflora_addon.proxies.facet_sizes import COARSE, COARSEST, FacetSizes, coarseness, subplant_facet_sizes
+from tetflora_addon.proxies.microsurfaces import facet_mesh, subplant_facets
+from tetflora_addon.refinement.contents import Contents
+from tetflora_addon.refinement.decisions import Decision
+
+PIXELS = 0.33
+PLANTS = 200
+
+
+def sizes(clearance: float, coarse: float, extent: float = 0.01) -> tuple[FacetSizes, Contents]:
+    """Of plants so many metres beside a view whose pixels span so many metres there."""
+    flora = support.small_flora()
+    contents = Contents.of_plants(flora, support.plants(np.arange(PLANTS)))
+    camera = SimpleNamespace(
+        extent_around=lambda points: np.full(len(points), extent),
+        clearance=lambda points: np.full(len(points), clearance),
+    )
+    return subplant_facet_sizes(flora, contents, camera, np.array([coarse])), contents
+
+
+@given(st.floats(-100.0, 1e5), st.floats(1e-4, 10.0))
+@examples(deadline=None, max_examples=20)
+def test_what_is_seen_is_as_fine_as_asked_for(clearance: float, extent: float) -> None:
+    seen, _ = sizes(clearance, 1.0, extent)
+    leaf, wood = seen.sides(PIXELS)
+    assert not seen.hidden.any()
+    assert np.allclose(wood, PIXELS * extent)
+    assert np.allclose(leaf, np.maximum(PIXELS * extent, np.sqrt(seen.one_leaf)))
+
+
+@given(st.floats(0.0, 1e5), st.floats(1.0, 4.0), st.floats(COARSE, COARSEST), st.floats(1e-4, 10.0))
+@examples(deadline=None, max_examples=20)
+def test_facets_grow_with_the_way_to_the_view_and_with_what_hides_them(
+    clearance: float, times: float, coarse: float, extent: float
+) -> None:
+    near, far = sizes(clearance, COARSE, extent)[0], sizes(times * clearance, coarse, extent)[0]
+    for one, other in zip(near.sides(PIXELS), far.sides(PIXELS), strict=True):
+        assert (one <= other * (1 + 1e-12)).all()
+
+
+def test_no_budget_makes_blots_of_what_is_deeply_hidden() -> None:
+    """Where facets are large already, depth makes them no larger; nothing is smaller than behind one crown."""
+    for pixels in (0.1, 0.33, 0.9, 1.1, 4.0, 20.0):
+        one, deep = (sizes(0.0, coarse, extent=1.0)[0].sides(pixels)[0] for coarse in (COARSE, COARSEST))
+        assert (deep <= np.maximum(one, 3.0) * (1 + 1e-12)).all()
+        assert (deep >= one).all()
+
+
+@pytest.mark.parametrize("clearance", [3.0, 30.0, 300.0, 1e6])
+def test_shadows_from_beside_the_view_keep_their_area(clearance: float) -> None:
+    """However far a plant is, some facets of it are left, and they cover what it covers."""
+    flora = support.small_flora()
+    beside, contents = sizes(clearance, COARSE)
+    mesh = facet_mesh(subplant_facets(flora, contents.subplants.items, *beside.sides(PIXELS)))
+    amounts = contents.subplants.amounts
+    optical = (amounts.leaf_area + amounts.wood_area / 2).sum()
+    assert support.face_areas(mesh).sum() == pytest.approx(optical, rel=0.05)
+    assert mesh.polygons == pytest.approx(beside.counts(PIXELS).sum(), rel=0.05)
+    assert mesh.polygons >= 4 * PLANTS
+
+
+def test_a_plant_far_beside_the_view_is_a_handful_of_facets() -> None:
+    counts = [sizes(clearance, COARSE, 1e-3)[0].counts(PIXELS).mean() for clearance in (0.0, 10.0, 100.0, 1000.0)]
+    assert (np.diff(counts) <= 0).all()
+    assert counts[0] > 4 * counts[-1]
+    assert counts[-1] < 16
+
+
+def test_deeper_hidden_is_coarser() -> None:
+    """Seen nodes are not; beside the view, where nothing is in front, it is the distance that counts."""
+    *_, result = scene()
+    coarse = coarseness(result)
+    hidden = result.chosen(Decision.HIDDEN)
+    assert (coarse[~hidden] == 1.0).all()
+    assert (coarse[hidden & ~result.in_view] == COARSE).all()
+    for light, expected in ((0.02, COARSE), (1e-3, 5.2), (1e-9, COARSEST), (0.0, COARSEST)):
+        dark = replace(
+            result,
+            transmittance=np.full_like(result.transmittance, light),
+            decision=np.full_like(result.decision, Decision.HIDDEN),
+        )
+        assert coarseness(dark)[dark.nodes[dark.in_view[dark.nodes]]] == pytest.approx(expected, rel=0.01)

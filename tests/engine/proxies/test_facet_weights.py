@@ -1,0 +1,144 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Facets hold up as many rays as the plants that they stand for, also those that nothing was fitted to."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.engine import support
+from tetflora_addon.camera.camera import Camera
+from tetflora_addon.compiled.flora import Flora, compile_species
+from tetflora_addon.emission.plants import expanded_blocks
+from tetflora_addon.growth.growth import trunks
+from tetflora_addon.proxies import facet_weights as subject
+from tetflora_addon.proxies.microsurfaces import CIRCUMRADIUS, facet_mesh, piece_facets, subplant_facets
+from tetflora_addon.refinement.contents import piece_amounts, subplant_amounts
+from tetflora_addon.refinement.rasterise import occluder_depth
+from tetflora_addon.species.catalogue import list_species, load_species
+from tetflora_addon.subplants.pieces import open_subplants
+
+
+def triangles(buffers) -> np.ndarray:
+    corner = buffers.positions[buffers.corner_verts].astype(float)
+    first, number = buffers.face_offsets[:-1], np.diff(buffers.face_offsets)
+    fans = []
+    for k in range(1, int(number.max()) - 1):
+        some = first[number > k + 1]
+        fans.append(corner[np.stack([some, some + k, some + k + 1], axis=1)])
+    return np.concatenate(fans)
+
+
+def held_up(parts: list[np.ndarray], reach: float, pixels: int = 120) -> float:
+    """Share of level rays from four sides that meet something within a window around the origin."""
+    total = 0.0
+    for turn in (0.3, 1.1, 1.9, 2.7):
+        right = np.array([np.cos(turn), np.sin(turn), 0.0])
+        back = np.array([-np.sin(turn), np.cos(turn), 0.0])
+        frame = np.stack([right, np.array([0.0, 0.0, 1.0]), back], axis=1)
+        window = (-reach, reach, 0.0, 2.0 * reach)
+        camera = Camera("ORTHO", back * 4 * reach, frame, window, 1e-3, 8 * reach, pixels, pixels)
+        total += np.isfinite(occluder_depth(np.concatenate(parts), camera, pixels, pixels)).mean()
+    return total / 4
+
+
+def as_facets(flora: Flora, seeds, opened: int, side: float, shares: subject.FacetShares | None) -> list[np.ndarray]:
+    """A plant opened some orders deep, as facets."""
+    some, out = trunks(flora.rows, seeds), []
+    for _ in range(opened):
+        some, _, pieces, _ = open_subplants(flora, some)
+        amounts = piece_amounts(flora, pieces)
+        whole = (amounts.leaf_area + amounts.wood_area / 2) / np.maximum(pieces.t1 - pieces.t0, 1e-12)
+        share = None if shares is None else shares.of_pieces(pieces.branches.row, whole / side**2)
+        out.append(piece_facets(flora, pieces, np.full(len(pieces), side), share=share))
+    amounts = subplant_amounts(flora, some)
+    area = amounts.leaf_area + amounts.wood_area / 2
+    share = None if shares is None else shares.of_subplants(some.row, area / side**2)
+    out.append(subplant_facets(flora, some, np.full(len(some), side), share=share))
+    return [triangles(facet_mesh(f)) for f in out if len(f)]
+
+
+@pytest.mark.parametrize("identifier", ["aspen", "birch"])
+def test_opened_plants_of_other_seeds_are_as_opaque(identifier: str) -> None:
+    flora = compile_species([load_species(identifier)])
+    shares = subject.facet_shares(flora)
+    truth, fitted, full = [], [], []
+    for seed in (901, 905):
+        seeds = replace(support.plants(seed), species=np.zeros(1, np.int32))
+        real = [triangles(block.buffers) for block in expanded_blocks(flora, seeds)]
+        reach = float(max(np.abs(part).max() for part in real)) / 2
+        truth.append(held_up(real, reach))
+        side = 2 * reach / 40
+        fitted.append(held_up(as_facets(flora, seeds, 1, side, shares), reach))
+        full.append(held_up(as_facets(flora, seeds, 1, side, None), reach))
+    error = abs(np.mean(fitted) - np.mean(truth)) / np.mean(truth)
+    assert error < 0.08
+    assert error < abs(np.mean(full) - np.mean(truth)) / np.mean(truth)
+
+
+def test_tables_of_shipped_species_are_those_of_today() -> None:
+    """Run ``python -m devtools.facet_tables`` and raise `_METHOD` after changes of species or of facets."""
+    flora = compile_species([load_species("flower")])
+    known = subject.shipped()[subject.digest(flora, 0)]
+    fitted = subject.fitted_shares(flora, np.zeros(1, np.int32))
+    assert len(fitted) == len(known["whole"])
+    for row, (whole, own) in fitted.items():
+        np.testing.assert_allclose(whole, known["whole"][row], atol=0.05)
+        np.testing.assert_allclose(own, known["own"][row], atol=0.05)
+
+
+def test_every_shipped_species_has_a_table() -> None:
+    for identifier in list_species():
+        assert subject.digest(compile_species([load_species(identifier)]), 0) in subject.shipped(), identifier
+
+
+@given(st.floats(0.05, 1.6), st.floats(1e-3, 1e6))
+def test_between_known_numbers_shares_follow_the_logarithm(level: float, count: float) -> None:
+    table = np.full((2, len(subject.COUNTS)), level)
+    shares = subject.FacetShares(table, table)
+    assert shares.of_subplants(np.array([1]), np.array([count]))[0] == pytest.approx(level)
+    rising = np.tile(np.arange(len(subject.COUNTS), dtype=float), (2, 1))
+    shares = subject.FacetShares(rising, rising)
+    place = np.clip(np.log(count / subject.COUNTS[0]) / np.log(4), 0, len(subject.COUNTS) - 1)
+    assert shares.of_pieces(np.array([0]), np.array([count]))[0] == pytest.approx(place)
+
+
+def test_the_least_share_with_which_a_triangle_reaches_a_ray() -> None:
+    """Seen face on: at its middle none is needed, at the middle of a side and at its corners all."""
+    facets = subplant_facets(
+        support.small_flora(), trunks(support.small_flora().rows, support.plants(1)), np.array([1.0])
+    )
+    one = replace(
+        facets,
+        centre=np.zeros((1, 3)),
+        across=np.array([[1.0, 0.0, 0.0]]),
+        along=np.array([[0.0, 1.0, 0.0]]),
+        side=np.array([1.0 / CIRCUMRADIUS]),
+        colour=np.ones((1, 3)),
+        transmission=np.zeros(1),
+    )
+    for point, expected in (((0.0, 0.0), 0.0), ((0.0, -0.5), 1.0), ((0.0, 1.0), 1.0), ((0.0, -0.25), 0.25)):
+        moved = replace(one, centre=np.array([[-point[0] * 1.0, -point[1] * 1.0, 0.0]]))
+        view = subject._View(np.array([1.0, 0, 0]), np.array([0, 1.0, 0]), 1000.0)
+        far = replace(moved, centre=moved.centre + 0.0)
+        least = subject._Sight.least_shares(view, far)
+        assert len(least) == 1
+        assert least[0] == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_species_is_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compiled again, alone or beside others, it has the shares that were found before."""
+    asked = []
+    real = subject.fitted_shares
+    monkeypatch.setattr(subject, "fitted_shares", lambda f, n: asked.append(n.tolist()) or real(f, n))
+    monkeypatch.setattr(subject, "shipped", dict)
+    monkeypatch.setattr(subject, "_found", {})
+    alone = subject.facet_shares(compile_species([load_species("flower")]))
+    again = subject.facet_shares(compile_species([load_species("grass"), load_species("flower")]))
+    assert asked == [[0], [0]]
+    rows = len(alone.whole)
+    np.testing.assert_array_equal(again.whole[-rows:], alone.whole)
+    np.testing.assert_array_equal(again.own[-rows:], alone.own)

@@ -1,0 +1,181 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Microsurfaces stand for surfaces that are not made: as much area, turned the same way, in the same place."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from tests.engine import support
+from tests.engine.subplants.test_leaf_meshes import check_topology
+from tetflora_addon.buffers import MeshBuffers
+from tetflora_addon.compiled.flora import Flora
+from tetflora_addon.growth.branches import Branches
+from tetflora_addon.growth.growth import trunks
+from tetflora_addon.proxies.facet_sizes import COARSE, piece_facet_sizes, subplant_facet_sizes
+from tetflora_addon.proxies.microsurfaces import facet_mesh, piece_facets, subplant_facets
+from tetflora_addon.refinement.contents import Contents, bounding_cylinders, subplant_amounts
+
+
+def facets(flora: Flora, subplants: Branches, side: float) -> MeshBuffers:
+    return facet_mesh(subplant_facets(flora, subplants, np.full(len(subplants), side)))
+
+
+def part(mesh: MeshBuffers, leaves: bool) -> np.ndarray:
+    """Faces that stand for leaves, or for wood."""
+    return (mesh.attributes["tf_transmission"][1] > 0) == leaves
+
+
+def moment_of(mesh: MeshBuffers, chosen: np.ndarray) -> np.ndarray:
+    vectors = support.face_vectors(mesh)[chosen]
+    areas = np.linalg.norm(vectors, axis=1)
+    return np.einsum("ni,nj->ij", vectors / areas[:, None], vectors) / areas.sum()
+
+
+@pytest.mark.parametrize("side", [0.02, 0.1, 0.4, 1.5])
+@pytest.mark.parametrize("name", ["bush", "conifer", "fern", "grass", "oak", "rowan"])
+def test_area_is_kept_at_any_size(name: str, side: float) -> None:
+    """Leaves count in full, closed branches half; plants are small enough for facets larger than all of them."""
+    flora, species = support.flora(), support.SPECIES.index(name)
+    number = 60 if side > 0.1 else 1
+    plants = trunks(flora.rows, support.plants(np.arange(number), species))
+    mesh = facets(flora, plants, side)
+    check_topology(mesh)
+    amounts, areas = subplant_amounts(flora, plants), support.face_areas(mesh)
+    for leaves, expected in ((True, amounts.leaf_area), (False, amounts.wood_area / 2)):
+        found = areas[part(mesh, leaves)]
+        error = np.sqrt(number) / 2 * side**2  # of rounding a number of facets up or down, at most
+        assert found.sum() == pytest.approx(expected.sum(), abs=4 * error + 1e-3 * expected.sum())
+
+
+def test_small_shares_are_met_on_average_and_from_all_samples() -> None:
+    """Sub-plants of a tenth of a facet: one in ten gets one, and they do not crowd at a few places."""
+    still = {"leaf_light": 0}
+    upright = {"length": [3, 0], "angle": [0, 0], "branches": [7, 0]}
+    flora = support.compiled(support.small(order0=upright, order1=still, order2=still))
+    n = 20_000
+    plants = trunks(flora.rows, support.plants(np.arange(n)))
+    side = np.sqrt(subplant_amounts(flora, plants).leaf_area * 10)
+    mesh = facet_mesh(subplant_facets(flora, plants, side))
+    leaves = part(mesh, True)
+    assert leaves.sum() == pytest.approx(n / 10, abs=4 * np.sqrt(n * 0.09))
+    heights = support.face_centres(mesh)[leaves][:, 2]
+    assert len(np.unique(np.round(heights, 5))) > 500  # each height is that of one sample
+    amounts = subplant_amounts(flora, plants)
+    total = support.face_areas(mesh)[leaves].sum()
+    assert total == pytest.approx(amounts.leaf_area.sum(), rel=0.1)
+
+
+@pytest.mark.parametrize("name", ["birch", "bush", "conifer", "oak", "spruce"])
+def test_orientation_and_place_are_those_of_the_plant(name: str) -> None:
+    """Facets of whole plants against their leaves: moment, mean height and spread; wood against its tubes."""
+    flora, species = support.flora(), support.SPECIES.index(name)
+    seeds = support.plants(np.arange(8), species)
+    trunk, pieces = support.grown(flora, seeds)
+    mesh = facets(flora, trunk, 0.1)
+    tubes, leaves = support.meshes(flora, pieces)
+    height = trunk.length.mean()
+    for is_leaf, meshes in ((True, leaves), (False, tubes)):
+        chosen = part(mesh, is_leaf)
+        # A facet is flat where a leaf may be bent or of several blades.
+        np.testing.assert_allclose(moment_of(mesh, chosen), support.moment(*meshes), atol=0.12 if is_leaf else 0.05)
+        areas = np.concatenate([support.face_areas(real) for real in meshes])
+        places = np.concatenate([support.face_centres(real) for real in meshes])
+        for axis in (0, 1, 2):
+            centre, other = support.face_centres(mesh)[chosen][:, axis], places[:, axis]
+            mean = np.average(other, weights=areas)
+            spread = np.sqrt(np.average((other - mean) ** 2, weights=areas))
+            assert centre.mean() == pytest.approx(mean, abs=0.15 * max(spread, 0.1 * height))
+            assert centre.std() == pytest.approx(spread, rel=0.15, abs=0.02 * height)
+
+
+@given(st.integers(-(2**63), 2**63 - 1), st.floats(0.02, 2), st.floats(0.1, 10))
+@settings(deadline=None, max_examples=20)
+def test_facets_stay_by_their_plant(seed: int, side: float, scale: float) -> None:
+    """Centres within the bound, but for half a leaf; corners half a diagonal further."""
+    flora = support.small_flora()
+    plant = trunks(flora.rows, support.plants(seed, scale=scale, position=(3, 4, 5)))
+    mesh = facet_mesh(subplant_facets(flora, plant, np.array([side * scale])))
+    assume(mesh.polygons)
+    centre, radius, half_height = bounding_cylinders(flora, plant)
+    offset = support.face_centres(mesh) - centre
+    along = offset @ plant.frame[0, :, 2]
+    across = np.linalg.norm(offset - along[:, None] * plant.frame[0, :, 2], axis=1)
+    assert np.abs(along).max() <= half_height[0] * (1 + 1e-5)
+    assert across.max() <= radius[0] * (1 + 1e-5)
+    colour, share = (mesh.attributes[n][1] for n in ("tf_colour", "tf_transmission"))
+    assert 0 <= colour.min() <= colour.max() <= 1
+    assert set(np.unique(share)) <= {np.float32(0), np.float32(flora.transmission[0])}
+    assert support.face_areas(mesh).min() > 0
+
+
+def test_hidden_wood_gets_no_more_facets_than_it_has_faces() -> None:
+    """Plants beside the eye, where a pixel is a millimetre: the area stays, the number is that of their polygons."""
+    flora = support.small_flora()
+    plants, pieces = support.grown(flora, support.plants(np.arange(100)))
+    contents = Contents.of(flora, plants, np.zeros(100, int), pieces, np.zeros(len(pieces), int))
+    camera = SimpleNamespace(
+        extent_around=lambda points: np.full(len(points), 1e-3), clearance=lambda points: np.zeros(len(points))
+    )
+    for sizes_of, make, things, faces, amounts in (
+        (
+            subplant_facet_sizes,
+            subplant_facets,
+            plants,
+            100 * (flora.polygons[0] - flora.leaf_count[0] * flora.leaf.polygons[0]),
+            contents.subplants.amounts,
+        ),
+        (
+            piece_facet_sizes,
+            piece_facets,
+            pieces,
+            flora.rows["sides"][pieces.branches.row].sum(),
+            contents.pieces.amounts,
+        ),
+    ):
+        sizes = sizes_of(flora, contents, camera, np.array([COARSE]))
+        made = facet_mesh(make(flora, things, *sizes.sides(1.0)))
+        assert made.polygons == pytest.approx(sizes.counts(1.0).sum(), rel=0.02)
+        wood = part(made, False)
+        assert wood.sum() <= faces * 1.01
+        assert support.face_areas(made)[wood].sum() == pytest.approx(amounts.wood_area.sum() / 2, rel=0.1)
+        seen = sizes_of(flora, contents, camera, np.ones(1))
+        assert part(facet_mesh(make(flora, things, *seen.sides(3.0))), False).sum() > faces * 5
+        assert (seen.sides(3.0)[0] >= np.sqrt(seen.one_leaf)).all()
+
+
+def test_facets_are_equilateral_and_share_the_area_of_their_plant() -> None:
+    """As large as asked for or as a leaf, but for what it takes to have exactly the area of each plant."""
+    flora = support.small_flora()
+    plant = trunks(flora.rows, support.plants(np.arange(5)))
+    amounts = subplant_amounts(flora, plant)
+    leaf = flora.area_nodes[0, 0] / flora.leaf_count[0]
+    for side in (1e-2, 0.1):
+        mesh = facets(flora, plant, side)
+        corners = mesh.positions.reshape(-1, 3, 3).astype(float)
+        edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
+        np.testing.assert_allclose(edges, np.tile(edges.mean(axis=1)[:, None], 3), rtol=2e-3)
+        areas, leafy = support.face_areas(mesh), part(mesh, True)
+        expected = np.where(leafy, max(side**2, leaf), side**2)
+        assert (np.abs(areas / expected - 1) < 0.5).all()
+        assert areas[leafy].sum() == pytest.approx(amounts.leaf_area.sum(), rel=1e-4)
+        assert areas[~leafy].sum() == pytest.approx(amounts.wood_area.sum() / 2, rel=1e-4)
+
+
+def test_a_share_of_the_area_is_that_and_darkens_as_a_cluster_does() -> None:
+    """Recollision: none where all is seen, all light lost within for black shares; white stays white."""
+    flora = support.small_flora()
+    plant = trunks(flora.rows, support.plants(np.arange(5)))
+    side = np.full(5, 0.05)
+    whole = subplant_facets(flora, plant, side)
+    part_of = subplant_facets(flora, plant, side, share=np.full(5, 0.5))
+    np.testing.assert_allclose(part_of.side**2, 0.5 * whole.side**2)
+    leafy = whole.transmission > 0
+    c = whole.colour[leafy]
+    np.testing.assert_allclose(part_of.colour[leafy], c * 0.5 / (1 - 0.5 * c))
+    assert (part_of.colour <= whole.colour + 1e-12).all()

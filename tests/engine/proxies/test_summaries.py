@@ -1,0 +1,138 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Summaries of tetrahedra and their extinction, against what flakes of known orientation show."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from tests.engine import support
+from tests.engine.refinement.test_contents import divided, expanded
+from tetflora_addon.compiled.flora import Flora
+from tetflora_addon.proxies.summaries import Summaries, extinction_matrices, summarise
+from tetflora_addon.refinement.contents import Contents
+
+
+def of_everything(flora: Flora, contents: Contents, nodes: int) -> Summaries:
+    return summarise(flora, contents, np.zeros(nodes, np.int64), 1)
+
+
+def as_summaries(moment: NDArray[np.float64], area: float = 1.0) -> Summaries:
+    return Summaries(np.array([area]), np.zeros((1, 3)), np.zeros(1), np.asarray(moment, float)[None])
+
+
+def kappa(packed: NDArray[np.float64], directions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """√(ωᵀSω) for directions (n, 3)."""
+    xx, yy, zz, xy, xz, yz = packed
+    matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", directions, matrix, directions), 0))
+
+
+def sphere(count: int, seed: int = 0) -> NDArray[np.float64]:
+    points = np.random.default_rng(seed).normal(size=(count, 3))
+    return points / np.linalg.norm(points, axis=1, keepdims=True)
+
+
+def test_isotropic_surfaces_show_half_their_area_everywhere() -> None:
+    packed, _, plane = extinction_matrices(as_summaries(np.eye(3) / 3, area=5.0), np.array([2.0]))
+    np.testing.assert_allclose(kappa(packed[0], sphere(50)), 5.0 / 2 / 2.0, rtol=1e-9)
+    assert plane[0] == pytest.approx(0, abs=1e-9)
+
+
+@given(st.integers(0, 2**31))
+@settings(deadline=None, max_examples=30)
+def test_parallel_flakes_show_the_cosine(seed: int) -> None:
+    normal = sphere(1, seed)[0]
+    packed, axis, plane = extinction_matrices(as_summaries(np.outer(normal, normal), area=3.0), np.array([1.5]))
+    directions = sphere(50, seed + 1)
+    np.testing.assert_allclose(kappa(packed[0], directions), 2.0 * np.abs(directions @ normal), atol=1e-3)
+    assert abs(axis[0] @ normal) == pytest.approx(1)
+    assert plane[0] == pytest.approx(1)
+
+
+@given(st.integers(0, 2**31), st.floats(0, 4))
+@settings(deadline=None, max_examples=30)
+def test_extinction_is_close_to_that_of_real_flakes(seed: int, order: float) -> None:
+    """Flakes gathered about an axis, from all ways round to nearly parallel: Σ A |ω·n| / V within 6 %."""
+    rng = np.random.default_rng(seed)
+    normals = sphere(20_000, seed)
+    normals[:, 2] *= 1 + order
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    normals = normals @ turn.T
+    packed, _, _ = extinction_matrices(as_summaries(normals.T @ normals / len(normals)), np.ones(1))
+    directions = sphere(40, seed + 1)
+    real = np.abs(directions @ normals.T).mean(axis=1)
+    assert np.abs(kappa(packed[0], directions) - real).max() < 0.06 * real.max()
+
+
+@given(st.integers(0, 2**31), st.sampled_from(["PERSP", "ORTHO"]))
+@settings(deadline=None, max_examples=12)
+def test_summaries_of_any_division(seed: int, kind: str) -> None:
+    """Means are means: colours within those of the species, moments of trace 1, areas those of the contents."""
+    flora = support.small_flora()
+    tree, contents = divided(flora, support.grove(4, 2.0), seed, kind)
+    index = np.full(len(tree), -1)
+    nodes = np.unique(np.concatenate([contents.subplants.cell, contents.pieces.cell]))
+    index[nodes] = np.arange(len(nodes))
+    each = summarise(flora, contents, index, len(nodes))
+    whole = of_everything(flora, contents, len(tree))
+    assert each.optical_area.sum() == pytest.approx(whole.optical_area[0], rel=1e-9)
+    held = each.optical_area > 0
+    np.testing.assert_allclose(np.trace(each.moment[held], axis1=1, axis2=2), 1)
+    assert np.linalg.eigvalsh(each.moment[held]).min() > -1e-9
+    np.testing.assert_allclose(each.moment, each.moment.transpose(0, 2, 1), atol=1e-12)
+    colours = np.concatenate([flora.rows[n][:, 0] for n in ("leaf_colour", "branch_colour")])
+    assert (each.colour[held] >= colours.min(axis=0) - 1e-9).all()
+    assert (each.colour[held] <= colours.max(axis=0) + 1e-9).all()
+    assert ((each.transmission >= 0) & (each.transmission <= flora.transmission[0])).all()
+    weighted = each.optical_area @ each.colour / each.optical_area.sum()
+    np.testing.assert_allclose(weighted, whole.colour[0], rtol=1e-9)
+
+
+def test_sums_do_not_depend_on_how_contents_are_cut() -> None:
+    """Many plants held whole, or opened and clipped to shreds: area, colour, transmission and moment stay."""
+    data = support.small(
+        order1={"leaf_colour": [[0.6, 0.5, 0.1], [0, 0, 0]], "branch_colour": [[0.1, 0.1, 0.1], [0, 0, 0]]},
+        order2={"leaf_colour": [[0.1, 0.3, 0.1], [0, 0, 0]], "branch_colour": [[0.4, 0.2, 0.1], [0, 0, 0]]},
+    )
+    flora = support.compiled(data)
+    seeds = support.grove(250, 1.5)
+    whole = of_everything(flora, Contents.of_plants(flora, seeds), 1)
+    tree, contents = divided(flora, seeds, 5, "PERSP", rounds=3)
+    shreds = expanded(flora, contents)
+    none = contents.within(np.zeros(len(tree), bool))
+    shredded = Contents.of(flora, none.subplants.items, none.subplants.cell, shreds, np.zeros(len(shreds), np.int32))
+    for other in (of_everything(flora, contents, len(tree)), of_everything(flora, shredded, 1)):
+        assert other.optical_area[0] == pytest.approx(whole.optical_area[0], rel=0.03)
+        np.testing.assert_allclose(other.colour, whole.colour, rtol=0.03)
+        np.testing.assert_allclose(other.transmission, whole.transmission, rtol=0.03)
+        np.testing.assert_allclose(other.moment, whole.moment, atol=0.03)
+
+
+def test_summaries_against_the_polygons_that_would_be_made() -> None:
+    flora = support.small_flora()
+    seeds = support.grove(100, 2.0)
+    summary = of_everything(flora, Contents.of_plants(flora, seeds), 1)
+    tubes, leaves = support.meshes(flora, support.grown(flora, seeds)[1])
+    faces = [(m, w) for meshes, w in ((leaves, 1.0), (tubes, 0.5)) for m in meshes]
+    area = sum(w * support.face_areas(m).sum() for m, w in faces)
+    assert summary.optical_area[0] == pytest.approx(area, rel=0.03)
+    moment = sum(w * support.face_areas(m).sum() * support.moment(m) for m, w in faces) / area
+    np.testing.assert_allclose(summary.moment[0], moment, atol=0.03)
+    colour = sum(w * support.face_areas(m) @ m.attributes["tf_colour"][1] for m, w in faces) / area
+    np.testing.assert_allclose(summary.colour[0], colour, rtol=0.03)
+
+
+def test_contents_of_other_nodes_are_passed_over() -> None:
+    flora = support.small_flora()
+    contents = Contents.of_plants(flora, support.grove(3, 2.0))
+    nothing = summarise(flora, contents, np.array([-1]), 2)
+    assert (nothing.optical_area == 0).all()
+    assert np.isfinite(nothing.moment).all()
+    packed, _, _ = extinction_matrices(nothing, np.ones(2))
+    assert (packed == 0).all()

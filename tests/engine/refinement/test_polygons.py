@@ -1,0 +1,412 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Explicit polygons: whatever cuts them, area, colours, directions and texture coordinates stay what they were."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.engine import support
+from tests.engine.subplants.test_leaf_meshes import check_topology
+from tetflora_addon.buffers import MeshBuffers
+from tetflora_addon.emission.budget import afford
+from tetflora_addon.emission.polygons import mended, polygon_blocks, polygon_buffers, polygon_facets
+from tetflora_addon.emission.shells import proxy_shells
+from tetflora_addon.growth.hashing import mix
+from tetflora_addon.proxies.summaries import summarise
+from tetflora_addon.refinement.contents import Contents
+from tetflora_addon.refinement.decisions import Decision
+from tetflora_addon.refinement.descent import cut, push_down
+from tetflora_addon.refinement.loop import Refinement, refine
+from tetflora_addon.refinement.mesh_features import mesh_features
+from tetflora_addon.refinement.polygons import Meshes, Polygons, Surface, shares
+from tetflora_addon.refinement.settings import RefinementSettings
+from tetflora_addon.refinement.views import widened_for
+from tetflora_addon.tetrahedra.roots import view_root
+
+#: u, v and a number at a place in the mesh's own space: affine, so that they must be so after any cut.
+AFFINE = np.array([[0.3, -0.2, 0.9], [0.5, 0.1, 0.2], [-1.0, 0.4, 0.3]])
+SEEDS = st.integers(0, 2**31)
+
+
+def surface(positions: np.ndarray, faces: list[list[int]], **changes: object) -> Surface:
+    """A mesh of two materials with texture coordinates and another attribute that follow from the place."""
+    sizes = np.array([len(f) for f in faces])
+    offsets = np.concatenate([[0], np.cumsum(sizes)])
+    verts = np.concatenate([np.asarray(f) for f in faces])
+    triangles = [[s, s + k, s + k + 1] for s, n in zip(offsets, sizes, strict=False) for k in range(1, n - 1)]
+    values = (positions @ AFFINE.T)[verts].astype(np.float32)
+    solid, leaf, width = mesh_features(positions, verts, offsets)
+    given = {
+        "name": "rock",
+        "positions": positions,
+        "corner_verts": verts.astype(np.int32),
+        "face_offsets": offsets.astype(np.int32),
+        "triangles": np.array(triangles, np.int32),
+        "material": (np.arange(len(faces)) % 2).astype(np.int32),
+        "colours": np.array([[0.1, 0.4, 0.05], [0.3, 0.2, 0.1]]),
+        "transmission": np.array([0.3, 0.0]),
+        "coverage": np.ones(2),
+        "solid": solid,
+        "leaf": leaf,
+        "width": width,
+        "attributes": {"UVMap": values[:, :2], "number": values[:, 2:]},
+    }
+    return Surface(**{**given, **changes})
+
+
+def sound(mesh: MeshBuffers) -> None:
+    """A valid mesh, but for edges of many faces, which check_topology does not want to see."""
+    floats = {name: (domain, v) for name, (domain, v) in mesh.attributes.items() if v.dtype == np.float32}
+    check_topology(replace(mesh, attributes=floats))
+
+
+def thicket(seed: int, faces: int = 60, fans: bool = True) -> Surface:
+    """Quads, triangles and pentagons all over the place: with gaps, edges of many faces, and faces of no area."""
+    rng = np.random.default_rng(seed)
+    positions = [rng.uniform(-3, 3, (faces, 1, 3)) + rng.uniform(-1, 1, (faces, 5, 3)), np.zeros((1, 1, 3))]
+    positions = np.concatenate([p.reshape(-1, 3) for p in positions])
+    own = [list(range(5 * i, 5 * i + 3 + i % 3)) for i in range(faces)]
+    own += [[2, 2, 3], [4, 4, 4], [8, 9, 8]] + fans * [[0, 1, 5], [0, 1, 6], [0, 1, 7]]  # none and four at one edge
+    return surface(positions, own)
+
+
+def placed(one: Surface, seed: int, number: int = 3) -> Meshes:
+    """Instances, turned, sheared, stretched, and the last one mirrored."""
+    rng = np.random.default_rng(seed)
+    matrices = np.tile(np.eye(4), (number, 1, 1))
+    matrices[:, :3, :3] += 0.3 * rng.uniform(-1, 1, (number, 3, 3))
+    matrices[-1, 0] *= -1
+    matrices[:, :3, 3] = rng.uniform(-4, 4, (number, 3))
+    return Meshes([one], np.zeros(number, int), matrices)
+
+
+def sums(polygons: Polygons) -> np.ndarray:
+    """Area, colour, transmission, orientation moment, all as sums."""
+    nothing = np.zeros(1, np.int64)
+    summary = summarise(support.small_flora(), Contents.of_polygons(polygons), nothing, 1)
+    return np.concatenate([[1], summary.colour[0], summary.transmission, summary.moment.ravel()]) * summary.optical_area
+
+
+def divided(polygons: Polygons, seed: int, slack: float | None, rounds: int = 4) -> tuple[object, Contents]:
+    """Contents of a tree that a camera roots and random choices divide."""
+    rng = np.random.default_rng(seed)
+    flora = support.small_flora()
+    contents = Contents.of_polygons(polygons)
+    camera = support.camera(rng.uniform(-9, 9, 3), rng.uniform(-3, 3, 3))
+    tree = view_root(camera, contents.bounding_box(flora))
+    loose = None if slack is None else lambda points: np.full(len(points), slack)
+    contents = push_down(flora, tree, contents, loose)
+    for _ in range(rounds):
+        nodes = np.unique(contents.polygons.cell)
+        nodes = nodes[rng.random(len(nodes)) < 0.7]
+        for _ in range(2):
+            nodes = tree.split(nodes).ravel()
+        contents = push_down(flora, tree, contents, loose)
+    return tree, contents
+
+
+@given(SEEDS, st.sampled_from([None, 0.02, 0.5]))
+@settings(deadline=None, max_examples=25)
+def test_area_colour_and_moment_are_exact_under_any_cuts(seed: int, slack: float | None) -> None:
+    """To 1e-6, as sums over all tetrahedra; amounts are those of the fragments, and all is in terminal nodes."""
+    polygons = Polygons.everything(placed(thicket(seed), seed))
+    tree, contents = divided(polygons, seed, slack)
+    parts = contents.polygons.items
+    assert (tree.children[contents.polygons.cell, 0] < 0).all()
+    assert len(parts) > len(polygons)
+    assert parts.areas().sum() == pytest.approx(polygons.areas().sum(), rel=1e-9)
+    assert sums(parts) == pytest.approx(sums(polygons), rel=1e-6, abs=1e-9)
+    amounts = contents.sums(len(tree))
+    assert amounts.area.sum() == pytest.approx(polygons.areas().sum(), rel=1e-9)
+    assert amounts.polygons.sum() == len(parts)
+
+
+@given(SEEDS)
+@settings(deadline=None, max_examples=15)
+def test_everything_is_on_the_right_side(seed: int) -> None:
+    """Every corner of every polygon lies within its tetrahedron's planes, up to the root; within the slack if any."""
+    for slack in (None, 0.1):
+        tree, contents = divided(Polygons.everything(placed(thicket(seed, 30), seed)), seed, slack)
+        polygons, node = contents.polygons.items, contents.polygons.cell.astype(np.intp)
+        assert (tree.parent[node] >= 0).any()
+        while (tree.parent[node] >= 0).any():
+            parent = np.maximum(tree.parent[node], 0)
+            low, high = polygons.distances(tree.planes(parent))
+            beyond = np.where(tree.children[parent, 1] == node, -low, high)
+            assert beyond[tree.parent[node] >= 0].max() < 1e-7 + (slack or 0)
+            node = np.where(tree.parent[node] >= 0, parent, node)
+
+
+@given(SEEDS)
+@settings(deadline=None, max_examples=25)
+def test_texture_coordinates_and_attributes_are_interpolated(seed: int) -> None:
+    """What was an affine function of the place before is the same function after cuts."""
+    one = thicket(seed, 30, fans=False)
+    meshes = Meshes([one], np.zeros(1, int), np.eye(4)[None])
+    _, contents = divided(Polygons.everything(meshes), seed, None)
+    mesh = polygon_buffers(contents.polygons.items)
+    sound(mesh)
+    expected = mesh.positions[mesh.corner_verts].astype(np.float64) @ AFFINE.T
+    assert mesh.attributes["UVMap"][0] == "CORNER"
+    np.testing.assert_allclose(mesh.attributes["UVMap"][1], expected[:, :2], atol=1e-5)
+    np.testing.assert_allclose(mesh.attributes["number"][1], expected[:, 2], atol=1e-5)
+
+
+@given(SEEDS)
+@settings(deadline=None, max_examples=25)
+def test_a_plane_leaves_each_piece_on_one_side(seed: int) -> None:
+    """Shares of a face's triangles add up to 1, and no fragment reaches across."""
+    rng = np.random.default_rng(seed)
+    polygons = Polygons.everything(placed(thicket(seed), seed))
+    normal = rng.normal(size=(len(polygons), 3))
+    planes = np.c_[normal / np.linalg.norm(normal, axis=1, keepdims=True), rng.uniform(-1, 1, len(polygons))]
+    owner, side, parts = cut(polygons, planes)
+    total = np.bincount(owner, shares(parts.weights)[parts.part], len(polygons))
+    np.testing.assert_allclose(total, polygons.meshes.face_size[polygons.face] - 2, atol=1e-12)
+    distance = parts.corner_distances(planes[owner]) * np.where(side, 1, -1)[:, None]
+    assert distance.min() > -1e-8
+
+
+def test_a_cut_face_of_which_all_is_there_is_mended() -> None:
+    """What nobody needed to cut comes out as it went in: faces, materials, even those without area."""
+    one = thicket(1)
+    meshes = placed(one, 1)
+    polygons = Polygons.everything(meshes)
+    _, contents = divided(polygons, 1, None)
+    assert len(contents.polygons) > 2 * len(polygons)
+    whole = mended(contents.polygons.items)
+    assert (whole.part == -1).all()
+    key = np.sort(whole.instance.astype(np.int64) * 1000 + whole.face)
+    assert (key == np.sort(polygons.instance.astype(np.int64) * 1000 + polygons.face)).all()
+    some = contents.polygons.items.take(np.random.default_rng(0).random(len(contents.polygons)) < 0.8)
+    assert mended(some).areas().sum() == pytest.approx(some.areas().sum(), rel=1e-9)
+
+
+def test_whole_faces_share_vertices_and_mirrored_ones_are_turned() -> None:
+    cube = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+    faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    mirror = np.diag([-2.0, 1.0, 1.0, 1.0])
+    box = surface(cube, faces)
+    box = surface(cube, faces, normals=np.repeat(support.face_vectors(plain(box)), 4, axis=0).astype(np.float32))
+    meshes = Meshes([box], np.zeros(2, int), np.stack([np.eye(4), mirror]))
+    mesh = polygon_buffers(Polygons.everything(meshes))
+    assert (len(mesh.positions), len(mesh.edge_verts), mesh.polygons) == (16, 24, 12)
+    sound(mesh)
+    normal = support.face_vectors(mesh) / support.face_areas(mesh)[:, None]
+    np.testing.assert_allclose(np.repeat(normal, 4, axis=0), mesh.attributes["custom_normal"][1], atol=1e-6)
+    middle = np.repeat([[0.5, 0.5, 0.5], [-1.0, 0.5, 0.5]], 6, axis=0)
+    assert (np.einsum("ni,ni->n", normal, support.face_centres(mesh) - middle) > 0).all()
+    assert (mesh.attributes["material_index"][1] == np.tile(np.arange(6) % 2, 2)).all()
+
+
+def plain(one: Surface) -> MeshBuffers:
+    """A surface as a mesh by itself."""
+    return polygon_buffers(Polygons.everything(Meshes([one], np.zeros(1, int), np.eye(4)[None])))
+
+
+@pytest.mark.parametrize("what", ["vertex", "transform"])
+def test_what_is_no_number_is_refused_by_name(what: str) -> None:
+    one, matrix = thicket(0), np.eye(4)[None]
+    if what == "vertex":
+        one.positions[3, 1] = np.nan
+    else:
+        matrix[0, 2, 3] = np.inf
+    with pytest.raises(ValueError, match="rock"):
+        Meshes([one], np.zeros(1, int), matrix)
+
+
+def grove(number: int = 40) -> tuple[Meshes, object]:
+    """Heaps of small leaves from near to far."""
+    rng = np.random.default_rng(5)
+    faces = 300
+    middle = rng.uniform([-2, -2, 0], [2, 2, 4], (faces, 1, 3))
+    a, b = 0.06 * rng.normal(size=(2, faces, 1, 3))
+    corners = np.concatenate([middle, middle + a, middle + a + b, middle + b], axis=1)
+    leaves = surface(corners.reshape(-1, 3), np.arange(4 * faces).reshape(-1, 4).tolist())
+    matrices = np.tile(np.eye(4), (number, 1, 1))
+    matrices[:, 1, 3] = np.linspace(0, 14, number) ** 2
+    matrices[:, 0, 3] = rng.uniform(-1, 1, number) * (3 + 0.3 * matrices[:, 1, 3])
+    return Meshes([leaves], np.zeros(number, int), matrices), support.camera((0, -6, 2), (0, 60, 2), 160, 1.0)
+
+
+def refined(meshes: Meshes, camera: object, **options: float) -> Refinement:
+    flora = support.small_flora()
+    given = {"visibility_resolution": 64, "max_tetrahedra": 20_000, **options}
+    loop = refine(flora, support.plants([]), camera, RefinementSettings(**given), None, Polygons.everything(meshes))
+    while True:
+        try:
+            next(loop)
+        except StopIteration as stop:
+            return stop.value
+
+
+@pytest.mark.parametrize("anchored", [False, True])
+def test_near_polygons_stay_and_far_ones_become_facets_of_the_same_area(anchored: bool) -> None:
+    """No plant is needed. Leaves near the eye are there as they were, all others are there as area, but for chance."""
+    meshes, camera = grove()
+    result = refined(meshes, camera, anchored=anchored)
+    whole = Polygons.everything(meshes)
+    assert result.contents.polygons.items.areas().sum() == pytest.approx(whole.areas().sum(), rel=1e-9)
+    assert {Decision.PROXY, Decision.EXPLICIT} <= set(result.decision.tolist())
+    blocks = [b.buffers for b in polygon_blocks(result, camera, 0.4)]
+    kept = sum(support.face_areas(b).sum() for b in blocks)
+    proxies = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN))
+    beside = ~result.in_view[proxies.polygons.cell]
+    facets = np.concatenate([f.side**2 for f, _ in polygon_facets(proxies, result, camera, 0.4)])
+    drawn = facets.sum()
+    chance = 2 * np.sqrt((facets**2).sum())  # facets are there or not; of a mesh, not independently
+    assert chance < 0.1 * drawn
+    assert 0.1 < kept / (kept + drawn) < 0.95
+    # Facets beside the view may have been made smaller, so that they do not reach into it.
+    loss = 0.5 * proxies.polygons.amounts.area[beside].sum()
+    assert whole.areas().sum() - loss - chance <= kept + drawn <= whole.areas().sum() + chance
+    assert sum(b.polygons for b in blocks) + len(facets) < 0.7 * len(whole)
+    near = whole.take(np.linalg.norm(whole.centre - camera.position, axis=1) < 7)
+    inside = camera.clearance(near.centre) < -0.5
+    points = np.concatenate([b.positions for b in blocks])
+    away = np.abs(points[None] - meshes.corners(meshes.face_triangle[near.face], near.instance)[inside][:60, :1]).max(2)
+    assert away.min(axis=1).max() < 1e-5
+
+
+def test_facets_of_polygons_come_in_runs_that_are_bounded_and_the_same() -> None:
+    meshes, camera = grove()
+    result = refined(meshes, camera, anchored=True)
+    proxies = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN))
+    made = []
+    for at_once in (np.inf, 100.0):
+        parts = list(polygon_facets(proxies, result, camera, 0.2, at_once))
+        made.append(
+            [np.concatenate([np.c_[f.centre, f.side] for f, s in parts if s == seen]) for seen in (True, False)]
+        )
+    assert all(map(np.array_equal, *made))
+    sizes = [len(facets) for facets, _ in parts]
+    assert sum(sizes) > 1_000
+    assert max(sizes) < 2 * 100
+
+
+def test_explicit_everywhere_is_the_original() -> None:
+    meshes, camera = grove(6)
+    result = refined(meshes, camera, leaf_limit=1e-6, hidden=-1.0, cutoff=1e-3, few_polygons=100)
+    seen = result.tree.inside[result.contents.polygons.cell]
+    assert np.isin(result.decision, [Decision.EXPLICIT, Decision.HIDDEN]).all()
+    blocks = list(polygon_blocks(result, camera, 1e-4))
+    assert sum(b.buffers.polygons for b in blocks) == len(Polygons.everything(meshes))
+    total = sum(support.face_areas(b.buffers).sum() for b in blocks)
+    assert total == pytest.approx(meshes.face_areas(np.tile(np.arange(300), 6), np.repeat(np.arange(6), 300)).sum())
+    assert seen.any()
+    assert [b.fraction for b in blocks] == sorted(b.fraction for b in blocks)
+
+
+def test_lens_and_shutter_widen_the_view_for_polygons_alone() -> None:
+    meshes, camera = grove(6)
+    flora, polygons = support.small_flora(), Polygons.everything(meshes)
+    nobody = Contents().subplants.items
+    sharp = widened_for(camera, 0.04, flora, nobody, polygons)
+    assert sharp.window == camera.widened(0.04).window
+    blurred = widened_for(replace(camera, lens_radius=0.2, focus=20.0), 0.04, flora, nobody, polygons)
+    assert blurred.width > sharp.width
+    empty = polygons.take(slice(0))
+    assert widened_for(replace(camera, lens_radius=0.2, focus=20.0), 0.04, flora, nobody, empty).width == sharp.width
+
+
+def rough(number: int = 30, size: float = 40.0) -> Meshes:
+    """A rough plain of large faces through the grove."""
+    step = np.linspace(-size, size, number)
+    x, y = (a.ravel() for a in np.meshgrid(step, step + size, indexing="ij"))
+    faces = [[i, i + number, i + number + 1, i + 1] for i in range(number * (number - 1)) if (i + 1) % number]
+    plain_ = surface(np.stack([x, y, 0.2 * np.sin(3 * x)], axis=1), faces)
+    leaves = grove()[0]
+    matrices = np.tile(np.eye(4), (1 + len(leaves.surface), 1, 1))
+    matrices[1:, :3, 3] = leaves.origin
+    return Meshes([plain_, leaves.surfaces[0]], np.minimum(np.arange(len(matrices)), 1), matrices)
+
+
+@pytest.mark.parametrize("facet_pixels", [0.6, None])
+def test_large_polygons_stay_whole_among_proxies(facet_pixels: float | None) -> None:
+    """Ground is neither fog nor facets because leaves above it are, and does not make leaves explicit."""
+    meshes, camera = rough(), grove()[1]
+    result = refined(meshes, camera)
+    blocks = list(polygon_blocks(result, camera, facet_pixels))
+    near = [b.buffers for b in blocks if b.surface == 0]
+    alone = refined(grove()[0], camera)
+    ground = meshes.face_areas(np.arange(29**2), np.zeros(29**2, int))
+    assert sum(support.face_areas(b).sum() for b in near) > 0.9 * ground.sum()
+    assert sum(b.polygons for b in near) < 1.5 * 29**2
+    leaves = [
+        sum(b.buffers.polygons for b in every if b.surface == s)
+        for every, s in ((blocks, 1), (list(polygon_blocks(alone, camera, facet_pixels)), 0))
+    ]
+    assert leaves[0] == pytest.approx(leaves[1], rel=0.4)
+    shells = proxy_shells(support.small_flora(), result)
+    assert np.isfinite(shells.attributes["tf_kappa"][1]).all()
+
+
+def test_a_budget_counts_polygons() -> None:
+    meshes, camera = grove()
+    result, flora = refined(meshes, camera), support.small_flora()
+    sizes = []
+    for most in (0, 3_000, 1_000):
+        options = RefinementSettings(max_polygons=most)
+        fitted, side = afford(flora, result, camera, options)
+        made = [b.buffers for b in polygon_blocks(fitted, camera, side)]
+        facets = support.facet_buffers(flora, fitted, camera, side)
+        sizes.append(sum(b.polygons for b in made) + (facets.polygons if facets else 0))
+        assert sizes[-1] <= (most or np.inf)
+    assert sizes[0] > sizes[1] > sizes[2] > 500
+
+
+def tube(radius: float, length: float, sides: int = 8, rings: int = 20) -> tuple[np.ndarray, list[list[int]]]:
+    angle = np.linspace(0, 2 * np.pi, sides, endpoint=False)
+    ring = radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    positions = np.concatenate([ring + [0, 0, z] for z in np.linspace(0, length, rings)])
+    faces = [
+        [i * sides + j, i * sides + (j + 1) % sides, (i + 1) * sides + (j + 1) % sides, (i + 1) * sides + j]
+        for i in range(rings - 1)
+        for j in range(sides)
+    ]
+    return positions, faces
+
+
+@pytest.mark.parametrize(("radius", "length"), [(0.1, 2.0), (0.01, 1.0), (0.5, 40.0)])
+@pytest.mark.parametrize("split", [False, True])
+def test_tubes_are_solid_and_as_wide_as_they_are(radius: float, length: float, split: bool) -> None:
+    """Open ends or not, with vertices shared or with those of each face by themselves."""
+    positions, faces = tube(radius, length)
+    if split:
+        positions, faces = positions[np.ravel(faces)], np.arange(4 * len(faces)).reshape(-1, 4).tolist()
+    one = surface(positions, faces)
+    assert one.solid.all()
+    assert not one.leaf.any()
+    np.testing.assert_allclose(one.width, 2 * radius, rtol=0.1)
+
+
+def test_cards_are_leaves_and_ground_and_walls_are_neither_leaf_nor_solid() -> None:
+    card = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.2, 0], [0, 0.2, 0]], float)
+    many = np.concatenate([card + [i, 0, 0] for i in range(100)])
+    own = [[4 * i + k for k in face] for i in range(100) for face in ([0, 1, 2], [0, 2, 3])]
+    cards, wall = surface(many, own), surface(card, [[0, 1, 2, 3]])
+    assert cards.leaf.all()
+    assert not (cards.solid.any() or wall.solid.any() or wall.leaf.any())
+    assert cards.width == pytest.approx(0.09, abs=0.01)
+    side = 20
+    place = np.stack(np.meshgrid(np.arange(side), np.arange(side), indexing="ij"), -1).reshape(-1, 2)
+    height = mix(np.arange(side * side).astype(np.uint64)) / 2**64
+    faces = [[i, i + side, i + side + 1, i + 1] for i in range(side * (side - 1)) if (i + 1) % side]
+    ground = surface(np.c_[place, height].astype(float), faces)
+    assert not (ground.leaf.any() or ground.solid.any())
+    assert ground.width.min() > 10
+
+
+@given(SEEDS)
+@settings(deadline=None, max_examples=15)
+def test_features_do_not_depend_on_the_unit(seed: int) -> None:
+    one = thicket(seed, 20)
+    _, _, width = mesh_features(1000 * one.positions, one.corner_verts, one.face_offsets)
+    np.testing.assert_allclose(width, 1000 * one.width, rtol=1e-6)
+    assert np.isfinite(width).all()

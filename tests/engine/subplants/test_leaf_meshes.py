@@ -1,0 +1,265 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes of plants: consistent topology, outward faces, areas as the model says, nothing lost where parts meet."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.engine import support
+from tetflora_addon.buffers import MeshBuffers, concatenate_buffers
+from tetflora_addon.growth.growth import radius_at
+from tetflora_addon.subplants.leaf_meshes import leaf_meshes
+from tetflora_addon.subplants.pieces import Pieces, clipped, expand, leaf_fraction, wood_areas
+from tetflora_addon.subplants.tubes import tube_buffers
+
+
+def check_topology(mesh: MeshBuffers) -> None:
+    """Everything that Blender's validation looks at, and no vertex or edge without a face."""
+    v, e, c = len(mesh.positions), len(mesh.edge_verts), len(mesh.corner_verts)
+    assert mesh.face_offsets[0] == 0
+    assert mesh.face_offsets[-1] == c == len(mesh.corner_edges)
+    assert (np.diff(mesh.face_offsets) >= 3).all()
+    assert np.unique(mesh.corner_verts).tolist() == list(range(v))
+    assert np.unique(mesh.corner_edges).tolist() == list(range(e))
+    following = np.arange(1, c + 1)
+    following[mesh.face_offsets[1:] - 1] = mesh.face_offsets[:-1]
+    joined = np.stack([mesh.corner_verts, mesh.corner_verts[following]], axis=1)
+    assert (np.sort(joined, axis=1) == np.sort(mesh.edge_verts[mesh.corner_edges], axis=1)).all()
+    assert (mesh.edge_verts[:, 0] != mesh.edge_verts[:, 1]).all()
+    assert len(np.unique(np.sort(mesh.edge_verts, axis=1), axis=0)) == e
+    assert np.bincount(mesh.corner_edges, minlength=e).max() <= 2
+    assert np.isfinite(mesh.positions).all()
+    sizes = {"POINT": v, "FACE": mesh.polygons, "CORNER": c}
+    for domain, values in mesh.attributes.values():
+        assert len(values) == sizes[domain]
+        assert values.dtype == np.float32
+        assert np.isfinite(values).all()
+    for array in (mesh.edge_verts, mesh.corner_verts, mesh.corner_edges, mesh.face_offsets):
+        assert array.dtype == np.int32
+    assert mesh.positions.dtype == np.float32
+
+
+def check_attributes(mesh: MeshBuffers) -> None:
+    assert set(mesh.attributes) == {"UVMap", "tf_colour", "tf_transmission"}
+    assert mesh.attributes["UVMap"][0] == "CORNER"
+    assert mesh.attributes["UVMap"][1].shape[1] == 2
+    for name in ("tf_colour", "tf_transmission"):
+        domain, values = mesh.attributes[name]
+        assert domain == "FACE"
+        assert values.min() >= 0
+        assert values.max() <= 1
+
+
+@pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
+def test_meshes_of_shipped_species(species: int) -> None:
+    flora = support.flora()
+    _, pieces = support.grown(flora, support.plants([3, 4], species))
+    tubes, leaves = support.meshes(flora, pieces)
+    assert (not leaves) == (flora.leaf_count[flora.first_row[species]] == 0)
+    for mesh in (*tubes, *leaves):
+        check_topology(mesh)
+        check_attributes(mesh)
+
+
+def test_tubes_are_open_pipes_that_face_outwards() -> None:
+    """Euler number 0 for each; every edge between rings has two faces, rims have one; normals lead from the axis."""
+    flora = support.small_flora()
+    _, pieces = support.grown(flora, support.plants([1, 2, 3]))
+    tubes = tube_buffers(flora, pieces)
+    branches = int((pieces.t0 == 0).sum())
+    assert len(tubes.positions) - len(tubes.edge_verts) + tubes.polygons == 0
+    uses = np.bincount(tubes.corner_edges)
+    rims = flora.rows["sides"][pieces.branches.row[pieces.t0 == 0]].sum() * 2
+    assert (uses == 1).sum() == rims
+    assert branches > 50
+    assert tubes.smooth
+    assert tubes.polygons == flora.rows["sides"][pieces.branches.row].sum()
+    for key in pieces.branches.key[pieces.t0 == 0][::3]:
+        own = pieces.take(pieces.branches.key == key)
+        mesh = tube_buffers(flora, own)
+        centre, normal = support.face_centres(mesh), support.face_vectors(mesh)
+        axis = own.end - own.start
+        along = np.clip(np.einsum("fni,ni->fn", centre[:, None] - own.start, axis) / (axis**2).sum(1), 0, 1)
+        apart = centre[:, None] - own.start - along[..., None] * axis
+        nearest = np.linalg.norm(apart, axis=2).argmin(axis=1)
+        assert (np.einsum("fi,fi->f", apart[np.arange(len(centre)), nearest], normal) > 0).all()
+
+
+def test_a_straight_tube_is_a_frustum() -> None:
+    """Positive volume, the radii of its ends, the area of its trapezoids."""
+    flora = support.compiled({**support.small(order0={"curvature": [0, 0], "angle": [0, 0], "branches": [0, 0]})})
+    trunk, pieces = support.grown(flora, support.plants(5))
+    mesh = tube_buffers(flora, pieces)
+    sides, taper = int(flora.rows["sides"][0]), float(flora.rows["taper"][0, 0])
+    rings = mesh.positions.reshape(-1, sides, 3)
+    radii = np.linalg.norm(rings[..., :2], axis=2)
+    heights = rings[..., 2].mean(axis=1)
+    for ring in (0, -1):
+        expected = trunk.radius[0] * (1 - (1 - taper) * heights[ring] / trunk.length[0])
+        np.testing.assert_allclose(radii[ring], expected, rtol=1e-5)
+        assert radius_at(flora.rows, trunk, np.array([heights[ring] / trunk.length[0]])) == pytest.approx(expected)
+    centre, vectors = support.face_centres(mesh), support.face_vectors(mesh)
+    lateral = np.einsum("fi,fi->f", centre * [1, 1, 0], vectors)
+    assert (lateral > 0).all()
+    assert support.face_areas(mesh).sum() == pytest.approx(wood_areas(flora, pieces).sum(), rel=1e-3)
+
+
+def test_area_of_tubes_is_the_area_of_the_wood() -> None:
+    """Mitred joints take and give a little, and the curve of a flare is straight between rings."""
+    flora = support.flora()
+    for species in range(len(support.SPECIES)):
+        _, pieces = support.grown(flora, support.plants([1, 2], species))
+        area = support.face_areas(tube_buffers(flora, pieces)).sum()
+        assert area == pytest.approx(wood_areas(flora, pieces).sum(), rel=0.03)
+
+
+def test_area_of_leaves_is_that_of_the_model_times_size_squared() -> None:
+    flora = support.flora()
+    for species in range(len(support.SPECIES)):
+        _, pieces = support.grown(flora, support.plants([1], species))
+        tips = pieces.take(pieces.t1 == 1)
+        owner, _, size = support.leaves_of(flora, tips.branches)
+        number, area, single = 0, 0.0, True
+        for leaf in leaf_meshes(flora, pieces, species):
+            model = flora.forms[species][leaf.kind][leaf.form]
+            copies = leaf.buffers.polygons // model.polygons
+            assert len(leaf.buffers.positions) == copies * len(model.positions)
+            number, area = number + copies, area + support.face_areas(leaf.buffers).sum()
+            single &= len(flora.forms[species][leaf.kind]) == 1
+        assert number == len(size)
+        expected = (size**2 * flora.leaf.area[tips.branches.row[owner]]).sum()
+        assert area == pytest.approx(expected, rel=1e-4 if single else 0.03)  # forms are drawn by chance
+
+
+def test_uv_of_leaves_and_bark() -> None:
+    flora = support.small_flora()
+    _, pieces = support.grown(flora, support.plants(1))
+    leaves, tubes = support.leaf_mesh(flora, pieces, 0), tube_buffers(flora, pieces)
+    number = leaves.polygons // flora.forms[0][0][0].polygons
+    assert (leaves.attributes["UVMap"][1] == np.tile(flora.forms[0][0][0].uv, (number, 1))).all()
+    quads = tubes.attributes["UVMap"][1].reshape(-1, 4, 2)
+    assert (quads[:, [0, 3], 0] < quads[:, [1, 2], 0]).all()  # no face spans the seam backwards
+    assert (quads[:, 0, 1] < quads[:, 3, 1]).all()
+    assert quads[..., 0].max() == 1
+
+
+def test_one_colour_a_branch_and_a_leaf() -> None:
+    flora = support.small_flora()
+    _, pieces = support.grown(flora, support.plants(1))
+    own = pieces.take(pieces.branches.row == 0)
+    colours = tube_buffers(flora, own).attributes["tf_colour"][1]
+    assert len(np.unique(colours, axis=0)) == 1
+    leaves = support.leaf_mesh(flora, pieces, 0).attributes["tf_colour"][1]
+    assert len(np.unique(leaves, axis=0)) > 0.9 * len(leaves) / flora.forms[0][0][0].polygons
+    low, high = (flora.rows["leaf_colour"][1, 0] + s * flora.rows["leaf_colour"][1, 1] for s in (-1, 1))
+    assert ((leaves >= low - 1e-6) & (leaves <= high + 1e-6)).all()
+
+
+def cut(pieces: Pieces, plane: np.ndarray) -> Pieces:
+    """Pieces with those that cross a plane cut in two."""
+    start, end = (p @ plane[:3] + plane[3] for p in (pieces.start, pieces.end))
+    crossing = (start < 0) != (end < 0)
+    return Pieces.concatenate([pieces.take(~crossing), *clipped(pieces.take(crossing), start[crossing], end[crossing])])
+
+
+@given(st.integers(0, 2**31), st.integers(1, 4))
+@settings(deadline=None, max_examples=25)
+def test_cutting_changes_nothing_but_the_number_of_rings(seed: int, cuts: int) -> None:
+    """Leaves are the same to the bit, the tube's surface stays, and no seam opens where pieces touch."""
+    flora = support.small_flora()
+    rng = np.random.default_rng(seed)
+    _, pieces = support.grown(flora, support.plants(seed))
+    parts = pieces
+    for _ in range(cuts):
+        normal = rng.normal(size=3)
+        normal /= np.linalg.norm(normal)
+        parts = cut(parts, np.append(normal, -normal @ (rng.normal(size=3) * 0.5 + [0, 0, 1.5])))
+    parts = parts.take(rng.permutation(len(parts)))
+    assert wood_areas(flora, parts).sum() == pytest.approx(wood_areas(flora, pieces).sum(), rel=1e-12)
+    assert (leaf_fraction(flora, parts)).sum() == pytest.approx(leaf_fraction(flora, pieces).sum(), rel=1e-12)
+    for row in range(3):
+        of = [support.leaf_mesh(flora, p.take(p.branches.row == row), 0) for p in (pieces, parts)]
+        if of[0] is None:
+            assert of[1] is None
+            continue
+        ordered = [np.unique(m.positions.reshape(-1, 12), axis=0) for m in of]
+        assert (ordered[0] == ordered[1]).all()
+    whole, mesh = tube_buffers(flora, pieces), tube_buffers(flora, parts)
+    check_topology(mesh)
+    added = flora.rows["sides"][parts.branches.row].sum() - flora.rows["sides"][pieces.branches.row].sum()
+    assert mesh.polygons == whole.polygons + added
+    assert len(mesh.positions) == len(whole.positions) + added  # one ring, not two, at each cut
+    assert support.face_areas(mesh).sum() == pytest.approx(support.face_areas(whole).sum(), rel=1e-3)
+
+
+def test_copies_of_a_seed_are_plants_of_their_own() -> None:
+    """Two plants of one seed at different places: twice the mesh of one, each around its own trunk."""
+    flora = support.small_flora()
+    one, _ = support.meshes(flora, support.grown(flora, support.plants(9))[1])
+    both, both_leaves = support.meshes(
+        flora, support.grown(flora, support.plants([9, 9], position=[(0, 0, 0), (50, 0, 0)]))[1]
+    )
+    assert both[0].polygons == 2 * one[0].polygons
+    for mesh in (both[0], both_leaves[0]):
+        second = mesh.positions[:, 0] > 25
+        assert second.sum() * 2 == len(second)
+        np.testing.assert_allclose(
+            np.sort(mesh.positions[~second, 2]), np.sort(mesh.positions[second, 2]), rtol=0, atol=1e-5
+        )
+
+
+def test_species_of_one_seed_are_plants_of_their_own() -> None:
+    flora = support.compiled(support.SMALL, support.shipped("bush"))
+    pieces = support.grown(flora, support.plants([9, 9], [0, 1]))[1]
+    together = tube_buffers(flora, pieces).polygons
+    apart = [tube_buffers(flora, pieces.take(flora.species_of(pieces.branches.row) == s)).polygons for s in (0, 1)]
+    assert together == sum(apart)
+
+
+def test_concatenation() -> None:
+    """Parts keep their shape, numbers are offset by what stands before; nothing is made of nothing."""
+    flora = support.small_flora()
+    _, pieces = support.grown(flora, support.plants(2))
+    parts = [tube_buffers(flora, pieces.take(pieces.branches.row == row)) for row in range(3)]
+    mesh = concatenate_buffers(parts)
+    check_topology(mesh)
+    assert mesh.smooth
+    assert mesh.polygons == sum(p.polygons for p in parts)
+    assert mesh.nbytes == sum(p.nbytes for p in parts) - 8  # of the offsets, two ends fewer
+    np.testing.assert_array_equal(support.face_areas(mesh), np.concatenate([support.face_areas(p) for p in parts]))
+    assert concatenate_buffers([]) is None
+    assert concatenate_buffers(parts[:1]) is parts[0]
+
+
+def test_no_mesh_without_contents() -> None:
+    flora = support.small_flora()
+    _, pieces = support.grown(flora, support.plants(2))
+    assert tube_buffers(flora, Pieces.empty()) is None
+    assert support.leaf_mesh(flora, Pieces.empty(), 0) is None
+    assert support.leaf_mesh(flora, pieces.take(pieces.branches.row == 0), 0) is None
+    bare = pieces.take((pieces.branches.row == 1) & (pieces.t1 <= 0.5))
+    assert len(bare)
+    assert support.leaf_mesh(flora, bare, 0) is None
+
+
+def test_whole_branches_are_the_same_as_all_their_pieces() -> None:
+    """Down to the last digit, whichever way they came; in the emission whole branches pass by without being pieces."""
+    flora = support.flora()
+    for species in range(len(support.SPECIES)):
+        whole, pieces = support.grown(flora, support.plants([1, 2], species))
+        stems = list(expand(flora, whole))
+        meshes = [
+            [tube_buffers(flora, *some), *(leaf.buffers for leaf in leaf_meshes(flora, some[0], species, some[1]))]
+            for some in ((pieces, ()), (Pieces.empty(), stems))
+        ]
+        for cut, made in zip(*meshes, strict=True):
+            assert cut.polygons == made.polygons
+            check_topology(made)
+            faces = [support.face_vectors(m).round(9) + support.face_centres(m).round(6) for m in (cut, made)]
+            assert np.array_equal(*(np.sort(f.view([("", float)] * 3).reshape(-1)) for f in faces))
+            for name, (_, values) in cut.attributes.items():
+                assert values.sum() == pytest.approx(made.attributes[name][1].sum(), rel=1e-5)

@@ -1,0 +1,328 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``blender scene.blend --command tetflora refine|render|stats|farm``: TetFlora for scripts and render farms.
+
+Exit codes: 0 done, 1 the scene or a file cannot be used, 2 wrong arguments. An error is one line on stderr. With
+``--json`` the last line on stdout is one JSON object; Blender's own chatter comes before it.
+"""
+
+import argparse
+import json
+import os
+import re
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from itertools import takewhile
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ...errors import SceneError, TetFloraError
+from ..compat import EEVEE_ENGINES, eevee_engine
+from ..job import refine as job
+from ..job.contents import estimate
+from ..properties import TetFloraScene
+from ..runtime import failed_frames
+from ..saved_files import damaged, write_blend
+from ..scene.camera import read_camera
+from . import farm as farm_bundle
+from .farm_template import MOST_FRAME, Run, frame_numbers, frame_runs
+
+NAME = "tetflora"
+#: Most samples that Cycles takes.
+_MOST = 1 << 24
+
+_command: Any = None
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line, as all other errors are said."""
+
+    def error(self, message: str) -> None:
+        raise SystemExit(_fail(f"{message}; see --help", 2))
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run one command on the open file.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        What follows ``--command tetflora``.
+
+    Returns
+    -------
+    int
+        Exit code, see above.
+    """
+    try:
+        options = _parser().parse_args(list(arguments))
+    except SystemExit as stop:
+        return stop.code if isinstance(stop.code, int) else 0
+    try:
+        _check_file()
+        figures = options.run(options)
+    except (TetFloraError, OSError) as error:
+        return _fail(str(error), 1)
+    except RuntimeError as error:
+        # Blender's operators say "Error: ..." and more, on several lines.
+        return _fail(" ".join(str(error).split()).removeprefix("Error: "), 1)
+    if figures is None:
+        return 1
+    try:
+        if options.json:
+            print(json.dumps(figures), flush=True)
+        else:
+            for key, value in figures.items():
+                if key != "steps":  # a line of a dozen figures for each pass: for programs
+                    print(f"{key.replace('_', ' '):>22}: {_readable(value)}", flush=True)
+    except OSError as error:  # into a file on a full disk, or into a program that has ended
+        return _fail(f"cannot print the statistics: {error.strerror}", 1)
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog=f"blender FILE --command {NAME}",
+        description="Refine and render the plants of a scene, in the file that Blender has opened.",
+    )
+    commands = parser.add_subparsers(title="commands", required=True, metavar="refine|render|stats|farm")
+
+    refine = commands.add_parser("refine", help="create meshes of the plants for the scene camera")
+    refine.add_argument("--cutoff", type=_positive, metavar="PIXELS", help="override the Cutoff of the scene")
+    refine.add_argument("--save", metavar="PATH", help="save a copy of the file with the results")
+    refine.set_defaults(run=_refine)
+
+    render = commands.add_parser("render", help="refine and render frames")
+    which = render.add_mutually_exclusive_group()
+    which.add_argument(
+        "--frame", type=_frame, metavar="N", help="frame to render (default: current frame of the scene)"
+    )
+    which.add_argument("--frames", type=_frames, metavar="A-B", help="frames to render, like 1-24, 1-99:2 or 3,7-9")
+    render.add_argument("--engine", choices=("cycles", "eevee"), help="override the render engine of the scene")
+    render.add_argument("--samples", type=_whole, metavar="N", help="override the number of samples per pixel")
+    render.add_argument("--output", metavar="PATH", help="output folder or file name; #### is the frame")
+    about = "render existing images again, even if Overwrite is off in the scene"
+    render.add_argument("--overwrite", action="store_true", help=about)
+    render.set_defaults(run=_render)
+
+    stats = commands.add_parser("stats", help="count plants and their polygons without changing anything")
+    stats.set_defaults(run=_stats)
+
+    farm = commands.add_parser("farm", help="write a job for a render farm (Open Job Description)")
+    farm.add_argument("folder", type=Path, metavar="OUT_DIR", help="new or empty folder for the job")
+    farm.add_argument("--chunk", type=_whole, default=1, metavar="N", help="frames that a worker renders per task")
+    farm.add_argument("--frames", type=_frames, metavar="A-B", help="frames of the job (default: those of the scene)")
+    farm.add_argument("--copy", action="store_true", help="copy the file and its assets into the job")
+    farm.set_defaults(run=_farm)
+
+    for command in (refine, render):
+        command.add_argument("--form", choices=_choices("proxy_form"), help="override the proxy form of the scene")
+        about = "override the Lighting of the scene"
+        command.add_argument("--baked-light", choices=_choices("baked_light"), help=about)
+    for command in (refine, render, stats, farm):
+        command.add_argument("--json", action="store_true", help="print statistics as a JSON object in the last line")
+    return parser
+
+
+def _refine(options: argparse.Namespace) -> dict:
+    scene = bpy.context.scene
+    if options.cutoff is not None:
+        scene.tetflora.cutoff = options.cutoff
+    _set_proxies(scene, options)
+    target = None if options.save is None else _named(options.save)
+    if target is not None:
+        _check_target(target)
+    statistics = job.refine(scene, bpy.context.evaluated_depsgraph_get(), view_layer=bpy.context.view_layer)
+    if target is not None:
+        scene.tetflora.output.save_results = True  # that is what was asked for
+        write_blend(target, lambda path: bpy.ops.wm.save_as_mainfile(filepath=path, copy=True))
+    return asdict(statistics)
+
+
+def _check_target(path: Path) -> None:
+    """Say before the work what would be said after it."""
+    if not path.parent.is_dir():
+        raise SceneError(f"The folder {path.parent} does not exist; create it or choose another")
+    if path.is_dir():
+        raise SceneError(f"{path} is a folder; add a file name")
+
+
+def _render(options: argparse.Namespace) -> dict | None:
+    scene = bpy.context.scene
+    # Blender's own message about a missing camera comes late and is hard to read.
+    read_camera(scene, bpy.context.evaluated_depsgraph_get())
+    scene.tetflora.refine_at_render = True
+    _set_proxies(scene, options)
+    if options.engine is not None:
+        scene.render.engine = 'CYCLES' if options.engine == "cycles" else eevee_engine()
+    if options.samples is not None:
+        if scene.render.engine in EEVEE_ENGINES:
+            scene.eevee.taa_render_samples = options.samples
+        elif scene.render.engine == 'CYCLES':
+            scene.cycles.samples = options.samples
+        else:
+            raise SceneError(f"The engine {scene.render.engine} has no samples; choose one with --engine")
+    if options.output is not None:
+        scene.render.filepath = _place(options.output)
+    if options.overwrite:
+        scene.render.use_overwrite = True
+    if options.frames is not None:
+        rendered = [_animation(scene, run) for run in options.frames]
+        files = [name for names, _ in rendered for name in names]
+        whole = all(whole for _, whole in rendered)
+    else:
+        if scene.render.is_movie_format:
+            raise SceneError("The output format is a movie; set the frames with --frames, or choose an image format")
+        if options.frame is not None:
+            scene.frame_set(options.frame)
+        # Blender leaves #### as it is in stills.
+        name, whole = _still(scene, _still_path(scene))
+        files = [name]
+    paths = [Path(bpy.path.abspath(f)) for f in files]
+    for path in damaged(scene, paths):
+        raise SceneError(f"{path} is incomplete; check the free disk space")
+    if not whole:
+        return None  # said on stderr when it happened
+    return {"files": list(map(str, paths)), **json.loads(scene.tetflora.statistics or "{}")}
+
+
+def _stats(_options: argparse.Namespace) -> dict:
+    statistics = estimate(bpy.context.scene, bpy.context.evaluated_depsgraph_get())
+    return {"plants": statistics.plants, "polygons_full": statistics.polygons_full}
+
+
+def _farm(options: argparse.Namespace) -> dict:
+    written = farm_bundle.write_bundle(bpy.context.scene, options.folder, options.chunk, options.frames, options.copy)
+    for path in written["missing"]:
+        print(f"tetflora: warning: missing file: {path}", file=sys.stderr, flush=True)
+    for path in written["absolute_paths"]:
+        about = "use File > External Data > Make Paths Relative if other machines cannot access it"
+        print(f"tetflora: warning: absolute path: {path}; {about}", file=sys.stderr, flush=True)
+    return written
+
+
+def _check_file() -> None:
+    """Refuse to go on where Blender could not open the file: it does, with a cube, whose pictures pass for the film's.
+
+    Raises
+    ------
+    SceneError
+        The command line names a file, and none is open.
+    """
+    named = [text for text in takewhile(lambda text: text != "--command", sys.argv) if re.search(r"\.blend\d*$", text)]
+    if named and not bpy.data.filepath:
+        raise SceneError(f"{named[-1]} cannot be opened; see Blender's message above")
+
+
+def _animation(scene: bpy.types.Scene, run: Run) -> tuple[list[str], bool]:
+    """Render a run of frames: its files, and whether all of them have their plants."""
+    first, last, step = run
+    stills = []
+    while first <= min(last, -1):  # no range of Blender's begins below 0
+        scene.frame_set(first)
+        stills.append(_still(scene, scene.render.frame_path(frame=first)))
+        first += step
+    files, whole = [name for name, _ in stills], all(whole for _, whole in stills)
+    if first <= last:
+        scene.frame_start, scene.frame_end, scene.frame_step = first, last, step
+        bpy.ops.render.render(animation=True)
+        whole = whole and not failed_frames
+        names = [scene.render.frame_path(frame=n) for n in frame_numbers([(first, last, step)])]
+        files += dict.fromkeys(names)  # all of a movie are one
+    return files, whole
+
+
+def _still(scene: bpy.types.Scene, path: str) -> tuple[str, bool]:
+    """Render the frame of the scene: its file, and whether it has its plants."""
+    before, scene.render.filepath = scene.render.filepath, path
+    bpy.ops.render.render(write_still=True)
+    scene.render.filepath = before
+    return bpy.path.ensure_ext(path, scene.render.file_extension), not failed_frames
+
+
+def _named(text: str) -> Path:
+    """A place as the command line names it; Blender's own // leads from the .blend."""
+    return Path(bpy.path.abspath(text)).absolute()
+
+
+def _place(text: str) -> str:
+    """Where pictures go, as Blender wants it: a folder ends with a slash."""
+    path = _named(text)
+    return f"{path}{os.sep}" if text.endswith(("/", os.sep)) or path.is_dir() else str(path)
+
+
+def _still_path(scene: bpy.types.Scene) -> str:
+    folder, name = os.path.split(bpy.path.abspath(scene.render.filepath))
+    frame = scene.frame_current
+    # In a folder pictures are named by their frames, as in animations.
+    return os.path.join(folder, re.sub(r"#+", lambda match: f"{frame:0{len(match.group())}d}", name or "####"))
+
+
+def _set_proxies(scene: bpy.types.Scene, options: argparse.Namespace) -> None:
+    if options.form is not None:
+        scene.tetflora.proxy_form = options.form.upper()
+    if options.baked_light is not None:
+        scene.tetflora.baked_light = options.baked_light.upper()
+
+
+def _choices(name: str) -> list[str]:
+    return [item.identifier.lower() for item in TetFloraScene.bl_rna.properties[name].enum_items]
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not a number greater than 0")
+    return value
+
+
+def _whole(text: str) -> int:
+    value = int(text)
+    if not 1 <= value <= _MOST:
+        raise argparse.ArgumentTypeError(f"{text} is not a number from 1 to {_MOST:,}")
+    return value
+
+
+def _frame(text: str) -> int:
+    value = int(text)
+    if abs(value) > MOST_FRAME:
+        raise argparse.ArgumentTypeError(f"{text} exceeds the last frame that Blender supports, {MOST_FRAME:,}")
+    return value
+
+
+def _frames(text: str) -> list[Run]:
+    try:
+        return frame_runs(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _readable(value: object) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {_readable(item)}" for key, item in value.items())
+    if isinstance(value, list):
+        return " ".join(map(str, value)) or "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:,.2f}" if isinstance(value, float) else f"{value:,}" if isinstance(value, int) else str(value)
+
+
+def _fail(message: str, code: int) -> int:
+    print(f"tetflora: error: {message}", file=sys.stderr, flush=True)
+    return code
+
+
+def register() -> None:
+    """Make ``--command tetflora`` known."""
+    global _command
+    _command = bpy.utils.register_cli_command(NAME, main)
+
+
+def unregister() -> None:
+    """Take the command back; 4.5 hangs at exit if it stays."""
+    global _command
+    bpy.utils.unregister_cli_command(_command)
+    _command = None

@@ -1,0 +1,321 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``--command tetflora farm``: the open file as a job bundle that any scheduler of Open Job Description can run.
+
+A bundle is a folder: the three texts of `farm_template`, a folder with the extension's zip, its installer and the
+user's own species, and, if asked for, a copy of the .blend with the files that it uses. Files keep their places
+relative to each other, so that paths that begin with // lead to them unchanged, in linked libraries as well. The open
+file is only read.
+"""
+
+from __future__ import annotations
+
+import fnmatch
+import json
+import os
+import re
+import shutil
+import tomllib
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ...errors import SceneError
+from ..job.contents import estimate
+from ..preferences import species_folders
+from ..scene.camera import read_camera
+from ..scene.plants import NoPlantsError
+from . import farm_template
+from .farm_template import Run
+
+#: Root of the extension as it is installed, or of the source tree.
+EXTENSION = Path(__file__).resolve().parents[3]
+MANIFEST = "blender_manifest.toml"
+#: What Blender leaves out of an extension whose manifest does not say.
+_LEFT_OUT = ("__pycache__/", ".*", "/*.zip")
+#: A zip of the same files is the same zip.
+_DATE = (1980, 1, 1, 0, 0, 0)
+
+
+@dataclass(frozen=True)
+class Assets:
+    """Files on disk that a scene uses besides its .blend; all paths absolute.
+
+    Attributes
+    ----------
+    files, folders : tuple of Path
+        Those that are there.
+    missing : tuple of Path
+        Those that are not.
+    absolute : tuple of str
+        Paths that do not begin with //, as the file has them: they only lead anywhere on machines that see the same
+        drives.
+    """
+
+    files: tuple[Path, ...]
+    folders: tuple[Path, ...]
+    missing: tuple[Path, ...]
+    absolute: tuple[str, ...]
+
+
+def write_bundle(
+    scene: bpy.types.Scene, folder: Path, chunk: int = 1, runs: list[Run] | None = None, copy: bool = False
+) -> dict[str, Any]:
+    """Write the open file as a job bundle.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene that the .blend opens with.
+    folder : Path
+        Made if it is not there; it has to be empty.
+    chunk : int
+        Most frames that one worker renders in one go.
+    runs : list of tuple, optional
+        First, last and step of frames; the scene's own if not given.
+    copy : bool
+        Copy the .blend and what it uses into the bundle, instead of naming their places.
+
+    Returns
+    -------
+    dict
+        Figures and names, for the command line.
+
+    Raises
+    ------
+    SceneError
+        The scene cannot be rendered by a farm, or the folder cannot be used or written; in the latter case what was
+        written is taken away again.
+    TetFloraError
+        Its plants could not be made.
+    """
+    blend = _saved_file()
+    _check_output(scene)
+    runs = runs or [(scene.frame_start, scene.frame_end, scene.frame_step)]
+    frames = farm_template.frame_expression(runs)
+    plants = _plants(scene)
+    assets = used_files(blend)
+    places = _places(blend, assets) if copy else {}
+    folder = folder.absolute()
+    made = _empty_folder(folder)
+    name = os.path.basename(scene.render.filepath.replace("\\", "/")) or "frame_####"
+    inside = places[blend].as_posix() if copy else None
+    texts = {
+        "template": farm_template.template(farm_template.Job(blend.stem, frames, chunk, name, inside)),
+        "parameter_values": farm_template.parameter_values(None if copy else str(blend)),
+        "asset_references": farm_template.asset_references(
+            [] if copy else [str(path) for path in (blend, *assets.files)],
+            [] if copy else [str(path) for path in assets.folders],
+        ),
+    }
+    try:
+        _write_files(folder / farm_template.FILES)
+        for path, place in places.items():
+            _copy(path, folder / farm_template.SCENE_FOLDER / place)
+        for title, content in texts.items():
+            text = json.dumps(content, indent=2, ensure_ascii=False)
+            (folder / f"{title}.json").write_text(text + "\n", encoding="utf-8")
+    except BaseException as error:
+        _take_away(folder, made)
+        if isinstance(error, OSError):
+            raise SceneError(f"Cannot write the job {folder}: {_reason(error)}. Choose another folder") from None
+        raise
+    numbers = farm_template.frame_numbers(runs)
+    return {
+        "bundle": str(folder),
+        "plants": plants,
+        "frames": len(numbers),
+        "tasks": -(-len(numbers) // chunk),
+        "assets": len(assets.files) + len(assets.folders),
+        "missing": [str(path) for path in assets.missing],
+        "absolute_paths": list(assets.absolute),
+    }
+
+
+def used_files(blend: Path) -> Assets:
+    """Images, libraries, caches, sounds and fonts on disk that the open file uses, packed ones left out."""
+    written = bpy.utils.blend_paths(absolute=False, packed=False, local=False)
+    paths = bpy.utils.blend_paths(absolute=True, packed=False, local=False)
+    files: set[Path] = set()
+    folders: set[Path] = set()
+    missing: set[Path] = set()
+    for path in {Path(os.path.normpath(text)) for text in paths if text}:
+        found = list(_files_of(path))
+        files.update(p for p in found if p.is_file())
+        folders.update(p for p in found if p.is_dir() and p not in blend.parents)  # not the whole project
+        if not found:
+            missing.add(path)
+    for user in (*bpy.data.images, *bpy.data.movieclips):
+        if user.source == 'SEQUENCE' and user.filepath:
+            files.update(_sequence(Path(os.path.normpath(bpy.path.abspath(user.filepath, library=user.library)))))
+    cache = blend.with_name(f"blendcache_{blend.stem}")
+    if cache.is_dir():
+        folders.add(cache)
+    absolute = {text for text in written if text and not text.startswith("//")}
+    return Assets(
+        tuple(sorted(files - {blend})), tuple(sorted(folders)), tuple(sorted(missing)), tuple(sorted(absolute))
+    )
+
+
+def write_zip(target: Path, root: Path = EXTENSION) -> None:
+    """Pack an installed extension as Blender's own build does; its manifest says what stays out.
+
+    Raises
+    ------
+    SceneError
+        The folder is no extension.
+    """
+    names = extension_files(root)
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in names:
+            info = zipfile.ZipInfo(name, _DATE)
+            info.compress_type, info.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
+            archive.writestr(info, (root / name).read_bytes())
+
+
+def extension_files(root: Path = EXTENSION) -> list[str]:
+    """Names, with slashes, of an extension's files."""
+    manifest = _manifest(root)
+    patterns = tuple(manifest.get("build", {}).get("paths_exclude_pattern", _LEFT_OUT))
+    names = []
+    for folder, inner, files in os.walk(root):
+        above = Path(folder).relative_to(root).as_posix()
+        above = "" if above == "." else above + "/"
+        inner[:] = sorted(n for n in inner if not _left_out(above + n, patterns, folder=True))
+        names += [above + n for n in sorted(files) if not _left_out(above + n, patterns, folder=False)]
+    return names
+
+
+def _left_out(name: str, patterns: tuple[str, ...], folder: bool) -> bool:
+    """Whether a pattern in the manner of .gitignore fits: a slash in front ties to the root, one behind to folders."""
+    for pattern in patterns:
+        if pattern.endswith("/") and not folder:
+            continue
+        wanted = pattern.strip("/")
+        subject = name if pattern.startswith("/") or "/" in wanted else name.rsplit("/", 1)[-1]
+        if fnmatch.fnmatchcase(subject, wanted):
+            return True
+    return False
+
+
+def _manifest(root: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads((root / MANIFEST).read_text(encoding="utf-8"))
+    except OSError:
+        raise SceneError(f"{root} has no {MANIFEST}; install TetFlora as an extension from its zip file") from None
+
+
+def _saved_file() -> Path:
+    if not bpy.data.filepath:
+        raise SceneError("The file has not been saved; save it before you write the job")
+    blend = Path(os.path.normpath(bpy.data.filepath))
+    if not blend.is_file():
+        raise SceneError(f"{blend} no longer exists; save the file again")
+    return blend
+
+
+def _check_output(scene: bpy.types.Scene) -> None:
+    if scene.render.is_movie_format:
+        raise SceneError(
+            f"The output format is a movie ({scene.render.image_settings.file_format}), which workers cannot write in "
+            "parts; choose an image format in the Output properties"
+        )
+    read_camera(scene, bpy.context.evaluated_depsgraph_get())
+
+
+def _plants(scene: bpy.types.Scene) -> int:
+    """How many there are; an unknown species is found now, not by each worker."""
+    try:
+        return estimate(scene, bpy.context.evaluated_depsgraph_get()).plants
+    except NoPlantsError:
+        return 0
+
+
+def _empty_folder(folder: Path) -> bool:
+    """Make sure that the folder is there, empty and writable; whether it was made."""
+    made = False
+    try:
+        if not folder.exists():
+            folder.mkdir(parents=True)
+            made = True
+        if not folder.is_dir():
+            raise SceneError(f"{folder} is a file; choose a folder for the job")
+        if any(folder.iterdir()):
+            raise SceneError(f"{folder} is not empty; choose an empty folder for the job")
+        probe = folder / "template.json"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise SceneError(f"Cannot write to {folder}: {error.strerror}. Choose another folder") from None
+    return made
+
+
+def _reason(error: OSError) -> str:
+    """Why a file could not be written or copied; where many could not, why the first."""
+    if isinstance(error, shutil.Error):
+        source, _, why = error.args[0][0]
+        return f"{source}: {why}"
+    return error.strerror or str(error)
+
+
+def _take_away(folder: Path, made: bool) -> None:
+    for path in folder.iterdir():
+        if path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
+    if made:
+        folder.rmdir()
+
+
+def _write_files(folder: Path) -> None:
+    folder.mkdir()
+    version = _manifest(EXTENSION)["version"]
+    write_zip(folder / f"tetflora-{version}.zip")
+    shutil.copyfile(Path(__file__).with_name("farm_installer.py"), folder / farm_template.INSTALLER)
+    for own in species_folders():
+        for path in sorted(own.glob("*.json")):
+            (folder / "species").mkdir(exist_ok=True)
+            shutil.copyfile(path, folder / "species" / path.name)
+
+
+def _places(blend: Path, assets: Assets) -> dict[Path, Path]:
+    """Where each file goes within the bundle: as they lie to each other."""
+    everything = (blend, *assets.files, *assets.folders)
+    drives = {path.drive: path for path in reversed(everything)}
+    if len(drives) > 1:
+        other = next(path for path in everything if path.drive != blend.drive)
+        raise SceneError(f"{other} is not on the drive of {blend.name}; pack it into the file, or copy it there")
+    root = os.path.commonpath([path.parent for path in everything])
+    return {path: path.relative_to(root) for path in everything}
+
+
+def _copy(path: Path, target: Path) -> None:
+    target.parent.mkdir(parents=True, exist_ok=True)
+    if path.is_dir():
+        shutil.copytree(path, target, dirs_exist_ok=True)
+    else:
+        shutil.copyfile(path, target)
+
+
+def _files_of(path: Path) -> Iterator[Path]:
+    """The file, or all tiles of an image that is stored in tiles."""
+    if re.search(r"<(UDIM|UVTILE)>", path.name):
+        pattern = re.sub(r"<(UDIM|UVTILE)>", "*", path.name)
+        if path.parent.is_dir():
+            yield from sorted(p for p in path.parent.iterdir() if fnmatch.fnmatchcase(p.name, pattern))
+    elif path.exists():
+        yield path
+
+
+def _sequence(path: Path) -> Iterator[Path]:
+    """All pictures of the sequence that one picture is of: names that differ in the last number."""
+    match = re.fullmatch(r"(.*?)(\d+)(\D*)", path.name)
+    if match is None or not path.parent.is_dir():
+        return
+    same = re.compile(re.escape(match[1]) + r"\d+" + re.escape(match[3]))
+    yield from sorted(p for p in path.parent.iterdir() if same.fullmatch(p.name))

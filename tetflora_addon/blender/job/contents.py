@@ -1,0 +1,127 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a scene gives to refinement: plants, meshes, lights, their flora and the settings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import bpy
+import numpy as np
+
+from ...compiled.flora import Flora, compile_species
+from ...emission.light import Sources
+from ...growth.growth import trunks
+from ...growth.seeds import Seeds
+from ...refinement.lights import Light
+from ...refinement.polygons import Polygons
+from ...refinement.settings import RefinementSettings
+from ...refinement.statistics import Statistics
+from ...species.catalogue import list_species, load_species
+from ..results.forms import form_of
+from ..results.hiding import originals_shown
+from ..results.leaf_objects import resolved_species
+from ..scene.explicit import Explicit, read_explicit
+from ..scene.lights import read_lights, read_sources
+from ..scene.objects import read_occluders
+from ..scene.plants import NoPlantsError, read_plants
+from ..settings import wind_of
+
+
+@dataclass(frozen=True)
+class Given:
+    """What a scene holds; ``explicit`` is None where no mesh takes part, ``sources`` where no light is baked."""
+
+    seeds: Seeds
+    explicit: Explicit | None
+    occluders: np.ndarray
+    lights: tuple[Light, ...]
+    sources: Sources | None = None
+
+    @property
+    def species(self) -> tuple[str, ...]:
+        """Species of its plants."""
+        return self.seeds.identifiers
+
+    @property
+    def polygons(self) -> Polygons | None:
+        """All explicit polygons."""
+        return None if self.explicit is None else Polygons.everything(self.explicit.meshes)
+
+    def polygons_full(self, flora: Flora) -> int:
+        """Polygons of everything, expanded: expected ones of plants, and those of meshes."""
+        plants = round(flora.polygons[trunks(flora.rows, self.seeds).row].sum())
+        return plants + (self.explicit.meshes.faces if self.explicit else 0)
+
+
+def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Given:
+    """Read everything that takes part in refinement except the camera.
+
+    Raises
+    ------
+    TetFloraError
+        Nothing to refine, or unusable plants or meshes; the message says which.
+    """
+    with originals_shown(scene, depsgraph):
+        explicit = read_explicit(depsgraph, view_layer)
+        try:
+            seeds = read_plants(scene, depsgraph, view_layer)
+        except NoPlantsError:
+            if explicit is None:
+                raise
+            none = np.zeros(0)
+            frames = none.reshape(0, 3), none.reshape(0, 3, 3)
+            seeds = Seeds((), none.astype(np.int32), none.astype(np.int64), *frames, none)
+        lights = read_lights(depsgraph, view_layer) if scene.tetflora.shadow_cutoff > 0.0 else ()
+        baked = scene.tetflora.baked_light != 'OFF' and not scene.tetflora.expand_everything
+        sources = read_sources(scene, depsgraph, view_layer) if baked else None
+        return Given(seeds, explicit, read_occluders(scene, depsgraph, view_layer), lights, sources)
+
+
+def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Flora:
+    """Load and compile species, leaf objects of the scene included.
+
+    Without any, for meshes alone, it is a shipped one, of which nothing grows: the artist's own files and edits
+    must not cost time or raise errors where the scene does not use them.
+
+    Raises
+    ------
+    SpeciesError
+        Unknown or broken species, or a leaf object that is missing or not a mesh with faces.
+    """
+    if not identifiers:
+        return compile_species([load_species(min(list_species()))])
+    return compile_species([resolved_species(scene, identifier, depsgraph) for identifier in identifiers])
+
+
+def blown(scene: bpy.types.Scene, flora: Flora) -> Flora:
+    """A flora in the scene's wind at its frame."""
+    wind = wind_of(scene)
+    return flora if wind is None else flora.in_wind(wind)
+
+
+def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statistics:
+    """Count plants and polygons of the expanded scene, without growing anything.
+
+    Raises
+    ------
+    TetFloraError
+        As `read_scene` and `compile_for`.
+    """
+    given = read_scene(scene, depsgraph, depsgraph.view_layer)
+    flora = compile_for(given.species, scene, depsgraph)
+    return Statistics(plants=len(given.seeds), polygons_full=given.polygons_full(flora))
+
+
+def settings_from(scene: bpy.types.Scene) -> RefinementSettings:
+    """The scene's settings as the engine takes them."""
+    group = scene.tetflora
+    # A field that has no property of its own keeps the engine's value.
+    names = [f.name for f in fields(RefinementSettings) if f.name in group.bl_rna.properties]
+    return RefinementSettings(**{name: getattr(group, name) for name in names})
+
+
+def refinement_settings(scene: bpy.types.Scene) -> RefinementSettings:
+    """The scene's settings, as fine as its proxy form needs them."""
+    emission = form_of(scene).emission
+    return replace(settings_from(scene), hidden_block=emission.hidden_block, proxy_block=emission.proxy_block)

@@ -1,0 +1,202 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Single plants as ordinary meshes, wood and leaves in one: for the species preview, and for artists to keep."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+from numpy.typing import NDArray
+
+from ...buffers import MeshBuffers, concatenate_buffers
+from ...compiled.flora import Flora
+from ...emission import plants as emission
+from ...errors import SceneError
+from ...growth.growth import trunks
+from ...growth.seeds import Seeds
+from ...refinement.statistics import Progress
+from ...species.species import Species
+from ..attributes import frames_of, world_matrix, write
+from ..results.leaf_objects import materials_of
+from ..results.meshes import write_mesh
+from ..scene.skeletons import kind_of
+from .contents import compile_for
+
+#: Polygons that are made at once at most; more would fill the memory of most computers.
+MOST_POLYGONS = 30_000_000
+
+_UPRIGHT = np.eye(3)
+
+
+def single_seed(identifier: str, seed: int, frame: NDArray[np.float64] = _UPRIGHT) -> Seeds:
+    """One plant at the origin, of scale 1; its leaves turn to the sky, so that its tilt (3, 3) matters."""
+    return Seeds(
+        identifiers=(identifier,),
+        species=np.zeros(1, np.int32),
+        seed=np.array([seed], dtype=np.int64),
+        position=np.zeros((1, 3)),
+        frame=np.array(frame)[None],
+        scale=np.ones(1),
+    )
+
+
+def expected_polygons(flora: Flora, seeds: Seeds) -> float:
+    """Faces that plants will have, about."""
+    return float(flora.polygons[trunks(flora.rows, seeds).row].sum())
+
+
+@dataclass(frozen=True)
+class Part:
+    """Polygons of a plant that have materials of their own.
+
+    Attributes
+    ----------
+    kind : str
+        ``'bark'``, ``'leaf'`` or ``'blossom'``.
+    form : int
+        Which of the species' forms of leaf.
+    buffers : MeshBuffers
+    """
+
+    kind: str
+    form: int
+    buffers: MeshBuffers
+
+
+def plant_parts(flora: Flora, seeds: Seeds) -> list[Part]:
+    """All polygons of one plant at the origin, in its own space."""
+    frame = seeds.frame[0].astype(np.float32)
+    found: dict[tuple[str, int], list[MeshBuffers]] = {}
+    for block in emission.expanded_blocks(flora, seeds):
+        found.setdefault((block.kind, block.form), []).append(block.buffers)
+    joined = [(*what, concatenate_buffers(buffers)) for what, buffers in sorted(found.items())]
+    # Row vectors times the frame are turned back by it.
+    return [Part(kind, form, replace(b, positions=b.positions @ frame)) for kind, form, b in joined if b is not None]
+
+
+def plant_mesh(scene: bpy.types.Scene, name: str, species: Species, parts: list[Part]) -> bpy.types.Mesh:
+    """One mesh of the parts of a plant, with materials for each.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        Whose leaf objects count.
+    name : str
+        Of the datablock.
+    species : Species
+        Materials are the species' own, as Refine makes them.
+    parts : list of Part
+        What `plant_parts` gives.
+
+    Returns
+    -------
+    bpy.types.Mesh
+        In the space of the plant. Wood is shaded smooth, leaves flat.
+    """
+    numbered, materials = [], []
+    for part in parts:
+        buffers = part.buffers
+        _, index = buffers.attributes.get("material_index", ("", np.zeros(buffers.polygons, dtype=np.int32)))
+        attributes = {**buffers.attributes, "material_index": ("FACE", index + np.int32(len(materials)))}
+        numbered.append(replace(buffers, attributes=attributes, smooth=True))
+        materials += materials_of(scene, species, part.kind, part.form)
+    whole = concatenate_buffers(numbered)
+    if whole is None:
+        raise SceneError(f'A plant of "{species.name}" has no branches or leaves; edit the species')
+    mesh = write_mesh(name, whole, materials)
+    sharp = np.repeat([not p.buffers.smooth for p in parts], [p.buffers.polygons for p in parts])
+    if sharp.any():
+        write(mesh, "sharp_face", sharp, 'FACE')
+    return mesh
+
+
+def make_plant_meshes(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, plants: Iterable[bpy.types.Object]
+) -> list[bpy.types.Object]:
+    """Make ordinary mesh objects of plants at once; see `make_plant_mesh_steps`."""
+    steps = make_plant_mesh_steps(scene, depsgraph, plants)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as stop:
+            return stop.value
+
+
+def make_plant_mesh_steps(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, plants: Iterable[bpy.types.Object]
+) -> Generator[Progress, object, list[bpy.types.Object]]:
+    """Make ordinary mesh objects of plants, in their places and collections; the plants are disabled, not deleted.
+
+    A step for each plant; closed before its end, it takes back what was made.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        Whose edited species and leaf objects count.
+    depsgraph : bpy.types.Depsgraph
+        Says where the plants are.
+    plants : iterable of bpy.types.Object
+        Plants; each gives an object of its own, whose mesh nobody shares.
+
+    Returns
+    -------
+    list of bpy.types.Object
+        In the order of the plants.
+
+    Raises
+    ------
+    TetFloraError
+        A species or place that cannot be used, or too many polygons; nothing is made then.
+    """
+    plants = list(plants)
+    world = np.array([world_matrix(p, depsgraph) for p in plants]).reshape(-1, 4, 4)
+    frame, scale, sound = frames_of(world[:, :3, :3])
+    for plant, good in zip(plants, sound, strict=True):
+        if not good:
+            raise SceneError(f'"{plant.name}": zero scale or an invalid position; clear them with Alt S and Alt G')
+    floras = {kind_of(p): compile_for((kind_of(p),), scene, depsgraph) for p in plants}
+    seeds = [single_seed(kind_of(p), p.tetflora.seed, f) for p, f in zip(plants, frame, strict=True)]
+    polygons = sum(expected_polygons(floras[s.identifiers[0]], s) for s in seeds)
+    if polygons > MOST_POLYGONS:
+        raise SceneError(
+            f"{len(plants):,} plants have about {polygons:,.0f} polygons; select fewer, the limit is {MOST_POLYGONS:,}"
+        )
+    made, switched = [], []
+    whole = False
+    try:
+        for number, (plant, seed) in enumerate(zip(plants, seeds, strict=True)):
+            yield Progress(number / len(plants), f"mesh {number + 1:,} of {len(plants):,}")
+            flora = floras[kind_of(plant)]
+            mesh = plant_mesh(scene, f"{plant.name} mesh", flora.species[0], plant_parts(flora, seed))
+            made.append(_placed(mesh, plant, frame[number] * scale[number], world[number, :3, 3]))
+            if plant.tetflora.enabled:
+                plant.tetflora.enabled = False
+                switched.append(plant)
+        whole = True
+    finally:
+        if not whole:
+            bpy.data.batch_remove([obj.data for obj in made])  # and the objects with them
+            for plant in switched:
+                plant.tetflora.enabled = True
+    return made
+
+
+def _placed(
+    mesh: bpy.types.Mesh, plant: bpy.types.Object, frame: NDArray[np.float64], position: NDArray[np.float64]
+) -> bpy.types.Object:
+    """An object of a plant's mesh in the plant's collections, at its place (3,) with its axes (3, 3)."""
+    obj = bpy.data.objects.new(mesh.name, mesh)
+    for collection in plant.users_collection:
+        collection.objects.link(obj)
+    if plant.parent is not None:  # what carries the plant carries its mesh
+        obj.parent = plant.parent
+        obj.parent_type, obj.parent_bone = plant.parent_type, plant.parent_bone
+        obj.matrix_parent_inverse = plant.matrix_parent_inverse
+    place = Matrix(frame.tolist()).to_4x4()
+    place.translation = position.tolist()
+    obj.matrix_world = place
+    return obj

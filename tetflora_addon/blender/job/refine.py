@@ -1,0 +1,260 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The whole way from a scene of plants and meshes to results, as steps that can be shown, stopped and undone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Generator, Sequence
+
+import bpy
+import numpy as np
+
+from ...camera.camera import Camera
+from ...compiled.flora import Flora
+from ...emission import plants, polygons
+from ...emission.budget import afford
+from ...emission.forms import Refined
+from ...emission.plants import Transition
+from ...proxies.facet_weights import facet_shares
+from ...refinement.decisions import Decision
+from ...refinement.loop import Refinement, step_of
+from ...refinement.loop import refine as refine_loop
+from ...refinement.settings import RefinementSettings
+from ...refinement.statistics import Progress, Statistics, Stopwatch, at_once
+from ..compat import drawn_disc
+from ..materials.materials import baked_material
+from ..results.collection import Results, has_results, result_collections
+from ..results.forms import form_of
+from ..results.hiding import hide_originals, remove_results
+from ..results.leaf_objects import materials_of
+from ..results.output import adopt_materials, release_materials
+from ..results.proxies import Baking, write_proxies
+from ..scene.camera import read_camera
+from ..scene.explicit import Explicit
+from .contents import Given, blown, compile_for, read_scene, refinement_settings
+
+__all__ = ["clear", "has_results", "partition", "refine", "refine_steps"]
+
+#: Fraction of the progress bar that the loop takes; the rest is for writing meshes.
+_LOOP_FRACTION = 0.6
+
+
+def refine_steps(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    *,
+    view_layer: bpy.types.ViewLayer | None = None,
+    for_render: bool = False,
+    beside: Sequence[bpy.types.Collection] = (),
+    camera: Camera | None = None,
+    given: Given | None = None,
+    mark: str = "",
+) -> Generator[Progress, bool | None, Statistics]:
+    """Refine a scene step by step.
+
+    Closing the generator, or an error, leaves the scene as it was. Earlier results are replaced when all is done.
+    Sending it True while it refines makes it go on with what there is; the statistics say that it is not complete.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    depsgraph : bpy.types.Depsgraph
+        Evaluated for the frame that is wanted.
+    view_layer : bpy.types.ViewLayer, optional
+        Whose plants count; by default the dependency graph's.
+    for_render : bool
+        Results live beside those of the artist, in a collection of their own, and are refined for the render region.
+    beside : sequence of bpy.types.Collection
+        Earlier results that stay: those of other view layers.
+    camera : Camera, optional
+        In place of the scene's as it stands.
+    given : Given, optional
+        What `read_scene` returned for it.
+    mark : str
+        Comes after the names of results.
+
+    Raises
+    ------
+    TetFloraError
+        No camera, nothing to refine, unknown species, unusable plants or meshes; the message says which.
+    """
+    clock = Stopwatch()
+    yield Progress(0.0, "Reading the scene")
+    if camera is None:
+        camera = read_camera(scene, depsgraph, region_only=for_render)
+    if given is None:
+        given = read_scene(scene, depsgraph, view_layer or depsgraph.view_layer)
+    clock.lap("read")
+    yield Progress(0.02, "Compiling species")
+    flora = blown(scene, compile_for(given.species, scene, depsgraph))
+    clock.lap("compile")
+    full = given.polygons_full(flora)
+    statistics = Statistics(plants=len(given.seeds), polygons_full=full, seconds=clock.seconds)
+    originals = []
+    results = Results(scene, 'RENDER' if for_render else 'VIEW', mark)
+    for earlier in result_collections(scene, 'VIEW'):
+        adopt_materials(scene, earlier)
+    try:
+        if scene.tetflora.expand_everything:
+            results.open()
+            # Explicit objects are what they are; they stay in view by themselves.
+            yield from _write_blocks(results, flora, plants.expanded_blocks(flora, given.seeds), statistics, 0.05)
+        else:
+            originals = given.explicit.originals if given.explicit is not None else []
+            yield from _write_refined(results, flora, given, camera, statistics, clock)
+        clock.lap("emit")
+    except BaseException:  # an error, Esc (GeneratorExit) or Ctrl+C: nothing of ours may stay behind
+        results.discard()
+        raise
+    remove_results(scene, results.purpose, keep=(results.collection, *beside))
+    release_materials()
+    hide_originals(scene, results.purpose, originals)
+    results.finish()
+    statistics.seconds = dict(clock.seconds)
+    scene.tetflora.statistics = json.dumps(statistics.as_dict())
+    return statistics
+
+
+def refine(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, **options: object) -> Statistics:
+    """Refine a scene at once; options and errors as for `refine_steps`."""
+    return at_once(refine_steps(scene, depsgraph, **options))
+
+
+def partition(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[Camera, Refinement]:
+    """Camera and state of space after refinement, without making anything; for pictures of the partition.
+
+    Raises
+    ------
+    TetFloraError
+        As `refine_steps`.
+    """
+    camera, given = read_camera(scene, depsgraph), read_scene(scene, depsgraph, depsgraph.view_layer)
+    flora = blown(scene, compile_for(given.species, scene, depsgraph))
+    return camera, at_once(_run_loop(flora, given, camera, refinement_settings(scene), Statistics()))
+
+
+def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:
+    """Remove what refinement made for a scene, and nothing else.
+
+    Parameters
+    ----------
+    for_render : bool, optional
+        Only what was made for a render (True), only what the artist made (False), or both (None).
+
+    Returns
+    -------
+    int
+        Number of datablocks removed.
+    """
+    removed = remove_results(scene, {None: None, True: 'RENDER', False: 'VIEW'}[for_render])
+    if not for_render:
+        scene.tetflora.statistics = ""
+    return removed
+
+
+def _run_loop(
+    flora: Flora, given: Given, camera: Camera, settings: RefinementSettings, statistics: Statistics
+) -> Generator[Progress, bool | None, Refinement]:
+    """Refine; the statistics get a step for each pass."""
+    loop = refine_loop(flora, given.seeds, camera, settings, given.occluders, given.polygons, given.lights)
+    fraction, enough = 0.05, None
+    while True:
+        try:
+            state, last = loop.send(enough), False
+        except StopIteration as stop:
+            state, last = stop.value, True
+        statistics.steps.append(step_of(state))
+        if last:
+            return state
+        waiting = int((state.decision == Decision.SPLIT).sum())
+        fraction += 0.15 * (_LOOP_FRACTION - fraction)  # nobody knows how many passes will follow
+        enough = yield Progress(
+            fraction, f"Refining, pass {state.passes}: {state.tree.tetrahedra_made:,} tetrahedra, {waiting:,} to split"
+        )
+
+
+def _write_refined(
+    results: Results, flora: Flora, given: Given, camera: Camera, statistics: Statistics, clock: Stopwatch
+) -> Generator[Progress, bool | None, None]:
+    """Refine, and make meshes and proxies of what was decided."""
+    scene, form, settings = results.scene, form_of(results.scene), refinement_settings(results.scene)
+    refinement = yield from _run_loop(flora, given, camera, settings, statistics)
+    own = form.emission
+    refinement, facet_pixels = afford(flora, refinement, camera, settings, own.faces, own.primitive_bytes)
+    clock.lap("refine")
+    _count(statistics, refinement)
+    refined = Refined(flora, refinement, camera)
+    if own.facets:
+        yield Progress(_LOOP_FRACTION, "Analyzing leaf clustering")
+        facet_shares(flora)
+        transition = Transition(flora, camera, settings.leaf_limit)
+        refined = Refined(flora, refinement, camera, facet_pixels, transition, drawn_disc(scene.render.engine))
+    results.open()
+    baking = None
+    if given.sources is not None:
+        baking = Baking(given.sources, leaves=scene.tetflora.baked_light == 'ALL')
+    blocks = plants.explicit_blocks(flora, refinement, refined.transition)
+    yield from _write_blocks(results, flora, blocks, statistics, _LOOP_FRACTION, baking)
+    if given.explicit is not None:
+        kept = polygons.polygon_blocks(refinement, camera, refined.facet_pixels)
+        yield from _write_polygons(results, given.explicit, kept, statistics, baking)
+    if baking is not None:
+        clock.lap("emit")
+        yield from _bake(baking, refined)
+        clock.lap("light")
+    yield Progress(0.95, "Making proxies")
+    for done in write_proxies(results, form, refined, statistics, baking):
+        yield Progress(0.95 + 0.05 * done, f"Making proxies: {statistics.polygons_proxy:,}")
+
+
+def _count(statistics: Statistics, refinement: Refinement) -> None:
+    statistics.tetrahedra_made = int(refinement.tree.tetrahedra_made)
+    statistics.tetrahedra_terminal = len(refinement.tree.terminals())
+    statistics.tetrahedra_proxy = int(np.isin(refinement.decision, (Decision.PROXY, Decision.HIDDEN)).sum())
+    statistics.levels = refinement.passes
+    statistics.complete = refinement.complete
+
+
+def _write_blocks(
+    results: Results, flora: Flora, blocks: object, statistics: Statistics, start: float, baking: Baking | None = None
+) -> Generator[Progress, None, None]:
+    materials: dict[tuple[int, str, int], list[bpy.types.Material]] = {}
+    for block in blocks:
+        species, what = flora.species[block.species], (block.species, block.kind, block.form)
+        if what not in materials:
+            baked = baking is not None and baking.leaves
+            made = [baked_material()] if baked else materials_of(results.scene, species, block.kind, block.form)
+            materials[what] = made
+        name = f"{species.name} {block.kind} {block.number:03d}"
+        obj = results.add(name, block.kind, block.buffers, materials[what], species)
+        if baking is not None:
+            baking.add(obj, block.buffers, lit=True)
+        statistics.polygons_meshed += block.buffers.polygons
+        statistics.memory_mb += block.buffers.nbytes / 1e6
+        yield Progress(start + (0.95 - start) * block.fraction, f"Making polygons: {statistics.polygons_meshed:,}")
+
+
+def _write_polygons(
+    results: Results, explicit: Explicit, blocks: object, statistics: Statistics, baking: Baking | None = None
+) -> Generator[Progress, None, None]:
+    for block in blocks:
+        name = explicit.meshes.surfaces[block.surface].name
+        materials = explicit.materials[block.surface]
+        obj = results.add(f"{name} {block.number:03d}", "explicit", block.buffers, materials)
+        if baking is not None:
+            baking.add(obj, block.buffers, lit=False)
+        statistics.polygons_meshed += block.buffers.polygons
+        statistics.memory_mb += block.buffers.nbytes / 1e6
+        yield Progress(0.95, f"Keeping polygons: {statistics.polygons_meshed:,}")
+
+
+def _bake(baking: Baking, refined: Refined) -> Generator[Progress, None, None]:
+    """Find the light of everything that is drawn, and give it to meshes."""
+    if refined.facet_pixels is not None:
+        for count in baking.add_facets(refined):
+            yield Progress(0.9, f"Baking light: {count:,} facets")
+    for done in baking.look(refined):
+        yield Progress(0.9 + 0.03 * done, f"Baking light: {done:.0%} of the shadows")
+    for done in baking.light_meshes():
+        yield Progress(0.93 + 0.02 * done, f"Baking light: {done:.0%} of the leaves")

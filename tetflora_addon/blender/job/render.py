@@ -1,0 +1,263 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Refine at render: what Blender calls before and after each frame that it renders, on load and on save.
+
+Tried on 4.5 and 5.2, and the reason for the order of things here:
+
+- ``render_pre`` comes before Blender goes to the frame: in animations the camera still stands where it stood a frame
+  ago, so the handler goes to the frame itself. Objects made there reach the picture of that frame.
+- 5.2 crashes if objects that were rendered are deleted in ``render_post`` or ``render_write``, while the renderer still
+  holds them. They go in the next ``render_pre``, and in ``render_complete`` or ``render_cancel`` after the last frame.
+- What is made for a render is marked as runtime data, which Blender never writes into a file, whenever somebody saves.
+"""
+
+import sys
+import traceback
+from dataclasses import dataclass, field
+
+import bpy
+
+from ...errors import TetFloraError
+from ..results.collection import has_results, leave_out_of_file, result_collections
+from ..results.forms import raise_bounces
+from ..results.hiding import (
+    lift_marks,
+    originals_shown,
+    pack_override_marks,
+    restore_marks,
+    show_left_over,
+    unpack_override_marks,
+)
+from ..results.output import KIND, adopt_materials, release_materials
+from ..runtime import Handlers, Listeners, complain, failed_frames
+from ..saved_files import migrate
+from ..scene.objects import has_contents, show_in, view_layer_groups
+from ..scene.plants import NoPlantsError
+from ..species.edits import looked_at_once
+from . import frame_cache, refine
+from .contents import read_scene
+
+
+@dataclass
+class _Rendering:
+    """What has to be undone when a render ends; names, because references do not outlive a load."""
+
+    busy: bool = False
+    hidden: list[str] = field(default_factory=list)
+    lifted: dict[tuple[str, str], str] = field(default_factory=dict)  # marks of originals, while a file is written
+    bounces: dict[str, dict[str, int]] = field(default_factory=dict)  # of Cycles, as they were, by name of the scene
+    outer: str = ""  # scene that is rendered; those that its sequencer shows begin and end renders of their own
+    scenes: list[str] = field(default_factory=list)  # all of these
+    warnings: list[str] = field(default_factory=list)
+
+
+_rendering = _Rendering()
+#: Notified when a render shows no plants because nothing is refined for it.
+nothing_refined = Listeners()
+
+
+def render_errors() -> list[str]:
+    """Messages of all frames of the last render that went without their plants."""
+    return list(failed_frames)
+
+
+def forget_render_errors() -> None:
+    """What stood in the way of the last render is gone: Refine has made the plants."""
+    failed_frames.clear()
+
+
+def on_render_init(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
+    """A render starts: earlier errors are past, unless it is part of another one."""
+    if _rendering.outer not in {"", scene.name}:
+        return
+    failed_frames.clear()
+    _rendering.warnings.clear()
+
+
+def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
+    """Before a frame: refine for its camera, unless what an earlier frame left serves it as well."""
+    if _rendering.busy:
+        return
+    _rendering.busy = True
+    _rendering.outer = _rendering.outer or scene.name
+    if scene.name not in _rendering.scenes:
+        _rendering.scenes.append(scene.name)
+    made = False
+    try:
+        wanted = scene.tetflora.refine_at_render and scene.tetflora.output.show_render
+        if wanted and has_contents(scene):
+            with looked_at_once():
+                _make(scene)
+            made = True
+        elif not scene.tetflora.refine_at_render and has_contents(scene) and not _has_meshes(scene):
+            _warn(scene)
+    except NoPlantsError:
+        pass  # all of them are disabled or hidden: the artist wants no forest
+    except TetFloraError as error:
+        _complain(scene, str(error))
+    except Exception as error:
+        # Blender would print it and render on; the count of errors and the message in the window must not miss it.
+        traceback.print_exc()
+        _complain(scene, f"unexpected error, please report it as a bug: {error!r}")
+    finally:
+        if not made:
+            _take_back(scene)
+        _rendering.busy = False
+
+
+def on_render_end(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
+    """After the last frame, or when the render was cancelled: leave all scenes as they were.
+
+    Not yet where only a scene ends that a sequencer shows: the render around it goes on, and Blender 5.2 crashes if
+    what it has rendered is gone before that ends as well.
+    """
+    if _rendering.busy or _rendering.outer not in {"", scene.name}:
+        return
+    _rendering.busy = True
+    rendered = {*_rendering.scenes, scene.name}
+    try:
+        for other in bpy.data.scenes:
+            if other.name in rendered and other.library is None:
+                _take_back(other)
+    finally:
+        _rendering.busy, _rendering.outer = False, ""
+        _rendering.scenes.clear()
+
+
+def on_save_pre(_path: object, _other: object = None) -> None:
+    """Before a file is written: what is only hidden or raised for a render is stored as it was."""
+    _show_hidden()
+    for name in _rendering.bounces:
+        _set_bounces(name)
+    leave_out_of_file()
+    _rendering.lifted = lift_marks()
+    pack_override_marks()
+
+
+def on_save_post(_path: object, _other: object = None) -> None:
+    """After a file was written, in the middle of a render: hide and raise it again."""
+    for collection in _named(_rendering.hidden):
+        collection.hide_render = True
+    for name in _rendering.bounces:
+        raise_bounces(bpy.data.scenes[name, None])
+    unpack_override_marks()
+    restore_marks(_rendering.lifted)
+    _rendering.lifted.clear()
+    release_materials()
+
+
+def on_load_post(_path: object, _other: object = None) -> None:
+    """After a file was read: nothing of an earlier render counts any more; bring old properties up to date.
+
+    Meshes that are hidden for results which the file does not hold are shown.
+    """
+    _rendering.busy, _rendering.outer = False, ""
+    _rendering.scenes.clear()
+    _rendering.bounces.clear()
+    _rendering.hidden.clear()
+    _rendering.lifted.clear()
+    failed_frames.clear()
+    frame_cache.forget_names()
+    unpack_override_marks()
+    show_left_over()
+    for scene in bpy.data.scenes:
+        if scene.library is None and scene.tetflora.statistics and not has_results(scene):
+            scene.tetflora.statistics = ""
+    migrate()
+
+
+def _make(scene: bpy.types.Scene) -> None:
+    """Results for the frame that is about to be rendered; those that the artist made for another view are hidden."""
+    # Also where nothing is animated: it is what the renderer does next, and the only way to a depsgraph of this frame.
+    scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
+    for earlier in result_collections(scene, 'VIEW'):
+        adopt_materials(scene, earlier)  # first of all, or the next frame would count as changed
+    with originals_shown(scene):  # the frame before has hidden some
+        groups = view_layer_groups(scene)
+    wanted = []
+    for layers in groups:
+        layers[0].update()  # going to the frame brings only the active layer's depsgraph up to date, if others have any
+        depsgraph = layers[0].depsgraph
+        given = read_scene(scene, depsgraph, layers[0])
+        read = frame_cache.shared_camera(scene, depsgraph, given), given
+        wanted.append((frame_cache.key_of(scene, depsgraph, layers, *read), layers, read))
+    frame_cache.stow(scene, [key for key, *_ in wanted])
+    for key, layers, (camera, given) in wanted:
+        layer, there = layers[0], frame_cache.recall(scene, key)
+        new = [] if there is None else [there]
+        if there is None:
+            options = {"view_layer": layer, "for_render": True, "camera": camera, "given": given, "mark": key[:8]}
+            before = result_collections(scene, 'RENDER')
+            statistics = refine.refine(scene, layer.depsgraph, beside=before, **options)
+            new = [c for c in result_collections(scene, 'RENDER') if c not in before]
+            for collection in new:
+                frame_cache.keep(scene, key, collection, statistics.memory_mb)
+        show_in(scene, new, layers)
+    frame_cache.hide_for(scene, [key for key, *_ in wanted])
+    if len(scene.view_layers) > 1 or _rendering.outer != scene.name:
+        # Without, Blender crashes when it renders a layer that is not the window's, or one for a sequencer, and objects
+        # are new in it.
+        for layer in scene.view_layers:
+            layer.update()
+    _rendering.bounces.setdefault(scene.name, {}).update(raise_bounces(scene))
+    # Hidden only now: if refinement failed, yesterday's trees are better than none.
+    _rendering.hidden += [c.name for c in result_collections(scene, 'VIEW') if not c.hide_render]
+    for collection in _named(_rendering.hidden):
+        collection.hide_render = True
+
+
+def _take_back(scene: bpy.types.Scene) -> None:
+    _show_hidden()
+    _rendering.hidden.clear()
+    _set_bounces(scene.name)
+    _rendering.bounces.pop(scene.name, None)
+    frame_cache.forget_all(scene)
+    refine.clear(scene, for_render=True)
+
+
+def _set_bounces(scene: str) -> None:
+    for name, value in _rendering.bounces.get(scene, {}).items():
+        setattr(bpy.data.scenes[scene, None].cycles, name, value)
+
+
+def _show_hidden() -> None:
+    for collection in _named(_rendering.hidden):
+        collection.hide_render = False
+
+
+def _named(names: list[str]) -> list[bpy.types.Collection]:
+    return [found for name in names if (found := bpy.data.collections.get((name, None))) is not None]
+
+
+def _has_meshes(scene: bpy.types.Scene) -> bool:
+    """Whether plants are there as meshes: results, or some that the artist kept."""
+    return any(KIND in obj for obj in scene.objects)
+
+
+def _warn(scene: bpy.types.Scene) -> None:
+    """Say, once a session of renders, that the picture will have no plants; nothing is wrong, but it looks so."""
+    text = "nothing is refined and Refine at Render is off, so the render shows no plants"
+    if text in _rendering.warnings:
+        return
+    _rendering.warnings.append(text)
+    print(f"TetFlora: warning: {text}", file=sys.stderr, flush=True)
+    nothing_refined.notify()
+
+
+def _complain(scene: bpy.types.Scene, message: str) -> None:
+    text = f"frame {scene.frame_current} was rendered without plants: {message}"
+    failed_frames.append(text)
+    complain(text)
+
+
+_HANDLERS = Handlers(
+    render_init=on_render_init,
+    render_pre=on_render_pre,
+    render_complete=on_render_end,
+    render_cancel=on_render_end,
+    save_pre=on_save_pre,
+    save_post=on_save_post,
+    save_post_fail=on_save_post,
+    load_post=on_load_post,
+)
+register, unregister = _HANDLERS.register, _HANDLERS.unregister

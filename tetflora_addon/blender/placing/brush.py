@@ -1,0 +1,284 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The brush in a scene: which plants stand where, and strokes that add and remove them.
+
+`planting.strokes` decides, in arrays; here the scene is read before a stroke and changed while it goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SceneError
+from ...planting import strokes
+from ...planting.places import Placement
+from ...planting.strokes import Brush
+from ..attributes import world_matrix
+from ..scene.fields import fields_of, read_field
+from ..species.catalogue import default_species
+from .field_edits import add_points, editable, positions, take_points
+from .ground import Ground
+from .plant_objects import add_field, add_plants, plants_of
+from .populations import own_number, own_objects
+from .properties import MOST_PAINTED_EMPTIES
+from .rules import note_erased
+
+PAINTED = "Painted plants"
+_PAINTED_MARK = "tetflora_painted"  # on the field that painted plants go to
+_OBJECTS = -1  # where single plants are, in place of the number of a field
+_REACH = 2.0  # radii above and below the brush within which ground counts
+_LEAST_REACH = 10.0  # metres
+_STRONG = 0.5  # strength from which on Erase clears the ground, and not only the plants that it meets
+_SAME = 0.1  # radii within which a dab that removes nothing says no more than the one before
+_PLACE = 0.05  # metres around a plant that was removed, where no other stands
+
+
+def brush_of(scene: bpy.types.Scene, pressure: float = 1.0) -> tuple[Brush, tuple[str, ...]]:
+    """The scene's brush as arrays take it, and the species that its shares count through.
+
+    Raises
+    ------
+    SceneError
+        No species has a share, or the brush is too wide for its density.
+    """
+    settings = scene.tetflora.brush
+    mix = [(entry.species, entry.weight) for entry in scene.tetflora.populate.mix if entry.species]
+    if settings.source == 'ONE' or not mix:
+        mix = [(settings.species if settings.source == 'ONE' and settings.species else default_species(), 1.0)]
+    if not sum(weight for _, weight in mix) > 0.0:
+        raise SceneError("No species has a weight above 0; raise a weight in the Populate panel")
+    brush = Brush(
+        radius=settings.radius,
+        density=settings.density / 100.0,
+        strength=max(0.01, settings.strength * pressure),
+        min_distance=settings.min_distance,
+        scale_min=settings.scale_min,
+        scale_max=settings.scale_max,
+        shares=tuple(weight for _, weight in mix),
+    )
+    if strokes.too_many(brush):
+        raise SceneError(
+            f"A brush with a radius of {settings.radius:g} m and {settings.density:g} plants per 100 m² is too large; "
+            "lower Radius or Density, or use Populate"
+        )
+    return brush, tuple(identifier for identifier, _ in mix)
+
+
+class Standing:
+    """Plants of a scene that stand by themselves or in fields, as arrays.
+
+    Attributes
+    ----------
+    places : (n, 3) float64
+        World space.
+    source : (n,) int32
+        Index into ``fields``, or -1 for ``objects``.
+    number : (n,) int64
+        Index into ``objects``, or point of the field.
+    removable : (n,) bool
+    """
+
+    def __init__(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+        self.objects = plants_of(scene.objects)
+        self.fields = fields_of(scene.objects)
+        places = [np.array([o.matrix_world.translation for o in self.objects], np.float64).reshape(-1, 3)]
+        source, number = [np.full(len(self.objects), _OBJECTS)], [np.arange(len(self.objects))]
+        removable = [
+            np.array([o.library is None and o.override_library is None and o.visible_get() for o in self.objects], bool)
+        ]
+        for index, field in enumerate(self.fields):
+            own = editable(field)
+            if own:
+                found = positions(field)
+            else:
+                found = read_field(field, depsgraph, world_matrix(field, depsgraph)[None]).position
+            places.append(found)
+            source.append(np.full(len(found), index))
+            number.append(np.arange(len(found)))
+            removable.append(np.full(len(found), own and field.visible_get()))
+        self.places = np.concatenate(places)
+        self.source, self.number = np.concatenate(source).astype(np.int32), np.concatenate(number).astype(np.int64)
+        self.removable = np.concatenate(removable)
+
+    def add(self, places: NDArray[np.float64], source: int, first: int) -> None:
+        """Note new plants: at the end of the list of objects or of a field, from number ``first`` on."""
+        self.places = np.concatenate([self.places, places])
+        self.source = np.concatenate([self.source, np.full(len(places), source, np.int32)])
+        self.number = np.concatenate([self.number, first + np.arange(len(places))])
+        self.removable = np.concatenate([self.removable, np.ones(len(places), bool)])
+
+    def by_population(self, gone: NDArray[np.bool_]) -> dict[str, NDArray[np.float64]]:
+        """Places of plants, (n,) bool, by the identity of their population; without those of none."""
+        found: dict[str, list[NDArray[np.float64]]] = {}
+        for source in np.unique(self.source[gone]).tolist():
+            own = np.flatnonzero(gone & (self.source == source))
+            if source != _OBJECTS:
+                found.setdefault(self.fields[source].tetflora.population, []).append(self.places[own])
+                continue
+            uids = np.array([self.objects[i].tetflora.population for i in self.number[own].tolist()])
+            for uid in np.unique(uids).tolist():
+                found.setdefault(uid, []).append(self.places[own[uids == uid]])
+        return {uid: np.concatenate(places) for uid, places in found.items() if uid}
+
+    def remove(self, gone: NDArray[np.bool_]) -> None:
+        """Take plants, (n,) bool, out of the scene and out of the arrays."""
+        single = gone & (self.source == _OBJECTS)
+        if single.any():
+            dead = set(self.number[single].tolist())
+            bpy.data.batch_remove([self.objects[i] for i in dead])
+            self.objects = [o for i, o in enumerate(self.objects) if i not in dead]
+        for source in np.unique(self.source[gone]).tolist():
+            own = self.source == source
+            keep = np.ones(int(own.sum()), bool)
+            keep[self.number[gone & own]] = False
+            if source != _OBJECTS:
+                take_points(self.fields[source], keep)
+            self.number[own] = (np.cumsum(keep) - 1)[self.number[own]]
+        self.places, self.source = self.places[~gone], self.source[~gone]
+        self.number, self.removable = self.number[~gone], self.removable[~gone]
+
+
+class Stroke:
+    """One stroke: made when the button goes down, dabbed while the mouse moves, flushed to show what was done.
+
+    Parameters
+    ----------
+    scene, view_layer, depsgraph
+        As they are now. References to objects are kept until the stroke ends.
+    mode : {'PAINT', 'ERASE', 'THIN'}
+    """
+
+    def __init__(
+        self,
+        scene: bpy.types.Scene,
+        view_layer: bpy.types.ViewLayer,
+        depsgraph: bpy.types.Depsgraph,
+        mode: str,
+    ) -> None:
+        settings = scene.tetflora.brush
+        self.scene, self.mode = scene, mode
+        brush_of(scene)  # what is wrong with the settings is said before anything is done
+        self.standing = Standing(scene, depsgraph)
+        self.ground = Ground(view_layer, depsgraph)
+        self.key = strokes.stroke_key(settings.seed, settings.strokes)
+        settings.strokes += 1
+        self.dabs = self.added = self.removed = 0
+        self._new: list[tuple[NDArray[np.float64], NDArray[np.uint64]]] = []
+        self._gone = np.zeros(len(self.standing.places), bool)
+        self._cleared: list[tuple[float, float]] = []  # middles of dabs that clear the ground
+        self._weak = False  # whether there were others
+        self._taken: dict[str, list[NDArray[np.float64]]] = {}  # places of plants by their population
+
+    def dab(self, centre: Sequence[float], pressure: float = 1.0) -> int:
+        """Do what the brush does at a place on the ground (3 floats); how many plants that adds or removes."""
+        brush, _ = brush_of(self.scene, pressure)
+        dab, self.dabs = self.dabs, self.dabs + 1
+        if self.mode == 'PAINT':
+            return self._paint(brush, centre, dab)
+        # Those that cannot be removed count for Thin: they are denser all the same.
+        decide = strokes.erase if self.mode == 'ERASE' else strokes.thin
+        alive = np.flatnonzero(~self._gone)
+        chosen = alive[decide(brush, centre, self.standing.places[alive], self.key, dab)]
+        chosen = chosen[self.standing.removable[chosen]]
+        self._gone[chosen] = True
+        self.removed += len(chosen)
+        if self.mode == 'THIN' or brush.strength < _STRONG:
+            self._weak = True
+        else:
+            last = np.subtract(self._cleared[-1], centre[:2]) if self._cleared else np.inf
+            if len(chosen) or np.linalg.norm(last) > _SAME * brush.radius:
+                self._cleared.append((centre[0], centre[1]))
+        return len(chosen)
+
+    def _paint(self, brush: Brush, centre: Sequence[float], dab: int) -> int:
+        # Of a million plants only those nearby are copied.
+        near = self.standing.places[strokes.within(self.standing.places, centre, strokes.reach_of(brush))]
+        standing = np.concatenate([near, *(places for places, _ in self._new)])
+        places, keys = strokes.paint(brush, centre, standing, self.key, dab)
+        reach = max(_REACH * brush.radius, _LEAST_REACH)
+        height = self.ground.heights(places, centre[2] + reach, centre[2] - reach)
+        on_ground = np.isfinite(height)
+        self._new.append((np.column_stack([places, height])[on_ground], keys[on_ground]))
+        self.added += int(on_ground.sum())
+        return int(on_ground.sum())
+
+    @property
+    def pending(self) -> int:
+        """Plants that were added or removed since the last flush."""
+        return sum(len(keys) for _, keys in self._new) + int(self._gone.sum())
+
+    def flush(self) -> None:
+        """Change the scene by what the dabs since the last flush decided."""
+        if self._gone.any():
+            for uid, places in self.standing.by_population(self._gone).items():
+                self._taken.setdefault(uid, []).append(places)
+            self.standing.remove(self._gone)
+        if any(len(keys) for _, keys in self._new):
+            self._make(*(np.concatenate(part) for part in zip(*self._new, strict=True)))
+        self._new, self._gone = [], np.zeros(len(self.standing.places), bool)
+
+    def finish(self) -> None:
+        """Change the scene by what is left to do, and let populations remember what was taken from them."""
+        self.flush()
+        for population in self.scene.tetflora.populations:
+            taken = self._taken.get(population.uid)
+            if taken is None:
+                continue
+            population.made = own_number(own_objects(self.scene, population))
+            if self._weak:
+                note_erased(population, np.concatenate(taken), _PLACE)
+            if self._cleared:
+                note_erased(population, self._cleared, self.scene.tetflora.brush.radius)
+        self._taken, self._cleared, self._weak = {}, [], False
+
+    def _make(self, places: NDArray[np.float64], keys: NDArray[np.uint64]) -> None:
+        brush, species = brush_of(self.scene)
+        made = strokes.individuals(brush, keys)
+        placement = Placement(position=places, wanted=len(keys), **made)
+        standing = self.standing
+        if not self._in_field(len(keys)):
+            first = len(standing.objects)
+            standing.objects += add_plants(self.scene, placement, species)
+            standing.add(places, _OBJECTS, first)
+            return
+        number = next((i for i, o in enumerate(standing.fields) if o.get(_PAINTED_MARK) and editable(o)), None)
+        if number is None:
+            number = len(standing.fields)
+            field = add_field(self.scene, placement, species)
+            field.name = field.data.name = PAINTED
+            field[_PAINTED_MARK] = True
+            standing.fields.append(field)
+            standing.add(places, number, 0)
+            return
+        field = standing.fields[number]
+        first = len(field.data.vertices)
+        c, s, none = np.cos(placement.azimuth), np.sin(placement.azimuth), np.zeros(len(keys))
+        rows = ((c, -s, none), (s, c, none), (none, none, none + 1.0))
+        frame = np.stack([np.stack(row, axis=1) for row in rows], axis=1)
+        add_points(field, places, frame, placement.scale, placement.species, placement.seed, species)
+        standing.add(places, number, first)
+
+    def _in_field(self, more: int) -> bool:
+        store = self.scene.tetflora.brush.store
+        return store == 'FIELD' or (store == 'AUTOMATIC' and len(self.standing.objects) + more > MOST_PAINTED_EMPTIES)
+
+
+def draped_circle(
+    ground: Ground, centre: Sequence[float], normal: Sequence[float], radius: float, sides: int = 48
+) -> NDArray[np.float64]:
+    """The brush's circle on the map laid on the ground, (sides + 1, 3) with the first corner twice.
+
+    Where there is no ground, it goes on in the plane through the centre.
+    """
+    angle = np.linspace(0.0, 2.0 * np.pi, sides + 1)
+    x, y = centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)
+    reach = max(_REACH * radius, _LEAST_REACH)
+    z = ground.heights(np.stack([x[:-1], y[:-1]], axis=1), centre[2] + reach, centre[2] - reach)
+    z = np.concatenate([z, z[:1]])
+    tilt = max(abs(normal[2]), 0.2)
+    plane = centre[2] - ((x - centre[0]) * normal[0] + (y - centre[1]) * normal[1]) / tilt
+    return np.stack([x, y, np.where(np.isfinite(z), z, plane)], axis=1)

@@ -1,0 +1,339 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A small complete scene to begin with: rolling ground, some ninety plants, a camera, the sun and a sky.
+
+Nothing of the artist's is removed. A scene that is empty, or holds only what Blender starts with, is used; beside
+anything else a new scene is made.
+
+Ground and sky of the first forest; plain node trees that an artist can read and change.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import radians
+
+import bpy
+import numpy as np
+from mathutils import Vector
+from numpy.typing import NDArray
+
+from ...growth.hashing import child_key, key_of_seed, uniform
+from ...planting.places import Placement
+from ...planting.strokes import admitted
+from ..attributes import write
+from ..compat import shader_tree
+from ..species.catalogue import default_species
+from ..species.edits import catalogue
+from .plant_objects import add_plants
+
+
+def meadow(name: str) -> bpy.types.Material:
+    """Moss and litter by noise, and trodden earth where the attribute ``aside`` (metres from the path) is small."""
+    material = bpy.data.materials.new(name)
+    tree = shader_tree(material)
+    tree.nodes.clear()
+    new, link = tree.nodes.new, tree.links.new
+    place = new("ShaderNodeTexCoord")
+    patches = _ramp(tree, place, 0.35, 6.0, ((0.38, (0.055, 0.085, 0.02)), (0.62, (0.16, 0.13, 0.055))))
+    grain = _ramp(tree, place, 5.0, 8.0, ((0.3, (0.35, 0.35, 0.35)), (0.7, (1.5, 1.4, 1.3))))
+    floor = _mixed(tree, 'MULTIPLY', 1.0, patches, grain)
+    earth = _ramp(tree, place, 9.0, 6.0, ((0.35, (0.11, 0.08, 0.05)), (0.65, (0.26, 0.2, 0.13))))
+    aside = new("ShaderNodeAttribute")
+    aside.attribute_name = "aside"
+    edge = new("ShaderNodeTexNoise")
+    edge.inputs["Scale"].default_value, edge.inputs["Detail"].default_value = 1.2, 5.0
+    link(place.outputs["Object"], edge.inputs["Vector"])
+    ragged = new("ShaderNodeMath")
+    ragged.operation = 'MULTIPLY_ADD'
+    ragged.inputs[1].default_value = 1.8
+    link(edge.outputs[0], ragged.inputs[0])
+    link(aside.outputs["Fac"], ragged.inputs[2])
+    share = new("ShaderNodeMapRange")
+    share.interpolation_type = 'SMOOTHSTEP'
+    for socket, value in (("From Min", 1.3), ("From Max", 2.6), ("To Min", 0.0), ("To Max", 1.0)):
+        share.inputs[socket].default_value = value
+    link(ragged.outputs[0], share.inputs["Value"])
+    colour = _mixed(tree, 'MIX', share.outputs[0], earth, floor)
+    bump = new("ShaderNodeBump")
+    bump.inputs["Strength"].default_value, bump.inputs["Distance"].default_value = 0.6, 0.05
+    link(grain, bump.inputs["Height"])
+    surface = new("ShaderNodeBsdfDiffuse")
+    link(colour, surface.inputs["Color"])
+    link(bump.outputs["Normal"], surface.inputs["Normal"])
+    output = new("ShaderNodeOutputMaterial")
+    link(surface.outputs[0], output.inputs["Surface"])
+    return material
+
+
+def sky(name: str) -> bpy.types.World:
+    """Blue above, pale at the horizon."""
+    world = bpy.data.worlds.new(name)
+    tree = shader_tree(world)
+    tree.nodes.clear()
+    new, link = tree.nodes.new, tree.links.new
+    place, split, ramp = (new(f"ShaderNode{kind}") for kind in ("TexCoord", "SeparateXYZ", "ValToRGB"))
+    _set_stops(ramp, ((0.0, (0.75, 0.84, 0.93)), (0.45, (0.12, 0.3, 0.75))))
+    link(place.outputs["Generated"], split.inputs[0])
+    link(split.outputs["Z"], ramp.inputs[0])
+    background, output = new("ShaderNodeBackground"), new("ShaderNodeOutputWorld")
+    background.inputs["Strength"].default_value = 0.7
+    link(ramp.outputs["Color"], background.inputs["Color"])
+    link(background.outputs[0], output.inputs["Surface"])
+    return world
+
+
+Stops = tuple[tuple[float, tuple[float, float, float]], ...]
+
+
+def _set_stops(ramp: bpy.types.ShaderNode, stops: Stops) -> None:
+    for element, (position, colour) in zip(ramp.color_ramp.elements, stops, strict=True):
+        element.position, element.color = position, (*colour, 1.0)
+
+
+def _ramp(
+    tree: bpy.types.NodeTree, place: bpy.types.ShaderNode, scale: float, detail: float, stops: Stops
+) -> bpy.types.NodeSocket:
+    """Colours by noise over the object's coordinates."""
+    noise, ramp = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeValToRGB")
+    noise.inputs["Scale"].default_value, noise.inputs["Detail"].default_value = scale, detail
+    tree.links.new(place.outputs["Object"], noise.inputs["Vector"])
+    tree.links.new(noise.outputs[0], ramp.inputs[0])
+    _set_stops(ramp, stops)
+    return ramp.outputs["Color"]
+
+
+def _mixed(
+    tree: bpy.types.NodeTree,
+    blend: str,
+    factor: float | bpy.types.NodeSocket,
+    a: bpy.types.NodeSocket,
+    b: bpy.types.NodeSocket,
+) -> bpy.types.NodeSocket:
+    mix = tree.nodes.new("ShaderNodeMix")
+    mix.data_type, mix.blend_type = 'RGBA', blend
+    # A mix node has sockets of each name for each type of data; those of colours are found by their type.
+    colours = [s for s in mix.inputs if s.type == 'RGBA']
+    share = next(s for s in mix.inputs if s.type == 'VALUE' and s.name == "Factor")
+    if isinstance(factor, float):
+        share.default_value = factor
+    else:
+        tree.links.new(factor, share)
+    tree.links.new(a, colours[0])
+    tree.links.new(b, colours[1])
+    return next(s for s in mix.outputs if s.type == 'RGBA')
+
+
+NAME = "First forest"
+EYE_HEIGHT = 1.7  # metres
+SAMPLES = 24
+_MARK = "tetflora_first_forest"  # on the collection, so that it may be renamed
+_STARTUP = {"Cube": 'MESH', "Camera": 'CAMERA', "Light": 'LIGHT'}
+_WEST, _EAST, _SOUTH, _NORTH = -48.0, 48.0, -14.0, 112.0  # of the ground, metres; the camera looks north
+_STEP = 2.0  # metres between the ground's vertices
+_CANDIDATES = 4000
+_PATH = 2.2  # metres from the middle of the path to its edge
+
+
+@dataclass(frozen=True)
+class Layer:
+    """Plants of one species, set after those of the layers before.
+
+    Attributes
+    ----------
+    species : str
+    number : int
+    spacing : float
+        Least distance to plants of this layer and of those before, metres.
+    near, far : float
+        Between which distances from the camera they stand, metres.
+    verge : float
+        Metres that they keep from the edge of the path.
+    smallest, largest : float
+        Scales.
+    """
+
+    species: str
+    number: int
+    spacing: float
+    near: float
+    far: float
+    verge: float
+    smallest: float
+    largest: float
+
+
+LAYERS = (
+    Layer("birch", 24, 3.2, 8.0, 62.0, 1.2, 0.8, 1.15),
+    Layer("spruce", 22, 3.6, 20.0, 104.0, 3.2, 0.65, 1.15),
+    Layer("rowan", 8, 2.2, 7.0, 32.0, 0.9, 0.55, 0.9),
+    Layer("fern", 42, 0.7, 2.6, 16.0, 0.1, 0.8, 1.5),
+)
+
+
+def build(context: bpy.types.Context, seed: int) -> tuple[bpy.types.Scene, str]:
+    """Make the forest.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    seed : int
+        Another seed is another forest on the same ground.
+
+    Returns
+    -------
+    scene : bpy.types.Scene
+        Where it is; the window shows it.
+    said : str
+        What happened to what was there, empty if there was nothing.
+
+    Raises
+    ------
+    SpeciesError
+        The catalogue is empty.
+    """
+    default_species()
+    scene, said = _scene_for(context)
+    collection = bpy.data.collections.new(NAME)
+    collection[_MARK] = True
+    scene.collection.children.link(collection)
+    collection.objects.link(_ground())
+    _plant(scene, seed)
+    camera = _camera()
+    collection.objects.link(camera)
+    scene.camera = camera
+    collection.objects.link(_sun())
+    if scene.world is not None:
+        scene.world.use_fake_user = True  # it is still the artist's, and is saved although no scene uses it
+    scene.world = sky("First forest sky")
+    _settings(scene)
+    return scene, said
+
+
+def height(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The ground's height at places on the map, metres; the path lies in a shallow hollow and the land rises beyond."""
+    x, y = np.asarray(x, float), np.asarray(y, float)
+    waves = 0.5 * np.sin(0.11 * x + 0.6) * np.cos(0.083 * y) + 0.22 * np.sin(0.29 * x - 0.17 * y + 1.0)
+    aside = np.abs(x - path(y))
+    banks = 0.9 * (1.0 - np.exp(-((aside / 9.0) ** 2)))
+    return waves * np.clip(aside / 4.0, 0.25, 1.0) + banks + 5.0 * np.clip((y - 20.0) / 90.0, 0.0, 1.0) ** 2
+
+
+def path(y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Where the middle of the path is, x by y, metres."""
+    return 5.0 * np.sin(np.asarray(y, float) / 21.0)
+
+
+def is_first_forest(scene: bpy.types.Scene) -> bool:
+    """Whether a scene has a first forest; cheap."""
+    return any(_MARK in collection for collection in scene.collection.children)
+
+
+def is_startup(scene: bpy.types.Scene) -> bool:
+    """Whether a scene holds exactly what Blender starts with, and nobody has touched the cube."""
+    if {o.name: o.type for o in scene.objects} != _STARTUP:
+        return False
+    cube = scene.objects["Cube"]
+    corners = {tuple(round(c, 4) for c in v.co) for v in cube.data.vertices}
+    plain = {(a, b, c) for a in (-1.0, 1.0) for b in (-1.0, 1.0) for c in (-1.0, 1.0)}
+    rest = bool(np.allclose(np.array(cube.matrix_basis), np.eye(4), atol=1e-6))
+    return corners == plain and rest and not cube.modifiers and cube.animation_data is None and not cube.children
+
+
+def _scene_for(context: bpy.types.Context) -> tuple[bpy.types.Scene, str]:
+    scene = context.scene
+    if not scene.objects:
+        return scene, ""
+    if is_startup(scene):
+        for name in ("Cube", "Light"):
+            scene.objects[name].hide_viewport = scene.objects[name].hide_render = True
+        return scene, "the default cube and light are hidden, the camera is kept"
+    made = bpy.data.scenes.new(NAME)
+    if context.window is not None:
+        context.window.scene = made
+    return made, f'in a new scene; "{scene.name}" is unchanged'
+
+
+def _ground() -> bpy.types.Object:
+    xs, ys = np.arange(_WEST, _EAST + 0.1, _STEP), np.arange(_SOUTH, _NORTH + 0.1, _STEP)
+    x, y = np.meshgrid(xs, ys)
+    points = np.stack([x, y, height(x, y)], axis=2).reshape(-1, 3)
+    first = (np.arange(len(ys) - 1)[:, None] * len(xs) + np.arange(len(xs) - 1)).reshape(-1)
+    faces = np.stack([first, first + 1, first + len(xs) + 1, first + len(xs)], axis=1)
+    mesh = bpy.data.meshes.new("Forest ground")
+    mesh.from_pydata(points.tolist(), [], faces.tolist(), shade_flat=False)
+    mesh.materials.append(meadow("Forest floor"))
+    write(mesh, "aside", np.abs(points[:, 0] - path(points[:, 1])).astype(np.float32))
+    ground = bpy.data.objects.new("Forest ground", mesh)
+    ground.tetflora.is_occluder = True
+    return ground
+
+
+def places(seed: int) -> list[NDArray[np.float64]]:
+    """Places on the map of the plants of each layer, (n, 2) each."""
+    standing, out = np.zeros((0, 2)), []
+    for number, layer in enumerate(LAYERS):
+        keys = child_key(child_key(key_of_seed(seed), number), np.arange(_CANDIDATES))
+        # In the camera's view, with more near than far: as many in each metre of depth.
+        y = layer.near + (layer.far - layer.near) * uniform(keys, 1)
+        x = (2.0 * uniform(keys, 2) - 1.0) * (0.75 * (y + 6.0))
+        x = x + path(y) * np.clip(1.0 - y / 60.0, 0.0, 1.0)
+        fits = (np.abs(x - path(y)) > _PATH + layer.verge) & (x > _WEST + 2.0) & (x < _EAST - 2.0)
+        candidates = np.stack([x, y], axis=1)[fits]
+        chosen = candidates[admitted(candidates, standing, layer.spacing)[: layer.number]]
+        standing = np.concatenate([standing, chosen])
+        out.append(chosen)
+    return out
+
+
+def _plant(scene: bpy.types.Scene, seed: int) -> None:
+    known = catalogue()
+    for number, (layer, place) in enumerate(zip(LAYERS, places(seed), strict=True)):
+        keys = child_key(child_key(key_of_seed(seed), 100 + number), np.arange(len(place)))
+        scale = layer.smallest + (layer.largest - layer.smallest) * uniform(keys, 1)
+        placement = Placement(
+            position=np.column_stack([place, height(place[:, 0], place[:, 1])]),
+            azimuth=2.0 * np.pi * uniform(keys, 2),
+            scale=scale,
+            species=np.zeros(len(place), np.int32),
+            seed=(uniform(keys, 3) * 2**31).astype(np.int32),
+            wanted=layer.number,
+        )
+        add_plants(scene, placement, [layer.species if layer.species in known else default_species()])
+
+
+def _camera() -> bpy.types.Object:
+    camera = bpy.data.objects.new("Forest camera", bpy.data.cameras.new("Forest camera"))
+    eye = Vector((float(path(-2.0)), -2.0, float(height(path(-2.0), -2.0)) + EYE_HEIGHT))
+    target = Vector((1.5, 20.0, float(height(path(20.0), 20.0)) + 4.2))
+    camera.location = eye
+    camera.rotation_euler = (target - eye).to_track_quat('-Z', 'Y').to_euler()
+    camera.data.lens, camera.data.clip_end = 28.0, 1000.0
+    return camera
+
+
+def _sun() -> bpy.types.Object:
+    sun = bpy.data.objects.new("Forest sun", bpy.data.lights.new("Forest sun", 'SUN'))
+    sun.data.energy, sun.data.angle, sun.data.color = 5.0, radians(0.6), (1.0, 0.93, 0.82)
+    sun.location = (-20.0, 10.0, 30.0)  # where it can be seen and grasped; its light comes from everywhere alike
+    sun.rotation_euler = (radians(52.0), 0.0, radians(-68.0))
+    return sun
+
+
+def _settings(scene: bpy.types.Scene) -> None:
+    """What lets Refine and a render give a picture in seconds, and Populate and the brush go on with these species."""
+    scene.tetflora.quality = 'DRAFT'
+    mix, known_species = scene.tetflora.populate.mix, catalogue()
+    for layer in LAYERS if not mix else ():
+        if layer.species in known_species:
+            entry = mix.add()
+            entry.species, entry.weight = layer.species, 0.1 * layer.number
+    render = scene.render
+    known = {item.identifier for item in bpy.types.RenderSettings.bl_rna.properties["engine"].enum_items}
+    if 'CYCLES' in known or hasattr(scene, "cycles"):
+        render.engine = 'CYCLES'
+        scene.cycles.samples, scene.cycles.use_denoising = SAMPLES, True
+        scene.cycles.use_adaptive_sampling, scene.cycles.adaptive_threshold = True, 0.1
+        scene.cycles.max_bounces = 4
+    render.resolution_x, render.resolution_y, render.resolution_percentage = 1280, 720, 50
+    scene.view_settings.exposure = 0.9

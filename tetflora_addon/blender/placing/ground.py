@@ -1,0 +1,180 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The ground under brush, cursor and plants: rays against visible meshes that are neither plants nor results.
+
+`Scene.ray_cast` would stop at the leaves of a refined forest, and knows no way to leave objects out.
+
+Plants moved along the vertical onto the ground.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from math import inf
+
+import bpy
+import numpy as np
+from mathutils import Vector
+from numpy.typing import NDArray
+
+from ..attributes import read, write
+from ..materials.nodes import is_ours
+from .field_edits import own_mesh
+
+_FEW = 8  # objects of which all are asked; of more only those whose boxes the ray meets
+_ABOVE = 1e-3  # metres above a plant's foot from which it falls, so that rounding does not let it through the ground
+
+Hit = tuple[Vector, Vector]
+
+
+class Ground:
+    """Visible meshes to stand on.
+
+    Holds references to objects: good until the next undo, or until objects are removed.
+
+    Parameters
+    ----------
+    view_layer : bpy.types.ViewLayer
+    depsgraph : bpy.types.Depsgraph
+        Decides about modifiers and places.
+    without : iterable of bpy.types.Object, optional
+        Not ground, whatever they are.
+    """
+
+    def __init__(
+        self,
+        view_layer: bpy.types.ViewLayer,
+        depsgraph: bpy.types.Depsgraph,
+        without: Iterable[bpy.types.Object] = (),
+    ) -> None:
+        self.depsgraph = depsgraph
+        left_out = set(without)
+        found = [o for o in view_layer.objects if o.type == 'MESH' and o not in left_out and is_ground(o)]
+        self.objects = [o for o in found if len(o.evaluated_get(depsgraph).data.polygons)]
+        places = [np.array(o.evaluated_get(depsgraph).matrix_world, dtype=np.float64) for o in self.objects]
+        boxes = [np.array(o.evaluated_get(depsgraph).bound_box, dtype=np.float64) for o in self.objects]
+        corners = [b @ m[:3, :3].T + m[:3, 3] for b, m in zip(boxes, places, strict=True)]
+        self._low = np.array([c.min(axis=0) for c in corners]).reshape(-1, 3)
+        self._high = np.array([c.max(axis=0) for c in corners]).reshape(-1, 3)
+
+    def __len__(self) -> int:
+        return len(self.objects)
+
+    def cast(self, origin: Vector, direction: Vector, distance: float = inf) -> Hit | None:
+        """First place, and its normal towards the ray's origin, that a ray meets; world space, None without any."""
+        direction = direction.normalized()
+        nearest, found = distance, None
+        for obj in self._candidates(origin, direction):
+            matrix = obj.evaluated_get(self.depsgraph).matrix_world
+            inverse = matrix.inverted_safe()
+            start, along = inverse @ origin, inverse.to_3x3() @ direction
+            # Lengths in the object's space are other ones; None of the arguments may be infinite there.
+            reach = min(nearest * along.length, 1e30)
+            hit, place, normal, _ = obj.ray_cast(start, along.normalized(), distance=reach, depsgraph=self.depsgraph)
+            if not hit:
+                continue
+            world = matrix @ place
+            gap = (world - origin).length
+            if gap <= nearest:
+                turned = (inverse.to_3x3().transposed() @ normal).normalized()
+                nearest, found = gap, (world, -turned if turned.dot(direction) > 0.0 else turned)
+        return found
+
+    def heights(
+        self, places: NDArray[np.float64], above: float | NDArray[np.float64], below: float | NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Height of the uppermost ground at places on the map.
+
+        Parameters
+        ----------
+        places : (n, 2) float64
+        above, below : float or (n,) float64
+            World z between which ground is looked for.
+
+        Returns
+        -------
+        (n,) float64
+            NaN where there is none.
+        """
+        top, bottom = (np.broadcast_to(np.asarray(z, float), len(places)) for z in (above, below))
+        down = Vector((0.0, 0.0, -1.0))
+        out = np.full(len(places), np.nan)
+        for i, ((x, y), z, end) in enumerate(zip(places.tolist(), top.tolist(), bottom.tolist(), strict=True)):
+            hit = self.cast(Vector((x, y, z)), down, z - end)
+            if hit is not None:
+                out[i] = hit[0].z
+        return out
+
+    def nearest_heights(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Height of the ground that is nearest along z, below or above, for places (n, 3); (n,), NaN where none is."""
+        down, up = Vector((0.0, 0.0, -1.0)), Vector((0.0, 0.0, 1.0))
+        out = np.full(len(places), np.nan)
+        for i, (x, y, z) in enumerate(places.tolist()):
+            low = self.cast(Vector((x, y, z + _ABOVE)), down)
+            high = self.cast(Vector((x, y, z)), up, abs(z - low[0].z) if low else inf)
+            hit = high or low
+            if hit is not None:
+                out[i] = hit[0].z
+        return out
+
+    def _candidates(self, origin: Vector, direction: Vector) -> list[bpy.types.Object]:
+        if len(self.objects) <= _FEW:
+            return self.objects
+        start, along = np.array(origin), np.array(direction)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            a, b = (self._low - start) / along, (self._high - start) / along
+        # A ray along a face of a box has no entry or exit there, and passes.
+        enter = np.nan_to_num(np.minimum(a, b), nan=-inf).max(axis=1)
+        leave = np.nan_to_num(np.maximum(a, b), nan=inf).min(axis=1)
+        return [self.objects[i] for i in np.flatnonzero((enter <= leave) & (leave >= 0.0)).tolist()]
+
+
+def is_ground(obj: bpy.types.Object) -> bool:
+    """Whether plants can stand on an object: seen, and neither a plant, nor made of them, nor refined as one."""
+    group = obj.tetflora
+    return not (group.is_plant or group.is_field or group.is_explicit or is_ours(obj)) and obj.visible_get()
+
+
+_STAYS = 1e-6  # metres: less is standing on it already
+
+
+def drop_plants(plants: Sequence[bpy.types.Object], ground: Ground) -> tuple[int, int]:
+    """Move plants that are objects; how many moved, and how many have no ground below or above.
+
+    Children move with their parents before they fall themselves.
+    """
+    places = np.array([o.matrix_world.translation for o in plants], dtype=np.float64).reshape(-1, 3)
+    heights = ground.nearest_heights(places)
+    gaps = heights - places[:, 2]
+    fall = np.flatnonzero(np.abs(gaps) > _STAYS)
+    chosen = set(plants)
+    for i in sorted(fall.tolist(), key=lambda i: _depth(plants[i])):
+        plant = plants[i]
+        moved = plant.matrix_world.copy()
+        moved.translation.z = heights[i]
+        plant.matrix_world = moved
+        if any(child in chosen for child in plant.children):
+            bpy.context.view_layer.update()
+    return len(fall), int(np.isnan(heights).sum())
+
+
+def _depth(obj: bpy.types.Object) -> int:
+    return 0 if obj.parent is None else 1 + _depth(obj.parent)
+
+
+def drop_field(field: bpy.types.Object, ground: Ground) -> tuple[int, int]:
+    """Move the points of an editable field; how many moved, and how many have no ground below or above."""
+    positions = read(field.data, "position")
+    world = np.array(field.matrix_world, dtype=np.float64)
+    places = positions.astype(np.float64) @ world[:3, :3].T + world[:3, 3]
+    heights = ground.nearest_heights(places)
+    # Positions are stored in single precision.
+    fall = np.abs(heights - places[:, 2]) > np.maximum(_STAYS, 1e-6 * np.abs(places).max(axis=1, initial=0.0))
+    if fall.any():
+        places[fall, 2] = heights[fall]
+        inverse = np.linalg.inv(world)
+        positions[fall] = places[fall] @ inverse[:3, :3].T + inverse[:3, 3]
+        mesh = own_mesh(field)
+        write(mesh, "position", positions)
+        mesh.update()
+    return int(fall.sum()), int(np.isnan(heights).sum())

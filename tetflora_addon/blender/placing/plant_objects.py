@@ -1,0 +1,310 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Plants as objects of a scene: making, finding and removing the empties and fields that stand for them."""
+
+from collections.abc import Iterable, Sequence
+from functools import lru_cache
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Quaternion
+
+from ...errors import SceneError
+from ...planting.places import Placement, new_seeds
+from .. import settings
+from ..attributes import world_matrix
+from ..saved_files import VERSION
+from ..scene.fields import fields_of, quaternions, read_field, stored_size, write_field
+from ..scene.plants import single_plants
+from ..scene.skeletons import form_of, species_of
+from ..species.catalogue import display_height
+from ..species.edits import catalogue
+
+COLLECTION = "TetFlora plants"
+FIELD = "Field of plants"
+POPULATION_MARK = "tetflora_population"  # on the collection of a population's plants
+_FIELD_MARK = "tetflora_field"  # on the objects of fields that TetFlora made and may remove
+_MARK = "tetflora_plants"  # on the collection, so that it may be renamed
+_FEW = 1000  # plants that may get their names the way Blender does it
+
+
+def plants_of(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+    """Those of the objects that are plants, each by itself; fields are told by `fields_of`."""
+    return [o for o in objects if o.tetflora.is_plant]
+
+
+def plant_collections(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
+    """The scene's collections for plants that are there."""
+    return [c for c in scene.collection.children_recursive if c.get(_MARK) and c.library is None]
+
+
+def plant_collection(scene: bpy.types.Scene) -> bpy.types.Collection:
+    """The scene's collection for plants; made if there is none."""
+    for collection in scene.collection.children_recursive:
+        if collection.get(_MARK) and collection.library is None:
+            return collection
+    collection = bpy.data.collections.new(COLLECTION)
+    collection[_MARK] = True
+    settings.begin(scene)
+    scene.collection.children.link(collection)
+    return collection
+
+
+def add_plants(
+    scene: bpy.types.Scene,
+    placement: Placement,
+    species: Sequence[str],
+    collection: bpy.types.Collection | None = None,
+) -> list[bpy.types.Object]:
+    """Make the empties of a placement.
+
+    Parameters
+    ----------
+    placement : Placement
+    species : sequence of str
+        Identifiers that ``placement.species`` counts through.
+    collection : bpy.types.Collection, optional
+        Where they go; the scene's collection for plants if not given.
+
+    Returns
+    -------
+    list of bpy.types.Object
+        In the placement's order.
+    """
+    rows = (placement.position, _eulers(placement), placement.scale, placement.species, placement.seed)
+    return _empties(scene, rows, species, [None] * len(species), collection)
+
+
+def _empties(
+    scene: bpy.types.Scene,
+    rows: Sequence[np.ndarray],
+    species: Sequence[str],
+    forms: Sequence[bpy.types.Object | None],
+    collection: bpy.types.Collection | None = None,
+) -> list[bpy.types.Object]:
+    """One empty for each row of places, XYZ Euler angles, scales, numbers of kinds and seeds."""
+    known = catalogue()
+    names = _numbered([known[s].name if s in known else s for s in species], rows[3])
+    target = (collection or plant_collection(scene)).objects
+    new = bpy.data.objects.new
+    made: list = [None] * len(names)
+    kinds, seeds = rows[3].tolist(), rows[4].tolist()
+    # Blender keeps objects sorted by name, and is fast where one comes after the one before.
+    for number in sorted(range(len(names)), key=names.__getitem__):
+        made[number] = obj = new(names[number], None)
+        kind, group = kinds[number], obj.tetflora
+        group.version, group.is_plant, group.species, group.seed = VERSION, True, species[kind], seeds[number]
+        if forms[kind] is not None:
+            group.form = forms[kind]
+        target.link(obj)
+    _set_at_once(made, rows, np.array([display_height(s) for s in species], dtype=np.float32))
+    prepare_scene(scene)
+    return made
+
+
+def _set_at_once(objects: Sequence[bpy.types.Object], rows: Sequence[np.ndarray], heights: np.ndarray) -> None:
+    """Give new empties their places and looks.
+
+    What is set object by object makes Blender slow when it deletes them later: 10,000 take several times as long as
+    with ``foreach_set``, which needs a collection that holds these and nothing else.
+    """
+    position, angles, scale, kind, _ = rows
+    arrow = bpy.types.Object.bl_rna.properties["empty_display_type"].enum_items['SINGLE_ARROW'].value
+    within = bpy.data.collections.new(COLLECTION)
+    for obj in objects:
+        within.objects.link(obj)
+    for name, values in (
+        ("location", position),
+        ("rotation_euler", angles),
+        ("scale", np.repeat(scale, 3)),
+        ("empty_display_size", heights[kind]),
+    ):
+        within.objects.foreach_set(name, np.ascontiguousarray(values, dtype=np.float32).reshape(-1))
+    within.objects.foreach_set("empty_display_type", np.full(len(objects), arrow, np.int32))
+    bpy.data.collections.remove(within)
+
+
+def _eulers(placement: Placement) -> np.ndarray:
+    """XYZ Euler angles, (n, 3); those of plants that are upright turn about the vertical and nothing else."""
+    angles = np.zeros((len(placement), 3))
+    angles[:, 2] = placement.azimuth
+    tilted = np.flatnonzero(placement.up[:, 2] < 1.0)
+    if len(tilted):
+        angles[tilted] = [Quaternion(q).to_euler() for q in placement.rotation[tilted].tolist()]
+    return angles
+
+
+def _numbered(names: Sequence[str], kinds: np.ndarray) -> list[str]:
+    """Name of each new plant, by its kind.
+
+    Blender finds numbers for equal names by itself, and is slow at it: 30,000 plants of one name take twice as long as
+    with numbers beyond all that are there.
+    """
+    if len(kinds) < _FEW:
+        return [names[kind] for kind in kinds.tolist()]
+    used = [int(end) for _, dot, end in (o.name.rpartition(".") for o in bpy.data.objects) if dot and end.isdecimal()]
+    first = max(used, default=0) + 1
+    width = max(3, len(str(first + len(kinds))))
+    return [f"{names[kind]}.{number:0{width}d}" for number, kind in enumerate(kinds.tolist(), first)]
+
+
+def add_field(
+    scene: bpy.types.Scene,
+    placement: Placement,
+    species: Sequence[str],
+    collection: bpy.types.Collection | None = None,
+) -> bpy.types.Object:
+    """Make one field of the plants of a placement.
+
+    Parameters
+    ----------
+    placement : Placement
+    species : sequence of str
+        Identifiers that ``placement.species`` counts through.
+    collection : bpy.types.Collection, optional
+        Where it goes; the scene's collection for plants if not given.
+    """
+    rows = (placement.position, placement.rotation, placement.scale, placement.species, placement.seed)
+    return _link_field(scene, write_field(FIELD, *rows, species), collection)
+
+
+def field_from_plants(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    plants: Iterable[bpy.types.Object],
+    collection: bpy.types.Collection | None = None,
+) -> bpy.types.Object:
+    """Put a field in place of plants that are objects; the same individuals stand at the same places.
+
+    Parameters
+    ----------
+    collection : bpy.types.Collection, optional
+        Where it goes; the scene's collection for plants if not given.
+
+    Raises
+    ------
+    SceneError
+        A plant cannot be read; nothing is changed.
+    """
+    plants = sorted(plants, key=lambda o: o.name_full)
+    read = single_plants(plants, depsgraph)
+    species, forms = [species_of(kind) for kind in read.identifiers], [form_of(kind) for kind in read.identifiers]
+    rows = (read.position, quaternions(read.frame), read.scale, read.species, read.seed)
+    made = _link_field(scene, write_field(FIELD, *rows, species, forms), collection)
+    remove_plants(plants)
+    return made
+
+
+def plants_from_field(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    field: bpy.types.Object,
+    most: int,
+    collection: bpy.types.Collection | None = None,
+) -> list[bpy.types.Object]:
+    """Put empties in place of a field; the same individuals stand at the same places.
+
+    Parameters
+    ----------
+    most : int
+        Objects that may be made.
+    collection : bpy.types.Collection, optional
+        Where they go; the scene's collection for plants if not given.
+
+    Raises
+    ------
+    SceneError
+        The field has no points, too many, or cannot be read; nothing is changed.
+    """
+    read = read_field(field, depsgraph, world_matrix(field, depsgraph)[None])
+    if not 0 < len(read) <= most:
+        raise SceneError(
+            f'"{field.name}" has {len(read):,} plants; '
+            + (f"the limit for objects is {most:,}. Split the field first" if len(read) else "add points first")
+        )
+    angles = np.array([Matrix(frame).to_euler() for frame in read.frame])
+    species, forms = [species_of(kind) for kind in read.identifiers], [form_of(kind) for kind in read.identifiers]
+    made = _empties(scene, (read.position, angles, read.scale, read.species, read.seed), species, forms, collection)
+    remove_fields([field])
+    return made
+
+
+def remove_fields(objects: Iterable[bpy.types.Object], tidy: bool = True) -> int:
+    """Delete fields that TetFlora made; others keep their object and lose the mark. How many plants they stored.
+
+    Parameters
+    ----------
+    tidy : bool
+        Remove collections that this leaves empty.
+    """
+    fields = [o for o in fields_of(objects) if o.library is None]
+    number = sum(stored_size(field) for field in fields)
+    for field in fields:
+        field.tetflora.is_field = False
+    ours = [field for field in fields if field.get(_FIELD_MARK)]
+    meshes = {field.data for field in ours}
+    bpy.data.batch_remove(ours)
+    bpy.data.batch_remove([mesh for mesh in meshes if not mesh.users])
+    if tidy:
+        remove_empty_collections()
+    return number
+
+
+def _link_field(
+    scene: bpy.types.Scene, field: bpy.types.Object, collection: bpy.types.Collection | None = None
+) -> bpy.types.Object:
+    field.tetflora.version, field[_FIELD_MARK] = VERSION, True
+    (collection or plant_collection(scene)).objects.link(field)
+    prepare_scene(scene)
+    return field
+
+
+def prepare_scene(scene: bpy.types.Scene) -> None:
+    """Settings that a scene with plants needs.
+
+    Refinement changes the scene while it renders; with Blender's interface unlocked, the window would draw the same
+    data at that time and could crash.
+    """
+    scene.render.use_lock_interface = True
+    scene.tetflora.version = VERSION
+
+
+def assign_species(objects: Iterable[bpy.types.Object], identifier: str) -> int:
+    """Make plants belong to a species; how many were changed. Their seeds stay."""
+
+    @lru_cache(maxsize=1)
+    def height() -> float:
+        return display_height(identifier)
+
+    changed = [o for o in plants_of(objects) if o.tetflora.species != identifier]
+    for obj in changed:
+        obj.tetflora.species = identifier
+        if obj.type == 'EMPTY':
+            obj.empty_display_size = height()
+    return len(changed)
+
+
+def reseed(objects: Iterable[bpy.types.Object], roll: int = 0) -> int:
+    """Give plants other seeds; how many there were. The same roll of the same plants gives the same seeds."""
+    plants = sorted(plants_of(objects), key=lambda o: o.name_full)
+    # Copies made by duplicating have equal seeds and shall part, so the place among the plants takes part.
+    old = np.array([o.tetflora.seed for o in plants], dtype=np.int64) + (np.arange(len(plants)) << 32)
+    for obj, seed in zip(plants, new_seeds(old, roll).tolist(), strict=True):
+        obj.tetflora.seed = seed
+    return len(plants)
+
+
+def remove_plants(objects: Iterable[bpy.types.Object]) -> int:
+    """Delete plants from the file, and the collection for plants if that leaves it empty; how many there were."""
+    plants = [o for o in plants_of(objects) if o.library is None]
+    bpy.data.batch_remove(plants)
+    remove_empty_collections()
+    return len(plants)
+
+
+def remove_empty_collections() -> None:
+    """Remove collections for plants and for populations that hold nothing."""
+    for mark in (POPULATION_MARK, _MARK):  # populations lie within
+        for collection in [c for c in bpy.data.collections if c.get(mark) and c.library is None]:
+            if not collection.objects and not collection.children:
+                bpy.data.collections.remove(collection)

@@ -1,0 +1,246 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Populations as JSON files: the rules by which plants are placed, for other scenes and other people.
+
+Keys are the names of the settings in Python. Angles are degrees, lengths metres. Objects, images and collections are
+named; what another file does not have is left empty and said. Everything else that is not understood is refused.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from math import degrees, isfinite, radians
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...errors import SceneError
+from ...storage import write_whole
+from .populations import NAME, add_population, set_grounds
+from .properties import TetFloraMixEntry, TetFloraPopulation
+from .rules import settings_of
+
+ENDING = ".json"
+FORMAT = "TetFlora populations"
+VERSION = 1
+
+_MIX = ("species", "weight", "companion", "companion_strength", "companion_distance")
+_ENDLESS = 1e30  # what Blender has for no bound is larger
+
+
+def as_data(populations: Iterable[TetFloraPopulation]) -> dict[str, Any]:
+    """Populations as what a file of them holds."""
+    return {"format": FORMAT, "version": VERSION, "populations": [_population_data(p) for p in populations]}
+
+
+def write_populations(populations: Iterable[TetFloraPopulation], path: Path) -> Path:
+    """Write populations to a file, whole or not at all.
+
+    Raises
+    ------
+    SceneError
+        The file cannot be written.
+    """
+    text = json.dumps(as_data(populations), indent=2, ensure_ascii=False) + "\n"
+    try:
+        write_whole(path, text)
+    except OSError as error:
+        raise SceneError(f"Cannot write {path.name}: {error.strerror}") from None
+    return path
+
+
+def read_populations(
+    scene: bpy.types.Scene, path: Path, grounds: Iterable[bpy.types.Object] = ()
+) -> tuple[int, list[str]]:
+    """Add the populations of a file to a scene, without plants.
+
+    Parameters
+    ----------
+    grounds : iterable of bpy.types.Object
+        Where populations grow of whose own grounds the scene has none.
+
+    Returns
+    -------
+    number : int
+        Populations added.
+    missing : list of str
+        What the file names and this one does not have.
+
+    Raises
+    ------
+    SceneError
+        The file cannot be read, or breaks a rule of the format; names file and key. Nothing is added.
+    """
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
+    except OSError as error:
+        raise SceneError(f"{path.name}: cannot read the file: {error.strerror}") from None
+    except (ValueError, RecursionError) as error:
+        raise SceneError(f"{path.name}: is not valid JSON: {error}") from None
+    try:
+        entries = _checked(data)
+    except ValueError as error:
+        raise SceneError(f"{path.name}: {error}") from None
+    missing: list[str] = []
+    for entry in entries:
+        population = add_population(scene, name=entry.get("name", NAME))
+        _fill(population, entry, scene, missing)
+        if not population.grounds and population.ground_collection is None:
+            set_grounds(population, grounds)
+    return len(entries), list(dict.fromkeys(missing))
+
+
+def _population_data(population: TetFloraPopulation) -> dict[str, Any]:
+    data: dict[str, Any] = {"name": population.name}
+    data["grounds"] = [entry.object.name for entry in population.grounds if entry.object is not None]
+    data["species"] = [
+        {name: _value(entry.bl_rna.properties[name], getattr(entry, name)) for name in _MIX} for entry in population.mix
+    ]
+    for prop in _simple_settings(population):
+        value = getattr(population, prop.identifier)
+        data[prop.identifier] = (
+            (value.name if value is not None else None) if _is_pointer(prop) else _value(prop, value)
+        )
+    return data
+
+
+def _simple_settings(group: type[bpy.types.PropertyGroup] | bpy.types.PropertyGroup) -> list[bpy.types.Property]:
+    return [p for p in settings_of(group) if p.type != 'COLLECTION']
+
+
+def _is_pointer(prop: bpy.types.Property) -> bool:
+    return prop.type == 'POINTER'
+
+
+def _value(prop: bpy.types.Property, value: Any) -> Any:
+    """A stored value as files have it; numbers in as few digits as give the same single-precision number back."""
+    if prop.type != 'FLOAT':
+        return value
+    forth, back = (degrees, radians) if prop.subtype == 'ANGLE' else (float, float)
+    for digits in range(6, 18):
+        short = float(f"{forth(value):.{digits}g}")
+        if np.float32(back(short)) == np.float32(value):
+            return short
+    return forth(value)
+
+
+def _refuse_constant(name: str) -> float:
+    raise ValueError(f"{name} is not a number")
+
+
+def _checked(data: Any) -> list[dict[str, Any]]:
+    """Populations of a decoded file.
+
+    Raises
+    ------
+    ValueError
+        Something is not as it must be; names the key.
+    """
+    _keys("the file", data, {"format", "version", "populations"}, {"format", "version", "populations"})
+    if data["format"] != FORMAT:
+        raise ValueError(f'"format" is {data["format"]!r}; population files have "{FORMAT}"')
+    if data["version"] != VERSION or isinstance(data["version"], bool):
+        raise ValueError(
+            f'"version" is {data["version"]!r}; this version of TetFlora reads {VERSION}; update the extension'
+        )
+    entries = _list_of("populations", data["populations"])
+    simple = {p.identifier: p for p in _simple_settings(TetFloraPopulation)}
+    mix = {name: TetFloraMixEntry.bl_rna.properties[name] for name in _MIX}
+    for number, entry in enumerate(entries, 1):
+        where = f"population {number}"
+        _keys(where, entry, {"name"}, {"name", "grounds", "species", *simple})
+        _text(f'{where}: "name"', entry["name"])
+        for name in _list_of(f'{where}: "grounds"', entry.get("grounds", [])):
+            _text(f'{where}: "grounds"', name)
+        for index, part in enumerate(_list_of(f'{where}: "species"', entry.get("species", [])), 1):
+            _keys(f"{where}: species {index}", part, {"species"}, set(mix))
+            for key, value in part.items():
+                _check(f'{where}: species {index}: "{key}"', mix[key], value)
+        for key in simple.keys() & entry.keys():
+            _check(f'{where}: "{key}"', simple[key], entry[key])
+    return entries
+
+
+def _check(where: str, prop: bpy.types.Property, value: Any) -> None:
+    if _is_pointer(prop):
+        if value is not None:
+            _text(where, value)
+    elif prop.type == 'BOOLEAN':
+        if not isinstance(value, bool):
+            raise ValueError(f"{where} is {value!r}; it must be true or false")
+    elif prop.type == 'ENUM':
+        known = [item.identifier for item in prop.enum_items]
+        if value not in known:
+            raise ValueError(f"{where} is {value!r}; it must be one of {', '.join(known)}")
+    elif prop.type == 'STRING':
+        _text(where, value)
+    else:
+        _check_number(where, prop, value)
+
+
+def _check_number(where: str, prop: bpy.types.Property, value: Any) -> None:
+    whole = prop.type == 'INT'
+    if isinstance(value, bool) or not isinstance(value, int if whole else int | float):
+        raise ValueError(f"{where} is {value!r}; it must be a {'whole ' if whole else ''}number")
+    if not whole and not isfinite(value):
+        raise ValueError(f"{where} is {value!r}; it must be a finite number")
+    angle = prop.subtype == 'ANGLE'
+    # Bounds are single-precision numbers: 0.1 as a file has it is less than 0.1 as Blender stores it.
+    with np.errstate(over="ignore"):
+        stored = value if whole else float(np.float32(radians(value) if angle else value))
+    if not prop.hard_min <= stored <= prop.hard_max:
+        low, high = (degrees(b) if angle else b for b in (prop.hard_min, prop.hard_max))
+        limits = f"from {low:.6g} to {high:.6g}" if abs(high) < _ENDLESS else f"{low:.6g} or greater"
+        raise ValueError(f"{where} is {value!r}; it must be {limits}")
+
+
+def _keys(where: str, data: Any, needed: set[str], known: set[str]) -> None:
+    if not isinstance(data, dict):
+        raise ValueError(f"{where} is {type(data).__name__}; it must be an object with keys")
+    if needed - data.keys():
+        raise ValueError(f'{where} has no "{min(needed - data.keys())}"')
+    if data.keys() - known:
+        raise ValueError(f'{where} has an unknown key "{min(data.keys() - known)}"')
+
+
+def _list_of(where: str, value: Any) -> list:
+    if not isinstance(value, list):
+        raise ValueError(f"{where} is {type(value).__name__}; it must be a list")
+    return value
+
+
+def _text(where: str, value: Any) -> None:
+    if not isinstance(value, str):
+        raise ValueError(f"{where} is {value!r}; it must be a string")
+
+
+def _fill(population: TetFloraPopulation, entry: dict[str, Any], scene: bpy.types.Scene, missing: list[str]) -> None:
+    """Give a new population what a checked entry says, and defaults for the rest."""
+    for prop in _simple_settings(population):
+        name = prop.identifier
+        population.property_unset(name)
+        if _is_pointer(prop):
+            setattr(population, name, _named(prop.fixed_type.identifier, entry.get(name), missing))
+        elif name in entry:
+            angle = prop.subtype == 'ANGLE' and prop.type == 'FLOAT'
+            setattr(population, name, radians(entry[name]) if angle else entry[name])
+    population.mix.clear()
+    for part in entry.get("species", []):
+        new = population.mix.add()
+        for key, value in part.items():
+            setattr(new, key, value)
+    found = [(name, scene.objects.get(name)) for name in entry.get("grounds", [])]
+    missing += [f'the ground "{name}"' for name, obj in found if obj is None]
+    set_grounds(population, [obj for _, obj in found if obj is not None and obj.type == 'MESH'])
+
+
+def _named(kind: str, name: str | None, missing: list[str]) -> bpy.types.ID | None:
+    if name is None:
+        return None
+    found = (bpy.data.images if kind == "Image" else bpy.data.collections).get(name)
+    if found is None:
+        missing.append(f'the {kind.lower()} "{name}"')
+    return found

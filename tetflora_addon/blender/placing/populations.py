@@ -1,0 +1,273 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Populations of a scene: plants that were placed together, and can be placed anew by the rules that are stored.
+
+A plant or field knows its population by an identity, and its number in it, so neither names nor places in lists matter.
+What an artist copies by hand has the number of its original; of those with one number the oldest belongs to the
+population, and the others are the artist's. Plants of other populations, and those set by hand, keep their room.
+"""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...errors import SceneError
+from ...growth.hashing import child_key, key_of_seed, uniform
+from ..scene.fields import fields_of, stored_size
+from .plant_objects import (
+    POPULATION_MARK,
+    add_field,
+    add_plants,
+    plant_collection,
+    plants_of,
+    remove_empty_collections,
+    remove_fields,
+)
+from .properties import MOST_EMPTIES, TetFloraPopulation
+from .rules import copy_settings, fingerprint, makes_field, place_population
+
+NAME = "Population"
+
+
+@dataclass(frozen=True)
+class Made:
+    """What became of a population.
+
+    Attributes
+    ----------
+    objects : list of bpy.types.Object
+        Its plants in the order of the placement, or its field.
+    number, wanted : int
+        Plants that there are, and that were asked for.
+    reason : str
+        Why there are fewer, empty if there are not.
+    returned : int
+        Plants among them that had been deleted by hand.
+    erased : int
+        Plants that stay away because they would stand where the brush has erased.
+    """
+
+    objects: list[bpy.types.Object]
+    number: int
+    wanted: int
+    reason: str
+    returned: int
+    erased: int
+
+
+def owner_of(scene: bpy.types.Scene, objects: Iterable[bpy.types.Object]) -> TetFloraPopulation | None:
+    """The population that all of these plants and fields belong to; None if there is no such one."""
+    objects = set(objects)
+    uids = {o.tetflora.population for o in objects}
+    found = next((p for p in scene.tetflora.populations if {p.uid} == uids), None)
+    return found if found is not None and objects <= set(own_objects(scene, found)) else None
+
+
+def adopt(scene: bpy.types.Scene, population: TetFloraPopulation, objects: Iterable[bpy.types.Object]) -> None:
+    """Let plants and fields belong to a population, after those that it has."""
+    numbers = [o.tetflora.population_number for o in own_objects(scene, population)]
+    for number, obj in enumerate(objects, max(numbers, default=-1) + 1):
+        obj.tetflora.population, obj.tetflora.population_number = population.uid, number
+
+
+def recount(scene: bpy.types.Scene) -> None:
+    """Let populations know how many plants they still have, after some were removed."""
+    for population in scene.tetflora.populations:
+        population.made = own_number(own_objects(scene, population))
+
+
+def add_population(
+    scene: bpy.types.Scene,
+    grounds: Iterable[bpy.types.Object] = (),
+    settings: TetFloraPopulation | None = None,
+    name: str = NAME,
+) -> TetFloraPopulation:
+    """Add a population without plants and make it the active one.
+
+    Parameters
+    ----------
+    grounds : iterable of bpy.types.Object
+        Meshes to grow on.
+    settings : TetFloraPopulation, optional
+        What to begin with; the scene's settings for new populations if not given.
+    name : str
+        A number is added if another population has it.
+    """
+    group = scene.tetflora
+    population = group.populations.add()
+    group.populations_index = len(group.populations) - 1
+    population.uid = uuid.uuid4().hex
+    population.name = _free_name(scene, name)
+    copy_settings(settings or group.populate, population)
+    set_grounds(population, grounds)
+    return population
+
+
+def set_grounds(population: TetFloraPopulation, grounds: Iterable[bpy.types.Object]) -> None:
+    """Let a population grow on these meshes instead."""
+    population.grounds.clear()
+    for obj in grounds:
+        population.grounds.add().object = obj
+
+
+def own_objects(scene: bpy.types.Scene, population: TetFloraPopulation) -> list[bpy.types.Object]:
+    """Plants and fields that belong to a population, in the order of their numbers."""
+    return _sorted_out(scene, population)[0]
+
+
+def own_number(objects: Iterable[bpy.types.Object]) -> int:
+    """How many plants there are in plants and fields."""
+    return sum(stored_size(o) if o.tetflora.is_field else 1 for o in objects)
+
+
+def make_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraPopulation) -> Made:
+    """Place a population's plants by its settings, in place of those that it has.
+
+    Raises
+    ------
+    SceneError
+        It is frozen, or no plants can be placed by its settings, as the message says; nothing is changed.
+    """
+    refuse_frozen(population)
+    own, copies = _sorted_out(scene, population)
+    placement, species = place_population(scene, depsgraph, population, set(own))
+    if population.as_field == 'EMPTIES' and len(placement) > MOST_EMPTIES:
+        raise SceneError(
+            f"{len(placement):,} plants exceed the limit of {MOST_EMPTIES:,} empties; "
+            "set Create As to Field, or use fewer plants"
+        )
+    returned = max(population.made - own_number(own), 0)
+    _release(copies)
+    _remove(own)
+    collection = collection_of(scene, population)
+    if makes_field(population, len(placement)) and len(placement):
+        made = [add_field(scene, placement, species, collection)]
+    else:
+        made = add_plants(scene, placement, species, collection)
+    for number, obj in enumerate(made):
+        group = obj.tetflora
+        group.population, group.population_number = population.uid, number
+    if not made:
+        remove_empty_collections()
+    population.made, population.message = len(placement), placement.reason
+    population.placed_by = fingerprint(population)
+    returned = min(returned, len(placement))
+    return Made(made, len(placement), placement.wanted, placement.reason, returned, placement.erased)
+
+
+def reroll(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraPopulation) -> Made:
+    """Place a population anew with another seed, which follows from the one that it has.
+
+    Raises
+    ------
+    SceneError
+        As `make_plants`; the seed stays as well.
+    """
+    old = population.seed
+    # A hash and not the next number: populations with neighbouring seeds would follow each other's arrangements.
+    population.seed = int(uniform(child_key(key_of_seed(old), 1), 0) * 2**31)
+    try:
+        return make_plants(scene, depsgraph, population)
+    except SceneError:
+        population.seed = old
+        raise
+
+
+def remove_population(scene: bpy.types.Scene, index: int, keep_plants: bool = False) -> int:
+    """Remove a population; its plants go with it, unless they are frozen or shall be kept. How many went.
+
+    What stays is the artist's own.
+    """
+    group = scene.tetflora
+    population = group.populations[index]
+    own, copies = _sorted_out(scene, population)
+    kept = keep_plants or population.frozen
+    _release([*own, *copies] if kept else copies)
+    number = 0 if kept else own_number(own)
+    if not kept:
+        _remove(own)
+        _dissolve(scene, population.collection)
+    group.populations.remove(index)
+    group.populations_index = max(min(group.populations_index, len(group.populations) - 1), 0)
+    remove_empty_collections()
+    return number
+
+
+def refuse_frozen(population: TetFloraPopulation) -> None:
+    """Keep the plants of a frozen population from being replaced.
+
+    Raises
+    ------
+    SceneError
+        It is frozen.
+    """
+    if population.frozen:
+        raise SceneError(f'"{population.name}" is frozen and keeps its plants; turn off Freeze to change it')
+
+
+def _sorted_out(
+    scene: bpy.types.Scene, population: TetFloraPopulation
+) -> tuple[list[bpy.types.Object], list[bpy.types.Object]]:
+    """A population's own plants and fields by number, and copies of them that the artist made."""
+    uid = population.uid
+    marked = [o for o in scene.objects if o.tetflora.population == uid and _is_local(o)] if uid else []
+    own: dict[int, bpy.types.Object] = {}
+    copies = []
+    for obj in sorted(marked, key=lambda o: o.session_uid):
+        if own.setdefault(obj.tetflora.population_number, obj) is not obj:
+            copies.append(obj)
+    return [own[number] for number in sorted(own)], copies
+
+
+def _is_local(obj: bpy.types.Object) -> bool:
+    return obj.library is None and obj.override_library is None and (obj.tetflora.is_plant or obj.tetflora.is_field)
+
+
+def _release(objects: Iterable[bpy.types.Object]) -> None:
+    """Make plants the artist's own."""
+    for obj in objects:
+        obj.tetflora.property_unset("population")
+        obj.tetflora.property_unset("population_number")
+
+
+def _remove(objects: Iterable[bpy.types.Object]) -> None:
+    objects = list(objects)
+    plants, fields = plants_of(objects), fields_of(objects)
+    remove_fields(fields, tidy=False)  # the collection keeps what the artist set for it
+    bpy.data.batch_remove(plants)
+
+
+def collection_of(scene: bpy.types.Scene, population: TetFloraPopulation) -> bpy.types.Collection:
+    """The collection of a population's plants, within the scene's for plants; made if there is none in the scene."""
+    found = population.collection
+    if found is None or found.library is not None or found not in set(scene.collection.children_recursive):
+        found = population.collection = bpy.data.collections.new(population.name)
+        found[POPULATION_MARK] = True
+        plant_collection(scene).children.link(found)
+    found.name = population.name
+    return found
+
+
+def _dissolve(scene: bpy.types.Scene, collection: bpy.types.Collection | None) -> None:
+    """Take a population's collection away; what else lies in it goes up to the scene's collection for plants."""
+    if collection is None or collection.library is not None:
+        return
+    parent = plant_collection(scene)
+    for obj in collection.objects:
+        if obj.name not in parent.objects:
+            parent.objects.link(obj)
+    for child in collection.children:
+        if child.name not in parent.children:
+            parent.children.link(child)
+    bpy.data.collections.remove(collection)
+
+
+def _free_name(scene: bpy.types.Scene, name: str) -> str:
+    taken = {p.name for p in scene.tetflora.populations}
+    numbered = (f"{name}.{i:03d}" for i in np.arange(1, len(taken) + 2))
+    return name if name not in taken else next(n for n in numbered if n not in taken)

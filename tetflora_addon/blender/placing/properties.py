@@ -1,0 +1,296 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a population of plants stores: the rules by which it was placed, so that it can be placed anew.
+
+The same group holds the settings for new populations (``Scene.tetflora.populate``). `populations` acts on it.
+
+Settings of the brush that paints plants: ``Scene.tetflora.brush``.
+"""
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+from ...planting.rules import Companion, Rules
+from ...planting.strokes import Brush
+from ...setting import LENGTH
+from ..runtime import Listeners
+from ..settings import properties_of
+from ..species.catalogue import SpeciesChoice, items_for, number_of
+from .rules import EMPTIES_UNASKED
+
+#: Most plants that Populate creates as objects.
+MOST_EMPTIES = 100_000
+STORAGE_ITEMS = (
+    ('AUTOMATIC', "Automatic", f"Empties up to {EMPTIES_UNASKED:,} plants, a field for more", 0),
+    ('EMPTIES', "Empties", "One object per plant. Each can be moved on its own; many slow Blender down", 1),
+    ('FIELD', "Field", "One object whose vertices are the plants. Room for millions", 2),
+)
+NOBODY = ("NONE", "None", "No companion", 'NONE', 0)
+
+#: Called after each change of a setting, without arguments; the preview of points listens.
+listeners = Listeners()
+_kept_items: dict[int, list] = {}  # Blender keeps no copy of the strings of dynamic items
+
+
+def _tell(_group: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    listeners.notify()
+
+
+_LIVE = {"options": set(), "update": _tell}
+_HIDDEN = {"options": {'HIDDEN'}}
+_RULES = properties_of(Rules, **_LIVE)
+_COMPANION = properties_of(Companion, **_LIVE)
+
+
+def _companion_items(entry: "TetFloraMixEntry", _context: bpy.types.Context | None) -> list:
+    items = items_for(entry.companion)
+    return _kept_items.setdefault(id(items), [NOBODY, *items])
+
+
+def _choose_companion(entry: "TetFloraMixEntry", number: int) -> None:
+    found = [item[0] for item in _companion_items(entry, None) if item[4] == number]
+    entry.companion = found[0] if found and number else ""
+
+
+class TetFloraMixEntry(bpy.types.PropertyGroup, SpeciesChoice):
+    """One species of a mixture to populate with, and how it stands to another."""
+
+    weight: FloatProperty(
+        name="Weight",
+        description="Relative frequency of this species among the plants",
+        default=1.0,
+        min=0.0,
+        soft_max=10.0,
+        **_LIVE,
+    )
+    companion: StringProperty(
+        name="Companion",
+        description="Identifier of the species that this one seeks or avoids; empty for none",
+        **_LIVE,
+    )
+    companion_choice: EnumProperty(
+        name="Companion",
+        description="Species that this one seeks or avoids, in this population or planted earlier",
+        items=_companion_items,
+        get=lambda self: number_of(self.companion) if self.companion else 0,
+        set=_choose_companion,
+        options={'SKIP_SAVE'},
+    )
+    companion_strength: _COMPANION.strength
+    companion_distance: _COMPANION.distance
+
+
+class TetFloraGround(bpy.types.PropertyGroup):
+    """One mesh that a population grows on."""
+
+    object: PointerProperty(
+        name="Ground",
+        description="Mesh that the plants grow on, including its modifiers",
+        type=bpy.types.Object,
+        poll=lambda _group, candidate: candidate.type == 'MESH' and not candidate.tetflora.is_field,
+        update=_tell,
+    )
+
+
+class TetFloraPopulation(bpy.types.PropertyGroup):
+    """How plants are placed together."""
+
+    # What it is, and what became of it. The plants know it by ``uid``, never by its name or place in the list.
+    name: StringProperty(name="Name", description="Name of the population, and of the collection of its plants")
+    uid: StringProperty(name="Identity", **_HIDDEN)
+    frozen: BoolProperty(name="Frozen", **_HIDDEN)
+    collection: PointerProperty(name="Collection", type=bpy.types.Collection, **_HIDDEN)
+    made: IntProperty(name="Plants Made", **_HIDDEN)
+    message: StringProperty(name="Message", **_HIDDEN)
+    placed_by: StringProperty(name="Placed By", **_HIDDEN)  # `population_rules.fingerprint` of when it was placed
+    erased: StringProperty(name="Erased Places", **_HIDDEN)  # as `erased_places` writes it
+
+    grounds: CollectionProperty(name="Grounds", description="Meshes that the plants grow on", type=TetFloraGround)
+    ground_collection: PointerProperty(
+        name="Ground Collection",
+        description="All meshes in this collection are ground too, including those added later",
+        type=bpy.types.Collection,
+        **_LIVE,
+    )
+    by_density: _RULES.by_density
+    count: _RULES.count
+    density: FloatProperty(
+        name="Plants per Hectare",
+        description=(
+            "Plants per hectare (10,000 m², a square of 100 m) of fully suitable ground; fewer where it is partly "
+            "suitable. Old forest: 200 to 500 trees; young forest: 2,000; shrubs: 3,000; ferns: 20,000 (2 per m²)"
+        ),
+        default=200.0,
+        min=0.0,
+        soft_max=100_000.0,
+        precision=1,
+        **_LIVE,
+    )
+    as_field: EnumProperty(
+        name="Create As",
+        description="What the plants are created as",
+        items=STORAGE_ITEMS,
+        default='AUTOMATIC',
+        **_LIVE,
+    )
+    seed: _RULES.seed
+
+    mix: CollectionProperty(
+        name="Species",
+        description="Species to choose from; if empty, the first one of the catalog",
+        type=TetFloraMixEntry,
+    )
+    mix_index: IntProperty(name="Active Species", options={'HIDDEN', 'SKIP_SAVE'})
+
+    min_distance: _RULES.min_distance
+    clumping: _RULES.clumping
+    clump_size: _RULES.clump_size
+
+    slope_min: _RULES.slope_min
+    slope_max: _RULES.slope_max
+    use_altitude: BoolProperty(
+        name="Altitude",
+        description="Plant only between two heights above the scene's origin",
+        **_LIVE,
+    )
+    altitude_min: _RULES.altitude_min
+    altitude_max: _RULES.altitude_max
+    altitude_falloff: _RULES.altitude_falloff
+    aspect: _RULES.aspect
+    aspect_spread: _RULES.aspect_spread
+    edge_falloff: _RULES.edge_falloff
+    vertex_group: StringProperty(
+        name="Vertex Group",
+        description="Vertex group of the ground whose weights control the density: 0 is bare, 1 is full",
+        **_LIVE,
+    )
+    invert_group: BoolProperty(name="Invert Vertex Group", description="Weight 1 is bare, 0 is full", **_LIVE)
+    image: PointerProperty(
+        name="Image",
+        description="Image whose brightness controls the density: black is bare, white is full",
+        type=bpy.types.Image,
+        **_LIVE,
+    )
+    invert_image: BoolProperty(name="Invert Image", description="White is bare, black is full", **_LIVE)
+    uv_layer: StringProperty(
+        name="UV Map",
+        description="UV map of the ground for the image; the active one if empty",
+        **_LIVE,
+    )
+    areas: PointerProperty(
+        name="Areas",
+        description="Collection of closed curves; plants grow only inside them, as seen from above",
+        type=bpy.types.Collection,
+        **_LIVE,
+    )
+    paths: PointerProperty(
+        name="Paths",
+        description="Collection of curves along which the ground stays bare, as seen from above",
+        type=bpy.types.Collection,
+        **_LIVE,
+    )
+    path_distance: FloatProperty(
+        name="Path Distance",
+        description=(
+            "Minimum distance from trunks to the path's centerline: half the width of the road, plus room for branches"
+        ),
+        default=2.0,
+        min=0.0,
+        soft_max=50.0,
+        **LENGTH,
+        **_LIVE,
+    )
+
+    scale_min: _RULES.scale_min
+    scale_max: _RULES.scale_max
+    scale_at_top: _RULES.scale_at_top
+    tilt: _RULES.tilt
+
+
+#: Painted plants become empties as long as the scene has no more plants than this that are objects.
+MOST_PAINTED_EMPTIES = 2_000
+MODES = (
+    ('PAINT', "Paint", "Add plants where there are fewer than the density", 'BRUSH_DATA', 0),
+    ('ERASE', "Erase", "Remove plants of every species under the brush", 'TRASH', 1),
+    (
+        'THIN',
+        "Thin",
+        "Remove plants above the density, or closer than the minimum distance",
+        'PARTICLES',
+        2,
+    ),
+)
+_BRUSH = properties_of(Brush, options=set())
+_SIZES = properties_of(Rules, options=set())
+
+
+class TetFloraBrush(bpy.types.PropertyGroup, SpeciesChoice):
+    """How the brush paints."""
+
+    mode: EnumProperty(name="Mode", description="What dragging does; hold Shift to erase", items=MODES, options=set())
+    radius: _BRUSH.radius
+    density: FloatProperty(
+        name="Density",
+        description=(
+            "Plants per 100 m² of the map. Paint adds plants up to this density, Thin removes those above it; painting "
+            "over a place again changes nothing"
+        ),
+        default=4.0,
+        min=0.001,
+        soft_max=100.0,
+        max=100_000.0,
+        options=set(),
+    )
+    strength: _BRUSH.strength
+    min_distance: _BRUSH.min_distance
+    source: EnumProperty(
+        name="Species",
+        description="What to paint",
+        items=(
+            ('MIX', "As in Populate", "The species of the Populate panel, by weight", 0),
+            ('ONE', "One Species", "The species below", 1),
+        ),
+        options=set(),
+    )
+    scale_min: _SIZES.scale_min
+    scale_max: _SIZES.scale_max
+    store: EnumProperty(
+        name="Create As",
+        description="What painted plants are created as. Erase and Thin affect both kinds",
+        items=(
+            (
+                'AUTOMATIC',
+                "Automatic",
+                f"Empties until the scene has {MOST_PAINTED_EMPTIES:,}, then the field of painted plants",
+                0,
+            ),
+            ('EMPTIES', "Empties", "One object per plant. Each can be moved on its own; many slow Blender down", 1),
+            ('FIELD', "Field", 'One object, "Painted plants", whose vertices are the plants. Room for millions', 2),
+        ),
+        options=set(),
+    )
+    seed: IntProperty(
+        name="Seed", description="A different seed paints different plants in different places", options=set()
+    )
+    strokes: IntProperty(
+        name="Strokes",
+        description="Strokes painted so far; each draws its own random numbers",
+        min=0,
+        options={'HIDDEN'},
+    )
+
+
+CLASSES = (
+    TetFloraMixEntry,
+    TetFloraGround,
+    TetFloraPopulation,
+    TetFloraBrush,
+)

@@ -1,0 +1,285 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From what a population stores to the engine's rules, and settings that pass from one population to another.
+
+From a population to places for its plants: its ground and masks, what stands there already, and the engine.
+
+Where the brush has taken plants from populations: these places stay bare when a population is placed anew.
+
+Stored in the population as JSON text: a list for each stroke, of a radius and the x and y of the circles' middles.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from hashlib import blake2b
+from math import inf
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SceneError
+from ...planting.places import Placement, place, without
+from ...planting.rules import Companion, Rules
+from ...planting.terrain import Path
+from ..attributes import world_matrix
+from ..scene.fields import fields_of, read_field
+from ..scene.objects import objects_within
+from ..scene.skeletons import species_of
+from ..species.catalogue import default_species
+from ..species.edits import catalogue
+from .plant_objects import plants_of
+from .terrain import read_ground
+
+#: Up to this many become empties if nobody says otherwise; beyond, Blender becomes slow.
+EMPTIES_UNASKED = 10_000
+#: Square metres of the area that densities are counted on: foresters count trees by the hectare.
+HECTARE = 10_000.0
+#: What a population is and what became of it; all else are settings, which can be copied and written to files.
+IDENTITY = {
+    *("rna_type", "name", "uid", "frozen", "collection", "made", "message", "placed_by", "erased"),
+    "mix_index",
+}
+_ENTRY = ("species", "weight", "companion", "companion_strength", "companion_distance")
+
+
+def settings_of(group: type[bpy.types.PropertyGroup] | bpy.types.PropertyGroup) -> list[bpy.types.Property]:
+    """Properties of a population that say how plants are placed."""
+    return [p for p in group.bl_rna.properties if p.identifier not in IDENTITY]
+
+
+def fingerprint(population: bpy.types.PropertyGroup) -> str:
+    """A short text that is another one when settings are; what is left at its default does not count.
+
+    So a setting that comes with another version changes nothing of populations that do not use it.
+    """
+    values: list[Any] = [[e.object.name_full for e in population.grounds if e.object is not None]]
+    values += [[getattr(entry, name) for name in _ENTRY] for entry in population.mix]
+    for name, default in _defaults(type(population)):
+        value = getattr(population, name)
+        if isinstance(value, bpy.types.ID):
+            value = value.name_full
+        if value != default:
+            values.append([name, value])
+    return blake2b(repr(values).encode(), digest_size=8).hexdigest()
+
+
+@lru_cache(maxsize=1)
+def _defaults(kind: type[bpy.types.PropertyGroup]) -> tuple[tuple[str, Any], ...]:
+    """Names and defaults of settings that are single values; kept, because panels ask at every redraw."""
+    simple = [p for p in settings_of(kind) if p.type != 'COLLECTION']
+    return tuple((p.identifier, None if p.type == 'POINTER' else p.default) for p in simple)
+
+
+def is_outdated(population: bpy.types.PropertyGroup) -> bool:
+    """Whether an update would place by other settings than those by which the plants stand; grounds are not read."""
+    return bool(population.placed_by) and not population.frozen and population.placed_by != fingerprint(population)
+
+
+def awaits_update(population: bpy.types.PropertyGroup) -> bool:
+    """Whether a population has no plants yet, or others than an update would give it."""
+    if not population.uid or population.frozen:
+        return False
+    return not population.made or not population.placed_by or is_outdated(population)
+
+
+def copy_settings(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
+    """Give a population the settings of another; identity, grounds and plants stay its own."""
+    for prop in settings_of(source):
+        if prop.type != 'COLLECTION':
+            setattr(target, prop.identifier, getattr(source, prop.identifier))
+    target.mix.clear()
+    for entry in source.mix:
+        new = target.mix.add()
+        new.species, new.weight = entry.species, entry.weight
+        copy_companion(entry, new)
+
+
+def copy_companion(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
+    """Let one species stand to others as another entry says."""
+    for name in ("companion", "companion_strength", "companion_distance"):
+        setattr(target, name, getattr(source, name))
+
+
+def active_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None:
+    """The population that buttons act on; None where there is none."""
+    settings = scene.tetflora
+    number = settings.populations_index
+    return settings.populations[number] if 0 <= number < len(settings.populations) else None
+
+
+def shown_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup:
+    """What the panel shows: the active population, or the settings for new ones where there is none."""
+    return active_population(scene) or scene.tetflora.populate
+
+
+def rules_from(population: bpy.types.PropertyGroup) -> tuple[Rules, tuple[str, ...]]:
+    """A population's settings as the engine takes them, and the species that its shares count through.
+
+    Companions that are none of the mixture's species follow it with a share of 0.
+    """
+    mix = [(e.species or default_species(), e) for e in population.mix]
+    shares: dict[str, float] = {}
+    for identifier, entry in mix:
+        shares[identifier] = shares.get(identifier, 0.0) + entry.weight
+    if not mix:
+        shares[default_species()] = 1.0
+    for _, entry in mix:
+        if entry.companion:
+            shares.setdefault(entry.companion, 0.0)
+    species = tuple(shares)
+    companions = tuple(
+        Companion(species.index(identifier), species.index(e.companion), e.companion_strength, e.companion_distance)
+        for identifier, e in mix
+        if e.companion and e.companion_strength
+    )
+    free = ("altitude_min", "altitude_max", "density", "shares", "companions")
+    given = {name: getattr(population, name) for name in Rules.__dataclass_fields__ if name not in free}
+    low, high = (population.altitude_min, population.altitude_max) if population.use_altitude else (-inf, inf)
+    rules = Rules(
+        **given,
+        altitude_min=low,
+        altitude_max=high,
+        density=population.density / HECTARE,
+        shares=tuple(shares.values()),
+        companions=companions,
+    )
+    return rules, species
+
+
+def makes_field(population: bpy.types.PropertyGroup, number: int) -> bool:
+    """Whether so many plants of a population are made as one field."""
+    return population.as_field == 'FIELD' or (population.as_field == 'AUTOMATIC' and number > EMPTIES_UNASKED)
+
+
+def unknown_species(population: bpy.types.PropertyGroup) -> list[str]:
+    """Species of a population that the catalogue does not have."""
+    known = catalogue()
+    return [e.species for e in population.mix if e.species and e.species not in known]
+
+
+_DIGITS = 4  # tenths of a millimetre
+
+
+def note_erased(population: bpy.types.PropertyGroup, middles: NDArray[np.float64] | Sequence, radius: float) -> None:
+    """Let circles on the map, with middles (n, 2) or more columns, stay bare; metres."""
+    flat = np.round(np.asarray(middles, dtype=np.float64)[:, :2], _DIGITS).ravel().tolist()
+    strokes = [*_strokes(population), [round(radius, _DIGITS), *flat]]
+    population.erased = json.dumps(strokes, separators=(",", ":"))
+
+
+def erased_places(population: bpy.types.PropertyGroup) -> tuple[Path, ...]:
+    """What stays bare, as lines of one point."""
+    return tuple(
+        Path(middle[None], stroke[0])
+        for stroke in _strokes(population)
+        for middle in np.array(stroke[1:], dtype=np.float64).reshape(-1, 2)
+    )
+
+
+def _strokes(population: bpy.types.PropertyGroup) -> list[list[float]]:
+    return json.loads(population.erased) if population.erased else []
+
+
+def grounds_of(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> list[bpy.types.Object]:
+    """Meshes of the scene that a population grows on.
+
+    What was deleted from the scene does not count, although the population's pointer keeps it in the file.
+    """
+    named = [entry.object for entry in population.grounds]
+    if population.ground_collection is not None:
+        named += objects_within(population.ground_collection)
+    meshes = dict.fromkeys(o for o in named if o is not None and o.type == 'MESH' and not o.tetflora.is_field)
+    return [o for o in meshes if scene in o.users_scene]
+
+
+def place_population(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    population: bpy.types.PropertyGroup,
+    own: Collection[bpy.types.Object],
+    grounds: Sequence[bpy.types.Object] | None = None,
+    most: int | None = None,
+) -> tuple[Placement, tuple[str, ...]]:
+    """Find places for the plants of a population.
+
+    Parameters
+    ----------
+    own : set of bpy.types.Object
+        Its present plants, which take no room.
+    grounds : sequence of bpy.types.Object, optional
+        Grow on these meshes instead of the population's own.
+    most : int, optional
+        Plants that are enough, for a preview.
+
+    Returns
+    -------
+    placement : Placement
+    species : tuple of str
+        Identifiers that the placement counts through.
+
+    Raises
+    ------
+    SceneError
+        No ground, a species that the catalogue does not have, or settings that leave no place; says what to do.
+    """
+    unknown = unknown_species(population)
+    if unknown:
+        raise SceneError(f'Unknown species "{unknown[0]}"; choose one of {", ".join(catalogue())}')
+    grounds = grounds_of(scene, population) if grounds is None else grounds
+    if not grounds:
+        raise SceneError(
+            f'"{population.name}" has no ground in this scene; select meshes and click Use Selected Meshes'
+            if population.uid
+            else "Select a mesh to plant on"
+        )
+    rules, species = rules_from(population)
+    if most is not None:
+        rules = replace(rules, count=min(rules.count, most))
+    ground = read_ground(
+        grounds,
+        depsgraph,
+        vertex_group=population.vertex_group,
+        image=population.image,
+        uv_layer=population.uv_layer,
+        invert_group=population.invert_group,
+        invert_image=population.invert_image,
+        areas=population.areas,
+        paths=population.paths,
+        path_distance=population.path_distance,
+    )
+    found = place(ground, rules, *standing(scene, depsgraph, own, species))
+    return without(found, erased_places(population)), species
+
+
+def standing(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    without: Collection[bpy.types.Object],
+    species: Sequence[str],
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Places (m, 3) and species (m,) of the plants of a scene, those that are objects and those of fields.
+
+    Parameters
+    ----------
+    without : set of bpy.types.Object
+        Plants and fields that do not count.
+    species : sequence of str
+        Identifiers that the result counts through; others have -1.
+    """
+    numbers = {identifier: number for number, identifier in enumerate(species)}
+    objects = [o for o in scene.objects if o not in without] if without else scene.objects
+    single = plants_of(objects)
+    position = [np.array([o.matrix_world.translation for o in single], dtype=np.float64).reshape(-1, 3)]
+    kinds = [np.array([numbers.get(o.tetflora.species, -1) for o in single], dtype=np.int32)]
+    for field in fields_of(objects):
+        read = read_field(field, depsgraph, world_matrix(field, depsgraph)[None])
+        position.append(read.position)
+        own_numbers = np.array([numbers.get(species_of(kind), -1) for kind in read.identifiers], dtype=np.int32)
+        kinds.append(own_numbers[read.species])
+    return np.concatenate(position), np.concatenate(kinds)

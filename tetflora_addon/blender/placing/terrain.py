@@ -1,0 +1,274 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Read the ground that plants shall grow on: meshes, vertex groups, an image, and curves for areas and paths.
+
+Curves as lines on the map: borders of areas to plant, and paths to keep free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SceneError
+from ...planting.terrain import Path, Terrain
+from ..attributes import image_pixels, members, read, values_of, world_matrix
+from ..scene.objects import objects_within
+
+
+@dataclass(frozen=True)
+class Line:
+    """One curve.
+
+    Attributes
+    ----------
+    points : (k, 2) float64
+        On the map, metres.
+    cyclic : bool
+        The last point is joined to the first, which is not repeated.
+    half_width : float
+        What its bevel adds to either side, metres.
+    """
+
+    points: NDArray[np.float64]
+    cyclic: bool
+    half_width: float
+
+
+def lines_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[Line]:
+    """Lines of a curve object, as smooth as it is drawn; none of objects of other types.
+
+    Modifiers count, except where a curve has a bevel, an extrusion or a fill: then its control points are read.
+
+    Raises
+    ------
+    SceneError
+        A NURBS curve with a bevel, an extrusion or a fill.
+    """
+    evaluated = obj.evaluated_get(depsgraph)
+    half_width = 0.0
+    if obj.type == 'CURVE':
+        found = _from_edges(evaluated)
+        if found is None:
+            found = [_from_spline(spline, obj) for spline in obj.data.splines]
+            matrix = world_matrix(obj, depsgraph)
+            half_width = obj.data.bevel_depth * float(np.linalg.norm(matrix[:3, :3], axis=0).mean())
+    elif obj.type == 'CURVES':
+        found = _from_curves(evaluated.data)
+    else:
+        return []
+    matrix = world_matrix(obj, depsgraph)
+    lines = [((points @ matrix[:3, :3].T + matrix[:3, 3])[:, :2], cyclic) for points, cyclic in found if len(points)]
+    if not all(np.isfinite(points).all() for points, _ in lines):
+        raise SceneError(f'The curve "{obj.name}" has points that are not finite numbers; check its transform')
+    return [Line(points, cyclic, half_width) for points, cyclic in lines]
+
+
+def _from_edges(evaluated: bpy.types.Object) -> list[tuple[NDArray[np.float64], bool]] | None:
+    """Splines of a curve that evaluates to nothing but edges; None if it has faces."""
+    mesh = evaluated.to_mesh()
+    try:
+        if mesh is None or len(mesh.polygons):
+            return None
+        count = len(mesh.vertices)
+        positions = members(mesh.vertices, "co", 3).astype(np.float64)
+        ends = np.sort(members(mesh.edges, "vertices", 2, np.int32), axis=1)
+    finally:
+        evaluated.to_mesh_clear()
+    if not count:
+        return []
+    # The points of a spline follow each other, and an edge from the last to the first closes it.
+    joined = np.zeros(count, bool)
+    joined[ends[ends[:, 1] - ends[:, 0] == 1, 0]] = True
+    stops = np.flatnonzero(~joined) + 1
+    starts = np.concatenate([[0], stops[:-1]])
+    closing = set(map(tuple, ends[ends[:, 1] - ends[:, 0] > 1].tolist()))
+    return [(positions[a:b], (a, b - 1) in closing) for a, b in zip(starts.tolist(), stops.tolist(), strict=True)]
+
+
+def _from_spline(spline: bpy.types.Spline, obj: bpy.types.Object) -> tuple[NDArray[np.float64], bool]:
+    cyclic = spline.use_cyclic_u
+    if spline.type == 'POLY':
+        return np.array([p.co[:3] for p in spline.points], dtype=np.float64).reshape(-1, 3), cyclic
+    if spline.type != 'BEZIER':
+        raise SceneError(
+            f'The NURBS curve "{obj.name}" has a bevel, extrusion or fill; remove it, or change its type to Bézier'
+        )
+    knots = np.array([(p.handle_left, p.co, p.handle_right) for p in spline.bezier_points], dtype=np.float64)
+    following = np.roll(knots, -1, axis=0) if cyclic else knots[1:]
+    before = knots if cyclic else knots[:-1]
+    t = (np.arange(spline.resolution_u) / spline.resolution_u)[None, :, None]
+    a, b, c, d = (p[:, None] for p in (before[:, 1], before[:, 2], following[:, 0], following[:, 1]))
+    points = (1 - t) ** 3 * a + 3 * (1 - t) ** 2 * t * b + 3 * (1 - t) * t**2 * c + t**3 * d
+    return np.concatenate([points.reshape(-1, 3), knots[len(before) :, 1]]), cyclic
+
+
+def _from_curves(curves: bpy.types.Curves) -> list[tuple[NDArray[np.float64], bool]]:
+    """Lines through the points of hair curves."""
+    if not len(curves.curves):
+        return []
+    first = members(curves.curve_offset_data, "value", dtype=np.int32)
+    attribute = curves.attributes.get("cyclic")
+    cyclic = np.zeros(len(curves.curves), bool) if attribute is None else values_of(attribute)
+    parts = np.split(read(curves, "position").astype(np.float64), first[1:-1])
+    return list(zip(parts, cyclic.tolist(), strict=True))
+
+
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec. 709
+
+
+def read_ground(
+    objects: Iterable[bpy.types.Object],
+    depsgraph: bpy.types.Depsgraph,
+    *,
+    vertex_group: str = "",
+    image: bpy.types.Image | None = None,
+    uv_layer: str = "",
+    invert_group: bool = False,
+    invert_image: bool = False,
+    areas: bpy.types.Collection | None = None,
+    paths: bpy.types.Collection | None = None,
+    path_distance: float = 0.0,
+) -> Terrain:
+    """The ground as the engine takes it, modifiers applied, in world space.
+
+    Parameters
+    ----------
+    objects : iterable of bpy.types.Object
+        Meshes.
+    depsgraph : bpy.types.Depsgraph
+    vertex_group : str
+        Group whose weights say how suitable the ground is; every mesh needs it. A float attribute of that name serves
+        as well.
+    image : bpy.types.Image, optional
+        Its luminance says how suitable the ground is, as the values are stored: a picture of 50 % grey halves the
+        number of plants. Alpha does not count.
+    uv_layer : str
+        UV map for the image; the one that renders if empty.
+    invert_group, invert_image : bool
+        Plants grow where weight or luminance are low.
+    areas : bpy.types.Collection, optional
+        Plants grow inside of its cyclic curves only; open curves do not count.
+    paths : bpy.types.Collection, optional
+        All of its curves are kept free.
+    path_distance : float
+        Metres to either side of the paths, beyond the depth of their bevel.
+
+    Raises
+    ------
+    SceneError
+        Something is missing or cannot be used; names the object and the setting.
+    """
+    parts = [_read_mesh(obj, depsgraph, vertex_group, uv_layer, image is not None) for obj in objects]
+    if not parts:
+        raise SceneError("No ground to populate; select a mesh with faces")
+    triangles, weight, uv, border = zip(*parts, strict=True)
+    weights = np.concatenate(weight) if vertex_group else None
+    if weights is not None and invert_group:
+        weights = 1.0 - weights
+    grey = None
+    if image is not None:
+        grey = _luminance(image)
+        grey = 1.0 - grey if invert_image else grey
+    return Terrain(
+        triangles=np.concatenate(triangles),
+        weight=weights,
+        uv=None if image is None else np.concatenate(uv),
+        image=grey,
+        areas=() if areas is None else tuple(line.points for line in _lines(areas, depsgraph, "Areas", closed=True)),
+        paths=() if paths is None else tuple(_path(line, path_distance) for line in _lines(paths, depsgraph, "Paths")),
+        border=np.concatenate(border),
+    )
+
+
+def _path(line: Line, distance: float) -> Path:
+    points = np.concatenate([line.points, line.points[:1]]) if line.cyclic else line.points
+    return Path(points, distance + line.half_width)
+
+
+def _lines(
+    collection: bpy.types.Collection, depsgraph: bpy.types.Depsgraph, setting: str, closed: bool = False
+) -> list[Line]:
+    """Curves of a collection, those that are closed or all of them; there is at least one."""
+    found = [line for obj in objects_within(collection) for line in lines_of(obj, depsgraph)]
+    if not found:
+        raise SceneError(f'The {setting} collection "{collection.name}" has no curves; add one, or clear {setting}')
+    if not closed:
+        return found
+    cyclic = [line for line in found if line.cyclic and len(line.points) > 2]
+    if not cyclic:
+        raise SceneError(
+            f'The {setting} collection "{collection.name}" has no closed curves; close one in Edit Mode with '
+            "Curve > Toggle Cyclic"
+        )
+    return cyclic
+
+
+def _read_mesh(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, group: str, uv_layer: str, with_uv: bool
+) -> tuple[NDArray[np.float64], NDArray[np.float32] | None, NDArray[np.float64] | None, NDArray[np.float64]]:
+    """Triangles in world space, weights and UV at their corners where asked for, and the border."""
+    if obj.type != 'MESH':
+        raise SceneError(f'"{obj.name}" is not a mesh; select a mesh with faces')
+    evaluated = obj.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        if not len(mesh.polygons):
+            raise SceneError(f'"{obj.name}" has no faces; select a mesh with faces')
+        mesh.calc_loop_triangles()
+        vertices = members(mesh.loop_triangles, "vertices", 3, np.int32)
+        matrix = world_matrix(obj, depsgraph)
+        positions = read(mesh, "position").astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+        weight = _weights(evaluated, mesh, group, obj.name)[vertices] if group else None
+        uv = None
+        if with_uv:
+            uv = _uv(mesh, uv_layer, obj.name)[members(mesh.loop_triangles, "loops", 3, np.int32)]
+        ends = read(mesh, ".edge_verts")
+        faces = np.bincount(read(mesh, ".corner_edge"), minlength=len(ends))
+    finally:
+        evaluated.to_mesh_clear()
+    return positions[vertices], weight, uv, positions[ends[faces == 1]]
+
+
+def _weights(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, group: str, name: str) -> NDArray[np.float64]:
+    """Weight of each vertex, (v,)."""
+    attribute = mesh.attributes.get(group)
+    # Geometry nodes turn vertex groups into attributes.
+    if attribute is not None and (attribute.domain, attribute.data_type) == ('POINT', 'FLOAT'):
+        return values_of(attribute).astype(np.float64)
+    found = evaluated.vertex_groups.get(group)
+    if found is None:
+        raise SceneError(f'"{name}" has no vertex group "{group}"; add it, or clear Vertex Group')
+    index = found.index
+    # Weights are lists within lists, which no foreach_get reads.
+    each = (next((g.weight for g in v.groups if g.group == index), 0.0) for v in mesh.vertices)
+    return np.fromiter(each, np.float64, len(mesh.vertices))
+
+
+def _uv(mesh: bpy.types.Mesh, layer: str, name: str) -> NDArray[np.float64]:
+    """UV of each corner, (c, 2)."""
+    if layer and layer not in mesh.uv_layers:
+        raise SceneError(f'"{name}" has no UV map "{layer}"; add it, or clear UV Map')
+    found = mesh.uv_layers[layer] if layer else next((u for u in mesh.uv_layers if u.active_render), None)
+    if found is None:
+        raise SceneError(f'"{name}" has no UV map for the image; unwrap it, or clear Image')
+    return read(mesh, found.name).astype(np.float64)
+
+
+def _luminance(image: bpy.types.Image) -> NDArray[np.float32]:
+    """Grey values of an image, (h, w), the first row at the bottom."""
+    if image.source == 'TILED':
+        raise SceneError(
+            f'The image "{image.name}" has UDIM tiles, which Populate does not support; use a single image'
+        )
+    if not (all(image.size) and image.channels):
+        raise SceneError(
+            f'Cannot load the image "{image.name}" from "{image.filepath}"; find it with '
+            "File > External Data > Find Missing Files, or clear Image"
+        )
+    pixels = image_pixels(image)
+    return pixels[..., :3] @ _LUMINANCE if image.channels >= 3 else pixels[..., 0].copy()

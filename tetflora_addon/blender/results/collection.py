@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Results in the scene: a collection of objects that refinement makes, replaces and clears, and nothing else."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...buffers import MeshBuffers, PointBuffers
+from ...species.species import Species
+from ..materials.nodes import tag
+from .meshes import point_object, write_mesh
+from .output import (
+    KIND,
+    PURPOSE,
+    dress,
+    dress_collection,
+    keep_materials,
+    mark_runtime,
+    parent_of,
+    remove_collection,
+    result_collections,
+)
+
+#: Bytes of a name that Blender 4.5 takes (5.0 takes more), but for those with which it tells the same names apart.
+_LONGEST = 59
+#: Custom property of those that are being made.
+UNFINISHED = "tetflora_unfinished"
+NAMES = {'VIEW': "TetFlora", 'RENDER': "TetFlora render"}
+
+
+class Results:
+    """A result collection under construction.
+
+    It is linked to the scene at once, so that an object reaches the render as soon as it is made; `discard` takes
+    everything back.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    purpose : {'VIEW', 'RENDER'}
+    mark : str
+        Comes after the names of all that is made, where results of several cameras are there at the same time.
+    """
+
+    def __init__(self, scene: bpy.types.Scene, purpose: str, mark: str = "") -> None:
+        self.scene = scene
+        self.purpose = purpose
+        self.mark = f" {mark}" if mark else ""
+        self.collection: bpy.types.Collection | None = None
+
+    def open(self) -> None:
+        """Make the collection and link it to the scene."""
+        self.collection = bpy.data.collections.new(NAMES[self.purpose] + self.mark)
+        self.collection[PURPOSE] = self.purpose
+        self.collection[UNFINISHED] = True
+        tag(self.collection)
+        self.scene.collection.children.link(self.collection)
+
+    def add(
+        self,
+        name: str,
+        kind: str,
+        buffers: MeshBuffers,
+        materials: list[bpy.types.Material],
+        species: Species | None = None,
+    ) -> bpy.types.Object:
+        """Write one mesh as an object of the collection; of one species, or of None."""
+        name = self._name(name)
+        return self._link(bpy.data.objects.new(name, write_mesh(name, buffers, materials)), kind, species)
+
+    def add_points(
+        self,
+        name: str,
+        kind: str,
+        buffers: PointBuffers,
+        materials: list[bpy.types.Material],
+        species: Species | None = None,
+    ) -> bpy.types.Object:
+        """Write one cloud of points, which has one material, as an object of the collection."""
+        return self._link(point_object(self._name(name), buffers, *materials), kind, species)
+
+    def _name(self, name: str) -> str:
+        """A name that ends in a number, with the mark; Blender must not cut it off where names are too long."""
+        if not self.mark:
+            return name
+        stem, _, number = name.rpartition(" ")
+        end = f" {number}{self.mark}"
+        return stem.encode()[: _LONGEST - len(end)].decode(errors="ignore") + end
+
+    def _link(self, made: bpy.types.Object, kind: str, species: Species | None) -> bpy.types.Object:
+        tag(made.data)
+        if species is not None:
+            made.parent = parent_of(self.collection, species.identifier, species.name)
+        made[KIND] = kind
+        made.hide_select = True  # millions of polygons under the cursor; the plants are what is edited
+        tag(made)
+        dress(self.scene, made, "" if species is None else species.identifier)
+        self.collection.objects.link(made)
+        return made
+
+    def finish(self) -> None:
+        """All is made: results of a render are no part of files, those of the artist are what the scene says."""
+        if self.collection is not None:
+            del self.collection[UNFINISHED]
+        if self.collection is not None and self.purpose == 'VIEW':
+            dress_collection(self.scene, self.collection)
+        elif self.collection is not None:
+            mark_runtime(self.collection, True)
+
+    def discard(self) -> None:
+        """Remove all that was made."""
+        if self.collection is not None:
+            remove_collection(self.scene, self.collection)
+            self.collection = None
+
+
+def dress_results(scene: bpy.types.Scene) -> None:
+    """Bring the artist's results of a scene in step with its output settings."""
+    for collection in result_collections(scene, 'VIEW'):
+        dress_collection(scene, collection)
+
+
+def has_results(scene: bpy.types.Scene) -> bool:
+    """Whether the scene holds meshes or proxies that the artist made by Refine."""
+    return bool(result_collections(scene, 'VIEW'))
+
+
+def leave_out_of_file() -> None:
+    """Before a file is written: results that it shall not hold are marked as such, and their materials kept.
+
+    Here and not only when they are made, because undo brings datablocks back without the mark.
+    """
+    for scene in bpy.data.scenes:
+        saved = scene.tetflora.output.save_results
+        for collection in result_collections(scene) if scene.library is None else ():
+            # Of a refinement that goes on, the file has what there was before it.
+            runtime = collection[PURPOSE] == 'RENDER' or not saved or UNFINISHED in collection
+            mark_runtime(collection, runtime)
+            if runtime and collection[PURPOSE] == 'VIEW':
+                keep_materials(collection)

@@ -1,0 +1,192 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The table of proxy forms: one row for each item of the setting Proxies. A new form is a new row.
+
+Transparent bounces of Cycles: a ray passes two faces of each shell, and is black where it runs out of bounces.
+
+Shells with baked light need as many. EEVEE has no bounces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import bpy
+
+from ...emission import forms as emission_forms
+from ...emission.forms import EmissionForm
+from ..materials.materials import baked_material, proxy_material, sphere_material
+from ..materials.shell import baked_shell_material, shell_material
+
+#: The form of new scenes, and of scenes whose own form is not registered.
+DEFAULT = 'AUTOMATIC'
+
+_Material = Callable[[], bpy.types.Material]
+
+
+@dataclass(frozen=True)
+class ProxyForm:
+    """One form of proxies.
+
+    Attributes
+    ----------
+    identifier, label, description, icon : str
+        Of the item in the setting Proxies.
+    number : int
+        Value of the item in saved files: never change it, never use one twice.
+    emission : EmissionForm
+        How buffers are made.
+    material : callable
+        Makes the material of meshes, or returns the one that is there.
+    point_material, baked_material : callable
+        The same for point clouds, and for either where light is baked.
+    sockets : mapping of str to str
+        Properties of ``scene.tetflora`` by the sockets of `material` that follow them; the panel Proxy Shading shows
+        them.
+    bounces : int
+        Transparent bounces that Cycles needs for a ray through many proxies; 0 for opaque ones.
+    """
+
+    identifier: str
+    number: int
+    label: str
+    description: str
+    icon: str
+    emission: EmissionForm
+    material: _Material = proxy_material
+    point_material: _Material = sphere_material
+    baked_material: _Material = baked_material
+    sockets: Mapping[str, str] = field(default_factory=dict)
+    bounces: int = 0
+
+
+_FORMS = {
+    form.identifier: form
+    for form in (
+        ProxyForm(
+            'MICROSURFACES',
+            0,
+            "Microsurfaces",
+            "Small facets with the area, directions and colors of the leaves that they replace",
+            'MESH_GRID',
+            emission_forms.MICROSURFACES,
+        ),
+        ProxyForm(
+            'SHELLS',
+            1,
+            "Shells",
+            "A translucent volume for each tetrahedron, as in the paper. Slower to render; suits haze",
+            'MESH_CONE',
+            emission_forms.SHELLS,
+            material=shell_material,
+            baked_material=baked_shell_material,
+            sockets={
+                "p": "shell_diffuse",
+                "s": "shell_gloss",
+                "spear": "shell_spear",
+                "Roundness": "shell_roundness",
+                "Variation": "shell_variation",
+            },
+            bounces=256,
+        ),
+        ProxyForm(
+            'MICROSPHERES',
+            2,
+            "Microspheres",
+            "A point cloud of opaque spheres of about one pixel, one for each facet. Uses the least memory",
+            'POINTCLOUD_DATA',
+            emission_forms.MICROSPHERES,
+        ),
+        ProxyForm(
+            'AUTOMATIC',
+            3,
+            "Automatic",
+            "Microsurfaces where the camera sees them, which match the plants best; microspheres elsewhere",
+            'SHADERFX',
+            emission_forms.AUTOMATIC,
+        ),
+    )
+}
+
+
+def forms() -> tuple[ProxyForm, ...]:
+    """All registered forms, in the order of the enumeration."""
+    return tuple(_FORMS.values())
+
+
+def form_of(scene: bpy.types.Scene) -> ProxyForm:
+    """The form that a scene asks for; the default one where nobody has registered that."""
+    return _FORMS.get(scene.tetflora.proxy_form, _FORMS[DEFAULT])
+
+
+def form_property() -> object:
+    """The setting Proxies, with an item for each form."""
+    return bpy.props.EnumProperty(
+        name="Proxies",
+        description="What replaces plants that are too small or too hidden for their own polygons",
+        items=[(form.identifier, form.label, form.description, form.icon, form.number) for form in forms()],
+        default=DEFAULT,
+    )
+
+
+def register_form(form: ProxyForm) -> None:
+    """Add a form to the setting Proxies, for scripts and other add-ons.
+
+    Raises
+    ------
+    ValueError
+        Its identifier or number is taken.
+    """
+    taken = [other.label for other in forms() if {other.identifier, other.number} & {form.identifier, form.number}]
+    if taken:
+        raise ValueError(f"{form.label}: the proxy form {taken[0]} has the same identifier or number; choose another")
+    _FORMS[form.identifier] = form
+    _redefine()
+
+
+def unregister_form(identifier: str) -> None:
+    """Remove a form that `register_form` added; scenes that use it fall back to the default form."""
+    del _FORMS[identifier]
+    _redefine()
+
+
+def _redefine() -> None:
+    settings = bpy.types.PropertyGroup.bl_rna_get_subclass_py("TetFloraScene")
+    if settings is not None:  # else the property is going to be defined from the table
+        settings.proxy_form = form_property()
+
+
+#: Fraction of a form's bounces below which the artist is warned.
+FEW = 0.5
+#: Settings of Cycles: where rays end, and up to where none is given up at random. Below that number Cycles follows
+#: rays through what is transparent to their ends; beyond it, light that has become weak goes on by chance, as noise.
+_SETTINGS = ("transparent_max_bounces", "min_transparent_bounces")
+
+
+def raise_bounces(scene: bpy.types.Scene) -> dict[str, int]:
+    """Raise what is too low for a scene's proxies.
+
+    Returns
+    -------
+    dict of str to int
+        Settings of ``scene.cycles`` that were changed, as they were.
+    """
+    cycles, bounces = getattr(scene, "cycles", None), form_of(scene).bounces
+    if scene.tetflora.expand_everything or cycles is None:
+        return {}
+    before = {name: getattr(cycles, name) for name in _SETTINGS if getattr(cycles, name, bounces) < bounces}
+    for name in before:
+        setattr(cycles, name, bounces)
+    return before
+
+
+def few_bounces(scene: bpy.types.Scene) -> str:
+    """A warning if the scene's own bounces are too few for its proxies, else an empty text."""
+    cycles, form = getattr(scene, "cycles", None), form_of(scene)
+    if scene.render.engine != 'CYCLES' or cycles is None or cycles.transparent_max_bounces >= FEW * form.bounces:
+        return ""
+    return (
+        f"Cycles renders {form.label.lower()} black with {cycles.transparent_max_bounces} transparent bounces; "
+        f"raise Render > Light Paths > Max Bounces > Transparent to {form.bounces}"
+    )

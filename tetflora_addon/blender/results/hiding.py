@@ -1,0 +1,216 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Objects that results replace: hidden while there are results, and shown again as they were.
+
+How visible they were is stored with them in custom properties, so that it outlives a file, a rename, and results that
+somebody deleted by hand; whatever removes results gives it back. An object may be hidden for several scenes: it is
+shown when the last of them has no results any more.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import bpy
+
+from ..materials.nodes import is_own, untag
+from .output import KIND, PARENT, PURPOSE, mark_runtime, remove_collection, result_collections
+
+#: Custom properties of objects that results stand for, as JSON: hide_render and hide_viewport as they were before
+#: ("flags"), and the names of the scenes whose results they are ("scenes"). Results of a render come last and go first.
+HIDDEN = {'VIEW': "tetflora_hidden", 'RENDER': "tetflora_hidden_for_render"}
+#: Custom property of scenes in files: marks of library overrides, which Blender does not store with them.
+OVERRIDES = "tetflora_hidden_overrides"
+
+
+def hide_originals(scene: bpy.types.Scene, purpose: str, originals: Sequence[bpy.types.Object]) -> None:
+    """Hide objects whose place results take, in viewports too unless they are made for a render alone."""
+    for original in originals:
+        # Hidden for another scene already: how it looks now is not how the artist left it.
+        flags, scenes = _marker(original, purpose) or ([original.hide_render, original.hide_viewport], [])
+        if scene.name in scenes and original.hide_render:
+            continue  # writing the same again would make Blender evaluate it again
+        _mark(original, purpose, flags, sorted({*scenes, scene.name}))
+        original.hide_render = True
+        original.hide_viewport = original.hide_viewport or purpose == 'VIEW'
+
+
+def remove_results(
+    scene: bpy.types.Scene, purpose: str | None = None, keep: Sequence[bpy.types.Collection] = ()
+) -> int:
+    """Remove result collections with what was made for them; returns the number of datablocks removed.
+
+    What was hidden for their sake is shown again as it was.
+    """
+    for which in ('RENDER', 'VIEW'):
+        if purpose in {None, which}:
+            show_originals(scene, which)
+    return sum(remove_collection(scene, c) for c in result_collections(scene, purpose) if c not in keep)
+
+
+def hidden_originals(scene: bpy.types.Scene, purpose: str | None = None) -> list[bpy.types.Object]:
+    """Objects that Clear would show, or release, in a scene: hidden for its results, or for results that are no more.
+
+    Wherever they are: somebody may have unlinked them from the scene meanwhile.
+    """
+    purposes = HIDDEN if purpose is None else [purpose]
+    return [o for which in purposes for o in _marked(which) if _concerns(scene, o, which)]
+
+
+def show_originals(scene: bpy.types.Scene, purpose: str) -> None:
+    """Show what is hidden for a scene's results of one purpose as it was."""
+    for original in hidden_originals(scene, purpose):
+        flags, _ = _marker(original, purpose)
+        others = _others(scene, original, purpose)
+        if others:
+            _mark(original, purpose, flags, others)
+        else:
+            _show(original, purpose)
+
+
+def _show(original: bpy.types.Object, purpose: str) -> None:
+    original.hide_render, original.hide_viewport = _marker(original, purpose)[0]
+    del original[HIDDEN[purpose]]
+
+
+def _marked(purpose: str) -> list[bpy.types.Object]:
+    """Objects of this file that are hidden; a library's own marks are the business of its file."""
+    return [o for o in bpy.data.objects if HIDDEN[purpose] in o and o.library is None]
+
+
+def _marker(original: bpy.types.Object, purpose: str) -> tuple[list[bool], list[str]] | None:
+    """Flags before it was hidden, and names of scenes; None if it is not hidden."""
+    stored = original.get(HIDDEN[purpose])
+    if stored is None:
+        return None
+    marker = json.loads(stored)
+    return marker["flags"], marker["scenes"]
+
+
+def _mark(original: bpy.types.Object, purpose: str, flags: list[bool], scenes: list[str]) -> None:
+    original[HIDDEN[purpose]] = json.dumps({"flags": flags, "scenes": scenes})
+
+
+def _concerns(scene: bpy.types.Scene, original: bpy.types.Object, purpose: str) -> bool:
+    return scene.name in _marker(original, purpose)[1] or not _others(scene, original, purpose)
+
+
+def _others(scene: bpy.types.Scene, original: bpy.types.Object, purpose: str) -> list[str]:
+    """Names of other scenes with results in the place of an object."""
+    names = _marker(original, purpose)[1]
+    renamed = any(name not in bpy.data.scenes for name in names)
+    return [
+        other.name
+        for other in bpy.data.scenes
+        if other != scene
+        and result_collections(other, purpose)
+        and (other.name in names or (renamed and other.objects.get(original.name) == original))
+    ]
+
+
+def keep_results(scene: bpy.types.Scene) -> int:
+    """Make the artist's results of a scene the artist's own; of how many objects.
+
+    Explicit objects in whose place they are stay hidden.
+    """
+    for original in _marked('VIEW'):
+        if _concerns(scene, original, 'VIEW') and not _others(scene, original, 'VIEW'):
+            del original[HIDDEN['VIEW']]
+    kept = 0
+    for collection in result_collections(scene, 'VIEW'):
+        mark_runtime(collection, False)
+        for obj in collection.objects:
+            if is_own(obj):
+                kept += obj.get(KIND) != PARENT
+                obj.hide_select = False
+                for datablock in (obj, obj.data):
+                    if datablock is not None:
+                        untag(datablock)
+        del collection[PURPOSE]
+        untag(collection)
+        collection.name = "TetFlora kept"
+    return kept
+
+
+def lift_marks() -> dict[tuple[str, str], str]:
+    """Show everything that is hidden for results that files do not hold: of renders, and of the artist unless asked.
+
+    Returns
+    -------
+    dict
+        The marks by purpose and name of the object, for `restore_marks`.
+    """
+    saving = {scene.name for scene in bpy.data.scenes if scene.tetflora.output.save_results}
+    lifted = {}
+    for purpose in ('RENDER', 'VIEW'):
+        for original in _marked(purpose):
+            if purpose == 'RENDER' or not saving.intersection(_marker(original, purpose)[1]):
+                lifted[purpose, original.name] = original[HIDDEN[purpose]]
+                _show(original, purpose)
+    return lifted
+
+
+def restore_marks(lifted: dict[tuple[str, str], str]) -> None:
+    """Hide again what `lift_marks` showed."""
+    for (purpose, name), mark in reversed(lifted.items()):
+        original = bpy.data.objects.get((name, None))
+        if original is not None:
+            original[HIDDEN[purpose]] = mark
+            original.hide_render = True
+            original.hide_viewport = original.hide_viewport or purpose == 'VIEW'
+
+
+def show_left_over() -> None:
+    """Show what is hidden for results that are not there: a file was read, which does not hold them."""
+    for original in _marked('RENDER'):
+        _show(original, 'RENDER')
+    for original in _marked('VIEW'):
+        names = _marker(original, 'VIEW')[1]
+        homes = [s for s in bpy.data.scenes if s.name in names or s.objects.get(original.name) == original]
+        if not any(result_collections(scene, 'VIEW') for scene in homes):
+            _show(original, 'VIEW')
+
+
+def pack_override_marks() -> None:
+    """Put marks of library overrides where a file keeps them: of overrides Blender stores flags, but no new property.
+
+    While a file is written and no longer: what a scene refers to by a property could not be deleted.
+    """
+    packed = [{"object": o, "mark": o[HIDDEN['VIEW']]} for o in _marked('VIEW') if o.override_library is not None]
+    home = next((scene for scene in bpy.data.scenes if scene.library is None), None)
+    if packed and home is not None:
+        home[OVERRIDES] = packed
+
+
+def unpack_override_marks() -> None:
+    """Give library overrides back what `pack_override_marks` kept."""
+    for scene in bpy.data.scenes:
+        if scene.library is not None or OVERRIDES not in scene:
+            continue
+        for entry in scene[OVERRIDES]:
+            original = entry["object"]
+            if original is not None and original.library is None:
+                original[HIDDEN['VIEW']] = entry["mark"]
+        del scene[OVERRIDES]
+
+
+@contextmanager
+def originals_shown(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> Iterator[None]:
+    """While the scene is read, objects that results hide, be it those of another scene, are as the artist left them.
+
+    None for the dependency graph will do where nothing that is evaluated is read.
+    """
+    marked = {purpose: _marked(purpose) for purpose in ('RENDER', 'VIEW')}
+    before = {o: (o.hide_render, o.hide_viewport) for every in marked.values() for o in every}
+    for purpose, every in marked.items():
+        for o in every:
+            o.hide_render, o.hide_viewport = _marker(o, purpose)[0]
+    try:
+        if before and depsgraph is not None:
+            depsgraph.update()
+        yield
+    finally:
+        for o, flags in before.items():
+            o.hide_render, o.hide_viewport = flags

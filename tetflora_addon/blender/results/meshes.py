@@ -1,0 +1,248 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arrays in and out of Blender meshes, at the speed of a copy.
+
+Buffers of points as objects that are drawn as spheres: point clouds, or vertices that nodes make one of.
+
+Versions of Blender whose point clouds cannot be given a size get a mesh of vertices and a group of geometry nodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...buffers import MeshBuffers, PointBuffers
+from ..attributes import face_offsets, members, type_for, write
+from ..compat import can_resize_point_clouds
+from ..materials.nodes import Graph, get_or_create
+
+UV_MAP = "UVMap"
+
+_DOMAINS = ("POINT", "FACE", "CORNER")
+
+
+def write_mesh(name: str, buffers: MeshBuffers, materials: Sequence[bpy.types.Material | None] = ()) -> bpy.types.Mesh:
+    """Make a mesh datablock from buffers.
+
+    Topology is copied as it comes, edges included, so nothing has to be worked out by Blender. Positions and indices
+    go through the mesh's attributes, which are plain memory; the older ``vertices`` and ``loops`` collections are
+    many times slower.
+
+    Parameters
+    ----------
+    name : str
+        Name of the new datablock; Blender appends a number where it is taken.
+    buffers : MeshBuffers
+        The mesh, see ``docs/architecture.md``. ``UVMap`` becomes the UV map; an INT attribute ``material_index`` on
+        ``'FACE'`` chooses among `materials`.
+    materials : sequence of bpy.types.Material or None
+        Material slots in their order.
+
+    Returns
+    -------
+    bpy.types.Mesh
+        Not linked to any object.
+
+    Raises
+    ------
+    ValueError
+        Arrays of wrong shape or type, or indices out of range; no datablock is left behind. Checked here because
+        Blender takes whatever it is given and crashes later.
+    """
+    check_buffers(buffers)
+    mesh = bpy.data.meshes.new(name)
+    try:
+        _fill(mesh, buffers)
+    except BaseException:
+        bpy.data.meshes.remove(mesh)
+        raise
+    for material in materials:
+        mesh.materials.append(material)
+    return mesh
+
+
+def _fill(mesh: bpy.types.Mesh, buffers: MeshBuffers) -> None:
+    mesh.vertices.add(len(buffers.positions))
+    mesh.edges.add(len(buffers.edge_verts))
+    mesh.loops.add(len(buffers.corner_verts))
+    mesh.polygons.add(buffers.polygons)
+    write(mesh, "position", buffers.positions)
+    write(mesh, ".edge_verts", buffers.edge_verts)
+    write(mesh, ".corner_vert", buffers.corner_verts)
+    write(mesh, ".corner_edge", buffers.corner_edges)
+    # Offsets are no attribute, but setting the starts of faces writes the very same array.
+    mesh.polygons.foreach_set("loop_start", np.ascontiguousarray(buffers.face_offsets[:-1]))
+    for key, (domain, values) in buffers.attributes.items():
+        if key == UV_MAP:
+            mesh.uv_layers.new(name=UV_MAP, do_init=False)
+        write(mesh, key, values, domain)
+    if not buffers.smooth and buffers.polygons:
+        # Smooth is what a mesh without this layer is; `shade_flat` does the same far more slowly.
+        write(mesh, "sharp_face", np.ones(buffers.polygons, bool), "FACE")
+    mesh.update()
+
+
+def check_buffers(buffers: MeshBuffers) -> None:
+    """Raise ValueError unless Blender can take the buffers as they are.
+
+    Parameters
+    ----------
+    buffers : MeshBuffers
+        What to look at: shapes, types, ranges of indices, sizes of faces and of attributes.
+    """
+    corners, faces, vertices = len(buffers.corner_verts), buffers.polygons, len(buffers.positions)
+    for key, shape, dtype in (
+        ("positions", (vertices, 3), np.float32),
+        ("edge_verts", (len(buffers.edge_verts), 2), np.int32),
+        ("corner_verts", (corners,), np.int32),
+        ("corner_edges", (corners,), np.int32),
+        ("face_offsets", (faces + 1,), np.int32),
+    ):
+        array = getattr(buffers, key)
+        if array.shape != shape or array.dtype != dtype:
+            raise ValueError(
+                f"{key} must be {np.dtype(dtype)} of shape {shape}, not {array.dtype} of shape {array.shape}"
+            )
+    offsets = buffers.face_offsets
+    if faces < 0 or offsets[0] != 0 or offsets[-1] != corners or (faces and np.diff(offsets).min() < 3):
+        raise ValueError(f"face_offsets must rise from 0 to {corners} corners in steps of at least 3")
+    _check_range("edge_verts", buffers.edge_verts, vertices)
+    _check_range("corner_verts", buffers.corner_verts, vertices)
+    _check_range("corner_edges", buffers.corner_edges, len(buffers.edge_verts))
+    sizes = {"POINT": vertices, "FACE": faces, "CORNER": corners}
+    for key, (domain, values) in buffers.attributes.items():
+        if domain not in _DOMAINS:
+            raise ValueError(f"Attribute {key}: domain must be one of {', '.join(_DOMAINS)}, not {domain!r}")
+        if type_for(values) is None:
+            raise ValueError(
+                f"Attribute {key}: Blender has no attribute type for {values.dtype} of shape {values.shape}"
+            )
+        if len(values) != sizes[domain]:
+            raise ValueError(f"Attribute {key}: has {len(values)} values, but {domain} has {sizes[domain]} elements")
+        if key == UV_MAP and (domain != "CORNER" or values.shape[1:] != (2,)):
+            raise ValueError(f"Attribute {UV_MAP} must be float32 of shape (corners, 2) on CORNER")
+
+
+def _check_range(key: str, indices: NDArray, count: int) -> None:
+    if indices.size and (indices.min() < 0 or indices.max() >= count):
+        raise ValueError(f"{key} must lie between 0 and {count - 1}, not {indices.min()} to {indices.max()}")
+
+
+def read_mesh_arrays(mesh: bpy.types.Mesh) -> MeshBuffers:
+    """Copy a mesh into buffers: the geometry, the active UV map and the indices of materials if there are any.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+        Any mesh, of an object or evaluated. In edit mode it holds what was there when the mode was entered; call
+        ``obj.update_from_editmode()`` first. Positions stay in the mesh's own space.
+
+    Returns
+    -------
+    MeshBuffers
+        Arrays of the caller's own; ``attributes`` may have ``UVMap`` and ``material_index``; ``smooth`` if any face is.
+    """
+    positions = members(mesh.vertices, "co", 3)
+    edges = members(mesh.edges, "vertices", 2, np.int32)
+    corner_verts = members(mesh.loops, "vertex_index", dtype=np.int32)
+    corner_edges = members(mesh.loops, "edge_index", dtype=np.int32)
+    smooth = members(mesh.polygons, "use_smooth", dtype=bool)
+    attributes = {}
+    layer = mesh.uv_layers.active
+    if layer is not None and len(mesh.loops):
+        attributes[UV_MAP] = ("CORNER", members(layer.uv, "vector", 2))
+    if "material_index" in mesh.attributes:
+        attributes["material_index"] = ("FACE", members(mesh.polygons, "material_index", dtype=np.int32))
+    return MeshBuffers(positions, edges, corner_verts, corner_edges, face_offsets(mesh), attributes, bool(smooth.any()))
+
+
+SPHERES = "TetFlora Spheres"
+_SPHERES_VERSION = 1
+
+
+def point_object(
+    name: str,
+    buffers: PointBuffers,
+    material: bpy.types.Material,
+    by_nodes: bool | None = None,
+) -> bpy.types.Object:
+    """Make an object of points, not linked to any collection.
+
+    Parameters
+    ----------
+    name : str
+        Name of the new datablocks; Blender appends a number where it is taken.
+    buffers : PointBuffers
+    material : bpy.types.Material
+        Of all points.
+    by_nodes : bool, optional
+        Vertices with nodes, or a point cloud; by default what this Blender can do best.
+
+    Returns
+    -------
+    bpy.types.Object
+        Its data is a point cloud, or a mesh that a modifier makes one of.
+
+    Raises
+    ------
+    ValueError
+        Arrays of wrong shape or type; no datablock is left behind.
+    """
+    vertices = _as_vertices(buffers)
+    by_nodes = not can_resize_point_clouds() if by_nodes is None else by_nodes
+    if by_nodes:
+        data = write_mesh(name, vertices, [material])
+    else:
+        data = _write_cloud(name, vertices)
+        data.materials.append(material)
+    made = bpy.data.objects.new(name, data)
+    if by_nodes:
+        made.modifiers.new("Spheres", 'NODES').node_group = spheres_group(material)
+    return made
+
+
+def _as_vertices(buffers: PointBuffers) -> MeshBuffers:
+    """Points as a mesh without edges and faces, its attributes on the vertices."""
+    none = np.zeros(0, np.int32)
+    values = {"radius": buffers.radius, **buffers.attributes}
+    attributes = {name: ("POINT", array) for name, array in values.items()}
+    return MeshBuffers(buffers.positions, none.reshape(0, 2), none, none, np.zeros(1, np.int32), attributes)
+
+
+def _write_cloud(name: str, vertices: MeshBuffers) -> bpy.types.PointCloud:
+    check_buffers(vertices)
+    cloud = bpy.data.pointclouds.new(name)
+    cloud.resize(len(vertices.positions))
+    write(cloud, "position", vertices.positions)
+    for key, (_, values) in vertices.attributes.items():
+        write(cloud, key, values)
+    cloud.update_tag()
+    return cloud
+
+
+def spheres_group(material: bpy.types.Material) -> bpy.types.NodeTree:
+    """The group "TetFlora Spheres" of geometry nodes: vertices become points of the radius that they carry."""
+
+    def build(tree: bpy.types.NodeTree) -> None:
+        for in_out in ('INPUT', 'OUTPUT'):
+            tree.interface.new_socket(name="Geometry", in_out=in_out, socket_type="NodeSocketGeometry")
+        graph = Graph(tree)
+        given = graph.node("NodeGroupInput").outputs["Geometry"]
+        named = graph.node("GeometryNodeInputNamedAttribute", {"Name": "radius"}, data_type='FLOAT')
+        points = graph.node("GeometryNodeMeshToPoints", {"Mesh": given, "Radius": named}, mode='VERTICES')
+        # Points that are made of vertices take no material over.
+        graph.node("NodeGroupOutput", {"Geometry": graph.node("GeometryNodeSetMaterial", {"Geometry": points})})
+        graph.arrange()
+
+    def new(name: str) -> bpy.types.NodeTree:
+        return bpy.data.node_groups.new(name, "GeometryNodeTree")
+
+    group = get_or_create(bpy.data.node_groups, SPHERES, _SPHERES_VERSION, new, build)
+    for node in group.nodes:
+        if node.bl_idname == "GeometryNodeSetMaterial":
+            node.inputs["Material"].default_value = material
+    return group

@@ -1,0 +1,203 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Result objects dressed as the scene's output settings ask: visibility, indices, groups, parents for Cryptomatte.
+
+All objects of a species have one parent, an empty with the species' name: what renderers call the asset in
+Cryptomatte's third layer. Results of a render and those of the artist share it, so that its name, and with it the
+matte, is the same in both.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from ..materials.nodes import is_ours, is_own, tag
+
+#: Custom property of a result object: 'leaf', 'blossom', 'bark', 'explicit' or 'proxy', or the parent of a species.
+KIND = "tetflora_kind"
+#: Custom properties of result objects: the identifier of their species, and the name of the material that they got.
+SPECIES = "tetflora_species"
+MATERIAL = "tetflora_material"
+PARENT = "species"
+#: Custom property of a result collection: 'VIEW' for what the artist keeps, 'RENDER' for what lives while rendering.
+PURPOSE = "tetflora_purpose"
+_KEPT = "tetflora_kept"  # on materials that a file keeps for the results that it does not hold
+#: Kinds of which a species' materials can be replaced.
+REPLACED = ("leaf", "blossom", "bark")
+
+#: Switches by what Blender calls them after ``visible_``: what artists read about them.
+SWITCHES = {
+    "camera": {
+        "name": "Camera",
+        "description": "Visible to camera rays. Otherwise plants only cast shadows and appear in reflections",
+        "default": True,
+    },
+    "diffuse": {
+        "name": "Diffuse",
+        "description": "Visible to diffuse rays, which light matte surfaces",
+        "default": True,
+    },
+    "glossy": {"name": "Glossy", "description": "Visible to glossy rays, as in reflections", "default": True},
+    "transmission": {
+        "name": "Transmission",
+        "description": "Visible to transmission rays, as through glass",
+        "default": True,
+    },
+    "volume_scatter": {
+        "name": "Volume Scatter",
+        "description": "Visible to volume scatter rays, which light fog and clouds",
+        "default": True,
+    },
+    "shadow": {"name": "Shadow", "description": "Plants cast shadows", "default": True},
+}
+
+
+def entry_of(scene: bpy.types.Scene, identifier: str) -> Any | None:
+    """What a scene has to say about a species' output; None if nothing."""
+    return next((entry for entry in scene.tetflora.output.species if entry.species == identifier), None)
+
+
+def replaced_material(scene: bpy.types.Scene, identifier: str, kind: str) -> bpy.types.Material | None:
+    """The artist's material for ``'leaf'``, ``'blossom'`` or ``'bark'`` of a species, if there is one."""
+    entry = entry_of(scene, identifier)
+    return getattr(entry, kind) if entry is not None and kind in REPLACED else None
+
+
+def dress(scene: bpy.types.Scene, made: bpy.types.Object, identifier: str) -> None:
+    """Give a result object what the scene's output settings say; ``identifier`` is empty where species are mixed."""
+    output, entry = scene.tetflora.output, entry_of(scene, identifier)
+    for name in SWITCHES:
+        setattr(made, f"visible_{name}", getattr(output, name))
+    made.pass_index = output.pass_index if entry is None else entry.pass_index
+    made.lightgroup = (entry.light_group if entry is not None else "") or output.light_group
+    made[SPECIES] = identifier
+    first = made.material_slots[0].material if made.material_slots else None
+    made[MATERIAL] = first.name if first is not None else ""
+
+
+def parent_of(collection: bpy.types.Collection, identifier: str, name: str) -> bpy.types.Object:
+    """The parent of a species' results, in a result collection; one for all of the file."""
+    # Of all objects of the file only once for a collection: there may be hundreds of thousands.
+    for objects in (collection.objects, bpy.data.objects):
+        found = next((o for o in objects if o.get(KIND) == PARENT and o.get(SPECIES) == identifier and is_own(o)), None)
+        if found is not None:
+            break
+    else:
+        found = bpy.data.objects.new(f"{name} (TetFlora)", None)
+        found.empty_display_size = 0.0
+        found.hide_select = True
+        found[KIND], found[SPECIES] = PARENT, identifier
+        tag(found)
+    if found.name not in collection.objects:
+        collection.objects.link(found)
+    return found
+
+
+def dress_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
+    """Bring a collection of results in step with the output settings: shown or not, in files or not, and how."""
+    output = scene.tetflora.output
+    collection.hide_viewport, collection.hide_render = not output.show_viewport, not output.show_render
+    mark_runtime(collection, not output.save_results)
+    for obj in collection.objects:
+        if is_own(obj) and obj.get(KIND) != PARENT:
+            dress(scene, obj, obj.get(SPECIES, ""))
+
+
+def mark_runtime(collection: bpy.types.Collection, runtime: bool) -> None:
+    """Say of a result collection and all it holds whether Blender leaves it out of files.
+
+    What another collection holds too, and meshes with other users, are that one's business.
+    """
+    collection.is_runtime_data = runtime
+    for obj in collection.objects:
+        if is_own(obj) and (len(obj.users_collection) == 1 or not runtime):
+            obj.is_runtime_data = runtime
+            if obj.data is not None and is_own(obj.data):
+                obj.data.is_runtime_data = runtime
+
+
+def adopt_materials(scene: bpy.types.Scene, collection: bpy.types.Collection) -> list[str]:
+    """Keep materials that the artist put on results in place of TetFlora's; of which species' parts, for a report."""
+    adopted = []
+    for obj in collection.objects:
+        part, identifier = obj.get(KIND), obj.get(SPECIES, "")
+        if part not in REPLACED or not identifier or not obj.material_slots:
+            continue
+        given = obj.material_slots[0].material
+        if given is None or given.name == obj.get(MATERIAL) or is_ours(given):
+            continue
+        entry = entry_of(scene, identifier)
+        if entry is None:
+            entry = scene.tetflora.output.species.add()
+            entry.species, entry.pass_index = identifier, scene.tetflora.output.pass_index
+        if getattr(entry, part) != given:
+            setattr(entry, part, given)
+            adopted.append(f"{identifier} {part}")
+    return adopted
+
+
+def keep_materials(collection: bpy.types.Collection) -> None:
+    """Let a file hold the materials of results that it does not hold: somebody may have edited them."""
+    for obj in collection.objects:
+        for material in obj.data.materials if obj.data is not None else ():
+            if material is not None and is_own(material) and not material.use_fake_user:
+                material.use_fake_user, material[_KEPT] = True, True
+
+
+def release_materials() -> None:
+    """Take back what `keep_materials` did: from here on results use them, or nobody does."""
+    for material in bpy.data.materials:
+        if material.library is None and material.get(_KEPT):
+            material.use_fake_user = False
+            del material[_KEPT]
+
+
+def result_collections(scene: bpy.types.Scene, purpose: str | None = None) -> list[bpy.types.Collection]:
+    """Result collections of a scene, of one purpose or of all; those that are linked from other files are none."""
+    made = [c for c in scene.collection.children if is_own(c) and PURPOSE in c]
+    return [c for c in made if purpose is None or c[PURPOSE] == purpose]
+
+
+def remove_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) -> int:
+    """Remove results, be they linked to the scene or not; returns the number of datablocks removed."""
+    data, objects, groups = [], [], set()
+    for held in list(collection.objects):
+        if is_own(held) and held.get(KIND) == PARENT and len(held.users_collection) > 1:
+            continue  # other results have it too
+        if is_own(held):
+            objects.append(held)
+            if held.data is not None and is_own(held.data):
+                data.append(held.data)
+            groups |= {m.node_group for m in held.modifiers if m.type == 'NODES' and m.node_group is not None}
+        elif held.name not in scene.collection.objects:
+            scene.collection.objects.link(held)  # the artist put it here; it stays in the scene
+    for child in list(collection.children):
+        if child.name not in scene.collection.children:
+            scene.collection.children.link(child)
+    materials = {m for d in data for m in d.materials if m is not None and is_own(m)}
+    removed = [*objects, *(d for d in data if d.users <= 1), collection]
+    bpy.data.batch_remove(removed)
+    return len(removed) + _remove_unused(materials, groups)
+
+
+def _remove_unused(materials: set[bpy.types.Material], groups: set[bpy.types.NodeTree]) -> int:
+    """Remove groups and materials of ours that nothing uses any more, and the node groups of these."""
+    removed = _remove_groups(groups)  # first: groups of geometry nodes use materials
+    unused = [m for m in materials if m.users == 0]
+    groups = {n.node_tree for m in unused for n in m.node_tree.nodes if n.type == 'GROUP' and n.node_tree is not None}
+    bpy.data.batch_remove(unused)
+    return removed + len(unused) + _remove_groups(groups)
+
+
+def _remove_groups(groups: set[bpy.types.NodeTree]) -> int:
+    removed = 0
+    while True:
+        empty = [g for g in groups if g.users == 0 and is_own(g)]
+        if not empty:
+            return removed
+        inner = {n.node_tree for g in empty for n in g.nodes if n.type == 'GROUP' and n.node_tree is not None}
+        groups = (groups - set(empty)) | inner
+        bpy.data.batch_remove(empty)
+        removed += len(empty)

@@ -1,0 +1,222 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Objects of the artist's own that take part in refinement (``tetflora.is_explicit``): trees from elsewhere, rocks.
+
+All that has a surface counts, as it is evaluated, modifiers included. A marked object that collections or nodes
+instance takes part with every instance, and so does all else that such an instancer shows, because an instancer can
+only be hidden as a whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SceneError
+from ...refinement.mesh_features import mesh_features
+from ...refinement.polygons import Meshes, Surface
+from ..attributes import face_offsets, members, read, values_of, world_matrix
+from ..materials.means import Looks
+from ..materials.nodes import is_ours
+from .objects import may_instance, renderable_objects
+
+#: What `is_explicit` looks like to the artist.
+PROPERTY = {
+    "name": "Refine This Mesh",
+    "description": (
+        "Refine the object's own polygons with the plants: kept where they are near, drawn as proxies where they are "
+        "far or hidden. Use it for trees from other sources, rocks and scans, and for objects that instance them"
+    ),
+    "options": set(),
+}
+SURFACE_TYPES = {'MESH', 'CURVE', 'SURFACE', 'FONT', 'META', 'CURVES'}
+#: Light that goes through sheets whose material does not tell.
+_SHEET_TRANSMISSION = 0.3
+_TYPES = {'FLOAT', 'FLOAT2', 'FLOAT_VECTOR', 'FLOAT_COLOR', 'BYTE_COLOR'}
+_OWN = {"position", "custom_normal"}
+
+
+@dataclass(frozen=True)
+class Explicit:
+    """Explicit polygons of a scene.
+
+    Attributes
+    ----------
+    meshes : Meshes
+    materials : list of list of bpy.types.Material or None
+        Slots of each surface.
+    originals : list of bpy.types.Object
+        Whose place the refined polygons take.
+    """
+
+    meshes: Meshes
+    materials: list[list[bpy.types.Material | None]]
+    originals: list[bpy.types.Object]
+
+
+def read_explicit(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Explicit | None:
+    """Polygons of all marked objects of a view layer that render, and of their instances; None where there are none.
+
+    Raises
+    ------
+    SceneError
+        A marked object without faces, or with numbers that are none, or one that is linked and cannot be hidden; the
+        message names it.
+    """
+    if not any(o.tetflora.is_explicit for o in bpy.data.objects):
+        return None
+    rendered = set(renderable_objects(view_layer))
+    marked = {o for o in rendered if o.tetflora.is_explicit}
+    wanted = marked | _instancers_of_marked(rendered, depsgraph)
+    if not wanted:
+        return None
+    reader, found = _Reader(), set()
+    for instance in depsgraph.object_instances:
+        owner = instance.parent.original if instance.is_instance else instance.object.original
+        if owner not in wanted or not instance.show_self or instance.object.type not in SURFACE_TYPES:
+            continue
+        if instance.is_instance and _unseen(instance):
+            continue
+        if reader.add(instance.object, np.array(instance.matrix_world, dtype=np.float64)):
+            found.add(owner)
+    # Objects that are switched off in viewports but render are not evaluated: they come without modifiers.
+    for obj in sorted(marked - found, key=lambda o: o.name_full):
+        unseen = obj.type in SURFACE_TYPES and not obj.evaluated_get(depsgraph).is_evaluated
+        if unseen and reader.add(obj, world_matrix(obj, depsgraph)):
+            found.add(obj)
+        else:
+            raise SceneError(
+                f'"{obj.name}" has no faces to refine; add faces, or turn off Refine This Mesh in the TetFlora '
+                "tab of the sidebar"
+            )
+    for obj in sorted(found, key=lambda o: o.name_full):
+        if obj.library is not None:
+            raise SceneError(
+                f'"{obj.name}" is linked, so it cannot be hidden while results replace it; choose '
+                "Object > Relations > Make Local, or Object > Library Override > Make"
+            )
+    try:
+        meshes = Meshes(reader.surfaces, np.array(reader.surface), np.array(reader.matrices))
+    except ValueError as error:
+        raise SceneError(str(error)) from error
+    return Explicit(meshes, reader.materials, sorted(found, key=lambda o: o.name_full))
+
+
+def _instancers_of_marked(rendered: set[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> set[bpy.types.Object]:
+    """Objects that show instances of marked ones."""
+    if not any(may_instance(o) or len(o.particle_systems) for o in rendered):
+        return set()
+    return {
+        instance.parent.original
+        for instance in depsgraph.object_instances
+        if instance.is_instance
+        and instance.object.original.tetflora.is_explicit
+        and not _unseen(instance)
+        and instance.parent.original in rendered
+    }
+
+
+def _unseen(instance: bpy.types.DepsgraphObjectInstance) -> bool:
+    """Whether an instance does not render: collections leave out what is hidden in renders, nodes do not."""
+    return instance.object.original.hide_render and instance.parent.original.instance_type == 'COLLECTION'
+
+
+class _Reader:
+    """Collects surfaces, each mesh with its materials once, and instances of them."""
+
+    def __init__(self) -> None:
+        self.surfaces: list[Surface] = []
+        self.materials: list[list[bpy.types.Material | None]] = []
+        self.surface: list[int] = []
+        self.matrices: list[NDArray[np.float64]] = []
+        self._known: dict[tuple, int | None] = {}
+        self._looks = Looks()
+
+    def add(self, obj: bpy.types.Object, matrix: NDArray[np.float64]) -> bool:
+        """Take an evaluated object, or an original that is not evaluated; False if it has no faces."""
+        own = tuple(slot.material.name_full for slot in obj.material_slots if slot.link == 'OBJECT' and slot.material)
+        key = obj.data.as_pointer(), obj.type, own, obj.original.as_pointer() if obj.type != 'MESH' else 0
+        if key not in self._known:
+            self._known[key] = self._read(obj)
+        number = self._known[key]
+        if number is None or is_ours(obj.original):
+            return False
+        self.surface.append(number)
+        self.matrices.append(matrix)
+        return True
+
+    def _read(self, obj: bpy.types.Object) -> int | None:
+        mesh = obj.to_mesh()
+        try:
+            if mesh is None or not len(mesh.polygons):
+                return None
+            materials = [m.original if m is not None else None for m in mesh.materials] or [None]
+            for i, slot in enumerate(obj.material_slots):
+                if slot.link == 'OBJECT' and i < len(materials):
+                    materials[i] = slot.material.original if slot.material else None
+            self.surfaces.append(_surface(obj.original.name, mesh, materials, self._looks))
+        finally:
+            obj.to_mesh_clear()
+        self.materials.append(materials)
+        return len(self.surfaces) - 1
+
+
+def _surface(name: str, mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None], looks: Looks) -> Surface:
+    mesh.calc_loop_triangles()
+    positions = read(mesh, "position").astype(np.float64)
+    if not np.isfinite(positions).all():
+        raise SceneError(f'"{name}" has vertices that are not finite numbers; delete them')
+    corner_verts, offsets = read(mesh, ".corner_vert"), face_offsets(mesh)
+    triangles = members(mesh.loop_triangles, "loops", 3, np.int32)
+    slot = np.clip(members(mesh.polygons, "material_index", dtype=np.int32), 0, len(materials) - 1)
+    attributes = dict(_attributes(mesh, corner_verts, np.diff(offsets)))
+    solid, leaf, width = mesh_features(positions, corner_verts, offsets)
+    seen = [looks.of(material, attributes) for material in materials]
+    transmission = np.array([look.transmission for look in seen], np.float64)
+    # Materials that do not tell: light goes through what is more sheet than solid.
+    sheets = np.bincount(slot, ~solid, len(seen)) * 2 > np.bincount(slot, minlength=len(seen))
+    transmission = np.where(np.isnan(transmission), np.where(sheets, _SHEET_TRANSMISSION, 0.0), transmission)
+    normals = None
+    sharp = mesh.attributes.get("sharp_face")
+    if sharp is None or not values_of(sharp).all():
+        normals = members(mesh.corner_normals, "vector", 3)
+    return Surface(
+        name=name,
+        positions=positions,
+        corner_verts=corner_verts,
+        face_offsets=offsets,
+        triangles=triangles,
+        material=slot,
+        colours=np.array([look.colour for look in seen], np.float64),
+        transmission=transmission,
+        coverage=np.array([look.coverage for look in seen], np.float64),
+        solid=solid,
+        leaf=leaf,
+        width=width,
+        attributes=attributes,
+        normals=normals,
+    )
+
+
+def _attributes(
+    mesh: bpy.types.Mesh, corner_verts: NDArray[np.int32], sizes: NDArray[np.int32]
+) -> Iterator[tuple[str, NDArray[np.float32]]]:
+    """Attributes of floating point numbers at corners (c, k), the UV map that renders first."""
+    layers = mesh.uv_layers
+    first = next((layer.name for layer in layers if layer.active_render), "")
+    for attribute in sorted(mesh.attributes, key=lambda a: a.name != first):
+        if attribute.name.startswith(".") or attribute.name in _OWN or attribute.data_type not in _TYPES:
+            continue
+        if attribute.domain not in {'POINT', 'CORNER', 'FACE'}:
+            continue
+        values = values_of(attribute, "color" if "COLOR" in attribute.data_type else "")
+        values = values[:, None] if values.ndim == 1 else values[:, :3]
+        if attribute.domain == 'POINT':
+            values = values[corner_verts]
+        elif attribute.domain == 'FACE':
+            values = np.repeat(values, sizes, axis=0)
+        yield attribute.name, np.ascontiguousarray(values)

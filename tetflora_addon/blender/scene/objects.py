@@ -1,0 +1,357 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What of a scene renders and may take part in refinement, by view layer, and results that only some layers show.
+
+Where plants and fields of plants stand as instances: of collections, and of what geometry nodes make.
+
+Blender lists instances one by one (``Depsgraph.object_instances``). Here each thing that is instanced is visited once,
+and all of its places are worked out at once as arrays, so that a million instances cost what their numbers do.
+
+Triangles of mesh objects in world space: what hides plants, and what they stand on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from zlib import crc32
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SceneError
+from ...growth.hashing import child_key, key_of_seed
+from ..attributes import members, read, values_of, world_matrix
+
+
+def view_layer_groups(scene: bpy.types.Scene) -> list[list[bpy.types.ViewLayer]]:
+    """Rendered view layers with something to refine, together where it is the same; at least one group.
+
+    Layers that render the same plants share a refinement; where each has plants of its own, each gets one.
+    """
+    layers = [layer for layer in scene.view_layers if layer.use] or list(scene.view_layers)
+    if len(layers) == 1:
+        return [layers]  # at no cost: films of ten thousand objects have mostly one
+    groups: dict[frozenset[int], list[bpy.types.ViewLayer]] = {}
+    for layer in layers:
+        rendered = list(renderable_objects(layer))
+        if any(may_take_part(o) for o in rendered):
+            held = frozenset(o.session_uid for o in rendered if may_take_part(o) or o.tetflora.is_occluder)
+            groups.setdefault(held, []).append(layer)
+    return list(groups.values()) or [layers[:1]]
+
+
+def show_in(
+    scene: bpy.types.Scene, results: Sequence[bpy.types.Collection], layers: Sequence[bpy.types.ViewLayer]
+) -> None:
+    """Leave results out of all rendered view layers of a scene but some."""
+    for layer in scene.view_layers:
+        if layer.use and layer not in layers:
+            for child in layer.layer_collection.children:
+                if child.collection in results:
+                    child.exclude = True
+
+
+def renderable_objects(view_layer: bpy.types.ViewLayer) -> Iterator[bpy.types.Object]:
+    """Objects of a view layer that render: neither they nor all of their collections are hidden in renders."""
+    seen: set[int] = set()
+    open_layers = [view_layer.layer_collection]
+    while open_layers:
+        layer = open_layers.pop()
+        if layer.exclude or layer.collection.hide_render:
+            # Children of an excluded collection can be included again, those of a hidden one cannot be shown.
+            open_layers += [] if layer.collection.hide_render else list(layer.children)
+            continue
+        open_layers += list(layer.children)
+        for obj in layer.collection.objects:
+            if not obj.hide_render and (pointer := obj.as_pointer()) not in seen:
+                seen.add(pointer)
+                yield obj
+
+
+def takes_part(obj: bpy.types.Object) -> bool:
+    """Whether an object is a plant, a field of plants, or a mesh that takes part in refinement."""
+    return obj.tetflora.is_plant or obj.tetflora.is_field or obj.tetflora.is_explicit
+
+
+def may_take_part(obj: bpy.types.Object) -> bool:
+    """Whether an object takes part in refinement, or may instance some that do; cheap."""
+    return takes_part(obj) or may_instance(obj)
+
+
+def has_contents(scene: bpy.types.Scene) -> bool:
+    """Whether a scene may hold something to refine; cheap, and never wrong where there is something."""
+    if any(takes_part(o) for o in scene.objects):
+        return True
+    # What is instanced need not lie in the scene, but somewhere.
+    return any(takes_part(o) for o in bpy.data.objects) and any(may_instance(o) for o in scene.objects)
+
+
+def has_nodes(obj: bpy.types.Object) -> bool:
+    """Whether geometry nodes may instance something on an object, or make points of it."""
+    return any(modifier.type == 'NODES' for modifier in obj.modifiers)
+
+
+def may_instance(obj: bpy.types.Object) -> bool:
+    """Whether an object may stand for others."""
+    return obj.is_instancer or has_nodes(obj)
+
+
+def objects_within(collection: bpy.types.Collection) -> list[bpy.types.Object]:
+    """Objects of a collection and of those within it, each once.
+
+    What ``Collection.all_objects`` says; but that fills a cache which Blender 4.5 to 5.2 leaves stale at undo, and the
+    next undo, or reading it, may then end in a crash.
+    """
+    homes = [collection, *collection.children_recursive]
+    return list(dict.fromkeys(obj for home in homes for obj in home.objects))
+
+
+_ONE_BY_ONE = {'VERTS', 'FACES'}  # ways to instance whose places only Blender knows
+
+
+@dataclass(frozen=True)
+class Copies:
+    """All places of one plant or field within one instancer.
+
+    Attributes
+    ----------
+    owner : bpy.types.Object
+        The original object that is a plant or a field.
+    geometry : bpy.types.GeometrySet or None
+        None for the object itself; else geometry that its nodes instance, which counts for fields only.
+    matrices : (n, 4, 4) float64
+        To world space.
+    keys : (n,) uint64
+        Tell individuals apart.
+    """
+
+    owner: bpy.types.Object
+    geometry: bpy.types.GeometrySet | None
+    matrices: NDArray[np.float64]
+    keys: NDArray[np.uint64]
+
+
+class _OneByOne(Exception):
+    """Something is instanced in a way that has no arrays."""
+
+
+def copies_of(objects: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> list[Copies]:
+    """Places of all plants and fields that some objects instance, the objects themselves not included.
+
+    Individuals are told apart by the instancer's name and by the ``id`` of the instance, which is its number where
+    nodes set none, so that they stay the same while an animation goes on.
+
+    Parameters
+    ----------
+    objects : sequence of bpy.types.Object
+        Original objects that render, in an order that does not change.
+    """
+    found: list[Copies] = []
+    left: set[bpy.types.Object] = set()
+    groups: dict[bpy.types.Collection, list[bpy.types.Object]] = {}
+    for obj in objects:
+        if obj.instance_type in _ONE_BY_ONE or len(obj.particle_systems):
+            left.add(obj)
+        elif obj.instance_type == 'COLLECTION' and obj.instance_collection is not None:
+            groups.setdefault(obj.instance_collection, []).append(obj)
+        elif has_nodes(obj):
+            try:
+                walk = _Walk(depsgraph)
+                walk.nodes(obj, world_matrix(obj, depsgraph)[None].astype(np.float64), _name_keys([obj]))
+                found += walk.found
+            except _OneByOne:
+                left.add(obj)
+    for collection, instancers in groups.items():
+        try:
+            walk = _Walk(depsgraph)
+            matrices = np.array([world_matrix(obj, depsgraph) for obj in instancers], dtype=np.float64)
+            walk.collection(collection, matrices, _name_keys(instancers))
+            found += walk.found
+        except _OneByOne:
+            left.update(instancers)
+    return found + (list(_one_by_one(left, depsgraph)) if left else [])
+
+
+def geometry_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.GeometrySet | None:
+    """What an object evaluates to; None if the dependency graph does not hold it (switched off in viewports)."""
+    evaluated = obj.evaluated_get(depsgraph)
+    return evaluated.evaluated_geometry() if evaluated.is_evaluated else None
+
+
+def rendered_objects(collection: bpy.types.Collection) -> Iterator[bpy.types.Object]:
+    """Objects of a collection, and of those in it, that are not hidden in renders."""
+    waiting, seen = [collection], set()
+    while waiting:
+        inner = waiting.pop()
+        if inner.hide_render:
+            continue
+        waiting += list(inner.children)
+        for obj in inner.objects:
+            if not obj.hide_render and (pointer := obj.as_pointer()) not in seen:
+                seen.add(pointer)
+                yield obj
+
+
+class _Walk:
+    """Follows references down to plants and fields, with all places at once."""
+
+    def __init__(self, depsgraph: bpy.types.Depsgraph) -> None:
+        self.depsgraph = depsgraph
+        self.found: list[Copies] = []
+
+    def object(self, obj: bpy.types.Object, matrices: NDArray[np.float64], keys: NDArray[np.uint64]) -> None:
+        group = obj.tetflora
+        if obj.hide_render:
+            return
+        if group.is_plant or group.is_field:
+            self.found.append(Copies(obj, None, matrices, keys))
+        if obj.instance_type in _ONE_BY_ONE or len(obj.particle_systems):
+            raise _OneByOne
+        if obj.instance_type == 'COLLECTION' and obj.instance_collection is not None:
+            self.collection(obj.instance_collection, matrices, keys)
+        if has_nodes(obj):
+            self.nodes(obj, matrices, keys)
+
+    def collection(self, collection: bpy.types.Collection, matrices: NDArray, keys: NDArray[np.uint64]) -> None:
+        back = np.eye(4)
+        back[:3, 3] = -np.array(collection.instance_offset)
+        for n, obj in enumerate(sorted(rendered_objects(collection), key=lambda o: o.name_full)):
+            self.object(obj, matrices @ (back @ world_matrix(obj, self.depsgraph)), child_key(keys, n))
+
+    def nodes(self, obj: bpy.types.Object, matrices: NDArray[np.float64], keys: NDArray[np.uint64]) -> None:
+        geometry = geometry_of(obj, self.depsgraph)
+        if geometry is not None:
+            self._instances(obj, geometry, matrices, keys)
+
+    def _instances(self, owner, geometry: bpy.types.GeometrySet, matrices: NDArray, keys: NDArray[np.uint64]) -> None:
+        points = geometry.instances_pointcloud()
+        if points is None or not len(points.points):
+            return
+        references = geometry.instance_references()
+        reference, transform, number = _read_instances(points)
+        order = np.argsort(reference, kind="stable")
+        bounds = np.searchsorted(reference[order], np.arange(len(references) + 1))
+        for target, (start, end) in zip(references, pairwise(bounds), strict=True):
+            if target is None or start == end:
+                continue
+            rows = order[start:end]
+            # Columns one after the other: a single product for each place, not one for each instance.
+            columns = transform[rows].reshape(-1, 4) @ matrices.transpose(0, 2, 1)
+            places = columns.reshape(-1, 4, 4).transpose(0, 2, 1)
+            names = child_key(keys[:, None], number[rows]).reshape(-1)
+            if isinstance(target, bpy.types.Object):
+                self.object(target.original, places, names)
+            elif isinstance(target, bpy.types.Collection):
+                # Of evaluated collections the objects are evaluated, too; the walk wants originals throughout.
+                self.collection(target.original, places, names)
+            else:
+                if owner.tetflora.is_field:
+                    self.found.append(Copies(owner, target, places, names))
+                self._instances(owner, target, places, names)
+
+
+def _read_instances(points: bpy.types.PointCloud) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.int64]]:
+    """Reference, columns of the transform (n, 4, 4) and identifier of each instance."""
+    transform = read(points, "instance_transform").reshape(-1, 4, 4).astype(np.float64)
+    own = points.attributes.get("id")
+    known = own is not None and own.data_type == 'INT'
+    return (
+        read(points, ".reference_index"),
+        transform,
+        values_of(own).astype(np.int64) if known else np.arange(len(transform)),
+    )
+
+
+def _one_by_one(instancers: set[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Iterator[Copies]:
+    """Instances on vertices and faces, and of particles: Blender's own list is the only one that has them."""
+    for instance in depsgraph.object_instances:
+        if instance.is_instance and instance.show_self and instance.parent.original in instancers:
+            obj, original = instance.object, instance.object.original
+            group = original.tetflora
+            # Parts of an object that are of another type come once more, as objects of that type.
+            if (group.is_plant or group.is_field) and not original.hide_render and obj.type == original.type:
+                key = key_of_seed(np.array([instance.random_id]))
+                yield Copies(original, None, np.array(instance.matrix_world, dtype=np.float64)[None], key)
+
+
+def _name_keys(objects: Sequence[bpy.types.Object]) -> NDArray[np.uint64]:
+    return key_of_seed(np.array([crc32(obj.name_full.encode()) for obj in objects]))
+
+
+_OCCLUDER_REMEDY = (
+    "an occluder must be a mesh with faces. Add faces, or turn off Occluder in the TetFlora tab of the sidebar"
+)
+
+
+def mesh_triangles(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, remedy: str) -> NDArray[np.float64]:
+    """Triangles of a mesh object, modifiers applied.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        The original object.
+    depsgraph : bpy.types.Depsgraph
+        Decides about animation and modifiers. An object that it does not hold (switched off in viewports) is taken
+        without its modifiers.
+    remedy : str
+        What the artist can do if the object cannot be used; ends the message of the error.
+
+    Returns
+    -------
+    (t, 3, 3) float64
+        Corners in world space, metres.
+
+    Raises
+    ------
+    SceneError
+        Not a mesh (any more), or a mesh without faces.
+    """
+    if obj.type != 'MESH':
+        raise SceneError(f'"{obj.name}" is not a mesh; {remedy}')
+    evaluated = obj.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        positions, corners = _triangles(mesh)
+    finally:
+        evaluated.to_mesh_clear()
+    if not len(corners):
+        raise SceneError(f'"{obj.name}" has no faces; {remedy}')
+    matrix = world_matrix(obj, depsgraph)
+    return (positions @ matrix[:3, :3].T + matrix[:3, 3])[corners]
+
+
+def _triangles(mesh: bpy.types.Mesh) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Places (v, 3) of vertices, and the vertices (t, 3) of triangles."""
+    if not len(mesh.polygons):
+        return np.zeros((0, 3)), np.zeros((0, 3), np.int32)
+    mesh.calc_loop_triangles()
+    vertices = read(mesh, ".corner_vert")[members(mesh.loop_triangles, "loops", 3, np.int32)]
+    return read(mesh, "position").astype(np.float64), vertices
+
+
+def read_occluders(
+    _scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer | None = None
+) -> NDArray[np.float64]:
+    """Triangles of all meshes of a view layer that are marked as hiding plants and render.
+
+    Parameters
+    ----------
+    view_layer : bpy.types.ViewLayer or None
+        None takes the one that the depsgraph was made for.
+
+    Returns
+    -------
+    (t, 3, 3) float64
+        Corners in world space, metres; ``(0, 3, 3)`` if there are none.
+
+    Raises
+    ------
+    SceneError
+        One of them has no faces or is no longer a mesh.
+    """
+    marked = [o for o in renderable_objects(view_layer or depsgraph.view_layer) if o.tetflora.is_occluder]
+    marked.sort(key=lambda o: o.name_full)
+    return np.concatenate([np.zeros((0, 3, 3)), *(mesh_triangles(o, depsgraph, _OCCLUDER_REMEDY) for o in marked)])

@@ -1,0 +1,168 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Read from a scene what refinement needs: camera, plants and what hides them.
+
+Only here and in `plant_copies` does TetFlora loop over objects; what comes out are plain arrays.
+"""
+
+from dataclasses import replace
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SceneError
+from ...growth.hashing import child_key, key_of_seed
+from ...growth.seeds import Seeds
+from ..attributes import frames_of, world_matrix
+from ..species.edits import catalogue
+from .fields import read_field
+from .objects import Copies, copies_of, may_instance, renderable_objects
+from .skeletons import kind_of, species_of
+
+_NAMED = 3  # objects that a message names before it only counts
+
+
+class NoPlantsError(SceneError):
+    """There is nothing to refine; a renderer may pass over it in silence."""
+
+
+def read_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Seeds:
+    """Enabled plants of a view layer that render: single ones by name, then instances, then fields.
+
+    Plants and fields that collections or geometry nodes instance take part; each instance becomes an individual of its
+    own.
+
+    Of a plant's transform the direction of its z axis and the azimuth of its x axis are kept, and the mean of the
+    absolute scales: plants are neither stretched nor mirrored.
+
+    Raises
+    ------
+    NoPlantsError
+        No plant is left; the message says how to get some.
+    SceneError
+        A species that the catalogue does not have, a scale of 0, or a transform that is not a number; the message names
+        the objects.
+    """
+    objects = sorted(renderable_objects(view_layer), key=lambda o: o.name_full)
+    own = [o for o in objects if o.tetflora.is_plant or o.tetflora.is_field]
+    single = [o for o in own if o.tetflora.is_plant and o.tetflora.enabled]
+    read = [(single[0].name if single else "", single_plants(single, depsgraph))]
+    copies = copies_of([o for o in objects if may_instance(o)], depsgraph)
+    read += [
+        (c.owner.name, _copied_plants(c))
+        for c in copies
+        if c.owner.tetflora.is_plant and c.geometry is None and _enabled(c)
+    ]
+    for obj in own:
+        if obj.tetflora.is_field and obj.tetflora.enabled:
+            read.append((obj.name, read_field(obj, depsgraph, world_matrix(obj, depsgraph)[None])))
+    read += [
+        (c.owner.name, read_field(c.owner, depsgraph, c.matrices, c.keys, c.geometry))
+        for c in copies
+        if c.owner.tetflora.is_field and _enabled(c)
+    ]
+    read = [(name, seeds) for name, seeds in read if len(seeds)]
+    if not read:
+        found = own or copies
+        off = found and not any(o.tetflora.enabled for o in (*own, *(c.owner for c in copies)))
+        hidden = sum(o.tetflora.is_plant or o.tetflora.is_field for o in scene.objects) - len(own)
+        raise NoPlantsError(_none_left(bool(off), [o.name for o in own if o.tetflora.is_field], hidden))
+    return _merged(read)
+
+
+def _none_left(off: bool, fields: list[str], hidden: int) -> str:
+    if off:
+        return "All plants in the scene are disabled; enable some in the TetFlora tab of the sidebar"
+    if fields:
+        return f"{_listed(fields)}: the field of plants has no points; add vertices, or populate a mesh"
+    if hidden:
+        return (
+            f"No plants to render; {hidden:,} are hidden in renders or excluded from the view layer. Enable them "
+            "or their collections in the Outliner"
+        )
+    return (
+        "No plants to render; add some with Add > TetFlora Plant, or with Populate in the TetFlora tab of the sidebar"
+    )
+
+
+def _enabled(copies: Copies) -> bool:
+    return copies.owner.tetflora.enabled
+
+
+def single_plants(plants: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Seeds:
+    """Plants that are objects, in their order.
+
+    Raises
+    ------
+    SceneError
+        As `read_plants`.
+    """
+    names, own = [obj.name for obj in plants], [kind_of(obj) for obj in plants]
+    _check_species(list(zip(names, own, strict=True)))
+    number = {kind: i for i, kind in enumerate(sorted(set(own)))}
+    species = np.array([number[kind] for kind in own], dtype=np.int32)
+    seeds = np.array([obj.tetflora.seed for obj in plants], dtype=np.int64)
+    # Matrices of Blender's become single precision in some versions; seeds are double throughout.
+    matrices = np.array([world_matrix(obj, depsgraph) for obj in plants], dtype=np.float64).reshape(-1, 4, 4)
+    return _placed(names, tuple(number), species, seeds, matrices)
+
+
+def _copied_plants(copies: Copies) -> Seeds:
+    """A plant that is instanced. Copies shall not be the same individual: each instance's key joins the seed."""
+    plant = copies.owner
+    seeds = child_key(key_of_seed(plant.tetflora.seed), copies.keys).view(np.int64)
+    return _placed([plant.name], (kind_of(plant),), np.zeros(len(seeds), np.int32), seeds, copies.matrices)
+
+
+def _placed(
+    names: list[str],
+    kinds: tuple[str, ...],
+    species: NDArray[np.int32],
+    seeds: NDArray[np.int64],
+    matrices: NDArray[np.float64],
+) -> Seeds:
+    frame, scale, sound = frames_of(matrices[:, :3, :3])
+    sound &= np.isfinite(matrices).all(axis=(1, 2))
+    if not sound.all():
+        bad = [names[min(i, len(names) - 1)] for i in np.flatnonzero(~sound)[: _NAMED * len(names)].tolist()]
+        raise SceneError(
+            f"{_listed(list(dict.fromkeys(bad)))}: zero scale or an invalid position; clear them with Alt S and Alt G"
+        )
+    return Seeds(kinds, species, seeds, matrices[:, :3, 3].copy(), frame, scale)
+
+
+def _merged(read: list[tuple[str, Seeds]]) -> Seeds:
+    """Plants of all objects, each with its name, as one, with the kinds that occur."""
+    tables = []
+    for _, seeds in read:
+        occurring = np.bincount(seeds.species, minlength=len(seeds.identifiers)) > 0
+        tables.append({i: seeds.identifiers[i] for i in np.flatnonzero(occurring).tolist()})
+    _check_species([(name, kind) for (name, _), table in zip(read, tables, strict=True) for kind in table.values()])
+    identifiers = tuple(sorted({kind for table in tables for kind in table.values()}))
+    number = {kind: i for i, kind in enumerate(identifiers)}
+    parts = []
+    for (_, seeds), table in zip(read, tables, strict=True):
+        to_all = np.zeros(len(seeds.identifiers), np.int32)
+        to_all[list(table)] = [number[kind] for kind in table.values()]
+        parts.append(replace(seeds, identifiers=identifiers, species=to_all[seeds.species]))
+    # Millions of frames are not copied where there is nothing to join.
+    return parts[0] if len(parts) == 1 else Seeds.concatenate(parts)
+
+
+def _check_species(plants: list[tuple[str, str]]) -> None:
+    """Refuse kinds, each with the name of an object that has it, whose species nobody has."""
+    known = catalogue()
+    bad = [(name, species) for name, kind in plants if (species := species_of(kind)) not in known]
+    if bad:
+        species = bad[0][1]
+        raise SceneError(
+            f'{_listed([name for name, other in bad if other == species])}: unknown species "{species}"; choose '
+            "another in the TetFlora tab of the sidebar, or add "
+            f"{species or 'its file'}{'.json' if species else ''} with Load Species"
+        )
+
+
+def _listed(names: list[str]) -> str:
+    text = ", ".join(f'"{name}"' for name in names[:_NAMED])
+    return text if len(names) <= _NAMED else f"{text} and {len(names) - _NAMED} more"

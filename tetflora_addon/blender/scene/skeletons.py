@@ -1,0 +1,216 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Plants formed by hand: curves, edges of meshes and hair curves of the artist's, read as skeletons.
+
+What kind of plant an object is: its species, and its form where that is modelled by hand.
+
+Plants of one species and form are compiled once. A kind is told by a text, as the engine's seeds want it.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SpeciesError
+from ...species.curves import Chains, bezier_chains, joined_edges, nurbs_chain, smooth_handles
+from ...species.skeletons import Skeleton, skeleton_from_edges
+from ..attributes import frames_of, members, values_of, world_matrix
+
+FORM_TYPES = ('CURVE', 'CURVES', 'MESH')
+"""Types of objects that can be the form of a plant."""
+
+RADIUS = "radius"  # the attribute's name in hair curves and, by convention, in meshes
+_CATMULL_ROM, _POLY, _BEZIER, _NURBS = range(4)  # Blender's numbers for types of hair curves
+_DEFAULT_STEPS = 12
+
+
+def upright_turn(matrix: NDArray[np.float64]) -> float:
+    """Turn about the vertical, in radians, of an object with a matrix (4, 4) in world space: that of its x axis."""
+    return float(np.arctan2(matrix[1, 0], matrix[0, 0])) if np.hypot(*matrix[:2, 0]) > 0 else 0.0
+
+
+def read_skeleton(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skeleton:
+    """The skeleton that an object draws.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        A curve, a mesh or hair curves; the original object.
+    depsgraph : bpy.types.Depsgraph
+        Decides about animation and modifiers. An object that it does not hold is taken without its modifiers.
+
+    Returns
+    -------
+    Skeleton
+        About the object's origin, in metres, z up: its scale and tilt are applied, its place and its turn about
+        the vertical are left to the plant.
+
+    Raises
+    ------
+    SpeciesError
+        Another type of object, a mesh with faces, no edges, scale 0, or what `skeleton_from_edges` refuses; the message
+        names the object.
+    """
+    if obj.type not in FORM_TYPES:
+        raise SpeciesError(
+            f'"{obj.name}" cannot be used as the form of a plant: '
+            "choose a curve, hair curves, or a mesh of edges without faces"
+        )
+    matrix = world_matrix(obj, depsgraph)
+    _, scale, sound = frames_of(matrix[None, :3, :3])
+    if not sound[0]:
+        raise SpeciesError(f'"{obj.name}" cannot be used as the form of a plant: its scale is 0; clear it with Alt S')
+    if obj.type == 'MESH':
+        (points, edges), line = _of_mesh(obj, depsgraph), None
+    else:
+        chains = _of_curve(obj, depsgraph) if obj.type == 'CURVE' else _of_hair(obj, depsgraph)
+        # Radii in the object's own measure, as they are joined there.
+        points, edges, line = joined_edges(chains)
+    turn = upright_turn(matrix)
+    upright = np.array([[np.cos(turn), np.sin(turn), 0], [-np.sin(turn), np.cos(turn), 0], [0, 0, 1]]) @ matrix[:3, :3]
+    return skeleton_from_edges(points[:, :3] @ upright.T, points[:, 3] * scale[0], edges, obj.name, line)
+
+
+def _of_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Points (p, 4) with radii, 0 where there are none, and edges (e, 2)."""
+    evaluated = obj.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        if not len(mesh.polygons):
+            return _mesh_arrays(mesh)
+    finally:
+        evaluated.to_mesh_clear()
+    # A modifier such as Skin clothes the edges with faces: what was modelled is the skeleton.
+    if len(obj.data.polygons):
+        raise SpeciesError(
+            f'"{obj.name}" cannot be used as the form of a plant: it has faces. Keep only edges along the centers of '
+            "branches (X > Only Faces in Edit Mode), or use a curve"
+        )
+    return _mesh_arrays(obj.data)
+
+
+def _mesh_arrays(mesh: bpy.types.Mesh) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    points = np.zeros((len(mesh.vertices), 4))
+    points[:, :3] = _read(mesh.vertices, "co", 3)
+    radius = mesh.attributes.get(RADIUS)
+    if radius is not None and radius.domain == 'POINT' and radius.data_type == 'FLOAT':
+        points[:, 3] = values_of(radius)
+    elif len(mesh.skin_vertices):
+        points[:, 3] = _read(mesh.skin_vertices[0].data, "radius", 2).mean(axis=1)
+    return points, members(mesh.edges, "vertices", 2, np.int32).astype(np.int64)
+
+
+def _of_curve(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Chains:
+    """Splines of a curve object, with shape keys and modifiers that move its control points."""
+    evaluated = obj.evaluated_get(depsgraph)
+    curve = evaluated.to_curve(depsgraph, apply_modifiers=True) if evaluated.is_evaluated else obj.data
+    try:
+        parts = [_of_spline(spline) for spline in curve.splines]
+    finally:
+        if evaluated.is_evaluated:
+            evaluated.to_curve_clear()
+    chains = Chains.concatenate(parts)
+    return _meant_radii(chains, _thickness(obj.data))
+
+
+def _of_spline(spline: bpy.types.Spline) -> Chains:
+    cyclic = np.array([spline.use_cyclic_u])
+    if spline.type == 'BEZIER':
+        knots = spline.bezier_points
+        places = np.column_stack([_read(knots, "co", 3), _read(knots, "radius")])
+        handles = (_read(knots, side, 3) for side in ("handle_left", "handle_right"))
+        control = Chains(places, np.array([0, len(knots)]), cyclic)
+        return bezier_chains(control, *handles, np.array([spline.resolution_u]))
+    places = _read(spline.points, "co", 4)
+    weights = places[:, 3].copy()
+    places[:, 3] = _read(spline.points, "radius")
+    if spline.type == 'NURBS':
+        flags = {"endpoint": spline.use_endpoint_u, "bezier": spline.use_bezier_u, "cyclic": spline.use_cyclic_u}
+        return nurbs_chain(places, weights, spline.order_u, spline.resolution_u, **flags)
+    return Chains(places, np.array([0, len(places)]), cyclic)
+
+
+def _thickness(curve: bpy.types.Curve) -> float:
+    """What the radius of a curve's points is multiplied by to give the radius of its tube; 0 without a tube."""
+    if curve.bevel_mode == 'OBJECT':
+        return max(curve.bevel_object.dimensions[:2]) / 2 if curve.bevel_object is not None else 0.0
+    return curve.bevel_depth
+
+
+def _meant_radii(chains: Chains, thickness: float) -> Chains:
+    """Radii in the object's measure; 0 where all are equal and nothing shows them, as in curves newly made."""
+    points = chains.points.copy()
+    if thickness > 0:
+        points[:, 3] *= thickness
+    elif len(points) and np.ptp(points[:, 3]) < 1e-6:
+        points[:, 3] = 0.0
+    return Chains(points, chains.first, chains.cyclic)
+
+
+def _of_hair(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Chains:
+    """Hair curves with their modifiers."""
+    curves = obj.evaluated_get(depsgraph).data
+    points = np.zeros((len(curves.points), 4))
+    points[:, :3] = _attribute(curves, "position", np.zeros((len(points), 3)))
+    points[:, 3] = _attribute(curves, RADIUS, points[:, 3])
+    starts = members(curves.curves, "first_point_index", dtype=np.int32)
+    first = np.append(starts, len(points)).astype(np.int64)
+    none = np.zeros(len(starts), np.int32)
+    kind = _attribute(curves, "curve_type", none)
+    control = Chains(points, first, _attribute(curves, "cyclic", none > 0))
+    steps = _attribute(curves, "resolution", none + _DEFAULT_STEPS)
+    left, right = smooth_handles(control)
+    bezier = np.repeat(kind == _BEZIER, np.diff(first))[:, None]
+    left = np.where(bezier, _attribute(curves, "handle_left", left), left)
+    right = np.where(bezier, _attribute(curves, "handle_right", right), right)
+    chains = bezier_chains(control, left, right, np.where(kind == _POLY, 1, steps))
+    nurbs = np.flatnonzero(kind == _NURBS)
+    if len(nurbs):
+        weights = _attribute(curves, "nurbs_weight", np.ones(len(points)))
+        order = _attribute(curves, "nurbs_order", none + 4)
+        mode = _attribute(curves, "knots_mode", none)  # 1 ends at the outer points, 2 Bezier, 3 both
+        parts = [chains.without(nurbs)]
+        for i in nurbs.tolist():
+            own = slice(first[i], first[i + 1])
+            flags = {"endpoint": mode[i] in (1, 3), "bezier": mode[i] in (2, 3), "cyclic": bool(control.cyclic[i])}
+            parts.append(nurbs_chain(points[own], weights[own], int(order[i]), int(steps[i]), **flags))
+        chains = Chains.concatenate(parts)
+    return _meant_radii(chains, 0.0)
+
+
+def _read(collection: bpy.types.bpy_prop_collection, name: str, width: int = 1) -> NDArray[np.float64]:
+    return members(collection, name, width).astype(np.float64)
+
+
+def _attribute(curves: bpy.types.Curves, name: str, default: NDArray) -> NDArray:
+    """Values of an attribute of hair curves, like ``default`` in shape and type; ``default`` where it is missing."""
+    found = curves.attributes.get(name)
+    values = None if found is None else values_of(found)
+    return default if values is None or values.shape != default.shape else values.astype(default.dtype)
+
+
+# Neither identifiers of species nor names that anyone types hold a line break.
+_BREAK = "\n"
+
+
+def kind_of(plant: bpy.types.Object) -> str:
+    """Kind of a plant."""
+    return kind_of_choice(plant.tetflora)
+
+
+def kind_of_choice(group: bpy.types.PropertyGroup) -> str:
+    """Kind that a group of properties with a species and a form says."""
+    return group.species if group.form is None else f"{group.species}{_BREAK}{group.form.name_full}"
+
+
+def species_of(kind: str) -> str:
+    """Identifier of the species of a kind of plant."""
+    return kind.partition(_BREAK)[0]
+
+
+def form_of(kind: str) -> bpy.types.Object | None:
+    """Object that has the form of a kind of plant, or None where it is grown."""
+    name = kind.partition(_BREAK)[2]
+    return next((o for o in bpy.data.objects if o.name_full == name), None) if name else None

@@ -1,0 +1,222 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's properties, generated from the engine's dataclasses of settings.
+
+Settings of refinement as properties of a scene: those of the engine, quality, and the look of shells.
+
+Qualities: names for sets of values; which one the settings have is read from the values themselves.
+
+Settings of animations as properties of a scene: what frames share, and the size of the frame cache.
+
+The wind of a scene: its settings, and what they are at a frame.
+
+What the user's preferences give to a scene when its first plant is added.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from types import SimpleNamespace
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+
+from ..camera.view_cells import ViewCells
+from ..growth.wind import Wind
+from ..refinement.settings import QUALITIES, RefinementSettings
+from .preferences import preferences
+
+_MAKERS = {bool: BoolProperty, int: IntProperty, float: FloatProperty}
+
+
+def properties_of(settings: type, **common: Any) -> SimpleNamespace:
+    """A property for each field of a dataclass that is declared with `setting.setting`.
+
+    Parameters
+    ----------
+    settings : type
+        The dataclass.
+    **common
+        Further options of all of them, as ``options`` and ``update``.
+
+    Returns
+    -------
+    SimpleNamespace
+        The properties by the fields' names, to be used as annotations of a property group.
+    """
+    made = SimpleNamespace()
+    for f in fields(settings):
+        if f.metadata:
+            setattr(made, f.name, _MAKERS[type(f.default)](**{"default": f.default, **f.metadata, **common}))
+    return made
+
+
+def quality_number(group: bpy.types.PropertyGroup) -> int:
+    """Index of the quality whose values the settings have; the last one is that of others."""
+    for number, values in enumerate(QUALITIES.values()):
+        if all(abs(getattr(group, name) - value) < 1e-6 * max(value, 1) for name, value in values.items()):
+            return number
+    return len(QUALITIES)
+
+
+def set_quality(group: bpy.types.PropertyGroup, number: int) -> None:
+    """Give the settings the values of a quality; beyond the last one they stay as they are."""
+    for name, value in list(QUALITIES.values())[number].items() if number < len(QUALITIES) else ():
+        setattr(group, name, value)
+
+
+class EngineSettings:
+    """The engine's settings, field by field."""
+
+    __annotations__ = vars(properties_of(RefinementSettings))
+
+
+class RefinementProperties(EngineSettings):
+    """Part of the settings of a scene."""
+
+    quality: EnumProperty(
+        name="Quality",
+        description="How fine the result is; sets Cutoff, Leaf Limit, Facet Size and Visibility Resolution",
+        items=(
+            ('DRAFT', "Draft", "Quick and coarse, for setting up a scene"),
+            ('PREVIEW', "Preview", "For judging light and composition"),
+            ('FINAL', "Final", "For final renders: proxies are indistinguishable from real plants"),
+            ('CUSTOM', "Custom", "Your own values"),
+        ),
+        get=quality_number,
+        set=set_quality,
+    )
+    # How shells look: the user's values of the paper's shading (section 7).
+    shell_diffuse: FloatProperty(
+        name="Diffuse (p)",
+        description="Fraction of light that shells scatter evenly (p in the paper). Smaller values are darker",
+        subtype='FACTOR',
+        default=1.0,
+        min=0.0,
+        max=1.0,
+    )
+    shell_gloss: FloatProperty(
+        name="Gloss (s)",
+        description="Fraction of light that shells of coplanar leaves reflect as a highlight (s in the paper)",
+        subtype='FACTOR',
+        default=0.04,
+        min=0.0,
+        max=1.0,
+    )
+    shell_spear: FloatProperty(
+        name="Sharpness (spear)",
+        description="Exponent of the highlight (spear in the paper). Larger values make it smaller and brighter",
+        default=7.5,
+        min=0.0,
+        soft_max=100.0,
+        max=1000.0,
+    )
+    shell_roundness: FloatProperty(
+        name="Roundness",
+        description="How round the contents of shells are shaded: 1 as spheres, 0 as flat discs facing the camera",
+        subtype='FACTOR',
+        default=1.0,
+        min=0.0,
+        max=1.0,
+    )
+    shell_variation: FloatProperty(
+        name="Variation",
+        description="Random variation of brightness between shells",
+        subtype='FACTOR',
+        default=0.05,
+        min=0.0,
+        max=1.0,
+    )
+
+
+_CELLS = properties_of(ViewCells)
+
+
+class AnimationProperties:
+    """Part of the settings of a scene."""
+
+    share_frames: BoolProperty(
+        name="Share Between Frames",
+        description=(
+            "Where the camera is animated, refine once for all frames with similar cameras, slightly finer and wider "
+            "than a single one needs. A frame looks the same whichever frames are rendered before it"
+        ),
+        default=True,
+    )
+    cell_length: _CELLS.length
+    cell_turn: _CELLS.turn
+    kept_memory: FloatProperty(
+        name="Frame Cache",
+        description=(
+            "Maximum size of the frame cache in gigabytes. A render keeps meshes for frames in which the camera "
+            "returns; the least recently used go first. The current frame itself is not limited"
+        ),
+        default=1.0,
+        min=0.0,
+        soft_max=64.0,
+        precision=1,
+    )
+
+
+#: Where the middle of the exposure lies from the frame, in times that the shutter is open.
+_MIDDLE = {'START': 0.5, 'CENTER': 0.0, 'END': -0.5}
+_WIND = properties_of(Wind)
+
+
+class TetFloraWind(bpy.types.PropertyGroup):
+    """Settings of the wind; all but the switch and the loop can be animated."""
+
+    enabled: BoolProperty(
+        name="Wind",
+        description=(
+            "Bend and sway plants, and flutter their leaves, as they are at the refined frame. Results of Refine do "
+            "not move; with Refine at Render, each frame of an animation has its own"
+        ),
+        options=set(),
+    )
+    speed: _WIND.speed
+    direction: _WIND.direction
+    gusts: _WIND.gusts
+    loop: IntProperty(
+        name="Loop",
+        description="Number of frames after which all movement repeats exactly; 0 for never",
+        default=0,
+        min=0,
+        soft_max=1000,
+        options=set(),
+    )
+
+
+def wind_of(scene: bpy.types.Scene) -> Wind | None:
+    """The wind at the scene's frame, the part of a frame included; None where none blows.
+
+    With motion blur it is that of the middle of the exposure, from which Cycles goes back and forth by velocities. The
+    scene's range of frames has no say: workers of a farm set it to the frames that they render.
+    """
+    group = scene.tetflora.wind
+    if not group.enabled or group.speed == 0.0:
+        return None
+    rate = scene.render.fps / scene.render.fps_base
+    frame = scene.frame_current_final
+    if group.loop:
+        frame %= group.loop  # here, where frames are whole numbers, it is exact
+    blurred = scene.render.use_motion_blur
+    if blurred:
+        frame += _MIDDLE[scene.render.motion_blur_position] * scene.render.motion_blur_shutter
+    return Wind(group.speed, group.direction, group.gusts, frame / rate, group.loop / rate, blurred)
+
+
+def begin(scene: bpy.types.Scene) -> None:
+    """Give a scene that has no plants yet the user's quality and memory limit, unless it has its own already."""
+    group, chosen = scene.tetflora, preferences()
+    if chosen is None:
+        return
+    values = QUALITIES[chosen.new_quality]
+    if not any(group.is_property_set(name) for name in values):
+        set_quality(group, list(QUALITIES).index(chosen.new_quality))
+    if chosen.new_memory > 0.0 and not group.is_property_set("max_memory"):
+        group.max_memory = chosen.new_memory
+
+
+CLASSES = (TetFloraWind,)

@@ -1,0 +1,291 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Species of the catalogue as items of menus and enumerations.
+
+How a species is stored and chosen: as text, with an enumeration over it for panels.
+
+Pictures of species for menus and asset browsers: PNG files beside the species, made by ``examples.thumbnails``.
+
+Species as files: saved for other scenes, taken from others, given away, deleted. Only sound ones get in or out.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+from zlib import crc32
+
+import bpy
+from bpy.props import EnumProperty, StringProperty
+from bpy.utils import previews
+
+from ...errors import SpeciesError
+from ...species.catalogue import SpeciesInfo, builtin_folder
+from ...species.schema import read_species
+from ...storage import write_whole
+from ..preferences import own_species_folder, species_folders
+from .edits import catalogue, species_data, species_for, tell_listeners
+
+FOLDER = "thumbnails"
+THUMBNAIL_ENDING = ".png"
+#: Where a species has no picture.
+FALLBACK_ICON = 'OUTLINER_OB_EMPTY'
+
+_pictures: previews.ImagePreviewCollection | None = None
+
+
+def thumbnail_file(identifier: str) -> Path | None:
+    """The picture of a species: ``thumbnails/identifier.png`` in the user's folder or among the shipped ones."""
+    for folder in (*species_folders(), builtin_folder()):
+        path = folder / FOLDER / (identifier + THUMBNAIL_ENDING)
+        if identifier and path.is_file():
+            return path
+    return None
+
+
+# Seconds for which a picture is not looked for again: menus and panels ask for all of them at each redraw.
+_TRUSTED = 0.0 if bpy.app.background else 1.0
+_icons: dict[str, tuple[float, int]] = {}
+
+
+def icon_of(identifier: str) -> int:
+    """Number of a species' picture for items and layouts, loaded at first use; 0 where it has none."""
+    now = time.monotonic()
+    seen, icon = _icons.get(identifier, (-_TRUSTED, 0))
+    if now - seen >= _TRUSTED:
+        icon = _icon_of(identifier)
+        _icons[identifier] = now, icon
+    return icon
+
+
+def _icon_of(identifier: str) -> int:
+    path = thumbnail_file(identifier)
+    if path is None or _pictures is None:
+        return 0
+    name = f"{path}|{path.stat().st_mtime_ns}"  # another picture under the same name is another one
+    found = _pictures.get(name) or _pictures.load(name, str(path), 'IMAGE')
+    return found.icon_id
+
+
+def register() -> None:
+    """Open an empty collection of pictures."""
+    global _pictures
+    _pictures = previews.new()
+
+
+def unregister() -> None:
+    """Free the pictures."""
+    global _pictures
+    if _pictures is not None:
+        previews.remove(_pictures)
+    _pictures = None
+    _icons.clear()
+
+
+# What an enumeration says when there is nothing to choose.
+NO_SPECIES = "NONE"
+FALLBACK_HEIGHT = 5.0  # metres, of the arrow of a plant whose species cannot be read
+
+Item = tuple[str, str, str, str | int, int]
+
+# Blender keeps no copy of the strings of dynamic items, so somebody has to.
+_kept: dict[tuple, list[Item]] = {}
+
+
+def number_of(identifier: str) -> int:
+    """A number that stays the same when species come and go, so that a stored choice keeps its meaning."""
+    return crc32(identifier.encode()) & 0x7FFFFFFF
+
+
+def items_for(present: str = "") -> list[Item]:
+    """Items of an enumeration: the catalogue, and the present choice if the catalogue does not have it.
+
+    Parameters
+    ----------
+    present : str
+        Identifier that is chosen now; it survives although its file is missing.
+    """
+    known = catalogue()
+    icons = {identifier: icon_of(identifier) for identifier in known}
+    missing = present if present not in known else ""
+    stamp = (missing, *((i.identifier, i.name, i.description, icons[i.identifier]) for i in known.values()))
+    if stamp not in _kept:
+        _kept[stamp] = _items(known, icons, present)
+    return _kept[stamp]
+
+
+def _items(known: Mapping[str, SpeciesInfo], icons: Mapping[str, int], present: str) -> list[Item]:
+    items = [
+        (i.identifier, i.name, i.description, icons[i.identifier] or FALLBACK_ICON, number_of(i.identifier))
+        for i in known.values()
+    ]
+    if present and present not in known:
+        text = "This species is not in the catalog; Refine fails until you add it or choose another"
+        items.append((present, f"{present} (missing)", text, 'ERROR', number_of(present)))
+    return items or [(NO_SPECIES, "No species found", "The catalog is empty", 'ERROR', 0)]
+
+
+def operator_items(_operator: bpy.types.OperatorProperties, _context: bpy.types.Context | None) -> list[Item]:
+    """Items for an operator's ``species``."""
+    return items_for()
+
+
+def display_height(identifier: str) -> float:
+    """Height of a species' trunk in metres, for the arrow that stands for a plant in the viewport."""
+    try:
+        return float(species_for(None, identifier).orders[0].length.mean)
+    except SpeciesError:
+        return FALLBACK_HEIGHT
+
+
+def default_species() -> str:
+    """First species of the catalogue.
+
+    Raises
+    ------
+    SpeciesError
+        There is none.
+    """
+    known: Sequence[str] = tuple(catalogue())
+    if not known:
+        raise SpeciesError("The catalog has no species; reinstall TetFlora, or set a Species Folder in the preferences")
+    return known[0]
+
+
+class SpeciesChoice:
+    """A stored identifier, and an enumeration over it for panels.
+
+    The identifier is a string, so that a species whose file is missing survives; the enumeration only reads and
+    writes it.
+    """
+
+    species: StringProperty(
+        name="Species",
+        description="File name of the species in the catalog, without extension",
+        override={'LIBRARY_OVERRIDABLE'},
+    )
+    species_choice: EnumProperty(
+        name="Species",
+        description="Species from the catalog",
+        items=lambda self, _context: items_for(self.species),
+        get=lambda self: number_of(self.species) if self.species else items_for()[0][4],
+        set=lambda self, number: _choose(self, number),
+        options={'SKIP_SAVE'},
+    )
+
+
+def _choose(group: SpeciesChoice, number: int) -> None:
+    for identifier, *_, item_number in items_for(group.species):
+        if item_number == number and number:
+            group.species = identifier
+            tell_listeners()
+
+
+ENDING = ".json"
+
+
+def own_file(identifier: str) -> Path | None:
+    """The user's own file of a species, if there is one."""
+    for folder in species_folders():
+        path = folder / (identifier + ENDING)
+        if identifier and path.is_file():
+            return path
+    return None
+
+
+def as_text(data: dict[str, Any]) -> str:
+    """A decoded species as a person would write it: a key a line, except within ranges and leaves."""
+
+    def line(key: str, value: Any) -> str:
+        return f"{json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}"
+
+    parts = []
+    for key, value in data.items():
+        if key == "orders":
+            orders = [",\n     ".join(line(k, v) for k, v in order.items()) for order in value]
+            parts.append('"orders": [\n    ' + ",\n    ".join(f"{{{text}}}" for text in orders) + "\n  ]")
+        else:
+            parts.append(line(key, value))
+    return "{\n  " + ",\n  ".join(parts) + "\n}\n"
+
+
+def write_species(scene: bpy.types.Scene, identifier: str, path: Path) -> Path:
+    """Write a species as this file has it.
+
+    Raises
+    ------
+    SpeciesError
+        The species is broken, or the file cannot be written.
+    """
+    species_for(scene, identifier)
+    try:
+        write_whole(path, as_text(species_data(scene, identifier)))
+    except OSError as error:
+        raise SpeciesError(f"Cannot write {path.name}: {error.strerror}") from None
+    return path
+
+
+def save_species(scene: bpy.types.Scene, identifier: str) -> Path:
+    """Save a species into the user's own folder, over an earlier file of that name.
+
+    Raises
+    ------
+    SpeciesError
+        As `write_species`; or there is no folder.
+    """
+    return write_species(scene, identifier, own_species_folder() / (identifier + ENDING))
+
+
+def load_species_file(path: Path, replace: bool = False) -> str:
+    """Take a species file into the user's own folder; returns the identifier.
+
+    Parameters
+    ----------
+    path : Path
+        Anywhere; a file that lies in the folder already is only checked.
+    replace : bool
+        Whether an own file of the same name and other content gives way.
+
+    Raises
+    ------
+    SpeciesError
+        The file breaks a rule of the format, as the message says, or another one of its name is there.
+    """
+    read_species(path)
+    target = own_species_folder() / (path.stem + ENDING)
+    try:
+        content = path.read_bytes()
+        if target.is_file() and target.read_bytes() == content:
+            return path.stem
+        if target.exists() and not replace:
+            raise SpeciesError(
+                f'Your species folder already has another "{path.stem}"; turn on Replace in the file browser, or '
+                "rename it"
+            )
+        write_whole(target, content)
+    except OSError as error:
+        raise SpeciesError(f"Cannot write {target.name}: {error.strerror}") from None
+    tell_listeners()
+    return path.stem
+
+
+def delete_species_file(identifier: str) -> Path:
+    """Delete the user's own file of a species; shipped ones stay.
+
+    Raises
+    ------
+    SpeciesError
+        There is none, or it cannot be deleted.
+    """
+    path = own_file(identifier)
+    if path is None:
+        raise SpeciesError(f'"{identifier}" has no file in your species folder; built-in species cannot be deleted')
+    try:
+        path.unlink()
+    except OSError as error:
+        raise SpeciesError(f"Cannot delete {path.name}: {error.strerror}") from None
+    tell_listeners()
+    return path

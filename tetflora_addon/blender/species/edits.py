@@ -1,0 +1,275 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Species that an artist changed in this file: JSON text on the scene, in place of the catalogue's species.
+
+The text is what a species file holds, so it passes the same checks, and a key that comes in another version of the
+format needs no migration of its own. `species_for` is the one door: refinement, previews and panels load through it.
+"""
+
+import copy
+import json
+import re
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy.props import StringProperty
+
+from ...errors import SpeciesError
+from ...species.catalogue import SpeciesInfo, list_species, load_species
+from ...species.schema import species_from_dict
+from ...species.species import Species
+from ..preferences import species_folders
+from ..runtime import Listeners
+
+#: Called after every change of a species, without arguments; the preview listens.
+listeners = Listeners()
+
+# In the background nothing is drawn, and scripts expect to find what they have just written.
+_TRUSTED = 0.0 if bpy.app.background else 0.3
+_seen: dict[str, SpeciesInfo] | None = None
+_seen_at = 0.0
+_looking = True  # or what was seen is trusted until told otherwise
+_read: dict[str, dict[str, Any]] = {}  # decoded files, as long as what was seen is trusted
+
+
+class TetFloraSpeciesEdit(bpy.types.PropertyGroup):
+    """A species as this file has it."""
+
+    identifier: StringProperty(
+        name="Identifier", description="Catalog species that the text replaces in this file, or a new species"
+    )
+    text: StringProperty(name="Text", description="The species in JSON, as in a species file")
+
+
+def listed() -> dict[str, SpeciesInfo]:
+    """Species that files hold, edits aside.
+
+    A panel asks for them hundreds of times while it is drawn, so in the window folders are looked at every `_TRUSTED`
+    seconds only, and when TetFlora itself has changed a file.
+    """
+    global _seen, _seen_at
+    now = time.monotonic()
+    if _seen is None or (_looking and now - _seen_at >= _TRUSTED):
+        _seen, _seen_at = list_species(species_folders()), now
+        _read.clear()
+    return _seen
+
+
+@contextmanager
+def looked_at_once() -> Iterator[None]:
+    """Folders are looked at now, and not again meanwhile unless TetFlora itself has changed a file.
+
+    Where a whole scene is read, each of its species would ask several times.
+    """
+    global _looking
+    look_again()
+    listed()
+    _looking = False
+    try:
+        yield
+    finally:
+        _looking = True
+
+
+def look_again() -> None:
+    """A species file has changed."""
+    global _seen
+    _seen = None
+
+
+def find_edit(scene: bpy.types.Scene | None, identifier: str) -> TetFloraSpeciesEdit | None:
+    """What this file has in place of a species.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene or None
+        Looked at before the file's other scenes: a species is the same in all of them unless two scenes disagree.
+    identifier : str
+    """
+    return next((edit for edit in _edits(scene) if edit.identifier == identifier), None)
+
+
+def _edits(scene: bpy.types.Scene | None) -> Iterator[TetFloraSpeciesEdit]:
+    # While add-ons are enabled at startup bpy.data has nothing.
+    others = [s for s in getattr(bpy.data, "scenes", ()) if s != scene]
+    for one in ([scene] if scene is not None else []) + others:
+        yield from one.tetflora.species_edits
+
+
+def species_for(scene: bpy.types.Scene | None, identifier: str) -> Species:
+    """A species as this file has it: edited here, else the catalogue's.
+
+    Raises
+    ------
+    SpeciesError
+        Unknown, or broken; the message names the key and what is allowed.
+    """
+    edit = find_edit(scene, identifier)
+    return load_species(identifier, known=listed()) if edit is None else _species(edit.text, identifier)
+
+
+@lru_cache(maxsize=64)
+def _species(text: str, identifier: str) -> Species:
+    source = f"{identifier} (edited in this file)"
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise SpeciesError(f"{source}: is not valid JSON: {error}") from None
+    return species_from_dict(data, identifier, source)
+
+
+def problem_of(scene: bpy.types.Scene | None, identifier: str) -> str:
+    """What is wrong with a species, or an empty text; cheap enough for a panel."""
+    edit = find_edit(scene, identifier)
+    if edit is not None:
+        return _problem(edit.text, identifier)
+    try:
+        load_species(identifier, known=listed())
+    except SpeciesError as error:
+        return str(error)
+    return ""
+
+
+@lru_cache(maxsize=64)
+def _problem(text: str, identifier: str) -> str:
+    try:
+        _species(text, identifier)
+    except SpeciesError as error:
+        return str(error)
+    return ""
+
+
+def species_data(scene: bpy.types.Scene | None, identifier: str) -> dict[str, Any]:
+    """The decoded JSON of a species, edited or not, valid or not.
+
+    Returns
+    -------
+    dict
+        Shared with other callers: look, do not touch. Use `change_species` to change it.
+
+    Raises
+    ------
+    SpeciesError
+        Unknown species, or a file that holds no JSON object.
+    """
+    edit = find_edit(scene, identifier)
+    if edit is not None:
+        return _decoded(edit.text, identifier)
+    known = listed()
+    if identifier not in known:
+        raise SpeciesError(f'Unknown species "{identifier}"; available: {", ".join(known) or "none"}')
+    if identifier not in _read:
+        path = known[identifier].path
+        status = path.stat()
+        _read[identifier] = _decoded_file(path, status.st_mtime_ns, status.st_size)
+    return _read[identifier]
+
+
+@lru_cache(maxsize=64)
+def _decoded(text: str, name: str) -> dict[str, Any]:
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise SpeciesError(f"{name}: is not valid JSON: {error}") from None
+    if not isinstance(data, dict):
+        raise SpeciesError(f"{name}: must be a JSON object")
+    return data
+
+
+@lru_cache(maxsize=64)
+def _decoded_file(path: Path, _modified: int, _size: int) -> dict[str, Any]:
+    try:
+        return _decoded(path.read_text(encoding="utf-8-sig"), path.name)
+    except (OSError, UnicodeDecodeError) as error:
+        raise SpeciesError(f"{path.name}: cannot read the file: {error}") from None
+
+
+def change_species(scene: bpy.types.Scene, identifier: str, change: Callable[[dict[str, Any]], None]) -> None:
+    """Change a species in this file; the catalogue's file stays as it is.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        Receives the edit if no scene of the file has one yet.
+    identifier : str
+    change : callable
+        Changes the decoded JSON that it is given. What comes of it need not be valid; `problem_of` tells.
+
+    Raises
+    ------
+    SpeciesError
+        As `species_data`.
+    """
+    data = copy.deepcopy(species_data(scene, identifier))
+    change(data)
+    store_species(scene, identifier, data)
+
+
+def store_species(scene: bpy.types.Scene, identifier: str, data: dict[str, Any]) -> None:
+    """Keep a decoded species in this file under an identifier, in place of an earlier one."""
+    text = json.dumps(data, ensure_ascii=False)
+    edit = find_edit(scene, identifier)
+    if edit is None:
+        edit = scene.tetflora.species_edits.add()
+        edit.identifier = identifier
+    if edit.text != text:
+        edit.text = text
+        tell_listeners()
+
+
+def revert_species(identifier: str) -> int:
+    """Forget what this file has in place of a species, in all scenes; how many edits there were."""
+    removed = 0
+    for scene in bpy.data.scenes:
+        edits = scene.tetflora.species_edits
+        for index in [i for i, edit in enumerate(edits) if edit.identifier == identifier][::-1]:
+            edits.remove(index)
+            removed += 1
+    if removed:
+        tell_listeners()
+    return removed
+
+
+def tell_listeners() -> None:
+    """Some species has changed."""
+    look_again()
+    listeners.notify()
+
+
+def new_identifier(name: str, taken: Callable[[str], bool]) -> str:
+    """An identifier for a name, fit for a file's name on every system, that nothing has yet."""
+    stem = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")[:60] or "species"
+    number, identifier = 1, stem
+    while taken(identifier):
+        number += 1
+        identifier = f"{stem}_{number}"
+    return identifier
+
+
+def catalogue() -> dict[str, SpeciesInfo]:
+    """All species that this user or this file has, by identifier, sorted by name."""
+    known = listed()
+    edited = edited_infos()
+    return dict(sorted((known | edited).items(), key=lambda item: item[1].name.lower())) if edited else known
+
+
+def edited_infos() -> dict[str, SpeciesInfo]:
+    """What menus show of the species that this file has; the first scene's where scenes disagree."""
+    found: dict[str, SpeciesInfo] = {}
+    for edit in _edits(None):
+        if edit.identifier and edit.identifier not in found:
+            try:
+                data = _decoded(edit.text, edit.identifier)
+            except SpeciesError:
+                data = {}
+            name, description = str(data.get("name", edit.identifier)), str(data.get("description", ""))
+            found[edit.identifier] = SpeciesInfo(edit.identifier, name, description, Path())
+    return found
+
+
+CLASSES = (TetFloraSpeciesEdit,)

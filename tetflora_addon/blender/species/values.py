@@ -1,0 +1,303 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reading and writing the species that the editor shows, key by key, in its JSON.
+
+Properties of the species editor beside the keys of an order: name, leaves, bark, which order is shown.
+"""
+
+from __future__ import annotations
+
+from math import isnan
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+
+from ...errors import SpeciesError
+from ...species.leaf_models import LEAF_MODELS
+from ...species.schema import ORDER_KEYS, QUALITY_LIMITS
+from ...species.skeletons import MAX_ORDERS
+from ...species.species import BARKS
+from .catalogue import SpeciesChoice
+from .edits import catalogue, change_species, species_data, species_for, tell_listeners
+
+_SIGNIFICANT = 6  # digits of a slider's float32 that are meant
+
+
+def present_species(editor: bpy.types.PropertyGroup) -> str:
+    """Identifier of the species that the editor shows; what the drop-down shows when none was chosen yet."""
+    return editor.species or next(iter(catalogue()), "")
+
+
+def _data_of(editor: bpy.types.PropertyGroup) -> dict[str, Any]:
+    """The decoded species that the editor shows; empty where there is none that could be shown."""
+    try:
+        return species_data(editor.id_data, present_species(editor))
+    except SpeciesError:
+        return {}
+
+
+def _orders_in(data: dict[str, Any]) -> list[dict[str, Any]]:
+    orders = data.get("orders")
+    return orders if isinstance(orders, list) and all(isinstance(o, dict) for o in orders) else []
+
+
+def orders_of(editor: bpy.types.PropertyGroup) -> list[dict[str, Any]]:
+    """Decoded orders of the species that the editor shows; empty where there is none that could be shown."""
+    return _orders_in(_data_of(editor))
+
+
+def parts_of(editor: bpy.types.PropertyGroup) -> list[dict[str, Any]]:
+    """The orders, and after them the short shoot of species that have one."""
+    data = _data_of(editor)  # looked up once: each slider of the panel asks for it at each redraw
+    orders, spur = _orders_in(data), data.get("spur")
+    return orders + ([spur] if isinstance(spur, dict) and orders else [])
+
+
+def present_order(editor: bpy.types.PropertyGroup) -> int:
+    """Index among `parts_of` of what the sliders show."""
+    return _order_in(editor, parts_of(editor))
+
+
+def _order_in(editor: bpy.types.PropertyGroup, parts: list[dict[str, Any]]) -> int:
+    return max(min(editor.order_index, len(parts) - 1), 0)
+
+
+def order_label(index: int, order: dict[str, Any], spur: bool = False) -> str:
+    """A line of the list of orders."""
+    name = "Short shoots" if spur else ("Trunk", "Branches", "Twigs")[index] if index < 3 else f"Order {index}"
+    counts = [f"{text} {what}" for what in ("branches", "leaves") if (text := _count(order.get(what)))]
+    number = "+" if spur else index
+    return f"{number}  {name}: {', '.join(counts)}" if counts else f"{number}  {name}"
+
+
+def _count(value: Any) -> str:
+    try:
+        mean, variation = map(float, value)
+    except (TypeError, ValueError):
+        return ""
+    return f"{mean:g}" if mean + variation > 0 else ""
+
+
+def value_of(editor: bpy.types.PropertyGroup, name: str) -> Any:
+    """Value of a key of the shown order as JSON; the default if the file does not give it."""
+    parts, key = parts_of(editor), ORDER_KEYS[name]
+    index = _order_in(editor, parts)
+    if parts and name in parts[index]:
+        return parts[index][name]
+    try:
+        # Some defaults follow from other keys, and only the reader knows how.
+        species = species_for(editor.id_data, present_species(editor))
+        return getattr(species.orders[index] if index < len(species.orders) else species.spur, name)
+    except (SpeciesError, AttributeError):
+        return key.default
+
+
+def species_value(editor: bpy.types.PropertyGroup, name: str, default: Any) -> Any:
+    """Value of a key of the whole species as JSON."""
+    return _data_of(editor).get(name, default)
+
+
+def set_species_value(editor: bpy.types.PropertyGroup, name: str, value: Any) -> None:
+    """Write a key of the whole species; None takes it out."""
+
+    def change(data: dict[str, Any]) -> None:
+        data[name] = value
+        if value is None:
+            del data[name]
+
+    change_species(editor.id_data, present_species(editor), change)
+
+
+def number_in(value: Any, *path: int) -> float:
+    """A number inside nested lists; 0 where there is none. A range may be written as its mean alone."""
+    if path and isinstance(value, int | float):
+        return 0.0 if path[0] else float(value)
+    try:
+        for step in path:
+            value = value[step]
+        number = float(value)
+    except (TypeError, ValueError, IndexError, KeyError):
+        return 0.0
+    return 0.0 if isnan(number) else number
+
+
+def rounded(value: float) -> float:
+    """The digits of a slider's single precision that are meant."""
+    return float(f"{value:.{_SIGNIFICANT}g}")
+
+
+def write(editor: bpy.types.PropertyGroup, name: str, value: Any) -> None:
+    """Write a key of the shown order; Blender swallows errors of setters, so the panel has to show them."""
+    index = present_order(editor)
+    if len(parts_of(editor)) > index:
+
+        def change(data: dict[str, Any]) -> None:
+            orders = data["orders"]
+            (orders[index] if index < len(orders) else data["spur"])[name] = value
+
+        change_species(editor.id_data, present_species(editor), change)
+
+
+def write_range(editor: bpy.types.PropertyGroup, name: str, part: int, value: float) -> None:
+    """Write the mean (0) or the variation (1) of a range of the shown order."""
+    old = value_of(editor, name)
+    write(editor, name, [value if i == part else rounded(number_in(old, i)) for i in (0, 1)])
+
+
+#: Items of ``leaf_form`` and ``blossom_form`` that are no built-in model.
+OBJECT_LEAF, OWN_LEAF, NO_LEAF = "OBJECT", "OWN", "NONE"
+
+# Blender keeps no copy of the strings of dynamic items, so somebody has to.
+_kept: dict[tuple[str, ...], list[tuple[str, str, str, int]]] = {}
+
+
+def _order_items(editor: bpy.types.PropertyGroup, _context: Any) -> list[tuple[str, str, str, int]]:
+    orders = len(orders_of(editor))
+    labels = tuple(order_label(i, part, i >= orders) for i, part in enumerate(parts_of(editor)[: MAX_ORDERS + 1]))
+    if labels not in _kept:
+        if len(_kept) > 256:  # every number on the way of a slider is another text
+            _kept.clear()
+        _kept[labels] = [(str(i), text, "Edit the branches of this order", i) for i, text in enumerate(labels)] or [
+            ("0", "No orders", "This species cannot be read", 0)
+        ]
+    return _kept[labels]
+
+
+_LEAF_ITEMS = [
+    *((name, name.capitalize(), f"{m.polygons} faces", i) for i, (name, m) in enumerate(LEAF_MODELS.items())),
+    (OBJECT_LEAF, "Mesh Object", "Mesh object of this file, one unit long along +Y", len(LEAF_MODELS)),
+    (OWN_LEAF, "From Species File", "Polygons from the species file, or several forms", len(LEAF_MODELS) + 1),
+]  # fmt: skip
+_BLOSSOM_ITEMS = [*_LEAF_ITEMS, (NO_LEAF, "None", "The species has no blossoms or fruit", len(_LEAF_ITEMS))]
+
+
+def _forms(editor: bpy.types.PropertyGroup, kind: str) -> dict[str, Any]:
+    """The only form of a kind of leaf as JSON; empty where there are several, or none."""
+    forms = species_value(editor, kind, {})
+    return forms if isinstance(forms, dict) else {}
+
+
+def _form(editor: bpy.types.PropertyGroup, kind: str) -> str:
+    form = _forms(editor, kind)
+    if "object" in form:
+        return OBJECT_LEAF
+    if kind == "blossom" and species_value(editor, kind, None) is None:
+        return NO_LEAF
+    return model if (model := form.get("model")) in LEAF_MODELS else OWN_LEAF
+
+
+def _set_form(editor: bpy.types.PropertyGroup, kind: str, identifier: str) -> None:
+    if identifier == OBJECT_LEAF:
+        set_species_value(editor, kind, {"object": str(_forms(editor, kind).get("object") or kind.capitalize())})
+    elif identifier == NO_LEAF:
+        set_species_value(editor, kind, None)
+    elif identifier != OWN_LEAF:  # polygons cannot be invented here
+        set_species_value(editor, kind, {"model": identifier})
+
+
+def _form_property(kind: str, items: list[tuple[str, str, str, int]], name: str, description: str) -> Any:
+    return EnumProperty(
+        name=name,
+        description=description,
+        items=items,
+        get=lambda self: next(i for key, _, _, i in items if key == _form(self, kind)),
+        set=lambda self, number: _set_form(self, kind, items[number][0]),
+        options={'SKIP_SAVE'},
+    )
+
+
+def _object_property(kind: str) -> Any:
+    return StringProperty(
+        name=f"{kind.capitalize()} Object",
+        description=f"Mesh object used as the {kind}: stalk at the origin, pointing along +Y, upper side facing +Z",
+        get=lambda self: str(_forms(self, kind).get("object", "")),
+        set=lambda self, value: set_species_value(self, kind, {"object": value}),
+        options={'SKIP_SAVE'},
+    )
+
+
+def _transmission_property(kind: str) -> Any:
+    key = f"{kind}_transmission"
+    return FloatProperty(
+        name=f"{kind.capitalize()} Translucency",
+        description=f"Fraction of the light scattered by a {kind} that passes through it",
+        subtype='FACTOR',
+        min=0.0,
+        max=1.0,
+        get=lambda self: number_in(species_value(self, key, 0.4)),
+        set=lambda self, value: set_species_value(self, key, rounded(value)),
+        options={'SKIP_SAVE'},
+    )
+
+
+class WholeSpecies(SpeciesChoice):
+    """Properties of the editor that do not come from the keys of an order."""
+
+    order_index: IntProperty(name="Active Order", min=0, options={'HIDDEN'})
+    order: EnumProperty(
+        name="Order",
+        description="Generation of branches to edit: 0 is the trunk, 1 grows on the trunk",
+        items=_order_items,
+        get=present_order,
+        set=lambda self, number: setattr(self, "order_index", number),
+        options={'SKIP_SAVE'},
+    )
+    preview_seed: IntProperty(
+        name="Seed",
+        description="Individual of the species to show in the preview",
+        default=1,
+        min=0,
+        update=lambda _self, _context: tell_listeners(),
+        options=set(),
+    )
+    species_name: StringProperty(
+        name="Name",
+        description="Name shown in menus; the identifier that plants refer to does not change",
+        get=lambda self: str(species_value(self, "name", "")),
+        set=lambda self, value: set_species_value(self, "name", value),
+        options={'SKIP_SAVE'},
+    )
+    species_description: StringProperty(
+        name="Description",
+        description="Tooltip of the species in menus, in one sentence",
+        get=lambda self: str(species_value(self, "description", "")),
+        set=lambda self, value: set_species_value(self, "description", value),
+        options={'SKIP_SAVE'},
+    )
+    leaf_form: _form_property("leaf", _LEAF_ITEMS, "Leaf Model", "Shape of each leaf")
+    leaf_object: _object_property("leaf")
+    leaf_transmission: _transmission_property("leaf")
+    blossom_form: _form_property(
+        "blossom", _BLOSSOM_ITEMS, "Blossom Model", "Shape of blossoms or fruit, used by orders of this Leaf Kind"
+    )
+    blossom_object: _object_property("blossom")
+    blossom_transmission: _transmission_property("blossom")
+    exact: BoolProperty(
+        name="Exact Plant",
+        description="Make all plants of the species identical: ignore variation and seeds",
+        get=lambda self: species_value(self, "exact", False) is True,
+        set=lambda self, value: set_species_value(self, "exact", value),
+        options={'SKIP_SAVE'},
+    )
+    bark: EnumProperty(
+        name="Bark",
+        description="Pattern of the bark",
+        items=[(name, name.capitalize(), "", number) for number, name in enumerate(BARKS)],
+        get=lambda self: BARKS.index(value) if (value := species_value(self, "bark", BARKS[0])) in BARKS else 0,
+        set=lambda self, number: set_species_value(self, "bark", BARKS[number]),
+        options={'SKIP_SAVE'},
+    )
+    quality: FloatProperty(
+        name="Quality",
+        description="Polygon multiplier for this species: below 1 fewer, larger leaves; above 1 more, finer ones",
+        min=QUALITY_LIMITS[0],
+        max=QUALITY_LIMITS[1],
+        soft_min=0.02,
+        soft_max=10.0,
+        default=1.0,
+        precision=3,
+        get=lambda self: number_in(species_value(self, "quality", 1.0)),
+        set=lambda self, value: set_species_value(self, "quality", rounded(value)),
+        options={'SKIP_SAVE'},
+    )

@@ -1,0 +1,249 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Refine by itself in the window, a moment after the camera, plants or settings changed; in slices between redraws.
+
+A change while it works stops it, and it begins again when nothing has changed for `QUIET` seconds. What a refinement
+depends on is digested first (`scene_digest`): where that is the same as last time, nothing is done. The results of the
+time before stay until there are new ones.
+
+Undo, loading, rendering, and operators that change results stop it too, because it holds on to datablocks that these
+take away.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import bpy
+
+from ...errors import TetFloraError
+from ...refinement.statistics import Progress
+from ..job import refine
+from ..job.frame_cache import choices, scene_digest
+from ..materials.nodes import is_ours
+from ..placing.plant_objects import prepare_scene
+from ..properties import auto_refine_switched
+from ..results.collection import has_results
+from ..results.leaf_objects import leaf_objects
+from ..runtime import Handlers, call_off, call_soon, redraw
+from ..settings import wind_of
+from .state import camera_now
+
+#: Seconds without a change before it begins, and seconds of work between two redraws.
+QUIET, SLICE = 0.6, 0.03
+_BUSY = 0.5  # seconds until it looks again whether Blender has time
+_CHANGING = (bpy.types.Object, bpy.types.Camera, bpy.types.Light, bpy.types.Mesh, bpy.types.PointCloud, bpy.types.Curve)
+
+
+@dataclass
+class _State:
+    """The job of the session; names instead of datablocks, which do not outlive a load."""
+
+    scene: str = ""
+    steps: Generator[Progress, bool | None, object] | None = None
+    digest: str = ""  # of the job
+    due: float = 0.0
+    message: str = ""
+    working: bool = False  # in here right now: what changes is our own doing
+    again: bool = False  # look once more when the job is done
+    paused: int = 0  # others that refine
+
+
+_state = _State()
+_done: dict[str, str] = {}  # digest of the results that a scene has, by its name
+
+
+def message() -> str:
+    """What a panel says of it; empty where there is nothing to say."""
+    return _state.message
+
+
+def _switched(scene: bpy.types.Scene) -> None:
+    """It was switched on or off in a scene."""
+    stop()
+    _state.message = ""
+    if scene.tetflora.auto_refine:
+        schedule(scene)
+
+
+def schedule(scene: bpy.types.Scene) -> None:
+    """Refine a scene when it has been quiet for a moment; stops what was begun before."""
+    stop()
+    _state.scene, _state.due = scene.name, time.monotonic() + QUIET
+    if not bpy.app.background:
+        call_soon(tick, QUIET)
+
+
+def stop() -> None:
+    """Stop, and take away what is half made."""
+    if _state.steps is not None:
+        _state.working = True
+        try:
+            _state.steps.close()
+        finally:
+            _state.steps, _state.working, _state.message = None, False, ""
+
+
+@contextmanager
+def paused() -> Iterator[None]:
+    """Stop, and wait while somebody else refines: each would take away what the other has half made."""
+    stop()
+    _state.paused += 1
+    try:
+        yield
+    finally:
+        _state.paused -= 1
+
+
+def refined(scene: bpy.types.Scene) -> None:
+    """Somebody else has refined a scene as it is now: what that made need not be made again."""
+    if scene.tetflora.auto_refine:
+        layer = _view_layer(scene)
+        layer.update()
+        _done[scene.name] = scene_digest(scene, layer.depsgraph, layer)
+
+
+def tick() -> float | None:
+    """Do a slice of what there is to do; seconds until the next, or None if nothing is left."""
+    scene = bpy.data.scenes.get((_state.scene, None))
+    if scene is None or not scene.tetflora.auto_refine:
+        stop()
+        return None
+    wait = _state.due - time.monotonic()
+    if _state.steps is None and wait > 0.0:
+        return wait
+    if _state.paused or bpy.app.is_job_running('RENDER') or bpy.context.mode != 'OBJECT':
+        return _BUSY
+    _state.working = True
+    try:
+        more = _begin(scene) if _state.steps is None else _slice(scene)
+    except Exception as error:
+        expected = isinstance(error, TetFloraError)
+        _state.steps, more = None, False
+        _state.message = str(error) if expected else f"unexpected error, please report it as a bug: {error!r}"
+        redraw()
+        if not expected:
+            raise
+    finally:
+        _state.working = False
+    return 0.001 if more else None
+
+
+def _begin(scene: bpy.types.Scene) -> bool:
+    """Start the job if what it depends on has changed."""
+    layer = _view_layer(scene)
+    layer.update()
+    digest = scene_digest(scene, layer.depsgraph, layer)
+    if _done.get(scene.name) == digest and has_results(scene):
+        _state.message = ""
+        redraw()
+        return False
+    _state.digest, _state.again = digest, False
+    _state.steps = refine.refine_steps(scene, layer.depsgraph, view_layer=layer)
+    return True
+
+
+def _slice(scene: bpy.types.Scene) -> bool:
+    end = time.monotonic() + SLICE
+    try:
+        progress = next(_state.steps)
+        while time.monotonic() < end:
+            progress = next(_state.steps)
+    except StopIteration:
+        _state.steps, _state.message = None, ""
+        _done[scene.name] = _state.digest
+        prepare_scene(scene)
+        redraw()
+        _state.due = time.monotonic() + QUIET
+        return _state.again
+    text = f"{progress.fraction:.0%}  {progress.message}"
+    if text != _state.message:  # a redraw of the viewport may take longer than the slice
+        _state.message = text
+        redraw()
+    return True
+
+
+def _view_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
+    windows = bpy.context.window_manager.windows
+    shown = next((window.view_layer for window in windows if window.scene == scene), None)
+    return shown or scene.view_layers[0]
+
+
+_seen: dict[str, str] = {}  # settings of scenes as they were at the last change
+
+
+def on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Something in a scene changed: is it anything of what refinement depends on?"""
+    if _state.working or not scene.tetflora.auto_refine:
+        return
+    settings = f"{choices(scene)}{camera_now(scene)}{leaf_objects(scene)}"
+    other = _seen.get(scene.name) != settings
+    _seen[scene.name] = settings
+    concerns = [update for update in depsgraph.updates if _concerns(update)]
+    at_it = _state.steps is not None and scene.name == _state.scene
+    if at_it and not other and all(_only_flags(update) for update in concerns):
+        # Results that are linked have the flags of all other objects updated, and that when we are no longer at work:
+        # the job would stop itself for ever. Whoever hid an object meanwhile is heard when it is done.
+        _state.again = _state.again or bool(concerns)
+    elif other or concerns:
+        schedule(scene)
+
+
+def on_frame(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
+    """Another frame: in the wind all plants have moved."""
+    if not _state.working and scene.tetflora.auto_refine and wind_of(scene) is not None:
+        schedule(scene)
+
+
+def _concerns(update: bpy.types.DepsgraphUpdate) -> bool:
+    changed = update.id.original
+    return isinstance(changed, _CHANGING) and not is_ours(changed)
+
+
+def _only_flags(update: bpy.types.DepsgraphUpdate) -> bool:
+    """Whether an object has neither moved nor another form nor other settings; it may have been hidden."""
+    moved = update.is_updated_transform or update.is_updated_geometry
+    return isinstance(update.id.original, bpy.types.Object) and not moved
+
+
+def on_interruption(*_arguments: object) -> None:
+    """Undo, load or render: datablocks that the job holds may go."""
+    scene = bpy.data.scenes.get((_state.scene, None)) if _state.steps is not None else None
+    stop()
+    if scene is not None:
+        schedule(scene)
+
+
+def on_load(*_arguments: object) -> None:
+    """Another file: its results are none of ours."""
+    _done.clear()
+    _seen.clear()
+    _state.message = ""
+    call_off(tick)
+
+
+_HANDLERS = Handlers(
+    depsgraph_update_post=on_change,
+    frame_change_post=on_frame,
+    undo_pre=on_interruption,
+    redo_pre=on_interruption,
+    render_init=on_interruption,
+    load_pre=(on_interruption, on_load),
+)
+
+
+def register() -> None:
+    """Listen."""
+    auto_refine_switched.append(_switched)
+    _HANDLERS.register()
+
+
+def unregister() -> None:
+    """Stop, and listen no more."""
+    stop()
+    on_load()
+    _HANDLERS.unregister()
+    auto_refine_switched.remove(_switched)

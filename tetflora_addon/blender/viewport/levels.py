@@ -1,0 +1,166 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Find out what viewports preview: levels of refinement when asked to, plants of few faces whenever they change.
+
+Without a window nobody looks: then nothing is read unasked, and nothing listens but to the loading of files.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator
+
+import bpy
+
+from ...errors import TetFloraError
+from ...preview.levels import Levels, gather
+from ...preview.light_plants import Shapes, bounds_of_plants, light_plants
+from ...refinement.loop import refine as refine_loop
+from ...refinement.statistics import Progress
+from ..job.contents import compile_for, read_scene, refinement_settings
+from ..runtime import Handlers, call_off, call_soon, redraw
+from ..scene.camera import read_camera
+from ..scene.plants import NoPlantsError, read_plants
+from ..species import edits
+from . import state
+from .state import camera_now, find, of
+
+_SOON = 0.2  # seconds from a change of plants to reading them again
+
+
+def level_steps(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer | None = None
+) -> Generator[Progress, None, Levels]:
+    """Refine a scene without making anything, and keep all levels for viewports; closing it changes nothing.
+
+    Raises
+    ------
+    TetFloraError
+        As `job.refine_steps`.
+    """
+    yield Progress(0.0, "Reading the scene")
+    looked = camera_now(scene)
+    before = find(scene)
+    camera = before.frozen if before is not None and before.frozen is not None else read_camera(scene, depsgraph)
+    given = read_scene(scene, depsgraph, view_layer or depsgraph.view_layer)
+    yield Progress(0.02, "Compiling species")
+    flora = compile_for(given.species, scene, depsgraph)
+    settings = refinement_settings(scene)
+    states = refine_loop(flora, given.seeds, camera, settings, given.occluders, given.polygons, given.lights)
+    loop = gather(states, flora, camera)
+    fraction = 0.05
+    while True:
+        try:
+            level = next(loop)
+        except StopIteration as stop:
+            levels = stop.value
+            break
+        fraction += 0.15 * (1.0 - fraction)  # nobody knows how many passes will follow
+        yield Progress(fraction, f"Level {level.number}: {len(level):,} tetrahedra")
+    preview = of(scene)
+    preview.levels, preview.looked = levels, looked
+    preview.made += 1
+    if scene.tetflora.preview.freeze:
+        preview.frozen = camera
+    redraw()
+    return levels
+
+
+def read_shapes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Shapes | None:
+    """Make the plants of a scene anew in the form that its settings say; None where they are not to be shown.
+
+    What is wrong with a plant is told by `Preview.message`, for the panel, and the plants of before stay.
+    """
+    begin, preview, form = time.perf_counter(), of(scene), scene.tetflora.preview.plants
+    preview.message, preview.objects = "", len(scene.objects)
+    try:
+        if form == 'NONE':
+            preview.shapes = None
+        else:
+            seeds = read_plants(scene, depsgraph, depsgraph.view_layer)
+            make = light_plants if form == 'LIGHT' else bounds_of_plants
+            preview.shapes = make(compile_for(seeds.identifiers, scene, depsgraph), seeds)
+    except NoPlantsError as error:
+        preview.shapes, preview.message = None, str(error)
+    except TetFloraError as error:
+        preview.message = str(error)
+    preview.made += 1
+    preview.seconds = time.perf_counter() - begin
+    redraw()
+    return preview.shapes
+
+
+def schedule() -> None:
+    """Read the plants of what is open soon; many changes in a row are one reading."""
+    if not bpy.app.background:
+        # A forest of many plants must not keep the window busy while one of them is moved.
+        call_soon(_on_timer, max(_SOON, state.longest_reading()))
+
+
+def _on_timer() -> None:
+    for window in bpy.context.window_manager.windows:
+        scene = window.scene
+        if scene.tetflora.preview.plants != 'NONE':
+            depsgraph = window.view_layer.depsgraph
+            if depsgraph is not None:
+                read_shapes(scene, depsgraph)
+
+
+def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    if scene.tetflora.preview.plants == 'NONE':
+        return
+    preview = find(scene)
+    for update in depsgraph.updates:
+        datablock = update.id
+        if isinstance(datablock, bpy.types.Object):
+            own = datablock.original.tetflora
+            if (own.is_plant or own.is_field) and (update.is_updated_transform or update.is_updated_geometry):
+                schedule()
+                return
+        # Deleted objects are told only by what they were in.
+        elif isinstance(datablock, (bpy.types.Scene, bpy.types.Collection)) and (
+            preview is None or len(scene.objects) != preview.objects
+        ):
+            schedule()
+            return
+
+
+def _on_undo(scene: bpy.types.Scene, _other: object = None) -> None:
+    state.bring_in_step(scene)
+
+
+def _on_load_pre(_path: object, _other: object = None) -> None:
+    state.forget_all()
+    call_off(_on_timer)
+
+
+def _on_load_post(_path: object, _other: object = None) -> None:
+    for scene in bpy.data.scenes:
+        settings = scene.tetflora.preview
+        if settings.freeze:  # the camera that was frozen is gone
+            settings.freeze = False
+        if settings.plants != 'NONE':
+            schedule()
+
+
+_HANDLERS = Handlers(load_pre=_on_load_pre, load_post=_on_load_post)
+_IN_WINDOW = Handlers(depsgraph_update_post=_on_update, undo_post=_on_undo, redo_post=_on_undo)
+
+
+def register() -> None:
+    """Listen to changes of plants where there is a window, and to loading in any case."""
+    _HANDLERS.register()
+    if not bpy.app.background:
+        _IN_WINDOW.register()
+    for listeners in (edits.listeners, state.listeners):
+        listeners.append(schedule)
+
+
+def unregister() -> None:
+    """Forget everything and stop listening."""
+    for listeners in (edits.listeners, state.listeners):
+        listeners.remove(schedule)
+    state.forget_all()
+    call_off(_on_timer)
+    _IN_WINDOW.unregister()
+    _HANDLERS.unregister()

@@ -1,0 +1,320 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Draw previews over 3D viewports: plants, tetrahedra, the frozen camera, figures. Nothing is drawn without a window.
+
+What does not depend on the view is handed to the graphics card once and kept. Translucent tetrahedra are made anew when
+the view changes, as many of them as the last view could be made of in a moment.
+
+From arrays to what the graphics card draws: edges and translucent triangles of tetrahedra, plants, a view's pyramid.
+
+Only called while a viewport is drawn; nothing here decides what is shown.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+import traceback
+from collections.abc import Callable
+
+import blf
+import bpy
+import gpu
+import numpy as np
+from numpy.typing import NDArray
+
+from ...camera.camera import Camera
+from ...preview.levels import FORMS, Level, Levels, as_shown, colours_of
+from ...preview.light_plants import Shapes
+from ...preview.projected import THICK, drawable, project
+from ...refinement.decisions import Decision
+from ...tetrahedra.geometry import EDGES
+from . import state
+from .state import Preview, TetFloraPreview
+
+#: Tetrahedra whose edges are drawn; of more, those that change most pixels.
+MOST_WIRES = 60_000
+_WIRE_ALPHA = 0.7
+#: Opacity under which a translucent tetrahedron is left out: less than a screen tells apart.
+_FAINT = 0.004
+
+
+def batch(kind: str, positions: NDArray, colours: NDArray, indices: NDArray) -> gpu.types.GPUBatch:
+    """A batch of 'LINES' or 'TRIS' with a colour (v, 4) for each corner (v, 3)."""
+    layout = gpu.types.GPUVertFormat()
+    layout.attr_add(id="pos", comp_type='F32', len=3, fetch_mode='FLOAT')
+    layout.attr_add(id="color", comp_type='F32', len=4, fetch_mode='FLOAT')
+    corners = gpu.types.GPUVertBuf(layout, len(positions))
+    corners.attr_fill("pos", np.ascontiguousarray(positions, np.float32))
+    corners.attr_fill("color", np.ascontiguousarray(colours, np.float32))
+    elements = gpu.types.GPUIndexBuf(type=kind, seq=np.ascontiguousarray(indices, np.int32))
+    return gpu.types.GPUBatch(type=kind, buf=corners, elem=elements)
+
+
+def chosen_by_worth(level: Level, forms: set[str], most: int) -> NDArray[np.intp]:
+    """Places (k,) in a level of tetrahedra of some forms, at most so many, those that change most pixels first."""
+    wanted = np.flatnonzero(np.isin(level.decision, [Decision[name] for name in forms]))
+    if len(wanted) <= most:
+        return wanted
+    return wanted[np.argsort(-level.contribution[wanted], kind="stable")[:most]]
+
+
+def wires(levels: Levels, level: Level, colour: str, forms: set[str]) -> gpu.types.GPUBatch | None:
+    """Edges of a level's tetrahedra; None where there are none."""
+    some = chosen_by_worth(level, forms, MOST_WIRES)
+    if len(some) == 0:
+        return None
+    vertices = levels.vertices(level, some)
+    shown = colours_of(level, colour, int(levels.levels[-1].depth.max()))[some]
+    indices = EDGES[None] + 4 * np.arange(len(some))[:, None, None]
+    return batch(
+        'LINES', vertices.reshape(-1, 3), np.repeat(_opaque(shown, _WIRE_ALPHA), 4, axis=0), indices.reshape(-1, 2)
+    )
+
+
+def translucent(
+    levels: Levels, level: Level, forms: set[str], camera: Camera, most: int
+) -> tuple[gpu.types.GPUBatch | None, int]:
+    """Projected tetrahedra of a level as a camera sees them, farthest first, and how many they are."""
+    some = chosen_by_worth(level, forms, most)
+    some = some[drawable(levels.vertices(level, some), camera)]
+    if len(some) == 0:
+        return None, 0
+    some = levels.back_to_front(level, camera, some)
+    projected = project(levels.vertices(level, some).astype(np.float64), level.extinction[some], camera)
+    colours = np.zeros((len(some), 5, 4), np.float32)
+    colours[:, :, :3] = as_shown(level.colour[some])[:, None]
+    colours[:, THICK, 3] = projected.opacity
+    triangles = projected.triangles[projected.opacity[projected.triangles[:, 0] // 5] > _FAINT]
+    if len(triangles) == 0:
+        return None, 0
+    return batch('TRIS', projected.corners.reshape(-1, 3), colours.reshape(-1, 4), triangles), len(some)
+
+
+def plants(shapes: Shapes) -> gpu.types.GPUBatch | None:
+    """All plants; None where there are none."""
+    if shapes.plants == 0:
+        return None
+    kind = 'TRIS' if shapes.indices.shape[1] == 3 else 'LINES'
+    return batch(kind, shapes.positions, _opaque(shapes.colours, 1.0), shapes.indices)
+
+
+def pyramid(camera: Camera, far: float, colour: tuple[float, float, float, float]) -> gpu.types.GPUBatch:
+    """Edges of what a camera sees between its near plane and a distance; its place and directions for a panorama."""
+    if camera.kind == "PANO":
+        axes = np.concatenate([camera.frame.T, -camera.frame.T]) * far / 10.0 + camera.position
+        ends = np.concatenate([axes, camera.position[None]])
+        return batch('LINES', ends, np.tile(colour, (7, 1)), np.array([(6, i) for i in range(6)]))
+    left, right, bottom, top = camera.window
+    rim = np.array([(left, bottom), (right, bottom), (right, top), (left, top)])
+    parts = []
+    for depth in (camera.near, max(far, 2.0 * camera.near)):
+        wide = rim * depth if camera.kind == "PERSP" else rim
+        local = np.concatenate([wide, np.full((4, 1), -depth)], axis=1)
+        parts.append(local @ camera.frame.T + camera.position)
+    ring = [(i, (i + 1) % 4) for i in range(4)]
+    edges = [*ring, *((a + 4, b + 4) for a, b in ring), *((i, i + 4) for i in range(4))]
+    return batch('LINES', np.concatenate(parts), np.tile(colour, (8, 1)), np.array(edges))
+
+
+def _opaque(colours: NDArray[np.float32], alpha: float) -> NDArray[np.float32]:
+    return np.concatenate([colours, np.full((len(colours), 1), alpha, np.float32)], axis=1)
+
+
+#: Seconds that making translucent tetrahedra of a view may take, and how many they are at least and at most.
+_MOMENT = 0.03
+_LEAST, _MOST = 500, 20_000
+_FROZEN = (1.0, 0.75, 0.2, 1.0)
+_TEXT, _COMPLAINT = (0.95, 0.95, 0.95, 1.0), (1.0, 0.7, 0.3, 1.0)
+_handles: list[object] = []
+
+
+def view_camera(region: bpy.types.RegionView3D, near: float) -> Camera:
+    """A viewport's view as the engine takes it; the size of its picture does not matter here."""
+    matrix = np.array(region.view_matrix.inverted(), np.float64)
+    kind = "PERSP" if region.is_perspective else "ORTHO"
+    # From an orthographic view everything is in front: its eye is as far back as one likes.
+    near = near if kind == "PERSP" else -np.inf
+    return Camera(kind, matrix[:3, 3], matrix[:3, :3], (-1.0, 1.0, -1.0, 1.0), near, np.inf, 1, 1)
+
+
+def _kept(preview: Preview, name: str, key: tuple, make: Callable[[], object]) -> object:
+    """What was made for a key, or made now if it has changed."""
+    if preview.cache.get(name, (None,))[0] != key:
+        preview.cache[name] = (key, make())
+    return preview.cache[name][1]
+
+
+def _draw_plants(preview: Preview) -> None:
+    shapes = preview.shapes
+    made = _kept(preview, "plants", (preview.made,), lambda: plants(shapes))
+    if made is None:
+        return
+    gpu.state.depth_test_set('LESS_EQUAL')
+    gpu.state.depth_mask_set(True)
+    gpu.state.face_culling_set('BACK')  # crowns and trunks are closed
+    made.draw(gpu.shader.from_builtin('SMOOTH_COLOR'))
+    gpu.state.face_culling_set('NONE')
+    gpu.state.depth_mask_set(False)
+
+
+def _draw_levels(preview: Preview, settings: TetFloraPreview, space: bpy.types.SpaceView3D) -> None:
+    levels, level = preview.levels, preview.levels.at(settings.level)
+    forms = frozenset(settings.forms)
+    shown = (preview.made, level.number, forms)
+    shader = gpu.shader.from_builtin('SMOOTH_COLOR')
+    gpu.state.blend_set('ALPHA')
+    gpu.state.depth_test_set('LESS_EQUAL')
+    gpu.state.depth_mask_set(False)  # clouds hide nothing
+    if settings.projected:
+        view = tuple(np.array(space.region_3d.view_matrix).ravel().round(7)), space.region_3d.is_perspective
+        made = _kept(
+            preview,
+            f"projected {space.as_pointer()}",
+            (*shown, *view),
+            lambda: _made_in_time(preview, level, forms, view_camera(space.region_3d, space.clip_start)),
+        )
+        if made is not None:
+            made.draw(shader)
+    if settings.wires:
+        made = _kept(
+            preview,
+            "wires",
+            (*shown, settings.colour),
+            lambda: wires(levels, level, settings.colour, forms),
+        )
+        if made is not None:
+            made.draw(shader)
+    gpu.state.blend_set('NONE')
+
+
+def _made_in_time(preview: Preview, level: Level, forms: frozenset[str], camera: Camera) -> gpu.types.GPUBatch | None:
+    """Translucent tetrahedra of a view; how long it takes decides how many the next view has."""
+    most = preview.cache.get("most", _MOST)
+    begin = time.perf_counter()
+    made, number = translucent(preview.levels, level, forms, camera, most)
+    seconds = max(time.perf_counter() - begin, 1e-4)
+    if number >= most // 2:
+        most = int(most * np.clip(_MOMENT / seconds, 0.5, 2.0))
+        preview.cache["most"] = int(np.clip(most, _LEAST, _MOST))
+    return made
+
+
+def _draw_frozen(preview: Preview) -> None:
+    camera = preview.frozen
+    far = _reach(preview, camera)
+    made = _kept(preview, "frozen", (*_place(camera), far), lambda: pyramid(camera, far, _FROZEN))
+    gpu.state.depth_test_set('LESS_EQUAL')
+    made.draw(gpu.shader.from_builtin('SMOOTH_COLOR'))
+
+
+def _reach(preview: Preview, camera: Camera) -> float:
+    """How far a frozen camera's pyramid is drawn: to the farthest that it sees of plants, metres."""
+    if preview.levels is None:
+        return min(camera.far, 100.0)
+
+    def farthest() -> float:
+        level = preview.levels.levels[-1]
+        middles = preview.levels.vertices(level).mean(axis=1)[level.visibility > 0.0]
+        depth = camera.to_camera_space(middles)[:, 2]
+        return float(min(max(depth.max(initial=1.0), 1.0), camera.far))
+
+    return _kept(preview, "reach", (preview.made, *_place(camera)), farthest)
+
+
+def _place(camera: Camera) -> tuple[float, ...]:
+    return (*camera.position.tolist(), *camera.frame.ravel().tolist(), *camera.window)
+
+
+def lines_of(scene: bpy.types.Scene, preview: Preview) -> list[tuple[str, tuple[float, float, float, float]]]:
+    """Lines of the figures in the corner of a viewport, from top to bottom, and their colours."""
+    settings, lines = scene.tetflora.preview, []
+    if preview.levels is not None:
+        level = preview.levels.at(settings.level)
+        figures, last = level.figures, preview.levels.levels[-1].number
+        lines.append((f"Level {level.number} of {last}   {len(level):,} tetrahedra with plants", _TEXT))
+        parts = (
+            (Decision.EXPLICIT, "explicit", figures.explicit),
+            (Decision.PROXY, "proxies", figures.proxy),
+            (Decision.HIDDEN, "hidden", figures.hidden),
+            (Decision.SPLIT, "to split", figures.split),
+        )
+        for decision, name, number in parts:
+            colour = (*FORMS[decision], 1.0) if settings.colour == 'FORM' else _TEXT
+            lines.append((f"    {number:,} {name}", colour))
+        lines.append((f"    {figures.polygons:,} explicit polygons", _TEXT))
+        if settings.colour != 'FORM' and settings.wires:
+            lines.append(("    dark: low    bright: high", _TEXT))
+    if preview.shapes is not None:
+        shapes = preview.shapes
+        of = f" of {shapes.of:,}" if shapes.of > shapes.plants else ""
+        lines.append((f"{shapes.plants:,}{of} plants shown", _TEXT))
+    if preview.frozen is not None:
+        lines.append(("Camera frozen", _FROZEN))
+    elif state.is_outdated(scene):
+        lines.append(("The camera has changed; compute the levels again, or freeze the camera", _COMPLAINT))
+    return lines
+
+
+def _draw_figures(scene: bpy.types.Scene, preview: Preview, area: bpy.types.Area) -> None:
+    lines = lines_of(scene, preview)
+    scale = bpy.context.preferences.system.ui_scale
+    left = next((r.width for r in area.regions if r.type == 'TOOLS' and r.alignment == 'LEFT'), 0)
+    step = 18.0 * scale
+    blf.size(0, 12.0 * scale)
+    blf.enable(0, blf.SHADOW)
+    blf.shadow(0, 3, 0.0, 0.0, 0.0, 0.9)
+    for n, (text, colour) in enumerate(reversed(lines)):
+        blf.color(0, *colour)
+        blf.position(0, left + 16.0 * scale, 16.0 * scale + n * step, 0.0)
+        blf.draw(0, text)
+    blf.disable(0, blf.SHADOW)
+
+
+def _guarded(draw: Callable[[bpy.types.Context, Preview], None]) -> None:
+    """Draw what a viewport shows; an error is told once and not at every redraw."""
+    context = bpy.context
+    preview = state.find(context.scene)
+    if preview is None or not context.space_data.overlay.show_overlays:
+        return
+    if preview.cache.get("broken") == preview.made:
+        return
+    try:
+        draw(context, preview)
+    except Exception:
+        preview.cache["broken"] = preview.made
+        print("TetFlora: cannot draw the preview; please report this as a bug:", file=sys.stderr)
+        traceback.print_exc()
+    finally:
+        gpu.state.blend_set('NONE')
+        gpu.state.face_culling_set('NONE')
+        gpu.state.depth_mask_set(False)
+        gpu.state.depth_test_set('NONE')
+
+
+def _in_space(context: bpy.types.Context, preview: Preview) -> None:
+    if preview.shapes is not None:
+        _draw_plants(preview)
+    if preview.levels is not None:
+        _draw_levels(preview, context.scene.tetflora.preview, context.space_data)
+    if preview.frozen is not None:
+        _draw_frozen(preview)
+
+
+def _on_screen(context: bpy.types.Context, preview: Preview) -> None:
+    if context.scene.tetflora.preview.statistics:
+        _draw_figures(context.scene, preview, context.area)
+
+
+def register() -> None:
+    """Draw over all 3D viewports from now on; in the background there are none."""
+    if bpy.app.background:
+        return
+    for draw, kind in ((_in_space, 'POST_VIEW'), (_on_screen, 'POST_PIXEL')):
+        _handles.append(bpy.types.SpaceView3D.draw_handler_add(_guarded, (draw,), 'WINDOW', kind))
+
+
+def unregister() -> None:
+    """Draw no more."""
+    while _handles:
+        bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), 'WINDOW')

@@ -1,0 +1,290 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Dots where the plants of the shown population would stand, in the viewport while its settings are edited.
+
+Nothing is made: dots are drawn by the gpu module, belong to the session and are forgotten when a file is loaded. What
+is shown is remembered by names and arrays, for references do not outlive undo.
+
+Lines that a tool draws on the ground while it runs: the brush's circle, the plant that a click would set.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import bpy
+import gpu
+import numpy as np
+from gpu_extras.batch import batch_for_shader
+from numpy.typing import NDArray
+
+from ...errors import TetFloraError
+from .. import compat
+from ..placing import properties
+from ..placing.populations import own_objects
+from ..placing.rules import awaits_update, makes_field, place_population, shown_population
+from ..runtime import Handlers, call_off, call_soon, redraw
+from ..species import edits
+
+#: Dots that are drawn at most, evenly chosen among the plants.
+MOST_DOTS = 20_000
+#: Plants that are placed at most for a preview; of more, it says so.
+MOST_PLACED = 200_000
+#: One after the other for the species of the mixture; linear RGB, told apart by colour-blind eyes as well
+#: (the palette of Okabe and Ito, "Color Universal Design", 2008).
+PALETTE = np.array(
+    [[0.0, 0.62, 0.45], [0.9, 0.62, 0.0], [0.34, 0.71, 0.91], [0.94, 0.89, 0.26], [0.84, 0.37, 0.0], [0.8, 0.47, 0.65]]
+)
+_SIZE = 6.0  # pixels
+_LIFT = 0.1  # metres above the ground, which would hide half of each dot
+_SOON = 0.08  # seconds from a change to new dots
+
+
+@dataclass(frozen=True)
+class Dots:
+    """What a preview shows.
+
+    Attributes
+    ----------
+    position : (n, 3) float32
+        Metres, world space.
+    colour : (n, 4) float32
+    plants : int
+        Plants that would be placed; at least, where ``more``.
+    more : bool
+    message : str
+        Why there are fewer than asked for, empty if there are not.
+    """
+
+    position: NDArray[np.float32]
+    colour: NDArray[np.float32]
+    plants: int
+    more: bool
+    message: str
+
+
+@dataclass
+class _State:
+    """The scene that shows a preview, and how the last placing went."""
+
+    scene: str | None = None
+    uid: str = ""
+    dots: Dots | None = None
+    error: str = ""
+    seconds: float = 0.0
+    handle: object = None
+    batch: object = field(default=None, repr=False)
+
+
+_state = _State()
+
+
+def shown_in(scene: bpy.types.Scene) -> bool:
+    """Whether the preview is switched on in a scene."""
+    return _state.scene == scene.name
+
+
+def show(scene: bpy.types.Scene, on: bool) -> None:
+    """Switch the preview of a scene on or off; in the window it appears a moment later, in the background never."""
+    _state.scene = scene.name if on else None
+    if on:
+        schedule()
+    else:
+        _clear()
+
+
+def found_for(population: bpy.types.PropertyGroup) -> Dots | None:
+    """What the preview found for a population by its present settings, if it is shown."""
+    return _state.dots if _state.scene is not None and population.uid == _state.uid else None
+
+
+def error() -> str:
+    """Why there are no dots, empty if there are some."""
+    return _state.error
+
+
+def schedule() -> None:
+    """Place dots anew soon; many changes in a row are one placing."""
+    if _state.scene is not None and not bpy.app.background:
+        # What takes long to place must not keep the window busy while a slider is dragged.
+        call_soon(_on_timer, max(_SOON, _state.seconds))
+
+
+def dots_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Dots:
+    """Dots for the population that the panel shows, without a change to anything.
+
+    Raises
+    ------
+    TetFloraError
+        Its settings leave no place, as the message says.
+    """
+    population = shown_population(scene)
+    if population.frozen:
+        raise TetFloraError(f'"{population.name}" is frozen and keeps its plants; turn off Freeze to preview changes')
+    grounds = None
+    if not population.uid:  # settings for a new population, which would grow on what is selected
+        chosen = [o for o in view_layer.objects if o.select_get(view_layer=view_layer)]
+        grounds = [o for o in chosen if o.type == 'MESH' and not o.tetflora.is_field]
+    own = set(own_objects(scene, population))
+    placement, _ = place_population(scene, depsgraph, population, own, grounds, MOST_PLACED)
+    number = len(placement)
+    drawn = np.linspace(0, number - 1, min(number, MOST_DOTS)).astype(np.int64) if number else np.zeros(0, np.int64)
+    position = placement.position[drawn].astype(np.float32)
+    position[:, 2] += _LIFT
+    colour = np.ones((len(drawn), 4), np.float32)
+    colour[:, :3] = PALETTE[placement.species[drawn] % len(PALETTE)]
+    return Dots(position, colour, number, number >= MOST_PLACED, placement.reason)
+
+
+def status(population: bpy.types.PropertyGroup) -> str:
+    """How many plants there are or will be, and as what; reads no geometry, so that panels may call it."""
+    dots = found_for(population)
+    if dots is not None:
+        number, known = dots.plants, not dots.more or population.by_density
+    elif population.uid and not awaits_update(population):
+        number, known = population.made, True
+    elif population.by_density:
+        number, known = 0, False
+    else:
+        number, known = population.count, True
+    if dots is not None and dots.more and not population.by_density:
+        number, known = population.count, True
+    if not known:
+        return "As many plants as fit on the ground"
+    made_as = "one field" if makes_field(population, number) else "empties"
+    more = "more than " if dots is not None and dots.more and population.by_density else ""
+    return f"{more}{number:,} plant{'' if number == 1 else 's'}, as {made_as}"
+
+
+def complaints(population: bpy.types.PropertyGroup) -> list[str]:
+    """What is wrong with a population, for the panel; reads no geometry."""
+    if _state.scene is not None and population.uid == _state.uid:
+        told = _state.error or (_state.dots.message if _state.dots is not None else "")
+    else:
+        told = population.message
+    return [told] if told else []
+
+
+def _on_timer() -> None:
+    scene = bpy.data.scenes.get((_state.scene, None)) if _state.scene is not None else None
+    if scene is None or scene != bpy.context.scene:
+        _clear()
+        return
+    begin = time.perf_counter()
+    try:
+        dots = dots_of(scene, bpy.context.evaluated_depsgraph_get(), bpy.context.view_layer)
+        _state.error = ""
+    except TetFloraError as wrong:
+        dots, _state.error = None, str(wrong)
+    _state.seconds = time.perf_counter() - begin
+    _clear()
+    _state.dots, _state.uid = dots, shown_population(scene).uid
+    if dots is not None and len(dots.position):
+        _state.handle = bpy.types.SpaceView3D.draw_handler_add(_draw, (), 'WINDOW', 'POST_VIEW')
+    redraw()
+
+
+def _draw() -> None:
+    context = bpy.context
+    if _state.dots is None or context.scene.name != _state.scene or not context.space_data.overlay.show_overlays:
+        return
+    shader = gpu.shader.from_builtin(compat.dot_shader())
+    if _state.batch is None:
+        _state.batch = batch_for_shader(shader, 'POINTS', {"pos": _state.dots.position, "color": _state.dots.colour})
+    gpu.state.depth_test_set('LESS_EQUAL')
+    gpu.state.point_size_set(_SIZE * context.preferences.system.ui_scale)
+    _state.batch.draw(shader)
+    gpu.state.point_size_set(1.0)
+    gpu.state.depth_test_set('NONE')
+
+
+def _clear() -> None:
+    """Take the dots and their handler away."""
+    if _state.handle is not None:
+        bpy.types.SpaceView3D.draw_handler_remove(_state.handle, 'WINDOW')
+    _state.handle = _state.batch = _state.dots = None
+    redraw()
+
+
+def _on_undo(_scene: bpy.types.Scene, _other: object = None) -> None:
+    schedule()
+
+
+def _on_load_pre(_path: object, _other: object = None) -> None:
+    _state.scene = None
+    call_off(_on_timer)
+    _clear()
+
+
+_HANDLERS = Handlers(undo_post=_on_undo, redo_post=_on_undo, load_pre=_on_load_pre)
+
+
+def register() -> None:
+    """Listen to changes of populations and species, undo and loading."""
+    properties.listeners.append(schedule)
+    edits.listeners.append(schedule)
+    _HANDLERS.register()
+
+
+def unregister() -> None:
+    """Take the dots and all that listens away."""
+    _state.scene = None
+    call_off(_on_timer)
+    _clear()
+    _HANDLERS.unregister()
+    edits.listeners.remove(schedule)
+    properties.listeners.remove(schedule)
+
+
+Colour = tuple[float, float, float, float]
+
+WIDTH = 2.0  # pixels, times the interface's scale
+
+
+class GroundCursor:
+    """Line strips in one window, from `start` to `stop`; change ``lines`` and redraw the area."""
+
+    def __init__(self) -> None:
+        self.lines: list[tuple[NDArray[np.float64], Colour]] = []
+        self._window: int | None = None
+        self._handle: object | None = None
+
+    def start(self, window: bpy.types.Window) -> None:
+        """Draw from now on, in this window only."""
+        self._window = window.as_pointer()
+        self._handle = bpy.types.SpaceView3D.draw_handler_add(self._draw, (), 'WINDOW', 'POST_VIEW')
+
+    def stop(self) -> None:
+        """Draw no more."""
+        if self._handle is not None:
+            bpy.types.SpaceView3D.draw_handler_remove(self._handle, 'WINDOW')
+            self._handle = None
+        self.lines = []
+
+    def _draw(self) -> None:
+        context = bpy.context
+        if not self.lines or context.window is None or context.window.as_pointer() != self._window:
+            return
+        shader = gpu.shader.from_builtin('POLYLINE_UNIFORM_COLOR')
+        size = gpu.state.viewport_get()[2:]
+        gpu.state.blend_set('ALPHA')
+        gpu.state.depth_test_set('NONE')
+        scale = context.preferences.system.ui_scale
+        shader.bind()
+        shader.uniform_float("viewportSize", size)
+        for points, colour in self.lines:
+            batch = batch_for_shader(shader, 'LINE_STRIP', {"pos": np.ascontiguousarray(points, np.float32)})
+            # A dark line below makes the bright one seen on any ground.
+            for line, width in (((0.0, 0.0, 0.0, 0.5 * colour[3]), 2.0 * WIDTH), (colour, WIDTH)):
+                shader.uniform_float("lineWidth", width * scale)
+                shader.uniform_float("color", line)
+                batch.draw(shader)
+        gpu.state.blend_set('NONE')
+
+
+def circle(centre: Sequence[float], radius: float, sides: int = 32) -> NDArray[np.float64]:
+    """A level circle, (sides + 1, 3) with the first corner twice."""
+    angle = np.linspace(0.0, 2.0 * np.pi, sides + 1)
+    return np.stack([np.cos(angle), np.sin(angle), np.zeros(sides + 1)], axis=1) * radius + np.asarray(centre, float)

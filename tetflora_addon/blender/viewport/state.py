@@ -1,0 +1,279 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What viewports preview of each scene: levels of refinement, plants of few faces. Of this session, never of a file.
+
+What a preview in the viewport shows: settings of a scene; what is shown itself lives in the session alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, IntProperty
+
+from ...camera.camera import Camera
+from ...errors import TetFloraError
+from ...preview.levels import Levels
+from ...preview.light_plants import Shapes
+from ..runtime import Listeners, redraw
+from ..scene.camera import read_camera
+
+#: What `camera_reader` reads of a camera, of its depth of field, and of the picture.
+_LENS = (
+    *("type", "lens", "ortho_scale", "shift_x", "shift_y", "sensor_fit", "sensor_width", "sensor_height"),
+    *("clip_start", "clip_end", "panorama_type", "longitude_min", "longitude_max", "latitude_min", "latitude_max"),
+    *("fisheye_fov", "fisheye_lens"),
+)
+_FOCUS = "use_dof", "aperture_fstop", "focus_distance"
+_PICTURE = (
+    *("resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x", "pixel_aspect_y"),
+    *("use_multiview", "use_motion_blur", "motion_blur_shutter", "motion_blur_position"),
+)
+
+#: Called when plants are to be shown in another form, without arguments; `preview_job` listens.
+listeners = Listeners()
+
+
+@dataclass
+class Preview:
+    """What is shown of one scene.
+
+    Attributes
+    ----------
+    levels : Levels, optional
+        All levels of the last refinement that was asked for.
+    looked : tuple
+        How the scene's camera was then, see `camera_now`.
+    frozen : Camera, optional
+        Camera that stays whatever becomes of the scene's.
+    shapes : Shapes, optional
+        All plants in the form that is chosen.
+    objects : int
+        Objects of the scene when they were read.
+    message : str
+        Why plants cannot be shown; empty if they can.
+    seconds : float
+        What reading them took.
+    made : int
+        Counts changes of levels and shapes, so that what was handed to the graphics card can be told from what is new.
+    cache : dict
+        Room for the overlay.
+    """
+
+    levels: Levels | None = None
+    looked: tuple = ()
+    frozen: Camera | None = None
+    shapes: Shapes | None = None
+    objects: int = 0
+    message: str = ""
+    seconds: float = 0.0
+    made: int = 0
+    cache: dict = field(default_factory=dict)
+
+
+_previews: dict[int, Preview] = {}
+
+
+def find(scene: bpy.types.Scene) -> Preview | None:
+    """What is previewed of a scene, if anything."""
+    return _previews.get(scene.session_uid)
+
+
+def of(scene: bpy.types.Scene) -> Preview:
+    """The same, made if there is none."""
+    return _previews.setdefault(scene.session_uid, Preview())
+
+
+def forget_all() -> None:
+    """Forget everything: another file is opened, or TetFlora is switched off."""
+    _previews.clear()
+
+
+def longest_reading() -> float:
+    """Seconds that reading the plants of any scene took last."""
+    return max((preview.seconds for preview in _previews.values()), default=0.0)
+
+
+def forget(scene: bpy.types.Scene) -> None:
+    """Forget the levels of a scene; its frozen camera and its plants stay."""
+    preview = find(scene)
+    if preview is not None:
+        preview.levels, preview.looked = None, ()
+        preview.made += 1
+    redraw()
+
+
+def camera_now(scene: bpy.types.Scene) -> tuple:
+    """What of the scene's camera and picture decides on levels; cheap, to see whether it has changed.
+
+    Not where an object in focus is, and how far apart the eyes of a stereoscopic picture are.
+    """
+    camera, render = scene.camera, scene.render
+    if camera is None or camera.type != 'CAMERA':
+        return ()
+    data = camera.data
+    matrix = tuple(round(value, 6) for row in camera.matrix_world for value in row)
+    lens = (*(getattr(data, name) for name in _LENS), *(getattr(data.dof, name) for name in _FOCUS))
+    return camera.name, matrix, lens, tuple(getattr(render, name) for name in _PICTURE)
+
+
+def is_outdated(scene: bpy.types.Scene) -> bool:
+    """Whether the scene's camera has changed since its levels were computed, and nothing is frozen."""
+    preview = find(scene)
+    if preview is None or preview.levels is None or preview.frozen is not None:
+        return False
+    return preview.looked != camera_now(scene)
+
+
+def freeze(scene: bpy.types.Scene, on: bool, depsgraph: Callable[[], bpy.types.Depsgraph]) -> None:
+    """Keep the camera of the levels that are shown, or the scene's where there are none; or let go of it."""
+    preview = of(scene)
+    preview.frozen = None
+    if on:
+        try:
+            preview.frozen = preview.levels.camera if preview.levels else read_camera(scene, depsgraph())
+        except TetFloraError as error:
+            preview.message = str(error)
+    redraw()
+
+
+def bring_in_step(scene: bpy.types.Scene) -> None:
+    """After undo, which changes settings without a word: what is frozen, and shown of plants, follows them."""
+    preview, settings = find(scene), scene.tetflora.preview
+    if preview is not None:
+        if not settings.freeze:
+            preview.frozen = None
+        elif preview.frozen is None and preview.levels is not None:
+            preview.frozen = preview.levels.camera
+    if preview is not None or settings.plants != 'NONE':
+        plants_wanted(scene)
+
+
+def plants_wanted(scene: bpy.types.Scene) -> None:
+    """The form of plants was chosen: show them soon, or take them away at once."""
+    if scene.tetflora.preview.plants == 'NONE':
+        preview = of(scene)
+        preview.shapes, preview.message = None, ""
+        preview.made += 1
+        redraw()
+    else:
+        listeners.notify()
+
+
+#: Reached by the slider; more can be typed.
+_USUAL_LEVELS = 24
+
+
+def _redraw(_group: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    redraw()
+
+
+def _plants_changed(group: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    plants_wanted(group.id_data)
+
+
+def _freeze_changed(group: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    freeze(group.id_data, group.freeze, context.evaluated_depsgraph_get)
+
+
+class TetFloraPreview(bpy.types.PropertyGroup):
+    """Preview of refine levels and of plants in 3D viewports."""
+
+    level: IntProperty(
+        name="Level",
+        description=(
+            "Level of refinement to show: 0 is the view before any pass, each further level is one pass. Beyond the "
+            "last level, the last one is shown"
+        ),
+        min=0,
+        soft_max=_USUAL_LEVELS,
+        max=1000,
+        options=set(),
+        update=_redraw,
+    )
+    wires: BoolProperty(
+        name="Tetrahedra",
+        description="Draw the edges of tetrahedra that contain plants",
+        default=True,
+        options=set(),
+        update=_redraw,
+    )
+    colour: EnumProperty(
+        name="Color By",
+        description="What the colors of tetrahedra show",
+        items=(
+            (
+                'FORM',
+                "Representation",
+                "Green becomes polygons, orange proxies, blue is hidden, white will be split",
+                0,
+            ),
+            ('LEVEL', "Level", "How often space was split: dark is rarely, bright is often", 1),
+            ('VISIBILITY', "Visibility", "Fraction that the camera sees: dark is hidden", 2),
+            (
+                'CONTRIBUTION',
+                "Contribution",
+                "Number of pixels it affects in the image: dark is few, bright is many",
+                3,
+            ),
+        ),
+        default='FORM',
+        options=set(),
+        update=_redraw,
+    )
+    projected: BoolProperty(
+        name="Translucent",
+        description=(
+            "Draw tetrahedra as clouds with the color and density of their contents. The most important ones are drawn "
+            "first, as many as keep the viewport responsive"
+        ),
+        default=False,
+        options=set(),
+        update=_redraw,
+    )
+    forms: EnumProperty(
+        name="Show",
+        description="Tetrahedra to draw, by what they become; Shift-click to select several",
+        items=(
+            ('EXPLICIT', "Polygons", "Tetrahedra whose leaves and branches become polygons", 1),
+            ('PROXY', "Proxies", "Tetrahedra drawn as proxies because they affect few pixels", 2),
+            ('HIDDEN', "Hidden", "Tetrahedra that the camera barely sees", 4),
+            ('SPLIT', "To Split", "Tetrahedra that the next level splits", 8),
+        ),
+        default={'EXPLICIT', 'PROXY', 'HIDDEN', 'SPLIT'},
+        options={'ENUM_FLAG'},
+        update=_redraw,
+    )
+    plants: EnumProperty(
+        name="Plants",
+        description="How plants appear in viewports. Not rendered, and no objects are created",
+        items=(
+            ('NONE', "None", "Only their empties, or the points of their fields", 0),
+            ('LIGHT', "Simple Shapes", "A crown and a trunk of about twenty triangles, in the species' color", 1),
+            ('BOUNDS', "Bounds", "Bounding boxes of the species", 2),
+        ),
+        default='NONE',
+        options=set(),
+        update=_plants_changed,
+    )
+    statistics: BoolProperty(
+        name="Statistics",
+        description="Show the level and the numbers of tetrahedra and polygons in the corner of the viewport",
+        default=True,
+        options=set(),
+        update=_redraw,
+    )
+    freeze: BoolProperty(
+        name="Freeze Camera",
+        description=(
+            "Keep the current camera for the preview, even when levels are computed again, while you move the scene's "
+            "camera or navigate. Its view is drawn as a pyramid. Not saved in the file"
+        ),
+        options=set(),
+        update=_freeze_changed,
+    )
+
+
+CLASSES = (TetFloraPreview,)

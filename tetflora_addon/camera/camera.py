@@ -1,0 +1,297 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The camera as the engine sees it: a window at unit depth or on the sphere, projection and its inverse.
+
+How much further a picture reaches where its lens is open or its camera moves: depth of field and motion blur.
+
+A lens of radius R that is focused on depth f draws a point at depth z as a disc; at depth 1 its radius is R |1/z − 1/f|
+(M. Potmesil and I. Chakravarty, "A lens and aperture camera model for synthetic image generation", Computer Graphics
+15 (3), 1981). What lies beside the view by less than that is in the picture.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Cosine of the latitude from which on panoramas count as if no pixels were added towards the poles: 84 degrees.
+LEAST_COSINE = 0.1
+#: How far from several eyes things are at least to hide others from all of them, in radii of the eyes' room.
+_OPEN = 2.0
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A perspective, orthographic or panoramic camera.
+
+    Camera space is Blender's: +x right, +y up, looking along −z. *Depth* is the distance along the viewing direction.
+
+    Attributes
+    ----------
+    kind : {'PERSP', 'ORTHO', 'PANO'}
+        Perspective, parallel rays along the viewing direction, or an equirectangular panorama: columns are longitudes
+        and rows are latitudes.
+    position : (3,) float64
+        The eye; for ``'ORTHO'`` the point from which depth is counted.
+    frame : (3, 3) float64
+        Rotation; columns are the camera's x, y and z axes in world space.
+    window : tuple of float
+        ``(left, right, bottom, top)`` of the picture at depth 1 (``'PERSP'``), at any depth in metres (``'ORTHO'``), or
+        in radians (``'PANO'``): longitude from the viewing direction to the right, latitude from its plane upwards.
+        Lens shift, sensor fit and pixel aspect are in it; it need not be symmetric.
+    near, far : float
+        Clipping depths, metres, ``0 < near < far``.
+    width, height : int
+        Size of the final picture in pixels.
+    lens_radius : float
+        Radius of the lens, metres; 0 where all is sharp.
+    focus : float
+        Depth that is sharp, metres.
+    shutter : tuple of Camera
+        The camera at other times while the shutter is open, and the other eyes of a stereoscopic picture; often empty.
+    setback : float
+        How far, in depth, the position lies behind the eye, metres: not 0 where the camera stands for several.
+    room : float
+        How far from that eye others are for which it stands, metres; see `view_cells`.
+    """
+
+    kind: Literal["PERSP", "ORTHO", "PANO"]
+    position: NDArray[np.float64]
+    frame: NDArray[np.float64]
+    window: tuple[float, float, float, float]
+    near: float
+    far: float
+    width: int
+    height: int
+    lens_radius: float = 0.0
+    focus: float = np.inf
+    shutter: tuple[Camera, ...] = ()
+    setback: float = 0.0
+    room: float = 0.0
+
+    @property
+    def eye(self) -> NDArray[np.float64]:
+        """Where the picture is seen from (3,), metres: before the position where the camera stands for several."""
+        left, right, bottom, top = self.window
+        ahead = np.array([(left + right) / 2.0, (bottom + top) / 2.0, -1.0])
+        return self.position + self.setback * (self.frame @ ahead)
+
+    @property
+    def line_of_sight(self) -> dict[str, NDArray[np.float64]]:
+        """What `TetrahedralTree.order` needs to know of the camera: the eye or the direction of its rays."""
+        return {"direction": -self.frame[:, 2]} if self.kind == "ORTHO" else {"eye": self.position}
+
+    @property
+    def pixel_size(self) -> float:
+        """Side of a pixel at depth 1 (perspective), at any depth (orthographic) or 1 m away (panorama), metres."""
+        left, right, bottom, top = self.window
+        return float(np.sqrt((right - left) * (top - bottom) / (self.width * self.height)))
+
+    def to_camera_space(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """World points ``(..., 3)`` to (x right, y up, depth) ``(..., 3)``, metres."""
+        return ((points - self.position) @ self.frame) * np.array([1.0, 1.0, -1.0])
+
+    def clearance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distance of world points (n, 3) from the space that the picture shows, metres; negative within it."""
+        x, y, depth = self.to_camera_space(points).T
+        left, right, bottom, top = self.window
+        if self.kind == "PANO":
+            return self._beside_panorama(np.stack([x, y, depth], axis=-1))
+        if self.kind == "ORTHO":
+            return np.max([x - right, left - x, y - top, bottom - y], axis=0)
+        walls = [
+            (x - right * depth, right),
+            (left * depth - x, left),
+            (y - top * depth, top),
+            (bottom * depth - y, bottom),
+        ]
+        return np.max([distance / np.hypot(1.0, slope) for distance, slope in walls], axis=0)
+
+    def widened(self, margin: float, margin_up: float | None = None) -> Camera:
+        """The same camera with more around its picture.
+
+        Parameters
+        ----------
+        margin : float
+            Share of the picture's width that is added on the left and on the right.
+        margin_up : float, optional
+            Share of its height that is added below and above; as ``margin`` if it is not given.
+        """
+        left, right, bottom, top = self.window
+        # Whole pixels, so that the pixels of the picture stay where they are.
+        across = round(margin * self.width)
+        up = round((margin if margin_up is None else margin_up) * self.height)
+        step_x, step_y = (right - left) / self.width, (top - bottom) / self.height
+        if self.kind == "PANO":
+            # There is nothing beyond the poles, nor beyond the whole way round.
+            across = min(across, int((2.0 * np.pi - (right - left)) / (2.0 * step_x) + 1e-9))
+            up = min(up, max(int(min(np.pi / 2.0 - top, bottom + np.pi / 2.0) / step_y + 1e-9), 0))
+        return replace(
+            self,
+            window=(left - across * step_x, right + across * step_x, bottom - up * step_y, top + up * step_y),
+            width=self.width + 2 * across,
+            height=self.height + 2 * up,
+        )
+
+    def longitude_latitude(self, local: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Place on a panorama of points ``(..., 3)`` in camera space, radians.
+
+        The longitude is the one nearest to the middle of the window.
+        """
+        x, y, depth = np.moveaxis(local, -1, 0)
+        middle = (self.window[0] + self.window[1]) / 2.0
+        longitude = np.arctan2(x, depth) - middle
+        longitude = middle + longitude - 2.0 * np.pi * np.round(longitude / (2.0 * np.pi))
+        return longitude, np.arctan2(y, np.hypot(x, depth))
+
+    def _beside_panorama(self, local: NDArray[np.float64]) -> NDArray[np.float64]:
+        left, right, bottom, top = self.window
+        longitude, latitude = self.longitude_latitude(local)
+        far, across = np.linalg.norm(local, axis=-1), np.hypot(local[..., 0], local[..., 2])
+
+        def beyond(angle: NDArray[np.float64], metres: NDArray[np.float64]) -> NDArray[np.float64]:
+            return metres * np.sin(np.clip(angle, -np.pi / 2.0, np.pi / 2.0))
+
+        # What goes all the way round or to a pole has no walls there.
+        beside = np.full(far.shape, -np.inf)
+        if right - left < 2.0 * np.pi - 1e-9:
+            beside = np.maximum(beside, beyond(np.maximum(longitude - right, left - longitude), across))
+        if top < np.pi / 2.0 - 1e-9:
+            beside = np.maximum(beside, beyond(latitude - top, far))
+        if bottom > -np.pi / 2.0 + 1e-9:
+            beside = np.maximum(beside, beyond(bottom - latitude, far))
+        return beside
+
+    def pixel_extent(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Metres that one pixel spans at each of the world points ``(..., 3)``; result ``(...)``.
+
+        Points nearer than the near plane count as lying on it.
+        """
+        if self.kind == "ORTHO":
+            return np.full(np.shape(points)[:-1], self.pixel_size)
+        if self.kind == "PANO":
+            local = self.to_camera_space(points)
+            distance = np.maximum(np.linalg.norm(local, axis=-1), self.near)
+            # Towards the poles a picture has more pixels for each solid angle.
+            cosine = np.hypot(local[..., 0], local[..., 2]) / distance
+            return self.pixel_size * self._nearest(distance) * np.sqrt(np.clip(cosine, LEAST_COSINE, 1.0))
+        depth = self.to_camera_space(points)[..., 2]
+        return self.pixel_size * self._nearest(depth - self.setback)
+
+    @property
+    def closest(self) -> float:
+        """Least distance from an eye at which things count, metres; see `_nearest`."""
+        return max(self.room / 2.0, self.near if self.setback == 0.0 else 0.0)
+
+    @property
+    def hides_from(self) -> float:
+        """Depth from which on things hide what is behind them, metres: nearer ones not from all eyes; 0 for one eye."""
+        return self.setback + _OPEN * self.room
+
+    def pixel_gain(self, points: NDArray[np.float64]) -> NDArray[np.float64] | float:
+        """Pixels ``(...)`` of what is at points ``(..., 3)`` for each that it has as seen from the position.
+
+        1 but where the camera stands for several, of which the nearest counts.
+        """
+        if self.setback == 0.0:
+            return 1.0
+        depth = np.maximum(self.to_camera_space(points)[..., 2], self.near)
+        return (self.pixel_size * depth / self.pixel_extent(points)) ** 2
+
+    def _nearest(self, distance: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distances from the nearest of the eyes, given those from the one in the middle, metres.
+
+        Within their room nobody knows: half of it is as near as it comes to what is not grazed.
+        """
+        return np.maximum(distance - self.room, self.closest)
+
+    def extent_around(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Metres (n,) that one pixel spans at points (n, 3), in view or not.
+
+        Beside and behind the camera depth says nothing, but distance does.
+        """
+        extent = self.pixel_extent(points)
+        if self.kind == "PERSP":
+            away = np.linalg.norm(points - self.eye, axis=-1)
+            extent = np.maximum(extent, self.pixel_size * (away - self.room))
+        return extent
+
+
+#: Margins never exceed this share of the picture on each side. A twig at the lens is blurred over more than all of it,
+#: but so thinly that its leaves cannot be told.
+MOST = 0.5
+
+
+def blur_margins(camera: Camera, centre: NDArray[np.float64], reach: NDArray[np.float64]) -> tuple[float, float]:
+    """Shares of the picture's width and height by which blur reaches beyond it.
+
+    Parameters
+    ----------
+    camera : Camera
+        With its lens and shutter.
+    centre : (n, 3) float64
+        Middles of the plants, metres, world space.
+    reach : (n,) float64
+        Radii of spheres around them that hold the plants, metres.
+
+    Returns
+    -------
+    across, up : float
+        For each side of the picture, 0 to `MOST`. Where nothing is blurred, 0.
+    """
+    if not len(centre) or not (camera.lens_radius > 0.0 or camera.shutter):
+        return 0.0, 0.0
+    depth = _depths(camera, centre)
+    near, far = camera.near - camera.setback, camera.far - camera.setback
+    nearest = np.maximum(depth - reach - camera.room, camera.closest)
+    farthest = np.maximum(np.minimum(depth + reach + camera.room, far), camera.closest)
+    ahead = (depth + reach > near) & (depth - reach < far)
+    radius = np.maximum(circle_of_confusion(camera, nearest), circle_of_confusion(camera, farthest))
+    metres = radius if camera.kind == "ORTHO" else radius * farthest
+    seen = ahead & (camera.clearance(centre) - reach < metres)
+    left, right, bottom, top = camera.window
+    size = np.array([right - left, top - bottom])
+    margins = np.max(radius[seen], initial=0.0) / size
+    if seen.any() and camera.kind != "PANO":
+        between = float(nearest[seen].min()), float(farthest[seen].max())
+        for other in camera.shutter:
+            margins = np.maximum(margins, _movement(camera, other, between) / size)
+    across, up = np.minimum(margins, MOST).tolist()
+    return across, up
+
+
+def circle_of_confusion(camera: Camera, depth: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Radius (n,) on the window of the discs that points at depths (n,), metres, are drawn as; see the module."""
+    if camera.lens_radius <= 0.0:
+        return np.zeros(len(depth))
+    if camera.kind == "ORTHO":
+        return camera.lens_radius * np.abs(depth / camera.focus - 1.0)
+    return camera.lens_radius * np.abs(1.0 / np.maximum(depth, camera.closest) - 1.0 / camera.focus)
+
+
+def _depths(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Depths (n,) from the eye, metres, or distances where a picture is all around it."""
+    local = camera.to_camera_space(points)
+    return np.linalg.norm(local, axis=-1) if camera.kind == "PANO" else local[..., 2] - camera.setback
+
+
+def _movement(camera: Camera, other: Camera, depths: tuple[float, float]) -> NDArray[np.float64]:
+    """How far beyond the window of a camera (2,) the view of another reaches between two depths.
+
+    That view is convex, and so is its picture: the corners are enough.
+    """
+    left, right, bottom, top = other.window
+    corners = np.array([(x, y, 1.0) for x in (left, right) for y in (bottom, top)])
+    scale = [np.array([1.0, 1.0, d]) if other.kind == "ORTHO" else np.full(3, d) for d in depths]
+    local = np.concatenate([corners * s for s in scale]) * np.array([1.0, 1.0, -1.0])
+    seen = camera.to_camera_space(local @ other.frame.T + other.position)
+    if camera.kind == "PERSP":
+        if (seen[:, 2] <= 0.0).any():
+            return np.full(2, np.inf)
+        seen = seen / seen[:, 2:]
+    left, right, bottom, top = camera.window
+    low, high = seen[:, :2].min(axis=0), seen[:, :2].max(axis=0)
+    return np.max([np.array([left, bottom]) - low, high - np.array([right, top]), np.zeros(2)], axis=0)

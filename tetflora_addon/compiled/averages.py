@@ -1,0 +1,255 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Expected amounts of sub-plants in closed form, from the highest order down to the trunk (paper, section 5).
+
+Every amount is kept by the row that contributes it, so that colours and shares follow by a product. What depends on how
+far outside in the crown a sub-plant sits is known at three places, `NODES`, and quadratic between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..growth.axes import profile, profile_integral
+from ..growth.rows import FORK, LATERAL, SPUR
+from ..species.leaf_models import LeafModel
+from ..species.members import expected_forks
+from ..species.species import Range, crown_ratio
+
+NODES = np.array([0.0, 0.5, 1.0])
+_SHARES = (np.arange(256) + 0.5) / 256
+
+
+@dataclass(frozen=True)
+class RowLeaves:
+    """Means over the forms of the leaf that each row bears; arrays (r,).
+
+    Attributes
+    ----------
+    area : (r,) float64
+        One-sided, of a leaf of size 1.
+    polygons, width, reach : (r,) float64
+        Faces, width and farthest vertex of such a leaf; of the reach the greatest.
+    transmission : (r,) float64
+    """
+
+    area: NDArray[np.float64]
+    polygons: NDArray[np.float64]
+    width: NDArray[np.float64]
+    reach: NDArray[np.float64]
+    transmission: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Averages:
+    """Expected amounts of the sub-plant of each row, by contributing row.
+
+    Attributes
+    ----------
+    leaves : (r, r) float64
+        Number of leaves.
+    leaf_area : (r, 3, r) float64
+        One-sided area at `NODES`, m² at plant scale 1.
+    leaf_colour : (r, 3, 3) float64
+        Area times linear RGB at `NODES`.
+    fixed_wood, full_wood : (r, r) float64
+        Surface over length × radius of the own branch: what every sub-plant has, and what follows its fullness.
+    spur_wood : (r, r) float64
+        Surface of short shoots and what they bear, m² at plant scale 1; follows the fullness.
+    fixed_faces, full_faces : (r, r) float64
+        Faces of branches, likewise.
+    length, radius : (r,) float64
+        Typical size of a branch of the row at plant scale 1, metres.
+    """
+
+    leaves: NDArray[np.float64]
+    leaf_area: NDArray[np.float64]
+    leaf_colour: NDArray[np.float64]
+    fixed_wood: NDArray[np.float64]
+    full_wood: NDArray[np.float64]
+    spur_wood: NDArray[np.float64]
+    fixed_faces: NDArray[np.float64]
+    full_faces: NDArray[np.float64]
+    length: NDArray[np.float64]
+    radius: NDArray[np.float64]
+
+
+def quadratic(outward: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Weights (n, 3) of the values at `NODES` for values at places (n,) between 0 and 1 (Lagrange)."""
+    o = np.asarray(outward)
+    return np.stack([2 * (o - 0.5) * (o - 1), 4 * o * (1 - o), 2 * o * (o - 0.5)], axis=-1)
+
+
+def tube_perimeter(sides: NDArray[np.integer]) -> NDArray[np.float64]:
+    """Perimeter of a branch's cross-section, a regular polygon, divided by its radius."""
+    return 2 * sides * np.sin(np.pi / sides)
+
+
+def row_leaves(
+    rows: NDArray[np.void], forms: Sequence[Sequence[Sequence[LeafModel]]], transmission: NDArray
+) -> RowLeaves:
+    """Means over the forms of leaves of species and kinds; ``transmission`` is (species, kinds)."""
+    kind = rows["species"], rows["leaf_kind"]
+
+    def by_row(name: str, function: object) -> NDArray[np.float64]:
+        table = [[function([getattr(m, name) for m in kinds]) if kinds else 0.0 for kinds in one] for one in forms]
+        return np.array(table, dtype=np.float64)[kind]
+
+    means = (by_row(name, np.mean) for name in ("area", "polygons", "width"))
+    return RowLeaves(*means, by_row("reach", np.max), transmission[kind])
+
+
+def own_leaf_integrals(
+    size_tip: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Means of (size at a place)² / (size inside)², and of that times the place, over places low to high (n,)."""
+    k = size_tip - 1
+
+    def moment(power: int) -> NDArray[np.float64]:  # mean of o^power over the interval, exact where it is a point
+        terms = [low ** (power - i) * high**i for i in range(power + 1)]
+        return sum(terms) / (power + 1)
+
+    first = 1 + 2 * k * moment(1) + k * k * moment(2)
+    return first, moment(1) + 2 * k * moment(2) + k * k * moment(3)
+
+
+def average(rows: NDArray[np.void], leaf: RowLeaves) -> Averages:
+    """Expected amounts of every row.
+
+    Parameters
+    ----------
+    rows : (r,) parameter table
+    leaf : RowLeaves
+    """
+    r = len(rows)
+    exact = rows.copy()  # means of what is linear in its ranges
+    exact["taper"][:, 1] = 0
+    every, no_key = np.arange(r), np.zeros(r, np.uint64)
+    eye = np.eye(r)
+    number, size = rows["leaves"][:, 0], rows["leaf_size"]
+    one_area = number * (size[:, 0] ** 2 + size[:, 1] ** 2 / 3) * leaf.area  # E[s²] of a uniform range
+    leaves, leaf_area, leaf_colour = eye * number, np.zeros((r, 3, r)), np.zeros((r, 3, 3))
+    start, (first, last) = rows["leaf_start"][:, 0], rows["part"].T
+    for n, place in enumerate(NODES):
+        low = np.where(rows["outward"], first + (last - first) * start, place)
+        high = np.where(rows["outward"], last, place)
+        area, area_outward = own_leaf_integrals(rows["leaf_size_tip"], low, high)
+        leaf_area[every, n, every] = one_area * area
+        inside, tip = rows["leaf_colour"][:, 0], rows["leaf_colour_tip"]
+        leaf_colour[:, n] = one_area[:, None] * (area[:, None] * inside + area_outward[:, None] * (tip - inside))
+    whole = profile_integral(exact, every, no_key, np.ones(r))
+    real = ~rows["phantom"]
+    fixed_wood = eye * (tube_perimeter(np.maximum(rows["sides"], 3)) * whole * real)
+    fixed_faces = eye * (rows["sides"] * (rows["segments"] + rows["rings"]) * real)
+    full_wood, spur_wood, full_faces = np.zeros((3, r, r))
+    length, radius = np.zeros((2, r))
+    sums = {}
+    for i in range(r):
+        if rows["order"][i] == 0 and not rows["continues"][i]:
+            length[i] = rows["length"][i, 0]
+            radius[i] = length[i] * rows["thickness"][i, 0]
+        if rows["drawn"][i]:
+            length[i], radius[i] = rows["size"][i, :2]
+        for sort in np.flatnonzero(rows["next"][i] >= 0):
+            sums[i, sort] = one = _sums(exact, i, int(sort))
+            j = rows["next"][i, sort]
+            if sort == SPUR:
+                length[j], radius[j] = rows["length"][j, 0], rows["length"][j, 0] * rows["thickness"][j, 0]
+            else:
+                length[j], radius[j] = length[i] * one.length, radius[i] * one.radius
+    for i in range(r - 1, -1, -1):
+        for sort in np.flatnonzero(rows["next"][i] >= 0):
+            one, j = sums[i, sort], rows["next"][i, sort]
+            leaves[i] += one.full * leaves[j]
+            leaf_area[i] += np.tensordot(one.nodes, leaf_area[j], 1)
+            leaf_colour[i] += one.nodes @ leaf_colour[j]
+            if sort == FORK:
+                fixed_wood[i] += one.wood * fixed_wood[j]
+                full_wood[i] += one.wood * full_wood[j]
+                fixed_faces[i] += one.number * fixed_faces[j]
+                full_faces[i] += one.number * full_faces[j]
+            else:
+                wood = one.wood * fixed_wood[j] + one.full_wood * full_wood[j]
+                if sort == SPUR:
+                    spur_wood[i] += wood
+                else:
+                    full_wood[i] += wood
+                full_faces[i] += one.number * fixed_faces[j] + one.full * full_faces[j]
+            spur_wood[i] += one.full * spur_wood[j]
+        for j in range(*rows["drawn_rows"][i]):
+            # Each drawn branch is there once, of a known size and fullness.
+            vigour, outward = rows["size"][j, 2:]
+            full = 1 - rows["count_by_length"][j] * (1 - vigour)
+            node = quadratic(np.array(outward))
+            relative = length[j] * radius[j] / (length[i] * radius[i])
+            leaves[i] += full * leaves[j]
+            leaf_area[i] += full * (node @ leaf_area[j].reshape(3, -1))
+            leaf_colour[i] += full * (node @ leaf_colour[j])
+            fixed_wood[i] += relative * (fixed_wood[j] + full * full_wood[j])
+            fixed_faces[i] += fixed_faces[j] + full * full_faces[j]
+            spur_wood[i] += full * spur_wood[j]
+    return Averages(
+        leaves, leaf_area, leaf_colour, fixed_wood, full_wood, spur_wood, fixed_faces, full_faces, length, radius
+    )
+
+
+@dataclass(frozen=True)
+class _Sums:
+    """Expected sums over the children of one sort of a branch of vigour 1.
+
+    ``number`` of them; ``full``, the sum of the factors on their own numbers (`growth.fullness`); ``wood`` and
+    ``full_wood``, the sums of length × radius relative to the parent's (of short shoots in m²), without and with that
+    factor; ``nodes`` (3, 3), what their amounts at `NODES` add to the parent's; ``length`` and ``radius``, typical ones
+    relative to the parent's.
+    """
+
+    number: float
+    full: float
+    wood: float
+    full_wood: float
+    nodes: NDArray[np.float64]
+    length: float
+    radius: float
+
+
+def _sums(rows: NDArray[np.void], i: int, sort: int) -> _Sums:
+    row, child = rows[i], rows[rows["next"][i, sort]]
+    number, thickness = float(row["count"][sort, 0]), child["thickness"][0]
+    if sort == FORK:
+        return _fork_sums(rows, i)
+    start, (low, high) = row["start"][sort, 0], row["share"][sort]
+    t = start + (1 - start) * _SHARES
+    vigour = np.ones_like(t)
+    if sort == LATERAL:
+        vigour = crown_ratio(np.full(t.shape, row["crown"]), 1 - (low + (high - low) * _SHARES))
+    full = 1 - child["count_by_length"] * (1 - vigour)
+    if sort == SPUR:
+        mean, variation = child["length"]
+        size, radius = np.full(t.shape, (mean**2 + variation**2 / 3) * thickness), thickness
+    else:
+        here = np.full(t.shape, i)
+        thick = row["pipe_share"] * vigour if row["pipe"] > 0 else profile(rows, here, np.zeros(len(t), np.uint64), t)
+        size, radius = vigour * row["nominal"] * child["length"][0] * thick * thickness, float(thick.mean() * thickness)
+    nodes = number * full.mean() * np.eye(3)
+    if row["order"] == 1:
+        outward = row["part"][0] + (row["part"][1] - row["part"][0]) * t
+        nodes = np.tile(number * (full[:, None] * quadratic(outward)).mean(axis=0), (3, 1))
+    length = float(row["nominal"] * child["length"][0] * vigour.mean())
+    means = (float(number * m.mean()) for m in (full, size, size * full))
+    return _Sums(number, *means, nodes, length, radius)
+
+
+def _fork_sums(rows: NDArray[np.void], i: int) -> _Sums:
+    row, child = rows[i], rows[rows["next"][i, FORK]]
+    forks, power = Range(*row["count"][FORK]), 1 - 1 / row["fork_power"]
+    summed, number = expected_forks(forks, power), expected_forks(forks)
+    tip = profile(rows, np.array([i]), np.zeros(1, np.uint64), np.ones(1))[0]
+    length = float(child["length"][0])
+    wood = float(summed * tip * length)
+    return _Sums(
+        number, number, wood, wood, number * np.eye(3), length, float(tip * number ** (-1 / row["fork_power"]))
+    )

@@ -1,0 +1,229 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bounding volumes of sub-plants of every order, from the ranges alone (paper, section 5).
+
+Computed from the highest order down to the trunk: the longest possible branch at every angle that it may take. The
+volume is a cylinder about the branch's axis for a branch of unit length; what does not scale with the length (leaves,
+thickness) is a pad.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..growth.rows import FORK, LATERAL, SPUR
+from ..growth.wind import widest_sway
+from ..species.leaf_models import LeafModel
+from ..species.species import crown_ratio
+from .samples import Points
+
+_SLABS = 48
+_ANGLES = 33
+_CROWN_SLOPE = 1 / 0.3  # steepest of the crown shapes
+
+
+def _axis_envelope(row: NDArray[np.void]) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """At each knot of a unit branch: widest radius, lowest and highest z; and the widest turn of each segment."""
+    segments = int(row["segments"])
+    # Turns of joints add up at most. The joint in the middle of an even number belongs to the outer half.
+    joint = np.repeat(_joint_turns(row), [(segments + 1) // 2, segments // 2])
+    joint[0] = widest_sway(row) / segments  # the first segment sets out straight, but for the wind
+    turn = np.minimum(np.cumsum(joint), np.pi)
+    sideways = np.sin(np.minimum(turn, np.pi / 2)) / segments
+    radius = np.concatenate([[0], np.cumsum(sideways)])
+    low = np.concatenate([[0], np.cumsum(np.cos(turn)) / segments])
+    high = np.linspace(0, 1, segments + 1)
+    return radius, low, high, turn
+
+
+def _joint_turns(row: NDArray[np.void]) -> NDArray[np.float64]:
+    """Widest turn (..., 2) of a joint of the inner and of the outer half of branches of rows (...)."""
+    back = np.stack([np.abs(row["curvature"][..., 0]), np.abs(row["curvature_tip"])], axis=-1)
+    variation = row["curvature"][..., 1, None]
+    # A joint bends back by a, then aside by b: cos c = cos a cos b, and c² ≤ a² + b².
+    pulled = np.abs(row["attraction"]).sum(axis=-1)[..., None]
+    return (np.hypot(back + variation, variation) + pulled + widest_sway(row)[..., None]) / row["segments"][..., None]
+
+
+def ring_stretch(rows: NDArray[np.void]) -> NDArray[np.float64]:
+    """Greatest distance (r,) of a tube's vertices from its axis at joints, in radii.
+
+    Notes
+    -----
+    A ring at a joint lies along the means of both segments' axes, made unit vectors. These need not be at right angles:
+    between frames that a rotation by c separates, the cosine of their angle is at most (1 - cos c) / (3 + cos c),
+    where the rotation's axis lies half way between them. A circle becomes an ellipse with the half axis √(1 + cosine).
+    """
+    turn = np.minimum(_joint_turns(rows).max(axis=-1), np.pi)
+    return np.where(rows["segments"] > 1, 2 / np.sqrt(3 + np.cos(turn)), 1.0)
+
+
+def widest_radii(rows: NDArray[np.void]) -> NDArray[np.float64]:
+    """Greatest distance (r,) of the wood of sub-plants from their axes, in radii of the base; without short shoots."""
+    out = np.maximum(1 + rows["flare"], np.where(rows["drawn"], np.sqrt(2.0), ring_stretch(rows)))
+    for index in range(len(rows) - 1, -1, -1):
+        for sort in (LATERAL, FORK):
+            child = rows["next"][index, sort]
+            if child >= 0:  # no thicker than its parent, but it may flare more
+                out[index] = max(out[index], rows["thickness"][child].sum() * out[child])
+        if rows["drawn"][index]:
+            out[index] *= max(rows["radii"][index].max(), 1.0)
+        if rows["phantom"][index]:  # as thick as the thickest that is drawn
+            out[index] = out[slice(*rows["drawn_rows"][index])].max()
+    return out
+
+
+def leaf_boxes(rows: NDArray[np.void], forms: Sequence[Sequence[Sequence[LeafModel]]]) -> NDArray[np.float64]:
+    """Boxes around all forms of the leaf that each row bears, of size 1 and in its own axes.
+
+    Parameters
+    ----------
+    rows : (r,) table
+    forms : by species and kind of leaf
+
+    Returns
+    -------
+    (r, 2, 3) float64
+        Middle and half of the extent; zero without leaves.
+    """
+    out = np.zeros((len(rows), 2, 3))
+    for index, row in enumerate(rows):
+        models = forms[row["species"]][row["leaf_kind"]]
+        if models and row["leaves"].sum() > 0:
+            points = np.concatenate([model.positions for model in models])
+            low, high = points.min(axis=0), points.max(axis=0)
+            out[index] = (low + high) / 2, (high - low) / 2
+    return out
+
+
+def own_leaf_reaches(rows: NDArray[np.void], model_reach: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far leaves stick out beyond the axes that bear them (r,), at plant scale 1, metres; see `leaf_reaches`."""
+    largest = rows["leaf_size"].sum(axis=1) * np.maximum(rows["leaf_size_tip"], 1)
+    return np.where(rows["leaves"].sum(axis=1) > 0, largest * model_reach, 0.0)
+
+
+def _tilted(bound: NDArray, angle: NDArray, scale: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Radius, lowest and highest z of scaled cylinders tilted by angles; the cylinders contain their base point.
+
+    ``angle`` is (m, a), samples of the interval that each may take; ``scale`` is (m,).
+    """
+    radius, z0, z1 = bound
+    sin, cos = np.sin(angle), np.cos(angle)
+    reach = max(z1, -z0)
+    # Farthest from the axis: on the rim, where the gradient along the rim vanishes or at its outermost point.
+    c = np.clip(reach * cos / np.maximum(radius * sin, 1e-12), -1, 1)
+    far = np.sqrt((reach * sin + radius * c * cos) ** 2 + radius**2 * (1 - c**2))
+    top = np.maximum(z1 * cos, z0 * cos) + radius * sin
+    bottom = np.minimum(z0 * cos, z1 * cos) - radius * sin
+    # Between two samples nothing moves farther than half a step times the distance from the base.
+    slack = 0.5 * np.ptp(angle, axis=1) / (_ANGLES - 1) * np.hypot(reach, radius)
+    return scale * (far.max(1) + slack), scale * (bottom.min(1) - slack), scale * (top.max(1) + slack)
+
+
+def unit_bounds(rows: NDArray[np.void]) -> NDArray[np.float64]:
+    """Cylinders that hold every axis of every sub-plant whose branch has unit length.
+
+    Parameters
+    ----------
+    rows : (r,) table of `rows.build_rows`
+
+    Returns
+    -------
+    (r, 3) float64
+        Radius, lowest and highest z, in the frame of the branch's base; z is at most 0 at the bottom and at least 0 on
+        top.
+    """
+    bounds = np.zeros((len(rows), 3))
+    for index in range(len(rows) - 1, -1, -1):
+        bounds[index] = _unit_bound(rows, index, bounds)
+    return bounds
+
+
+def leaf_reaches(
+    rows: NDArray[np.void], bounds: NDArray[np.float64], model_reach: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """How far leaves and short shoots stick out beyond the axes of sub-plants at plant scale 1, metres.
+
+    Parameters
+    ----------
+    rows : (r,) table
+    bounds : (r, 3) float64
+        Of `unit_bounds`.
+    model_reach : (r,) float64
+        Distance of the farthest vertex from the base of the leaf that each row bears, for a leaf of size 1.
+    """
+    reach, widest = own_leaf_reaches(rows, model_reach), widest_radii(rows)
+    for index in range(len(rows) - 1, -1, -1):
+        for sort in np.flatnonzero(rows["next"][index] >= 0):
+            child = rows["next"][index, sort]
+            farther = reach[child]
+            if sort == SPUR:
+                radius, low, high = bounds[child]
+                length, thickness = rows["length"][child].sum(), rows["thickness"][child].sum()
+                farther += length * (np.hypot(radius, max(high, -low)) + thickness * widest[child])
+            reach[index] = max(reach[index], farther)
+        if rows["phantom"][index]:
+            reach[index] = reach[slice(*rows["drawn_rows"][index])].max()
+    return reach
+
+
+def _unit_bound(rows: NDArray[np.void], index: int, bounds: NDArray[np.float64]) -> NDArray[np.float64]:
+    row = rows[index]
+    radius, low, high, turn = _axis_envelope(row)
+    bound = np.array([radius.max(), min(low.min(), 0.0), max(high.max(), 0.0)])
+    knot_t = np.linspace(0, 1, len(radius))
+    for sort in (LATERAL, FORK):
+        if row["next"][sort] < 0:
+            continue
+        child = rows[row["next"][sort]]
+        share = np.linspace(0, 1, _SLABS + 1)
+        start = max(row["start"][sort, 0] - row["start"][sort, 1], 0.0)
+        t = start + (1 - start) * share
+        share = row["share"][sort, 0] + np.ptp(row["share"][sort]) * share
+        r, lo, hi = (np.interp(t, knot_t, v) for v in (radius, low, high))
+        first = np.minimum((t[:-1] * row["segments"]).astype(int), len(turn) - 1)
+        last = np.minimum((t[1:] * row["segments"]).astype(int), len(turn) - 1)
+        dev = np.maximum(turn[first], turn[last])
+        base, variation = child["angle"]
+        lean = base + (child["angle_tip"] - base) * share
+        most = np.clip(np.maximum(lean[:-1], lean[1:]) + variation + dev, 0, np.pi)
+        least = np.clip(np.minimum(lean[:-1], lean[1:]) - variation - dev, 0, np.pi)
+        longest = np.full(_SLABS, child["length"].sum() * row["nominal"])
+        if sort == FORK:
+            longest[:] = child["length"].sum()
+            least[:] = 0.0  # a single stem goes straight on
+        elif row["start"][sort, 1] > 0:
+            longest *= _crown_most(row, np.zeros(1), np.ones(1))[0]  # the places of shares are not known
+        else:
+            longest *= _crown_most(row, share[:-1], share[1:])
+        angle = np.linspace(least, most, _ANGLES, axis=1)
+        far, bottom, top = _tilted(bounds[row["next"][sort]], angle, longest)
+        # Between a slab's ends nothing sticks out: radius and height grow along the axis, the lowest height is concave.
+        bound[0] = max(bound[0], (np.maximum(r[:-1], r[1:]) + far).max())
+        bound[1] = min(bound[1], (np.minimum(lo[:-1], lo[1:]) + bottom).min())
+        bound[2] = max(bound[2], (np.maximum(hi[:-1], hi[1:]) + top).max())
+    return bound
+
+
+def _crown_most(row: NDArray[np.void], low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Greatest length ratio of children between two shares (n,)."""
+    inner = np.linspace(low, high, 5, axis=1)
+    ratio = crown_ratio(np.full(inner.shape, row["crown"]), 1 - inner).max(axis=1)
+    return np.minimum(ratio + _CROWN_SLOPE * (high - low) / 8, 1)
+
+
+def sampled_bounds(parts: Sequence[Points], rows: int) -> NDArray[np.float64]:
+    """Radius across the branch, and lowest and highest place along it (r, 3), that hold the samples of each row."""
+    out = np.zeros((rows, 3))
+    for points in parts:
+        across, along = np.hypot(points.position[:, 0], points.position[:, 1]), points.position[:, 2]
+        for row, (first, number) in enumerate(zip(points.first, points.number, strict=True)):
+            some = slice(int(first.min()), int((first + number).max()))  # the runs of a row follow one another
+            if some.stop > some.start:
+                out[row, 0] = max(out[row, 0], across[some].max())
+                out[row, 1] = min(out[row, 1], along[some].min())
+                out[row, 2] = max(out[row, 2], along[some].max())
+    return out

@@ -1,0 +1,268 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How much more light passes between leaves that sit in clusters than through an even fog of the same area.
+
+A cell that is filled evenly with the area of what it holds is too dark, the more the larger it is. Its extinction is
+therefore multiplied by a factor (the clumping index of Nilson, "A theoretical analysis of the frequency of gaps in
+plant stands", 1971), here as a function of the cell's size:
+
+    c(h) = offset + density · ln λ + root / √h
+
+with h the cube root of its volume, λ the length of the branch over the usual one of its row (leaves are no smaller on
+shorter branches, so that these are denser). Each order has an offset, each species the other two. They are fitted
+once, by rays through a few plants that are divided into tetrahedra of several sizes (`cells`): as many rays as meet
+nothing in truth shall on the mean pass through the tetrahedra. What is fitted is what is seen: whole stacks of cells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..growth.branches import Branches
+from ..growth.growth import trunks
+from ..growth.hashing import key_of_seed, mix, uniform
+from ..growth.seeds import Seeds
+from ..species.leaf_models import LeafModel
+from ..species.species import fingerprint
+from ..storage import remembered
+from .rays import WIDEST, Things, basis, cell_numbers, covered, opened, path_lengths, things_of
+
+#: Raise it when factors are found in another way.
+_METHOD = 1
+#: Polygons that are grown of each species, if two plants have no more than a number, and plants at most; of plants that
+#: are still larger than the last number some sub-plants are taken.
+_POLYGONS, _PAIR, _PLANTS, _LARGEST = 200_000, 500_000, 6, 400_000
+_VIEWS = 4  # directions that plants are seen from, shared out among them, but at least
+_LEAST_VIEWS = 2  # for each
+_RAYS = 28  # to a side of what is looked at
+_SIZES = 4  # of cells,
+_FINEST, _COARSEST = 2.0, 0.2  # from so many widths of a leaf to this share of the plant
+_SEGMENTS = 50_000  # of rays, for each size: fewer rays through finer cells
+#: Root (in widths of a leaf), density, offset, and difference of an order's from that where nothing is known; and the
+#: weights that these have against what is seen.
+_PRIOR = np.array([0.5, 0.3, 0.5, 0.0])
+_RIDGE = np.array([5e-4, 3e-3, 5e-4, 0.02])
+_STEPS = 15
+_AT, _TURN, _RAY, _CELL = range(121, 125)  # draws of this module
+_OFFSETS = 0.0, 1.5
+#: Factors are never less or more than this.
+LEAST, MOST = 0.1, 1.5
+
+
+@dataclass(frozen=True)
+class Clumping:
+    """What the factor of every row follows from; arrays by row.
+
+    Attributes
+    ----------
+    whole, own : (r,) float64
+        Offsets: of a whole sub-plant, and of what its branch itself bears.
+    root : (r,) float64
+        √m, at plant scale 1.
+    density : (r,) float64
+    length : (r,) float64
+        Usual length of the branch at plant scale 1, metres.
+    """
+
+    whole: NDArray[np.float64]
+    own: NDArray[np.float64]
+    root: NDArray[np.float64]
+    density: NDArray[np.float64]
+    length: NDArray[np.float64]
+
+    def coefficients(self, branches: Branches, offset: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What is constant and what is divided by √h (n, 2), for branches with the offsets of `whole` or `own`."""
+        row = branches.row
+        relative = np.log(np.maximum(branches.length, 1e-12) / (branches.scale * self.length[row]))
+        constant = offset[row] + self.density[row] * np.clip(relative, -WIDEST, WIDEST)
+        return np.stack([constant, self.root[row] * np.sqrt(branches.scale)], axis=1)
+
+
+def factors(coefficients: NDArray[np.float64], volumes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Factor on the extinction (n,) of cells, from the area-weighted means (n, 2) of `Clumping.coefficients`."""
+    return np.clip(coefficients[:, 0] + coefficients[:, 1] * volumes ** (-1 / 6), LEAST, MOST)
+
+
+def fit_clumping(
+    rows: NDArray[np.void],
+    forms: Sequence[Sequence[Sequence[LeafModel]]],
+    area: NDArray[np.float64],
+    polygons: NDArray[np.float64],
+    width: NDArray[np.float64],
+    length: NDArray[np.float64],
+) -> Clumping:
+    """Fit every species.
+
+    Parameters
+    ----------
+    rows : (r,) parameter table
+    forms : by species and kind
+        Models of leaves.
+    area : (r, r) float64
+        Expected optical area of a sub-plant by the row that contributes it.
+    polygons, width, length : (r,) float64
+        Expected faces of a sub-plant, width of its leaves (0 without) and length of its branch, metres at plant
+        scale 1.
+    """
+    root, density, own = np.zeros((3, len(rows)))
+    usual = np.where(length > 0, length, 1.0)
+    trunk = np.flatnonzero(np.diff(rows["species"], prepend=-1))
+    for first, end in zip(trunk, [*trunk[1:], len(rows)], strict=True):
+        every, leaves = slice(int(first), int(end)), forms[rows["species"][first]]
+        fit = partial(_fitted, rows, leaves, every, polygons, width[first], usual)
+        name = fingerprint(rows[every], leaves, _METHOD)
+        root[every], density[every], own[every] = remembered("clumping", name, (3, int(end - first)), fit)
+    total = area.sum(axis=1)
+    return Clumping(np.where(total > 0, area @ own / np.where(total > 0, total, 1), own), own, root, density, usual)
+
+
+def _fitted(
+    rows: NDArray[np.void],
+    forms: Sequence[Sequence[LeafModel]],
+    every: slice,
+    polygons: NDArray[np.float64],
+    width: float,
+    usual: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Roots, densities and own offsets (3, r) of the rows of one species."""
+    orders, group = np.unique(rows["order"][every], return_inverse=True)
+    group = group.reshape(-1)
+    things = [things_of(rows, forms, one, group, every.start, usual) for one in _plants(rows, every.start, polygons)]
+    finest = _FINEST * max(width, 0.0)
+    parts = [seen for n, one in enumerate(things) for seen in _rays(one, len(orders), finest, n, len(things))]
+    unit = np.sqrt(finest / _FINEST) if finest > 0 else np.sqrt(usual[every.start] / 100)
+    found = _solved(*(np.concatenate(values) for values in zip(*parts, strict=True)), unit)
+    own = np.clip(found[2] + found[3:][group], *_OFFSETS)
+    return np.stack([np.full(len(own), found[0] * unit), np.full(len(own), found[1]), own])
+
+
+def _plants(rows: NDArray[np.void], first: int, polygons: NDArray[np.float64]) -> list[Branches]:
+    """Plants of a species, or the sub-plants of some that are large."""
+    one = max(polygons[first], 1)
+    number = int(np.clip(_POLYGONS / one, 2 if 2 * one <= _PAIR else 1, _PLANTS))
+    seed = mix(key_of_seed(np.arange(number)) ^ np.uint64(0xC1A3)).view(np.int64)
+    frame = np.tile(np.eye(3), (number, 1, 1))
+    species = np.full(number, rows["species"][first], np.int32)
+    plants = trunks(rows, Seeds(("",), species, seed, np.zeros((number, 3)), frame, np.ones(number)))
+    if one > _LARGEST:
+        number = _PLANTS
+    while polygons[plants.row].max() > _LARGEST:
+        grown = opened(rows, plants)[2]
+        if len(grown) == 0:
+            break
+        order = np.argsort(-polygons[grown.row], kind="stable")
+        order = order[: (polygons[grown.row] >= 0.5 * polygons[grown.row].max()).sum()]
+        pick = order[(np.arange(min(number, len(order))) * len(order)) // min(number, len(order))]
+        plants = grown.take(pick)
+    return [plants.take(slice(i, i + 1)) for i in range(len(plants))]
+
+
+def _directions(plant: int, plants: int) -> NDArray[np.float64]:
+    """Directions (n, 3) on the half sphere from which one of some plants is seen, others for each."""
+    number = max(_VIEWS // plants, _LEAST_VIEWS)
+    i = plant + np.arange(number) * plants + 0.5
+    turn = np.pi * (1 + np.sqrt(5)) * i
+    z = i / (number * plants)
+    return np.stack([np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z], axis=1)
+
+
+def _rays(
+    things: Things, groups: int, finest: float, plant: int, plants: int
+) -> Iterator[tuple[NDArray, NDArray, NDArray]]:
+    """Whether rays through a sub-plant meet anything (k,), their optical depths (k, 3 + groups) and weights (k,).
+
+    Depths are those of cells evenly filled with what they hold: divided by √h, times ln λ, as they are, and by order.
+    """
+    key = key_of_seed(np.array([plant]))
+    low, high = things.middle.min(axis=1), things.middle.max(axis=1)
+    # A bare stem is one thing, and has no extent between middles.
+    extent = max(float((high - low).max()), float(things.radius.max()))
+    finest = max(finest, extent / 100)
+    middling = float(np.maximum(high - low, extent / 100).prod() ** (1 / 3))
+    sizes = np.geomspace(finest, max(_COARSEST * middling, 2 * finest), _SIZES)
+    grids = []
+    for s, h in enumerate(sizes):
+        side = h * 6 ** (1 / 3)  # of the cube that is divided into six such tetrahedra
+        corner = low - side * np.array([uniform(key, _CELL + 8 * (3 * s + k))[0] for k in range(3)])
+        shape = np.maximum(np.ceil((high - corner) / side), 1).astype(np.int64)
+        cells, within = np.unique(cell_numbers((things.middle - corner[:, None]) / side, shape), return_inverse=True)
+        grids.append((h, side, corner, shape, cells, within.reshape(-1)))
+    directions = _directions(plant, plants)
+    segments = _SEGMENTS / (plants * len(directions))
+    for d, direction in enumerate(directions):
+        origin, met = _looked_at(things, direction, uniform(key, _AT + 8 * d)[0])
+        shown = np.concatenate([p.shown(direction) for p in things.parts])
+        pick = np.argsort(mix(key ^ np.arange(len(origin)).astype(np.uint64)), kind="stable")
+        for h, side, corner, shape, cells, within in grids:
+            count = len(cells)
+            density = np.bincount(within * groups + things.group, shown, count * groups).reshape(-1, groups) / h**3
+            dense = np.bincount(within, shown * things.dense, count) / h**3
+            some = np.sort(pick[: max(int(segments / (3.5 * extent / side + 1)), 100)])
+            ray, cell, length = path_lengths((origin[some] - corner) / side, direction, shape)
+            at = np.minimum(np.searchsorted(cells, cell), count - 1)
+            full = np.flatnonzero(cells[at] == cell)
+            ray, at = ray[full], at[full]
+            held = np.concatenate([dense[at, None], density[at]], axis=1) * (length[full] * side)[:, None]
+            depth = np.stack([np.bincount(ray, held[:, k], len(some)) for k in range(groups + 1)], axis=1)
+            total = depth[:, 1:].sum(axis=1)
+            use = np.flatnonzero(met[some] | (total > 0))
+            columns = (total / np.sqrt(h), depth[:, 0], total, *depth[:, 1:].T)
+            depth = np.stack(columns, axis=1)[use]
+            yield met[some][use], depth, np.full(len(use), 1 / max(len(use), 1))
+
+
+def _looked_at(
+    things: Things, direction: NDArray[np.float64], offset: float
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Origins (k, 3) of parallel rays on a grid over a sub-plant, and whether each meets anything (k,)."""
+    u, v = basis(direction)
+    flat = np.stack([sum(axis[k] * things.middle[k] for k in range(3)) for axis in (u, v)])
+    least, most = flat.min(axis=1), flat.max(axis=1)
+    # Middles in a line have no area, and as fine a grid as they ask for would have no end.
+    spacing = float(np.sqrt(np.maximum(most - least, things.radius.max()).prod())) / _RAYS
+    low = np.floor(least / spacing - 1) + offset  # of rays: at spacing × (low + i)
+    shape = np.ceil(most / spacing - low + 1).astype(np.int64)
+    place = flat / spacing - low[:, None]
+    near = (np.abs(place - np.rint(place)) <= things.radius / spacing).all(axis=0)
+    met = np.zeros(shape.prod(), bool)
+    begin = 0
+    for part in things.parts:
+        end = begin + len(part)
+        corners, first, number = part.outlines(np.flatnonzero(near[begin:end]), u, v)
+        begin = end
+        _, ray = covered(corners / spacing - low, first, number)
+        inside = ((ray >= 0) & (ray < shape)).all(axis=1)
+        met[ray[inside, 0] * shape[1] + ray[inside, 1]] = True
+    i = np.arange(len(met))
+    at = (np.stack([i // shape[1], i % shape[1]], axis=1) + low) * spacing
+    return at[:, :1] * u + at[:, 1:] * v, met
+
+
+def _solved(
+    met: NDArray[np.bool_], depth: NDArray[np.float64], weight: NDArray[np.float64], unit: float
+) -> NDArray[np.float64]:
+    """Coefficients (k,) with which depths (n, k) let through as many rays as meet nothing, by Newton's method.
+
+    Equations are weighted by the share that each coefficient has in a ray's depth: one for each. The first coefficient
+    is one of 1 / √h, with h in units whose square root is given.
+    """
+    depth = depth * np.where(np.arange(depth.shape[1]) == 0, unit, 1.0)
+    weight = depth * (weight / weight.sum() / np.maximum(depth[:, 2], 1e-12))[:, None]
+    kind = np.minimum(np.arange(depth.shape[1]), len(_PRIOR) - 1)
+    prior, found = _PRIOR[kind], _PRIOR[kind]
+    for _ in range(_STEPS):
+        through = np.exp(-np.maximum(depth @ found, 0))
+        error = weight.T @ (1 - through - met)
+        slope = (weight * through[:, None]).T @ depth
+        ridge = _RIDGE[kind] * slope[2, 2]
+        step = np.linalg.solve(slope + np.diag(ridge), -error - ridge * (found - prior))
+        largest = float(np.abs(step).max())
+        found = found + step / max(1.0, largest)
+        if largest < 1e-4:
+            break
+    return found

@@ -1,0 +1,288 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is known of sub-plants before any is grown: bounds, mean areas, colours and orientation (paper, section 5).
+
+Areas, counts and colours are expectations in closed form. Orientation and the places of leaves and wood within a
+sub-plant are kept as a few hundred sample points, drawn by following random paths from the branch outwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SpeciesError
+from ..growth.branches import Branches
+from ..growth.growth import fullness
+from ..growth.rows import LATERAL, build_rows
+from ..growth.wind import Wind, is_windy, widest_sway, windy_rows
+from ..species.leaf_models import LeafModel
+from ..species.quality import with_quality
+from ..species.species import LEAF_KINDS, Species
+from .averages import Averages, RowLeaves, average, quadratic, row_leaves
+from .bounds import leaf_boxes, leaf_reaches, sampled_bounds, unit_bounds, widest_radii
+from .clumping import Clumping, fit_clumping
+from .orientation import Orientation, orientation_of
+from .samples import Samples, draw_samples
+
+
+@dataclass(frozen=True, eq=False)
+class Flora:
+    """The compiled species of a scene; arrays have one entry for each row (species and order).
+
+    Amounts are those of a sub-plant where the crown's branches are longest (vigour 1); of what follows the length, a
+    shorter one has the share that `growth.fullness` says.
+
+    Attributes
+    ----------
+    species : tuple of Species
+    forms : tuple of tuple of tuple of LeafModel
+        By species and kind of leaf.
+    rows : (r,) structured array
+        Parameters, see `rows.ROW_DTYPE`.
+    first_row : (species,) int64
+        Row of each species' trunk.
+    leaf : RowLeaves
+        Means over the forms of the leaf that each row's own branch bears.
+    bound : (r, 3) float64
+        Radius, lowest and highest z of the sub-plant's axes for a branch of length 1, see `bounds.unit_bounds`.
+    widest : (r,) float64
+        Greatest distance of the sub-plant's wood from its axes, in radii of its base, see `bounds.widest_radii`.
+    leaf_reach : (r,) float64
+        How far leaves and short shoots of the sub-plant stick out beyond its axes at plant scale 1, metres.
+    leaf_box : (r, 2, 3) float64
+        Middle and half of the extent of the leaf that the row's own branch bears, of size 1.
+    leaf_width : (r,) float64
+        Mean width of its leaves at plant scale 1, metres; 0 without leaves.
+    leaf_count : (r,) float64
+        Expected number of the leaves of the sub-plant.
+    fixed_wood, full_wood : (r,) float64
+        Expected surface of the branches of the sub-plant divided by length × radius of its own branch: what every one
+        has, and what follows its fullness.
+    spur_wood : (r,) float64
+        Surface of its short shoots, m² at plant scale 1; follows the fullness.
+    polygons, leaf_faces, fixed_faces : (r,) float64
+        Expected number of faces of the sub-plant, leaves and branches; those of the leaves; and those of the tubes that
+        every one has.
+    wood_colour : (r, 3) float64
+        Area-weighted mean.
+    transmission : (r,) float64
+        Share of scattered light that goes through the leaves of the sub-plant.
+    averages : Averages
+        All expected amounts by the row that contributes them.
+    area_nodes : (r, 3) float64
+        Expected one-sided area of leaves at `averages.NODES`, m² at plant scale 1.
+    colour_nodes : (r, 3, 3) float64
+        Area times mean colour at the same places.
+    calm : Flora or None
+        The same without the wind that this one is in.
+    """
+
+    species: tuple[Species, ...]
+    forms: tuple[tuple[tuple[LeafModel, ...], ...], ...]
+    rows: NDArray[np.void]
+    first_row: NDArray[np.int64]
+    leaf: RowLeaves
+    bound: NDArray[np.float64]
+    widest: NDArray[np.float64]
+    leaf_reach: NDArray[np.float64]
+    leaf_box: NDArray[np.float64]
+    leaf_width: NDArray[np.float64]
+    leaf_count: NDArray[np.float64]
+    fixed_wood: NDArray[np.float64]
+    full_wood: NDArray[np.float64]
+    spur_wood: NDArray[np.float64]
+    polygons: NDArray[np.float64]
+    leaf_faces: NDArray[np.float64]
+    fixed_faces: NDArray[np.float64]
+    wood_colour: NDArray[np.float64]
+    transmission: NDArray[np.float64]
+    averages: Averages
+    area_nodes: NDArray[np.float64]
+    colour_nodes: NDArray[np.float64]
+    calm: Flora | None = None
+
+    @property
+    def at_rest(self) -> Flora:
+        """The flora without wind: what is inside of sub-plants is known of plants that do not move."""
+        return self.calm or self
+
+    def in_wind(self, wind: Wind) -> Flora:
+        """The flora in a wind; bounds hold at all times."""
+        if wind.speed == 0:
+            return self.at_rest
+        windy = _windy(self.at_rest, replace(wind, time=0.0))
+        rows = windy.rows.copy()
+        rows["air"]["time"] = wind.time
+        return replace(windy, rows=rows)
+
+    @cached_property
+    def samples(self) -> Samples:
+        """Points on the leaves and wood of sub-plants; drawn when first asked for, as only proxies need them."""
+        if self.calm is not None:
+            return self.calm.samples
+        amounts = self.averages
+        return draw_samples(self.rows, amounts.leaf_area[:, 1], _wood_shares(amounts), amounts.length)
+
+    @cached_property
+    def sampled_bound(self) -> NDArray[np.float64]:
+        """Radius, and lowest and highest place along the branch (r, 3), of all samples; unit is the branch's length."""
+        if self.calm is not None:
+            return self.calm.sampled_bound
+        parts = (self.samples.leaves, self.samples.wood)
+        return sampled_bounds(parts, len(self.rows))
+
+    @cached_property
+    def orientation(self) -> Orientation:
+        """How the surfaces of sub-plants are turned; likewise."""
+        if self.calm is not None:
+            return self.calm.orientation
+        amounts = self.averages
+        return orientation_of(self.rows, self.forms, amounts.leaf_area[:, 1], _wood_shares(amounts), amounts.length)
+
+    @cached_property
+    def clumping(self) -> Clumping:
+        """How much lighter sub-plants are than even fogs of their area; fitted when first asked for, as above."""
+        if self.calm is not None:
+            return self.calm.clumping
+        amounts = self.averages
+        wood = _wood_shares(amounts) * (amounts.length * amounts.radius)[:, None]
+        area = amounts.leaf_area[:, 1] + wood / 2
+        return fit_clumping(self.rows, self.forms, area, self.polygons, self.leaf_width, amounts.length)
+
+    def species_of(self, row: NDArray[np.integer]) -> NDArray[np.integer]:
+        """Index (n,) of the species that rows (n,) belong to."""
+        return self.rows["species"][row]
+
+    def leaf_areas(self, subplants: Branches) -> NDArray[np.float64]:
+        """Expected one-sided area (n,) of the leaves of sub-plants, m²."""
+        area = self._at_place(self.area_nodes, subplants)
+        return fullness(self.rows, subplants) * area * subplants.scale**2
+
+    def leaf_colours(self, subplants: Branches) -> NDArray[np.float64]:
+        """Mean linear RGB (n, 3) of the leaves of sub-plants, weighted by area; black where they have none."""
+        area = self._at_place(self.area_nodes, subplants)
+        return self._at_place(self.colour_nodes, subplants) / np.maximum(area, 1e-300)[:, None]
+
+    def wood_areas(self, subplants: Branches) -> NDArray[np.float64]:
+        """Expected surface (n,) of the branches of sub-plants, m²."""
+        row, full = subplants.row, fullness(self.rows, subplants)
+        relative = self.fixed_wood[row] + full * self.full_wood[row]
+        return relative * subplants.length * subplants.radius + full * self.spur_wood[row] * subplants.scale**2
+
+    def face_counts(self, subplants: Branches) -> NDArray[np.float64]:
+        """Expected number (n,) of the faces of sub-plants, leaves and branches."""
+        row, fixed = subplants.row, self.fixed_faces[subplants.row]
+        return fixed + fullness(self.rows, subplants) * (self.polygons[row] - fixed)
+
+    def branch_faces(self, subplants: Branches) -> NDArray[np.float64]:
+        """Expected number (n,) of the faces of the branches of sub-plants."""
+        leaves = fullness(self.rows, subplants) * self.leaf_faces[subplants.row]
+        return self.face_counts(subplants) - leaves
+
+    def one_leaf_area(self, branches: Branches) -> NDArray[np.float64]:
+        """Mean one-sided area (n,) of a single leaf of sub-plants, m²; 0 where they have none."""
+        area = self._at_place(self.area_nodes, branches)
+        return area / np.maximum(self.leaf_count[branches.row], 1e-300) * branches.scale**2
+
+    def _at_place(self, nodes: NDArray[np.float64], subplants: Branches) -> NDArray[np.float64]:
+        """Values at the places of sub-plants between the inside and the outside of the crown."""
+        return np.einsum("nk,nk...->n...", quadratic(subplants.outward), nodes[subplants.row])
+
+
+def compile_species(species: Sequence[Species]) -> Flora:
+    """Compile the species of a scene; the last few results are kept, by content.
+
+    Raises
+    ------
+    SpeciesError
+        A species whose leaf is still the name of a Blender object (the bridge to Blender has to replace it first).
+    """
+    return _compiled(tuple(with_quality(one, one.quality) for one in species))
+
+
+@lru_cache(maxsize=8)
+def _compiled(species: tuple[Species, ...]) -> Flora:
+    for one in species:
+        for kind, name in enumerate(LEAF_KINDS):
+            for form in one.forms(kind):
+                if not isinstance(form, LeafModel):
+                    raise SpeciesError(f'{one.identifier}: the {name} object "{form}" was not replaced with a mesh')
+    rows = build_rows(species)
+    forms = tuple(tuple(one.forms(kind) for kind in range(len(LEAF_KINDS))) for one in species)
+    leaf = row_leaves(rows, forms, np.array([[one.leaf_transmission, one.blossom_transmission] for one in species]))
+    amounts = average(rows, leaf)
+    bound = _with_drawn(rows, unit_bounds(rows))
+    leaves, area = amounts.leaves, amounts.leaf_area[:, 1]
+    wood = _wood_shares(amounts)
+    leaf_count, leaf_area = leaves.sum(axis=1), area.sum(axis=1)
+    size = rows["leaf_size"][:, 0] * (1 + rows["leaf_size_tip"]) / 2
+    fixed, full = amounts.fixed_faces.sum(axis=1), amounts.full_faces.sum(axis=1)
+    polygons = fixed + full + leaves @ leaf.polygons
+    return Flora(
+        species=tuple(species),
+        forms=forms,
+        rows=rows,
+        first_row=np.flatnonzero(np.diff(rows["species"], prepend=-1)),
+        leaf=leaf,
+        bound=bound,
+        widest=widest_radii(rows),
+        leaf_reach=leaf_reaches(rows, bound, leaf.reach),
+        leaf_box=leaf_boxes(rows, forms),
+        leaf_width=leaves @ (size * leaf.width) / np.maximum(leaf_count, 1e-300),
+        leaf_count=leaf_count,
+        fixed_wood=amounts.fixed_wood.sum(axis=1),
+        full_wood=amounts.full_wood.sum(axis=1),
+        spur_wood=amounts.spur_wood.sum(axis=1),
+        polygons=polygons,
+        leaf_faces=leaves @ leaf.polygons,
+        fixed_faces=fixed,
+        wood_colour=wood @ rows["branch_colour"][:, 0] / wood.sum(axis=1, keepdims=True),
+        transmission=area @ leaf.transmission / np.maximum(leaf_area, 1e-300),
+        averages=amounts,
+        area_nodes=amounts.leaf_area.sum(axis=2),
+        colour_nodes=amounts.leaf_colour,
+    )
+
+
+@lru_cache(maxsize=8)
+def _windy(flora: Flora, wind: Wind) -> Flora:
+    """A flora at rest in a wind at one time."""
+    amounts = flora.averages
+    rows = windy_rows(flora.rows, amounts.length, amounts.radius, wind)
+    bound = _with_drawn(rows, unit_bounds(rows))
+    return replace(
+        flora,
+        rows=rows,
+        bound=bound,
+        widest=widest_radii(rows),
+        leaf_reach=leaf_reaches(rows, bound, flora.leaf.reach),
+        calm=flora,
+    )
+
+
+def _with_drawn(rows: NDArray[np.void], bound: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Bounds in which plants drawn by hand have theirs: the drawing, and what grows on it in any direction."""
+    bound = bound.copy()
+    for i in np.flatnonzero(rows["phantom"]):
+        own = rows[slice(*rows["drawn_rows"][i])]
+        child = own["next"][:, LATERAL]
+        farthest = np.hypot(bound[child, 0], np.maximum(bound[child, 2], -bound[child, 1]))
+        reach = np.where(child >= 0, own["size"][:, 0] * rows["length"][child].sum(axis=1) * farthest, 0.0)
+        across, height = np.hypot(own["knots"][..., 0], own["knots"][..., 1]), own["knots"][..., 2]
+        if is_windy(rows):  # no point moves farther than an arc that turns as its height does
+            above = np.maximum(height.max(), 0.0)
+            reach = reach + widest_sway(own[0]) * above * (above / 2 + across.max())
+        low, high = (height - reach[:, None]).min(), (height + reach[:, None]).max()
+        bound[i] = np.array([(across + reach[:, None]).max(), min(low, 0.0), max(high, 0.0)]) / rows["length"][i, 0]
+    return bound
+
+
+def _wood_shares(amounts: Averages) -> NDArray[np.float64]:
+    """Expected surface (r, r) of branches of typical size by contributing row, over length × radius of the own one."""
+    size = np.maximum(amounts.length * amounts.radius, 1e-300)
+    return amounts.fixed_wood + amounts.full_wood + amounts.spur_wood / size[:, None]

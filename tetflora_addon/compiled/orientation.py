@@ -1,0 +1,357 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How the surfaces of sub-plants are turned on the mean: moments of their normals, by where the sky is.
+
+They are the orientations of the paper's summaries (section 6.5). Leaves that turn to the sky, and boughs that bend to
+it, do not turn with their branch. So the mean of n nᵀ in the branch's own axes is kept as a function of the sky's
+direction in these axes: a polynomial, and the first harmonics of its azimuth. It is found from the highest order down:
+that of a sub-plant is the mean over its own leaves and over the sub-plants on it, whose own are known by then. It is
+fitted for skies all around the branch, but half of them are where an upright plant has them, so that what the functions
+cannot follow is missed where no branch stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import columns, cross, perpendicular
+from ..growth.axes import Axes, axes
+from ..growth.branches import Branches
+from ..growth.foliage import leaf_frames, leaf_keys, leaf_places, outwardness, settled
+from ..growth.growth import branch_counts, chosen_children, drawn_children, fullness, leaf_counts, radius_at
+from ..growth.hashing import Draw, key_of_seed, mix, thinned, uniform
+from ..growth.rows import FORK, LATERAL, SPUR, ranged
+from ..species.leaf_models import LeafModel
+
+_PIECE = 128
+_BRANCHES = 2048  # of each row that are looked at, each with the sky elsewhere
+_MET = 256  # of each row that are grown upwards from the trunk, to see how they stand
+_LEAVES = 4  # on each of them
+_SORTS = (LATERAL, FORK, SPUR)
+_ALONG, _CHILD = 111, 112  # draws of this module, beyond those of growth
+_UP = np.array([0.0, 0.0, 1.0])
+# Exponents of x, y, z: all polynomials of degree 4 on the sphere are sums of these.
+_EXPONENTS = np.array([(a, b, d - a - b) for d in (3, 4) for a in range(d + 1) for b in range(d + 1 - a)])
+_TERMS = len(_EXPONENTS) + 8
+_UPRIGHT = 1e-3  # squared sine of the tilt at which a branch begins to have sides
+_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+
+@dataclass(frozen=True)
+class Orientation:
+    """Polynomials of moments; arrays by row.
+
+    Attributes
+    ----------
+    leaves, own_leaves, wood : (r, 33, 6) float64
+        Coefficients of xx, yy, zz, xy, xz, yz of the mean of n nᵀ: over all leaves of the sub-plant, over those of its
+        branch itself where that is straight, and over its wood.
+    """
+
+    leaves: NDArray[np.float64]
+    own_leaves: NDArray[np.float64]
+    wood: NDArray[np.float64]
+
+
+def leaf_moments(orientation: Orientation, subplants: Branches) -> NDArray[np.float64]:
+    """Mean of n nᵀ over the leaves of sub-plants, (n, 3, 3) float64 of trace 1 (0 for rows without leaves)."""
+    return _evaluated(orientation.leaves, subplants.row, subplants.frame)
+
+
+def own_leaf_moments(
+    orientation: Orientation, row: NDArray[np.integer], axis: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The same (n, 3, 3) over the leaves that straight pieces of branches bear, given by row (n,) and axis (n, 3)."""
+    return _evaluated(orientation.own_leaves, row, _frames_along(axis))
+
+
+def wood_moments(orientation: Orientation, subplants: Branches) -> NDArray[np.float64]:
+    """Mean of n nᵀ over the branches of sub-plants, (n, 3, 3) float64 of trace 1."""
+    return _evaluated(orientation.wood, subplants.row, subplants.frame)
+
+
+def _evaluated(
+    coefficients: NDArray[np.float64], row: NDArray[np.integer], frame: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Moments (n, 3, 3) in the world, by polynomials (r, 33, 6) of rows (n,), for branches with frames (n, 3, 3)."""
+    basis = _basis(frame[:, 2, :])
+    local = np.zeros((len(row), 6))
+    for r in np.unique(row):
+        chosen = slice(None) if (row == r).all() else np.flatnonzero(row == r)
+        local[chosen] = _product(basis[chosen], coefficients[r])
+    trace = local[:, :3].sum(axis=1, keepdims=True)
+    return _turned(local / np.where(trace > 0, trace, 1), frame)
+
+
+def _basis(sky: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Functions (n, 33) of directions (n, 3): polynomials of degree 4, and the first harmonics of the azimuth."""
+    out = np.empty((_TERMS, len(sky)))
+    powers = [[np.ones(len(sky))] for _ in range(3)]
+    for axis, values in enumerate(np.ascontiguousarray(sky.T)):
+        for _ in range(_EXPONENTS.max()):
+            powers[axis].append(powers[axis][-1] * values)
+    for k, (a, b, c) in enumerate(_EXPONENTS):
+        np.multiply(powers[0][a], powers[1][b], out=out[k])
+        out[k] *= powers[2][c]
+    # Level sprays turn with the azimuth of the sky, however little the branch leans.
+    x, y, z = (powers[axis][1] for axis in range(3))
+    level = np.sqrt(x * x + y * y + _UPRIGHT)
+    c, s = x / level, y / level
+    for k, values in enumerate((c, s, c * c - s * s, 2 * c * s)):
+        out[len(_EXPONENTS) + k] = values
+        np.multiply(values, z, out=out[len(_EXPONENTS) + 4 + k])
+    return out.T
+
+
+def _product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Product of a tall array (n, k) and a small one, in pieces so small that no library starts threads for them."""
+    whole = len(a) // _PIECE * _PIECE
+    pieces = np.ascontiguousarray(a[:whole]).reshape(-1, _PIECE, a.shape[1]) @ b
+    return np.concatenate([pieces.reshape(whole, b.shape[1]), a[whole:] @ b])
+
+
+def _turned(six: NDArray[np.float64], frame: NDArray[np.float64]) -> NDArray[np.float64]:
+    """R M Rᵀ (n, 3, 3) of symmetric M given by six numbers (n, 6)."""
+    full = six[:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)
+    return frame @ full @ frame.transpose(0, 2, 1)
+
+
+def _six(moments: NDArray[np.float64], frame: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rᵀ M R as six numbers (n, 6) of symmetric M (n, 3, 3)."""
+    local = frame.transpose(0, 2, 1) @ moments @ frame
+    return np.stack([local[:, i, j] for i, j in _PAIRS], axis=1)
+
+
+def _frames_along(axis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Frames (n, 3, 3) whose third column is an axis (n, 3), turned about it as may be."""
+    x = perpendicular(axis)
+    return columns(x, cross(axis, x), axis)
+
+
+def orientation_of(
+    rows: NDArray[np.void],
+    forms: Sequence[Sequence[Sequence[LeafModel]]],
+    leaf_share: NDArray[np.float64],
+    wood: NDArray[np.float64],
+    length: NDArray[np.float64],
+) -> Orientation:
+    """Orientation of every row.
+
+    Parameters
+    ----------
+    rows : (r,) parameter table
+    forms : by species and kind
+        Models of leaves.
+    leaf_share : (r, r) float64
+        Expected area of leaves in a sub-plant by the row that bears them.
+    wood : (r, r) float64
+        Expected surface of branches by row, over length × radius of the sub-plant's own branch.
+    length : (r,) float64
+        Typical length of a branch at plant scale 1, metres.
+    """
+    out = Orientation(*np.zeros((3, len(rows), _TERMS, 6)))
+    turn = _model_moments(rows, forms)
+    leaf_area, wood_area = leaf_share.sum(axis=1), wood.sum(axis=1)
+    skies = _skies_met(rows, length)
+    for i in range(len(rows) - 1, -1, -1):
+        branches = _looked_at(i, float(length[i]), _skies_around(_BRANCHES, bool(rows["order"][i] == 0), skies[i]))
+        lines = axes(rows, branches)
+        children, owner, stands = _some_children(rows, branches, lines)
+        row, scale = children.row, branches.scale[0]
+        basis = _basis(branches.frame[:, 2, :])
+        # What grows on the children is turned as they say; own leaves and the own branch are looked at one by one.
+        if leaf_area[i] > 0:
+            weight = stands * fullness(rows, children) * leaf_area[row] * scale**2
+            leaves = _Sums.of(len(branches), owner, _evaluated(out.leaves, row, children.frame), weight)
+            if leaf_share[i, i] > 0:
+                leaves = _own_leaves(rows, branches, lines, turn[i]).mixed(leaves, leaf_share[i, i] / leaf_area[i])
+                straight = _own_leaves(rows, branches, _straight(branches), turn[i])
+                out.own_leaves[i] = straight.fitted(branches, basis)
+            out.leaves[i] = leaves.fitted(branches, basis)
+        weight = stands * children.length * children.radius * wood_area[row]
+        bark = _Sums.of(len(branches), owner, _evaluated(out.wood, row, children.frame), weight)
+        if not rows["phantom"][i]:
+            bark = _own_wood(rows, branches, lines).mixed(bark, wood[i, i] / wood_area[i])
+        out.wood[i] = bark.fitted(branches, basis)
+    return out
+
+
+@dataclass(frozen=True)
+class _Sums:
+    """What was met on each of n branches: sums of moments × weights (n, 3, 3), and of weights (n,)."""
+
+    moment: NDArray[np.float64]
+    weight: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, n: int, owner: NDArray[np.int64], moment: NDArray[np.float64], weight: NDArray[np.float64]) -> _Sums:
+        """Sums over things (m,) on branches (m,) of n, with moments (m, 3, 3)."""
+        values = (moment * weight[:, None, None]).reshape(-1, 9).T
+        sums = np.stack([np.bincount(owner, one, n) for one in values], axis=1)
+        return cls(sums.reshape(n, 3, 3), np.bincount(owner, weight, n))
+
+    def mixed(self, other: _Sums, share: float) -> _Sums:
+        """Both together; this one has a known share of all."""
+        if other.weight.sum() <= 0:
+            return self
+        a, b = (part / max(p.weight.sum(), 1e-300) for p, part in ((self, share), (other, 1 - share)))
+        return _Sums(self.moment * a + other.moment * b, self.weight * a + other.weight * b)
+
+    def fitted(self, branches: Branches, basis: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Coefficients (33, 6), by weighted least squares; ``basis`` (n, 33) for the sky of the branches."""
+        whole = max(self.weight.sum(), 1e-300)
+        normal = _inner(basis, basis * (self.weight / whole)[:, None])
+        # Where branches can only stand in some ways, others are left to the least coefficients.
+        normal += 1e-9 * np.trace(normal) / len(normal) * np.eye(len(normal))
+        return np.linalg.solve(normal, _inner(basis, _six(self.moment / whole, branches.frame)))
+
+
+def _inner(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """aᵀ b of tall arrays, in pieces so small that no library starts threads for them."""
+    whole = len(a) // _PIECE * _PIECE
+    left, right = (x[:whole].reshape(-1, _PIECE, x.shape[1]) for x in (a, b))
+    return (left.transpose(0, 2, 1) @ right).sum(axis=0) + a[whole:].T @ b[whole:]
+
+
+def _skies_met(rows: NDArray[np.void], length: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Directions (m, 3) of the sky in the axes of some branches of each row, on plants that stand as they should."""
+    met: list[list[NDArray[np.float64]]] = [[] for _ in rows]
+    out = []
+    for i in range(len(rows)):
+        if met[i]:
+            some = np.concatenate(met[i])
+            sky = some[thinned(len(some), _MET)]
+        else:  # a trunk
+            key = key_of_seed(np.arange(_MET))
+            tilt = ranged(rows, "angle", np.full(_MET, i), key, Draw.ANGLE)
+            sky = np.stack([-np.sin(tilt), np.zeros(_MET), np.cos(tilt)], axis=1)
+        out.append(sky)
+        if (rows["next"][i] >= 0).any() or rows["phantom"][i]:
+            branches = _looked_at(i, float(length[i]), sky)
+            children, *_ = _some_children(rows, branches, axes(rows, branches))
+            for row in np.unique(children.row):
+                met[row].append(children.frame[children.row == row, 2])
+    return out
+
+
+def _skies_around(n: int, upright: bool, met: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Directions (n, 3) of the sky, every other one of those that are met, the rest all around."""
+    cos = 1 - 2 * (np.arange(n) + 0.5) / n  # Fibonacci's sphere
+    if upright:  # most plants stand, and few lie
+        cos = 1 - 2 * ((1 - cos) / 2) ** 3
+    around = np.pi * (3 - np.sqrt(5)) * np.arange(n)
+    sin = np.sqrt(1 - cos * cos)
+    sky = np.stack([sin * np.cos(around), sin * np.sin(around), cos], axis=1)
+    sky[1::2] = met[thinned(len(met), len(sky[1::2]))]
+    return sky
+
+
+def _looked_at(row: int, length: float, sky: NDArray[np.float64]) -> Branches:
+    """Branches of a row, of length 1, with the sky in given directions (n, 3) of their axes."""
+    n = len(sky)
+    key = mix(key_of_seed(np.arange(n)) ^ np.uint64(0x0E1E))
+    frame = _frames_along(sky).transpose(0, 2, 1)
+    one, none = np.ones(n), np.zeros(n)
+    scale = np.full(n, 1 / max(length, 1e-9))
+    return Branches(
+        np.full(n, row, np.int32),
+        np.arange(n, dtype=np.int32),
+        key,
+        np.zeros((n, 3)),
+        frame,
+        one,
+        one,
+        scale,
+        one,
+        none,
+    )
+
+
+def _some_children(
+    rows: NDArray[np.void], branches: Branches, lines: Axes
+) -> tuple[Branches, NDArray[np.int64], NDArray[np.float64]]:
+    """One child of each sort of each branch that has any: the children, their parents, and how many each stands for.
+
+    Of plants that are drawn by hand all branches that are drawn.
+    """
+    if rows["phantom"][branches.row[0]]:
+        children, owner = drawn_children(rows, branches)
+        return children, owner, np.ones(len(owner))
+    grown, owners, stands = [Branches.empty()], [np.zeros(0, np.int64)], [np.zeros(0)]
+    for sort in _SORTS:
+        if rows["next"][branches.row[0], sort] < 0:
+            continue
+        counts = branch_counts(rows, branches, sort)
+        if not counts.any():  # so rare that no branch has any
+            counts = np.ones_like(counts)
+        some = np.flatnonzero(counts)
+        index = (uniform(branches.key[some], _CHILD + sort) * counts[some]).astype(np.int64)
+        grown.append(chosen_children(rows, branches, lines, some, index, counts, sort))
+        owners.append(some)
+        stands.append(counts[some].astype(np.float64))
+    return Branches.concatenate(grown), np.concatenate(owners), np.concatenate(stands)
+
+
+def _straight(branches: Branches) -> Axes:
+    """Centre lines of branches that do not bend."""
+    knots = np.stack([branches.position, branches.position + branches.frame[:, :, 2]], axis=1)
+    return Axes(knots, branches.frame[:, None], np.ones(len(branches), np.int64))
+
+
+def _own_leaves(rows: NDArray[np.void], branches: Branches, lines: Axes, turn: NDArray[np.float64]) -> _Sums:
+    """Some leaves of each branch."""
+    counts = leaf_counts(rows, branches)
+    if not counts.any():
+        counts = np.ones_like(counts)
+    bearers = np.flatnonzero(counts)
+    owner, each = np.repeat(bearers, _LEAVES), np.tile(np.arange(_LEAVES), len(bearers))
+    row, number = branches.row[:1], counts[owner]
+    # Evenly over the leaves of each branch, beginning anywhere.
+    part = (uniform(branches.key, _CHILD)[owner] + each / _LEAVES) % 1.0
+    index = (part * number).astype(np.int64)
+    if rows["leaf_spray"][row[0]] > 0:  # one leaf after the other, so that both sides of the spray have as many
+        index = (index - index % _LEAVES + each) % number
+    key = leaf_keys(branches, owner, index)
+    t = leaf_places(rows, branches, owner, index, counts, key)
+    roll = uniform(branches.key, Draw.ROLL)[owner]
+    if rows["leaf_spray"][row[0]] == 0:
+        # The first leaf stands anywhere around the branch, and so does any other: evenly, a good deal of chance goes.
+        roll, index = roll + each / _LEAVES, np.zeros_like(index)
+    _, along = lines.at(owner, t)
+    frame = leaf_frames(rows, row, along.astype(np.float32), roll, index, key)
+    light = ranged(rows, "leaf_light", row, key, Draw.LEAF_LIGHT)
+    frame = settled(rows, row, frame, light, _UP)
+    size = ranged(rows, "leaf_size", row, key, Draw.LEAF_SIZE)
+    size = size * (1 + (rows["leaf_size_tip"][row] - 1) * outwardness(rows, branches, owner, t))
+    weight = number * (size * branches.scale[owner]) ** 2
+    # F T Fᵀ, summed over the leaves of each branch: their frames side by side.
+    left = _product(frame.reshape(-1, 3).astype(np.float64), turn).reshape(-1, 3, 3) * weight[:, None, None]
+    left, right = (f.reshape(-1, _LEAVES, 3, 3).swapaxes(1, 2).reshape(-1, 3, 3 * _LEAVES) for f in (left, frame))
+    out = _Sums(np.zeros((len(branches), 3, 3)), np.zeros(len(branches)))
+    out.moment[bearers] = left @ right.transpose(0, 2, 1)
+    out.weight[bearers] = weight.reshape(-1, _LEAVES).sum(axis=1)
+    return out
+
+
+def _own_wood(rows: NDArray[np.void], branches: Branches, lines: Axes) -> _Sums:
+    """A place on each branch."""
+    t = uniform(branches.key, _ALONG)
+    _, frame = lines.at(np.arange(len(branches)), t)
+    axis = frame[:, :, 2]
+    moment = (np.eye(3) - axis[:, :, None] * axis[:, None, :]) / 2
+    radius = radius_at(rows, branches, t)
+    return _Sums(moment * radius[:, None, None], radius)
+
+
+def _model_moments(rows: NDArray[np.void], forms: Sequence[Sequence[Sequence[LeafModel]]]) -> NDArray[np.float64]:
+    """Orientation moment (r, 3, 3) of the leaf that each row bears, in the leaf's own axes."""
+    table = np.zeros((len(forms), max(len(one) for one in forms), 3, 3))
+    for s, one in enumerate(forms):
+        for k, models in enumerate(one):
+            areas = np.array([m.area for m in models])
+            table[s, k] = np.einsum("f,fij->ij", areas / areas.sum(), np.array([m.moment for m in models]))
+    return table[rows["species"], rows["leaf_kind"]]

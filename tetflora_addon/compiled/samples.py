@@ -1,0 +1,384 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sample points on the leaves and the wood of sub-plants, drawn by following random paths from the trunk outwards.
+
+They stand for a sub-plant that is not grown: where its surfaces are within its bound, and how they are turned. All rows
+of a species share one set of paths: what lies beyond a branch that a path has followed is a sample of what grows on
+branches of its kind. Each row takes the paths of its parents on, as many as it needs (splitting and thinning of paths;
+Kahn and Harris, "Estimation of particle transmission by random sampling", 1951).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Arrays, dot, gathered
+from ..growth.axes import Axes, axes
+from ..growth.branches import Branches
+from ..growth.foliage import leaf_keys, leaf_places, outwardness, place_leaves
+from ..growth.growth import branch_counts, chosen_children, chosen_drawn, leaf_counts, radius_at
+from ..growth.hashing import child_key, evenly, key_of_seed, mix, systematic, thinned
+from ..growth.rows import FORK, LATERAL, SPUR, SPUR_ORDER
+
+SAMPLES = 1024
+_PATHS = 1536  # branches of each row that are followed
+_TILTS = np.linspace(-1, 1, 9)  # cosines of the angle between a branch and the sky, for those that heed it
+_ROLLS = 4  # ways in which such a branch may lie on its side
+_CLASSES = len(_TILTS) * _ROLLS
+_UPRIGHT = np.isin(np.arange(_CLASSES) // _ROLLS, (0, len(_TILTS) - 1))  # or hanging: these lie on no side,
+_GROUPS = np.where(_UPRIGHT, np.arange(_CLASSES) // _ROLLS * _ROLLS, np.arange(_CLASSES))  # and share samples
+_OF_CLASS = 64  # samples of each class of tilt and roll
+_OF_UPRIGHT = 512  # of upright ones, as trunks are
+_CLASS_PATHS = 48  # paths for each class
+_DRAWN = 4  # more rows drawn by hand than this share the paths and samples of so many,
+_LEAST_DRAWN = 1 / 16  # but each has this share of another row's
+_BANDS = 8  # in which samples are spread evenly
+_LEAVES = 2  # of each branch that a path comes to
+_PICK, _ALONG, _TILT, _ROLL, _CHILD = range(101, 106)  # draws of this module, beyond those of growth
+
+
+@dataclass(frozen=True)
+class Points:
+    """Sample points of one sub-plant after the other; each row has one run of them, or one for each class of stand.
+
+    Attributes
+    ----------
+    first, number : (r, c) int64
+        Run of each row and class (tilt of the branch, and how it lies); rows that do not care have the same for all.
+    position : (k, 3) float32
+        In units of the branch's length, in its own axes.
+    frame : (k, 3, 3) float32
+        Of leaves, before they turn to the light; of wood the axis is the third column.
+    row : (k,) int32
+        Row that describes the leaf (its size, colour and turn to the light) or the branch.
+    outward : (k,) float32
+        Place between the inside and the outside of the crown.
+    light : (k,) float32
+        How far a leaf turns to the sky.
+    """
+
+    first: NDArray[np.int64]
+    number: NDArray[np.int64]
+    position: NDArray[np.float32]
+    frame: NDArray[np.float32]
+    row: NDArray[np.int32]
+    outward: NDArray[np.float32]
+    light: NDArray[np.float32]
+
+    def runs(self, subplants: Branches) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """First sample and number of samples (n,), (n,) that stand for sub-plants as they are turned to the sky."""
+        stand = _stand_classes(subplants.frame[:, 2, :])
+        return self.first[subplants.row, stand], self.number[subplants.row, stand]
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Points on the leaves and on the wood of sub-plants whose branch has length 1."""
+
+    leaves: Points
+    wood: Points
+
+
+def draw_samples(
+    rows: NDArray[np.void],
+    leaf_share: NDArray[np.float64],
+    wood_share: NDArray[np.float64],
+    length: NDArray[np.float64],
+) -> Samples:
+    """Sample every row.
+
+    Parameters
+    ----------
+    rows : (r,) parameter table
+    leaf_share, wood_share : (r, r) float64
+        Expected area in a sub-plant by the row that contributes it.
+    length : (r,) float64
+        Typical length of a branch, metres.
+    """
+    leaves, wood = _Collector(len(rows)), _Collector(len(rows))
+    trunk = np.flatnonzero(np.diff(rows["species"], prepend=-1))
+    for first, end in zip(trunk, [*trunk[1:], len(rows)], strict=True):
+        walk = _Walk(rows, int(first), int(end), leaf_share, length)
+        for row in range(first, end):
+            for points, share, out in ((walk.leaves, leaf_share, leaves), (walk.wood, wood_share, wood)):
+                if share[row].sum() > 0:
+                    out.add(row, *walk.sampled(points, row, share[row]))
+    return Samples(leaves.points(), wood.points())
+
+
+def _turned(cos: NDArray[np.float64], azimuth: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Frames (n, 3, 3) at tilts of given cosines (n,) that lean along the world's x, with the sky at azimuths (n,)."""
+    sin, c, s = np.sqrt(np.clip(1 - cos * cos, 0, 1)), np.cos(azimuth), np.sin(azimuth)
+    zero = np.zeros_like(cos)
+    return np.stack([[-c * cos, -s * cos, sin], [s, -c, zero], [c * sin, s * sin, cos]]).transpose(2, 0, 1)
+
+
+def _stand_classes(sky: NDArray[np.floating]) -> NDArray[np.int64]:
+    """Class (n,) of how branches stand, from the direction (n, 3) of the sky in their own axes."""
+    tilt = np.rint((sky[:, 2].clip(-1, 1) + 1) / 2 * (len(_TILTS) - 1)).astype(np.int64)
+    turn = np.arctan2(sky[:, 1], sky[:, 0]) / (2 * np.pi)
+    return tilt * _ROLLS + (np.floor((turn % 1.0) * _ROLLS).astype(np.int64) % _ROLLS)
+
+
+def _at_least_some(counts: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The same counts; one each where things are so rare that no path has met any, but some are expected."""
+    return counts if counts.any() else np.ones_like(counts)
+
+
+@dataclass
+class _Points(Arrays):
+    """Sample points on branches of one row or several; shapes as in `Points`.
+
+    ``line`` (n, slots) says on which branches the point is, see `_Walk`; ``offset`` (n, 3) is the part of the position
+    that does not follow the length of the branches that lead there: the way along a short shoot.
+    """
+
+    line: NDArray[np.int32]
+    position: NDArray[np.float64]
+    offset: NDArray[np.float64]
+    frame: NDArray[np.floating]
+    row: NDArray[np.int32]
+    outward: NDArray[np.float64]
+    light: NDArray[np.float64]
+    area: NDArray[np.float64]
+
+    @classmethod
+    def on(
+        cls, rows: NDArray[np.void], one: _Arrived, branch: NDArray[np.int64], position: NDArray, *rest: NDArray
+    ) -> _Points:
+        """Points on branches, given by number."""
+        row = one.branches.row[branch]
+        short = rows["order"][row[:1]] == SPUR_ORDER
+        offset = position - gathered(one.branches.position, branch) if short.all() else np.zeros_like(position)
+        frame, *others = rest
+        return cls(one.line[:, branch].T, position, offset, frame, row, *others)
+
+
+@dataclass
+class _Arrived:
+    """Branches of one row that paths have come to.
+
+    ``weight`` (n,) says how many branches each stands for, ``line`` (slots, n) on which branches it grows, see `_Walk`.
+    """
+
+    branches: Branches
+    weight: NDArray[np.float64]
+    line: NDArray[np.int32]
+
+
+class _Walk:
+    """Paths through one species; rows are counted from its trunk.
+
+    Each path keeps a line of ancestors: the number of the branch of each row that it has come through, or −1. Rows that
+    are drawn by hand share a slot of it, as none grows on another, and their branches are numbered on.
+
+    Attributes
+    ----------
+    branches : list of Branches
+        Those of each row that paths have followed.
+    leaves, wood : _Points
+        What they have met.
+    """
+
+    def __init__(
+        self, rows: NDArray[np.void], first: int, end: int, leaf_share: NDArray[np.float64], length: NDArray[np.float64]
+    ) -> None:
+        self.rows, self.first = rows, first
+        self.length = np.where(length[first:end] > 0, length[first:end], 1.0) / max(length[first], 1e-9)
+        self.scale = 1 / max(length[first], 1e-9)
+        drawn = rows["drawn"][first:end]
+        self.share = np.where(drawn, np.clip(_DRAWN / max(drawn.sum(), 1), _LEAST_DRAWN, 1), 1)
+        self.slot = np.cumsum(~drawn | (np.diff(drawn, prepend=False) & drawn)) - 1
+        self.start = np.where(drawn, self._number(int(drawn.argmax()) + first) * (np.cumsum(drawn) - 1), 0)
+        arrived: list[list[_Arrived]] = [[] for _ in range(first, end)]
+        self.branches: list[Branches] = []
+        leaves, wood = [], []
+        for row in range(first, end):
+            one = self._gathered(row, arrived[row - first])
+            one.line[self.slot[row - first]] = self.start[row - first] + np.arange(len(one.weight))
+            self.branches.append(one.branches)
+            lines = axes(rows, one.branches)
+            wood.append(_wood_points(rows, one, lines))
+            if leaf_share[row, row] > 0:
+                leaves.append(_leaf_points(rows, one, lines))
+            for sort in (LATERAL, FORK, SPUR):
+                child = int(rows["next"][row, sort])
+                if child >= 0 and rows["count"][row, sort, 0] > 0:
+                    arrived[child - first].append(_one_child_each(rows, one, lines, sort))
+            for number, child in enumerate(range(*rows["drawn_rows"][row])):
+                arrived[child - first].append(_drawn_child(rows, one, number, self._number(child)))
+        self.wood = _Points.concatenate(wood)
+        self.leaves = _Points.concatenate(leaves) if leaves else None
+
+    def _number(self, row: int) -> int:
+        return int((_CLASSES * _CLASS_PATHS if self.rows["worldly"][row] else _PATHS) * self.share[row - self.first])
+
+    def _gathered(self, row: int, arrived: list[_Arrived]) -> _Arrived:
+        """Branches of a row: as many from each row that bears them, and always the same number."""
+        if not arrived:
+            return self._begun(row)
+        number = self._number(row)
+        ends = np.linspace(0, number, len(arrived) + 1).astype(np.int64)
+        branches, weights, lines = [], [], []
+        for one, places in zip(arrived, np.diff(ends), strict=True):
+            pick = thinned(len(one.weight), places)
+            branches.append(one.branches.take(pick))
+            weights.append(one.weight[pick] * (len(one.weight) / places))
+            lines.append(one.line[:, pick])
+        joined = Branches.concatenate(branches)
+        # Paths that have been split part here.
+        joined = replace(joined, key=child_key(joined.key, np.arange(number)))
+        return _Arrived(joined, np.concatenate(weights), np.concatenate(lines, axis=1))
+
+    def _begun(self, row: int) -> _Arrived:
+        """Trunks at the origin; of length 1, with the plant scaled to fit."""
+        n = self._number(row)
+        # Keys from fixed seeds, so that what is compiled never depends on what was compiled before.
+        key = mix(key_of_seed(np.arange(n)) ^ np.uint64(0x7E7F10A5))
+        frame = np.broadcast_to(np.eye(3), (n, 3, 3))
+        if self.rows["worldly"][row]:
+            # Half of them upright, as most are.
+            half_n = np.arange(n) // 2
+            stand = np.where(np.arange(n) % 2, _CLASSES - _ROLLS + half_n % _ROLLS, half_n % _CLASSES)
+            half = (_TILTS[1] - _TILTS[0]) / 2
+            cos = np.clip(_TILTS[stand // _ROLLS] + half * (2 * evenly(key, _TILT) - 1), -1, 1)
+            frame = _turned(cos, 2 * np.pi * (stand % _ROLLS + evenly(key, _ROLL)) / _ROLLS)
+        one, none = np.ones(n), np.zeros(n)
+        size, scale = np.full(n, self.length[row - self.first]), np.full(n, self.scale)
+        kind, plant = np.full(n, row, np.int32), np.arange(n, dtype=np.int32)
+        branches = Branches(kind, plant, key, np.zeros((n, 3)), frame, size, one, scale, one, none)
+        return _Arrived(branches, one, np.full((self.slot[-1] + 1, n), -1, np.int32))
+
+    def sampled(
+        self, points: _Points | None, row: int, share: NDArray[np.float64]
+    ) -> tuple[_Points, NDArray[np.int64], NDArray[np.int64]]:
+        """Samples of what grows on branches of a row, drawn by area, in their axes.
+
+        Parameters
+        ----------
+        points : _Points
+            Where from: leaves, or wood.
+        row : int
+        share : (r,) float64
+            Expected area in a sub-plant by the row that contributes it.
+
+        Returns
+        -------
+        _Points, and first sample and number of samples for each class (c,), (c,)
+        """
+        i = row - self.first
+        number = np.zeros(0) if points is None else points.line[:, self.slot[i]] - self.start[i]
+        own = np.flatnonzero((number >= 0) & (number < len(self.branches[i])))
+        if len(own) == 0 or share[points.row[own]].sum() == 0:
+            # So rare that no path has met any: they are taken to be where the branches of the row itself are.
+            points = replace(self.wood, row=np.full_like(self.wood.row, share.argmax()))
+            own = np.flatnonzero(self.wood.row == row)
+        # Areas are scaled so that each row has its expected share; paths only say how it is spread.
+        met = np.bincount(points.row[own], points.area[own], len(share))
+        area = points.area[own] * (share / np.where(met > 0, met, 1))[points.row[own]]
+        base, under = self.branches[i], points.line[own, self.slot[i]] - self.start[i]
+        place = _in_bands(points, own, base, under)
+        group, numbers = np.zeros(len(own), np.int64), np.full(_CLASSES, int(SAMPLES * self.share[i]))
+        first = np.zeros(_CLASSES, np.int64)
+        if self.rows["worldly"][row]:
+            group = _GROUPS[_stand_classes(base.frame[:, 2, :])][under]
+            numbers = (np.where(_UPRIGHT, _OF_UPRIGHT, _OF_CLASS) * self.share[i]).astype(np.int64)
+            distinct = np.where(np.arange(_CLASSES) == _GROUPS, numbers, 0)
+            first = (np.cumsum(distinct) - distinct)[_GROUPS]
+            pick = systematic(area, group, place, distinct)
+        else:
+            pick = systematic(area, group, place, numbers[:1])
+        return self._local(points.take(own[pick]), base.take(under[pick]), i), first, numbers
+
+    def _local(self, points: _Points, base: Branches, i: int) -> _Points:
+        """Points (n,) in the axes of branches (n,) of a row, in units of their length."""
+        spur = self.rows["order"][self.first + i] == SPUR_ORDER
+        length = np.maximum(base.length, 1e-12)[:, None]
+        way = (points.position - points.offset - base.position) / length
+        # Short shoots do not follow the length of what bears them: they are as large as on one of typical length.
+        way += points.offset / (length if spur else self.length[i])
+        axis, frame = base.frame.transpose(1, 2, 0), points.frame.transpose(1, 2, 0)
+        frame = (axis[:, :, None] * frame[:, None]).sum(axis=0).transpose(2, 0, 1)
+        return replace(points, position=(axis * way.T[:, None]).sum(axis=0).T, frame=frame)
+
+
+def _in_bands(points: _Points, own: NDArray[np.int64], base: Branches, under: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Where points are (n,), 0 to 1: bands along the branch, and within each from the axis outwards."""
+    way = gathered(points.position, own) - gathered(base.position, under)
+    along = dot(way, gathered(base.frame[:, :, 2], under))
+    across = np.sqrt(np.maximum(dot(way, way) - along * along, 0))[:, 0]
+    length = np.maximum(base.length[under], 1e-12)
+    along, across = along[:, 0] / length, across / length
+    band = np.floor(_BANDS * (along - along.min()) / max(np.ptp(along), 1e-12)).clip(0, _BANDS - 1)
+    return (band + across / max(across.max(), 1e-12)) / _BANDS
+
+
+def _wood_points(rows: NDArray[np.void], one: _Arrived, lines: Axes) -> _Points:
+    """A place on the wood of each branch."""
+    branches = one.branches
+    every = np.arange(len(branches))
+    along = evenly(branches.key, _ALONG)
+    position, frame = lines.at(every, along)
+    area = one.weight * branches.length * radius_at(rows, branches, along)
+    none = np.zeros(len(every))
+    return _Points.on(rows, one, every, position, frame, outwardness(rows, branches, every, along), none, area)
+
+
+def _leaf_points(rows: NDArray[np.void], one: _Arrived, lines: Axes) -> _Points:
+    """Some leaves of each branch that bears any, spread along it: how they are turned differs most on one branch."""
+    branches = one.branches
+    counts = _at_least_some(leaf_counts(rows, branches))
+    picked = np.flatnonzero(counts)
+    place = (evenly(branches.key, _PICK)[picked] + np.arange(_LEAVES)[:, None] / _LEAVES).ravel() % 1.0
+    picked = np.tile(picked, _LEAVES)
+    index = (place * counts[picked]).astype(np.int64)
+    key = leaf_keys(branches, picked, index)
+    t = leaf_places(rows, branches, picked, index, counts, key)
+    leaves = place_leaves(rows, branches, lines, picked, index, key, t)
+    outward = outwardness(rows, branches, picked, t)
+    area = (one.weight * counts)[picked] * leaves.size**2
+    light = np.broadcast_to(leaves.light, len(leaves))  # may be one number for all
+    return _Points.on(rows, one, picked, leaves.position, leaves.frame, outward, light, area)
+
+
+def _drawn_child(rows: NDArray[np.void], one: _Arrived, number: int, places: int) -> _Arrived:
+    """One of the branches drawn by hand, of some of the plants."""
+    owner = thinned(len(one.weight), places)
+    weight = one.weight[owner] * (len(one.weight) / places)
+    return _Arrived(chosen_drawn(rows, one.branches, owner, np.full(places, number)), weight, one.line[:, owner])
+
+
+def _one_child_each(rows: NDArray[np.void], one: _Arrived, lines: Axes, sort: int) -> _Arrived:
+    """A child of one sort of each branch that has any."""
+    counts = _at_least_some(branch_counts(rows, one.branches, sort))
+    alive = np.flatnonzero(counts)
+    index = (evenly(one.branches.key, _CHILD + sort) * counts).astype(np.int64)[alive]
+    children = chosen_children(rows, one.branches, lines, alive, index, counts, sort)
+    return _Arrived(children, (one.weight * counts)[alive], one.line[:, alive])
+
+
+class _Collector:
+    """Samples of one row after the other."""
+
+    def __init__(self, rows: int) -> None:
+        self.first, self.number = np.zeros((2, rows, _CLASSES), np.int64)
+        self.parts: list[_Points] = []
+        self.done = 0
+
+    def add(self, row: int, points: _Points, first: NDArray[np.int64], number: NDArray[np.int64]) -> None:
+        """Samples of a row."""
+        self.first[row], self.number[row] = self.done + first, number
+        self.parts.append(points)
+        self.done += len(points.row)
+
+    def points(self) -> Points:
+        """All of them."""
+
+        def whole(name: str, shape: tuple[int, ...], kind: type = np.float32) -> NDArray:
+            return np.concatenate([np.zeros((0, *shape)), *(getattr(p, name) for p in self.parts)]).astype(kind, "C")
+
+        vectors, numbers = whole("position", (3,)), (whole(name, ()) for name in ("outward", "light"))
+        return Points(self.first, self.number, vectors, whole("frame", (3, 3)), whole("row", (), np.int32), *numbers)

@@ -1,0 +1,152 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Forms that proxies can take, as far as the engine is concerned: which buffers are made, how large, how many.
+
+`blender.proxy_forms` adds materials and labels to each.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..buffers import MeshBuffers, PointBuffers
+from ..camera.camera import Camera
+from ..compiled.flora import Flora
+from ..proxies.microsurfaces import Facets, concatenate_facets, facet_mesh
+from ..refinement.loop import Refinement
+from .budget import BYTES_PER_POLYGON, BYTES_PER_SPHERE
+from .facets import Parts, facet_parts, spheres
+from .light import BakedLight, baked_attributes
+from .plants import Transition
+from .shells import proxy_shells
+
+Buffers = MeshBuffers | PointBuffers
+
+
+@dataclass(frozen=True)
+class Refined:
+    """A refined scene, as forms of proxies take it.
+
+    Attributes
+    ----------
+    flora : Flora
+    refinement : Refinement
+    camera : Camera
+    facet_pixels : float or None
+        Side of facets and spheres, pixels; None in forms that have none.
+    transition : Transition or None
+        As for `emission.explicit_blocks`; None in forms without facets.
+    disc : float
+        Area that the renderer draws of a sphere of radius 1.
+    """
+
+    flora: Flora
+    refinement: Refinement
+    camera: Camera
+    facet_pixels: float | None = None
+    transition: Transition | None = None
+    disc: float = np.pi
+
+    def facet_parts(self) -> Iterator[Parts]:
+        """Facets of the proxies, block by block."""
+        return facet_parts(self.flora, self.refinement, self.camera, self.facet_pixels, self.transition)
+
+
+@dataclass(frozen=True)
+class EmissionForm:
+    """How one form of proxies becomes buffers.
+
+    Attributes
+    ----------
+    blocks : callable
+        Makes the buffers of a `Refined`, for proxies that the renderer lights.
+    baked_blocks : callable or None
+        The same with baked light, given that light and the number of the first facet in its list of sheets. None:
+        proxies of this form are always lit by the renderer.
+    primitive_bytes : float
+        Memory that one face or point takes in Blender and in a renderer together.
+    faces : float or None
+        Faces per proxy tetrahedron; None where the proxies are facets, whose number follows from Facet Size.
+    hidden_block, proxy_block : float
+        As in `RefinementSettings`.
+    """
+
+    blocks: Callable[[Refined], Iterator[Buffers]]
+    baked_blocks: Callable[[Refined, BakedLight, int], Iterator[Buffers]] | None = None
+    primitive_bytes: float = BYTES_PER_POLYGON
+    faces: float | None = None
+    hidden_block: float = math.inf
+    proxy_block: float = math.inf
+
+    @property
+    def facets(self) -> bool:
+        """Whether the proxies are facets, or one sphere for each."""
+        return self.faces is None
+
+
+def facet_blocks(refined: Refined) -> Iterator[MeshBuffers]:
+    """Proxies as microsurfaces."""
+    for parts in refined.facet_parts():
+        yield replace(facet_mesh(concatenate_facets([facets for facets, _ in parts])), species=parts.species)
+
+
+def sphere_blocks(refined: Refined) -> Iterator[PointBuffers]:
+    """Proxies as microspheres, one for each facet of `facet_blocks`."""
+    for parts in refined.facet_parts():
+        yield replace(spheres(parts, refined.camera, refined.disc), species=parts.species)
+
+
+def mixed_blocks(refined: Refined) -> Iterator[Buffers]:
+    """Proxies in the form that suits each: facets where they are seen, spheres where they are not.
+
+    In the fidelity benchmark facets come closer to the plants wherever they are seen. What is hidden only casts
+    shadows and lights other plants, for which spheres serve as well and take a third of the memory.
+    """
+    for parts in refined.facet_parts():
+        facets, hidden = [some for some, seen in parts if seen], [part for part in parts if not part[1]]
+        if facets:
+            yield replace(facet_mesh(concatenate_facets(facets)), species=parts.species)
+        if hidden:
+            yield replace(spheres(hidden, refined.camera, refined.disc), species=parts.species)
+
+
+def shell_blocks(refined: Refined, light: BakedLight | None = None, _first_sheet: int = 0) -> Iterator[MeshBuffers]:
+    """Proxies as shells, in one block."""
+    shells = proxy_shells(refined.flora, refined.refinement, light)
+    if shells is not None:
+        yield shells
+
+
+def _numbered(refined: Refined, first_sheet: int) -> Iterator[tuple[Parts, Facets, NDArray[np.int64]]]:
+    """Blocks of facets, each as parts and as one, with the sheets (n,) that they are in baked light."""
+    for parts in refined.facet_parts():
+        facets = concatenate_facets([some for some, _ in parts])
+        yield parts, facets, np.arange(first_sheet, first_sheet + len(facets))
+        first_sheet += len(facets)
+
+
+def _baked_facets(refined: Refined, light: BakedLight, first_sheet: int) -> Iterator[MeshBuffers]:
+    for parts, facets, sheets in _numbered(refined, first_sheet):
+        made, values = facet_mesh(facets), baked_attributes('FACE', *light.of_facets(facets, sheets))
+        yield replace(made, attributes={**made.attributes, **values}, species=parts.species)
+
+
+def _baked_spheres(refined: Refined, light: BakedLight, first_sheet: int) -> Iterator[PointBuffers]:
+    for parts, facets, sheets in _numbered(refined, first_sheet):
+        made, values = spheres(parts, refined.camera, refined.disc), light.of_spheres(facets, sheets)
+        baked = {name: array for name, (_, array) in baked_attributes('POINT', values).items()}
+        yield replace(made, attributes={**made.attributes, **baked}, species=parts.species)
+
+
+MICROSURFACES = EmissionForm(facet_blocks, _baked_facets)
+MICROSPHERES = EmissionForm(sphere_blocks, _baked_spheres, primitive_bytes=BYTES_PER_SPHERE)
+#: Facets where they are seen, spheres elsewhere. Where light is baked, all are facets.
+AUTOMATIC = EmissionForm(mixed_blocks, _baked_facets)
+#: Shells fill their tetrahedra evenly, so that hidden ones are divided as well; those that are seen further, because
+#: their shape shows.
+SHELLS = EmissionForm(shell_blocks, shell_blocks, faces=4.0, hidden_block=16.0, proxy_block=4.0)

@@ -1,0 +1,322 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Baked light: from what refinement made to what the camera sees of it, without a renderer (paper, section 7).
+
+What will be drawn is collected first, as sheets (`SheetList`); then `baked_light` looks at the scene from all its
+lights, and `BakedLight` answers for facets, spheres, shells and faces of meshes.
+
+The shadow pass (paper, section 7): a scene as all of its lights see it, one buffer after the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..camera.camera import Camera
+from ..compiled.flora import Flora
+from ..light.buffers import LightBuffer
+from ..light.illumination import Illumination, Lit
+from ..light.receivers import Clouds, Sheets, cell_of_node
+from ..light.scattering import DIRECTIONS
+from ..light.sources import Near, World, buffers_of, light_resolution, split_areas, to_eye
+from ..proxies.microsurfaces import Facets
+from ..refinement.decisions import Decision
+from ..refinement.lights import Light
+from ..refinement.loop import Refinement
+
+#: Longer side in pixels of the sky's buffers, for each pixel of a lamp's: what comes from all sides has no edges.
+SKY_SHARE = 0.1
+#: Its limits, pixels, of clouds alone and of sheets.
+SKY_PIXELS, SKY_SHEET_PIXELS = (32, 96), (32, 384)
+#: Sheets that stand in the sky's light at most, each for several: it comes from all sides, and details drown in it.
+SKY_SHEETS = 40_000
+#: Orders of scattering that are gathered one by one.
+ORDERS = 2
+
+
+def shadow_steps(
+    clouds: Clouds,
+    lights: Sequence[Light],
+    world: World,
+    occluders: NDArray[np.float64] | None = None,
+    resolution: int = 512,
+    ground: ArrayLike = (0.0, 0.0, 0.0),
+    orders: int = ORDERS,
+    sheets: Sheets | None = None,
+    near: Near | None = None,
+) -> Generator[float, None, Illumination]:
+    """Look at a scene from all of its lights.
+
+    Parameters
+    ----------
+    clouds : Clouds
+        All tetrahedra that hold something.
+    lights : sequence of Light
+    world : World
+    occluders : (t, 3, 3) float64, optional
+        Triangles of opaque polygons, metres.
+    resolution : int
+        Longer side of a lamp's buffer, pixels; see `light_resolution`. The sky's are `SKY_SHARE` of it.
+    ground : (3,) float
+        Mean colour of the polygons, which lights crowns from below.
+    orders : int
+        Orders of scattering that are gathered one by one, at least 1.
+    sheets : Sheets, optional
+        Facets and leaves as they are drawn. Clumps that are smaller than tetrahedra shadow themselves, which an even
+        cloud does not know of; with sheets the resolution should be such that a pixel is about as large as one.
+
+    near : Near, optional
+        Part of the scene that gets buffers of its own from suns.
+
+    Yields
+    ------
+    float
+        Share that is done.
+
+    Returns
+    -------
+    Illumination
+
+    Notes
+    -----
+    Penumbras of the sun and of lamps that are no areas are as sharp as the buffer.
+    """
+    sheets = Sheets.none(len(clouds)) if sheets is None else sheets
+    lamps = []
+    split = split_areas(tuple(lights))
+    for number, light in enumerate(split):
+        buffers = buffers_of(light, clouds, sheets, occluders, resolution, near) if light.shadow else []
+        lamps.append(Lit(light, buffers))
+        yield 0.3 * (number + 1) / len(split)
+    fewer, number = sheets.thinned(SKY_SHEETS)
+    # Between sheets there are gaps that coarse pixels do not see.
+    fine = fewer.pixels(SKY_SHEET_PIXELS) if len(sheets) else int(np.clip(resolution * SKY_SHARE, *SKY_PIXELS))
+    sky: list[LightBuffer | None] = []
+    for towards in DIRECTIONS:
+        light = Light("SUN", np.zeros(3), -towards)
+        views = buffers_of(light, clouds, fewer, occluders, fine)
+        sky.append(views[0] if views else None)
+        yield 0.3 + 0.3 * len(sky) / len(DIRECTIONS)
+    found = Illumination(clouds, sheets, lamps, sky, world, (fewer, number))
+    for share in found.scatter(np.asarray(ground, np.float64), max(orders, 1)):
+        yield 0.6 + 0.4 * share
+    return found
+
+
+#: Attributes of baked light: linear radiance of the side to which normals point, and of the other side.
+FRONT, BACK = "tf_light_front", "tf_light_back"
+#: Facets and faces whose light is computed together; some 2 kB each.
+AT_ONCE = 1 << 16
+#: Longer side in pixels of a lamp's buffer at most, with ground in it and without.
+GROUND_PIXELS, OPEN_PIXELS = 1024, 4096
+#: Suns see what is nearer to the camera than these fractions of the distance to the farthest leaf in views of its
+#: own, if so many sheets are there.
+NEAR_FRACTIONS, NEAR_SHEETS = (1 / 32, 1 / 8), 1000
+
+
+@dataclass(frozen=True)
+class Sources:
+    """What lights a scene, and what of it is opaque.
+
+    Attributes
+    ----------
+    lights : tuple of Light
+    world : World
+    occluders : (t, 3, 3) float64
+        Triangles of ground and buildings, metres.
+    ground : (3,) float64
+        Their mean colour, linear.
+    """
+
+    lights: tuple[Light, ...]
+    world: World
+    occluders: NDArray[np.float64]
+    ground: NDArray[np.float64]
+
+
+class SheetList:
+    """Small opaque surfaces as they are going to be drawn, in the order in which they are added."""
+
+    def __init__(self) -> None:
+        self._parts: list[NDArray[np.float32]] = []
+
+    def __len__(self) -> int:
+        return sum(len(part) for part in self._parts)
+
+    def add_facets(self, facets: Facets) -> None:
+        """Facets, as squares of the same area."""
+        half = 0.5 * facets.side[:, None]
+        a, b, c = half * facets.across, half * facets.along, facets.centre
+        self._parts.append(np.stack([c - a - b, c + a - b, c + a + b, c - a + b], axis=1).astype(np.float32))
+
+    def add_faces(
+        self, positions: NDArray[np.floating], corner_verts: NDArray[np.integer], offsets: NDArray[np.integer]
+    ) -> None:
+        """Faces of a mesh, in the layout of `buffers.MeshBuffers`."""
+        self._parts.append(positions[corner_verts[_four_corners(offsets)]].astype(np.float32))
+
+    def corners(self) -> NDArray[np.float32]:
+        """All of them, (m, 4, 3), metres."""
+        return np.concatenate(self._parts) if self._parts else np.zeros((0, 4, 3), np.float32)
+
+
+def _four_corners(offsets: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Corners (f, 4) of faces: of more than four, four that lie apart; triangles repeat their last."""
+    first, size = offsets[:-1].astype(np.int64), np.diff(offsets)
+    spread = np.where(size[:, None] <= 4, np.arange(4), np.arange(4) * size[:, None] // 4)
+    return first[:, None] + np.minimum(spread, size[:, None] - 1)
+
+
+@dataclass(frozen=True)
+class BakedLight:
+    """Light in a refined scene, as `baked_light` finds it.
+
+    Attributes
+    ----------
+    illumination : Illumination
+    cell : (m,) int64
+        Tetrahedron (index into the clouds) of each sheet, −1 where it lies in none that holds something.
+    camera : Camera
+    """
+
+    illumination: Illumination
+    cell: NDArray[np.int64]
+    camera: Camera
+
+    def of_facets(self, facets: Facets, sheets: NDArray[np.integer]) -> tuple[NDArray, NDArray]:
+        """Radiance (n, 3) of the fronts and of the backs of facets, which are these sheets (n,) of the list."""
+        return self.illumination.facet_radiance(
+            facets.centre,
+            facets.normal,
+            facets.colour,
+            facets.transmission,
+            self.cell[sheets],
+            self.camera,
+            sheets,
+        )
+
+    def of_spheres(self, facets: Facets, sheets: NDArray[np.integer]) -> NDArray:
+        """Radiance (n, 3) of spheres in the place of facets, which are these sheets (n,) of the list.
+
+        A sphere covers what its facet covers for the camera, and shows what the camera would see of the facet.
+        """
+        front, back = self.of_facets(facets, sheets)
+        towards = np.sum(facets.normal * to_eye(self.camera, facets.centre), axis=1) > 0.0
+        return np.where(towards[:, None], front, back)
+
+    def of_shells(self) -> NDArray:
+        """Radiance (t, 4, 3) of tetrahedra at their vertices, in the order of ``refinement.nodes``."""
+        return self.illumination.cell_sources(self.camera)
+
+    def of_faces(
+        self,
+        positions: NDArray[np.floating],
+        corner_verts: NDArray[np.integer],
+        offsets: NDArray[np.integer],
+        colour: NDArray[np.floating],
+        transmission: NDArray[np.floating],
+        sheets: NDArray[np.integer],
+    ) -> tuple[NDArray, NDArray]:
+        """Radiance (f, 3) of the fronts and of the backs of a mesh's faces, which are these sheets (f,) of the list.
+
+        Parameters
+        ----------
+        positions, corner_verts, offsets
+            In the layout of `buffers.MeshBuffers`.
+        colour : (f, 3) float
+        transmission : (f,) float
+        sheets : (f,) int
+        """
+        corners = positions[corner_verts[_four_corners(offsets)]].astype(np.float64)
+        normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+        centre = _middles(corners)
+        return self.illumination.facet_radiance(
+            centre,
+            normal,
+            colour.astype(np.float64),
+            transmission.astype(np.float64),
+            self.cell[sheets],
+            self.camera,
+            sheets,
+        )
+
+
+def at_vertices(values: NDArray[np.floating], corner_verts: NDArray, offsets: NDArray, vertices: int) -> NDArray:
+    """Means (v, 3) at vertices of values (f, 3) of the faces around them, so that what is round looks round."""
+    of_corner = np.repeat(values, np.diff(offsets), axis=0)
+    number = np.maximum(np.bincount(corner_verts, minlength=vertices), 1)
+    return np.stack([np.bincount(corner_verts, column, vertices) / number for column in of_corner.T], axis=1)
+
+
+def baked_attributes(
+    domain: str, front: NDArray[np.floating], back: NDArray[np.floating] | None = None
+) -> Mapping[str, tuple[str, NDArray[np.float32]]]:
+    """Attributes for buffers that carry baked light, in the layout of `buffers.MeshBuffers`.
+
+    Parameters
+    ----------
+    domain : {'FACE', 'POINT'}
+    front : (n, 3) float
+        Linear radiance of the side to which the normals point, or of all sides.
+    back : (n, 3) float, optional
+        Of the other side; by default the same.
+    """
+    back = front if back is None else back
+    return {FRONT: (domain, front.astype(np.float32)), BACK: (domain, back.astype(np.float32))}
+
+
+def _middles(corners: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Centres of area (m, 3) of quadrilaterals and of triangles that repeat their last corner."""
+    triangle = (corners[:, 2] == corners[:, 3]).all(axis=1)[:, None]
+    return np.where(triangle, corners[:, :3].mean(axis=1), corners.mean(axis=1))
+
+
+def baked_light(
+    flora: Flora, refinement: Refinement, camera: Camera, sources: Sources, made: SheetList, facets: bool
+) -> Generator[float, None, BakedLight]:
+    """Look at a refined scene from all of its lights.
+
+    Parameters
+    ----------
+    flora : Flora
+    refinement : Refinement
+    camera : Camera
+    sources : Sources
+    made : SheetList
+        All that is drawn as facets or polygons.
+    facets : bool
+        Whether proxies are drawn so as well; otherwise they stand in the light as clouds.
+
+    Yields
+    ------
+    float
+        Fraction that is done.
+    """
+    corners, cell = made.corners(), cell_of_node(refinement)
+    replaced = ~np.isin(refinement.decision, (Decision.PROXY, Decision.HIDDEN)) | facets
+    replaced &= len(corners) > 0
+    clouds = Clouds.of(flora, refinement, ~replaced)
+    inside = np.full(len(corners), -1, np.int64)
+    for start in range(0, len(corners), AT_ONCE):
+        part = slice(start, start + AT_ONCE)
+        inside[part] = cell[refinement.tree.locate(_middles(corners[part].astype(np.float64)))]
+    # A leaf that reaches out of all tetrahedra that hold something has no cell; it shadows like the others.
+    sheets = replace(Sheets.of(corners, inside, len(clouds)), replaced=replaced)
+    yield 0.05
+    resolution, near = light_resolution(camera), None
+    if len(corners):
+        # Ground is drawn into each pixel, sheets only where they are.
+        most = GROUND_PIXELS if len(sources.occluders) else OPEN_PIXELS
+        resolution = sheets.pixels((resolution // 2, most))
+        if resolution == most and camera.kind != "ORTHO":
+            away = np.linalg.norm(corners[:, 0] - camera.eye, axis=1)
+            radii = (fraction * away.max() for fraction in NEAR_FRACTIONS)
+            near = Near(camera.eye, tuple(r for r in radii if (away < r).sum() >= NEAR_SHEETS))
+    scene = sources.lights, sources.world, sources.occluders
+    found = yield from shadow_steps(clouds, *scene, resolution, sources.ground, sheets=sheets, near=near)
+    return BakedLight(found, inside, camera)

@@ -1,0 +1,272 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shells: tetrahedra as closed surfaces that carry what a shader needs to see the cloud inside (paper, section 7).
+
+From decisions to buffers: proxies as shells, the tetrahedra themselves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..buffers import MeshBuffers
+from ..compiled.flora import Flora
+from ..growth.hashing import mix, uniform
+from ..proxies.summaries import extinction_matrices, summarise
+from ..refinement.decisions import Decision
+from ..refinement.loop import Refinement
+from ..tetrahedra.geometry import EDGES, FACES, volume
+from .light import BakedLight
+
+# As a mesh stores them, with the edge from each corner to the next, in the order of faces.
+_FACES, _EDGES = FACES.astype(np.int32), EDGES.astype(np.int32)
+_FACE_EDGES = np.array([[3, 5, 4], [2, 5, 1], [0, 4, 2], [1, 3, 0]], dtype=np.int32)
+_BARYCENTRIC = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float32)
+
+# Six times the volume over the cube of the longest edge: beneath this a cell is flat as far as doubles can tell.
+_FLAT = 1e-13
+# Directions of the mean over the sphere, and cells at a time, so that their product stays small.
+_DIRECTIONS = 64
+_CHUNK = 65_536
+
+
+def mean_extinction(S: ArrayLike) -> NDArray[np.float64]:
+    """Mean over all directions of κ(ω) = √(ωᵀSω).
+
+    Parameters
+    ----------
+    S : (n, 6) float
+        Symmetric matrices as (Sxx, Syy, Szz, Sxy, Sxz, Syz), 1/m².
+
+    Returns
+    -------
+    (n,) float64
+        Mean extinction, 1/m; within 1.3 % of the integral, which single orientations reach.
+
+    Notes
+    -----
+    A mean over points of a Fibonacci lattice on the half sphere; κ(ω) = κ(−ω). The form of κ is that of Heitz,
+    Dupuy, Crassin and Dachsbacher, "The SGGX Microflake Distribution", 2015.
+    """
+    matrices = np.asarray(S, dtype=np.float64)
+    if matrices.ndim != 2 or matrices.shape[1] != 6:
+        raise ValueError(f"S must have shape (n, 6), not {matrices.shape}")
+    index = np.arange(_DIRECTIONS) + 0.5
+    z = index / _DIRECTIONS
+    turn = np.pi * (1.0 + np.sqrt(5.0)) * index
+    x, y = np.sqrt(1.0 - z * z) * np.cos(turn), np.sqrt(1.0 - z * z) * np.sin(turn)
+    basis = np.stack([x * x, y * y, z * z, 2 * x * y, 2 * x * z, 2 * y * z])
+    result = np.zeros(len(matrices))
+    for start in range(0, len(matrices), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        result[part] = np.sqrt(np.maximum(matrices[part] @ basis, 0.0)).mean(axis=1)
+    return result
+
+
+def barycentric_gradients(vertices: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Gradients of λ1, λ2, λ3, the barycentric coordinates of each tetrahedron's vertices 1 to 3.
+
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float
+        Corners, metres. Only differences are used, so the distance from the origin costs no precision.
+
+    Returns
+    -------
+    gradients : (n, 3, 3) float64
+        ``gradients[i, k]`` is ∇λ(k+1) of cell i, 1/m; zero for flat cells.
+    flat : (n,) bool
+        Cells without volume.
+    """
+    corners = np.asarray(vertices, dtype=np.float64)
+    a, b, c = (corners[:, k] - corners[:, 0] for k in (1, 2, 3))
+    normals = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+    determinant = np.einsum("ij,ij->i", a, normals[:, 0])
+    edges = np.stack([a, b, c, b - a, c - a, c - b], axis=1)
+    longest = np.sqrt(np.einsum("ijk,ijk->ij", edges, edges).max(axis=1, initial=0.0))
+    flat = np.abs(determinant) <= _FLAT * longest**3
+    gradients = normals / np.where(flat, 1.0, determinant)[:, None, None]
+    gradients[flat] = 0.0
+    return gradients, flat
+
+
+def _cell_noise(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Even random number (n,) in [0, 1) of each cell (n, 4, 3): the same wherever the same cell comes up again."""
+    # Corners as Blender stores them, so that the last bits of doubles do not matter; adding up forgets their order.
+    places = np.ascontiguousarray(corners, dtype=np.float32) + np.float32(0.0)  # no negative zeros
+    bits = places.view(np.uint32).astype(np.uint64)
+    key = mix(bits[..., 0])
+    for axis in (1, 2):
+        key = mix(key ^ bits[..., axis])
+    return uniform(key.sum(axis=1, dtype=np.uint64), 0)
+
+
+def shell_buffers(
+    vertices: ArrayLike,
+    colour: ArrayLike,
+    transmission: ArrayLike,
+    S: ArrayLike,
+    normal: ArrayLike,
+    plane: ArrayLike,
+    *,
+    rank: ArrayLike | None = None,
+    light: ArrayLike | None = None,
+) -> MeshBuffers:
+    """One mesh of all proxy tetrahedra, with the attributes that the shell material reads.
+
+    Each cell has vertices of its own: barycentric coordinates differ from cell to cell at a shared corner.
+
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float
+        Corners of the cells in either orientation, metres, world space.
+    colour : (n, 3) float
+        Mean colour of the contents, linear.
+    transmission : (n,) float
+        Share of the scattered light that passes through the sheets, 0 to 1.
+    S : (n, 6) float
+        (Sxx, Syy, Szz, Sxy, Sxz, Syz) with κ(ω) = √(ωᵀSω), 1/m².
+    normal : (n, 3) float
+        Axis of the largest eigenvalue of the contents' moment; any length and sign.
+    plane : (n,) float
+        Weight of the plane term against the particle term, 0 to 1.
+    rank : (n,) number, optional
+        Place of each cell front to back as the camera sees them, in any unit. Cells are then written back to front:
+        EEVEE blends the faces of a mesh in their order. Without it cells keep theirs.
+    light : (n, 4, 3) float, optional
+        Radiance that the contents scatter towards the camera at each corner, albedo and phase included, W/(m² sr);
+        becomes ``tf_light0`` to ``tf_light3`` for the material of baked light.
+
+    Returns
+    -------
+    MeshBuffers
+        Four triangles, four vertices and six edges a cell, facing outwards. Flat cells get no extinction, because
+        their thickness has no meaning.
+
+    Raises
+    ------
+    ValueError
+        Shapes that do not fit together.
+
+    Notes
+    -----
+    Paper, section 7, and ``docs/architecture.md`` for the names and units of the attributes.
+    """
+    corners = np.asarray(vertices, dtype=np.float64)
+    if corners.ndim != 3 or corners.shape[1:] != (4, 3):
+        raise ValueError(f"vertices must have shape (n, 4, 3), not {corners.shape}")
+    count = len(corners)
+    values = {
+        "colour": (np.asarray(colour, dtype=np.float64), (count, 3)),
+        "transmission": (np.asarray(transmission, dtype=np.float64), (count,)),
+        "S": (np.asarray(S, dtype=np.float64), (count, 6)),
+        "normal": (np.asarray(normal, dtype=np.float64), (count, 3)),
+        "plane": (np.asarray(plane, dtype=np.float64), (count,)),
+    }
+    if light is not None:
+        values["light"] = (np.asarray(light, dtype=np.float64), (count, 4, 3))
+    if rank is not None:
+        values["rank"] = (np.asarray(rank), (count,))
+    for name, (array, shape) in values.items():
+        if array.shape != shape:
+            raise ValueError(f"{name} must have shape {shape} for {count} tetrahedra, not {array.shape}")
+
+    if rank is not None:
+        order = np.argsort(values["rank"][0], kind='stable')[::-1]
+        corners = corners[order]
+        values = {name: (array[order], shape) for name, (array, shape) in values.items()}
+    spans = corners[:, 1:] - corners[:, :1]
+    inverted = np.einsum("ij,ij->i", spans[:, 0], np.cross(spans[:, 1], spans[:, 2])) < 0.0
+    random = _cell_noise(corners)
+    corners = np.where(inverted[:, None, None], corners[:, [0, 2, 1, 3]], corners)
+    gradients, flat = barycentric_gradients(corners)
+    matrices = np.where(flat[:, None], 0.0, values["S"][0])
+    axes = values["normal"][0]
+    length = np.sqrt(np.einsum("ij,ij->i", axes, axes))
+    axes = np.where(length[:, None] > 0.0, axes / np.where(length > 0.0, length, 1.0)[:, None], (0.0, 0.0, 1.0))
+
+    def per_face(array: NDArray) -> tuple[str, NDArray[np.float32]]:
+        return "FACE", np.repeat(array.astype(np.float32), 4, axis=0)
+
+    baked = {}
+    if light is not None:
+        given = values["light"][0]
+        given = np.where(inverted[:, None, None], given[:, [0, 2, 1, 3]], given)
+        baked = {f"tf_light{k}": per_face(given[:, k]) for k in range(4)}
+    first_vertex = np.arange(count, dtype=np.int32)[:, None, None] * 4
+    first_edge = np.arange(count, dtype=np.int32)[:, None, None] * 6
+    return MeshBuffers(
+        positions=corners.reshape(-1, 3).astype(np.float32),
+        edge_verts=(_EDGES + first_vertex).reshape(-1, 2),
+        corner_verts=(_FACES + first_vertex).ravel(),
+        corner_edges=(_FACE_EDGES + first_edge).ravel(),
+        face_offsets=np.arange(0, 12 * count + 1, 3, dtype=np.int32),
+        attributes={
+            "tf_colour": per_face(values["colour"][0]),
+            "tf_transmission": per_face(values["transmission"][0]),
+            "tf_kappa": per_face(mean_extinction(matrices)),
+            "tf_s0": per_face(matrices[:, :3]),
+            "tf_s1": per_face(matrices[:, 3:]),
+            "tf_normal": per_face(axes),
+            "tf_plane": per_face(values["plane"][0]),
+            "tf_random": per_face(random),
+            "tf_bary": ("POINT", np.tile(_BARYCENTRIC, (count, 1))),
+            "tf_g1": per_face(gradients[:, 0]),
+            "tf_g2": per_face(gradients[:, 1]),
+            "tf_g3": per_face(gradients[:, 2]),
+            **baked,
+        },
+        smooth=False,
+    )
+
+
+#: Fraction of its size by which a shell is smaller than its tetrahedron, at least and at most.
+GAP, MOST_GAP = 1e-3, 0.05
+# Steps between neighbouring numbers of single precision by which faces stand apart at least.
+_STEPS = 8.0
+
+
+def proxy_shells(flora: Flora, result: Refinement, light: BakedLight | None = None) -> MeshBuffers | None:
+    """Proxies as shells: the tetrahedra themselves, filled with a cloud of their extinction, colour and orientation.
+
+    They are written back to front, which is how EEVEE blends them. Tetrahedra that hold nothing but large polygons have
+    an extinction of 0. With ``light`` shells carry the radiance of their contents, for the material of baked light.
+    """
+    proxies = np.isin(result.decision, (Decision.PROXY, Decision.HIDDEN))
+    nodes = result.nodes[proxies]
+    if len(nodes) == 0:
+        return None
+    index = np.full(len(result.tree), -1, dtype=np.int64)
+    index[nodes] = np.arange(len(nodes))
+    contents = result.contents
+    # Large polygons are drawn as they are; a fog in their place would be no wall.
+    fine = np.isfinite(contents.polygons.amounts.width)
+    if not fine.all():
+        contents = replace(contents, polygons=contents.polygons.take(fine))
+    summaries = summarise(flora, contents, index, len(nodes))
+    vertices = result.tree.vertices(nodes)
+    matrices, normal, plane = extinction_matrices(summaries, volume(vertices))
+    vertices, matrices = set_apart(vertices, matrices)
+    rank = result.rank[proxies]
+    baked = None if light is None else light.of_shells()[proxies]
+    colour, transmission = summaries.colour, summaries.transmission
+    return shell_buffers(vertices, colour, transmission, matrices, normal, plane, rank=rank, light=baked)
+
+
+def set_apart(
+    vertices: NDArray[np.float64], matrices: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Tetrahedra (n, 4, 3) a little smaller, and their S (n, 6) so much larger that they are as dark as before.
+
+    Of faces at the very same distance Cycles meets only one: where a ray leaves one shell and enters the next through a
+    face that both have, the second would be lost, and with it a good part of a crown.
+    """
+    middle = vertices.mean(axis=1, keepdims=True)
+    away = vertices - middle
+    inwards = np.maximum(np.abs(away).max(axis=(1, 2)) / 8.0, 1e-300)  # a slender one is about so thick
+    step = np.abs(vertices).max(axis=(1, 2), initial=0.0) * np.finfo(np.float32).eps
+    fraction = np.clip(_STEPS * step / inwards, GAP, MOST_GAP)
+    return middle + away * (1.0 - fraction)[:, None, None], matrices / ((1.0 - fraction) ** 2)[:, None]

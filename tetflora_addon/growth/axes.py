@@ -1,0 +1,275 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Centre lines of branches: straight segments that bend at joints, turn to the sky or the ground, and sway.
+
+How thick branches are along their length: taper, flare of the base, and the pipe model.
+
+The radius is that of the base times a profile: linear from 1 to the taper, or by the pipe model, in which r^p is shared
+out among the children (Shinozaki et al., "A quantitative analysis of plant form: the pipe model theory", 1964; p = 2 is
+Leonardo's rule). The flare of Weber and Penn (SIGGRAPH 1995, section 4.4) is added over the first eighth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Arrays, by_component, columns, cross, gathered
+from .branches import Branches
+from .hashing import Draw, signed
+from .rows import ranged, varied
+from .wind import axis_and_angle, is_windy, leant, moment, sway, turned_by, turned_vectors
+
+
+@dataclass(frozen=True)
+class Axes(Arrays):
+    """Centre lines of branches: straight segments.
+
+    Attributes
+    ----------
+    knots : (n, S + 1, 3) float64
+        Ends of the segments; a branch with fewer than S segments repeats its last knot.
+    frames : (n, S, 3, 3) float64
+        Local axes along each segment.
+    segments : (n,) int64
+        Number of segments.
+    skies : (n, S, 3) float64 or None
+        In the wind: `branches.Branches.sky` along each segment.
+    later : Axes or None
+        The same lines a moment later, where it is asked how plants move.
+    """
+
+    knots: NDArray[np.float64]
+    frames: NDArray[np.float64]
+    segments: NDArray[np.int64]
+    skies: NDArray[np.float64] | None = None
+    later: Axes | None = None
+
+    @staticmethod
+    def _rows(own: NDArray | Arrays, index: NDArray | slice) -> NDArray | Arrays:
+        return own.take(index) if isinstance(own, Arrays) else _selected(own, index)
+
+    def at(self, branch: NDArray[np.integer], t: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
+        """Positions (m, 3) and frames (m, 3, 3) at the fractions t (m,) of the axes of branches (m,)."""
+        number = self.segments[branch]
+        along = t * number
+        segment = np.minimum(along.astype(np.int64), number - 1)
+        start = self.knot(branch, segment)
+        step = self.knot(branch, segment + 1) - start
+        return start + (along - segment)[:, None] * step, self.frame(branch, segment)
+
+    def sky_at(self, branch: NDArray[np.integer], t: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Sky (m, 3) at the fractions t (m,) of the axes of branches (m,); None without wind."""
+        if self.skies is None:
+            return None
+        number = self.segments[branch]
+        return _picked(self.skies, branch, np.minimum((t * number).astype(np.int64), number - 1))
+
+    def knot(self, branch: NDArray[np.integer], number: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Positions (m, 3) of knots given by branch (m,) and number (m,)."""
+        return _picked(self.knots, branch, number)
+
+    def frame(self, branch: NDArray[np.integer], segment: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Frames (m, 3, 3) of segments given by branch (m,) and number (m,)."""
+        return _picked(self.frames, branch, segment)
+
+
+def _selected(array: NDArray, index: NDArray | slice) -> NDArray:
+    """``array[index]`` of an array whose first axis is the last in memory and whose second the one before."""
+    if isinstance(index, slice) or array.ndim == 1:
+        return array[index]
+    return _to_front(np.take(_to_back(array), index, axis=-1))
+
+
+def _picked(array: NDArray, first: NDArray[np.integer], second: NDArray[np.integer]) -> NDArray:
+    """``array[first, second]`` of an array whose first axis is the last in memory and whose second the one before."""
+    flat = _to_back(array)
+    flat = flat.reshape(*flat.shape[:-2], -1)
+    picked = np.take(flat, second * len(array) + first, axis=-1)
+    return picked.transpose(-1, *range(picked.ndim - 1))
+
+
+def _to_back(array: NDArray) -> NDArray:
+    """(n, S, ...) to (..., S, n), as it lies in memory."""
+    return array.transpose(*range(2, array.ndim), 1, 0)
+
+
+def _to_front(array: NDArray) -> NDArray:
+    """(..., S, n) to (n, S, ...)."""
+    return array.transpose(-1, -2, *range(array.ndim - 2))
+
+
+def axes(rows: NDArray[np.void], branches: Branches) -> Axes:
+    """Centre lines; each joint bends by its share of the order's curvature, and turns to the sky or the ground."""
+    lines = _axes(rows, branches)
+    if branches.later is None:
+        return lines
+    return replace(lines, later=_axes(rows, branches.moved(), moment(rows)))
+
+
+def _axes(rows: NDArray[np.void], branches: Branches, ahead: float = 0.0) -> Axes:
+    """Centre lines so many seconds after the moment of the rows."""
+    segments = rows["segments"][branches.row]
+    most = int(segments.max(initial=1))
+    n = len(branches)
+    # Branches last in memory, see `vectors`. Zeros, not empty: padding must be finite.
+    knots, frames = _to_front(np.zeros((3, most + 1, n))), _to_front(np.zeros((3, 3, most, n)))
+    step = (branches.length / segments)[:, None]
+    bend = rows["curvature"][branches.row] / segments[:, None]
+    outer_bend = rows["curvature_tip"][branches.row] / segments
+    attraction = rows["attraction"][branches.row]
+    attracted = np.flatnonzero(attraction.any(axis=1))
+    pull = varied(attraction[attracted], branches.key[attracted], Draw.ATTRACTION) / segments[attracted]
+    frame, knot = by_component(branches.frame), by_component(branches.position)
+    knots[:, 0] = knot
+    windy = is_windy(rows)
+    skies = _to_front(np.zeros((3, most, n))) if windy else None
+    if windy:
+        axis, angle = axis_and_angle(sway(rows, branches, ahead) / segments[:, None])
+    for s in range(most):
+        if s:
+            # The joint in the middle of an even number of segments belongs to the outer half.
+            back = np.where(2 * s < segments, bend[:, 0], outer_bend) + bend[:, 1] * signed(
+                branches.key, Draw.BEND + 2 * s
+            )
+            aside = bend[:, 1] * signed(branches.key, Draw.BEND + 2 * s + 1)
+            frame = _bent(frame, -back, aside)
+            if len(attracted) == n:
+                frame = _pulled(frame, pull, branches.sky)
+            elif len(attracted):
+                sky = gathered(branches.sky, attracted) if windy else None
+                frame[attracted] = _pulled(gathered(frame, attracted), pull, sky)
+        shown = frame
+        if windy:  # what it does is not passed on to the next joint, or it would change how the branch grows
+            shown = turned_by(frame, axis, (s + 1) * angle)
+            skies[:, s] = turned_vectors(branches.sky, axis, (s + 1) * angle)
+        knot = np.where((s < segments)[:, None], knot + step * shown[:, :, 2], knot)
+        frames[:, s], knots[:, s + 1] = shown, knot
+    by_hand = np.flatnonzero(rows["drawn"][branches.row])
+    if len(by_hand):
+        own = branches.take(by_hand)
+        knots[by_hand], frames[by_hand], turn = _drawn_axes(rows, own, most)
+        if windy:
+            knots[by_hand], frames[by_hand], skies[by_hand] = _leant(
+                rows, own, turn, knots[by_hand], frames[by_hand], ahead
+            )
+    return Axes(knots, frames, segments, skies)
+
+
+def _drawn_axes(rows: NDArray[np.void], branches: Branches, most: int) -> tuple[NDArray, NDArray, NDArray]:
+    """Knots (n, most + 1, 3) and frames (n, most, 3, 3) of branches drawn by hand; their plants' frames (n, 3, 3)."""
+    local, line = rows["frames"][branches.row], rows["knots"][branches.row]
+    turn = branches.frame @ local[:, 0].transpose(0, 2, 1)
+    scale = branches.length / rows["size"][branches.row, 0]
+    knots = np.einsum("nij,nsj->nsi", turn * scale[:, None, None], line - line[:, :1]) + branches.position[:, None]
+    return knots[:, : most + 1], (turn[:, None] @ local)[:, :most], turn
+
+
+def _leant(
+    rows: NDArray[np.void], branches: Branches, turn: NDArray, knots: NDArray, frames: NDArray, ahead: float
+) -> tuple[NDArray, NDArray, NDArray]:
+    """Knots, frames and skies of branches drawn by hand in the wind, whose plants have the axes ``turn`` (n, 3, 3)."""
+    line = rows["knots"][branches.row, 0]
+    ground = branches.position - np.einsum("nij,nj->ni", turn, line) * branches.scale[:, None]
+    up = turn[:, :, 2]
+    whole = replace(branches, position=ground, frame=turn)
+    rate = sway(rows, whole, ahead) / branches.scale[:, None]
+    bent = leant(knots - ground[:, None], up, rate) + ground[:, None]
+    axis, rate = axis_and_angle(rate)
+    middle = (knots[:, 1:] + knots[:, :-1]) / 2 - ground[:, None]
+    height = np.maximum(np.einsum("nsi,ni->ns", middle, up), 0.0)
+    segments = height.shape[1]
+    axis, angle = np.repeat(axis, segments, axis=0), (rate[:, None] * height).ravel()
+    skies = turned_vectors(np.repeat(branches.sky, segments, axis=0), axis, angle).reshape(-1, segments, 3)
+    return bent, turned_by(frames.reshape(-1, 3, 3), axis, angle).reshape(frames.shape), skies
+
+
+def _bent(frame: NDArray[np.float64], pitch: NDArray[np.float64], yaw: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotate about the local y by pitch, then about the new local x by yaw."""
+    x, y, z = frame[:, :, 0], frame[:, :, 1], frame[:, :, 2]
+    cp, sp, cy, sy = (f(v)[:, None] for v in (pitch, yaw) for f in (np.cos, np.sin))
+    forward = sp * x + cp * z
+    return columns(cp * x - sp * z, cy * y + sy * forward, cy * forward - sy * y)
+
+
+def _pulled(
+    frame: NDArray[np.float64], pull: NDArray[np.float64], sky: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]:
+    """Turn frames to the sky by an angle (n,) times the sine of their tilt, about the level axis (Rodrigues)."""
+    if sky is not None:
+        axis, level = axis_and_angle(cross(frame[:, :, 2], sky))
+        return turned_by(frame, axis, pull * level)
+    level = np.hypot(frame[:, 0, 2], frame[:, 1, 2])
+    safe = np.maximum(level, 1e-12)
+    kx, ky = frame[:, 1, 2] / safe, -frame[:, 0, 2] / safe  # z × sky
+    cos, sin = np.cos(pull * level), np.sin(pull * level)
+    out = np.empty_like(frame)
+    for column in range(3):
+        vx, vy, vz = frame[:, :, column].T
+        along = (1 - cos) * (kx * vx + ky * vy)
+        out[:, 0, column] = cos * vx + sin * (ky * vz) + kx * along
+        out[:, 1, column] = cos * vy - sin * (kx * vz) + ky * along
+        out[:, 2, column] = cos * vz + sin * (kx * vy - ky * vx)
+    return out
+
+
+FLARE_END = 1 / 8
+_FALL = 8 * np.log(100.0)  # the flare falls to a hundredth over the first eighth
+
+
+def profile(rows: NDArray[np.void], row: NDArray, key: NDArray[np.uint64], t: NDArray[np.float64]) -> NDArray:
+    """Radius (n,) at fractions t (n,) of branches of rows (n,) and keys (n,), divided by that of the base unflared."""
+    taper = ranged(rows, "taper", row, key, Draw.TAPER)
+    out = 1 - (1 - taper) * t
+    hand = np.flatnonzero(rows["drawn"][row])
+    if len(hand):
+        out[hand] = _drawn(rows, row[hand], t[hand])[0]
+    piped = np.flatnonzero(rows["pipe"][row] > 0)
+    if len(piped):
+        power, start, tip = _pipe(rows, row[piped], taper[piped])
+        share = np.clip((t[piped] - start) / (1 - start), 0, 1)
+        out[piped] = (tip + (1 - tip) * (1 - share)) ** (1 / power)
+    flared = np.flatnonzero(rows["flare"][row] > 0)
+    if len(flared):
+        out[flared] += rows["flare"][row[flared]] * np.maximum(np.exp(-_FALL * t[flared]) - 0.01, 0)
+    return out
+
+
+def profile_integral(rows: NDArray[np.void], row: NDArray, key: NDArray[np.uint64], t: NDArray[np.float64]) -> NDArray:
+    """Integral (n,) of `profile` from 0 to t; differences of it are exact under any sequence of cuts."""
+    taper = ranged(rows, "taper", row, key, Draw.TAPER)
+    out = t - (1 - taper) * t * t / 2
+    hand = np.flatnonzero(rows["drawn"][row])
+    if len(hand):
+        out[hand] = _drawn(rows, row[hand], t[hand])[1]
+    piped = np.flatnonzero(rows["pipe"][row] > 0)
+    if len(piped):
+        power, start, tip = _pipe(rows, row[piped], taper[piped])
+        share = np.clip((t[piped] - start) / (1 - start), 0, 1)
+        q = 1 + 1 / power
+        fallen = 1 - (tip + (1 - tip) * (1 - share)) ** q
+        out[piped] = np.minimum(t[piped], start) + (1 - start) * fallen / (q * np.maximum(1 - tip, 1e-12))
+    flared = np.flatnonzero(rows["flare"][row] > 0)
+    if len(flared):
+        end = np.minimum(t[flared], FLARE_END)
+        out[flared] += rows["flare"][row[flared]] * ((1 - np.exp(-_FALL * end)) / _FALL - 0.01 * end)
+    return out
+
+
+def _pipe(rows: NDArray[np.void], row: NDArray, taper: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    power = rows["pipe"][row]
+    # A tip as thick as the base has nothing to share out; the limit keeps divisions finite.
+    return power, rows["start"][row, 0, 0], np.minimum(taper, 1 - 1e-6) ** power
+
+
+def _drawn(rows: NDArray[np.void], row: NDArray, t: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
+    """Profile of branches that are drawn by hand, linear between their knots, and its integral."""
+    radii, number = rows["radii"][row], rows["segments"][row]
+    along = t * number
+    segment = np.minimum(along.astype(np.int64), number - 1)
+    part, every = along - segment, np.arange(len(row))
+    low, high = radii[every, segment], radii[every, segment + 1]
+    whole = np.concatenate([np.zeros((len(row), 1)), np.cumsum((radii[:, 1:] + radii[:, :-1]) / 2, axis=1)], axis=1)
+    return low + (high - low) * part, (whole[every, segment] + part * (low + (high - low) * part / 2)) / number

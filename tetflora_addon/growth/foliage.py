@@ -1,0 +1,388 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Leaves on branches: where each sits, which way it grows and faces, its size and colour."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import cross, dot, gathered
+from .axes import Axes
+from .branches import Branches
+from .growth import level_azimuth
+from .hashing import Draw, child_key, signed, uniform
+from .rows import ranged
+from .wind import fluttered, gusts, is_windy
+
+_LEAF_PATH = 1 << 32  # child indices of leaves start here, so that they never meet those of branches
+_SKY = np.array([0.0, 0.0, 1.0])
+_PLACE_JITTER = 0.4  # below a half, so that leaves keep their order along the branch
+
+
+@dataclass(frozen=True)
+class Leaves:
+    """Leaves as a structure of arrays.
+
+    Attributes
+    ----------
+    branch : (n,) int64
+        Index of the branch that bears the leaf.
+    key : (n,) uint64
+    position : (n, 3) float64
+        Base of the leaf, metres.
+    frame : (n, 3, 3) float32
+        Columns: across, along the midrib, upper side; before it turns to the light. Single precision is off by some
+        nanometres at the tip of a leaf, and its cosines are ten times as fast.
+    size : (n,) float64
+        Metres by which the leaf model is scaled.
+    light : (n,) float64
+        How far it turns to the sky; (1,) where that is the same for all.
+    sky : (3,) float64 or (n, 3) float32
+        Where that is; with the branch in the wind.
+    """
+
+    branch: NDArray[np.int64]
+    key: NDArray[np.uint64]
+    position: NDArray[np.float64]
+    frame: NDArray[np.float32]
+    size: NDArray[np.float64]
+    light: NDArray[np.float64]
+    sky: NDArray[np.floating]
+
+    def __len__(self) -> int:
+        return len(self.key)
+
+
+def leaf_keys(branches: Branches, owner: NDArray[np.int64], index: NDArray[np.int64]) -> NDArray[np.uint64]:
+    """Hash keys (m,) of leaves given by branch and index."""
+    return child_key(np.take(branches.key, owner), index + _LEAF_PATH)
+
+
+def leaf_places(
+    rows: NDArray[np.void], branches: Branches, owner: NDArray, index: NDArray, counts: NDArray, key: NDArray[np.uint64]
+) -> NDArray[np.float64]:
+    """Fractions (m,) of the branches' axes at which leaves sit; those of a whorl share that of the first of them."""
+    row = _rows_of(branches, owner)
+    whorl = rows["leaf_whorl"][row]
+    number = np.take(counts, owner)
+    node = index
+    if (whorl > 1).any():
+        node = index // whorl
+        key = np.where(index % whorl > 0, leaf_keys(branches, owner, node * whorl), key)
+        number = number // whorl
+    share = (node + 0.5 + _PLACE_JITTER * signed(key, Draw.PLACE)) / number
+    start = leaf_start(rows, branches)
+    start = start[:1] if len(row) == 1 and (start == start[:1]).all() else np.take(start, owner)
+    return start + (1 - start) * share
+
+
+def leaf_start(rows: NDArray[np.void], branches: Branches) -> NDArray[np.float64]:
+    """Fraction (n,) of each branch's axis that is bare of leaves."""
+    return ranged(rows, "leaf_start", branches.row, branches.key, Draw.LEAF_START)
+
+
+def outwardness(
+    rows: NDArray[np.void], branches: Branches, owner: NDArray[np.int64], t: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Where leaves at fractions t (m,) of branches lie between the inside of the crown, 0, and the outside, 1."""
+    row = _rows_of(branches, owner)
+    first, last = rows["part"][row].T
+    return np.where(rows["outward"][row], first + (last - first) * t, np.take(branches.outward, owner))
+
+
+def leaf_range(
+    rows: NDArray[np.void],
+    branches: Branches,
+    counts: NDArray[np.int64],
+    t0: NDArray[np.float64],
+    t1: NDArray[np.float64],
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Which leaves sit on a part of each branch: those with t0 ≤ t < t1, and at the tip with t = 1 as well.
+
+    Leaves are numbered from base to tip, so that they are a range of numbers, and only one leaf at each end of the
+    part has to be looked at.
+
+    Parameters
+    ----------
+    rows : parameter table
+    branches : Branches of n
+    counts : (n,) int
+        Number of leaves of each whole branch.
+    t0, t1 : (n,) float64
+        Ends of the parts as fractions of the branches' axes.
+
+    Returns
+    -------
+    low, high : (n,) int64
+        Number of the first leaf, and of the first one beyond.
+    """
+
+    def below(t: NDArray[np.float64]) -> NDArray[np.int64]:
+        out = np.where(t >= 1, counts, 0)
+        near = np.flatnonzero((t > 0) & (t < 1) & (counts > 0))
+        some = branches.take(near)
+        start, whorl = leaf_start(rows, some), rows["leaf_whorl"][some.row]
+        number = counts[near] // whorl
+        share = (t[near] - start) / (1 - start)
+        # Each whorl keeps to its own part of the branch, one of `number`.
+        node = np.clip(np.floor(share * number), 0, number - 1).astype(np.int64)
+        place = leaf_places(rows, branches, near, node * whorl, counts, leaf_keys(branches, near, node * whorl))
+        out[near] = (node + (place < t[near])) * whorl
+        return out
+
+    return below(t0), below(t1)
+
+
+def _rows_of(branches: Branches, owner: NDArray[np.int64]) -> NDArray[np.int32]:
+    """Row (m,) of each branch's parameters, or the only one (1,), which is as good and need not be gathered."""
+    row = branches.row
+    return row[:1] if len(row) and (row == row[0]).all() else np.take(row, owner)
+
+
+def place_leaves(
+    rows: NDArray[np.void],
+    branches: Branches,
+    lines: Axes,
+    owner: NDArray[np.int64],
+    index: NDArray[np.int64],
+    key: NDArray[np.uint64],
+    t: NDArray[np.float64],
+) -> Leaves:
+    """Leaves at given fractions of their branches; call `face_light` to turn them to the sky.
+
+    Parameters
+    ----------
+    rows : parameter table
+    branches, lines : Branches of n and their Axes
+        Fastest where all are of one row, because parameters are then the same for all.
+    owner, index : (m,) int
+        Branch, and index of the leaf on it.
+    key : (m,) uint64
+        From `leaf_keys`.
+    t : (m,) float64
+        From `leaf_places`.
+    """
+    row = _rows_of(branches, owner)
+    skies = None if lines.skies is None else lines.skies.astype(np.float32)
+    light = Axes(lines.knots, lines.frames.astype(np.float32), lines.segments, skies)
+    position, frame = light.at(owner, t)
+    sky = light.sky_at(owner, t)
+    frame = leaf_frames(rows, row, frame, np.take(uniform(branches.key, Draw.ROLL), owner), index, key, sky)
+    size = np.take(branches.scale, owner) * ranged(rows, "leaf_size", row, key, Draw.LEAF_SIZE)
+    tip = rows["leaf_size_tip"][row]
+    if (tip != 1).any():
+        size *= 1 + (tip - 1) * outwardness(rows, branches, owner, t)
+    light = ranged(rows, "leaf_light", row, key, Draw.LEAF_LIGHT)
+    return Leaves(owner, key, position, frame, size, light, _SKY if sky is None else sky)
+
+
+def leaf_frames(
+    rows: NDArray[np.void],
+    row: NDArray[np.integer],
+    frame: NDArray[np.float32],
+    roll: NDArray[np.float64],
+    index: NDArray[np.int64],
+    key: NDArray[np.uint64],
+    sky: NDArray[np.floating] | None = None,
+) -> NDArray[np.float32]:
+    """Frames (m, 3, 3) of leaves before they turn to the light.
+
+    Parameters
+    ----------
+    rows : parameter table
+    row : (m,) or (1,) int
+    frame : (m, 3, 3) float32
+        Of the branch where each leaf sits.
+    roll : (m,) float64
+        Random number of the branch, 0 to 1: where around it its first leaf stands.
+    index : (m,) int
+        Number of the leaf on its branch.
+    key : (m,) uint64
+    sky : (m, 3) float32, optional
+        Where up is, if not along z.
+    """
+    step, jitter = rows["leaf_azimuth"][row].T
+    whorl = rows["leaf_whorl"][row]
+    node, within = (index // whorl, (index % whorl) / whorl) if (whorl > 1).any() else (index, 0.0)
+    turns = roll + within + (node * step + jitter * signed(key, Draw.AZIMUTH)) / (2 * np.pi)
+    spray = rows["leaf_spray"][row]
+    if spray.any():
+        level = level_azimuth(frame, sky) / (2 * np.pi) + (1 - spray) * (roll - 0.5) - roll
+        turns += np.where(spray > 0, level, 0.0)
+    turns -= np.rint(turns)  # whole turns would cost single precision its last digits
+    azimuth = (turns * (2 * np.pi)).astype(np.float32)
+    angle = ranged(rows, "leaf_angle", row, key, Draw.ANGLE).astype(np.float32)
+    return _leaf_frames(frame, azimuth, angle)
+
+
+def _leaf_frames(
+    frame: NDArray[np.float32], azimuth: NDArray[np.float32], angle: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """As `growth.turned`, with columns in the order of a leaf.
+
+    The upper side of a leaf faces the tip of its branch: against the tilt, whose first column leads away from it.
+    """
+    x, y, z = frame.transpose(2, 1, 0)
+    ca, sa, cd, sd = (f(v) for v in (azimuth, angle) for f in (np.cos, np.sin))
+    out = np.zeros((3, 3, len(azimuth)), np.float32)
+    across, along, up = out.swapaxes(0, 1)
+    radial = ca * x
+    radial += sa * y
+    np.multiply(sa, x, out=across)
+    across -= ca * y
+    np.multiply(sd, radial, out=along)
+    along += cd * z
+    np.multiply(sd, z, out=up)
+    up -= cd * radial
+    return out.transpose(2, 0, 1)
+
+
+def face_light(frame: NDArray[np.floating], light: NDArray[np.float64], sky: NDArray[np.float64]) -> NDArray:
+    """Turn leaves to the sky by the shares that their orders ask for.
+
+    Parameters
+    ----------
+    frame : (n, 3, 3) float64 or float32
+        Leaf frames (across, along, upper side).
+    light : (n,) or (1,) float64
+        0 leaves them as they are, 1 makes them level.
+    sky : (3,) or (n, 3) float64
+        Unit vector towards the sky.
+
+    Returns
+    -------
+    (n, 3, 3), type of frame
+        Right-handed frames; the upper side is turned, the midrib follows by the least turn.
+    """
+    kind = frame.dtype
+    light, sky = light.astype(kind), sky.astype(kind).T
+    along, up = frame[:, :, 1].T, frame[:, :, 2].T
+    out = np.zeros((3, 3, len(frame)), kind)
+    across_out, along_out, normal = out.swapaxes(0, 1)
+    np.multiply(1 - light, up, out=normal)
+    normal += light * sky if sky.ndim == 2 else light * sky[:, None]
+    normal += kind.type(1e-9) * up  # a leaf that hangs upside down half way has no direction left; it keeps its own
+    normal /= _length(normal)
+    np.multiply(_inner(along, normal), normal, out=along_out)
+    np.subtract(along, along_out, out=along_out)
+    length = _length(along_out)
+    # The midrib points straight up or down: turn about the blade. What is left of it must stand above rounding.
+    lost = np.flatnonzero(length <= (1e-6 if kind == np.float64 else 1e-3))
+    if len(lost):
+        across, facing = gathered(frame[:, :, 0], lost), normal[:, lost].T
+        along_out[:, lost] = cross(facing, across - dot(across, facing) * facing).T
+        length = _length(along_out)
+    along_out /= length
+    np.multiply(along_out[[1, 2, 0]], normal[[2, 0, 1]], out=across_out)
+    across_out -= along_out[[2, 0, 1]] * normal[[1, 2, 0]]
+    return out.transpose(2, 0, 1)
+
+
+def settled(
+    rows: NDArray[np.void],
+    row: NDArray[np.integer],
+    frame: NDArray[np.floating],
+    light: NDArray[np.float64],
+    sky: NDArray[np.float64],
+) -> NDArray:
+    """Leaf frames as they are in the end: turned to the light, then hanging, as far as their orders ask for.
+
+    Parameters
+    ----------
+    rows : parameter table
+    row : (n,) or (1,) int
+    frame, light, sky
+        As for `face_light`.
+    """
+    frame = face_light(frame, light, sky)
+    droop = rows["leaf_droop"][row]
+    return hanging(frame, droop, sky) if droop.any() else frame
+
+
+def in_wind(
+    rows: NDArray[np.void], branches: Branches, leaves: Leaves, frame: NDArray[np.float32], ahead: float = 0.0
+) -> NDArray[np.float32]:
+    """`settled` frames (m, 3, 3) of leaves (m) of branches as the wind turns them; as they are where there is none.
+
+    So many seconds after the moment of the rows; the branches are where they are then.
+    """
+    if not is_windy(rows):
+        return frame
+    gust = np.take(gusts(rows, branches.position, ahead), leaves.branch)
+    return fluttered(rows, _rows_of(branches, leaves.branch), frame, leaves.key, gust, ahead)
+
+
+def hanging(frame: NDArray[np.floating], droop: NDArray[np.float64], sky: NDArray[np.float64]) -> NDArray:
+    """Let leaves hang: the midrib turns down by the share ``droop`` (n,) or (1,), the blade follows it."""
+    kind = frame.dtype
+    droop, sky = droop.astype(kind), sky.astype(kind).T
+    along, up = frame[:, :, 1].T, frame[:, :, 2].T
+    out = np.zeros((3, 3, len(frame)), kind)
+    across_out, along_out, normal = out.swapaxes(0, 1)
+    np.multiply(1 - droop, along, out=along_out)
+    along_out -= droop * sky if sky.ndim == 2 else droop * sky[:, None]
+    along_out += kind.type(1e-6) * along  # a leaf that stands upright half way has no direction left; it keeps its own
+    along_out /= _length(along_out)
+    # The upper side leads away from the old midrib, so that it never lies along the new one: a leaf may hang over.
+    np.subtract(up, _inner(up, along_out) * along_out, out=normal)
+    lost = np.flatnonzero(_length(normal) < 1e-3)
+    if len(lost):
+        normal[:, lost] = -along[:, lost]
+    normal /= _length(normal)
+    np.multiply(along_out[[1, 2, 0]], normal[[2, 0, 1]], out=across_out)
+    across_out -= along_out[[2, 0, 1]] * normal[[1, 2, 0]]
+    return out.transpose(2, 0, 1)
+
+
+def _inner(a: NDArray, b: NDArray) -> NDArray:
+    """Scalar products (n,) of vectors given by component (3, n)."""
+    out = a[0] * b[0]
+    out += a[1] * b[1]
+    out += a[2] * b[2]
+    return out
+
+
+def _length(a: NDArray) -> NDArray:
+    """Lengths (n,) of vectors given by component (3, n), never quite zero."""
+    return np.maximum(np.sqrt(_inner(a, a)), np.finfo(a.dtype).tiny)
+
+
+def leaf_colours(
+    rows: NDArray[np.void],
+    row: NDArray[np.integer],
+    key: NDArray[np.uint64],
+    outward: NDArray[np.float64] | None = None,
+) -> NDArray[np.float64]:
+    """Linear RGB (n, 3) of leaves of the rows (n,), or all of one row (1,); ``outward`` (n,) is 0 inside the crown."""
+    deviation = signed(key, Draw.LEAF_COLOUR)
+    if outward is None:
+        return _colours(rows["leaf_colour"][row], deviation)
+    return np.clip(mean_leaf_colours(rows, row, outward) + rows["leaf_colour"][row, 1] * deviation[:, None], 0, 1)
+
+
+def mean_leaf_colours(
+    rows: NDArray[np.void], row: NDArray[np.integer], outward: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Mean linear RGB (n, 3) of leaves of rows (n,) at places between inside (0) and outside (1) of the crown."""
+    inside, tip = rows["leaf_colour"][row, 0], rows["leaf_colour_tip"][row]
+    return inside + (tip - inside) * outward[:, None]
+
+
+def leaf_forms(number: int, key: NDArray[np.uint64]) -> NDArray[np.int64]:
+    """Which of a number of forms each leaf (n,) has."""
+    return (uniform(key, Draw.LEAF_FORM) * number).astype(np.int64)
+
+
+def branch_colours(rows: NDArray[np.void], row: NDArray[np.integer], key: NDArray[np.uint64]) -> NDArray[np.float64]:
+    """Linear RGB (n, 3) of branches of the rows (n,), or all of one row (1,)."""
+    return _colours(rows["branch_colour"][row], signed(key, Draw.BRANCH_COLOUR))
+
+
+def _colours(colour: NDArray[np.float64], draw: NDArray[np.float64]) -> NDArray[np.float64]:
+    mean, variation = colour.transpose(1, 2, 0)
+    out = variation * draw
+    out += mean
+    return np.clip(out, 0, 1, out=out).T

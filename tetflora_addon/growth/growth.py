@@ -1,0 +1,285 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Growing branches: trunks from seeds, axes of branches, children of branches, all as arrays (paper, section 5).
+
+A branch is also a *sub-plant*: it and all that grows on it. Every function takes any mix of species and orders.
+
+Whole branches with their axes, which is all that wood and leaves are made from; an axis is worked out only once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Arrays, by_component, columns, dot, spread
+from ..species.species import crown_ratio
+from .axes import Axes, axes, profile
+from .branches import Branches, Pose
+from .hashing import Draw, child_key, key_of_seed, signed, uniform
+from .rows import FORK, LATERAL, SPUR, flare_rings, ranged, varied
+from .seeds import Seeds
+from .wind import is_windy, moment
+
+_PLACE_JITTER = 0.5  # of the distance from one child to the next: together children lie evenly along the whole parent
+# Each sort of children has child indices of its own, below those of leaves.
+_PATHS = np.array([0, 1 << 30, 1 << 31])
+_SKY = np.array([0.0, 0.0, 1.0])
+_DRAWN_PATH = 1 << 29
+_COUNT = (Draw.BRANCHES, Draw.FORKS, Draw.SPURS)
+_ROUND = (Draw.BRANCHES_ROUND, Draw.FORKS_ROUND, Draw.SPURS_ROUND)
+_START = (Draw.BRANCH_START, Draw.BRANCH_START, Draw.SPUR_START)
+
+
+def turned(frame: NDArray[np.float64], azimuth: NDArray[np.float64], angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Frames turned by an azimuth about their z and then tilted by an angle away from it.
+
+    Parameters
+    ----------
+    frame : (n, 3, 3) float64
+    azimuth, angle : (n,) float64
+        Radians.
+
+    Returns
+    -------
+    (n, 3, 3) float64
+        Third column leans by ``angle``; first column is the same lean a right angle further.
+    """
+    x, y, z = frame[:, :, 0], frame[:, :, 1], frame[:, :, 2]
+    ca, sa, cd, sd = (f(v)[:, None] for v in (azimuth, angle) for f in (np.cos, np.sin))
+    radial = ca * x + sa * y
+    return columns(cd * radial - sd * z, ca * y - sa * x, sd * radial + cd * z)
+
+
+def level_azimuth(frame: NDArray[np.floating], sky: NDArray[np.floating] | None = None) -> NDArray[np.floating]:
+    """Azimuth (n,) about the z of frames (n, 3, 3) at which one looks level to the side; any for upright ones.
+
+    ``sky`` (n, 3) is where up is, if not along z.
+    """
+    if sky is None:
+        return np.arctan2(-frame[:, 2, 0], frame[:, 2, 1])
+    return np.arctan2(-dot(frame[:, :, 0], sky)[:, 0], dot(frame[:, :, 1], sky)[:, 0])
+
+
+def trunks(rows: NDArray[np.void], seeds: Seeds) -> Branches:
+    """Trunks of plants (order 0)."""
+    first = np.flatnonzero(np.diff(rows["species"], prepend=-1))  # of each species
+    row = first[seeds.species].astype(np.int32)
+    key = key_of_seed(np.where(rows["exact"][row], 0, seeds.seed))
+    length = seeds.scale * ranged(rows, "length", row, key, Draw.LENGTH)
+    radius = length * ranged(rows, "thickness", row, key, Draw.THICKNESS)
+    roll = np.where(rows["phantom"][row], 0.0, 2 * np.pi * uniform(key, Draw.ROLL))
+    frame = turned(seeds.frame, roll, ranged(rows, "angle", row, key, Draw.ANGLE))
+    plant = np.arange(len(seeds), dtype=np.int32)
+    scale = np.asarray(seeds.scale, dtype=np.float64)
+    one, none = np.ones(len(seeds)), np.zeros(len(seeds))
+    sky = by_component(np.tile(_SKY, (len(seeds), 1))) if is_windy(rows) else None
+    later = Pose(seeds.position, frame, sky) if moment(rows) else None  # the foot of a plant stands still
+    return Branches(row, plant, key, seeds.position, frame, length, radius, scale, one, none, sky, later)
+
+
+def drawn_children(rows: NDArray[np.void], plants: Branches) -> tuple[Branches, NDArray[np.int64]]:
+    """Branches that are drawn by hand, of plants whose form is, and the index of each one's plant."""
+    first, last = rows["drawn_rows"][plants.row].T
+    owner, index = spread((last - first).astype(np.int64))
+    return chosen_drawn(rows, plants, owner, index), owner
+
+
+def chosen_drawn(
+    rows: NDArray[np.void], plants: Branches, owner: NDArray[np.int64], index: NDArray[np.int64]
+) -> Branches:
+    """Some of the branches drawn by hand, given by plant (m,) and number (m,)."""
+    plant = plants.take(owner)
+    row = (rows["drawn_rows"][plant.row, 0] + index).astype(np.int32)
+    length, radius, vigour, outward = rows["size"][row].T
+    start = np.einsum("nij,nj->ni", plant.frame, rows["knots"][row, 0]) * plant.scale[:, None]
+    position, frame = plant.position + start, plant.frame @ rows["frames"][row, 0]
+    return Branches(
+        row,
+        plant.plant,
+        child_key(plant.key, index + _DRAWN_PATH),
+        position,
+        frame,
+        length * plant.scale,
+        radius * plant.scale,
+        plant.scale,
+        vigour,
+        outward,
+        plant.sky,
+        # The drawing is bent when its lines are asked for.
+        None if plant.later is None else Pose(position, frame, plant.sky),
+    )
+
+
+def fullness(rows: NDArray[np.void], branches: Branches) -> NDArray[np.float64]:
+    """Factor (n,) on the numbers of branches and leaves: 1 for the longest branches of a crown, less for others."""
+    share = rows["count_by_length"][branches.row]
+    return 1 - share + share * branches.vigour
+
+
+def branch_counts(rows: NDArray[np.void], branches: Branches, sort: int = LATERAL) -> NDArray[np.int64]:
+    """Number of children of one sort of each branch, in whole whorls; its expectation is exactly the range's mean."""
+    row, key = branches.row, branches.key
+    wanted = varied(rows["count"][row, sort], key, _COUNT[sort])
+    child = rows["next"][row, sort]
+    if sort == FORK:
+        number = np.maximum(np.floor(wanted + uniform(key, _ROUND[sort])), 1)  # what divides goes on
+        return np.where(child >= 0, number, 0).astype(np.int64)
+    whorl = np.maximum(rows["whorl"][child], 1)
+    number = np.floor(wanted * fullness(rows, branches) / whorl + uniform(key, _ROUND[sort])).astype(np.int64) * whorl
+    return np.where(child >= 0, number, 0)
+
+
+def leaf_counts(rows: NDArray[np.void], branches: Branches) -> NDArray[np.int64]:
+    """Number of leaves on each branch's own axis, in whole whorls; its expectation is exactly the range's mean."""
+    wanted = ranged(rows, "leaves", branches.row, branches.key, Draw.LEAVES) * fullness(rows, branches)
+    whorl = rows["leaf_whorl"][branches.row]
+    return np.floor(wanted / whorl + uniform(branches.key, Draw.LEAVES_ROUND)).astype(np.int64) * whorl
+
+
+def radius_at(rows: NDArray[np.void], branches: Branches, t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Radius at fractions t (n,) of the branches (n,), metres."""
+    return branches.radius * profile(rows, branches.row, branches.key, t)
+
+
+def chosen_children(
+    rows: NDArray[np.void],
+    parents: Branches,
+    lines: Axes,
+    owner: NDArray[np.int64],
+    index: NDArray[np.int64],
+    counts: NDArray[np.int64],
+    sort: int = LATERAL,
+) -> Branches:
+    """Some children of branches.
+
+    Parameters
+    ----------
+    rows : parameter table
+    parents : Branches of n
+    lines : Axes of the same n
+    owner : (m,) int
+        Which parent.
+    index : (m,) int
+        Which of its children of this sort.
+    counts : (n,) int
+        Number of children of this sort of each parent.
+    sort : int
+        ``rows.LATERAL``, ``rows.FORK`` or ``rows.SPUR``.
+
+    Returns
+    -------
+    Branches of m
+    """
+    parent = parents.take(owner)
+    path = _PATHS[sort]
+    key = child_key(parent.key, index + path)
+    row = rows["next"][parent.row, sort]
+    if sort == FORK:
+        whorl, node, within, share = counts[owner], np.zeros_like(index), index, np.ones(len(index))
+        t = np.ones(len(index))
+    else:
+        # Branches of a whorl share their place: that of the first of them.
+        whorl = rows["whorl"][row]
+        node, within = index // whorl, index % whorl
+        place = signed(np.where(within > 0, child_key(parent.key, node * whorl + path), key), Draw.PLACE)
+        share = (node + 0.5 + _PLACE_JITTER * place) / np.maximum(counts[owner] // whorl, 1)
+        start = varied(rows["start"][parent.row, sort], parent.key, _START[sort])
+        t = start + (1 - start) * share
+        low, high = rows["share"][parent.row, sort].T
+        share = low + (high - low) * share
+    position, frame = lines.at(owner, t)
+    sky = lines.sky_at(owner, t)
+    angle_base, angle_spread = rows["angle"][row].T
+    angle = angle_base + (rows["angle_tip"][row] - angle_base) * share + angle_spread * signed(key, Draw.ANGLE)
+    step, jitter = rows["azimuth"][row].T
+    turn = uniform(parent.key, Draw.AZIMUTH)
+    azimuth = 2 * np.pi * (turn + within / whorl) + node * step + jitter * signed(key, Draw.AZIMUTH)
+    spray = rows["spray"][row]
+    if spray.any():
+        # Level to the sides, as far as the order asks for; 0 turns whole parents at random, as ``turn`` does.
+        level = level_azimuth(frame, sky) + 2 * np.pi * ((1 - spray) * (turn - 0.5) - turn)
+        azimuth += np.where(spray > 0, level, 0.0)
+    around = parent.outward
+    limb = (rows["order"][parent.row] == 1) & (sort != FORK)
+    if limb.any():
+        first, last = rows["part"][parent.row].T
+        around = np.where(limb, first + (last - first) * t, around)
+    radius = radius_at(rows, parent, t)
+    if sort == LATERAL:
+        vigour = crown_ratio(rows["crown"][parent.row], 1 - share)
+        measure = parent.length * rows["nominal"][parent.row] * vigour
+        radius = np.where(rows["pipe"][parent.row] > 0, parent.radius * rows["pipe_share"][parent.row] * vigour, radius)
+    elif sort == FORK:
+        vigour, measure = parent.vigour, parent.length  # which follows the crown already
+        radius = radius * np.maximum(whorl, 1) ** (-1 / rows["fork_power"][parent.row])
+        angle = np.where(whorl > 1, angle, 0.0)
+    else:
+        vigour, measure = np.ones(len(index)), parent.scale
+    length = measure * ranged(rows, "length", row, key, Draw.LENGTH)
+    thickness = ranged(rows, "thickness", row, key, Draw.THICKNESS)
+    radius = (length if sort == SPUR else radius) * thickness
+    frame = turned(frame, azimuth, angle)
+    later = None
+    if lines.later is not None:
+        again = chosen_children(rows, parents.moved(), lines.later, owner, index, counts, sort)
+        later = Pose(again.position, again.frame, again.sky)
+    return Branches(row, parent.plant, key, position, frame, length, radius, parent.scale, vigour, around, sky, later)
+
+
+def sorts_of(rows: NDArray[np.void], parents: Branches) -> list[int]:
+    """Sorts of children that any of the branches has."""
+    return [sort for sort in (LATERAL, FORK, SPUR) if (rows["next"][parents.row, sort] >= 0).any()]
+
+
+def children(
+    rows: NDArray[np.void], parents: Branches, lines: Axes | None = None
+) -> tuple[Branches, NDArray[np.int64]]:
+    """All children of branches, and the index of each one's parent."""
+    lines = axes(rows, parents) if lines is None else lines
+    grown, owners = [Branches.empty()], [np.zeros(0, np.int64)]
+    for sort in sorts_of(rows, parents):
+        counts = branch_counts(rows, parents, sort)
+        owner, index = spread(counts)
+        grown.append(chosen_children(rows, parents, lines, owner, index, counts, sort))
+        owners.append(owner)
+    return (grown[1], owners[1]) if len(grown) == 2 else (Branches.concatenate(grown), np.concatenate(owners))
+
+
+@dataclass(frozen=True)
+class Stems(Arrays):
+    """Whole branches and their axes.
+
+    Attributes
+    ----------
+    branches : Branches of n
+    lines : Axes of the same n
+    """
+
+    branches: Branches
+    lines: Axes
+
+    def knots(self, rows: NDArray[np.void]) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Where segments begin and end; a flared base has some more.
+
+        Returns
+        -------
+        owner : (m,) int64
+            Branch of each place, in order; those of a branch from base to tip.
+        t : (m,) float64
+            Fraction of its axis.
+        position : (m, 3) float64
+        """
+        rings = rows["rings"][self.branches.row]
+        owner, index = spread(self.lines.segments + rings + 1)
+        knot = index if not rings.any() else np.maximum(index - np.take(rings, owner), 0)
+        t = knot / np.take(self.lines.segments, owner)
+        position = self.lines.knot(owner, knot)
+        if rings.any():  # the first segment is cut where the flare bends most
+            at = np.concatenate([[0.0], flare_rings(int(rings.max()))])
+            cut = np.flatnonzero((index <= rings[owner]) & (index > 0) & (rings[owner] > 0))
+            t[cut] = at[index[cut]]
+            position[cut] = self.lines.at(owner[cut], t[cut])[0]
+        return owner, t, position

@@ -1,0 +1,180 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Random numbers as a pure function of (seed, path of child indices, attribute).
+
+Any part of a plant can therefore be made alone, in any order, and comes out the same. Only unsigned 64-bit integer
+arithmetic is used, which numpy defines exactly, so that no version of numpy or Blender changes a plant.
+
+Random choices that are spread more evenly than chance would spread them, so that few of them give good means.
+
+Stratified and systematic sampling (Cochran, "Sampling Techniques", 1977).
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
+_MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
+_MIX_2 = np.uint64(0x94D049BB133111EB)
+# Odd, and not the constant of seeds: else child i of seed s would be child s of seed i, and child s of seed s always 0.
+_CHILD = np.uint64(0xD1342543DE82EF95)
+_TO_UNIT = 2.0**-53
+
+
+class Draw(IntEnum):
+    """What a random number is drawn for; one number for each attribute of a branch or leaf."""
+
+    LENGTH = 1
+    THICKNESS = 2
+    ANGLE = 3
+    AZIMUTH = 4
+    ROLL = 5
+    PLACE = 6
+    BRANCHES = 7
+    BRANCHES_ROUND = 8
+    LEAVES = 9
+    LEAVES_ROUND = 10
+    BRANCH_COLOUR = 11
+    LEAF_COLOUR = 12
+    LEAF_SIZE = 13
+    TAPER = 14
+    BRANCH_START = 15
+    LEAF_START = 16
+    LEAF_LIGHT = 17
+    ATTRACTION = 18
+    FORKS = 19
+    FORKS_ROUND = 20
+    SPURS = 21
+    SPURS_ROUND = 22
+    SPUR_START = 23
+    LEAF_FORM = 24
+    TRANSITION = 25
+    SWAY_ALONG = 26
+    SWAY_ACROSS = 27
+    SWAY_UP = 28
+    BEND = 32  # one for each segment and axis from here on
+
+
+def mix(z: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Scramble 64-bit integers (the finaliser of SplitMix64; Steele, Lea and Flood, OOPSLA 2014).
+
+    Parameters
+    ----------
+    z : (...) uint64
+
+    Returns
+    -------
+    (...) uint64
+    """
+    z = np.asarray(z, dtype=np.uint64)
+    with np.errstate(over="ignore"):  # only scalars warn; wrapping is what is wanted
+        z = z ^ (z >> np.uint64(30))  # a new array, in which all that follows is worked out
+        z *= _MIX_1
+        z ^= z >> np.uint64(27)
+        z *= _MIX_2
+        z ^= z >> np.uint64(31)
+        return z
+
+
+def key_of_seed(seed: ArrayLike) -> NDArray[np.uint64]:
+    """Key of a whole plant from its integer seed ((...) any integer type, negative ones too)."""
+    seed = np.asarray(seed).astype(np.int64).view(np.uint64)
+    with np.errstate(over="ignore"):
+        return mix(seed * _GOLDEN + _GOLDEN)
+
+
+def child_key(key: NDArray[np.uint64], index: ArrayLike) -> NDArray[np.uint64]:
+    """Key of the child with a given index of the branches with given keys (both broadcast)."""
+    index = np.asarray(index).astype(np.uint64)
+    with np.errstate(over="ignore"):
+        return mix(np.asarray(key, dtype=np.uint64) ^ mix((index + np.uint64(1)) * _CHILD))
+
+
+def uniform(key: NDArray[np.uint64], draw: int) -> NDArray[np.float64]:
+    """Numbers in [0, 1), one for each key.
+
+    Parameters
+    ----------
+    key : (...) uint64
+    draw : int
+        What it is for, see `Draw`; different draws of a key are independent.
+    """
+    with np.errstate(over="ignore"):
+        z = mix(np.asarray(key, dtype=np.uint64) + np.uint64(draw) * _GOLDEN)
+    z >>= np.uint64(11)
+    out = z.astype(np.float64)
+    out *= _TO_UNIT
+    return out
+
+
+def stepped(key: NDArray[np.uint64], index: NDArray[np.integer]) -> NDArray[np.float64]:
+    """Numbers in [0, 1) that are spread evenly along consecutive indices (n,), beginning where each key (n,) says.
+
+    Steps by the golden section (H. Weyl, "Über die Gleichverteilung von Zahlen mod. Eins", 1916): of any run of them,
+    the share that falls into an interval is its length, to within one or two.
+    """
+    turned = key + np.asarray(index).astype(np.uint64) * _GOLDEN
+    return (turned >> np.uint64(11)).astype(np.float64) * _TO_UNIT
+
+
+def signed(key: NDArray[np.uint64], draw: int) -> NDArray[np.float64]:
+    """Numbers in [-1, 1), one for each key."""
+    out = uniform(key, draw)
+    out *= 2.0
+    out -= 1.0
+    return out
+
+
+# Multiples of it, less the whole part, are spread evenly, any run of them: the golden section.
+_STEP = (np.sqrt(5) - 1) / 2
+_THIN = 201  # a draw of this module, beyond those of growth and samples
+
+
+def evenly(key: NDArray[np.uint64], draw: int) -> NDArray[np.float64]:
+    """Numbers in [0, 1) as from `hashing.uniform`, but for all keys (n,) together one in each n-th of the interval."""
+    out = np.empty(len(key))
+    out[np.argsort(uniform(key, draw), kind="stable")] = (np.arange(len(key)) + 0.5) / len(key)
+    return out
+
+
+def thinned(number: int, places: int) -> NDArray[np.int64]:
+    """Indices (places,) of some of a number of things in order, or all and some again; one of each run.
+
+    Which one of the run is random: a fixed step could fall in with a pattern of the things.
+    """
+    each = np.arange(places)
+    return ((each + uniform(key_of_seed(each), _THIN)) * (number / places)).astype(np.int64)
+
+
+def systematic(
+    weights: NDArray[np.float64], group: NDArray[np.int64], sort: NDArray[np.float64], numbers: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Draw things by their weights from each of several groups (systematic resampling).
+
+    Parameters
+    ----------
+    weights : (n,) float64
+    group : (n,) int64
+    sort : (n,) float64
+        Between −1 and 1. Draws are spread evenly over these values within a group.
+    numbers : (groups,) int64
+        How many to draw from each group; from a group without members they are of all others.
+
+    Returns
+    -------
+    (sum of numbers,) int64 : indices, group after group, each in an order in which any run is spread over all of it
+    """
+    order = np.argsort(3 * group + sort, kind="stable")
+    edges = np.concatenate([[0.0], np.cumsum(weights[order])])
+    bounds = np.concatenate([[0], np.cumsum(np.bincount(group, minlength=len(numbers)))])
+    low, high = edges[bounds[:-1]], edges[bounds[1:]]
+    low, high = np.where(high > low, [low, high], [[0.0], [edges[-1]]])
+    of = np.repeat(np.arange(len(numbers)), numbers)
+    place = {number: np.argsort(np.argsort(np.arange(number) * _STEP % 1.0)) for number in set(numbers.tolist())}
+    share = (np.concatenate([place[number] for number in numbers.tolist()]) + 0.5) / numbers[of]
+    at = low[of] + (high - low)[of] * share
+    return order[np.minimum(np.searchsorted(edges[1:], at, side="right"), len(order) - 1)]

@@ -1,0 +1,385 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Parameters of all species as one table: the same array operations grow branches of every kind.
+
+A row describes one kind of branch: an order of a species, a part of it between forks, or the short shoot. It names the
+rows of its children, of three sorts: laterals of the next order, the stems that continue beyond a fork, short shoots.
+Children follow their parents in the table. Angles are in radians.
+
+Branches that are modelled by hand, as lines of even segments with frames: what rows of the table hold of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import perpendicular
+from ..errors import SpeciesError
+from ..species.members import expected_forks
+from ..species.skeletons import DrawnBranches, drawn_branches
+from ..species.species import CROWN_SHAPES, LEAF_KINDS, Order, Range, Species, crown_ratio, fork_cuts
+from .hashing import signed
+
+MAX_SEGMENTS = 24
+"""Straight pieces of a drawn branch at most; more are made even."""
+_FINER = 3  # segments for one that is drawn: even ones must not cut the corners of uneven ones
+MAX_DRAWN = 1000
+"""Drawn branches of a plant at most: higher orders are for the computer."""
+
+
+@dataclass(frozen=True)
+class DrawnLines:
+    """Drawn branches as arrays of one width, metres in the plant's space; parents come before children.
+
+    Attributes
+    ----------
+    order : (b,) int64
+    segments : (b,) int64
+    knots : (b, MAX_SEGMENTS + 1, 3) float64
+        Evenly spaced along the branch; beyond its segments the last one again.
+    radii : (b, MAX_SEGMENTS + 1) float64
+    frames : (b, MAX_SEGMENTS, 3, 3) float64
+        Columns are local axes; the third leads along the segment, the others are carried along without twist.
+    length, radius, outward : (b,) float64
+        Of the whole line; at its base; and where between inside and outside of the crown it leaves its limb.
+    """
+
+    order: NDArray[np.int64]
+    segments: NDArray[np.int64]
+    knots: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    frames: NDArray[np.float64]
+    length: NDArray[np.float64]
+    radius: NDArray[np.float64]
+    outward: NDArray[np.float64]
+
+
+def drawn_lines(branches: DrawnBranches) -> DrawnLines:
+    """Drawn branches with even segments, as many as they have themselves, at most `MAX_SEGMENTS`.
+
+    Raises
+    ------
+    SpeciesError
+        More than `MAX_DRAWN` branches.
+    """
+    number = len(branches)
+    if number > MAX_DRAWN:
+        raise SpeciesError(
+            f"The form has {number:,} branches, the limit is {MAX_DRAWN:,}; "
+            "remove the thinnest ones, the species grows them"
+        )
+    segments = np.clip(_FINER * (np.diff(branches.first) - 1), 1, MAX_SEGMENTS)
+    # Fractions of the length at which knots lie, one row a branch; the last one is repeated.
+    wanted = np.minimum(np.arange(MAX_SEGMENTS + 1) / segments[:, None], 1.0)
+    # One rising scale for all branches: that of branch b runs from 2 b to 2 b + 1.
+    place = 2 * branches.owner + branches.arc / np.maximum(branches.length, 1e-300)[branches.owner]
+    at = (2 * np.arange(number)[:, None] + wanted).ravel()
+    values = [np.interp(at, place, v).reshape(number, -1) for v in (*branches.knots.T, branches.radius)]
+    knots, radii = np.stack(values[:3], axis=-1), np.maximum(values[3], 1e-6)
+    chords = np.linalg.norm(np.diff(knots, axis=1), axis=2).sum(axis=1)
+    return DrawnLines(
+        branches.order.astype(np.int64), segments, knots, radii, _frames(knots, segments), chords, radii[:, 0],
+        np.asarray(branches.outward, dtype=np.float64),
+    )  # fmt: skip
+
+
+def _frames(knots: NDArray[np.float64], segments: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Frames along lines, each turned from the one before by the least rotation (Bishop, 1975)."""
+    step = np.diff(knots, axis=1)
+    size = np.linalg.norm(step, axis=2, keepdims=True)
+    last = np.minimum(np.arange(step.shape[1]), segments[:, None] - 1)[..., None]
+    direction = np.take_along_axis(step / np.maximum(size, 1e-12), last, axis=1)
+    z = np.where(np.linalg.norm(direction[:, 0], axis=1, keepdims=True) > 0.5, direction[:, 0], [0.0, 0.0, 1.0])
+    x = perpendicular(z)
+    out = np.empty((*direction.shape, 3))
+    for s in range(direction.shape[1]):
+        ahead = direction[:, s]
+        z = np.where(np.linalg.norm(ahead, axis=1, keepdims=True) > 0.5, ahead, z)
+        x = x - (x * z).sum(axis=1, keepdims=True) * z
+        lost = np.linalg.norm(x, axis=1) < 1e-6  # a line that turns back upon itself
+        x[lost] = np.cross(z[lost], [0.3, 0.5, 0.8])
+        x /= np.linalg.norm(x, axis=1, keepdims=True)
+        out[:, s] = np.stack([x, np.cross(z, x), z], axis=2)
+    return out
+
+
+LATERAL, FORK, SPUR = range(3)
+"""Sorts of children, the axis of ``next``, ``count``, ``start`` and ``share``."""
+
+SPUR_ORDER = 100
+_RANGES = (
+    "length", "thickness", "taper", "curvature", "attraction", "angle", "azimuth",
+    "leaves", "leaf_start", "leaf_size", "leaf_angle", "leaf_azimuth", "leaf_light",
+)  # fmt: skip
+_DEGREES = {"curvature", "curvature_tip", "attraction", "angle", "angle_tip", "azimuth", "leaf_angle", "leaf_azimuth"}
+_NUMBERS = (
+    "curvature_tip", "count_by_length", "angle_tip", "spray", "flare", "pipe",
+    "leaf_spray", "leaf_droop", "leaf_size_tip",
+)  # fmt: skip
+_INTEGERS = ("segments", "sides", "whorl", "leaf_whorl")
+#: Where a flared base gets rings of its own, fractions of the length; as far as they lie on the first segment.
+_FLARE_RINGS = (0.012, 0.035, 0.08)
+# A fork that no pipe model describes keeps the cross-section.
+_FORK_POWER = 2.0
+
+ROW_DTYPE = np.dtype(
+    [(name, np.float64, (2,)) for name in _RANGES]
+    + [(name, np.float64) for name in _NUMBERS]
+    + [(name, np.float64, (2, 3)) for name in ("branch_colour", "leaf_colour")]
+    + [("leaf_colour_tip", np.float64, (3,))]
+    + [(name, np.int64) for name in _INTEGERS]
+    + [(name, np.int64) for name in ("crown", "leaf_kind", "species", "order", "rings")]
+    + [("next", np.int32, (3,)), ("count", np.float64, (3, 2)), ("start", np.float64, (3, 2))]
+    + [("share", np.float64, (3, 2)), ("part", np.float64, (2,))]
+    + [("nominal", np.float64), ("pipe_share", np.float64), ("fork_power", np.float64)]
+    + [("continues", np.bool_), ("outward", np.bool_), ("worldly", np.bool_), ("gradient", np.bool_)]
+    + [("exact", np.bool_), ("phantom", np.bool_), ("drawn", np.bool_), ("drawn_rows", np.int32, (2,))]
+    + [("knots", np.float64, (MAX_SEGMENTS + 1, 3)), ("radii", np.float64, (MAX_SEGMENTS + 1,))]
+    + [("frames", np.float64, (MAX_SEGMENTS, 3, 3)), ("size", np.float64, (4,))]
+)
+"""One kind of branch.
+
+Ranges are (mean, variation), colours ((r, g, b), variation of each). Beyond the keys of an order: ``rings`` are those
+that a flared base gets besides its joints; ``next`` the rows of children, -1 for none, ``count`` how many, ``start``
+the part that stays bare, ``share`` which part of all children of the order's branch these are; ``part`` the ends of
+this row on the order's branch and ``nominal`` the length of that in lengths of this; ``pipe_share`` the radius of a
+lateral by the pipe model in radii of this; ``continues`` marks stems beyond a fork; ``outward`` branches whose own axis
+leads from the inside of the crown to the outside; ``worldly`` sub-plants whose shape depends on how they stand to the
+sky; ``gradient`` leaves that differ between inside and outside; ``exact`` plants that are all the same.
+
+A plant whose form is drawn by hand begins with a ``phantom`` row: a branch without wood, whose children are the
+``drawn`` rows from the first to before the last of ``drawn_rows``. Each of these is one branch with ``knots`` (metres,
+in the plant's space, evenly spaced), ``radii`` over that of the base, ``frames`` along it, and its ``size``: length,
+radius, vigour and place between inside and outside.
+"""
+
+
+def build_rows(species: Sequence[Species]) -> NDArray[np.void]:
+    """Table of parameters.
+
+    Returns
+    -------
+    (r,) array of `ROW_DTYPE`
+        The rows of each species follow one another, its trunk first.
+    """
+    kinds: list[np.void] = []
+    for s, one in enumerate(species):
+        kinds += _rows_of_species(one, s, len(kinds))
+    rows = np.array(kinds, dtype=ROW_DTYPE)
+    for i in range(len(rows) - 1, -1, -1):
+        row = rows[i]
+        here = row["attraction"].any() or row["spray"] > 0 or row["leaf_spray"] > 0
+        children = np.concatenate([row["next"][row["next"] >= 0], np.arange(*row["drawn_rows"])])
+        row["worldly"] = here or rows["worldly"][children].any()
+    return rows
+
+
+def _rows_of_species(one: Species, number: int, first: int) -> list[np.void]:
+    """Rows of one species; ``first`` is the index of its trunk in the table."""
+    if one.exact:
+        one = without_variation(one)
+    drawn = None
+    if one.form is not None:
+        drawn = drawn_lines(drawn_branches(one.form))
+    cuts = [fork_cuts(order) for order in one.orders]
+    ahead = 0 if drawn is None else 1 + len(drawn.order)
+    begin = first + ahead + np.concatenate([[0], np.cumsum([len(c) - 1 for c in cuts])])
+    spur = int(begin[-1])
+    out = [] if drawn is None else _drawn_rows(one, drawn, number, first, begin, spur)
+    for o, order in enumerate(one.orders):
+        whole = _row(order, number, o)
+        for p, (low, high) in enumerate(zip(cuts[o][:-1], cuts[o][1:], strict=True)):
+            row = whole.copy()
+            row["next"] = -1
+            if order.branches.high > 0:
+                row["next"][LATERAL] = begin[o + 1]
+            if p < len(cuts[o]) - 2:
+                row["next"][FORK] = begin[o] + p + 1
+                row["count"][FORK] = order.forks
+                row["start"][FORK] = 1.0, 0.0
+            if order.spurs.high > 0 and one.spur is not None:
+                row["next"][SPUR] = spur
+            out.append(_part(row, order, low, high, cuts[o][p - 1] if p else 0.0))
+            if row["next"][LATERAL] >= 0 and row["pipe"] > 0:
+                row["pipe_share"] = _pipe_share(row, one.orders[o + 1].thickness.high)
+    if any(order.spurs.high > 0 for order in one.orders) and one.spur is not None:
+        row = _row(one.spur, number, SPUR_ORDER)
+        row["next"] = -1
+        out.append(row)
+    for row in out:
+        row["exact"] = one.exact
+    return out
+
+
+def _drawn_rows(
+    one: Species, drawn: DrawnLines, number: int, first: int, begin: NDArray[np.int64], spur: int
+) -> list[np.void]:
+    """The phantom row of a plant that is drawn by hand, and a row for each of its branches."""
+    height = max(float(np.ptp(drawn.knots[:, :, 2])), 1e-6)
+    whole = np.zeros((), dtype=ROW_DTYPE)
+    whole["next"], whole["species"], whole["segments"], whole["sides"], whole["whorl"] = -1, number, 1, 3, 1
+    whole["phantom"], whole["length"], whole["part"], whole["nominal"] = True, (height, 0), (0, 1), 1
+    whole["thickness"], whole["taper"], whole["leaf_whorl"] = (drawn.radius.max() / height, 0), (1, 0), 1
+    whole["leaf_size_tip"] = 1
+    whole["drawn_rows"] = first + 1, first + 1 + len(drawn.order)
+    out = [whole]
+    highest = int(drawn.order.max())
+    longest = np.maximum.reduceat(drawn.length, np.searchsorted(drawn.order, np.arange(highest + 1)))
+    for b, o in enumerate(np.minimum(drawn.order, len(one.orders) - 1)):
+        order = one.orders[o]
+        row = _row(order, number, int(o))
+        row["next"], row["count"][FORK], row["rings"], row["flare"], row["pipe"] = -1, 0, 0, 0, 0
+        if drawn.order[b] == highest and order.branches.high > 0:
+            row["next"][LATERAL] = begin[o + 1]
+        if order.spurs.high > 0 and one.spur is not None:
+            row["next"][SPUR] = spur
+        row["drawn"], row["segments"] = True, drawn.segments[b]
+        row["knots"], row["frames"] = drawn.knots[b], drawn.frames[b]
+        row["radii"] = drawn.radii[b] / drawn.radius[b]
+        row["taper"] = min(row["radii"][-1], 1.0), 0
+        vigour = drawn.length[b] / longest[drawn.order[b]]
+        row["size"] = drawn.length[b], drawn.radius[b], vigour, drawn.outward[b]
+        out.append(row)
+    return out
+
+
+def _row(order: Order, species: int, number: int) -> np.void:
+    """Row of an order whose branches do not fork."""
+    row = np.zeros((), dtype=ROW_DTYPE)
+    for name in (*_RANGES, *_NUMBERS, *_INTEGERS):
+        value = np.asarray(getattr(order, name), dtype=np.float64)
+        row[name] = np.radians(value) if name in _DEGREES else value
+    row["branch_colour"], row["leaf_colour"] = order.branch_colour, order.leaf_colour
+    row["leaf_colour_tip"] = order.leaf_colour_tip
+    row["gradient"] = order.leaf_size_tip != 1 or order.leaf_colour_tip != order.leaf_colour.mean
+    row["crown"], row["leaf_kind"] = CROWN_SHAPES.index(order.crown), LEAF_KINDS.index(order.leaf_kind)
+    row["species"], row["order"], row["outward"] = species, number, number <= 1
+    row["count"] = order.branches, (0, 0), order.spurs
+    row["start"] = order.branch_start, (0, 0), order.spur_start
+    row["share"], row["part"], row["nominal"] = (0, 1), (0, 1), 1
+    if order.pipe > 0:
+        row["pipe"] = max(order.pipe, 1.0)
+    row["fork_power"] = row["pipe"] or _FORK_POWER
+    row["rings"] = _flare_rings(row)
+    return row
+
+
+def _part(row: np.void, order: Order, low: float, high: float, before: float) -> np.void:
+    """Turn the row of an order into that of its part from ``low`` to ``high``; the part below begins at ``before``."""
+    if (low, high) == (0.0, 1.0):
+        return row
+    length, tip = high - low, order.taper.mean
+    row["part"], row["nominal"] = (low, high), 1 / length
+    row["segments"] = max(round(order.segments * length), 1)
+    radius = [_radius(order, u) for u in (low, high)]
+    row["taper"] = radius[1] / radius[0], row["taper"][1] * (1.0 if tip == 0 else min(1.0, radius[1] / radius[0]))
+    row["taper"][1] = min(row["taper"][1], row["taper"][0], 1 - row["taper"][0])
+    middle = np.clip((0.5 - low) / length, 0, 1)  # of the order's branch, where its outer half begins
+    inner, outer = row["curvature"][0], row["curvature_tip"]
+    row["curvature"][0] = (inner if middle >= 0.5 else outer) * length
+    row["curvature_tip"] = (inner if middle > 0.5 else outer) * length
+    row["curvature"][1] *= length
+    row["attraction"] *= length
+    for sort, start in ((LATERAL, order.branch_start), (SPUR, order.spur_start)):
+        share = np.clip((np.array([low, high]) - start.mean) / (1 - start.mean), 0, 1)
+        row["share"][sort] = share
+        row["count"][sort] *= share[1] - share[0]
+        row["start"][sort] = _local_start(start, low, high)
+    leaf_share = np.clip((np.array([low, high]) - order.leaf_start.mean) / (1 - order.leaf_start.mean), 0, 1)
+    row["leaves"] *= leaf_share[1] - leaf_share[0]
+    row["leaf_start"] = _local_start(order.leaf_start, low, high)
+    if low > 0:
+        relative = order.length.variation / order.length.mean
+        factor = length / (low - before)
+        row["length"], row["thickness"] = (factor, factor * relative), (1, 0)
+        row["angle"] = np.radians(order.fork_angle)
+        row["angle_tip"], row["azimuth"] = row["angle"][0], (0, 0.35)
+        # As wide at its base as what it comes from, or the fork would be an open pipe.
+        row["whorl"], row["continues"] = 1, True
+        row["flare"] = expected_forks(order.forks) ** (1 / row["fork_power"]) - 1
+    else:
+        row["length"] *= length
+        if row["order"] == 0:  # whose thickness is a fraction of its length
+            row["thickness"] /= length
+    row["rings"] = _flare_rings(row)
+    return row
+
+
+def _local_start(start: Range, low: float, high: float) -> tuple[float, float]:
+    mean = float(np.clip((start.mean - low) / (high - low), 0, 0.999))
+    inside = low < start.mean < high
+    return mean, (min(start.variation / (high - low), mean, 0.999 - mean) if inside else 0.0)
+
+
+def _radius(order: Order, u: float) -> float:
+    """Radius at a fraction of the branch, in radii of its base (`profiles.profile` without flare)."""
+    if order.pipe <= 0:
+        return 1 - (1 - order.taper.mean) * u
+    share = float(np.clip((u - order.branch_start.mean) / (1 - order.branch_start.mean), 0, 1))
+    power = max(order.pipe, 1.0)
+    tip = order.taper.mean**power
+    return (tip + (1 - tip) * (1 - share)) ** (1 / power)
+
+
+def _flare_rings(row: np.void) -> int:
+    return sum(ring < 0.98 / row["segments"] for ring in _FLARE_RINGS) if row["flare"] > 0 else 0
+
+
+def flare_rings(number: int) -> NDArray[np.float64]:
+    """Fractions of the length at which a flared base has rings of its own."""
+    return np.array(_FLARE_RINGS[:number])
+
+
+def _pipe_share(row: np.void, thickest: float) -> float:
+    """Radius of a lateral of vigour 1 such that all together have what the taper takes away, in r^p."""
+    low, high = row["share"][LATERAL]
+    at = low + (high - low) * (np.arange(256) + 0.5) / 256
+    vigour = crown_ratio(np.full(at.shape, row["crown"]), 1 - at)
+    lost = 1 - row["taper"][0] ** row["pipe"]
+    number = max(row["count"][LATERAL, 0], 1.0) * (vigour ** row["pipe"]).mean()
+    return min((lost / number) ** (1 / row["pipe"]), 1 / max(thickest, 1e-9))
+
+
+def without_variation(species: Species) -> Species:
+    """The exact plant of a species: every range has its mean."""
+    orders = tuple(_exact(order) for order in species.orders)
+    return replace(species, orders=orders, spur=None if species.spur is None else _exact(species.spur))
+
+
+def _exact(order: Order) -> Order:
+    still = {name: Range(value.mean) for name, value in vars(order).items() if isinstance(value, Range)}
+    return replace(order, **still)
+
+
+def ranged(rows: NDArray[np.void], name: str, row: NDArray[np.integer], key: NDArray[np.uint64], draw: int) -> NDArray:
+    """Value of one parameter for each branch: mean + variation × a signed random number of its key.
+
+    Parameters
+    ----------
+    rows : table of `build_rows`
+    name : str
+        A range of `ROW_DTYPE`.
+    row : (n,) int
+        Or (1,), which stands for all.
+    key : (n,) uint64
+    draw : int
+        See `hashing.Draw`.
+
+    Returns
+    -------
+    (n,) float64
+        Or (1,) where it is the same for all of one row.
+    """
+    return varied(rows[name][row], key, draw)
+
+
+def varied(values: NDArray[np.float64], key: NDArray[np.uint64], draw: int) -> NDArray[np.float64]:
+    """Mean + variation × a signed random number, of ranges (n, 2) or (1, 2) and keys (n,)."""
+    mean, variation = values[..., 0], values[..., 1]
+    if not variation.any():  # most are exact, and hashing is most of the time that this takes
+        return mean if len(mean) == 1 else mean + np.zeros(len(key))
+    return mean + variation * signed(key, draw)

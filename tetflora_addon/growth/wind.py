@@ -1,0 +1,345 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Wind: how far branches bend and leaves turn at a moment, as a function of their keys, their places and the time.
+
+A branch turns by equal parts at its base and at each joint, towards where the wind pushes it: so it bends, stays as
+long as it is, and carries what grows on it along. It leans by a mean, more so in gusts, which travel over the land with
+the wind, and sways about that at its natural frequency. Each order adds its own movement, slow at the trunk and quick
+at the twigs, as in "Physically Guided Animation of Trees" (Habel, Kusternig and Wimmer, 2009); that branches which
+move by themselves are what keeps real trees from swaying like poles is said in "Mechanical stability of trees under
+dynamic loads" (James, Haritos and Ades, 2006).
+
+Rows of a flora in the wind have the columns of `WIND_COLUMNS` besides; others have not, and nothing here costs them
+anything.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import cross, dot
+from ..errors import TetFloraError
+from ..setting import setting
+from .branches import Branches
+from .hashing import Draw, uniform
+from .rows import ROW_DTYPE, SPUR_ORDER
+
+#: Radians by which the tip of a trunk `_SLENDER` times as long as thick leans at `_STRONG` m/s; and over that for
+#: limbs, their branches, and all beyond, as they carry more leaves for their wood. A cantilever leans by the fourth
+#: power of the ratio; plants' wood is not the same everywhere, and has grown in the wind (1.5 looks right).
+_LEAN, _SLENDER, _POWER, _LEAN_LIMITS = 0.03, 60.0, 1.5, (0.01, 0.45)
+_OVER_TRUNK = np.array([1.0, 3.0, 5.0, 6.0])
+#: Metres a second at which the lean is that. Drag grows no faster than the speed where leaves and twigs give way
+#: (de Langre, "Effects of Wind on Plants", 2008), and slower in a storm.
+_STRONG, _STORM = 10.0, 30.0
+#: Frequency of a cantilever, 1.875² / 4π √(E / ρ) radius / length² for wood of 8 GPa and 900 kg/m³ (Euler and
+#: Bernoulli), for what its own branches and leaves weigh besides. Branches as stiff as to be quicker hardly move.
+_SPEED_OF_BENDING, _LOADED, _RATES = 834.0, 0.4, (0.1, 2.5)
+#: Sway over lean: along the wind, across it, and up and down.
+_SWAY = np.array([0.5, 0.5, 0.25])
+_SWAY_RATES = np.array([1.0, 1.13, 1.29])  # over the natural frequency, or all would move on ellipses
+_SWAY_DRAWS = (Draw.SWAY_ALONG, Draw.SWAY_ACROSS, Draw.SWAY_UP)
+#: Frequencies of gusts in hertz, shares of their strength, and cycles a metre across the wind.
+_GUST_RATES = np.array([0.06, 0.17, 0.43])
+_GUST_SHARES = np.array([0.5, 0.3, 0.2])
+_GUST_ACROSS = np.array([0.004, -0.013, 0.031])
+#: Sine of the angle by which leaves flutter at `_STRONG`, and the rate in hertz of a leaf of so many metres.
+_FLUTTER, _FLUTTER_MOST, _FLUTTER_RATE, _FLUTTER_SIZE = 0.22, 0.45, 3.0, 0.06
+#: Cycles by which plants drawn by hand are apart for each metre between them: their branches have no key in common.
+_APART = np.array([0.37, 0.23, 0.0])
+
+#: Seconds between two looks: the velocity is that of the instant, as near as single precision tells.
+_MOMENT = 1e-3
+
+AIR_DTYPE = np.dtype(
+    [(name, np.float64) for name in ("time", "loop", "moment", "speed", "gusts")] + [("axes", np.float64, (3, 3))]
+)
+"""The wind: seconds, period after which all repeats (0: never), seconds between the two looks that tell how fast
+things move (0: nobody asks), metres a second, share by which gusts are stronger or
+weaker, and as rows where it blows to, across that, and up."""
+
+WIND_COLUMNS = [("lean", np.float64), ("pace", np.float64), ("flutter", np.float64), ("flutter_rate", np.float64)] + [
+    ("air", AIR_DTYPE)
+]
+"""``lean`` is the mean turn of a branch's tip, radians (of plants drawn by hand: for each metre above ground at scale
+1); ``pace`` the natural frequency times the length, hertz metres (likewise: hertz at scale 1); ``flutter`` the largest
+sine of leaves' turns in a wind without gusts, ``flutter_rate`` their frequency, hertz."""
+
+
+@dataclass(frozen=True)
+class Wind:
+    """A wind at a moment. Fields with a label are properties of a scene, and documented by their tooltips.
+
+    Attributes
+    ----------
+    direction : float
+        Radians from +x toward +y.
+    time : float
+        Seconds.
+    loop : float
+        Seconds after which all movement repeats; 0 for never.
+    moving : bool
+        Whether vertices shall have velocities.
+
+    Raises
+    ------
+    TetFloraError
+        A number that is none, a negative speed or loop, or gusts outside 0 to 1.
+    """
+
+    speed: float = setting(
+        4.0,
+        "Speed",
+        "Mean speed in meters per second: 2 stirs leaves, 4 is a gentle breeze, 10 sways trees, 20 is a gale. Animate "
+        "it slowly: plants react at once",
+        min=0.0,
+        soft_max=25.0,
+        max=100.0,
+    )
+    direction: float = setting(
+        0.0,
+        "Direction",
+        "Direction the wind blows toward: 0° is +X, 90° is +Y",
+        subtype='ANGLE',
+        soft_min=-np.pi,
+        soft_max=np.pi,
+    )
+    gusts: float = setting(
+        0.5,
+        "Gusts",
+        "Strength of gusts and lulls relative to the mean speed: 0 is an even wind, 1 makes gusts twice as strong. "
+        "They travel with the wind",
+        subtype='FACTOR',
+        min=0.0,
+        max=1.0,
+    )
+    time: float = 0.0
+    loop: float = 0.0
+    moving: bool = False
+
+    def __post_init__(self) -> None:
+        if not np.isfinite([self.speed, self.direction, self.gusts, self.time, self.loop]).all():
+            raise TetFloraError("Wind: Speed, Direction, Gusts, Loop and the time must be finite numbers")
+        if self.speed < 0 or self.loop < 0 or not 0 <= self.gusts <= 1:
+            raise TetFloraError("Wind: Speed and Loop must be 0 or greater, and Gusts between 0 and 1")
+
+    @property
+    def strength(self) -> float:
+        """How far things lean, 1 at `_STRONG` m/s."""
+        return self.speed / _STRONG * (1 + _STRONG / _STORM) / (1 + self.speed / _STORM)
+
+
+def windy_rows(
+    rows: NDArray[np.void], length: NDArray[np.float64], radius: NDArray[np.float64], wind: Wind
+) -> NDArray[np.void]:
+    """Rows with what a wind does to them.
+
+    Parameters
+    ----------
+    rows : (r,) array of `rows.ROW_DTYPE`
+    length, radius : (r,) float64
+        Typical ones of their branches; only their ratio counts.
+    wind : Wind
+
+    Returns
+    -------
+    (r,) array of `rows.ROW_DTYPE` and `WIND_COLUMNS`
+    """
+    out = np.zeros(len(rows), np.dtype(ROW_DTYPE.descr + WIND_COLUMNS))
+    for name in ROW_DTYPE.names:
+        out[name] = rows[name]
+    slender = rows["nominal"] * length / np.maximum(radius, 1e-9)
+    # A part of a branch between forks leans by its part.
+    order = np.minimum(np.where(rows["order"] == SPUR_ORDER, 2, rows["order"]), len(_OVER_TRUNK) - 1)
+    lean = _LEAN * _OVER_TRUNK[order] * (slender / _SLENDER) ** _POWER
+    out["lean"] = np.clip(lean, *_LEAN_LIMITS) * wind.strength / rows["nominal"]
+    out["pace"] = _LOADED * _SPEED_OF_BENDING / np.maximum(slender * rows["nominal"], 1e-9)
+    for i in np.flatnonzero(rows["phantom"]):  # all branches drawn by hand follow their plant
+        drawn = slice(*rows["drawn_rows"][i])
+        for name in ("lean", "pace"):
+            out[name][drawn] = out[name][i] / rows["length"][i, 0]
+    out["flutter"] = min(_FLUTTER * wind.strength, _FLUTTER_MOST)
+    out["flutter_rate"] = _FLUTTER_RATE * np.sqrt(
+        _FLUTTER_SIZE / np.clip(rows["leaf_size"][:, 0], _FLUTTER_SIZE / 4, _FLUTTER_SIZE * 4)
+    )
+    c, s = np.cos(wind.direction), np.sin(wind.direction)
+    air = out["air"]
+    air["time"], air["loop"], air["speed"], air["gusts"] = wind.time, wind.loop, wind.speed, wind.gusts
+    air["moment"] = _MOMENT if wind.moving else 0.0
+    air["axes"] = [[c, s, 0], [-s, c, 0], [0, 0, 1]]
+    return out
+
+
+def is_windy(rows: NDArray[np.void]) -> bool:
+    """Whether rows are those of a flora in the wind."""
+    return "air" in rows.dtype.names
+
+
+def moment(rows: NDArray[np.void]) -> float:
+    """Seconds until the second look at where things are, 0 where velocities are not asked for."""
+    return float(rows["air"]["moment"][0]) if is_windy(rows) else 0.0
+
+
+def widest_sway(rows: NDArray[np.void]) -> NDArray[np.float64]:
+    """Largest turn (...) of tips of branches of rows (...) at any time, radians (for those drawn by hand by metre)."""
+    if not is_windy(rows):
+        return np.zeros(rows.shape)
+    most = np.linalg.norm(_SWAY + [1, 0, 0])
+    return rows["lean"] * (1 + rows["air"]["gusts"]) * most
+
+
+def sway(rows: NDArray[np.void], branches: Branches, ahead: float = 0.0) -> NDArray[np.float64]:
+    """Rotation vectors (n, 3), radians, of branches' tips against their bases.
+
+    For plants drawn by hand ``branches`` are the whole plants: where they stand, and which way is up; what comes out is
+    for each metre of height at scale 1.
+
+    Parameters
+    ----------
+    rows : parameter table in the wind
+    branches : Branches of n
+    ahead : float
+        Seconds after the moment of the rows.
+    """
+    row, air = branches.row, rows["air"][0]
+    drawn = rows["drawn"][row]
+    rate = np.clip(rows["pace"][row] / np.maximum(np.where(drawn, branches.scale, branches.length), 1e-9), *_RATES)
+    key, place = branches.key, 0.0
+    if drawn.any():
+        key, place = np.where(drawn, np.uint64(0), key), np.where(drawn, branches.position @ _APART, 0.0)
+    force = np.zeros((3, len(row)))
+    for axis, (share, quicker, draw) in enumerate(zip(_SWAY, _SWAY_RATES, _SWAY_DRAWS, strict=True)):
+        force[axis] = share * np.sin(2 * np.pi * _cycles(air, rate * quicker, ahead, uniform(key, draw) + place))
+    force[0] += 1.0
+    force *= rows["lean"][row] * gusts(rows, branches.position, ahead)
+    # Towards the force by an angle that is largest where it comes from the side.
+    return cross(branches.frame[:, :, 2], force.T @ air["axes"])
+
+
+def gusts(rows: NDArray[np.void], position: NDArray[np.float64], ahead: float = 0.0) -> NDArray[np.float64]:
+    """Strength (n,) of the wind at places (n, 3) over its mean: within 1 ∓ the share of gusts."""
+    air = rows["air"][0]
+    along, across = position @ air["axes"][0], position @ air["axes"][1]
+    out = np.ones(len(position))
+    for rate, share, sideways in zip(_GUST_RATES, _GUST_SHARES, _GUST_ACROSS, strict=True):
+        whole = _whole(air, rate)
+        phase = sideways * across - whole / air["speed"] * along
+        out += air["gusts"] * share * np.sin(2 * np.pi * _cycles(air, whole, ahead, phase))
+    return out
+
+
+def _whole(air: np.void, rate: NDArray[np.float64] | float) -> NDArray[np.float64]:
+    """Rates that fit a whole number of times, and at least once, into the loop."""
+    return np.maximum(np.rint(rate * air["loop"]), 1.0) / air["loop"] if air["loop"] > 0 else rate
+
+
+def _cycles(
+    air: np.void, rate: NDArray[np.float64] | float, ahead: float, phase: NDArray[np.float64] | float
+) -> NDArray[np.float64]:
+    """Cycles (n,), less than one, that something of a rate (n,) is in at the moment."""
+    time = air["time"] + ahead
+    if air["loop"] > 0:
+        time %= air["loop"]
+    return (_whole(air, rate) * time + phase) % 1.0
+
+
+def turned_by(frame: NDArray[np.float64], axis: NDArray[np.float64], angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Frames (n, 3, 3) turned about unit vectors (n, 3) by angles (n,) (Rodrigues)."""
+    cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    x, z = (_rotated(frame[:, :, column], axis, cos, sin) for column in (0, 2))
+    return np.stack([x.T, cross(z, x).T, z.T], axis=1).transpose(2, 0, 1)
+
+
+def turned_vectors(
+    vector: NDArray[np.float64], axis: NDArray[np.float64], angle: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Vectors (n, 3) turned in the same way."""
+    return _rotated(vector, axis, np.cos(angle)[:, None], np.sin(angle)[:, None])
+
+
+def _rotated(vector: NDArray, axis: NDArray, cos: NDArray, sin: NDArray) -> NDArray[np.float64]:
+    return cos * vector + sin * cross(axis, vector) + (1 - cos) * dot(axis, vector) * axis
+
+
+def axis_and_angle(turn: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Unit vectors (n, 3) and lengths (n,) of rotation vectors (n, 3); any axis for no turn."""
+    angle = np.sqrt(dot(turn, turn))
+    return turn / np.maximum(angle, 1e-300), angle[:, 0]
+
+
+def leant(points: NDArray[np.float64], up: NDArray[np.float64], turn: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points of plants drawn by hand, bent over: all at one height turn alike, so that nothing comes apart.
+
+    Parameters
+    ----------
+    points : (n, k, 3) float64
+        From where the plants stand.
+    up : (n, 3) float64
+        Unit vectors along the plants' upright axes.
+    turn : (n, 3) float64
+        Rotation vector across ``up`` for each metre of height.
+
+    Returns
+    -------
+    (n, k, 3) float64
+    """
+    height = np.einsum("nki,ni->nk", points, up)
+    axis, rate = axis_and_angle(turn)
+    aside = np.cross(axis, up)
+    above = np.maximum(height, 0.0)
+    angle = rate[:, None] * above
+    # The upright axis becomes an arc of the same length.
+    steep = np.maximum(rate, 1e-300)[:, None]
+    along, beside = (
+        np.where(angle > 1e-9, v, w)
+        for v, w in ((np.sin(angle) / steep, above), ((1 - np.cos(angle)) / steep, above * angle / 2))
+    )
+    level = points - above[:, :, None] * up[:, None]
+    cos, sin = np.cos(angle)[..., None], np.sin(angle)[..., None]
+    k = axis[:, None]
+    level = cos * level + sin * np.cross(k, level) + (1 - cos) * (level * k).sum(-1, keepdims=True) * k
+    return along[..., None] * up[:, None] + beside[..., None] * aside[:, None] + level
+
+
+def fluttered(
+    rows: NDArray[np.void],
+    row: NDArray[np.integer],
+    frame: NDArray[np.float32],
+    key: NDArray[np.uint64],
+    gust: NDArray[np.float64],
+    ahead: float = 0.0,
+) -> NDArray[np.float32]:
+    """Frames of leaves (n, 3, 3) turned about their bases: up and down, and about their midribs.
+
+    Parameters
+    ----------
+    rows : parameter table in the wind
+    row : (n,) or (1,) int
+    frame : (n, 3, 3) float32
+        Across, along the midrib, upper side.
+    key : (n,) uint64
+        Of the leaves; its bits are as good as random numbers, and there are very many leaves.
+    gust : (n,) float64
+        Of `gusts` where they are.
+    ahead : float
+        Seconds after the moment of the rows.
+    """
+    air = rows["air"][0]
+    bits = [((key >> np.uint64(shift)) & np.uint64(0xFFFFF)).astype(np.float64) * 2.0**-20 for shift in (44, 24, 4)]
+    rate = rows["flutter_rate"][row] * (0.75 + 0.5 * bits[2])
+    most = (rows["flutter"][row] * gust).astype(np.float32)
+    pitch, roll = (
+        most * np.sin((2 * np.pi * _cycles(air, rate * quicker, ahead, phase)).astype(np.float32))
+        for quicker, phase in ((1.0, bits[0]), (1.37, bits[1]))
+    )
+    out = np.zeros((3, 3, len(frame)), np.float32)
+    across, along, up = frame.transpose(2, 1, 0)
+    for sine, first, second, i, j in ((pitch, along, up, 1, 2), (roll, across, out[2], 0, 2)):
+        cosine = np.sqrt(1 - sine * sine)
+        new = cosine * second - sine * first
+        out[i] = cosine * first + sine * second
+        out[j] = new
+    return out.transpose(2, 1, 0)

@@ -1,0 +1,330 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a light sees of the tetrahedra (paper, section 7): volume shadow, with polygons as an opaque part of it.
+
+The paper renders the scene from each light front to back, collects volume shadow in a gray buffer and polygon shadow
+in a z-buffer, and takes samples on the way. Here all fragments are sorted by pixel and distance once. Optical depth in
+front of any point is a cumulative sum, and what arrives there of the light that the tetrahedra themselves scatter
+comes from the same order. Samples are blended between the four nearest pixels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera.camera import Camera
+from ..refinement.rasterise import buffer_size, occluder_depth, tetrahedron_fragments
+from ..refinement.visibility import OPAQUE
+
+#: How far polygons' shadows begin behind them, in pixels of the buffer: none shadows what lies on it.
+BIAS = 1.5
+#: Points that are looked up together; some 500 bytes each.
+POINTS_AT_ONCE = 1 << 18
+#: Parts along each side of a sheet at most, and the share of a pixel that one covers at most.
+_MOST_CUTS, _MOST_COVERED = 64, 0.98
+
+
+@dataclass(frozen=True)
+class _Taps:
+    """The four pixels around each point (m, 4), their weights, and how far away the point is (m,)."""
+
+    pixel: NDArray[np.int64]
+    weight: NDArray[np.float64]
+    metres: NDArray[np.float64]
+
+
+class LightBuffer:
+    """Tetrahedra and polygons in the order in which light meets them.
+
+    Parameters
+    ----------
+    camera : Camera
+        Flat view from the light.
+    resolution : int
+        Longer side of the buffer, pixels.
+    vertices : (n, 4, 3) float64
+        Positively oriented tetrahedra that do not overlap, metres.
+    extinction : (n,) float64
+        κ ≥ 0 along the light, 1/m.
+    occluders : (t, 3, 3) float64, optional
+        Opaque triangles, metres.
+    sheets : (m, 4, 3) float64, optional
+        Corners of opaque facets or leaves, which count by the share of each pixel that they cover. They are owners
+        n to n + m − 1, after the tetrahedra.
+    """
+
+    def __init__(
+        self,
+        camera: Camera,
+        resolution: int,
+        vertices: NDArray[np.float64],
+        extinction: NDArray[np.float64],
+        occluders: NDArray[np.float64] | None = None,
+        sheets: NDArray[np.float64] | None = None,
+    ) -> None:
+        self.camera = camera
+        self.width, self.height = buffer_size(camera, resolution)
+        # What throws no shadow need not be drawn.
+        there = np.flatnonzero(extinction > 0.0).astype(np.int32)
+        found = tetrahedron_fragments(vertices[there], camera, self.width, self.height)
+        own = there[found.cell]
+        with np.errstate(invalid="ignore"):
+            depth = np.nan_to_num(np.minimum(extinction[own] * found.thickness, OPAQUE))
+        depth = depth * np.minimum(found.coverage, 1.0)
+        parts = [(own, found.pixel, found.entry, found.thickness, depth)]
+        if occluders is not None and len(occluders):
+            end = occluder_depth(occluders, camera, self.width, self.height)
+            hit = np.flatnonzero(np.isfinite(end))
+            across = camera.pixel_size * camera.width / self.width
+            shifted = end[hit] + BIAS * across * (1.0 if camera.kind == "ORTHO" else end[hit])
+            nothing = np.zeros(len(hit))
+            parts.append((np.full(len(hit), -1, np.int32), hit, shifted, nothing, np.full(len(hit), OPAQUE)))
+        if sheets is not None and len(sheets):
+            parts += [(own + np.int32(len(vertices)), *rest) for own, *rest in self._sheet_fragments(sheets)]
+        cell, pixel, entry, thickness, depth = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+        # One number to sort and to look up by: the pixel, and the distance as its fraction.
+        self._reach = float(entry.max(initial=0.0)) * 1.001 + 1e-9
+        key = self._key(pixel, entry)
+        order = np.argsort(key, kind="stable")  # others put equal ones in an order that depends on the processor
+        self._order_key, self._cell = key[order], cell[order]
+        self._pixel = pixel[order].astype(np.int32)
+        # Sums need doubles; what is looked up does not.
+        entry, thickness, depth = entry[order], thickness[order], depth[order]
+        self._entry, self._thickness, self._depth = (a.astype(np.float32) for a in (entry, thickness, depth))
+        summed = np.cumsum(depth)
+        begins = np.flatnonzero(np.diff(self._pixel, prepend=-1))
+        length = np.diff(begins, append=len(order))
+        #: First fragment of each fragment's pixel.
+        self._first = np.repeat(begins, length).astype(np.int32)
+        before = summed - depth - np.repeat((summed - depth)[begins], length)
+        self._before = np.maximum(before, 0.0).astype(np.float32)
+        own = self._cell * np.int64(self.width * self.height) + self._pixel
+        self._by_cell = np.argsort(own).astype(np.int32)
+        self._own_key = own[self._by_cell]
+
+    def _sheet_fragments(self, sheets: NDArray[np.float64]) -> Iterator[tuple[NDArray, ...]]:
+        """Owner, pixel, entry, thickness 0 and optical depth of sheets, those of about the same size at a time.
+
+        A sheet that covers the share c of a pixel lets 1 − c through: its optical depth is −ln (1 − c).
+        """
+        across = self.camera.pixel_size * self.camera.width / self.width
+        seen = np.flatnonzero(self._near_view(sheets, 2.0 * across))
+        numbers, sheets = seen, sheets[seen]
+        if not len(sheets):
+            return
+        centre = sheets.mean(axis=1)
+        vector = np.cross(sheets[:, 2] - sheets[:, 0], sheets[:, 3] - sheets[:, 1]) / 2.0
+        if self.camera.kind == "ORTHO":
+            seen, pixel_area = np.abs(vector @ self.camera.frame[:, 2]), np.full(len(sheets), across**2)
+        else:
+            away = centre - self.camera.position
+            distance = np.maximum(np.linalg.norm(away, axis=1), 1e-9)
+            seen = np.abs(np.sum(vector * away, axis=1)) / distance
+            # Beside the middle of a flat view a pixel sees less of the sphere.
+            pixel_area = (across * distance) ** 2 * np.abs(away @ self.camera.frame[:, 2] / distance) ** 3
+        longest = np.linalg.norm(sheets - np.roll(sheets, 1, axis=1), axis=2).max(axis=1)
+        # Smaller than a pixel, it is where its middle is; larger, no pixel between its parts may go without.
+        pixels = longest / np.sqrt(np.maximum(pixel_area, 1e-18))
+        cuts = np.where(pixels <= 1.0, 1, np.clip(np.ceil(2.0 * pixels), 1, _MOST_CUTS)).astype(int)
+        covered = seen / pixel_area
+        for count in np.unique(cuts):
+            x = (np.arange(count) + 0.5) / count
+            u, v = np.repeat(x, count), np.tile(x, count)
+            weights = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=1)
+            share_of_part = covered / count**2
+            alike, step = np.flatnonzero(cuts == count), max(POINTS_AT_ONCE // int(count) ** 2, 1)
+            for start in range(0, len(alike), step):
+                some = alike[start : start + step]
+                points = np.einsum("kc,mcx->mkx", weights, sheets[some]).reshape(-1, 3)
+                owner, pixel, metres, share = self._gathered_parts(points, np.repeat(some, count**2), share_of_part)
+                depth = -np.log1p(-np.minimum(share, _MOST_COVERED))
+                yield numbers[owner].astype(np.int32), pixel.astype(np.int32), metres, np.zeros(len(owner)), depth
+
+    def _gathered_parts(
+        self, points: NDArray[np.float64], owner: NDArray[np.int64], covered: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Parts of sheets by sheet and nearest pixel: both (f,), their mean distance (f,), and what share they cover.
+
+        Parts are at ``points`` (m, 3), of sheets ``owner`` (m,); each of sheet i covers ``covered[i]`` of a pixel.
+        """
+        taps, inside = self._taps(points)
+        owner = owner[inside]
+        nearest = taps.pixel[np.arange(len(owner)), taps.weight.argmax(axis=1)] if len(owner) else owner
+        key, first, own = np.unique(
+            owner * (self.width * self.height) + nearest, return_index=True, return_inverse=True
+        )
+        share = np.bincount(own.ravel(), covered[owner], len(key))
+        metres = np.bincount(own.ravel(), taps.metres, len(key)) / np.maximum(np.bincount(own.ravel()), 1)
+        return owner[first], nearest[first], metres, share
+
+    def _near_view(self, sheets: NDArray[np.floating], margin: float) -> NDArray[np.bool_]:
+        """Which sheets (m,) may reach into a sun's view, which may be a part of the scene; of other lights all."""
+        if self.camera.kind != "ORTHO":
+            return np.ones(len(sheets), bool)
+        left, right, bottom, top = self.camera.window
+        inside = np.ones(len(sheets), bool)
+        for axis, low, high in ((0, left, right), (1, bottom, top)):
+            place = (sheets - self.camera.position) @ self.camera.frame[:, axis]
+            inside &= (place.max(axis=1) >= low - margin) & (place.min(axis=1) <= high + margin)
+        return inside
+
+    def __len__(self) -> int:
+        return len(self._pixel)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the fragments, bytes."""
+        return sum(value.nbytes for value in vars(self).values() if isinstance(value, np.ndarray))
+
+    def transmittance(
+        self, points: NDArray[np.float64], cells: NDArray[np.integer], own_depth: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Share of the light that arrives at points.
+
+        Parameters
+        ----------
+        points : (m, 3) float64
+            Metres, world space.
+        cells : (m,) int
+            Tetrahedron that holds each or sheet on which it lies, −1 where there is none.
+        own_depth : (m,) float64
+            Optical depth of that tetrahedron between where light enters it and the point. However coarse the pixels,
+            none darkens itself by more, and no point is darkened by less.
+
+        Returns
+        -------
+        transmittance : (m,) float64
+            0 to 1; 1 where the point is out of view.
+        seen : (m,) bool
+            Whether the point is in view.
+        """
+        result, seen = np.ones(len(points)), np.zeros(len(points), bool)
+        for start in range(0, len(points), POINTS_AT_ONCE):
+            part = slice(start, start + POINTS_AT_ONCE)
+            taps, inside = self._taps(points[part])
+            place, found = self._last_before(taps)
+            depth = np.where(found, self._up_to(place, taps), 0.0)
+            own, has = self._own(taps, cells[part][inside])
+            # Small ones may overlap; what begins before the last fragment was counted in full.
+            counted = np.where(own < place, self._depth[own], self._partly(own, taps)) if len(self) else 0.0
+            drawn, exact = np.where(has & (own <= place), counted, 0.0), own_depth[part][inside][:, None]
+            # Where the point's own tetrahedron does not reach into a pixel, its neighbours do, or nothing is there.
+            depth = np.maximum(np.maximum(depth - drawn, 0.0) + np.minimum(drawn, exact), exact)
+            some = np.flatnonzero(inside) + start
+            result[some] = (np.exp(-depth) * taps.weight).sum(axis=1)
+            seen[some] = True
+        return result, seen
+
+    def light_up(self, sources: NDArray[np.float64], polygons: NDArray[np.float64]) -> None:
+        """Let tetrahedra, sheets and polygons shine, for `scattered`.
+
+        Parameters
+        ----------
+        sources : (n + m, 3) float64
+            Radiance J of each tetrahedron, were it thick, and of each sheet: they give J (1 − e^−τ).
+        polygons : (3,) float64
+            Radiance of all polygons.
+        """
+        if len(self):
+            emitted = np.where((self._cell >= 0)[:, None], sources[np.maximum(self._cell, 0)], polygons)
+            self._emitted = emitted.astype(np.float32)
+            self._arriving = self._gathered(emitted).astype(np.float32)
+
+    def scattered(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Radiance (m, 3) that arrives at points (m, 3) along the buffer's rays from what shines in front of them."""
+        result = np.zeros((len(points), 3))
+        if not len(self):
+            return result
+        emitted, arriving = self._emitted, self._arriving
+        for start in range(0, len(points), POINTS_AT_ONCE):
+            taps, inside = self._taps(points[start : start + POINTS_AT_ONCE])
+            place, found = self._last_before(taps)
+            share = np.exp(-(self._up_to(place, taps) - self._before[place]))[..., None]
+            light = arriving[place] * share + emitted[place] * (1.0 - share)
+            light = np.where(found[..., None], light, 0.0) * taps.weight[..., None]
+            result[np.flatnonzero(inside) + start] = light.sum(axis=1)
+        return result
+
+    def _gathered(self, emitted: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Radiance (f, 3) in front of each fragment, by a prefix scan over (transmittance, radiance) of its pixel.
+
+        Two stretches in a row are one: T = T₁ T₂, L = L₁ T₂ + L₂. Doubling their length covers all in few rounds
+        (Hillis and Steele, "Data Parallel Algorithms", 1986).
+        """
+        through = np.exp(-self._depth.astype(np.float64))
+        light = emitted * (1.0 - through)[:, None]
+        every = np.arange(len(self))
+        longest = int((every - self._first).max()) + 1
+        step = 1
+        while step < longest:
+            some = np.flatnonzero(every - step >= self._first)
+            earlier = some - step
+            added = light[earlier] * through[some, None]
+            factor = through[earlier] * through[some]
+            light[some] += added
+            through[some] = factor
+            step *= 2
+        before = np.zeros_like(light)
+        later = np.flatnonzero(every > self._first)
+        before[later] = light[later - 1]
+        return before
+
+    def _key(self, pixel: NDArray, metres: NDArray[np.float64]) -> NDArray[np.float64]:
+        return pixel + np.clip(metres / self._reach, 0.0, 1.0) * 0.999999
+
+    def _taps(self, points: NDArray[np.float64]) -> tuple[_Taps, NDArray[np.bool_]]:
+        """Pixels around those points (k,) that are in view, and which these are (m,)."""
+        local = self.camera.to_camera_space(points)
+        depth = local[:, 2]
+        left, right, bottom, top = self.camera.window
+        ahead = depth >= self.camera.near
+        flat = local[:, :2] if self.camera.kind == "ORTHO" else local[:, :2] / np.where(ahead, depth, 1.0)[:, None]
+        size = np.array([self.width, self.height])
+        place = (flat - [left, bottom]) / [right - left, top - bottom] * size
+        inside = ahead & (place >= -1e-9).all(axis=1) & (place <= size + 1e-9).all(axis=1)
+        place = place[inside] - 0.5
+        low = np.floor(place)
+        share = place - low
+        metres = depth[inside] if self.camera.kind == "ORTHO" else np.linalg.norm(local[inside], axis=1)
+        pixels, weights = [], []
+        for up in (0, 1):
+            for aside in (0, 1):
+                column = np.clip(low[:, 0] + aside, 0, self.width - 1).astype(np.int64)
+                row = np.clip(low[:, 1] + up, 0, self.height - 1).astype(np.int64)
+                pixels.append(row * self.width + column)
+                weights.append(np.abs(1 - aside - share[:, 0]) * np.abs(1 - up - share[:, 1]))
+        return _Taps(np.stack(pixels, axis=1), np.stack(weights, axis=1), metres), inside
+
+    def _last_before(self, taps: _Taps) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+        """The last fragment (k, 4) that begins in front of each point in each pixel, and whether there is one."""
+        if not len(self):
+            return np.zeros(taps.pixel.shape, np.intp), np.zeros(taps.pixel.shape, bool)
+        key = self._key(taps.pixel, taps.metres[:, None])
+        place = np.searchsorted(self._order_key, key.ravel(), side="right").reshape(key.shape) - 1
+        found = place >= 0
+        place = np.maximum(place, 0)
+        return place, found & (self._pixel[place] == taps.pixel)
+
+    def _own(self, taps: _Taps, cells: NDArray[np.integer]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+        """Fragment (k, 4) of each point's own tetrahedron in each pixel, and whether there is one."""
+        if not len(self):
+            return np.zeros(taps.pixel.shape, np.intp), np.zeros(taps.pixel.shape, bool)
+        key = cells.astype(np.int64)[:, None] * (self.width * self.height) + taps.pixel
+        place = np.searchsorted(self._own_key, key.ravel()).reshape(key.shape)
+        place = np.minimum(place, len(self) - 1)
+        return self._by_cell[place], (self._own_key[place] == key) & (cells >= 0)[:, None]
+
+    def _partly(self, place: NDArray[np.intp], taps: _Taps) -> NDArray[np.float64]:
+        """Optical depth of fragments as far as it lies in front of the points."""
+        if not len(self):
+            return np.zeros(place.shape)
+        inside = (taps.metres[:, None] - self._entry[place]) / np.maximum(self._thickness[place], 1e-9)
+        return self._depth[place] * np.clip(inside, 0.0, 1.0)
+
+    def _up_to(self, place: NDArray[np.intp], taps: _Taps) -> NDArray[np.float64]:
+        """Optical depth in front of the points, through the last fragment that begins there."""
+        return 0.0 if not len(self) else self._before[place] + self._partly(place, taps)

@@ -1,0 +1,352 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the shadow pass finds (paper, section 7): light in tetrahedra, and what facets and clouds make of it.
+
+Every lamp looks at the scene through a buffer. The sky does so from 24 directions, whose samples become harmonics.
+What tetrahedra scatter lights the others: it is gathered in the same 24 buffers, order by order, and what more orders
+would add is the sum of the geometric series that the last ones begin. There is no factor to be tuned.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera.camera import Camera
+from ..refinement.lights import Light
+from ..tetrahedra.geometry import volume
+from .buffers import LightBuffer
+from .receivers import Clouds, Sheets
+from .scattering import (
+    DIRECTIONS,
+    HARMONICS,
+    SOLID_ANGLE,
+    facet_ambient,
+    facet_direct,
+    fluence,
+    harmonics,
+    irradiance,
+    particle_ambient,
+    particle_direct,
+    scattered_shares,
+)
+from .sources import World, arriving, to_eye
+
+#: Greatest share of an order that the next one has: 1 would never end.
+_MOST_AGAIN = 0.97
+#: Facets that are shaded together; some 1 kB each.
+_AT_ONCE = 1 << 16
+
+
+@dataclass(frozen=True)
+class Lit:
+    """A lamp and its buffers: one, or six all around; none where nothing stands in its light."""
+
+    light: Light
+    buffers: list[LightBuffer]
+
+
+class Illumination:
+    """Light in a scene, as `shadow_pass.shadow_steps` finds it.
+
+    Attributes
+    ----------
+    clouds : Clouds of n
+    sheets : Sheets
+        What stands in the light in place of some of the clouds.
+    lamps : list of Lit
+        Areas are several of them.
+    ambient : (n, 4, 9, 3) float32
+        Light from the sky and from what is lit, at the tetrahedra's key points, by harmonic and colour.
+    """
+
+    def __init__(
+        self,
+        clouds: Clouds,
+        sheets: Sheets,
+        lamps: list[Lit],
+        sky: list[LightBuffer | None],
+        world: World,
+        fewer: tuple[Sheets, NDArray[np.int64]],
+    ) -> None:
+        self.clouds, self.sheets, self.lamps = clouds, sheets, lamps
+        # Of the sky's buffers: their sheets, and the number of each of the others among these.
+        self._sky, self._world, (self._sky_sheets, self._number) = sky, world, fewer
+        self._ground = np.zeros(3)
+        self.ambient = np.zeros((len(clouds), 4, HARMONICS, 3), np.float32)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of samples and buffers, bytes."""
+        buffers = [b for lit in self.lamps for b in lit.buffers] + [b for b in self._sky if b is not None]
+        return self.ambient.nbytes + sum(b.nbytes for b in buffers)
+
+    def direct(
+        self, points: NDArray[np.float64], cells: NDArray[np.integer], sheets: NDArray[np.integer] | None = None
+    ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Light of each lamp at points.
+
+        Parameters
+        ----------
+        points : (m, 3) float64
+            Metres.
+        cells : (m,) int
+            Tetrahedron (index into the clouds) that holds each, −1 for none.
+        sheets : (m,) int, optional
+            Sheet (index) on which each lies, which does not shadow it.
+
+        Yields
+        ------
+        towards : (m, 3) float64
+            Unit vectors to the lamp.
+        irradiance : (m, 3) float64
+            W/m² that arrive on a surface that faces it, shadows included.
+        """
+        for lit in self.lamps:
+            towards, light = arriving(lit.light, points)
+            if lit.buffers:
+                light = light * self._through(lit.buffers, points, cells, towards, sheets)[:, None]
+            yield towards, light
+
+    def around(self, points: NDArray[np.float64], cells: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Light from all sides at points, as harmonics (m, 9, 3): sky, and what tetrahedra and polygons scatter.
+
+        In a tetrahedron it is linear between the samples of its key points (paper, section 7); elsewhere the sky's
+        buffers are looked up again. Parameters as for `direct`.
+        """
+        result = np.zeros((len(points), HARMONICS, 3))
+        inside = np.flatnonzero(cells >= 0)
+        weights = self.clouds.weights(points[inside], cells[inside])
+        result[inside] = np.einsum("mk,mkhc->mhc", weights, self.ambient[cells[inside]])
+        outside = np.flatnonzero(cells < 0)
+        if len(outside):
+            none = np.full(len(outside), -1)
+            result[outside] = self._from_sky(points[outside], none) + self._from_clouds(points[outside])
+        return result
+
+    def irradiance(
+        self, points: NDArray[np.float64], normals: NDArray[np.float64], cells: NDArray[np.integer] | None = None
+    ) -> NDArray[np.float64]:
+        """Irradiance (m, 3) of surfaces at points with unit normals, on the side of the normals, W/m².
+
+        For vertices or faces of meshes; ``cells`` as for `direct`, by default none.
+        """
+        cells = np.full(len(points), -1) if cells is None else cells
+        result = irradiance(self.around(points, cells), normals)
+        for towards, light in self.direct(points, cells):
+            result += light * np.maximum(np.sum(normals * towards, axis=1), 0.0)[:, None]
+        return result
+
+    def facet_radiance(
+        self,
+        centre: NDArray[np.float64],
+        normal: NDArray[np.float64],
+        colour: NDArray[np.float64],
+        transmission: NDArray[np.float64],
+        cells: NDArray[np.integer],
+        camera: Camera | None = None,
+        sheets: NDArray[np.integer] | None = None,
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Outgoing radiance of facets or leaves.
+
+        Parameters
+        ----------
+        centre, normal : (m, 3) float64
+            Metres; unit vectors that point to the front.
+        colour : (m, 3) float64
+            Linear RGB.
+        transmission : (m,) float64
+            Share of the scattered light that goes through; 0 for bark.
+        cells : (m,) int
+            As for `direct`.
+        camera : Camera, optional
+            For the gloss; without, it is spread evenly.
+        sheets : (m,) int, optional
+            As for `direct`.
+
+        Returns
+        -------
+        front, back : (m, 3) float32
+            Linear RGB, as a pixel shows it.
+        """
+        front, back = np.zeros((2, len(centre), 3), np.float32)
+        for start in range(0, len(centre), _AT_ONCE):
+            part = slice(start, start + _AT_ONCE)
+            shares = scattered_shares(colour[part], transmission[part])
+            view = None if camera is None else to_eye(camera, centre[part])
+            sides = facet_ambient(normal[part], shares, self.around(centre[part], cells[part]), view)
+            on = None if sheets is None else sheets[part]
+            for towards, light in self.direct(centre[part], cells[part], on):
+                added = facet_direct(normal[part], shares, towards, light, view)
+                sides = sides[0] + added[0], sides[1] + added[1]
+            front[part], back[part] = sides
+        return front, back
+
+    def cloud_radiance(
+        self,
+        points: NDArray[np.float64],
+        colour: NDArray[np.float64],
+        transmission: NDArray[np.float64],
+        cells: NDArray[np.integer],
+        camera: Camera,
+        normal: NDArray[np.float64] | None = None,
+        plane: NDArray[np.float64] | None = None,
+        sheets: NDArray[np.integer] | None = None,
+    ) -> NDArray[np.float32]:
+        """Radiance (m, 3) of microspheres or, the same, of thick clouds around points, as the camera sees them.
+
+        Parameters
+        ----------
+        points, colour, transmission, cells
+            As for `facet_radiance`.
+        camera : Camera
+        normal : (m, 3) float64, optional
+            Axis of the plane term; both ways are alike.
+        plane : (m,) float64, optional
+            Weight of the plane term, by default 0.
+        sheets : (m,) int, optional
+            As for `direct`.
+        """
+        result = np.zeros((len(points), 3), np.float32)
+        for start in range(0, len(points), _AT_ONCE):
+            part = slice(start, start + _AT_ONCE)
+            shares, view = scattered_shares(colour[part], transmission[part]), to_eye(camera, points[part])
+            around = self.around(points[part], cells[part])
+            particles, planes = particle_ambient(shares, around, view), 0.0
+            if plane is not None:
+                axis = normal[part]
+                axis = axis * np.where(np.sum(axis * view, axis=1) < 0.0, -1.0, 1.0)[:, None]
+                planes = facet_ambient(axis, shares, around, view)[0]
+            on = None if sheets is None else sheets[part]
+            for towards, light in self.direct(points[part], cells[part], on):
+                particles += particle_direct(shares, towards, light, view)
+                if plane is not None:
+                    planes = planes + facet_direct(axis, shares, towards, light, view)[0]
+            weight = 0.0 if plane is None else plane[part][:, None]
+            result[part] = (1.0 - weight) * particles + weight * planes
+        return result
+
+    def cell_sources(self, camera: Camera) -> NDArray[np.float32]:
+        """Radiance J (n, 4, 3) of each tetrahedron at its vertices, were it thick, as the camera sees it.
+
+        The paper's blend of p cos φ and p cos α + s cos^spear β with the light of all lamps; linear between vertices.
+        """
+        cells = np.repeat(np.arange(len(self.clouds)), 4)
+        c = self.clouds
+        made = self.cloud_radiance(
+            c.key_points.reshape(-1, 3),
+            c.colour[cells],
+            c.transmission[cells],
+            cells,
+            camera,
+            c.normal[cells],
+            c.plane[cells],
+        )
+        return made.reshape(-1, 4, 3)
+
+    def scatter(self, ground: NDArray[np.float64], orders: int) -> Iterator[float]:
+        """Sample the sky at the key points and let light be scattered; what `shadow_pass.shadow_steps` does last.
+
+        Parameters
+        ----------
+        ground : (3,) float64
+            Colour of polygons.
+        orders : int
+            Gathered one by one; the rest is their geometric series.
+
+        Yields
+        ------
+        float
+            Share that is done.
+        """
+        count = len(self.clouds)
+        points, cells, sheets, keys = self.sheets.samples(self.clouds)
+        up = np.array([[0.0, 0.0, 1.0]])
+        bright = irradiance(self._world.parts.sum(axis=0)[None], up)[0]
+        for lit in self.lamps:
+            if lit.light.kind == "SUN":
+                bright += lit.light.colour * max(-lit.light.direction[2], 0.0)
+        self._ground = np.asarray(ground, np.float64) * bright / np.pi
+        if not count:
+            return
+        sky = keys.means(self._from_sky(points, cells, sheets))
+        yield 1.0 / (orders + 1)
+        first = fluence(sky)
+        for _, light in self.direct(points, cells, sheets):
+            first += keys.means(light)
+        gathered = last = np.zeros_like(sky)
+        for order in range(orders):
+            passing = keys.by_cell(first + fluence(gathered))
+            self._shine(self.clouds.albedo * passing / (4.0 * np.pi))
+            before, every = last, keys.means(self._from_clouds(points))
+            last, gathered = every - gathered, every
+            if order == orders - 1:
+                share = self._again(fluence(before), fluence(last))
+                gathered = gathered + last * (share / (1.0 - share))
+            yield (order + 2.0) / (orders + 1)
+        passing = keys.by_cell(first + fluence(gathered))
+        self._shine(self.clouds.albedo * passing / (4.0 * np.pi))
+        self.ambient[:] = (sky + gathered).reshape(count, 4, HARMONICS, 3)
+
+    def _again(self, before: NDArray[np.float64], last: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Share (3,) of one order of scattering that the next will have, from two of them: means over all surfaces."""
+        c = self.clouds
+        weight = np.repeat(np.sqrt(np.maximum(c.matrices[:, :3].sum(axis=1), 0.0)) * volume(c.vertices), 4)
+        former = weight @ before
+        share = (weight @ last) / np.where(former > 0.0, former, np.inf)
+        return np.clip(share, 0.0, _MOST_AGAIN)
+
+    def _through(
+        self,
+        buffers: list[LightBuffer],
+        points: NDArray[np.float64],
+        cells: NDArray[np.integer],
+        towards: NDArray[np.float64],
+        sheets: NDArray[np.integer] | None,
+    ) -> NDArray[np.float64]:
+        """Transmittance (m,) through the first of several views that sees each point."""
+        empty = np.append(self.sheets.replaced, True)[cells]
+        own = np.where(empty, 0.0, self.clouds.own_depth(points, cells, towards))
+        owner = np.where(empty, -1, cells) if sheets is None else np.where(sheets < 0, cells, sheets + len(self.clouds))
+        result, waiting = np.exp(-own), np.ones(len(points), bool)
+        for buffer in buffers:
+            some = np.flatnonzero(waiting)
+            through, seen = buffer.transmittance(points[some], owner[some], own[some])
+            result[some[seen]] = through[seen]
+            waiting[some[seen]] = False
+        return result
+
+    def _from_sky(
+        self, points: NDArray[np.float64], cells: NDArray[np.integer], sheets: NDArray[np.integer] | None = None
+    ) -> NDArray[np.float64]:
+        """Light of the sky (m, 9, 3) that nothing holds up."""
+        result = np.zeros((len(points), HARMONICS, 3))
+        if self._world.dark:
+            return result
+        if sheets is not None:
+            sheets = np.append(self._number, -1)[sheets]
+        for part, buffer, towards in zip(self._world.parts, self._sky, DIRECTIONS, strict=True):
+            through = np.ones(len(points))
+            if buffer is not None:
+                through = self._through([buffer], points, cells, towards, sheets)
+            result += through[:, None, None] * part
+        return result
+
+    def _shine(self, sources: NDArray[np.float64]) -> None:
+        """Let tetrahedra and their sheets give off their radiance (n, 3)."""
+        emitted = np.concatenate([sources, sources[self._sky_sheets.cell]])
+        for buffer in self._sky:
+            if buffer is not None:
+                buffer.light_up(emitted, self._ground)
+
+    def _from_clouds(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Light (m, 9, 3) that tetrahedra and polygons scatter."""
+        result = np.zeros((len(points), HARMONICS, 3))
+        for buffer, towards in zip(self._sky, DIRECTIONS, strict=True):
+            if buffer is not None:
+                light = buffer.scattered(points)
+                result += harmonics(towards)[:, None] * light[:, None, :] * SOLID_ANGLE
+        return result

@@ -1,0 +1,271 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tetrahedra as clouds in the light: what the shadow pass needs to know of each.
+
+Facets and leaves that stand in the light as they are drawn, and where light is sampled on them.
+
+Leaves sit in clusters, and so do the facets that stand for them: half of the light that an even cloud would let
+through to its surfaces does not reach those of a crown. Where sheets are drawn, they and not their tetrahedra shadow.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled.flora import Flora
+from ..proxies.summaries import extinction_matrices, summarise
+from ..refinement.loop import Refinement
+from ..tetrahedra.geometry import barycentric, barycentric_gradients, volume
+from .scattering import albedo
+
+#: How far the key points lie from the centroid towards the vertices. So placed, the mean over the four is that over
+#: the tetrahedron for anything that is quadratic in it (Hammer, Marlowe and Stroud 1956).
+INWARDS = 1.0 / np.sqrt(5.0)
+# Barycentric coordinates of the key points.
+_KEYS = (1.0 - INWARDS) / 4.0 + INWARDS * np.eye(4)
+
+
+@dataclass(frozen=True)
+class Clouds:
+    """Tetrahedra that stand in the light, explicit ones included: n of them, without overlap.
+
+    Attributes
+    ----------
+    vertices : (n, 4, 3) float64
+        Positively oriented, metres.
+    matrices : (n, 6) float64
+        S of κ(ω) = √(ωᵀSω), as `summaries.extinction_matrices` gives it, 1/m².
+    colour : (n, 3) float64
+    transmission : (n,) float64
+        Means of what they hold.
+    normal : (n, 3) float64
+        Axis in which most normals lie.
+    plane : (n,) float64
+        Weight of the plane term, 0 to 1.
+    """
+
+    vertices: NDArray[np.float64]
+    matrices: NDArray[np.float64]
+    colour: NDArray[np.float64]
+    transmission: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    plane: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.vertices)
+
+    @classmethod
+    def of(cls, flora: Flora, refinement: Refinement, even: NDArray[np.bool_] | None = None) -> Clouds:
+        """Everything that the loop left, in the order of ``refinement.nodes``.
+
+        Where ``even`` (n,) is set, a cloud is all that stands for its leaves, and dims what they scatter as their
+        clumps do: what leaves one surface meets another of its clump with the probability p = 1 − effective / whole
+        area, so that of the colour ω there comes ω (1 − p) / (1 − p ω) (Smolander and Stenberg, "Simple
+        parameterizations of the radiation budget of uniform broadleaved and coniferous canopies", 2005).
+        """
+        nodes, contents = refinement.nodes, refinement.contents
+        # Large polygons are walls, not fog: they come as occluders.
+        fine = np.isfinite(contents.polygons.amounts.width)
+        if not fine.all():
+            contents = replace(contents, polygons=contents.polygons.take(fine))
+        summaries = summarise(flora, contents, cell_of_node(refinement), len(nodes))
+        vertices = refinement.tree.vertices(nodes)
+        matrices, normal, plane = extinction_matrices(summaries, volume(vertices))
+        colour = summaries.colour
+        if even is not None:
+            volumes = volume(vertices)
+            again = 1.0 - summaries.effective_area(volumes) / np.where(
+                summaries.optical_area > 0.0, summaries.optical_area, np.inf
+            )
+            again = np.where(even & (summaries.optical_area > 0.0), np.clip(again, 0.0, 1.0), 0.0)[:, None]
+            colour = colour * (1.0 - again) / (1.0 - again * colour)
+        return cls(vertices, matrices, colour, summaries.transmission, normal, plane)
+
+    @cached_property
+    def gradients(self) -> NDArray[np.float64]:
+        """Gradients (n, 4, 3) of the barycentric coordinates, 1/m."""
+        return barycentric_gradients(self.vertices)
+
+    @cached_property
+    def key_points(self) -> NDArray[np.float64]:
+        """Where light is sampled, (n, 4, 3): one point for each vertex."""
+        return np.einsum("kj,njx->nkx", _KEYS, self.vertices)
+
+    @cached_property
+    def albedo(self) -> NDArray[np.float64]:
+        """Share (n, 3) of the light that is scattered again."""
+        return albedo(self.colour, self.transmission)
+
+    def extinction(self, directions: NDArray[np.float64], cells: NDArray | slice = slice(None)) -> NDArray[np.float64]:
+        """κ (m,) of some tetrahedra along unit directions (3,) or (m, 3), 1/m."""
+        matrices = self.matrices[cells]
+        x, y, z = np.moveaxis(np.broadcast_to(directions, (len(matrices), 3)), 1, 0)
+        basis = np.stack([x * x, y * y, z * z, 2 * x * y, 2 * x * z, 2 * y * z], axis=1)
+        return np.sqrt(np.maximum(np.sum(matrices * basis, axis=1), 0.0))
+
+    def own_depth(
+        self, points: NDArray[np.float64], cells: NDArray[np.integer], towards: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Optical depth (m,) between points and where light enters their tetrahedra; 0 where the cell is −1.
+
+        Parameters
+        ----------
+        points : (m, 3) float64
+        cells : (m,) int
+        towards : (3,) or (m, 3) float64
+            Unit vectors to the light.
+        """
+        result = np.zeros(len(points))
+        some = np.flatnonzero(cells >= 0)
+        own = cells[some]
+        towards = np.broadcast_to(towards, (len(points), 3))[some]
+        inside = np.maximum(barycentric(self.vertices[own], points[some]), 0.0)
+        slopes = np.einsum("nkx,nx->nk", self.gradients[own], towards)
+        # Towards the light a coordinate falls by its slope; the cell ends where the first reaches zero.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            lengths = np.where(slopes < 0.0, inside / -slopes, np.inf).min(axis=1)
+        result[some] = np.where(np.isfinite(lengths), lengths, 0.0) * self.extinction(towards, own)
+        return result
+
+    def weights(self, points: NDArray[np.float64], cells: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Weights (m, 4) of the key points' samples for points in tetrahedra: linear between the key points.
+
+        Beyond them the sample of the nearest side stays: nothing is extrapolated.
+        """
+        inside = barycentric(self.vertices[cells], points)
+        inside = np.maximum((inside - (1.0 - INWARDS) / 4.0) / INWARDS, 0.0)
+        return inside / np.maximum(inside.sum(axis=1, keepdims=True), 1e-12)
+
+
+def cell_of_node(refinement: Refinement) -> NDArray[np.int64]:
+    """Number (nodes,) in `Clouds.of` of each node of the tree, −1 where it is none of them."""
+    index = np.full(len(refinement.tree), -1, dtype=np.int64)
+    index[refinement.nodes] = np.arange(len(refinement.nodes))
+    return index
+
+
+#: Sheets of a tetrahedron on which light from all sides is sampled, at most, and of all of them, about.
+SAMPLES, ALL_SAMPLES = 8, 32_000
+# Side of a pixel for one sheet: most sheets then lie in one pixel alone.
+_ROOMY = 1.5
+
+
+@dataclass(frozen=True)
+class Sheets:
+    """Facets, leaves or other small opaque quadrilaterals: m of them, in n tetrahedra.
+
+    Attributes
+    ----------
+    corners : (m, 4, 3) float64
+        Metres; a triangle repeats a corner.
+    cell : (m,) int64
+        Tetrahedron (index into the clouds) of each, none negative; the nearest where it lies in none.
+    replaced : (n,) bool
+        Tetrahedra that throw no shadow themselves, since their sheets do.
+    """
+
+    corners: NDArray[np.float64]
+    cell: NDArray[np.int64]
+    replaced: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.cell)
+
+    @classmethod
+    def none(cls, count: int) -> Sheets:
+        """No sheets among a number of tetrahedra."""
+        return cls(np.zeros((0, 4, 3)), np.zeros(0, np.int64), np.zeros(count, bool))
+
+    @classmethod
+    def of(cls, corners: NDArray[np.float64], cell: NDArray[np.integer], count: int) -> Sheets:
+        """Sheets in place of all tetrahedra that have some; those with a negative ``cell`` belong to the first."""
+        replaced = np.bincount(cell[cell >= 0], minlength=count) > 0
+        return cls(corners, np.maximum(cell, 0).astype(np.int64), replaced)
+
+    def pixels(self, limits: tuple[int, int]) -> int:
+        """Longer side of a buffer that sees all sheets, of which a pixel is somewhat larger than one."""
+        if not len(self):
+            return limits[0]
+        vector = np.cross(self.corners[:, 2] - self.corners[:, 0], self.corners[:, 3] - self.corners[:, 1])
+        side = np.sqrt(np.median(np.linalg.norm(vector, axis=1)) / 2.0)
+        reach = np.ptp(self.corners.reshape(-1, 3), axis=0).max()
+        return int(np.clip(reach / max(_ROOMY * side, 1e-9), *limits))
+
+    def thinned(self, most: int) -> tuple[Sheets, NDArray[np.int64]]:
+        """At most so many sheets, larger as they are fewer, and the number (m,) of each of these among them, or −1."""
+        step = -(-len(self) // most)
+        if step <= 1:
+            return self, np.arange(len(self))
+        # Evenly among those of each tetrahedron, whatever their order means.
+        order = np.argsort(self.cell, kind="stable")[step // 2 :: step]
+        number = np.full(len(self), -1)
+        number[order] = np.arange(len(order))
+        corners = self.corners[order]
+        middle = corners.mean(axis=1, keepdims=True)
+        grown = middle + (corners - middle) * np.sqrt(len(self) / len(order))
+        return Sheets(grown, self.cell[order], self.replaced), number
+
+    def samples(self, clouds: Clouds) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], KeyMeans]:
+        """Where light from all sides is sampled.
+
+        Returns
+        -------
+        points : (k, 3) float64
+            The key points of each tetrahedron without sheets, and the middles of some sheets of each other one.
+        cells, sheets : (k,) int64
+            As for `Illumination.direct`.
+        keys : KeyMeans
+            Which key point each counts for.
+        """
+        key = np.arange(4 * len(clouds))
+        key = key[~self.replaced[key // 4]]
+        order = np.argsort(self.cell, kind="stable")
+        cell = self.cell[order]
+        counts = np.bincount(cell, minlength=len(clouds))
+        place = np.arange(len(cell)) - (np.cumsum(counts) - counts)[cell]
+        # Evenly among those of a tetrahedron, whatever their order means.
+        most = int(np.clip(ALL_SAMPLES // max(len(clouds), 1), 1, SAMPLES))
+        step = np.maximum(-(-counts[cell] // most), 1)
+        chosen = order[(place % step == 0) & self.replaced[cell]]
+        middle = self.corners[chosen].mean(axis=1)
+        nearest = np.argmax(clouds.weights(middle, self.cell[chosen]), axis=1)
+        points = np.concatenate([clouds.key_points.reshape(-1, 3)[key], middle])
+        cells = np.concatenate([key // 4, self.cell[chosen]])
+        sheets = np.concatenate([np.full(len(key), -1), chosen])
+        return points, cells, sheets, KeyMeans(np.concatenate([key, 4 * self.cell[chosen] + nearest]), len(clouds))
+
+
+class KeyMeans:
+    """Means of samples over what counts for each of the 4 n key points.
+
+    Parameters
+    ----------
+    key : (k,) int64
+        Key point of each sample.
+    count : int
+        Number n of tetrahedra.
+    """
+
+    def __init__(self, key: NDArray[np.int64], count: int) -> None:
+        self._key, self._count = key, count
+        self._number = np.bincount(key, minlength=4 * count).reshape(count, 4)
+
+    def means(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Means (4 n, ...) of values (k, ...); a key point without samples has its tetrahedron's mean."""
+        flat = values.reshape(len(values), -1)
+        sums = np.stack([np.bincount(self._key, column, 4 * self._count) for column in flat.T], axis=1)
+        sums, number = sums.reshape(self._count, 4, -1), self._number[..., None]
+        every = sums.sum(axis=1, keepdims=True) / np.maximum(number.sum(axis=1, keepdims=True), 1)
+        result = np.where(number > 0, sums / np.maximum(number, 1), every)
+        return result.reshape(4 * self._count, *values.shape[1:])
+
+    def by_cell(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Means (n, ...) over the samples of each tetrahedron, from those (4 n, ...) of its key points."""
+        values = values.reshape(self._count, 4, *values.shape[1:])
+        weight = np.where(self._number.any(axis=1, keepdims=True), self._number, 1)
+        weight = weight.reshape(self._count, 4, *(1,) * (values.ndim - 2))
+        return (values * weight).sum(axis=1) / weight.sum(axis=1)

@@ -1,0 +1,242 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Directions from which the sky is looked at, and light from all sides as few numbers: spherical harmonics.
+
+Irradiance changes so slowly with the normal that nine numbers a colour hold it within a few percent (Ramamoorthi and
+Hanrahan, "An Efficient Representation for Irradiance Environment Maps", 2001).
+
+What leaves, bark and clouds of them send to the eye of the light that arrives (paper, section 7).
+
+A facet is a sheet that scatters as the material of proxies does: evenly over the side of the light or, for the share
+of its transmission, over the other side, with a little gloss. A cloud is the paper's blend of a particle term and a
+plane term, in the forms of `docs/architecture.md`. All radiances are such that light of radiance 1 from all sides gives
+what is white a radiance of 1.
+"""
+
+from __future__ import annotations
+
+from itertools import permutations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Numbers of harmonics up to the second band, and the band of each.
+HARMONICS = 9
+BAND = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2])
+#: What the cosine lobe max(0, n·l) leaves of each band (Ramamoorthi and Hanrahan 2001, equation 8).
+_COSINE = np.array([np.pi, 2.0 * np.pi / 3.0, np.pi / 4.0])[BAND]
+# McLaren's improved snub cube (Hardin and Sloane, "McLaren's Improved Snub Cube and Other New Spherical Designs in
+# Three Dimensions", 1996): means over its 24 points are exact for polynomials up to degree 7.
+_SNUB = (0.8662468181078206, 0.4225186537611115, 0.2666354015167047)
+
+
+def _directions() -> NDArray[np.float64]:
+    points = []
+    for order in permutations(range(3)):
+        odd = sum(order[i] > order[j] for i, j in ((0, 1), (0, 2), (1, 2))) % 2
+        points += [
+            [sign[i] * _SNUB[order[i]] for i in range(3)]
+            for sign in product((1.0, -1.0), repeat=3)
+            if sign.count(1.0) % 2 == odd
+        ]
+    return np.array(points)
+
+
+#: Unit vectors (24, 3) towards the sky, each of the same solid angle.
+DIRECTIONS = _directions()
+#: Solid angle of each, steradians.
+SOLID_ANGLE = 4.0 * np.pi / len(DIRECTIONS)
+
+
+def harmonics(directions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Real spherical harmonics up to the second band (..., 9) of unit vectors (..., 3)."""
+    x, y, z = np.moveaxis(np.asarray(directions, np.float64), -1, 0)
+    return np.stack(
+        [
+            np.full_like(x, 0.28209479177387814),
+            0.4886025119029199 * y,
+            0.4886025119029199 * z,
+            0.4886025119029199 * x,
+            1.0925484305920792 * x * y,
+            1.0925484305920792 * y * z,
+            0.31539156525252005 * (3.0 * z * z - 1.0),
+            1.0925484305920792 * x * z,
+            0.5462742152960396 * (x * x - y * y),
+        ],
+        axis=-1,
+    )
+
+
+def irradiance(light: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Irradiance of surfaces in light from all sides.
+
+    Parameters
+    ----------
+    light : (..., 9, 3) float
+        Radiance by harmonic and colour.
+    normals : (..., 3) float64
+        Unit vectors.
+
+    Returns
+    -------
+    (..., 3) float64
+        W/m², not below 0.
+    """
+    return np.maximum(np.einsum("...k,...kc->...c", harmonics(normals) * _COSINE, light), 0.0)
+
+
+def fluence(light: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Light that passes through a point (..., 3), W/m²: the integral of the radiance over all directions."""
+    return light[..., 0, :] * np.sqrt(4.0 * np.pi)
+
+
+def nearest_direction(directions: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Index (m,) of the direction among `DIRECTIONS` that is nearest to unit vectors (m, 3)."""
+    return np.argmax(directions @ DIRECTIONS.T, axis=1)
+
+
+#: Light that has passed through a leaf lost more of its blue than light that was reflected: chlorophyll and carotenoids
+#: absorb on the whole way. Products over 1 are cut off.
+THROUGH_TINT = np.array([1.15, 1.1, 0.55])
+#: Share of the waxy surface's own, colourless reflection (4 % at a refractive index of 1.5), and its roughness.
+GLOSS, GLOSS_ROUGHNESS = 0.04, 0.6
+
+
+def scattered_shares(
+    colour: NDArray[np.float64], transmission: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Shares of light that sheets reflect (n, 3) and let through (n, 3) diffusely, and that they mirror (n,)."""
+    through = transmission[:, None]
+    gloss = np.where(transmission > 0.0, GLOSS, 0.0)
+    rest = (1.0 - gloss)[:, None]
+    return rest * (1.0 - through) * colour, rest * through * np.minimum(colour * THROUGH_TINT, 1.0), gloss
+
+
+def albedo(colour: NDArray[np.float64], transmission: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Share (n, 3) of light that sheets scatter in any way."""
+    reflected, through, gloss = scattered_shares(colour, transmission)
+    return reflected + through + gloss[:, None]
+
+
+def sphere_phase(cosine: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Phase function 1/sr of a white Lambert sphere by the cosine of the angle α between light and eye, ∫ p = 1.
+
+    p = 2 (sin α + (π − α) cos α) / (3π²). Leaves that face all ways and reflect scatter alike; those that let light
+    through do so with π − α (Ross, "The radiation regime and architecture of plant stands", 1981).
+    """
+    cosine = np.clip(cosine, -1.0, 1.0)
+    alpha = np.arccos(cosine)
+    return 2.0 / (3.0 * np.pi**2) * (np.sin(alpha) + (np.pi - alpha) * cosine)
+
+
+def _bands() -> NDArray[np.float64]:
+    """2π ∫ p(x) Pₗ(x) dx for l = 0, 1, 2: what the phase function leaves of each band of harmonics."""
+    x, weight = np.polynomial.legendre.leggauss(64)
+    return np.array([2.0 * np.pi * (weight * sphere_phase(x) * p).sum() for p in (1.0, x, (3.0 * x * x - 1.0) / 2.0)])
+
+
+_PHASE_BANDS = _bands()
+
+
+def facet_direct(
+    normal: NDArray[np.float64],
+    shares: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    towards: NDArray[np.float64],
+    arriving: NDArray[np.float64],
+    view: NDArray[np.float64] | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Radiance of the front and the back of facets by one light.
+
+    Parameters
+    ----------
+    normal : (n, 3) float64
+        Unit normals; the front is where they point.
+    shares : tuple
+        Of `scattered_shares`.
+    towards, arriving : (n, 3) float64
+        Unit vectors to the light; W/m² on a surface that faces it.
+    view : (n, 3) float64, optional
+        Unit vectors to the eye, for the gloss; without, it is spread as evenly as what is scattered.
+
+    Returns
+    -------
+    front, back : (n, 3) float64
+    """
+    reflected, through, gloss = shares
+    cosine = np.sum(normal * towards, axis=1)
+    same = reflected * arriving / np.pi * np.abs(cosine)[:, None]
+    other = through * arriving / np.pi * np.abs(cosine)[:, None]
+    lobe = np.abs(cosine) / np.pi if view is None else _mirrored(normal, towards, view)
+    same = same + (gloss * lobe)[:, None] * arriving
+    lit = (cosine > 0.0)[:, None]
+    return np.where(lit, same, other), np.where(lit, other, same)
+
+
+def facet_ambient(
+    normal: NDArray[np.float64],
+    shares: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    light: NDArray[np.float64],
+    view: NDArray[np.float64] | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Radiance of the front and the back of facets (n, 3 each) by light from all sides, as harmonics (n, 9, 3)."""
+    reflected, through, gloss = shares
+    front, back = irradiance(light, normal) / np.pi, irradiance(light, -normal) / np.pi
+    if view is None:
+        mirrored = front, back
+    else:
+        # So broad a lobe is about as wide as a cosine's.
+        across = np.sum(normal * view, axis=1, keepdims=True)
+        seen = irradiance(light, 2.0 * across * normal - view) / np.pi
+        mirrored = seen, seen
+    gloss = gloss[:, None]
+    return (
+        reflected * front + through * back + gloss * mirrored[0],
+        reflected * back + through * front + gloss * mirrored[1],
+    )
+
+
+def _mirrored(
+    normal: NDArray[np.float64], towards: NDArray[np.float64], view: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """BRDF times cosine (n,) of a rough mirror on the side of the light (GGX; Walter et al. 2007), Fresnel 1."""
+    light, eye = np.sum(normal * towards, axis=1), np.sum(normal * view, axis=1)
+    half = towards + view
+    half = half / np.maximum(np.linalg.norm(half, axis=1, keepdims=True), 1e-9)
+    alpha = GLOSS_ROUGHNESS**4
+    spread = np.sum(normal * half, axis=1) ** 2 * (alpha - 1.0) + 1.0
+    density = alpha / (np.pi * spread * spread)
+    inwards, outwards = np.abs(light), np.abs(eye)
+    masking = inwards * np.sqrt(alpha + (1.0 - alpha) * eye * eye) + outwards * np.sqrt(
+        alpha + (1.0 - alpha) * light * light
+    )
+    # Light and eye on different sides see nothing of it.
+    return np.where(light * eye > 0.0, density * inwards / (2.0 * np.maximum(masking, 1e-9)), 0.0)
+
+
+def particle_direct(
+    shares: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    towards: NDArray[np.float64],
+    arriving: NDArray[np.float64],
+    view: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Radiance (n, 3) of a thick cloud of sheets that face all ways, by one light; the gloss goes all ways as well."""
+    reflected, through, gloss = shares
+    cosine = np.sum(towards * view, axis=1)
+    phase = reflected * sphere_phase(cosine)[:, None] + through * sphere_phase(-cosine)[:, None]
+    return (phase + gloss[:, None] / (4.0 * np.pi)) * arriving
+
+
+def particle_ambient(
+    shares: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    light: NDArray[np.float64],
+    view: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Radiance (n, 3) of such a cloud by light from all sides, as harmonics (n, 9, 3)."""
+    reflected, through, gloss = shares
+    basis = harmonics(view)
+    result = np.zeros_like(reflected)
+    for band in range(3):
+        own = np.einsum("nk,nkc->nc", basis[:, band == BAND], light[:, band == BAND])
+        mirrored = gloss[:, None] if band == 0 else 0.0
+        result += (_PHASE_BANDS[band] * (reflected + (-1) ** band * through) + mirrored) * own
+    return np.maximum(result, 0.0)

@@ -1,0 +1,218 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light as it would arrive with nothing in its way: from lamps to points, and from the sky by direction.
+
+Which views a light takes of the scene, and the buffers that it sees it in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..camera.camera import Camera
+from ..refinement.lights import Light, lamp_views, light_views
+from .buffers import LightBuffer
+from .receivers import Clouds, Sheets
+from .scattering import DIRECTIONS, HARMONICS, harmonics, nearest_direction
+
+#: Points on an area light along the longer and the shorter of its sides.
+AREA_POINTS = 3
+#: Points (evenly spread) by which the sky is read.
+SKY_POINTS = 1 << 14
+#: Share of a spot's cosine range over which it fades at least, as in Cycles: none has an edge without width.
+_LEAST_BLEND = 1e-3
+
+
+def split_areas(lights: tuple[Light, ...]) -> list[Light]:
+    """Lights with each area as a few points of it, the same every time; colours add up."""
+    made: list[Light] = []
+    for light in lights:
+        if light.kind != "AREA":
+            made.append(light)
+            continue
+        across, along = _disk_points() if light.ellipse else _grid_points(light.span)
+        for x, y in zip(across, along, strict=True):
+            position = light.position + x * light.span[0] + y * light.span[1]
+            made.append(replace(light, position=position, colour=light.colour / len(across)))
+    return made
+
+
+def _grid_points(span: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Middles of equal parts of a rectangle, in half edges from its middle."""
+    length = np.linalg.norm(span, axis=1)
+    counts = np.clip(np.ceil(AREA_POINTS * length / max(length.max(), 1e-12)), 1, AREA_POINTS).astype(int)
+    x, y = ((2 * np.arange(n) + 1) / n - 1.0 for n in counts)
+    return np.repeat(x, len(y)), np.tile(y, len(x))
+
+
+def _disk_points() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points that stand for equal parts of a disk (Vogel, "A better way to construct the sunflower head", 1979)."""
+    index = np.arange(AREA_POINTS**2) + 0.5
+    radius, turn = np.sqrt(index / len(index)), np.pi * (3.0 - np.sqrt(5.0)) * index
+    return radius * np.cos(turn), radius * np.sin(turn)
+
+
+def arriving(light: Light, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Light at points with nothing in between.
+
+    Parameters
+    ----------
+    light : Light
+        An area counts as the single point in its middle, see `split_areas`.
+    points : (m, 3) float64
+        Metres.
+
+    Returns
+    -------
+    towards : (m, 3) float64
+        Unit vectors to the light.
+    irradiance : (m, 3) float64
+        W/m² on a surface that faces the light, linear RGB.
+    """
+    if light.kind == "SUN":
+        return np.tile(-light.direction, (len(points), 1)), np.tile(light.colour, (len(points), 1))
+    away = light.position - points
+    distance = np.linalg.norm(away, axis=1)
+    # No nearer than the lamp's own surface.
+    distance = np.maximum(distance, max(light.width / 2.0 if light.kind != "AREA" else 0.0, 1e-6))
+    towards = away / distance[:, None]
+    ahead = -(towards @ light.direction)
+    falloff = 1.0 / distance**2
+    if light.kind == "AREA":
+        falloff = falloff * np.maximum(ahead, 0.0)
+    elif light.kind == "SPOT":
+        edge = np.cos(light.angle)
+        share = np.clip((ahead - edge) / max((1.0 - edge) * light.blend, _LEAST_BLEND), 0.0, 1.0)
+        falloff = falloff * share * share * (3.0 - 2.0 * share)
+    return towards, falloff[:, None] * light.colour
+
+
+@dataclass(frozen=True)
+class World:
+    """The sky, cut into what is nearest to each of `DIRECTIONS`.
+
+    Attributes
+    ----------
+    parts : (24, 9, 3) float64
+        Radiance of each part by harmonic and colour: their sum is the whole sky's, and a part that is hidden is left
+        out of it.
+    """
+
+    parts: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, radiance: Callable[[NDArray[np.float64]], ArrayLike]) -> World:
+        """A sky whose radiance (m, 3) in unit directions (m, 3) is known."""
+        index = np.arange(SKY_POINTS) + 0.5
+        z, turn = 1.0 - 2.0 * index / SKY_POINTS, np.pi * (3.0 - np.sqrt(5.0)) * index
+        level = np.sqrt(1.0 - z * z)
+        towards = np.stack([level * np.cos(turn), level * np.sin(turn), z], axis=1)
+        seen = np.broadcast_to(np.asarray(radiance(towards), np.float64), (SKY_POINTS, 3)) * (4.0 * np.pi / SKY_POINTS)
+        part, basis = nearest_direction(towards), harmonics(towards)
+        parts = np.zeros((len(DIRECTIONS), HARMONICS, 3))
+        for k in range(HARMONICS):
+            for channel in range(3):
+                parts[:, k, channel] = np.bincount(part, basis[:, k] * seen[:, channel], len(DIRECTIONS))
+        return cls(parts)
+
+    @classmethod
+    def plain(cls, colour: ArrayLike) -> World:
+        """A sky of the same radiance (3,) everywhere."""
+        return cls.of(lambda towards: np.asarray(colour, np.float64))
+
+    @property
+    def dark(self) -> bool:
+        """Whether no light comes from it."""
+        return not self.parts[:, 0].any()
+
+
+#: Limits of the longer side of a lamp's buffer, pixels.
+LAMP_PIXELS = (64, 2048)
+
+
+@dataclass(frozen=True)
+class Near:
+    """Where light counts most: around the eye.
+
+    Attributes
+    ----------
+    eye : (3,) float64
+        Metres.
+    radii : tuple of float
+        Of what suns see in views of their own, metres, the smallest first.
+    """
+
+    eye: NDArray[np.float64]
+    radii: tuple[float, ...] = ()
+
+
+def light_resolution(camera: Camera) -> int:
+    """Longer side in pixels of a lamp's buffer: that of the picture (paper: "of proportional size")."""
+    return int(np.clip(max(camera.width, camera.height), *LAMP_PIXELS))
+
+
+def to_eye(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit vectors (m, 3) from points to the camera."""
+    if camera.kind == "ORTHO":
+        return np.tile(camera.frame[:, 2], (len(points), 1))
+    away = camera.eye - points
+    return away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
+
+
+def buffers_of(
+    light: Light,
+    clouds: Clouds,
+    sheets: Sheets,
+    occluders: NDArray[np.float64] | None,
+    resolution: int,
+    near: Near | None = None,
+) -> list[LightBuffer]:
+    """Buffers in which a light sees tetrahedra, sheets and polygons: one, six all around, or none without any.
+
+    A sun has further ones before it for what is ``near``, in which the same pixels are smaller.
+    """
+    views = _views(light, clouds, occluders, resolution) if len(clouds) else []
+    if light.kind == "SUN" and near is not None:
+        views = [closer for view in views for closer in _closer(view, near)] + views
+    return [_buffer(view, light, clouds, sheets, occluders, resolution) for view in views]
+
+
+def _views(light: Light, clouds: Clouds, occluders: NDArray[np.float64] | None, resolution: int) -> list[Camera]:
+    corners = clouds.vertices.reshape(-1, 3)
+    if light.kind != "SUN":
+        return lamp_views(light.position, corners, resolution)
+    # Where occluders are decides how far the view reaches, not how wide it is.
+    every = corners if occluders is None or not len(occluders) else np.concatenate([corners, occluders.reshape(-1, 3)])
+    return light_views(light, clouds.vertices, every, resolution)
+
+
+def _closer(view: Camera, near: Near) -> list[Camera]:
+    """Parts of a sun's view."""
+    left, right, bottom, top = view.window
+    made = []
+    x, y = (near.eye @ view.frame)[:2]
+    for radius in near.radii:
+        window = max(left, x - radius), min(right, x + radius), max(bottom, y - radius), min(top, y + radius)
+        width, height = window[1] - window[0], window[3] - window[2]
+        if min(width, height) > 0.0 and max(width, height) < 0.7 * max(right - left, top - bottom):
+            scale = 4096 / max(width, height)
+            shape = {"width": max(round(width * scale), 1), "height": max(round(height * scale), 1)}
+            made.append(replace(view, window=window, **shape))
+    return made
+
+
+def _buffer(
+    view: Camera,
+    light: Light,
+    clouds: Clouds,
+    sheets: Sheets,
+    occluders: NDArray[np.float64] | None,
+    resolution: int,
+) -> LightBuffer:
+    along = light.direction if light.kind == "SUN" else -to_eye(view, clouds.vertices.mean(axis=1))
+    extinction = np.where(sheets.replaced, 0.0, clouds.extinction(along))
+    return LightBuffer(view, resolution, clouds.vertices, extinction, occluders, sheets.corners)

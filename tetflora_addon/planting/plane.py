@@ -1,0 +1,308 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Areas and lines on the map: which points lie inside of closed curves, and how near they are to lines.
+
+Which points lie near others, and how to keep points apart: grids whose cells are as large as the distance.
+
+Clumps: noise on the map from hashes of a lattice, so that a seed means the same clumps everywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..growth.hashing import child_key, uniform
+
+_SLABS = 4096  # at most, into which a polygon is cut
+_CELLS = 4_000_000  # at most, of the grid of a set of lines
+_ENTRIES = 3_000_000  # about as many pieces of lines are noted in the cells
+
+
+def inside_any(points: NDArray[np.float64], polygons: Sequence[NDArray[np.float64]]) -> NDArray[np.bool_]:
+    """Which points lie in at least one polygon.
+
+    Parameters
+    ----------
+    points : (n, 2) float64
+    polygons : sequence of (k, 2) float64
+        Closed; the last corner is followed by the first. Where one crosses itself, what is wound twice is outside.
+
+    Returns
+    -------
+    (n,) bool
+    """
+    inside = np.zeros(len(points), bool)
+    for polygon in polygons:
+        low, high = polygon.min(axis=0), polygon.max(axis=0)
+        asked = np.flatnonzero(~inside & ((points >= low) & (points <= high)).all(axis=1))
+        if len(asked):
+            inside[asked] = _inside(points[asked], polygon)
+    return inside
+
+
+def _inside(points: NDArray[np.float64], polygon: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether a line to the east crosses the border an odd number of times; only edges of the own slab are asked."""
+    start, end = polygon, np.roll(polygon, -1, axis=0)
+    low, high = np.minimum(start[:, 1], end[:, 1]), np.maximum(start[:, 1], end[:, 1])
+    slabs, base = min(len(polygon), _SLABS), low.min()
+    height = max((high.max() - base) / slabs, np.finfo(np.float64).tiny)
+
+    def slab(y: NDArray[np.float64]) -> NDArray[np.int64]:
+        return np.clip((y - base) / height, 0, slabs - 1).astype(np.int64)
+
+    first = slab(low)
+    edge, offset = _repeated(slab(high) - first + 1)
+    order = np.argsort(first[edge] + offset, kind="stable")
+    begins = np.searchsorted((first[edge] + offset)[order], np.arange(slabs + 1))
+    edge = edge[order]
+    odd = np.zeros(len(points), bool)
+    place, stop = begins[slab(points[:, 1])], begins[slab(points[:, 1]) + 1]
+    asking = np.flatnonzero(place < stop)
+    while len(asking):  # as often as the fullest slab has edges
+        e, x, y = edge[place[asking]], points[asking, 0], points[asking, 1]
+        spans = (start[e, 1] <= y) != (end[e, 1] <= y)
+        rise = np.where(spans, end[e, 1] - start[e, 1], 1.0)
+        odd[asking] ^= spans & (x < start[e, 0] + (y - start[e, 1]) * (end[e, 0] - start[e, 0]) / rise)
+        place[asking] += 1
+        asking = asking[place[asking] < stop[asking]]
+    return odd
+
+
+class Lines:
+    """Straight pieces on the map, noted in the cells of a grid within their reach.
+
+    A cell keeps only pieces that can be the nearest of any point in it, so that a long border costs no more than a
+    short one.
+    """
+
+    def __init__(self, start: NDArray[np.float64], end: NDArray[np.float64], reach: NDArray[np.float64]) -> None:
+        """Pieces from ``start`` to ``end``, (e, 2) each, and how far from them it matters, (e,) above 0; metres."""
+        low = (np.minimum(start, end) - reach[:, None]).min(axis=0)
+        span = (np.maximum(start, end) + reach[:, None]).max(axis=0) - low
+        cell = max(reach.max() / 4.0, np.sqrt(span.prod() / _CELLS), span.max() / _CELLS)
+        start, end, reach = _cut(start, end, reach, 2.0 * max(reach.max(), cell))
+        reached = np.abs(end - start) + 2.0 * reach[:, None]
+        while cell < span.max() and (reached / cell + 1.0).prod(axis=1).sum() > _ENTRIES:
+            cell *= 1.5
+        self.start, self.along, self.reach = start, end - start, reach
+        self.low, self.cell = low, cell
+        self.columns, self.rows = (np.floor(span / cell).astype(np.int64) + 1).tolist()
+        first = self._column_row(np.minimum(start, end) - reach[:, None])
+        last = self._column_row(np.maximum(start, end) + reach[:, None])
+        wide = last - first + 1
+        piece, offset = _repeated(wide.prod(axis=1))
+        place = first[piece] + np.stack([offset % wide[piece, 0], offset // wide[piece, 0]], axis=1)
+        number = place[:, 1] * self.columns + place[:, 0]
+        # What is farther from a cell's middle than another's farthest place from it is nowhere in the cell the nearest.
+        gap = self._gap(low + (place + 0.5) * cell, piece)
+        half = cell * np.sqrt(0.5)
+        surely = np.full(self.columns * self.rows, np.inf)
+        np.minimum.at(surely, number, (gap + half) / reach[piece])
+        useful = gap - half <= np.minimum(surely[number], 1.0) * reach[piece]
+        order = np.argsort(number[useful], kind="stable")
+        self.piece = piece[useful][order]
+        self.begins = np.searchsorted(number[useful][order], np.arange(self.columns * self.rows + 1))
+
+    def nearness(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Least ratio of distance to reach over all pieces, (n,) between 0 and 1; 1 where nothing is within reach."""
+        ratio = np.ones(len(points))
+        place = np.floor((points - self.low) / self.cell)
+        within = np.flatnonzero(((place >= 0) & (place < (self.columns, self.rows))).all(axis=1))
+        column, row = place[within].astype(np.int64).T
+        at, stop = self.begins[row * self.columns + column], self.begins[row * self.columns + column + 1]
+        while len(within):  # as often as the fullest cell has pieces
+            open_ = at < stop
+            within, at, stop = within[open_], at[open_], stop[open_]
+            piece = self.piece[at]
+            ratio[within] = np.minimum(ratio[within], self._gap(points[within], piece) / self.reach[piece])
+            at = at + 1
+        return ratio
+
+    def _column_row(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
+        place = np.floor((points - self.low) / self.cell).astype(np.int64)
+        return np.clip(place, 0, (self.columns - 1, self.rows - 1))
+
+    def _gap(self, points: NDArray[np.float64], piece: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Distance of each point from its piece, metres."""
+        start, along = self.start[piece], self.along[piece]
+        length = np.maximum((along * along).sum(axis=1), np.finfo(np.float64).tiny)
+        share = np.clip(((points - start) * along).sum(axis=1) / length, 0.0, 1.0)
+        rest = points - start - share[:, None] * along
+        return np.hypot(rest[:, 0], rest[:, 1])
+
+
+def _cut(
+    start: NDArray[np.float64], end: NDArray[np.float64], reach: NDArray[np.float64], longest: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Pieces of at most the given length in the place of long ones."""
+    parts = np.ceil(np.linalg.norm(end - start, axis=1) / longest).astype(np.int64).clip(min=1)
+    piece, offset = _repeated(parts)
+    step = ((end - start) / parts[:, None])[piece]
+    begin = start[piece] + offset[:, None] * step
+    return begin, begin + step, reach[piece]
+
+
+def _repeated(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Each index as often as its count says, and which time it is, from 0."""
+    index = np.repeat(np.arange(len(counts)), counts)
+    return index, np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts, counts)
+
+
+NO_DISTANCE = 1e-4  # metres; less is none, and its cells could not be counted
+
+# Points that are too close lie at most two cells apart. The own cell comes first: whoever is there is near.
+_NEAR = sorted(
+    ((i, j) for i in range(-2, 3) for j in range(-2, 3) if abs(i) + abs(j) < 4), key=lambda s: s[0] ** 2 + s[1] ** 2
+)
+
+
+class Neighbours:
+    """Points on the map, (m, 2), that others are asked to keep near or far."""
+
+    def __init__(self, points: NDArray[np.float64], distance: float) -> None:
+        """Sort the points by cell; the distance is at least `NO_DISTANCE`, metres."""
+        self.distance = distance
+        self.cell = distance / np.sqrt(2.0)
+        cells = _cells(points, self.cell)
+        order = np.argsort(cells)
+        self.points, cells = points[order], cells[order]
+        first = np.flatnonzero(np.diff(cells, prepend=cells[:1] - 1))
+        self.cells, self.first = cells[first], np.append(first, len(points))
+
+    def near(self, points: NDArray[np.float64], least: int = 1) -> NDArray[np.bool_]:
+        """Which points, (n, 2), are closer than the distance to at least so many of the others, (n,)."""
+        if not len(self.points) or not len(points):
+            return np.zeros(len(points), bool)
+        met_so_far = np.zeros(len(points), np.int64)
+        far = np.arange(len(points))
+        for step in _NEAR:
+            wanted = _cells(points[far], self.cell, step)
+            place = np.minimum(np.searchsorted(self.cells, wanted), len(self.cells) - 1)
+            met = np.flatnonzero(self.cells[place] == wanted)
+            asking, place, end = far[met], self.first[place[met]], self.first[place[met] + 1]
+            while len(asking):  # as often as the fullest cell holds points
+                gap = points[asking] - self.points[place]
+                met_so_far[asking] += gap[:, 0] ** 2 + gap[:, 1] ** 2 < self.distance**2
+                place = place + 1
+                more = (place < end) & (met_so_far[asking] < least)
+                asking, place, end = asking[more], place[more], end[more]
+            far = far[met_so_far[far] < least]
+        return met_so_far >= least
+
+
+class Spacing:
+    """Keeps points apart with a grid whose cells hold one point at most.
+
+    Cells are as large as the distance is on their diagonal, so two points of a cell are always too close, and points
+    that are too close lie at most two cells apart.
+
+    Attributes
+    ----------
+    distance : float
+        Metres.
+    points : (m, 2) float64
+        Those that stand; they may crowd cells.
+    """
+
+    def __init__(self, distance: float, occupied: NDArray[np.float64]) -> None:
+        self.distance = distance
+        self.cell = distance / np.sqrt(2.0)
+        self.points = occupied
+
+    @property
+    def free(self) -> bool:
+        """Whether there is no distance to keep."""
+        return self.distance < NO_DISTANCE
+
+    def admit(self, candidates: NDArray[np.float64], most: int) -> NDArray[np.int64]:
+        """Indices of candidates, (k,) and at most ``most``, that keep their distance; earlier ones go first."""
+        if self.free:
+            return np.arange(min(most, len(candidates)))
+        undecided = np.flatnonzero(~Neighbours(self.points, self.distance).near(candidates))
+        chosen = []
+        while len(undecided):
+            # One speaker a cell, the earliest; those with no earlier speaker nearby are in.
+            _, first = np.unique(_cells(candidates[undecided], self.cell), return_index=True)
+            speakers = np.sort(undecided[first])
+            winners = speakers[~self._outranked(candidates[speakers])]
+            chosen.append(winners)
+            undecided = undecided[~Neighbours(candidates[winners], self.distance).near(candidates[undecided])]
+        kept = np.sort(np.concatenate(chosen))[:most] if chosen else np.zeros(0, np.int64)
+        self.points = np.concatenate([self.points, candidates[kept]])
+        return kept
+
+    def _outranked(self, speakers: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which speakers, one a cell and in order of rank, have an earlier one too close."""
+        outranked = np.zeros(len(speakers), bool)
+        own = _cells(speakers, self.cell)
+        order = np.argsort(own)
+        cells = own[order]
+        for step in _NEAR:
+            wanted = _cells(speakers, self.cell, step)
+            place = np.minimum(np.searchsorted(cells, wanted), len(cells) - 1)
+            other = order[place]
+            met = np.flatnonzero((cells[place] == wanted) & (other < np.arange(len(speakers))))
+            gap = speakers[met] - speakers[other[met]]
+            outranked[met] |= gap[:, 0] ** 2 + gap[:, 1] ** 2 < self.distance**2
+        return outranked
+
+
+def _cells(points: NDArray[np.float64], cell: float, step: tuple[int, int] = (0, 0)) -> NDArray[np.int64]:
+    place = np.floor(points / cell).astype(np.int64) + np.array(step)
+    return place[:, 0] * np.int64(2**32) + place[:, 1]
+
+
+# The lattice's cell for a metre from clump to clump: peaks of the noise are counted in the tests.
+CELL = 0.73
+_OCTAVES = ((1.0, 1.0), (2.17, 0.35))  # frequency and weight; not a multiple, or lattices would coincide
+_BARE, _FULL = -0.1, 0.25  # values of the noise below which nothing grows, and above which all does
+
+
+def gradient_noise(points: NDArray[np.float64], key: NDArray[np.uint64]) -> NDArray[np.float64]:
+    """Smooth noise with mean 0 between -1 and 1 (K. Perlin, "Improving noise", SIGGRAPH 2002, in two dimensions).
+
+    Parameters
+    ----------
+    points : (n, 2) float64
+        In cells of the lattice.
+    key : uint64
+        Of the whole lattice.
+    """
+    corner = np.floor(points)
+    part = points - corner
+    corner = corner.astype(np.int64)
+    sides = []
+    for i in (0, 1):
+        ends = []
+        for j in (0, 1):
+            name = (corner[:, 0] + i) * np.int64(2**32) + corner[:, 1] + j
+            turn = 2.0 * np.pi * uniform(child_key(key, name.view(np.uint64)), 0)
+            ends.append(np.cos(turn) * (part[:, 0] - i) + np.sin(turn) * (part[:, 1] - j))
+        sides.append(ends)
+    fade = part**3 * (part * (part * 6.0 - 15.0) + 10.0)
+    along = [low + fade[:, 1] * (high - low) for low, high in sides]
+    # A gradient of length 1 gives at most √½.
+    return np.sqrt(2.0) * (along[0] + fade[:, 0] * (along[1] - along[0]))
+
+
+def clumps(points: NDArray[np.float64], size: float, clumping: float, key: NDArray[np.uint64]) -> NDArray[np.float64]:
+    """How suitable places are, 0 to 1, for plants that grow in clumps, (n,).
+
+    Parameters
+    ----------
+    points : (n, 2) float64
+        Places on the map, metres.
+    size : float
+        Metres from clump to clump, on average.
+    clumping : float
+        0: suitable everywhere; 1: nothing between the clumps.
+    key : uint64
+    """
+    value = np.zeros(len(points))
+    for octave, (frequency, weight) in enumerate(_OCTAVES):
+        value += weight * gradient_noise(points * (frequency / (CELL * size)), child_key(key, octave))
+    share = np.clip((value - _BARE) / (_FULL - _BARE), 0.0, 1.0)
+    return 1.0 - clumping + clumping * share * share * (3.0 - 2.0 * share)

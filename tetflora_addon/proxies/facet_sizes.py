@@ -1,0 +1,182 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How large the facets are that stand for sub-plants, pieces and polygons, and how many that will make.
+
+Less than a pixel is wide there; three times that where nobody looks, and there one stands for several leaves, for
+hidden plants only cast shadows and light up others. They grow further the deeper it is hidden, and the farther it is
+from the view: a forest has far more of it than anybody sees.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera.camera import Camera
+from ..compiled.flora import Flora
+from ..refinement.contents import Amounts, Contents, bounding_cylinders
+from ..refinement.decisions import Decision
+from ..refinement.loop import Refinement
+
+#: How much larger facets of hidden tetrahedra are: at an optical depth in front of them that hides them, and at most,
+#: in proportion to the depth; but no more pixels wide than this for the depth's sake. Some of what is deeply hidden can
+#: be seen between crowns after all, and where a budget makes facets large it would be blots.
+COARSE, COARSEST = 3.0, 9.0
+_WIDEST = 3.0
+_HIDING_DEPTH = 4.0  # e^−4 = .02 is left
+#: Side of facets per metre from the view: the sun is .0093 radians wide, so their shadows are half as soft as large.
+_SOFT = 0.02
+#: Facets that a sub-plant keeps, about, however far it is from the view.
+_FEWEST = 8
+#: Leaves that one of them stands for at least.
+HIDDEN_LEAVES = 8
+#: Leaves' faces of explicit polygons that a hidden facet stands for.
+HIDDEN_FACES = 4
+
+
+@dataclass(frozen=True)
+class FacetSizes:
+    """What sizes and numbers of facets follow from, for one kind of things.
+
+    Attributes
+    ----------
+    extent : (n,) float64
+        Metres that a pixel spans.
+    one_leaf : (n,) float64
+        Area of a leaf, m².
+    least_wood : (n,) float64
+        Side of facets of which there are as many as the wood has faces, metres.
+    coarse : (n,) float64
+        How much larger than seen ones facets are; 1 where they are seen.
+    clearance : (n,) float64
+        Metres from the space that the picture shows; negative within.
+    amounts : Amounts of n
+    part : (n,) float64
+        Which part of a branch, or of a sub-plant, each is.
+    """
+
+    extent: NDArray[np.float64]
+    one_leaf: NDArray[np.float64]
+    least_wood: NDArray[np.float64]
+    coarse: NDArray[np.float64]
+    clearance: NDArray[np.float64]
+    amounts: Amounts
+    part: NDArray[np.float64]
+
+    @property
+    def hidden(self) -> NDArray[np.bool_]:
+        """Where (n,) nobody looks."""
+        return self.coarse > 1.0
+
+    @property
+    def whole_optical(self) -> NDArray[np.float64]:
+        """Optical area (n,) of the whole of which each is a part, m²."""
+        return self.amounts.optical_area / np.maximum(self.part, 1e-12)
+
+    def sides(self, pixels: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Sides (n,), (n,) of facets of leaves and of wood, metres, where those that are seen have so many pixels."""
+        side = np.minimum(self.coarse * pixels, max(COARSE * pixels, _WIDEST)) * self.extent
+        blurred = np.minimum(_SOFT * np.maximum(self.clearance, 0.0), np.sqrt(self.amounts.optical_area / _FEWEST))
+        unseen = np.maximum(blurred, np.sqrt(HIDDEN_LEAVES * self.one_leaf))
+        side = np.where(self.hidden, np.maximum(side, unseen), side)
+        # Where nobody looks, wood is cut into no more facets than it has faces. Elsewhere it is cut as fine as the
+        # side asks for, or thin twigs would become blots.
+        wood = np.where(self.hidden, np.maximum(side, self.least_wood), side)
+        return np.maximum(side, np.sqrt(self.one_leaf)), wood
+
+    def counts(self, pixels: float) -> NDArray[np.float64]:
+        """Expected number (n,) of facets."""
+        leaf, wood = self.sides(pixels)
+        # Branches are closed: half of their surface is never seen.
+        leaves = self.amounts.leaf_area / np.maximum(leaf, 1e-12) ** 2
+        return leaves + self.amounts.wood_area / 2 / np.maximum(wood, 1e-12) ** 2
+
+
+@dataclass(frozen=True)
+class PolygonFacetSizes:
+    """What sizes and numbers of facets follow from, for explicit polygons.
+
+    Attributes
+    ----------
+    extent : (n,) float64
+        Metres that a pixel spans.
+    face : (n,) float64
+        Area of the face that each is, or is a fragment of, m².
+    leaf, hidden : (n,) bool
+        Faces of leaves; where nobody looks.
+    optical : (n,) float64
+        Area that facets stand for, m²: of solids half, as the far side is never seen.
+    solid : (n,) bool
+    """
+
+    extent: NDArray[np.float64]
+    face: NDArray[np.float64]
+    leaf: NDArray[np.bool_]
+    hidden: NDArray[np.bool_]
+    optical: NDArray[np.float64]
+    solid: NDArray[np.bool_]
+
+    def sides(self, pixels: float) -> NDArray[np.float64]:
+        """Sides (n,) of facets, metres, where those of plants that are seen have so many pixels."""
+        fine = pixels * self.extent
+        coarse = COARSE * fine
+        coarse = np.where(self.leaf, np.maximum(coarse, np.sqrt(HIDDEN_FACES * self.face)), coarse)
+        return np.where(self.hidden, coarse, fine)
+
+    def kept(self, pixels: float) -> NDArray[np.bool_]:
+        """Polygons (n,) that are drawn as they are: a facet or more would take their place."""
+        return self.face * np.where(self.solid, 0.5, 1.0) >= self.sides(pixels) ** 2
+
+    def counts(self, pixels: float) -> NDArray[np.float64]:
+        """Expected number (n,) of faces."""
+        return np.where(self.kept(pixels), 1.0, self.optical / np.maximum(self.sides(pixels), 1e-12) ** 2)
+
+
+def coarseness(result: Refinement) -> NDArray[np.float64]:
+    """How much larger facets are (nodes,) than where they are seen: 1 there, `COARSE` to `COARSEST` where hidden.
+
+    In proportion to the optical depth in front, −ln of the transmittance that the visibility step finds (paper, section
+    6.3). Beside the view, where nothing is in front, `COARSE`; there `FacetSizes.clearance` makes them larger.
+    """
+    with np.errstate(divide="ignore"):
+        deep = np.clip(-COARSE / _HIDING_DEPTH * np.log(result.transmittance), COARSE, COARSEST)
+    coarse = np.full(len(result.tree), COARSE)
+    coarse[result.nodes] = deep
+    coarse[~result.in_view] = COARSE
+    return np.where(result.chosen(Decision.HIDDEN), coarse, 1.0)
+
+
+def polygon_facet_sizes(contents: Contents, camera: Camera, hidden: NDArray[np.bool_]) -> PolygonFacetSizes:
+    """Facets of the polygons of contents; ``hidden`` (nodes,) says in which nodes nobody looks."""
+    own, amounts = contents.polygons.items, contents.polygons.amounts
+    meshes = own.meshes
+    return PolygonFacetSizes(
+        camera.extent_around(own.centre),
+        meshes.face_areas(own.face, own.instance),
+        meshes.leaf[own.face],
+        hidden[contents.polygons.cell],
+        amounts.optical_area,
+        meshes.solid[own.face],
+    )
+
+
+def subplant_facet_sizes(flora: Flora, contents: Contents, camera: Camera, coarse: NDArray[np.float64]) -> FacetSizes:
+    """Facets of the sub-plants of contents; ``coarse`` (nodes,) as `coarseness` gives it."""
+    own = contents.subplants.items
+    amounts, faces = contents.subplants.amounts, flora.branch_faces(own)
+    least = np.sqrt(amounts.wood_area / 2 / np.maximum(faces, 1))
+    place, coarse = bounding_cylinders(flora, own)[0], coarse[contents.subplants.cell]
+    extent, away = camera.extent_around(place), camera.clearance(place)
+    return FacetSizes(extent, flora.one_leaf_area(own), least, coarse, away, amounts, np.ones(len(own)))
+
+
+def piece_facet_sizes(flora: Flora, contents: Contents, camera: Camera, coarse: NDArray[np.float64]) -> FacetSizes:
+    """Facets of the pieces of contents; parameters as for `subplant_facet_sizes`."""
+    own = contents.pieces.items
+    amounts, faces = contents.pieces.amounts, flora.rows["sides"][own.branches.row]
+    least = np.sqrt(amounts.wood_area / 2 / np.maximum(faces, 1))
+    place, coarse = (own.start + own.end) / 2, coarse[contents.pieces.cell]
+    extent, away = camera.extent_around(place), camera.clearance(place)
+    return FacetSizes(extent, flora.one_leaf_area(own.branches), least, coarse, away, amounts, own.t1 - own.t0)

@@ -1,0 +1,383 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which share of its area the facets of a sub-plant need, to hold up as much light as the sub-plant itself.
+
+Leaves sit in clusters and hide each other. Few large facets that are spread over the same sub-plant do so less: with
+the full area they would be up to three times as opaque. Rays are cast through grown sub-plants of each row of a species
+and through their facets, at several numbers of them; the share is the one with which as many rays are held up. So it is
+for facets what `plants.clumping` is for cells that are filled evenly.
+
+Sub-plants are looked at together with their next siblings, because facets spill over; where few facets stand for one,
+with all that grow around them, because then facets reach across the gaps between neighbours of any parent. Facets of
+pieces are compared in the same way with what branches themselves bear.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import spread
+from ..compiled.flora import Flora
+from ..compiled.rays import Things, basis, covered, things_of
+from ..growth.branches import Branches
+from ..growth.growth import trunks
+from ..growth.hashing import mix
+from ..growth.seeds import Seeds
+from ..refinement.contents import piece_amounts, subplant_amounts
+from ..species.species import fingerprint
+from ..storage import remembered
+from ..subplants.pieces import Pieces, open_subplants
+from .microsurfaces import CIRCUMRADIUS, SIN_60, Facets, piece_facets, subplant_facets
+
+#: Shares of the shipped species, made by ``python -m devtools.facet_tables``. Raise the number when facets or shares
+#: are made in another way.
+TABLE = Path(__file__).resolve().parent.parent / "catalogue" / "tables" / "facet_shares.json"
+_METHOD = 2
+#: Facets of a sub-plant for which shares are known; between them they follow the logarithm.
+COUNTS = 4.0 ** np.arange(-2, 6)
+#: Under so many facets of a sub-plant its neighbours count, and not only its siblings.
+_FEW = 4.0
+#: Families of a row that are looked at, and polygons that all may have; members of one at most, siblings or neighbours.
+_FAMILIES, _POLYGONS = 6, 50_000.0
+_SIBLINGS, _NEIGHBOURS = 12, 60
+#: Facets that stand for each number, over all families: as many copies are made as it takes for the first, if that is
+#: possible at all for the second; numbers that would need more than the third are not tried.
+_WANTED, _NEEDED, _MOST = 250.0, 60.0, 5_000.0
+_COPIES = 16
+#: Rays across a family, and directions of rays.
+_RAYS, _DIRECTIONS = 36, 4
+#: Shares are never more than this.
+_LARGEST_SHARE = 1.6
+
+
+@dataclass(frozen=True)
+class FacetShares:
+    """Shares of the area by row and number of facets.
+
+    Attributes
+    ----------
+    whole : (r, k) float64
+        Of sub-plants, for each of `COUNTS`.
+    own : (r, k) float64
+        Of what branches themselves bear, by the number of facets of a whole branch.
+    """
+
+    whole: NDArray[np.float64]
+    own: NDArray[np.float64]
+
+    def of_subplants(self, row: NDArray[np.integer], count: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Shares (n,) for sub-plants of rows (n,) that are cut into so many (n,) facets each."""
+        return _between(self.whole, row, count)
+
+    def of_pieces(self, row: NDArray[np.integer], count: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Shares (n,) for pieces of branches of which a whole one would be cut into so many (n,) facets."""
+        return _between(self.own, row, count)
+
+
+def _between(table: NDArray[np.float64], row: NDArray[np.integer], count: NDArray[np.float64]) -> NDArray[np.float64]:
+    place = np.log(np.maximum(count, 1e-12) / COUNTS[0]) / np.log(COUNTS[1] / COUNTS[0])
+    place = np.clip(place, 0.0, len(COUNTS) - 1.0)
+    low = np.minimum(place.astype(np.int64), len(COUNTS) - 2)
+    return table[row, low] + (place - low) * (table[row, low + 1] - table[row, low])
+
+
+#: Shares (2, r, k) of species that are not shipped: a scene is compiled anew for each refinement.
+_found: dict[str, NDArray[np.float64]] = {}
+_REMEMBERED = 256
+
+
+def facet_shares(flora: Flora) -> FacetShares:
+    """Shares for a flora; found when first asked for, and kept as long as the flora may be asked for again.
+
+    Those of the species that come with TetFlora are read from `TABLE`; it takes some seconds to find those of one, so
+    that these are kept on disk as well.
+    """
+    return _shares(flora.at_rest)
+
+
+@lru_cache(maxsize=8)
+def _shares(flora: Flora) -> FacetShares:
+    shares = np.ones((2, len(flora.rows), len(COUNTS)))
+    for number, first in enumerate(flora.first_row):
+        name = digest(flora, number)
+        known = shipped().get(name)
+        found = _of_species(flora, number, name) if known is None else np.array([known["whole"], known["own"]])
+        shares[:, first : first + found.shape[1]] = found
+    return FacetShares(*shares)
+
+
+def _of_species(flora: Flora, number: int, name: str) -> NDArray[np.float64]:
+    """Shares (2, r, k) of one species: the same whatever other species the flora has, and wherever they were found."""
+    if name not in _found:
+        rows = np.flatnonzero(flora.rows["species"] == number)
+
+        def find_out() -> NDArray[np.float64]:
+            fitted = fitted_shares(flora, np.array([number], np.int32))
+            return np.stack([fitted.get(int(row), np.ones((2, len(COUNTS)))) for row in rows], axis=1)
+
+        found = remembered("facet_shares", name, (2, len(rows), len(COUNTS)), find_out)
+        if len(_found) >= _REMEMBERED:
+            _found.clear()
+        _found[name] = found
+    return _found[name]
+
+
+def digest(flora: Flora, number: int) -> str:
+    """What tells a species of a flora from all others: its parameters and the forms of its leaves."""
+    return fingerprint(flora.rows[flora.rows["species"] == number], flora.forms[number], _METHOD)
+
+
+@cache
+def shipped() -> dict[str, dict[str, list[list[float]]]]:
+    """Shares of the shipped species by their `digest`: ``whole`` and ``own`` (r, k) as lists, and their ``species``."""
+    try:
+        return json.loads(TABLE.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return {}
+
+
+def fitted_shares(
+    flora: Flora, species: NDArray[np.int32]
+) -> dict[int, tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Shares (k,), (k,) by row of some species, of sub-plants and of what branches themselves bear."""
+    few, out = COUNTS < _FEW, {}
+    for siblings, counts in ((False, few), (True, ~few)):
+        for row, families in _families(flora, species, siblings).items():
+            apart = _apart(flora, families)
+            sights = _Sight.of_subplants(flora, *apart), _Sight.of_branches(flora, *apart)
+            for shares, sight in zip(out.setdefault(row, np.ones((2, len(COUNTS)))), sights, strict=True):
+                shares[counts] = _fitted(sight)[counts]
+    return out
+
+
+def _families(flora: Flora, species: NDArray[np.int32], siblings: bool) -> dict[int, list[Branches]]:
+    """Sub-plants of each row of some species as they grow together, in a few plants or on a few parents of each row."""
+    which = np.repeat(species, _FAMILIES)
+    n = len(which)
+    names = tuple(s.identifier for s in flora.species)
+    seeds = Seeds(names, which, np.arange(n), np.zeros((n, 3)), np.tile(np.eye(3), (n, 1, 1)), np.ones(n))
+    level, plant, found = trunks(flora.rows, seeds), np.arange(n), {}
+    parent = plant
+    while len(level):
+        some = []
+        for row in np.unique(level.row):
+            own, most = np.flatnonzero(level.row == row), _POLYGONS / _FAMILIES / max(flora.polygons[row], 1.0)
+            choose = _siblings if siblings else _neighbours
+            for members in choose(level, own, parent if siblings else plant, most):
+                some.append(members)
+                found.setdefault(int(row), []).append(level.take(members))
+        chosen = np.concatenate(some)
+        level, parent, _, _ = open_subplants(flora, level.take(chosen))
+        plant = plant[chosen][parent]
+    return {row: _affordable(flora, families) for row, families in found.items()}
+
+
+def _siblings(
+    level: Branches, own: NDArray[np.int64], parent: NDArray[np.int64], most: float
+) -> Iterator[NDArray[np.int64]]:
+    """Those in the middle of some parents."""
+    members = int(np.clip(most, 1, _SIBLINGS))
+    parents = np.unique(parent[own])
+    for p in parents[np.argsort(mix(parents.astype(np.uint64)))[:_FAMILIES]]:
+        born = own[parent[own] == p]
+        first = (len(born) - min(members, len(born))) // 2
+        yield born[first : first + members]
+
+
+def _neighbours(
+    level: Branches, own: NDArray[np.int64], plant: NDArray[np.int64], most: float
+) -> Iterator[NDArray[np.int64]]:
+    """Those that are next to one of each plant."""
+    members = int(np.clip(most, 1, _NEIGHBOURS))
+    for p in np.unique(plant[own]):
+        kin = own[plant[own] == p]
+        first = kin[np.argmin(mix(level.key[kin]))]
+        away = np.linalg.norm(level.position[kin] - level.position[first], axis=1)
+        yield kin[np.argsort(away, kind="stable")[:members]]
+
+
+def _affordable(flora: Flora, families: list[Branches]) -> list[Branches]:
+    """As many of the families as their polygons allow, and at least one."""
+    families = [families[i] for i in np.argsort(mix(np.arange(len(families)).astype(np.uint64)))][:_FAMILIES]
+    total = np.cumsum([flora.face_counts(family).sum() for family in families])
+    return [family for family, sum_ in zip(families, total, strict=True) if sum_ <= _POLYGONS] or families[:1]
+
+
+def _apart(flora: Flora, families: list[Branches]) -> tuple[Branches, NDArray[np.float64]]:
+    """All families, so far from each other that no ray meets two of them, and the way (3,) beyond the last."""
+    reach = np.hypot(flora.bound[:, 0], np.maximum(-flora.bound[:, 1], flora.bound[:, 2]))
+    extent = max(float(np.ptp(f.position, axis=0).max() + 2 * (reach[f.row] * f.length).max()) for f in families)
+    # Level, and longer than the least that a view from a sixth above the horizon makes of it.
+    step = 8.0 * extent * np.array([0.8, 0.6, 0.0])
+    moved = [replace(f, position=f.position - f.position.mean(axis=0) + n * step) for n, f in enumerate(families)]
+    return Branches.concatenate(moved), len(families) * step
+
+
+def _fitted(sight: _Sight) -> NDArray[np.float64]:
+    """Shares (k,) for one row."""
+    out = np.full(len(COUNTS), np.nan)
+    if sight.area.mean() <= 0.0:
+        return np.ones(len(COUNTS))
+    views = sight.views()
+    met = sum(sight.met(view) for view in views)
+    for k, count in enumerate(COUNTS):
+        expected = count * len(sight.area)
+        copies = int(np.clip(np.ceil(_WANTED / expected), 1, _COPIES))
+        if expected * copies < _NEEDED or met == 0:
+            continue
+        side = np.sqrt(sight.area.mean() / count)
+        facets = sight.facets(side, copies)
+        out[k] = _share(np.concatenate([sight.least_shares(view, facets) for view in views]), met * copies)
+        if expected > _MOST or (sight.leaf > side**2).all():
+            break
+    known = np.flatnonzero(np.isfinite(out))
+    return np.interp(np.arange(len(out)), known, out[known]) if len(known) else np.ones(len(out))
+
+
+def _share(least: NDArray[np.float64], met: int) -> float:
+    """Share with which so many rays are held up, from the least share (n,) with which each ray is."""
+    return float(np.partition(least, met - 1)[met - 1]) if met <= len(least) else _LARGEST_SHARE
+
+
+@dataclass(frozen=True)
+class _View:
+    """Parallel rays through the points of a lattice on the plane of two axes."""
+
+    u: NDArray[np.float64]
+    v: NDArray[np.float64]
+    spacing: float
+
+    def flat(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Vectors (n, 3) on the plane (n, 2), in units of the lattice."""
+        return vectors @ np.stack([self.u, self.v], axis=1) / self.spacing
+
+
+@dataclass(frozen=True)
+class _Sight:
+    """Families of sub-plants, or what their branches themselves bear, as rays see it.
+
+    Attributes
+    ----------
+    flora : Flora
+    some : Branches of n
+    beyond : (3,) float64
+        Where there is room for others of the same size, metres.
+    things : Things
+        Leaves and wood in truth.
+    area, leaf : (n,) float64
+        Optical area of each, and area of one of its leaves, m².
+    pieces : Pieces or None
+        Of the branches, where only these count.
+    """
+
+    flora: Flora
+    some: Branches
+    beyond: NDArray[np.float64]
+    things: Things
+    area: NDArray[np.float64]
+    leaf: NDArray[np.float64]
+    pieces: Pieces | None
+
+    @classmethod
+    def of_subplants(cls, flora: Flora, some: Branches, beyond: NDArray[np.float64]) -> _Sight:
+        """To the last leaf."""
+        area = subplant_amounts(flora, some).optical_area
+        return cls(flora, some, beyond, _grown(flora, some), area, flora.one_leaf_area(some), None)
+
+    @classmethod
+    def of_branches(cls, flora: Flora, some: Branches, beyond: NDArray[np.float64]) -> _Sight:
+        """Without what grows on the branches but leaves."""
+        pieces, owner = open_subplants(flora, some)[2:]
+        area = np.bincount(owner, piece_amounts(flora, pieces).optical_area, len(some))
+        return cls(flora, some, beyond, _grown(flora, some, orders=1), area, flora.one_leaf_area(some), pieces)
+
+    def views(self) -> list[_View]:
+        """Directions spread over the half sphere, with a lattice that is as fine for all of them."""
+        place = self.things.middle.T @ self.beyond
+        along = np.floor(place / (self.beyond @ self.beyond) * _FAMILIES + 0.5)
+        extent = 2.0 * float(self.things.radius.max())  # one straight branch has no extent but its own
+        for family in np.unique(along):
+            middle = self.things.middle[:, along == family]
+            extent = max(extent, float(np.ptp(middle, axis=1).max()))
+        z = (np.arange(_DIRECTIONS) + 0.5) / _DIRECTIONS
+        turn = np.pi * (1 + np.sqrt(5)) * (np.arange(_DIRECTIONS) + 0.5)
+        directions = np.stack([np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z], axis=1)
+        return [_View(*basis(direction), extent / _RAYS) for direction in directions]
+
+    def met(self, view: _View) -> int:
+        """How many rays meet anything."""
+        place = view.flat(self.things.middle.T)
+        near = (np.abs(place - np.rint(place)) <= (self.things.radius / view.spacing)[:, None]).all(axis=1)
+        begin, rays = 0, []
+        for part in self.things.parts:
+            end = begin + len(part)
+            corners, first, number = part.outlines(np.flatnonzero(near[begin:end]), view.u, view.v)
+            rays.append(covered(corners / view.spacing, first, number)[1])
+            begin = end
+        return len(np.unique(_ray_numbers(np.concatenate(rays))))
+
+    def facets(self, side: float, copies: int) -> Facets:
+        """Facets of a side, metres; others for each of some copies of all, which stand beside each other."""
+        if self.pieces is None:
+            several = Branches.concatenate([self._copy(self.some, n) for n in range(copies)])
+            return subplant_facets(self.flora, several, np.full(len(several), side))
+        beyond = [n * self.beyond for n in range(copies)]
+        several = Pieces.concatenate(
+            [
+                replace(
+                    self.pieces,
+                    branches=self._copy(self.pieces.branches, n),
+                    start=self.pieces.start + way,
+                    end=self.pieces.end + way,
+                )
+                for n, way in enumerate(beyond)
+            ]
+        )
+        return piece_facets(self.flora, several, np.full(len(several), side))
+
+    def _copy(self, branches: Branches, number: int) -> Branches:
+        key = mix(branches.key + np.uint64(number + 1))
+        return replace(branches, key=key, position=branches.position + number * self.beyond)
+
+    @staticmethod
+    def least_shares(view: _View, facets: Facets) -> NDArray[np.float64]:
+        """For each ray that any of the facets can hold up, the least share of their area with which one does."""
+        reach = CIRCUMRADIUS * facets.side[:, None]
+        centre, a, b = view.flat(facets.centre), view.flat(facets.across * reach), view.flat(facets.along * reach)
+        largest = np.sqrt(_LARGEST_SHARE)
+        across = SIN_60 * np.abs(a)
+        low = np.ceil(centre - largest * np.maximum(across + np.abs(b) / 2, np.abs(b))).astype(np.int64)
+        high = np.floor(centre + largest * np.maximum(across + np.abs(b) / 2, np.abs(b))).astype(np.int64)
+        sizes = np.maximum(high - low + 1, 0)
+        facet, step = spread(sizes[:, 0] * sizes[:, 1])
+        columns = sizes[facet, 1]
+        point = low[facet] + np.stack([step // columns, step % columns], axis=1)
+        x, y = (point - centre[facet]).T
+        (ax, ay), (bx, by) = a[facet].T, b[facet].T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            aside, up = (x * by - y * bx) / (ax * by - ay * bx), (ax * y - ay * x) / (ax * by - ay * bx)
+        # How many times as large the triangle has to be to reach the point: its sides are half a circumradius away.
+        scale = 2.0 * np.maximum(-up, SIN_60 * np.abs(aside) + up / 2)
+        inside = np.flatnonzero(scale <= largest)
+        ray, which = np.unique(_ray_numbers(point[inside]), return_inverse=True)
+        least = np.full(len(ray), np.inf)
+        np.minimum.at(least, which.reshape(-1), scale[inside] ** 2)
+        return least
+
+
+def _grown(flora: Flora, some: Branches, orders: int | None = None) -> Things:
+    """Leaves and wood of sub-plants of one species, to the last twig or so many orders only."""
+    rows = len(flora.rows)
+    forms = flora.forms[int(flora.species_of(some.row[:1])[0])]
+    return things_of(flora.rows, forms, some, np.zeros(rows, np.intp), 0, np.ones(rows), orders)
+
+
+def _ray_numbers(point: NDArray[np.int64]) -> NDArray[np.int64]:
+    return (point[:, 0] << 32) + point[:, 1]

@@ -1,0 +1,385 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Microsurfaces: few facets that stand for the many surfaces of what is not made explicit (paper, sections 1 and 7).
+
+Each facet takes place, orientation and colour from a leaf or branch that the compiled species expects in the sub-plant;
+there are as many as the area asks for, and they are about as large as a pixel. Area and orientation are kept on
+average.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Arrays, perpendicular, spread
+from ..buffers import MeshBuffers
+from ..compiled.flora import Flora
+from ..compiled.samples import Points
+from ..growth.axes import axes
+from ..growth.branches import Branches
+from ..growth.foliage import leaf_start, mean_leaf_colours, outwardness, place_leaves, settled
+from ..growth.hashing import Draw, child_key, mix, signed, uniform
+from ..growth.wind import moment
+from ..refinement.contents import Amounts, piece_amounts, subplant_amounts
+from ..subplants.pieces import Pieces
+
+_FACET_PATH = 1 << 40  # child indices of facets start here
+_WOOD_PATH = 1 << 41
+# Draws of this module. Wood and leaves have counts of their own; none may meet another, or facets bunch up.
+_LEAF_COUNT, _WOOD_COUNT, _TURN, _START, _PLACE = 201, 202, 203, 204, 205
+_MOVE = 211  # three draws from here on
+_GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
+_GOLDEN = (np.sqrt(5) - 1) / 2
+_MOVED = 0.04  # of the length of a sub-plant's branch
+_SKY = np.array([0.0, 0.0, 1.0])
+SIN_60 = np.sqrt(3) / 2
+#: Distance of the corners of an equilateral triangle of area 1 from its middle.
+CIRCUMRADIUS = 2 / 27**0.25
+
+
+@dataclass(frozen=True)
+class Facets(Arrays):
+    """Equilateral triangles as a structure of arrays.
+
+    Attributes
+    ----------
+    centre : (n, 3) float64
+    across, along : (n, 3) float64
+        Unit vectors in the facet's plane.
+    side : (n,) float64
+        Root of the area, metres.
+    colour : (n, 3) float64
+    transmission : (n,) float64
+    velocity : (n, 3) float64 or None
+        Metres a second, where it is asked how plants move.
+    """
+
+    centre: NDArray[np.float64]
+    across: NDArray[np.float64]
+    along: NDArray[np.float64]
+    side: NDArray[np.float64]
+    colour: NDArray[np.float64]
+    transmission: NDArray[np.float64]
+    velocity: NDArray[np.float64] | None = None
+
+    @property
+    def normal(self) -> NDArray[np.float64]:
+        """Unit vectors (n, 3) that facets are perpendicular to."""
+        return np.cross(self.across, self.along)
+
+
+def concatenate_facets(parts: Sequence[Facets]) -> Facets:
+    """Facets of one or more parts, in their order."""
+    if len(parts) == 1:
+        return parts[0]
+    if any(part.velocity is not None for part in parts):  # meshes from elsewhere stand still beside plants that move
+        parts = [replace(p, velocity=np.zeros((len(p), 3))) if p.velocity is None else p for p in parts]
+    return Facets.concatenate(parts)
+
+
+def subplant_facets(
+    flora: Flora,
+    subplants: Branches,
+    leaf_side: NDArray[np.float64],
+    wood_side: NDArray[np.float64] | None = None,
+    share: NDArray[np.float64] | None = None,
+    real: NDArray[np.float64] | None = None,
+) -> Facets:
+    """Facets of sub-plants.
+
+    Parameters
+    ----------
+    flora : Flora
+    subplants : Branches of n
+    leaf_side, wood_side : (n,) float64
+        Wanted side of a facet for leaves and for wood (the same if not given), metres; those for leaves are never
+        smaller than the leaves that they stand for.
+    share : (n,) float64, optional
+        Share of their area that facets have, see `facet_shares`.
+    real : (n,) float64, optional
+        Share of each sub-plant that is drawn as it is; so many of its facets are left out, by numbers of their own.
+    """
+    amounts = subplant_amounts(flora, subplants)
+    part = np.ones(len(subplants)) if share is None else share
+    wood_side = leaf_side if wood_side is None else wood_side
+    return concatenate_facets(
+        [
+            _leaves_of_subplants(flora, subplants, amounts, leaf_side, part, real),
+            _wood_of_subplants(flora, subplants, amounts, wood_side, part, real),
+        ]
+    )
+
+
+def piece_facets(
+    flora: Flora,
+    pieces: Pieces,
+    leaf_side: NDArray[np.float64],
+    wood_side: NDArray[np.float64] | None = None,
+    share: NDArray[np.float64] | None = None,
+    real: NDArray[np.float64] | None = None,
+    real_wood: NDArray[np.bool_] | None = None,
+) -> Facets:
+    """Facets of pieces of branches; parameters as for `subplant_facets`.
+
+    Here ``real`` is the share of the leaves, and ``real_wood`` (n,) says whose wood is drawn as it is.
+    """
+    amounts = piece_amounts(flora, pieces)
+    if real_wood is not None:
+        amounts = replace(amounts, wood_area=np.where(real_wood, 0.0, amounts.wood_area))
+    part = np.ones(len(pieces)) if share is None else share
+    return concatenate_facets(
+        [
+            _leaves_of_pieces(flora, pieces, amounts, leaf_side, part, real),
+            _wood_of_pieces(flora, pieces, amounts, leaf_side if wood_side is None else wood_side, part),
+        ]
+    )
+
+
+def kept_out_of_view(facets: Facets, clearance: Callable[[NDArray], NDArray], smallest: float) -> Facets:
+    """Shrink facets of what is out of view where they would reach into it.
+
+    Parameters
+    ----------
+    facets : Facets
+        Of `subplant_facets`, `piece_facets` or `polygon_facets`.
+    clearance : callable
+        Distance (n,) of points (n, 3) from the view, metres.
+    smallest : float
+        Least share of its side that a facet keeps, 0 to 1.
+    """
+    reach = CIRCUMRADIUS * facets.side
+    share = np.clip(clearance(facets.centre) / np.maximum(reach, 1e-12), smallest, 1.0)
+    return replace(facets, side=facets.side * share)
+
+
+def _trapped(colour: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Colour (n, 3) of clusters of surfaces that are seen by a share (n,) of their area.
+
+    What one surface scatters meets another of its cluster with the probability p = 1 − share, and is dimmed again:
+    ω (1 − p) / (1 − p ω) (Smolander and Stenberg, "Simple parameterizations of the radiation budget of uniform
+    broadleaved and coniferous canopies", 2005).
+    """
+    p = np.clip(1.0 - share, 0.0, 1.0)[:, None]
+    return colour * (1.0 - p) / (1.0 - p * colour)
+
+
+def _numbers(
+    key: NDArray, area: NDArray, facet: NDArray, path: int, draw: int, real: NDArray | None = None
+) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """Owner, index, key and area of the facets that areas (n,) are cut into; their expected number is area / facet.
+
+    Where it is 1 or more they share the area evenly; below, one facet stands for several sub-plants. Of owners of which
+    a share (n,) is real so many facets are left out.
+    """
+    expected = area / facet
+    counts = np.floor(expected + uniform(key, draw)).astype(np.int64)
+    owner, index = spread(counts)
+    one = facet * np.where(expected >= 1.0, expected / np.maximum(counts, 1), 1.0)
+    own = child_key(key[owner], index + path)
+    if real is None or not real.any():
+        return owner, index, own, one[owner]
+    kept = np.flatnonzero(uniform(own, Draw.TRANSITION) >= real[owner])
+    return owner[kept], index[kept], own[kept], one[owner[kept]]
+
+
+def _facet_colours(flora: Flora, row: NDArray, key: NDArray, leaves: NDArray, outward: NDArray) -> NDArray[np.float64]:
+    """Colours of facets that stand for a number of leaves (n,) each: their mean varies less than one leaf's colour."""
+    deviation = signed(key, Draw.LEAF_COLOUR) / np.sqrt(np.maximum(leaves, 1))
+    mean = mean_leaf_colours(flora.rows, row, outward)
+    return np.clip(mean + flora.rows["leaf_colour"][row, 1] * deviation[:, None], 0, 1)
+
+
+def _picked(
+    flora: Flora, points: Points, subplants: Branches, owner: NDArray, index: NDArray, key: NDArray[np.uint64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Samples for facets: runs of them are spread over a sub-plant, and each sub-plant starts its run elsewhere.
+
+    Returns
+    -------
+    (m,) int64, (m, 3) float64, (m, 3, 3) float64
+        Sample, its place in the world, and the rotation from its own axes to the world's. Where a sub-plant has more
+        facets than there are samples, none may lie upon another: whole plants are turned about their trunk, which is as
+        likely a plant; in others places are moved by a little.
+    """
+    first, number = points.runs(subplants)
+    start = (uniform(subplants.key, _START) * number).astype(np.int64)
+    pick = first[owner] + (start[owner] + index) % number[owner]
+    rows, row = flora.rows, subplants.row[owner]
+    place = points.position[pick].astype(np.float64)
+    base = subplants.frame[owner]
+    again = index // number[owner]
+    turned = np.flatnonzero((again > 0) & (rows["order"][row] == 0) & ~rows["phantom"][row])
+    if len(turned):
+        angle = again[turned] * _GOLDEN_ANGLE
+        c, s = np.cos(angle), np.sin(angle)
+        x, y = base[turned, :, 0], base[turned, :, 1]
+        base[turned, :, 0], base[turned, :, 1] = c[:, None] * x + s[:, None] * y, c[:, None] * y - s[:, None] * x
+    moved = np.flatnonzero((again > 0) & ((rows["order"][row] > 0) | rows["phantom"][row]))
+    if len(moved):
+        place[moved] += _MOVED * np.stack([signed(key[moved], _MOVE + axis) for axis in range(3)], axis=1)
+    place = subplants.position[owner] + subplants.length[owner, None] * np.einsum("nij,nj->ni", base, place)
+    return pick, place, base
+
+
+def _leaves_of_subplants(
+    flora: Flora, subplants: Branches, amounts: Amounts, side: NDArray, share: NDArray, real: NDArray | None
+) -> Facets:
+    rows, points = flora.rows, flora.samples.leaves
+    one = flora.one_leaf_area(subplants)
+    facet = np.maximum(side**2, one)
+    owner, index, key, area = _numbers(subplants.key, amounts.leaf_area, facet, _FACET_PATH, _LEAF_COUNT, real)
+    pick, place, base = _picked(flora, points, subplants, owner, index, key)
+    leaf_row = points.row[pick]
+    frame = base @ points.frame[pick].astype(np.float64)
+    frame = settled(rows, leaf_row, frame, points.light[pick].astype(np.float64), _SKY)
+    half_leaf = 0.5 * rows["leaf_size"][leaf_row, 0] * subplants.scale[owner]
+    centre = place + half_leaf[:, None] * frame[:, :, 1]
+    # Sub-plants beyond the limbs know how far outside they are, and all that grows on them is there.
+    outward = np.where(rows["outward"][subplants.row[owner]], points.outward[pick], subplants.outward[owner])
+    return Facets(
+        centre,
+        frame[:, :, 0],
+        frame[:, :, 1],
+        np.sqrt(area * share[owner]),
+        _trapped(_facet_colours(flora, leaf_row, key, area / one.clip(1e-300)[owner], outward), share[owner]),
+        flora.leaf.transmission[leaf_row],
+        _carried(flora, subplants, owner, centre),
+    )
+
+
+def _leaves_of_pieces(
+    flora: Flora, pieces: Pieces, amounts: Amounts, side: NDArray, share: NDArray, real: NDArray | None
+) -> Facets:
+    branches, rows = pieces.branches, flora.rows
+    row = branches.row
+    size, variation = rows["leaf_size"][row].T
+    one = (size**2 + variation**2 / 3) * flora.leaf.area[row] * branches.scale**2
+    facet = np.maximum(side**2, one)
+    start = leaf_start(rows, branches)
+    owner, index, key, area, t = _along(flora, pieces, amounts.leaf_area, facet, start, _FACET_PATH, _LEAF_COUNT, real)
+    bearers = np.flatnonzero(np.bincount(owner, minlength=len(branches)))  # far from all pieces get a facet
+    own = branches.take(bearers)
+    lines = axes(rows, own)
+    leaves = place_leaves(rows, own, lines, np.searchsorted(bearers, owner), index, key, t)
+    frame = settled(rows, row[owner], leaves.frame, leaves.light, leaves.sky)
+    centre = leaves.position + 0.5 * leaves.size[:, None] * frame[:, :, 1]
+    outward = outwardness(rows, branches, owner, t)
+    colour = _facet_colours(flora, row[owner], key, area / one.clip(1e-300)[owner], outward)
+    colour = _trapped(colour, share[owner])
+    transmission = flora.leaf.transmission[row[owner]]
+    velocity = None
+    if own.later is not None:
+        there = place_leaves(rows, own.moved(), lines.later, leaves.branch, index, key, t)
+        velocity = (there.position - leaves.position) / moment(rows)
+    return Facets(centre, frame[:, :, 0], frame[:, :, 1], np.sqrt(area * share[owner]), colour, transmission, velocity)
+
+
+def _wood_of_subplants(
+    flora: Flora, subplants: Branches, amounts: Amounts, side: NDArray, share: NDArray, real: NDArray | None
+) -> Facets:
+    points = flora.samples.wood
+    wood = amounts.wood_area / 2
+    owner, index, key, area = _numbers(subplants.key, wood, side**2, _WOOD_PATH, _WOOD_COUNT, real)
+    pick, centre, base = _picked(flora, points, subplants, owner, index, key)
+    axis = np.einsum("nij,nj->ni", base, points.frame[pick, :, 2].astype(np.float64))
+    colour = flora.rows["branch_colour"][points.row[pick], 0]
+    velocity = _carried(flora, subplants, owner, centre)
+    return Facets(
+        centre, _across(axis, key), axis, np.sqrt(area * share[owner]), colour, np.zeros(len(owner)), velocity
+    )
+
+
+def _wood_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDArray, share: NDArray) -> Facets:
+    none, wood = np.zeros(len(pieces)), amounts.wood_area / 2
+    owner, _, key, area, t = _along(flora, pieces, wood, side**2, none, _WOOD_PATH, _WOOD_COUNT)
+    vector = (pieces.end - pieces.start)[owner]
+    place = (t - pieces.t0[owner]) / np.maximum(pieces.t1 - pieces.t0, 1e-12)[owner]
+    centre = pieces.start[owner] + place[:, None] * vector
+    axis = vector / np.maximum(np.linalg.norm(vector, axis=1, keepdims=True), 1e-300)
+    colour = flora.rows["branch_colour"][pieces.branches.row[owner], 0]
+    velocity = None
+    if pieces.branches.later is not None:
+        lines = axes(flora.rows, pieces.branches)
+        velocity = (lines.later.at(owner, t)[0] - lines.at(owner, t)[0]) / moment(flora.rows)
+    return Facets(
+        centre, _across(axis, key), axis, np.sqrt(area * share[owner]), colour, np.zeros(len(owner)), velocity
+    )
+
+
+def _carried(
+    flora: Flora, subplants: Branches, owner: NDArray[np.int64], centre: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
+    """Velocities (m, 3) of points (m, 3) of sub-plants that move with their bases; None where nobody asks."""
+    if subplants.later is None:
+        return None
+    own = subplants.take(owner)
+    local = np.einsum("nji,nj->ni", own.frame, centre - own.position)
+    there = own.later.position + np.einsum("nij,nj->ni", own.later.frame, local)
+    return (there - centre) / moment(flora.rows)
+
+
+def _along(
+    flora: Flora,
+    pieces: Pieces,
+    area: NDArray[np.float64],
+    facet: NDArray[np.float64],
+    start: NDArray[np.float64],
+    path: int,
+    draw: int,
+    real: NDArray[np.float64] | None = None,
+) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
+    """Owner, index, key, area and place along the branch of the facets of pieces, see `_numbers`.
+
+    They are those of whole segments of branches, of which a piece has what lies on it: so they do not depend on where
+    a branch is cut. What they stand for begins at fractions ``start`` (n,) of the branches. Along a segment they follow
+    the golden section, and stay when others are added.
+    """
+    segments = flora.rows["segments"][pieces.branches.row]
+    number = np.minimum(np.floor((pieces.t0 + pieces.t1) / 2 * segments), segments - 1)
+    low, high = np.maximum(number / segments, start), (number + 1) / segments
+    first = np.maximum(pieces.t0, start)
+    length = np.maximum(pieces.t1 - first, 0.0)
+    part = np.where(length > 0, np.maximum(high - low, length) / np.maximum(length, 1e-12), 0.0)
+    numbered = mix(pieces.branches.key ^ (number.astype(np.uint64) + np.uint64(path)))
+    owner, index, key, one = _numbers(numbered, area * part, facet, path, draw, real)
+    t = low[owner] + (high - low)[owner] * ((uniform(numbered, _PLACE)[owner] + index * _GOLDEN) % 1.0)
+    on = np.flatnonzero((t >= first[owner]) & (t < pieces.t1[owner]))
+    return owner[on], index[on], key[on], one[on], t[on]
+
+
+def _across(axis: NDArray[np.float64], key: NDArray[np.uint64]) -> NDArray[np.float64]:
+    """Unit vectors perpendicular to axes, turned about them at random: closed tubes face all ways around."""
+    a = perpendicular(axis)
+    turn = 2 * np.pi * uniform(key, _TURN)[:, None]
+    return np.cos(turn) * a + np.sin(turn) * np.cross(axis, a)
+
+
+def facet_mesh(facets: Facets) -> MeshBuffers:
+    """Facets as a mesh of equilateral triangles, with the attributes that the material of proxies reads.
+
+    Triangles take half of a renderer's memory and time for squares of the same area.
+    """
+    n = len(facets.side)
+    reach = CIRCUMRADIUS * facets.side[:, None]
+    a, b = reach * facets.across, reach * facets.along
+    corners = np.stack([facets.centre + b, facets.centre - SIN_60 * a - b / 2, facets.centre + SIN_60 * a - b / 2], 1)
+    every = np.arange(3 * n, dtype=np.int32).reshape(n, 3)
+    motion = {}
+    if facets.velocity is not None:
+        motion["velocity"] = "POINT", np.repeat(facets.velocity.astype(np.float32), 3, axis=0)
+    return MeshBuffers(
+        positions=corners.reshape(-1, 3).astype(np.float32),
+        edge_verts=np.stack([every, np.roll(every, -1, axis=1)], axis=2).reshape(-1, 2),
+        corner_verts=every.ravel(),
+        corner_edges=every.ravel().copy(),
+        face_offsets=np.arange(n + 1, dtype=np.int32) * np.int32(3),
+        attributes={
+            "tf_colour": ("FACE", facets.colour.astype(np.float32)),
+            "tf_transmission": ("FACE", facets.transmission.astype(np.float32)),
+            **motion,
+        },
+    )

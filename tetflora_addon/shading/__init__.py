@@ -1,3 +1,0 @@
-# SPDX-FileCopyrightText: 2026 TetFlora Authors
-# SPDX-License-Identifier: GPL-3.0-or-later
-"""From summaries of tetrahedra to extinction, orientation and proxy geometry; numpy only."""

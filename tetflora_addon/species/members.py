@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How many branches, leaves and short shoots one plant has on average, from its description alone.
+
+The same numbers as those that a compiled species holds, for readers of files and levels of detail, which have to know
+them before anything is compiled.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .leaf_models import LeafModel
+from .species import CROWN_SHAPES, LEAF_KINDS, Order, Range, Species, crown_ratio, fork_cuts
+
+_SHARES = (np.arange(256) + 0.5) / 256
+
+
+@dataclass(frozen=True)
+class Members:
+    """Expected numbers on one plant, by order.
+
+    Attributes
+    ----------
+    branches : list of float
+        A branch that divides counts once.
+    stems : list of float
+        The same with every part between forks as one.
+    segments : list of float
+        Straight pieces of all branches of the order.
+    leaves : list of float
+    spurs, spur_leaves : float
+        Short shoots of all orders, and their leaves.
+    """
+
+    branches: list[float]
+    stems: list[float]
+    segments: list[float]
+    leaves: list[float]
+    spurs: float
+    spur_leaves: float
+
+
+def expected_members(species: Species) -> Members:
+    """Expected numbers; linear in the numbers that each order asks for."""
+    branches, stems, segments, leaves, spurs = [], [], [], [], 0.0
+    number = full = 1.0  # branches of the order, and the sum of the factors on what they bear
+    for i, order in enumerate(species.orders):
+        cuts = fork_cuts(order)
+        fold = expected_forks(order.forks) ** np.arange(len(cuts) - 1)  # stems side by side in each part
+        branches.append(number)
+        stems.append(number * float(fold.sum()))
+        segments.append(number * float(fold @ part_segments(order)))
+        leaves.append(full * order.leaves.mean * _fold(cuts, fold, order.leaf_start))
+        spurs += full * order.spurs.mean * _fold(cuts, fold, order.spur_start)
+        if i + 1 < len(species.orders):
+            start = order.branch_start.mean
+            stems_there = fold[np.searchsorted(cuts[1:-1], start + (1 - start) * _SHARES, side="right")]
+            vigour = crown_ratio(np.full(_SHARES.shape, CROWN_SHAPES.index(order.crown)), 1 - _SHARES)
+            follow = 1 - species.orders[i + 1].count_by_length * (1 - vigour)
+            number = full * order.branches.mean * float(stems_there.mean())
+            full = full * order.branches.mean * float((stems_there * follow).mean())
+    on_spur = species.spur.leaves.mean if species.spur is not None else 0.0
+    return Members(branches, stems, segments, leaves, spurs, spurs * on_spur)
+
+
+def expected_forks(forks: Range, power: float = 1.0) -> float:
+    """Mean of n^power, for the n stems into which a branch divides (`growth.branch_counts`)."""
+    wanted = forks.mean + forks.variation * (2 * _SHARES - 1)
+    below = np.floor(wanted)
+    more = wanted - below  # how likely one more is
+    return float(((1 - more) * np.maximum(below, 1) ** power + more * np.maximum(below + 1, 1) ** power).mean())
+
+
+def part_segments(order: Order) -> np.ndarray:
+    """Straight pieces of each part of a branch between its forks."""
+    return np.maximum(np.rint(order.segments * np.diff(fork_cuts(order))), 1)
+
+
+def _fold(cuts: list[float], fold: np.ndarray, start: Range) -> float:
+    """How many times as many things a branch bears because it divides; they are spread evenly from ``start`` on."""
+    ends = np.clip((np.array(cuts) - start.mean) / (1 - start.mean), 0, 1)
+    return float(fold @ np.diff(ends))
+
+
+def expected_polygons(species: Species) -> float:
+    """Mean number of polygons of one plant, leaves and branches.
+
+    Notes
+    -----
+    The rings of a flared base are left out; a leaf that is still the name of a Blender object counts as one polygon.
+    """
+    members = expected_members(species)
+    polygons = sum(n * o.sides for n, o in zip(members.segments, species.orders, strict=True))
+    bearers = list(zip(species.orders, members.leaves, strict=True))
+    if species.spur is not None:
+        polygons += members.spurs * species.spur.sides * species.spur.segments
+        bearers.append((species.spur, members.spur_leaves))
+    return polygons + sum(number * leaf_polygons(species, order) for order, number in bearers)
+
+
+def leaf_polygons(species: Species, order: Order) -> float:
+    """Mean polygons of the leaves that branches of an order bear."""
+    forms = species.forms(LEAF_KINDS.index(order.leaf_kind)) or species.leaf
+    return float(np.mean([form.polygons if isinstance(form, LeafModel) else 1 for form in forms]))

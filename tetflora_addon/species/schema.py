@@ -1,0 +1,396 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reading a species file: every key with its type and allowed range, every mistake named.
+
+The tables below are the reference of the file format; `docs/species.md` is written from them.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from ..errors import SpeciesError
+from .leaf_models import LEAF_MODELS, LeafModel, leaf_model
+from .members import expected_polygons
+from .skeletons import MAX_ORDERS
+from .species import BARKS, CROWN_SHAPES, LEAF_KINDS, Colour, Order, Range, Species
+
+FORMAT = 1
+MAX_FILE_BYTES = 4_000_000
+MAX_POLYGONS = 20_000_000
+LENGTH_HIGH = 20.0
+"""Highest length of a branch after order 0, of its parent's length."""
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key of an order: what it holds, within which range, and what it means.
+
+    Attributes
+    ----------
+    kind : {'range', 'number', 'integer', 'shape', 'kind', 'colour', 'rgb'}
+        A range is written ``[mean, variation]``, or as a number where it has no variation; mean − variation and mean +
+        variation both have to lie in the limits.
+    low, high : float
+        Limits, inclusive.
+    default : object
+        Used where the key is absent; None means that the key must be there.
+    unit, meaning : str
+        For the documentation and for tooltips.
+    """
+
+    kind: str
+    low: float
+    high: float
+    default: Any
+    unit: str
+    meaning: str
+
+
+ORDER_KEYS: dict[str, Key] = {
+    "length": Key(
+        "range", 0.001, 200, None, "m for the trunk, otherwise fraction of the parent's length", "length of a branch"
+    ),
+    "thickness": Key(
+        "range", 0.001, 1, None, "fraction of the trunk's length, or of the parent's radius", "radius at the base"
+    ),
+    "taper": Key("range", 0, 1, [0.3, 0], "fraction of the base radius", "radius at the tip"),
+    "flare": Key("number", 0, 4, 0.0, "fraction of the radius", "extra thickness at the very base"),
+    "pipe": Key(
+        "number",
+        0,
+        4,
+        0.0,
+        "",
+        "exponent of the pipe model, which divides the radius of a branch among its children (2 is Leonardo's rule; "
+        "values below 1 count as 1); 0 makes the thickness of a child a fraction of the parent's radius there",
+    ),
+    "segments": Key("integer", 1, 32, 1, "", "straight segments along a branch"),
+    "sides": Key("integer", 3, 64, 4, "", "faces around a branch"),
+    "curvature": Key("range", -360, 360, [0, 0], "degrees", "bend along the length; positive bends towards the parent"),
+    "curvature_tip": Key(
+        "number", -360, 360, math.nan, "degrees", "bend of the outer half of the branch (default: same as curvature)"
+    ),
+    "attraction": Key(
+        "range", -360, 360, [0, 0], "degrees", "turn of a level branch towards the sky; negative turns down"
+    ),
+    "angle": Key("range", 0, 180, [0, 0], "degrees", "angle between branch and parent, at the parent's base"),
+    "angle_tip": Key("number", 0, 180, math.nan, "degrees", "the same at the parent's tip (default: same as angle)"),
+    "azimuth": Key("range", -360, 360, [137.5, 10], "degrees", "rotation around the parent between branches"),
+    "spray": Key("number", 0, 1, 0.0, "", "how strongly branches spread horizontally to both sides of their parent"),
+    "whorl": Key("integer", 1, 12, 1, "", "branches at each node: 1 alternate, 2 opposite, 3 or more a whorl"),
+    "branches": Key("range", 0, 10_000, [0, 0], "", "number of branches of the next order on each branch"),
+    "branch_start": Key("range", 0, 0.99, [0.1, 0], "fraction of the length", "part at the base without branches"),
+    "crown": Key("shape", 0, 0, "cylindrical", "", "how the length of child branches varies along the branch"),
+    "count_by_length": Key(
+        "number",
+        0,
+        1,
+        0.0,
+        "",
+        "how much the number of branches and leaves decreases on shorter branches: 0 not at all, 1 in proportion",
+    ),
+    "forks": Key("range", 0, 8, [0, 0], "", "number of stems that the branch forks into; 0 disables forking"),
+    "fork_at": Key("number", 0.05, 0.95, 0.5, "fraction of the length", "position of the first fork"),
+    "fork_angle": Key("range", 0, 120, [25, 8], "degrees", "angle by which each stem turns away"),
+    "fork_levels": Key("integer", 1, 4, 1, "", "number of successive forks, evenly spaced up to the tip"),
+    "spurs": Key("range", 0, 10_000, [0, 0], "", "number of short shoots on each branch, as defined by spur"),
+    "spur_start": Key("range", 0, 0.99, [0.1, 0], "fraction of the length", "part at the base without short shoots"),
+    "leaf_kind": Key("kind", 0, 0, "leaf", "", "what grows on the branch: the leaf or the blossom of the species"),
+    "leaves": Key("range", 0, 10_000, [0, 0], "", "number of leaves directly on each branch of this order"),
+    "leaf_whorl": Key("integer", 1, 64, 1, "", "leaves at each node: 1 alternate, 2 opposite, 3 or more a whorl"),
+    "leaf_start": Key("range", 0, 0.99, [0.1, 0], "fraction of the length", "part at the base without leaves"),
+    "leaf_size": Key("range", 0.0005, 20, [0.08, 0.02], "m", "length of a leaf"),
+    "leaf_size_tip": Key("number", 0.05, 5, 1.0, "fraction of leaf_size", "size of leaves at the outside of the crown"),
+    "leaf_angle": Key("range", 0, 180, [50, 15], "degrees", "angle between branch and leaf"),
+    "leaf_azimuth": Key("range", -360, 360, [137.5, 20], "degrees", "rotation around the branch between leaves"),
+    "leaf_light": Key("range", 0, 1, [0.5, 0], "", "how strongly leaves turn towards the sky"),
+    "leaf_spray": Key("number", 0, 1, 0.0, "", "how strongly leaves spread horizontally to both sides of their branch"),
+    "leaf_droop": Key("number", 0, 1, 0.0, "", "how strongly leaves hang down"),
+    "branch_colour": Key("colour", 0, 1, [[0.16, 0.11, 0.07], [0.04, 0.03, 0.02]], "linear RGB", "color of the bark"),
+    "leaf_colour": Key("colour", 0, 1, [[0.08, 0.19, 0.03], [0.03, 0.06, 0.01]], "linear RGB", "color of the leaves"),
+    "leaf_colour_tip": Key(
+        "rgb",
+        0,
+        1,
+        None,
+        "linear RGB",
+        "color of leaves at the outside of the crown (default: same as leaf_colour)",
+    ),
+}
+
+SPECIES_KEYS = (
+    "format", "name", "description", "orders", "bark", "quality", "exact", "leaf", "leaf_transmission",
+    "blossom", "blossom_transmission", "spur",
+)  # fmt: skip
+MAX_FORMS = 8
+QUALITY_LIMITS = (0.001, 1000.0)
+#: The short shoot of a species that asks for some and describes none.
+DEFAULT_SPUR = {"length": [0.05, 0.02], "thickness": [0.03, 0.005], "angle": [50, 15], "leaves": [4, 1]}
+#: Defaults that another key of the same order gives.
+FOLLOWS = {"curvature_tip": "curvature", "angle_tip": "angle", "leaf_colour_tip": "leaf_colour"}
+#: What a key of a kind may be, where that is one of a few names.
+CHOICES = {"shape": CROWN_SHAPES, "kind": LEAF_KINDS}
+LEAF_KEYS = ("model", "object", "vertices", "faces", "uv")
+
+
+class _Reader:
+    """Names the file and the key in every complaint."""
+
+    def __init__(self, source: str) -> None:
+        self.source = source
+
+    def fail(self, key: str, problem: str) -> SpeciesError:
+        return SpeciesError(f"{self.source}: {key}: {problem}")
+
+    def number(self, value: Any, key: str, low: float, high: float) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.fail(key, f"must be a number from {low:g} to {high:g}, not {_shown(value)}")
+        if not low <= value <= high:  # false for NaN as well
+            raise self.fail(key, f"must be from {low:g} to {high:g}, not {_shown(value)}")
+        return float(value)
+
+    def range(self, value: Any, key: str, low: float, high: float) -> Range:
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            return Range(self.number(value, key, low, high))
+        if not isinstance(value, list) or len(value) != 2:
+            raise self.fail(key, f"must be [mean, variation] within {low:g} to {high:g}, not {_shown(value)}")
+        mean = self.number(value[0], f"{key}[0] (mean)", low, high)
+        variation = self.number(value[1], f"{key}[1] (variation)", 0, high - low)
+        if mean - variation < low - 1e-12 or mean + variation > high + 1e-12:
+            raise self.fail(
+                key,
+                f"mean ± variation is {mean - variation:g} to {mean + variation:g}, must be from {low:g} to {high:g}",
+            )
+        return Range(mean, variation)
+
+    def colour(self, value: Any, key: str) -> Colour:
+        form = "[[r, g, b], [variation of each]]"
+        if not (
+            isinstance(value, list) and len(value) == 2 and all(isinstance(v, list) and len(v) == 3 for v in value)
+        ):
+            raise self.fail(key, f"must be {form} with numbers from 0 to 1, not {_shown(value)}")
+        channels = [self.range([m, v], f"{key}.{c}", 0, 1) for m, v, c in zip(*value, "rgb", strict=True)]
+        return Colour(tuple(c.mean for c in channels), tuple(c.variation for c in channels))
+
+    def rgb(self, value: Any, key: str) -> tuple[float, float, float]:
+        if not isinstance(value, list | tuple) or len(value) != 3:
+            raise self.fail(key, f"must be [r, g, b] with numbers from 0 to 1, not {_shown(value)}")
+        return tuple(self.number(v, f"{key}.{c}", 0, 1) for v, c in zip(value, "rgb", strict=True))
+
+    def truth(self, value: Any, key: str) -> bool:
+        if not isinstance(value, bool):
+            raise self.fail(key, f"must be true or false, not {_shown(value)}")
+        return value
+
+    def choice(self, value: Any, key: str, choices: tuple[str, ...]) -> str:
+        if value not in choices:
+            raise self.fail(key, f"must be one of {', '.join(choices)}, not {_shown(value)}")
+        return value
+
+    def keys(self, value: Any, key: str, allowed: Mapping[str, Any] | tuple[str, ...]) -> None:
+        if not isinstance(value, dict):
+            raise self.fail(key, f"must be an object {{…}}, not {_shown(value)}")
+        for name in value:
+            if name not in allowed:
+                near = get_close_matches(name.lower(), allowed, 1)
+                meant = f'did you mean "{near[0]}"? Allowed' if near else "allowed"
+                raise self.fail(f"{key}.{name}" if key else name, f"unknown key; {meant} keys: {', '.join(allowed)}")
+
+    def text(self, value: Any, key: str, least: int = 1) -> str:
+        if not isinstance(value, str) or len(value.strip()) < least or len(value) > 1000:
+            raise self.fail(key, f"must be a string of {least} to 1000 characters, not {_shown(value)}")
+        return value
+
+
+def _shown(value: Any) -> str:
+    try:
+        text = repr(value)
+    except (RecursionError, ValueError):  # nested too deep, or an integer of thousands of digits
+        return f"a {type(value).__name__} too large to show"
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _read_order(reader: _Reader, data: Any, where: str, first: bool, last: bool) -> Order:
+    reader.keys(data, where, ORDER_KEYS)
+    values: dict[str, Any] = {}
+    for name, key in ORDER_KEYS.items():
+        path = f"{where}.{name}"
+        if name not in data and name in FOLLOWS:
+            values[name] = values[FOLLOWS[name]].mean
+            continue
+        value = data.get(name, key.default)
+        if value is None:
+            raise reader.fail(path, f"missing; must be {_expected(key)}")
+        high = LENGTH_HIGH if name == "length" and not first else key.high
+        readers: dict[str, Callable[[], Any]] = {
+            "range": lambda value=value, path=path, key=key, high=high: reader.range(value, path, key.low, high),
+            "number": lambda value=value, path=path, key=key: reader.number(value, path, key.low, key.high),
+            "colour": lambda value=value, path=path: reader.colour(value, path),
+            "rgb": lambda value=value, path=path: reader.rgb(value, path),
+        }
+        if key.kind in readers:
+            values[name] = readers[key.kind]()
+        elif key.kind == "integer":
+            number = reader.number(value, path, key.low, key.high)
+            if number != int(number):
+                raise reader.fail(path, f"must be a whole number, not {_shown(value)}")
+            values[name] = int(number)
+        else:
+            values[name] = reader.choice(value, path, CHOICES[key.kind])
+    if last and values["branches"].high > 0:
+        raise reader.fail(
+            f"{where}.branches", "must be [0, 0], because no order follows; add an order to describe these branches"
+        )
+    return Order(**values)
+
+
+def _expected(key: Key) -> str:
+    if key.kind == "range":
+        return f"[mean, variation] within {key.low:g} to {key.high:g}"
+    return f"a number from {key.low:g} to {key.high:g}"
+
+
+def _read_forms(reader: _Reader, data: Any, key: str) -> tuple[LeafModel | str, ...]:
+    """A leaf, or a list of forms among which each leaf has one by chance."""
+    if not isinstance(data, list):
+        return (_read_leaf(reader, data, key),)
+    if not 1 <= len(data) <= MAX_FORMS:
+        raise reader.fail(key, f"must have 1 to {MAX_FORMS} forms, has {len(data)}")
+    return tuple(_read_leaf(reader, one, f"{key}[{i}]") for i, one in enumerate(data))
+
+
+def _read_leaf(reader: _Reader, data: Any, where: str) -> LeafModel | str:
+    reader.keys(data, where, LEAF_KEYS)
+    forms = [k for k in ("model", "object", "vertices") if k in data]
+    if len(forms) != 1:
+        raise reader.fail(
+            where, "must have exactly one of model (built-in), object (Blender mesh) or vertices with faces"
+        )
+    if "model" in data:
+        if not isinstance(data["model"], str) or data["model"] not in LEAF_MODELS:
+            raise reader.fail(f"{where}.model", f"must be one of {', '.join(LEAF_MODELS)}, not {_shown(data['model'])}")
+        return LEAF_MODELS[data["model"]]
+    if "object" in data:
+        return reader.text(data["object"], f"{where}.object")
+    faces = data.get("faces")
+    if not isinstance(faces, list) or not all(
+        isinstance(f, list) and all(isinstance(v, int) and not isinstance(v, bool) for v in f) for f in faces
+    ):
+        raise reader.fail(f"{where}.faces", "must be a list of faces, each a list of vertex indices")
+    for key, form in (("vertices", "[x, y, z]"), ("uv", "[u, v]")):
+        if key in data and not _is_list_of_points(data[key], form.count(",") + 1):
+            raise reader.fail(f"{where}.{key}", f"must be a list of {form} numbers")
+    try:
+        return leaf_model(data["vertices"], faces, data.get("uv"))
+    except SpeciesError as error:
+        raise reader.fail(where, str(error)) from None
+
+
+def _is_list_of_points(value: Any, size: int) -> bool:
+    # numpy would take texts and truths for numbers, and stumble over integers that no float can hold.
+    return isinstance(value, list) and all(
+        isinstance(point, list)
+        and len(point) == size
+        and all(isinstance(x, int | float) and not isinstance(x, bool) and not abs(x) > 1e300 for x in point)
+        for point in value
+    )
+
+
+def species_from_dict(data: Any, identifier: str, source: str) -> Species:
+    """Check a decoded species file and turn it into a `Species`.
+
+    Parameters
+    ----------
+    data : object
+        What `json.load` gave.
+    identifier : str
+        Name by which plants refer to the species.
+    source : str
+        Named in errors, usually the file's path.
+
+    Raises
+    ------
+    SpeciesError
+        Names the source, the key and what is allowed.
+    """
+    reader = _Reader(source)
+    if not isinstance(data, dict):
+        raise reader.fail("species", f"must be an object {{…}}, not {_shown(data)}")
+    reader.keys(data, "", SPECIES_KEYS)
+    for key in ("format", "name", "orders", "leaf"):
+        if key not in data:
+            raise reader.fail(key, "missing; add this key")
+    if data["format"] != FORMAT or isinstance(data["format"], bool):
+        raise reader.fail("format", f"must be {FORMAT} for this version of TetFlora, not {_shown(data['format'])}")
+    orders = data["orders"]
+    if not isinstance(orders, list) or not 1 <= len(orders) <= MAX_ORDERS:
+        found = len(orders) if isinstance(orders, list) else _shown(orders)
+        raise reader.fail("orders", f"must be a list of 1 to {MAX_ORDERS} orders, has {found}")
+    read = tuple(_read_order(reader, o, f"orders[{i}]", i == 0, i == len(orders) - 1) for i, o in enumerate(orders))
+    spur = None
+    if "spur" in data or any(order.spurs.high > 0 for order in read):
+        spur = _read_order(reader, data.get("spur", DEFAULT_SPUR), "spur", True, True)
+        for key in ("spurs", "forks"):
+            if getattr(spur, key).high > 0:
+                raise reader.fail(f"spur.{key}", "must be [0, 0], because a short shoot has only leaves")
+    species = Species(
+        identifier=identifier,
+        name=reader.text(data["name"], "name"),
+        description=reader.text(data.get("description", ""), "description", least=0),
+        orders=read,
+        leaf=_read_forms(reader, data["leaf"], "leaf"),
+        leaf_transmission=reader.number(data.get("leaf_transmission", 0.4), "leaf_transmission", 0, 1),
+        blossom=_read_forms(reader, data["blossom"], "blossom") if "blossom" in data else (),
+        blossom_transmission=reader.number(data.get("blossom_transmission", 0.4), "blossom_transmission", 0, 1),
+        spur=spur,
+        bark=reader.choice(data.get("bark", BARKS[0]), "bark", BARKS),
+        quality=reader.number(data.get("quality", 1.0), "quality", *QUALITY_LIMITS),
+        exact=reader.truth(data.get("exact", False), "exact"),
+    )
+    polygons = expected_polygons(species) * species.quality
+    if polygons > MAX_POLYGONS:
+        raise reader.fail(
+            "orders" if species.quality <= 1 else "quality",
+            f"one plant would have {polygons:.3g} polygons, the limit is {MAX_POLYGONS:.0g}; use fewer branches",
+        )
+    return species
+
+
+def _once(source: str, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A JSON object whose keys all differ; Python's reader would take the last of equal ones and say nothing."""
+    data = dict(pairs)
+    if len(data) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise SpeciesError(f"{source}: {twice}: duplicate key in one object; remove one of them")
+    return data
+
+
+def read_species(path: Path) -> Species:
+    """Read and check one species file.
+
+    Raises
+    ------
+    SpeciesError
+        The file cannot be read, is not JSON, or breaks a rule of the format.
+    """
+    try:
+        if path.stat().st_size > MAX_FILE_BYTES:
+            raise SpeciesError(f"{path.name}: larger than {MAX_FILE_BYTES:,} bytes, the limit for a species file")
+        # Some editors begin a file with a mark of its encoding.
+        data = json.loads(path.read_text(encoding="utf-8-sig"), object_pairs_hook=partial(_once, path.name))
+    except OSError as error:
+        raise SpeciesError(f"{path.name}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise SpeciesError(f"{path.name}: is not valid JSON: not UTF-8 text; save the file as UTF-8") from None
+    except (RecursionError, ValueError) as error:
+        raise SpeciesError(f"{path.name}: is not valid JSON: {error}") from None
+    return species_from_dict(data, path.stem, path.name)

@@ -1,0 +1,183 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pieces of branches: straight parts of an axis with the leaves on them; branches are clipped to them (paper, 6.5).
+
+Opening sub-plants into their branches, one order at a time or all the way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Arrays, column, gathered, nested
+from ..compiled.averages import own_leaf_integrals, tube_perimeter
+from ..compiled.flora import Flora
+from ..growth.axes import axes, profile_integral
+from ..growth.branches import Branches
+from ..growth.foliage import leaf_start, outwardness
+from ..growth.growth import Stems, children, drawn_children
+
+
+@dataclass(frozen=True)
+class Pieces(Arrays):
+    """Parts of branches, each within one straight segment.
+
+    Attributes
+    ----------
+    branches : Branches of n
+        The whole branch that each piece is part of; enough to make its wood and leaves.
+    t0, t1 : (n,) float64
+        The part's ends as fractions of the branch's axis.
+    start, end : (n, 3) float64
+        The same ends in space, metres.
+    """
+
+    branches: Branches = field(metadata=nested(Branches))
+    t0: NDArray[np.float64]
+    t1: NDArray[np.float64]
+    start: NDArray[np.float64] = field(metadata=column(3))
+    end: NDArray[np.float64] = field(metadata=column(3))
+
+    def runs(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """First and last piece (k,), (k,) of each longest row of pieces that follow one another on a branch."""
+        key, plant = self.branches.key, self.branches.plant
+        apart = (key[1:] != key[:-1]) | (plant[1:] != plant[:-1]) | (self.t0[1:] != self.t1[:-1])
+        inner = np.flatnonzero(apart)
+        edge = np.zeros(min(len(self), 1), np.int64)
+        return np.concatenate([edge, inner + 1]), np.concatenate([inner, edge + len(self) - 1])
+
+
+def along_branches(pieces: Pieces) -> Pieces:
+    """The same pieces, those of each branch together and from base to tip; whole branches keep their place.
+
+    No two may overlap. What comes from `whole_pieces` is in order already and costs nothing.
+    """
+    first, last = pieces.runs()
+    # A branch that is whole in one run has no pieces elsewhere.
+    parts = (pieces.t0[first] > 0) | (pieces.t1[last] < 1)
+    if not parts.any():
+        return pieces
+    of_part = np.repeat(parts, last - first + 1)
+    rest = np.flatnonzero(of_part)
+    # The plant belongs to the order: plants of one seed (copies in the scene) have the same keys at different places.
+    key, plant = (np.take(a, rest) for a in (pieces.branches.key, pieces.branches.plant))
+    rest = rest[np.lexsort([np.take(pieces.t0, rest), key, plant])]
+    return pieces.take(np.concatenate([np.flatnonzero(~of_part), rest]))
+
+
+def whole_pieces(rows: NDArray[np.void], stems: Stems) -> tuple[Pieces, NDArray[np.int64]]:
+    """All segments of branches as pieces, and the index of the branch of each."""
+    owner, t, position = stems.knots(rows)
+    low = np.flatnonzero(owner[1:] == owner[:-1])
+    ends = gathered(position, low), gathered(position, low + 1)
+    owner = np.take(owner, low)
+    return Pieces(stems.branches.take(owner), t[low], t[low + 1], *ends), owner
+
+
+def clipped(
+    pieces: Pieces, distance_start: NDArray[np.float64], distance_end: NDArray[np.float64]
+) -> tuple[Pieces, Pieces]:
+    """Cut pieces that cross a plane.
+
+    Parameters
+    ----------
+    pieces : Pieces of n
+    distance_start, distance_end : (n,) float64
+        Signed distances of the ends from the plane, of opposite sign.
+
+    Returns
+    -------
+    tuple of Pieces
+        The halves at the start and at the end, n each.
+    """
+    share = distance_start / (distance_start - distance_end)
+    t = pieces.t0 + share * (pieces.t1 - pieces.t0)
+    middle = pieces.start + share[:, None] * (pieces.end - pieces.start)
+    return (
+        Pieces(pieces.branches, pieces.t0, t, pieces.start, middle),
+        Pieces(pieces.branches, t, pieces.t1, middle, pieces.end),
+    )
+
+
+def leaf_fraction(flora: Flora, pieces: Pieces) -> NDArray[np.float64]:
+    """Expected share (n,) of a branch's own leaves that sit on each piece."""
+    start = leaf_start(flora.rows, pieces.branches)
+    return np.clip(np.maximum(pieces.t1, start) - np.maximum(pieces.t0, start), 0, None) / (1 - start)
+
+
+def outward_ends(flora: Flora, pieces: Pieces) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Places between inside and outside of the crown of the first and the last leaf that each piece (n,) may bear."""
+    rows, branches = flora.rows, pieces.branches
+    start = leaf_start(rows, branches)
+    every = np.arange(len(pieces))
+    return tuple(outwardness(rows, branches, every, np.maximum(t, start)) for t in (pieces.t0, pieces.t1))
+
+
+def piece_leaf_colours(flora: Flora, pieces: Pieces) -> NDArray[np.float64]:
+    """Mean linear RGB (n, 3) of the leaves that branches themselves bear on pieces, weighted by area."""
+    row = pieces.branches.row
+    rows = flora.rows
+    inside = rows["leaf_colour"][row, 0]
+    if not rows["gradient"].any():
+        return inside
+    area, area_outward = own_leaf_integrals(rows["leaf_size_tip"][row], *outward_ends(flora, pieces))
+    return inside + (rows["leaf_colour_tip"][row] - inside) * (area_outward / area)[:, None]
+
+
+def wood_areas(flora: Flora, pieces: Pieces) -> NDArray[np.float64]:
+    """Surface (n,) of the wood of each piece, m²: perimeter × length at the mean radius."""
+    branches = pieces.branches
+    low, high = (profile_integral(flora.rows, branches.row, branches.key, t) for t in (pieces.t0, pieces.t1))
+    return tube_perimeter(flora.rows["sides"][branches.row]) * branches.radius * branches.length * (high - low)
+
+
+def open_subplants(flora: Flora, subplants: Branches) -> tuple[Branches, NDArray[np.int64], Pieces, NDArray[np.int64]]:
+    """Open sub-plants into the sub-plants of the next order and the pieces of their own branch.
+
+    Returns
+    -------
+    Branches, (m,) int64, Pieces, (k,) int64
+        Children with the index of the sub-plant that each comes from, and pieces with theirs.
+    """
+    stems, body, grown, owner = _opened(flora, subplants)
+    pieces, piece_owner = whole_pieces(flora.rows, stems)
+    return grown, body[owner], pieces, body[piece_owner]
+
+
+def expand(flora: Flora, subplants: Branches) -> Iterator[Stems]:
+    """All branches of sub-plants, to the last twig, order by order.
+
+    Notes
+    -----
+    Memory grows with the number of branches; split the sub-plants with `chunks` where there are many.
+    """
+    while len(subplants):
+        stems, _, subplants, _ = _opened(flora, subplants)
+        yield stems
+
+
+def _opened(flora: Flora, subplants: Branches) -> tuple[Stems, NDArray[np.int64], Branches, NDArray[np.int64]]:
+    """Branches of sub-plants with the index of the sub-plant of each, and their children with that of their parent."""
+    rows = flora.rows
+    phantom = rows["phantom"][subplants.row]
+    if phantom.any():  # a form drawn by hand: its branches are known, and opened with the plant
+        plants, rest = np.flatnonzero(phantom), np.flatnonzero(~phantom)
+        drawn, plant = drawn_children(rows, subplants.take(plants))
+        bodies, body = Branches.concatenate([subplants.take(rest), drawn]), np.concatenate([rest, plants[plant]])
+    else:
+        bodies, body = subplants, np.arange(len(subplants))
+    lines = axes(rows, bodies)
+    return Stems(bodies, lines), body, *children(rows, bodies, lines)
+
+
+def chunks(polygons: NDArray[np.float64], limit: float) -> Iterator[slice]:
+    """Runs of things whose expected polygons (n,) sum up to about a limit each."""
+    block = (np.cumsum(polygons) / limit).astype(np.int64)
+    edges = np.flatnonzero(np.diff(block)) + 1
+    for start, stop in zip([0, *edges], [*edges, len(polygons)], strict=True):
+        if stop > start:
+            yield slice(int(start), int(stop))
