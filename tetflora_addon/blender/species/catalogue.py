@@ -9,8 +9,6 @@ Pictures of species for menus and asset browsers: PNG files beside the species, 
 Species as files: saved for other scenes, taken from others, given away, deleted. Only sound ones get in or out.
 """
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Mapping, Sequence

@@ -5,8 +5,6 @@
 Properties of the species editor beside the keys of an order: name, leaves, bark, which order is shown.
 """
 
-from __future__ import annotations
-
 from math import isnan
 from typing import Any
 
