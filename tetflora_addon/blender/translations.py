@@ -1,173 +1,68 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the interface says in other languages: German for labels so far. Whoever adds a language adds a dictionary.
+"""The interface in other languages: a file in the folder ``locale`` for each, named by Blender's code of the language.
 
-Blender looks texts of operators up under "Operator", all others under "*"; what is missing stays English.
+A file maps English texts to translations, those of operators under "Operator" and all others under "*", Blender's
+contexts. What is missing stays English.
 """
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
 
 import bpy
 
-_OPERATORS = {
-    "First Forest": "Erster Wald",
-    "Populate": "Bepflanzen",
-    "Paint Plants": "Pflanzen malen",
-    "Place Plants by Clicking": "Pflanzen durch Klicken setzen",
-    "Drop Plants to Ground": "Pflanzen auf den Boden setzen",
-    "Add Plant": "Pflanze hinzufügen",
-    "Change Species": "Art wechseln",
-    "Re-roll Seeds": "Startwerte neu würfeln",
-    "Select Species": "Art auswählen",
-    "Refine": "Verfeinern",
-    "Clear": "Ergebnisse entfernen",
-    "Clear Cache": "Zwischenspeicher leeren",
-    "Refine Plants": "Pflanzen verfeinern",
-    "Clear Refined Plants": "Verfeinerte Pflanzen entfernen",
-    "Populate Selected Meshes": "Ausgewählte Meshes bepflanzen",
-    "Populate with Plants": "Mit Pflanzen bepflanzen",
-    "Update": "Aktualisieren",
-    "Re-roll": "Neu würfeln",
-    "Freeze": "Einfrieren",
-    "Use Selected Meshes": "Ausgewählte Meshes verwenden",
-    "Preview Points": "Vorschau als Punkte",
-    "Remove Selected": "Ausgewählte entfernen",
-    "Remove All Plants": "Alle Pflanzen entfernen",
-    "Select All of This Species": "Alle dieser Art auswählen",
-    "Convert to Meshes": "In Meshes umwandeln",
-    "Make Plant from Form": "Pflanze aus Form erzeugen",
-    "Convert Plants to Field": "Pflanzen in Feld umwandeln",
-    "Convert Field to Objects": "Feld in Objekte umwandeln",
-    "Mark as Occluder": "Als Verdecker markieren",
-    "Keep Results as Meshes": "Ergebnisse als Meshes behalten",
-    "Compute Levels": "Stufen berechnen",
-    "Look Through Camera": "Durch die Kamera blicken",
-    "Duplicate as New Species": "Als neue Art duplizieren",
-    "Save to My Species": "In meinen Arten speichern",
-    "Load Species": "Art laden",
-    "Export Species": "Art exportieren",
-    "Delete from My Species": "Aus meinen Arten löschen",
-    "Create Asset Library": "Asset-Bibliothek erstellen",
-}
-_LABELS = {
-    "Plants": "Pflanzen",
-    "Selected Plants": "Ausgewählte Pflanzen",
-    "Paint Plants": "Pflanzen malen",
-    "Populate": "Bepflanzen",
-    "Get Started": "Erste Schritte",
-    "Species": "Art",
-    "Seed": "Startwert",
-    "Radius": "Radius",
-    "Density": "Dichte",
-    "Strength": "Stärke",
-    "Min Distance": "Mindestabstand",
-    "Min Scale": "Kleinste Größe",
-    "Max Scale": "Größte Größe",
-    "Paint": "Malen",
-    "Erase": "Löschen",
-    "Thin": "Ausdünnen",
-    "One Species": "Eine Art",
-    "As in Populate": "Wie in Bepflanzen",
-    "Quality": "Qualität",
-    "Cutoff": "Schwelle",
-    "Visibility": "Sichtbarkeit",
-    "Leaf Limit": "Kleinste Blattbreite",
-    "Statistics": "Statistik",
-    "Wind": "Wind",
-    "Speed": "Geschwindigkeit",
-    "Direction": "Richtung",
-    "Gusts": "Böen",
-    "Loop": "Schleife",
-    "Limits": "Grenzen",
-    "Animation": "Animation",
-    "Share Between Frames": "Zwischen Bildern teilen",
-    "Within Distance": "Innerhalb der Strecke",
-    "Within Angle": "Innerhalb des Winkels",
-    "Frame Cache": "Bildspeicher",
-    "Populations": "Bestände",
-    "Placement": "Platzierung",
-    "Spacing": "Abstände",
-    "Size": "Größe",
-    "Output": "Ausgabe",
-    "Ray Visibility": "Strahlensichtbarkeit",
-    "Passes and Materials": "Renderpasses und Materialien",
-    "Preview": "Vorschau",
-    "Species Editor": "Arteneditor",
-    "Name, Leaf and Bark": "Name, Blatt und Rinde",
-    "Branches by Order": "Äste nach Ordnung",
-    "Leaves of This Order": "Blätter dieser Ordnung",
-    "Proxy Shading": "Proxy-Shading",
-    "Leaf Objects": "Blattobjekte",
-    "Passes": "Durchgänge",
-    "Plants per Hectare": "Pflanzen je Hektar",
-    "By Density": "Nach Dichte",
-    "Min Slope": "Kleinste Neigung",
-    "Max Slope": "Größte Neigung",
-    "Facing": "Ausrichtung",
-    "Facing Spread": "Streuung der Ausrichtung",
-    "Altitude": "Höhenlage",
-    "Min Altitude": "Kleinste Höhe",
-    "Max Altitude": "Größte Höhe",
-    "Edge Falloff": "Randabfall",
-    "Areas": "Flächen",
-    "Paths": "Wege",
-    "Path Distance": "Abstand von Wegen",
-    "Clumping": "Gruppierung",
-    "Clump Size": "Gruppengröße",
-    "Scale at Top": "Größe am höchsten Punkt",
-    "Follow Ground": "Boden folgen",
-    "Companion": "Begleiter",
-    "Attraction": "Anziehung",
-    "Reach": "Reichweite",
-    "Shadow Cutoff": "Schwelle für Schatten",
-    "Proxies": "Proxys",
-    "Lighting": "Beleuchtung",
-    "Baked Proxies": "Gebackene Proxys",
-    "Baked Proxies and Leaves": "Gebackene Proxys und Blätter",
-    "Occluder": "Verdecker",
-    "Max Polygons": "Max. Polygone",
-    "Max Memory": "Max. Speicher",
-    "Max Tetrahedra": "Max. Tetraeder",
-    "Max Levels": "Max. Stufen",
-    "Max Passes": "Max. Durchgänge",
-    "Refine at Render": "Beim Rendern verfeinern",
-    "Refine Automatically": "Automatisch verfeinern",
-    "Expand Everything": "Alles ausarbeiten",
-    "Facet Size": "Facettengröße",
-    "Block Size": "Blockgröße",
-    "Visibility Resolution": "Auflösung der Sichtbarkeit",
-    "Split Threshold": "Schwelle für Teilung",
-    "Hidden Below": "Verdeckt unter",
-    "Anchored": "Verankert",
-    "Save Results in File": "Ergebnisse in der Datei speichern",
-    "Show Results in Viewports": "Ergebnisse in Viewports zeigen",
-    "Show Results in Renders": "Ergebnisse in Renderings zeigen",
-    "Freeze Camera": "Kamera einfrieren",
-    "Color By": "Farbe nach",
-    "Translucent": "Durchscheinend",
-    "Species Folder": "Artenordner",
-    "Quality of New Scenes": "Qualität neuer Szenen",
-    "Max Memory of New Scenes": "Max. Speicher neuer Szenen",
-    "Cache Species Analysis": "Artenanalyse zwischenspeichern",
-    "Create As": "Erstellen als",
-    "Weight": "Gewicht",
-    "Cache Folder": "Zwischenspeicherordner",
-}
+from ..errors import TetFloraError
 
-#: Texts by language, each with its context, as Blender takes them.
-DICTIONARY = {
-    "de_DE": {
-        **{("Operator", text): german for text, german in _OPERATORS.items()},
-        **{("*", text): german for text, german in _LABELS.items()},
-    }
-}
-# The name under which Blender keeps them.
-_NAME = __name__
+FOLDER = Path(__file__).with_name("locale")
+CONTEXTS = ("Operator", "*")
+
+Entries = dict[tuple[str, str], str]
+
+
+def read_language(path: Path) -> Entries:
+    """Translations in a file by context and English text, as Blender takes them.
+
+    Raises
+    ------
+    TetFloraError
+        It cannot be read, or is not of the form above; the message names the file and the place.
+    """
+    try:
+        groups = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise TetFloraError(f"Cannot read the translation {path}: {error}") from None
+    if not isinstance(groups, dict) or not set(groups) <= set(CONTEXTS):
+        raise TetFloraError(f'{path}: use the groups "Operator" and "*", and no others')
+    entries = {}
+    for context, texts in groups.items():
+        if not isinstance(texts, dict):
+            raise TetFloraError(f'{path}: "{context}" must map English texts to translations')
+        for english, translation in texts.items():
+            if not isinstance(translation, str) or not translation.strip():
+                raise TetFloraError(f'{path}: the translation of "{english}" is not a text; add one or delete the line')
+            entries[context, english] = translation
+    return entries
+
+
+def read_languages(folder: Path = FOLDER) -> dict[str, Entries]:
+    """Translations by language; a file that cannot be used is reported on stderr and left out."""
+    found = {}
+    for path in sorted(folder.glob("*.json")):
+        try:
+            found[path.stem] = read_language(path)
+        except TetFloraError as error:
+            print(f"TetFlora: error: {error}", file=sys.stderr, flush=True)
+    return found
 
 
 def register() -> None:
-    """Make the translations known."""
-    bpy.app.translations.register(_NAME, DICTIONARY)
+    """Add the translations to Blender's."""
+    bpy.app.translations.register(__name__, read_languages())
 
 
 def unregister() -> None:
-    """Take them back."""
-    bpy.app.translations.unregister(_NAME)
+    """Remove them."""
+    bpy.app.translations.unregister(__name__)

@@ -133,11 +133,30 @@ def _texts():
 
 
 def test_every_translated_text_is_in_the_interface():
-    dictionary = translations.DICTIONARY
+    dictionary = translations.read_languages()
     texts = _texts()
     assert dictionary
     for language, entries in dictionary.items():
         assert entries
         assert re.fullmatch(r"[a-z]{2}_[A-Z]{2}", language)
         assert [text for (_, text) in entries if text not in texts] == []
-        assert all(value.strip() for value in entries.values())
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ('{"*": {"Wind": "Wind",}}', "line 1 column 22"),
+        ('{"Labels": {}}', '"Operator" and "*"'),
+        ('["Wind"]', '"Operator" and "*"'),
+        ('{"*": ["Wind"]}', 'must map English texts'),
+        ('{"*": {"Wind": ""}}', 'translation of "Wind"'),
+    ],
+)
+def test_a_broken_translation_is_named_and_the_others_stay(tmp_path, capsys, text, complaint):
+    (tmp_path / "de_DE.json").write_text(text, encoding="utf-8")
+    (tmp_path / "fr_FR.json").write_text('{"*": {"Wind": "Vent"}}', encoding="utf-8")
+    assert translations.read_languages(tmp_path) == {"fr_FR": {("*", "Wind"): "Vent"}}
+    message = capsys.readouterr().err
+    assert complaint in message
+    assert "de_DE.json" in message
+    assert message.count("\n") == 1
