@@ -121,7 +121,7 @@ def summed_up(error: np.ndarray, each: np.ndarray) -> dict[str, float]:
 
 def foretold(flora: Any, subplants: Any, oriented: bool) -> np.ndarray:
     """Expected sums over sub-plants."""
-    expected = contents.subplant_amounts(flora, subplants)
+    expected = contents.subplant_totals(flora, subplants)
     out = np.zeros(_FIELDS)
     out[0], out[1] = expected.leaf_area.sum(), expected.wood_area.sum()
     out[2:5] = expected.leaf_area @ flora.leaf_colours(subplants)

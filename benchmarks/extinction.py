@@ -101,7 +101,7 @@ def grown(flora: Any, seed: int) -> tuple[list[tuple], np.ndarray, np.ndarray, n
     none = pieces.Pieces.empty()
     for stems in pieces.expand(flora, growth.trunks(flora.rows, plant)):
         own, _ = pieces.whole_pieces(flora.rows, stems)
-        held = contents.piece_amounts(flora, own)
+        held = contents.piece_totals(flora, own)
         places.append((own.start + own.end) / 2)
         weights.append(held.leaf_area + held.wood_area / 2)
         coefficients.append(flora.clumping.coefficients(own.branches, flora.clumping.own))

@@ -19,7 +19,7 @@ def main() -> None:
     table = {}
     for identifier in sorted(list_species()):
         flora = compile_species([load_species(identifier)])
-        found = facet_weights.facet_shares(flora)
+        found = facet_weights.facet_weights(flora)
         table[facet_weights.digest(flora, 0)] = {
             "species": identifier,
             "whole": found.whole.round(3).tolist(),

@@ -265,15 +265,15 @@ def test_a_species_of_ones_own_is_looked_at_once_for_all_sessions(
     monkeypatch.setattr(facet_weights, "_found", {})
     one, other = load_species("fern"), load_species("grass")
     alone = compile_species([one])
-    shares, clumping = facet_weights.facet_shares(alone), alone.clumping
+    weights, clumping = facet_weights.facet_weights(alone), alone.clumping
     assert len(files(folder)) == 2
     monkeypatch.setattr(facet_weights, "_found", {})  # another session
-    monkeypatch.setattr(facet_weights, "fitted_shares", lambda _, n: pytest.fail(f"looked at {n} again"))
+    monkeypatch.setattr(facet_weights, "fitted_weights", lambda _, n: pytest.fail(f"looked at {n} again"))
     monkeypatch.setattr(facet_weights, "shipped", lambda: {facet_weights.digest(compile_species([other]), 0): TABLE})
     both = compile_species([other, one])
     rows = both.rows["species"] == 1
-    np.testing.assert_array_equal(facet_weights.facet_shares(both).whole[rows], shares.whole)
-    np.testing.assert_array_equal(facet_weights.facet_shares(both).own[rows], shares.own)
+    np.testing.assert_array_equal(facet_weights.facet_weights(both).whole[rows], weights.whole)
+    np.testing.assert_array_equal(facet_weights.facet_weights(both).own[rows], weights.own)
     for name in ("own", "root", "density"):
         np.testing.assert_array_equal(getattr(both.clumping, name)[rows], getattr(clumping, name))
     assert len(files(folder)) == 3  # the clumping of the other
@@ -290,8 +290,8 @@ def test_species_that_are_found_together_are_what_they_are_alone(monkeypatch: py
     for species in ([some[0]], [some[1]], some, some[::-1]):
         monkeypatch.setattr(facet_weights, "_found", {})
         flora = compile_species(species)
-        shares = facet_weights.facet_shares(flora)
-        found.append({one.identifier: shares.whole[flora.rows["species"] == n] for n, one in enumerate(species)})
+        weights = facet_weights.facet_weights(flora)
+        found.append({one.identifier: weights.whole[flora.rows["species"] == n] for n, one in enumerate(species)})
     for name, alone in (found[0] | found[1]).items():
         np.testing.assert_array_equal(found[2][name], alone)
         np.testing.assert_array_equal(found[3][name], alone)

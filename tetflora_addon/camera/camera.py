@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 #: Cosine of the latitude from which on panoramas count as if no pixels were added towards the poles: 84 degrees.
 LEAST_COSINE = 0.1
-#: How far from several eyes things are at least to hide others from all of them, in radii of the eyes' room.
+#: How far from several eyes things are at least to hide others from all of them, in cell radii.
 _OPEN = 2.0
 
 
@@ -54,8 +54,8 @@ class Camera:
         The camera at other times while the shutter is open, and the other eyes of a stereoscopic picture; often empty.
     setback : float
         How far, in depth, the position lies behind the eye, metres: not 0 where the camera stands for several.
-    room : float
-        How far from that eye others are for which it stands, metres; see `view_cells`.
+    cell_radius : float
+        Largest distance from that eye to the others that the camera stands for, metres; see `view_cells`.
     """
 
     kind: Literal["PERSP", "ORTHO", "PANO"]
@@ -70,7 +70,7 @@ class Camera:
     focus: float = np.inf
     shutter: tuple[Camera, ...] = ()
     setback: float = 0.0
-    room: float = 0.0
+    cell_radius: float = 0.0
 
     @property
     def eye(self) -> NDArray[np.float64]:
@@ -184,12 +184,12 @@ class Camera:
     @property
     def closest(self) -> float:
         """Least distance from an eye at which things count, metres; see `_nearest`."""
-        return max(self.room / 2.0, self.near if self.setback == 0.0 else 0.0)
+        return max(self.cell_radius / 2.0, self.near if self.setback == 0.0 else 0.0)
 
     @property
     def hides_from(self) -> float:
         """Depth from which on things hide what is behind them, metres: nearer ones not from all eyes; 0 for one eye."""
-        return self.setback + _OPEN * self.room
+        return self.setback + _OPEN * self.cell_radius
 
     def pixel_gain(self, points: NDArray[np.float64]) -> NDArray[np.float64] | float:
         """Pixels ``(...)`` of what is at points ``(..., 3)`` for each that it has as seen from the position.
@@ -204,9 +204,9 @@ class Camera:
     def _nearest(self, distance: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distances from the nearest of the eyes, given those from the one in the middle, metres.
 
-        Within their room nobody knows: half of it is as near as it comes to what is not grazed.
+        Within the cell nobody knows: half of its radius is as near as it comes to what is not grazed.
         """
-        return np.maximum(distance - self.room, self.closest)
+        return np.maximum(distance - self.cell_radius, self.closest)
 
     def extent_around(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Metres (n,) that one pixel spans at points (n, 3), in view or not.
@@ -216,7 +216,7 @@ class Camera:
         extent = self.pixel_extent(points)
         if self.kind == "PERSP":
             away = np.linalg.norm(points - self.eye, axis=-1)
-            extent = np.maximum(extent, self.pixel_size * (away - self.room))
+            extent = np.maximum(extent, self.pixel_size * (away - self.cell_radius))
         return extent
 
 
@@ -246,8 +246,8 @@ def blur_margins(camera: Camera, centre: NDArray[np.float64], reach: NDArray[np.
         return 0.0, 0.0
     depth = _depths(camera, centre)
     near, far = camera.near - camera.setback, camera.far - camera.setback
-    nearest = np.maximum(depth - reach - camera.room, camera.closest)
-    farthest = np.maximum(np.minimum(depth + reach + camera.room, far), camera.closest)
+    nearest = np.maximum(depth - reach - camera.cell_radius, camera.closest)
+    farthest = np.maximum(np.minimum(depth + reach + camera.cell_radius, far), camera.closest)
     ahead = (depth + reach > near) & (depth - reach < far)
     radius = np.maximum(circle_of_confusion(camera, nearest), circle_of_confusion(camera, farthest))
     metres = radius if camera.kind == "ORTHO" else radius * farthest

@@ -146,9 +146,9 @@ def cell_camera(camera: Camera, cells: ViewCells, around: Around | None = None) 
         beyond = np.abs((other.position - eye) @ frame) > reach
         if beyond.any() or not turns.holds(other.frame, 0.5 + BEYOND_TURN):
             return None
-    room = float(np.linalg.norm(steps) / 2.0)
+    radius = float(np.linalg.norm(steps) / 2.0)
     lens, focus = _lens_of_cell(camera)
-    alike = replace(camera, position=eye, frame=frame, room=room, shutter=(), lens_radius=lens, focus=focus)
+    alike = replace(camera, position=eye, frame=frame, cell_radius=radius, shutter=(), lens_radius=lens, focus=focus)
     if camera.kind == "PANO":
         return alike
     corners = [turns.frame((0.5 + BEYOND_TURN) * np.array(away)) for away in product((-1.0, 1.0), repeat=3)]

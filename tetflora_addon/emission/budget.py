@@ -27,7 +27,7 @@ BYTES_PER_POLYGON = 610
 BYTES_PER_SPHERE = 210
 #: Expected numbers are means; so much of the budget is kept back.
 _RESERVE = 0.06
-#: Share of the budget that facets may take before real leaves get theirs.
+#: Fraction of the budget that facets may take before real leaves get theirs.
 _FACETS_FIRST = 0.5
 _STEPS = 12  # of bisection on the logarithm of the facets' side, between 1 and:
 _LARGEST = 64.0
@@ -88,7 +88,7 @@ def _fitted(
 ) -> tuple[Refinement, float]:
     """Decisions and a side of facets, no less than the one given; a facet counts as ``weight`` polygons."""
     explicit = result.decision == Decision.EXPLICIT
-    polygons = np.where(explicit, result.amounts.polygons, 0.0)
+    polygons = np.where(explicit, result.totals.polygons, 0.0)
 
     count = _Facets(flora, result, camera) if faces is None else None
     fixed = None if faces is None else faces + _large(result)
@@ -117,7 +117,7 @@ def _fitted(
 def _large(result: Refinement) -> NDArray[np.float64]:
     """Polygons (cells,) that stay as they are although their cell is a proxy."""
     contents = result.contents
-    large = np.isinf(contents.polygons.amounts.width)
+    large = np.isinf(contents.polygons.totals.width)
     return np.bincount(contents.polygons.cell[large], minlength=len(result.tree))[result.nodes].astype(np.float64)
 
 

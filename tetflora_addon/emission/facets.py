@@ -22,7 +22,7 @@ from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.branches import Branches
 from ..proxies.facet_sizes import HIDDEN_LEAVES, coarseness, piece_facet_sizes, subplant_facet_sizes
-from ..proxies.facet_weights import facet_shares
+from ..proxies.facet_weights import facet_weights
 from ..proxies.microsurfaces import Facets, concatenate_facets, kept_out_of_view, piece_facets, subplant_facets
 from ..refinement.contents import Contents
 from ..refinement.decisions import Decision
@@ -96,7 +96,7 @@ def _facets(
     contents = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN) | explicit)
     if transition is not None:
         contents = _in_detail(contents, explicit, result.in_view & ~hidden, transition)
-    shares, coarse = facet_shares(flora), coarseness(result)
+    weights, coarse = facet_weights(flora), coarseness(result)
     every = []
     for things, cell, row, sizes, fraction_of, make in (
         (
@@ -104,7 +104,7 @@ def _facets(
             contents.subplants.cell,
             contents.subplants.items.row,
             subplant_facet_sizes(flora, contents, camera, coarse),
-            shares.of_subplants,
+            weights.of_subplants,
             _of_subplants,
         ),
         (
@@ -112,7 +112,7 @@ def _facets(
             contents.pieces.cell,
             contents.pieces.items.branches.row,
             piece_facet_sizes(flora, contents, camera, coarse),
-            shares.of_pieces,
+            weights.of_pieces,
             _of_pieces,
         ),
     ):
@@ -225,7 +225,7 @@ def _runs(expected: NDArray[np.float64], chosen: NDArray[np.int64]) -> Iterator[
         yield chosen[run]
 
 
-#: Least share of a facet's area that its sphere covers, where the facet is seen from its edge.
+#: Least fraction of a facet's area that its sphere covers, where the facet is seen from its edge.
 LEAST_COVER = 0.1
 #: Mean of |cos| over all directions.
 MEAN_COVER = 0.5
@@ -262,14 +262,14 @@ def spheres(parts: Sequence[tuple[Facets, bool]], camera: Camera, disc: float = 
 
 
 def cover_of(facets: Facets, camera: Camera | None) -> NDArray[np.float64]:
-    """Share (n,) of a facet's area that its sphere covers; without a camera, the mean over all directions."""
+    """Fraction (n,) of a facet's area that its sphere covers; without a camera, the mean over all directions."""
     if camera is None:
         return np.full(len(facets), MEAN_COVER)
     return np.maximum(facing(facets, camera), LEAST_COVER)
 
 
 def facing(facets: Facets, camera: Camera) -> NDArray[np.float64]:
-    """Share (n,) of its area that each facet shows to the camera, 0 to 1."""
+    """Fraction (n,) of its area that each facet shows to the camera, 0 to 1."""
     if camera.kind == "ORTHO":
         return np.abs(facets.normal @ camera.frame[:, 2])
     ray = facets.centre - camera.eye

@@ -29,7 +29,7 @@ from ..refinement.lights import Light
 from ..refinement.loop import Refinement
 
 #: Longer side in pixels of the sky's buffers, for each pixel of a lamp's: what comes from all sides has no edges.
-SKY_SHARE = 0.1
+SKY_FRACTION = 0.1
 #: Its limits, pixels, of clouds alone and of sheets.
 SKY_PIXELS, SKY_SHEET_PIXELS = (32, 96), (32, 384)
 #: Sheets that stand in the sky's light at most, each for several: it comes from all sides, and details drown in it.
@@ -60,7 +60,7 @@ def shadow_steps(
     occluders : (t, 3, 3) float64, optional
         Triangles of opaque polygons, metres.
     resolution : int
-        Longer side of a lamp's buffer, pixels; see `light_resolution`. The sky's are `SKY_SHARE` of it.
+        Longer side of a lamp's buffer, pixels; see `light_resolution`. The sky's are `SKY_FRACTION` of it.
     ground : (3,) float
         Mean colour of the polygons, which lights crowns from below.
     orders : int
@@ -75,7 +75,7 @@ def shadow_steps(
     Yields
     ------
     float
-        Share that is done.
+        Fraction that is done.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def shadow_steps(
         yield 0.3 * (number + 1) / len(split)
     fewer, number = sheets.thinned(SKY_SHEETS)
     # Between sheets there are gaps that coarse pixels do not see.
-    fine = fewer.pixels(SKY_SHEET_PIXELS) if len(sheets) else int(np.clip(resolution * SKY_SHARE, *SKY_PIXELS))
+    fine = fewer.pixels(SKY_SHEET_PIXELS) if len(sheets) else int(np.clip(resolution * SKY_FRACTION, *SKY_PIXELS))
     sky: list[LightBuffer | None] = []
     for towards in DIRECTIONS:
         light = Light("SUN", np.zeros(3), -towards)
@@ -102,8 +102,8 @@ def shadow_steps(
         sky.append(views[0] if views else None)
         yield 0.3 + 0.3 * len(sky) / len(DIRECTIONS)
     found = Illumination(clouds, sheets, lamps, sky, world, (fewer, number))
-    for share in found.scatter(np.asarray(ground, np.float64), max(orders, 1)):
-        yield 0.6 + 0.4 * share
+    for fraction in found.scatter(np.asarray(ground, np.float64), max(orders, 1)):
+        yield 0.6 + 0.4 * fraction
     return found
 
 

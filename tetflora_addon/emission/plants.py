@@ -7,9 +7,9 @@ time are held in memory. Proxies have files of their own: `facet_emission` and `
 
 Where leaves are neither all real nor all facets: a band of sizes in which a number of each leaf's own decides.
 
-A leaf whose width in pixels is below the limit is a facet, one that is wider by `BAND` is real, and in between a share
-of them is real that grows with the width. Real leaves and facets are thinned out by hashes of their own keys: what has
-become real stays real as the camera comes closer, nothing pops, and the area is the same on average.
+A leaf whose width in pixels is below the limit is a facet, one that is wider by `BAND` is real, and in between
+a fraction of them is real that grows with the width. Real leaves and facets are thinned out by hashes of their own
+keys: what has become real stays real as the camera comes closer, nothing pops, and the area is the same on average.
 
 Wood goes by its own width or that of the leaves on it, whichever is larger: a trunk is a tube even among leaves that
 are too small to be seen.
@@ -44,7 +44,7 @@ BAND = 2.5
 
 @dataclass(frozen=True)
 class Transition:
-    """Shares of leaves and wood that are real.
+    """Fractions of leaves and wood that are real.
 
     Attributes
     ----------
@@ -58,16 +58,16 @@ class Transition:
     camera: Camera
     limit: float
 
-    def share(self, width: NDArray[np.float64], position: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Share (n,) of things of so many metres (n,) at places (n, 3) that is real: a smooth step in the logarithm."""
+    def fraction(self, width: NDArray[np.float64], position: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Real fraction (n,) of things of a width (n,) in metres at places (n, 3): a smooth step in the logarithm."""
         pixels = width / np.maximum(self.camera.extent_around(position), 1e-300)
         place = np.log(np.maximum(pixels, 1e-300) / self.limit) / np.log(BAND)
         place = np.clip(place, 0.0, 1.0)
         return place * place * (3.0 - 2.0 * place)
 
     def of_branches(self, branches: Branches) -> NDArray[np.float64]:
-        """Share (n,) of the leaves of sub-plants, and of their wood; of leafless ones by the base of their branch."""
-        return self.share(self._width(branches), branches.position)
+        """Real fraction (n,) of the leaves and the wood of sub-plants; of leafless ones by the base of their branch."""
+        return self.fraction(self._width(branches), branches.position)
 
     def of_wood(self, pieces: Pieces, among_leaves: bool = True) -> NDArray[np.bool_]:
         """Pieces (n,) whose wood is real; with or without regard to the leaves that grow on their branch."""
@@ -80,7 +80,7 @@ class Transition:
     def _kept(self, branches: Branches, position: NDArray[np.float64], among_leaves: bool) -> NDArray[np.bool_]:
         own = 2.0 * branches.radius
         width = np.maximum(own, self._width(branches)) if among_leaves else own
-        return uniform(branches.key, Draw.TRANSITION) < self.share(width, position)
+        return uniform(branches.key, Draw.TRANSITION) < self.fraction(width, position)
 
     def _width(self, branches: Branches) -> NDArray[np.float64]:
         row = branches.row
@@ -103,7 +103,7 @@ class Block:
         Of the block, front to back.
     buffers : MeshBuffers
     fraction : float
-        Share of all polygons that is done with this block.
+        Fraction of all polygons that is done with this block.
     """
 
     kind: str
@@ -120,7 +120,7 @@ def explicit_blocks(flora: Flora, result: Refinement, transition: Transition | N
     With a transition, leaves that are small all the same are left to facets, by a number of each one's own.
     """
     explicit = result.decision == Decision.EXPLICIT
-    nodes, rank, polygons = result.nodes, result.rank, np.where(explicit, result.amounts.polygons, 0.0)
+    nodes, rank, polygons = result.nodes, result.rank, np.where(explicit, result.totals.polygons, 0.0)
     wood = Contents() if transition is None else _thick_wood(result, transition)
     number_of = np.full(len(result.tree), -1, dtype=np.int64)
     number_of[nodes] = np.arange(len(nodes))
@@ -170,12 +170,12 @@ def _block(
     bare = Pieces.empty() if bare is None else bare
     of_pieces, of_bare = flora.species_of(pieces.branches.row), flora.species_of(bare.branches.row)
     of_stems = [flora.species_of(some.branches.row) for some in stems]
-    share_of = None if transition is None else transition.of_branches
+    fraction_of = None if transition is None else transition.of_branches
     made: list[tuple[str, int, int, MeshBuffers | None]] = []
     for s in np.unique(np.concatenate([of_pieces, of_bare, *of_stems])):
         cut = pieces.take(of_pieces == s)
         whole = [some.take(species == s) for some, species in zip(stems, of_stems, strict=True)]
-        leaves = leaf_meshes(flora, cut, int(s), whole, share_of)
+        leaves = leaf_meshes(flora, cut, int(s), whole, fraction_of)
         made += [(LEAF_KINDS[m.kind], m.form, int(s), m.buffers) for m in leaves]
         if transition is not None:
             cut = cut.take(transition.of_wood(cut))

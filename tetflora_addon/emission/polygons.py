@@ -29,7 +29,7 @@ from ..proxies.microsurfaces import Facets, kept_out_of_view
 from ..refinement.contents import Contents
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
-from ..refinement.polygons import Polygons, shares
+from ..refinement.polygons import Polygons, area_fractions
 from ..subplants.pieces import chunks
 
 #: Attributes by their numbers of components; a fourth and further ones are none that a mesh could hold.
@@ -51,7 +51,7 @@ class PolygonBlock:
     buffers : MeshBuffers
         ``material_index`` is the surface's slot.
     fraction : float
-        Share of all polygons that is done with this block.
+        Fraction of all polygons that is done with this block.
     """
 
     surface: int
@@ -76,7 +76,7 @@ def polygon_blocks(result: Refinement, camera: Camera, facet_pixels: float | Non
     cell = contents.polygons.cell
     kept = ~result.chosen(Decision.PROXY, Decision.HIDDEN)[cell]
     if facet_pixels is None:
-        kept |= ~np.isfinite(contents.polygons.amounts.width)
+        kept |= ~np.isfinite(contents.polygons.totals.width)
     else:
         sizes = polygon_facet_sizes(contents, camera, result.chosen(Decision.HIDDEN))
         kept |= sizes.kept(facet_pixels)
@@ -103,7 +103,7 @@ def mended(polygons: Polygons) -> Polygons:
     key = polygons.instance[cut].astype(np.int64) * len(meshes.face_size) + polygons.face[cut]
     _, first, number = np.unique(key, return_index=True, return_inverse=True)
     number = number.reshape(-1)
-    there = np.bincount(number, shares(polygons.weights)[polygons.part[cut]])
+    there = np.bincount(number, area_fractions(polygons.weights)[polygons.part[cut]])
     complete = there >= meshes.face_size[polygons.face[cut[first]]] - 2 - _WHOLE
     part = polygons.part.copy()
     part[cut[complete[number]]] = -1
@@ -246,9 +246,9 @@ def chosen_facets(polygons: Polygons, optical: NDArray[np.float64], side: NDArra
         Of facets, metres. Their number is a matter of chance; its expectation is the area over that of a facet.
     """
     meshes = polygons.meshes
-    owner, triangle, share = polygons.triangles()
+    owner, triangle, fraction = polygons.triangles()
     vector = meshes.vectors(triangle, polygons.instance[owner])
-    own = share * np.linalg.norm(vector, axis=1)
+    own = fraction * np.linalg.norm(vector, axis=1)
     of_polygon = np.bincount(owner, own, len(polygons))
     rate = optical / (np.maximum(of_polygon, 1e-300) * np.maximum(side, 1e-12) ** 2)
     key = _keys(polygons, owner)

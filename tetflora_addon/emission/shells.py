@@ -126,7 +126,7 @@ def shell_buffers(
     colour : (n, 3) float
         Mean colour of the contents, linear.
     transmission : (n,) float
-        Share of the scattered light that passes through the sheets, 0 to 1.
+        Fraction of the scattered light that passes through the sheets, 0 to 1.
     S : (n, 6) float
         (Sxx, Syy, Szz, Sxy, Sxz, Syz) with κ(ω) = √(ωᵀSω), 1/m².
     normal : (n, 3) float
@@ -243,7 +243,7 @@ def proxy_shells(flora: Flora, result: Refinement, light: BakedLight | None = No
     index[nodes] = np.arange(len(nodes))
     contents = result.contents
     # Large polygons are drawn as they are; a fog in their place would be no wall.
-    fine = np.isfinite(contents.polygons.amounts.width)
+    fine = np.isfinite(contents.polygons.totals.width)
     if not fine.all():
         contents = replace(contents, polygons=contents.polygons.take(fine))
     summaries = summarise(flora, contents, index, len(nodes))

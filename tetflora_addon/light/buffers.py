@@ -24,7 +24,7 @@ from ..refinement.visibility import OPAQUE
 BIAS = 1.5
 #: Points that are looked up together; some 500 bytes each.
 POINTS_AT_ONCE = 1 << 18
-#: Parts along each side of a sheet at most, and the share of a pixel that one covers at most.
+#: Parts along each side of a sheet at most, and the fraction of a pixel that one covers at most.
 _MOST_CUTS, _MOST_COVERED = 64, 0.98
 
 
@@ -53,7 +53,7 @@ class LightBuffer:
     occluders : (t, 3, 3) float64, optional
         Opaque triangles, metres.
     sheets : (m, 4, 3) float64, optional
-        Corners of opaque facets or leaves, which count by the share of each pixel that they cover. They are owners
+        Corners of opaque facets or leaves, which count by the fraction of each pixel that they cover. They are owners
         n to n + m − 1, after the tetrahedra.
     """
 
@@ -109,7 +109,7 @@ class LightBuffer:
     def _sheet_fragments(self, sheets: NDArray[np.float64]) -> Iterator[tuple[NDArray, ...]]:
         """Owner, pixel, entry, thickness 0 and optical depth of sheets, those of about the same size at a time.
 
-        A sheet that covers the share c of a pixel lets 1 − c through: its optical depth is −ln (1 − c).
+        A sheet that covers the fraction c of a pixel lets 1 − c through: its optical depth is −ln (1 − c).
         """
         across = self.camera.pixel_size * self.camera.width / self.width
         seen = np.flatnonzero(self._near_view(sheets, 2.0 * across))
@@ -135,19 +135,19 @@ class LightBuffer:
             x = (np.arange(count) + 0.5) / count
             u, v = np.repeat(x, count), np.tile(x, count)
             weights = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=1)
-            share_of_part = covered / count**2
+            part_covers = covered / count**2
             alike, step = np.flatnonzero(cuts == count), max(POINTS_AT_ONCE // int(count) ** 2, 1)
             for start in range(0, len(alike), step):
                 some = alike[start : start + step]
                 points = np.einsum("kc,mcx->mkx", weights, sheets[some]).reshape(-1, 3)
-                owner, pixel, metres, share = self._gathered_parts(points, np.repeat(some, count**2), share_of_part)
-                depth = -np.log1p(-np.minimum(share, _MOST_COVERED))
+                owner, pixel, metres, fraction = self._gathered_parts(points, np.repeat(some, count**2), part_covers)
+                depth = -np.log1p(-np.minimum(fraction, _MOST_COVERED))
                 yield numbers[owner].astype(np.int32), pixel.astype(np.int32), metres, np.zeros(len(owner)), depth
 
     def _gathered_parts(
         self, points: NDArray[np.float64], owner: NDArray[np.int64], covered: NDArray[np.float64]
     ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-        """Parts of sheets by sheet and nearest pixel: both (f,), their mean distance (f,), and what share they cover.
+        """Parts of sheets by sheet and nearest pixel: both (f,), mean distance (f,), and the fraction that they cover.
 
         Parts are at ``points`` (m, 3), of sheets ``owner`` (m,); each of sheet i covers ``covered[i]`` of a pixel.
         """
@@ -157,9 +157,9 @@ class LightBuffer:
         key, first, own = np.unique(
             owner * (self.width * self.height) + nearest, return_index=True, return_inverse=True
         )
-        share = np.bincount(own.ravel(), covered[owner], len(key))
+        fraction = np.bincount(own.ravel(), covered[owner], len(key))
         metres = np.bincount(own.ravel(), taps.metres, len(key)) / np.maximum(np.bincount(own.ravel()), 1)
-        return owner[first], nearest[first], metres, share
+        return owner[first], nearest[first], metres, fraction
 
     def _near_view(self, sheets: NDArray[np.floating], margin: float) -> NDArray[np.bool_]:
         """Which sheets (m,) may reach into a sun's view, which may be a part of the scene; of other lights all."""
@@ -183,7 +183,7 @@ class LightBuffer:
     def transmittance(
         self, points: NDArray[np.float64], cells: NDArray[np.integer], own_depth: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Share of the light that arrives at points.
+        """Fraction of the light that arrives at points.
 
         Parameters
         ----------
@@ -243,8 +243,8 @@ class LightBuffer:
         for start in range(0, len(points), POINTS_AT_ONCE):
             taps, inside = self._taps(points[start : start + POINTS_AT_ONCE])
             place, found = self._last_before(taps)
-            share = np.exp(-(self._up_to(place, taps) - self._before[place]))[..., None]
-            light = arriving[place] * share + emitted[place] * (1.0 - share)
+            through = np.exp(-(self._up_to(place, taps) - self._before[place]))[..., None]
+            light = arriving[place] * through + emitted[place] * (1.0 - through)
             light = np.where(found[..., None], light, 0.0) * taps.weight[..., None]
             result[np.flatnonzero(inside) + start] = light.sum(axis=1)
         return result
@@ -288,7 +288,7 @@ class LightBuffer:
         inside = ahead & (place >= -1e-9).all(axis=1) & (place <= size + 1e-9).all(axis=1)
         place = place[inside] - 0.5
         low = np.floor(place)
-        share = place - low
+        fraction = place - low
         metres = depth[inside] if self.camera.kind == "ORTHO" else np.linalg.norm(local[inside], axis=1)
         pixels, weights = [], []
         for up in (0, 1):
@@ -296,7 +296,7 @@ class LightBuffer:
                 column = np.clip(low[:, 0] + aside, 0, self.width - 1).astype(np.int64)
                 row = np.clip(low[:, 1] + up, 0, self.height - 1).astype(np.int64)
                 pixels.append(row * self.width + column)
-                weights.append(np.abs(1 - aside - share[:, 0]) * np.abs(1 - up - share[:, 1]))
+                weights.append(np.abs(1 - aside - fraction[:, 0]) * np.abs(1 - up - fraction[:, 1]))
         return _Taps(np.stack(pixels, axis=1), np.stack(weights, axis=1), metres), inside
 
     def _last_before(self, taps: _Taps) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:

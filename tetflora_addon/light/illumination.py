@@ -31,11 +31,11 @@ from .scattering import (
     irradiance,
     particle_ambient,
     particle_direct,
-    scattered_shares,
+    scattered_fractions,
 )
 from .sources import World, arriving, to_eye
 
-#: Greatest share of an order that the next one has: 1 would never end.
+#: Greatest fraction of an order that the next one has: 1 would never end.
 _MOST_AGAIN = 0.97
 #: Facets that are shaded together; some 1 kB each.
 _AT_ONCE = 1 << 16
@@ -159,7 +159,7 @@ class Illumination:
         colour : (m, 3) float64
             Linear RGB.
         transmission : (m,) float64
-            Share of the scattered light that goes through; 0 for bark.
+            Fraction of the scattered light that goes through; 0 for bark.
         cells : (m,) int
             As for `direct`.
         camera : Camera, optional
@@ -175,12 +175,12 @@ class Illumination:
         front, back = np.zeros((2, len(centre), 3), np.float32)
         for start in range(0, len(centre), _AT_ONCE):
             part = slice(start, start + _AT_ONCE)
-            shares = scattered_shares(colour[part], transmission[part])
+            fractions = scattered_fractions(colour[part], transmission[part])
             view = None if camera is None else to_eye(camera, centre[part])
-            sides = facet_ambient(normal[part], shares, self.around(centre[part], cells[part]), view)
+            sides = facet_ambient(normal[part], fractions, self.around(centre[part], cells[part]), view)
             on = None if sheets is None else sheets[part]
             for towards, light in self.direct(centre[part], cells[part], on):
-                added = facet_direct(normal[part], shares, towards, light, view)
+                added = facet_direct(normal[part], fractions, towards, light, view)
                 sides = sides[0] + added[0], sides[1] + added[1]
             front[part], back[part] = sides
         return front, back
@@ -213,18 +213,18 @@ class Illumination:
         result = np.zeros((len(points), 3), np.float32)
         for start in range(0, len(points), _AT_ONCE):
             part = slice(start, start + _AT_ONCE)
-            shares, view = scattered_shares(colour[part], transmission[part]), to_eye(camera, points[part])
+            fractions, view = scattered_fractions(colour[part], transmission[part]), to_eye(camera, points[part])
             around = self.around(points[part], cells[part])
-            particles, planes = particle_ambient(shares, around, view), 0.0
+            particles, planes = particle_ambient(fractions, around, view), 0.0
             if plane is not None:
                 axis = normal[part]
                 axis = axis * np.where(np.sum(axis * view, axis=1) < 0.0, -1.0, 1.0)[:, None]
-                planes = facet_ambient(axis, shares, around, view)[0]
+                planes = facet_ambient(axis, fractions, around, view)[0]
             on = None if sheets is None else sheets[part]
             for towards, light in self.direct(points[part], cells[part], on):
-                particles += particle_direct(shares, towards, light, view)
+                particles += particle_direct(fractions, towards, light, view)
                 if plane is not None:
-                    planes = planes + facet_direct(axis, shares, towards, light, view)[0]
+                    planes = planes + facet_direct(axis, fractions, towards, light, view)[0]
             weight = 0.0 if plane is None else plane[part][:, None]
             result[part] = (1.0 - weight) * particles + weight * planes
         return result
@@ -260,7 +260,7 @@ class Illumination:
         Yields
         ------
         float
-            Share that is done.
+            Fraction that is done.
         """
         count = len(self.clouds)
         points, cells, sheets, keys = self.sheets.samples(self.clouds)
@@ -284,20 +284,20 @@ class Illumination:
             before, every = last, keys.means(self._from_clouds(points))
             last, gathered = every - gathered, every
             if order == orders - 1:
-                share = self._again(fluence(before), fluence(last))
-                gathered = gathered + last * (share / (1.0 - share))
+                fraction = self._again(fluence(before), fluence(last))
+                gathered = gathered + last * (fraction / (1.0 - fraction))
             yield (order + 2.0) / (orders + 1)
         passing = keys.by_cell(first + fluence(gathered))
         self._shine(self.clouds.albedo * passing / (4.0 * np.pi))
         self.ambient[:] = (sky + gathered).reshape(count, 4, HARMONICS, 3)
 
     def _again(self, before: NDArray[np.float64], last: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Share (3,) of one order of scattering that the next will have, from two of them: means over all surfaces."""
+        """Ratio (3,) of each further order of scattering to the one before, from two: means over all surfaces."""
         c = self.clouds
         weight = np.repeat(np.sqrt(np.maximum(c.matrices[:, :3].sum(axis=1), 0.0)) * volume(c.vertices), 4)
         former = weight @ before
-        share = (weight @ last) / np.where(former > 0.0, former, np.inf)
-        return np.clip(share, 0.0, _MOST_AGAIN)
+        fraction = (weight @ last) / np.where(former > 0.0, former, np.inf)
+        return np.clip(fraction, 0.0, _MOST_AGAIN)
 
     def _through(
         self,
@@ -322,7 +322,7 @@ class Illumination:
     def _from_sky(
         self, points: NDArray[np.float64], cells: NDArray[np.integer], sheets: NDArray[np.integer] | None = None
     ) -> NDArray[np.float64]:
-        """Light of the sky (m, 9, 3) that nothing holds up."""
+        """Light of the sky (m, 9, 3) that nothing blocks."""
         result = np.zeros((len(points), HARMONICS, 3))
         if self._world.dark:
             return result

@@ -69,7 +69,7 @@ class Clouds:
         """
         nodes, contents = refinement.nodes, refinement.contents
         # Large polygons are walls, not fog: they come as occluders.
-        fine = np.isfinite(contents.polygons.amounts.width)
+        fine = np.isfinite(contents.polygons.totals.width)
         if not fine.all():
             contents = replace(contents, polygons=contents.polygons.take(fine))
         summaries = summarise(flora, contents, cell_of_node(refinement), len(nodes))
@@ -97,7 +97,7 @@ class Clouds:
 
     @cached_property
     def albedo(self) -> NDArray[np.float64]:
-        """Share (n, 3) of the light that is scattered again."""
+        """Fraction (n, 3) of the light that is scattered again."""
         return albedo(self.colour, self.transmission)
 
     def extinction(self, directions: NDArray[np.float64], cells: NDArray | slice = slice(None)) -> NDArray[np.float64]:

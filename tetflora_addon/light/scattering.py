@@ -7,7 +7,7 @@ Hanrahan, "An Efficient Representation for Irradiance Environment Maps", 2001).
 
 What leaves, bark and clouds of them send to the eye of the light that arrives (paper, section 7).
 
-A facet is a sheet that scatters as the material of proxies does: evenly over the side of the light or, for the share
+A facet is a sheet that scatters as the material of proxies does: evenly over the side of the light or, for the fraction
 of its transmission, over the other side, with a little gloss. A cloud is the paper's blend of a particle term and a
 plane term, in the forms of `docs/architecture.md`. All radiances are such that light of radiance 1 from all sides gives
 what is white a radiance of 1.
@@ -98,14 +98,14 @@ def nearest_direction(directions: NDArray[np.float64]) -> NDArray[np.intp]:
 #: Light that has passed through a leaf lost more of its blue than light that was reflected: chlorophyll and carotenoids
 #: absorb on the whole way. Products over 1 are cut off.
 THROUGH_TINT = np.array([1.15, 1.1, 0.55])
-#: Share of the waxy surface's own, colourless reflection (4 % at a refractive index of 1.5), and its roughness.
+#: Fraction of the waxy surface's own, colourless reflection (4 % at a refractive index of 1.5), and its roughness.
 GLOSS, GLOSS_ROUGHNESS = 0.04, 0.6
 
 
-def scattered_shares(
+def scattered_fractions(
     colour: NDArray[np.float64], transmission: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Shares of light that sheets reflect (n, 3) and let through (n, 3) diffusely, and that they mirror (n,)."""
+    """Fractions of light that sheets reflect (n, 3) and let through (n, 3) diffusely, and that they mirror (n,)."""
     through = transmission[:, None]
     gloss = np.where(transmission > 0.0, GLOSS, 0.0)
     rest = (1.0 - gloss)[:, None]
@@ -113,8 +113,8 @@ def scattered_shares(
 
 
 def albedo(colour: NDArray[np.float64], transmission: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Share (n, 3) of light that sheets scatter in any way."""
-    reflected, through, gloss = scattered_shares(colour, transmission)
+    """Fraction (n, 3) of light that sheets scatter in any way."""
+    reflected, through, gloss = scattered_fractions(colour, transmission)
     return reflected + through + gloss[:, None]
 
 
@@ -140,7 +140,7 @@ _PHASE_BANDS = _bands()
 
 def facet_direct(
     normal: NDArray[np.float64],
-    shares: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    fractions: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
     towards: NDArray[np.float64],
     arriving: NDArray[np.float64],
     view: NDArray[np.float64] | None = None,
@@ -151,8 +151,8 @@ def facet_direct(
     ----------
     normal : (n, 3) float64
         Unit normals; the front is where they point.
-    shares : tuple
-        Of `scattered_shares`.
+    fractions : tuple
+        Of `scattered_fractions`.
     towards, arriving : (n, 3) float64
         Unit vectors to the light; W/m² on a surface that faces it.
     view : (n, 3) float64, optional
@@ -162,7 +162,7 @@ def facet_direct(
     -------
     front, back : (n, 3) float64
     """
-    reflected, through, gloss = shares
+    reflected, through, gloss = fractions
     cosine = np.sum(normal * towards, axis=1)
     same = reflected * arriving / np.pi * np.abs(cosine)[:, None]
     other = through * arriving / np.pi * np.abs(cosine)[:, None]
@@ -174,12 +174,12 @@ def facet_direct(
 
 def facet_ambient(
     normal: NDArray[np.float64],
-    shares: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    fractions: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
     light: NDArray[np.float64],
     view: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Radiance of the front and the back of facets (n, 3 each) by light from all sides, as harmonics (n, 9, 3)."""
-    reflected, through, gloss = shares
+    reflected, through, gloss = fractions
     front, back = irradiance(light, normal) / np.pi, irradiance(light, -normal) / np.pi
     if view is None:
         mirrored = front, back
@@ -214,25 +214,25 @@ def _mirrored(
 
 
 def particle_direct(
-    shares: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    fractions: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
     towards: NDArray[np.float64],
     arriving: NDArray[np.float64],
     view: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Radiance (n, 3) of a thick cloud of sheets that face all ways, by one light; the gloss goes all ways as well."""
-    reflected, through, gloss = shares
+    reflected, through, gloss = fractions
     cosine = np.sum(towards * view, axis=1)
     phase = reflected * sphere_phase(cosine)[:, None] + through * sphere_phase(-cosine)[:, None]
     return (phase + gloss[:, None] / (4.0 * np.pi)) * arriving
 
 
 def particle_ambient(
-    shares: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    fractions: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
     light: NDArray[np.float64],
     view: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Radiance (n, 3) of such a cloud by light from all sides, as harmonics (n, 9, 3)."""
-    reflected, through, gloss = shares
+    reflected, through, gloss = fractions
     basis = harmonics(view)
     result = np.zeros_like(reflected)
     for band in range(3):

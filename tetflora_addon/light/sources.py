@@ -23,7 +23,7 @@ from .scattering import DIRECTIONS, HARMONICS, harmonics, nearest_direction
 AREA_POINTS = 3
 #: Points (evenly spread) by which the sky is read.
 SKY_POINTS = 1 << 14
-#: Share of a spot's cosine range over which it fades at least, as in Cycles: none has an edge without width.
+#: Fraction of a spot's cosine range over which it fades at least, as in Cycles: none has an edge without width.
 _LEAST_BLEND = 1e-3
 
 
@@ -86,8 +86,8 @@ def arriving(light: Light, points: NDArray[np.float64]) -> tuple[NDArray[np.floa
         falloff = falloff * np.maximum(ahead, 0.0)
     elif light.kind == "SPOT":
         edge = np.cos(light.angle)
-        share = np.clip((ahead - edge) / max((1.0 - edge) * light.blend, _LEAST_BLEND), 0.0, 1.0)
-        falloff = falloff * share * share * (3.0 - 2.0 * share)
+        fraction = np.clip((ahead - edge) / max((1.0 - edge) * light.blend, _LEAST_BLEND), 0.0, 1.0)
+        falloff = falloff * fraction * fraction * (3.0 - 2.0 * fraction)
     return towards, falloff[:, None] * light.colour
 
 

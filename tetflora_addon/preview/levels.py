@@ -44,7 +44,7 @@ class Level:
     decision : (t,) int8
         `Decision`; in all levels but the last some are still to be divided.
     visibility : (t,) float32
-        Share of each one's light that nothing in front holds up; 0 out of view.
+        Fraction of each one's light that nothing in front blocks; 0 out of view.
     contribution : (t,) float32
         Pixels of the picture that its contents change.
     extinction : (t,) float32
@@ -161,7 +161,7 @@ def thinned(levels: list[Level]) -> list[Level]:
 
 def _level(flora: Flora, state: Refinement) -> Level:
     tree, nodes = state.tree, state.nodes
-    extinction = mean_extinction(state.amounts, volume(tree.vertices(nodes)))
+    extinction = mean_extinction(state.totals, volume(tree.vertices(nodes)))
     return Level(
         nodes=nodes.astype(np.int32),
         depth=tree.level[nodes].copy(),
@@ -182,18 +182,18 @@ def mean_colours(flora: Flora, contents: Contents, nodes: NDArray[np.integer], s
     """
     row, piece_row = contents.subplants.items.row, contents.pieces.items.branches.row
     parts = []
-    for cells, amounts, leaf, wood in (
-        (contents.subplants.cell, contents.subplants.amounts, flora.leaf_colours, flora.wood_colour[row]),
-        (contents.pieces.cell, contents.pieces.amounts, None, flora.rows["branch_colour"][piece_row, 0]),
+    for cells, totals, leaf, wood in (
+        (contents.subplants.cell, contents.subplants.totals, flora.leaf_colours, flora.wood_colour[row]),
+        (contents.pieces.cell, contents.pieces.totals, None, flora.rows["branch_colour"][piece_row, 0]),
     ):
         if len(cells) == 0:
             continue
         leaves = leaf(contents.subplants.items) if leaf else piece_leaf_colours(flora, contents.pieces.items)
-        parts += [(cells, amounts.leaf_area, leaves), (cells, amounts.wood_area / 2, wood)]
+        parts += [(cells, totals.leaf_area, leaves), (cells, totals.wood_area / 2, wood)]
     if len(contents.polygons.cell):
-        polygons, amounts = contents.polygons.items, contents.polygons.amounts
+        polygons, totals = contents.polygons.items, contents.polygons.totals
         colours = polygons.meshes.colours[polygons.meshes.slot[polygons.face]]
-        parts.append((contents.polygons.cell, amounts.optical_area, colours))
+        parts.append((contents.polygons.cell, totals.optical_area, colours))
     sums, area = np.zeros((size, 3)), np.zeros(size)
     for cells, weight, colours in parts:
         area += np.bincount(cells, weight, size)
@@ -215,9 +215,9 @@ _RAMP = np.array([(0.25, 0.1, 0.45), (0.2, 0.35, 0.75), (0.1, 0.65, 0.65), (0.5,
 _LEAST, _MOST = 0.25, 1_024.0
 
 
-def ramp(share: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Colours (n, 3) for shares (n,), dark violet at 0 over green to bright yellow at 1."""
-    at = np.clip(share, 0.0, 1.0) * (len(_RAMP) - 1)
+def ramp(fraction: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Colours (n, 3) for fractions (n,), dark violet at 0 over green to bright yellow at 1."""
+    at = np.clip(fraction, 0.0, 1.0) * (len(_RAMP) - 1)
     low = np.minimum(at.astype(np.intp), len(_RAMP) - 2)
     return (_RAMP[low] + (_RAMP[low + 1] - _RAMP[low]) * (at - low)[:, None]).astype(np.float32)
 
@@ -229,7 +229,7 @@ def colours_of(level: Level, mode: str, deepest: int) -> NDArray[np.float32]:
     ----------
     level : Level
     mode : {'LEVEL', 'VISIBILITY', 'FORM', 'CONTRIBUTION'}
-        By how often space was divided, by the share that is seen, by what was decided, or by the logarithm of the
+        By how often space was divided, by the fraction that is seen, by what was decided, or by the logarithm of the
         pixels that are changed.
     deepest : int
         Depth that is brightest, so that colours stay while one steps through levels.

@@ -23,11 +23,11 @@ from .levels import as_shown
 MOST_PLANTS = 50_000
 #: Corners of each of a crown's rings.
 SIDES = 4
-#: Heights of the rings, and of the band around each whose leaves say how wide it is, as shares of the crown's height.
+#: Heights of the rings, and of the band around each whose leaves set its width, as fractions of the crown's height.
 _RINGS, _BAND = (0.25, 0.65), 0.2
-#: Share of the leaves that lie below a crown, and above it, and within its rings.
+#: Fraction of the leaves that lie below a crown, and above it, and within its rings.
 _BELOW, _ABOVE, _WITHIN = 0.03, 0.995, 0.85
-#: Where light comes from, and what share of it is there without.
+#: Where light comes from, and what fraction of it is there without.
 _SUN, _SHADE = np.array([-0.45, -0.35, 0.82]), 0.45
 
 
@@ -74,8 +74,8 @@ def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
     low, high, *radii = profile.T
     crown = [np.stack([0 * low, 0 * low, low], axis=1)[:, None]]
     outward = [np.broadcast_to([0.0, 0.0, -1.0], (len(seeds), 1, 3))]
-    for share, radius, up in zip(_RINGS, radii[:2], (-0.1, 0.5), strict=True):
-        height = (low + share * (high - low))[:, None, None] * [0.0, 0.0, 1.0]
+    for fraction, radius, up in zip(_RINGS, radii[:2], (-0.1, 0.5), strict=True):
+        height = (low + fraction * (high - low))[:, None, None] * [0.0, 0.0, 1.0]
         crown.append(radius[:, None, None] * around + height)
         outward.append(np.broadcast_to((around + [0.0, 0.0, up]) / np.hypot(1.0, up), (len(seeds), SIDES, 3)))
     crown.append(np.stack([0 * high, 0 * high, high], axis=1)[:, None])
@@ -126,8 +126,8 @@ def _profile(flora: Flora, row: int) -> NDArray[np.float64]:
     low, high = np.quantile(along, [_BELOW, _ABOVE])
     high = max(high, low + 0.05)
     radii = []
-    for share in _RINGS:
-        band = np.abs((along - low) / (high - low) - share) <= _BAND
+    for fraction in _RINGS:
+        band = np.abs((along - low) / (high - low) - fraction) <= _BAND
         radii.append(np.quantile(across[band] if band.any() else across, _WITHIN))
     return np.array([low, high, *radii])
 

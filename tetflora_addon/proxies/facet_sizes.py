@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
-from ..refinement.contents import Amounts, Contents, bounding_cylinders
+from ..refinement.contents import Contents, Totals, bounding_cylinders
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 
@@ -52,7 +52,7 @@ class FacetSizes:
         How much larger than seen ones facets are; 1 where they are seen.
     clearance : (n,) float64
         Metres from the space that the picture shows; negative within.
-    amounts : Amounts of n
+    totals : Totals of n
     part : (n,) float64
         Which part of a branch, or of a sub-plant, each is.
     """
@@ -62,7 +62,7 @@ class FacetSizes:
     least_wood: NDArray[np.float64]
     coarse: NDArray[np.float64]
     clearance: NDArray[np.float64]
-    amounts: Amounts
+    totals: Totals
     part: NDArray[np.float64]
 
     @property
@@ -73,12 +73,12 @@ class FacetSizes:
     @property
     def whole_optical(self) -> NDArray[np.float64]:
         """Optical area (n,) of the whole of which each is a part, m²."""
-        return self.amounts.optical_area / np.maximum(self.part, 1e-12)
+        return self.totals.optical_area / np.maximum(self.part, 1e-12)
 
     def sides(self, pixels: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Sides (n,), (n,) of facets of leaves and of wood, metres, where those that are seen have so many pixels."""
         side = np.minimum(self.coarse * pixels, max(COARSE * pixels, _WIDEST)) * self.extent
-        blurred = np.minimum(_SOFT * np.maximum(self.clearance, 0.0), np.sqrt(self.amounts.optical_area / _FEWEST))
+        blurred = np.minimum(_SOFT * np.maximum(self.clearance, 0.0), np.sqrt(self.totals.optical_area / _FEWEST))
         unseen = np.maximum(blurred, np.sqrt(HIDDEN_LEAVES * self.one_leaf))
         side = np.where(self.hidden, np.maximum(side, unseen), side)
         # Where nobody looks, wood is cut into no more facets than it has faces. Elsewhere it is cut as fine as the
@@ -90,8 +90,8 @@ class FacetSizes:
         """Expected number (n,) of facets."""
         leaf, wood = self.sides(pixels)
         # Branches are closed: half of their surface is never seen.
-        leaves = self.amounts.leaf_area / np.maximum(leaf, 1e-12) ** 2
-        return leaves + self.amounts.wood_area / 2 / np.maximum(wood, 1e-12) ** 2
+        leaves = self.totals.leaf_area / np.maximum(leaf, 1e-12) ** 2
+        return leaves + self.totals.wood_area / 2 / np.maximum(wood, 1e-12) ** 2
 
 
 @dataclass(frozen=True)
@@ -150,14 +150,14 @@ def coarseness(result: Refinement) -> NDArray[np.float64]:
 
 def polygon_facet_sizes(contents: Contents, camera: Camera, hidden: NDArray[np.bool_]) -> PolygonFacetSizes:
     """Facets of the polygons of contents; ``hidden`` (nodes,) says in which nodes nobody looks."""
-    own, amounts = contents.polygons.items, contents.polygons.amounts
+    own, totals = contents.polygons.items, contents.polygons.totals
     meshes = own.meshes
     return PolygonFacetSizes(
         camera.extent_around(own.centre),
         meshes.face_areas(own.face, own.instance),
         meshes.leaf[own.face],
         hidden[contents.polygons.cell],
-        amounts.optical_area,
+        totals.optical_area,
         meshes.solid[own.face],
     )
 
@@ -165,18 +165,18 @@ def polygon_facet_sizes(contents: Contents, camera: Camera, hidden: NDArray[np.b
 def subplant_facet_sizes(flora: Flora, contents: Contents, camera: Camera, coarse: NDArray[np.float64]) -> FacetSizes:
     """Facets of the sub-plants of contents; ``coarse`` (nodes,) as `coarseness` gives it."""
     own = contents.subplants.items
-    amounts, faces = contents.subplants.amounts, flora.branch_faces(own)
-    least = np.sqrt(amounts.wood_area / 2 / np.maximum(faces, 1))
+    totals, faces = contents.subplants.totals, flora.branch_faces(own)
+    least = np.sqrt(totals.wood_area / 2 / np.maximum(faces, 1))
     place, coarse = bounding_cylinders(flora, own)[0], coarse[contents.subplants.cell]
     extent, away = camera.extent_around(place), camera.clearance(place)
-    return FacetSizes(extent, flora.one_leaf_area(own), least, coarse, away, amounts, np.ones(len(own)))
+    return FacetSizes(extent, flora.one_leaf_area(own), least, coarse, away, totals, np.ones(len(own)))
 
 
 def piece_facet_sizes(flora: Flora, contents: Contents, camera: Camera, coarse: NDArray[np.float64]) -> FacetSizes:
     """Facets of the pieces of contents; parameters as for `subplant_facet_sizes`."""
     own = contents.pieces.items
-    amounts, faces = contents.pieces.amounts, flora.rows["sides"][own.branches.row]
-    least = np.sqrt(amounts.wood_area / 2 / np.maximum(faces, 1))
+    totals, faces = contents.pieces.totals, flora.rows["sides"][own.branches.row]
+    least = np.sqrt(totals.wood_area / 2 / np.maximum(faces, 1))
     place, coarse = (own.start + own.end) / 2, coarse[contents.pieces.cell]
     extent, away = camera.extent_around(place), camera.clearance(place)
-    return FacetSizes(extent, flora.one_leaf_area(own.branches), least, coarse, away, amounts, own.t1 - own.t0)
+    return FacetSizes(extent, flora.one_leaf_area(own.branches), least, coarse, away, totals, own.t1 - own.t0)

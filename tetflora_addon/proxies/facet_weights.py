@@ -1,15 +1,15 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which share of its area the facets of a sub-plant need, to hold up as much light as the sub-plant itself.
+"""Weights of facets: the fraction of its area that the facets of a sub-plant need to block as much light as it does.
 
-Leaves sit in clusters and hide each other. Few large facets that are spread over the same sub-plant do so less: with
-the full area they would be up to three times as opaque. Rays are cast through grown sub-plants of each row of a species
-and through their facets, at several numbers of them; the share is the one with which as many rays are held up. So it is
-for facets what `plants.clumping` is for cells that are filled evenly.
+Leaves sit in clusters and hide each other. A few large facets spread over the same sub-plant do so less: with the full
+area they would be up to three times as opaque. Rays are cast through grown sub-plants of each row of a species and
+through their facets, at several numbers of facets; with the right weight as many rays are blocked. Weights are for
+facets what `compiled.clumping` is for evenly filled cells.
 
-Sub-plants are looked at together with their next siblings, because facets spill over; where few facets stand for one,
-with all that grow around them, because then facets reach across the gaps between neighbours of any parent. Facets of
-pieces are compared in the same way with what branches themselves bear.
+Sub-plants are looked at together with their next siblings, because facets spill over. Where few facets stand for one,
+all that grow around it take part, because facets then reach across the gaps between neighbours of any parent. Facets
+of pieces are compared in the same way with what branches themselves bear.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ from ..growth.branches import Branches
 from ..growth.growth import trunks
 from ..growth.hashing import mix
 from ..growth.seeds import Seeds
-from ..refinement.contents import piece_amounts, subplant_amounts
+from ..refinement.contents import piece_totals, subplant_totals
 from ..species.species import fingerprint
 from ..storage import remembered
 from ..subplants.pieces import Pieces, open_subplants
 from .microsurfaces import CIRCUMRADIUS, SIN_60, Facets, piece_facets, subplant_facets
 
-#: Shares of the shipped species, made by ``python -m devtools.facet_tables``. Raise the number when facets or shares
+#: Weights of the shipped species, made by ``python -m devtools.facet_tables``. Raise the number when facets or weights
 #: are made in another way.
-TABLE = Path(__file__).resolve().parent.parent / "catalogue" / "tables" / "facet_shares.json"
+TABLE = Path(__file__).resolve().parent.parent / "catalogue" / "tables" / "facet_weights.json"
 _METHOD = 2
-#: Facets of a sub-plant for which shares are known; between them they follow the logarithm.
+#: Facets of a sub-plant for which weights are known; between them they follow the logarithm.
 COUNTS = 4.0 ** np.arange(-2, 6)
 #: Under so many facets of a sub-plant its neighbours count, and not only its siblings.
 _FEW = 4.0
@@ -53,13 +53,13 @@ _WANTED, _NEEDED, _MOST = 250.0, 60.0, 5_000.0
 _COPIES = 16
 #: Rays across a family, and directions of rays.
 _RAYS, _DIRECTIONS = 36, 4
-#: Shares are never more than this.
-_LARGEST_SHARE = 1.6
+#: Weights are never more than this.
+_LARGEST = 1.6
 
 
 @dataclass(frozen=True)
-class FacetShares:
-    """Shares of the area by row and number of facets.
+class FacetWeights:
+    """Weights of the area by row and number of facets.
 
     Attributes
     ----------
@@ -73,11 +73,11 @@ class FacetShares:
     own: NDArray[np.float64]
 
     def of_subplants(self, row: NDArray[np.integer], count: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Shares (n,) for sub-plants of rows (n,) that are cut into so many (n,) facets each."""
+        """Weights (n,) for sub-plants of rows (n,) that are cut into so many (n,) facets each."""
         return _between(self.whole, row, count)
 
     def of_pieces(self, row: NDArray[np.integer], count: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Shares (n,) for pieces of branches of which a whole one would be cut into so many (n,) facets."""
+        """Weights (n,) for pieces of branches of which a whole one would be cut into so many (n,) facets."""
         return _between(self.own, row, count)
 
 
@@ -88,41 +88,41 @@ def _between(table: NDArray[np.float64], row: NDArray[np.integer], count: NDArra
     return table[row, low] + (place - low) * (table[row, low + 1] - table[row, low])
 
 
-#: Shares (2, r, k) of species that are not shipped: a scene is compiled anew for each refinement.
+#: Weights (2, r, k) of species that are not shipped: a scene is compiled anew for each refinement.
 _found: dict[str, NDArray[np.float64]] = {}
 _REMEMBERED = 256
 
 
-def facet_shares(flora: Flora) -> FacetShares:
-    """Shares for a flora; found when first asked for, and kept as long as the flora may be asked for again.
+def facet_weights(flora: Flora) -> FacetWeights:
+    """Weights for a flora; found when first asked for, and kept as long as the flora may be asked for again.
 
     Those of the species that come with TetFlora are read from `TABLE`; it takes some seconds to find those of one, so
     that these are kept on disk as well.
     """
-    return _shares(flora.at_rest)
+    return _of_flora(flora.at_rest)
 
 
 @lru_cache(maxsize=8)
-def _shares(flora: Flora) -> FacetShares:
-    shares = np.ones((2, len(flora.rows), len(COUNTS)))
+def _of_flora(flora: Flora) -> FacetWeights:
+    weights = np.ones((2, len(flora.rows), len(COUNTS)))
     for number, first in enumerate(flora.first_row):
         name = digest(flora, number)
         known = shipped().get(name)
         found = _of_species(flora, number, name) if known is None else np.array([known["whole"], known["own"]])
-        shares[:, first : first + found.shape[1]] = found
-    return FacetShares(*shares)
+        weights[:, first : first + found.shape[1]] = found
+    return FacetWeights(*weights)
 
 
 def _of_species(flora: Flora, number: int, name: str) -> NDArray[np.float64]:
-    """Shares (2, r, k) of one species: the same whatever other species the flora has, and wherever they were found."""
+    """Weights (2, r, k) of one species: the same whatever other species the flora has, and wherever they were found."""
     if name not in _found:
         rows = np.flatnonzero(flora.rows["species"] == number)
 
         def find_out() -> NDArray[np.float64]:
-            fitted = fitted_shares(flora, np.array([number], np.int32))
+            fitted = fitted_weights(flora, np.array([number], np.int32))
             return np.stack([fitted.get(int(row), np.ones((2, len(COUNTS)))) for row in rows], axis=1)
 
-        found = remembered("facet_shares", name, (2, len(rows), len(COUNTS)), find_out)
+        found = remembered("facet_weights", name, (2, len(rows), len(COUNTS)), find_out)
         if len(_found) >= _REMEMBERED:
             _found.clear()
         _found[name] = found
@@ -136,24 +136,24 @@ def digest(flora: Flora, number: int) -> str:
 
 @cache
 def shipped() -> dict[str, dict[str, list[list[float]]]]:
-    """Shares of the shipped species by their `digest`: ``whole`` and ``own`` (r, k) as lists, and their ``species``."""
+    """Weights of the shipped species by `digest`: ``whole`` and ``own`` (r, k) as lists, and their ``species``."""
     try:
         return json.loads(TABLE.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return {}
 
 
-def fitted_shares(
+def fitted_weights(
     flora: Flora, species: NDArray[np.int32]
 ) -> dict[int, tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Shares (k,), (k,) by row of some species, of sub-plants and of what branches themselves bear."""
+    """Weights (k,), (k,) by row of some species, of sub-plants and of what branches themselves bear."""
     few, out = COUNTS < _FEW, {}
     for siblings, counts in ((False, few), (True, ~few)):
         for row, families in _families(flora, species, siblings).items():
             apart = _apart(flora, families)
             sights = _Sight.of_subplants(flora, *apart), _Sight.of_branches(flora, *apart)
-            for shares, sight in zip(out.setdefault(row, np.ones((2, len(COUNTS)))), sights, strict=True):
-                shares[counts] = _fitted(sight)[counts]
+            for weights, sight in zip(out.setdefault(row, np.ones((2, len(COUNTS)))), sights, strict=True):
+                weights[counts] = _fitted(sight)[counts]
     return out
 
 
@@ -221,7 +221,7 @@ def _apart(flora: Flora, families: list[Branches]) -> tuple[Branches, NDArray[np
 
 
 def _fitted(sight: _Sight) -> NDArray[np.float64]:
-    """Shares (k,) for one row."""
+    """Weights (k,) for one row."""
     out = np.full(len(COUNTS), np.nan)
     if sight.area.mean() <= 0.0:
         return np.ones(len(COUNTS))
@@ -234,16 +234,16 @@ def _fitted(sight: _Sight) -> NDArray[np.float64]:
             continue
         side = np.sqrt(sight.area.mean() / count)
         facets = sight.facets(side, copies)
-        out[k] = _share(np.concatenate([sight.least_shares(view, facets) for view in views]), met * copies)
+        out[k] = _weight(np.concatenate([sight.least_weights(view, facets) for view in views]), met * copies)
         if expected > _MOST or (sight.leaf > side**2).all():
             break
     known = np.flatnonzero(np.isfinite(out))
     return np.interp(np.arange(len(out)), known, out[known]) if len(known) else np.ones(len(out))
 
 
-def _share(least: NDArray[np.float64], met: int) -> float:
-    """Share with which so many rays are held up, from the least share (n,) with which each ray is."""
-    return float(np.partition(least, met - 1)[met - 1]) if met <= len(least) else _LARGEST_SHARE
+def _weight(least: NDArray[np.float64], met: int) -> float:
+    """Weight with which so many rays are held up, from the least weight (n,) with which each ray is."""
+    return float(np.partition(least, met - 1)[met - 1]) if met <= len(least) else _LARGEST
 
 
 @dataclass(frozen=True)
@@ -288,14 +288,14 @@ class _Sight:
     @classmethod
     def of_subplants(cls, flora: Flora, some: Branches, beyond: NDArray[np.float64]) -> _Sight:
         """To the last leaf."""
-        area = subplant_amounts(flora, some).optical_area
+        area = subplant_totals(flora, some).optical_area
         return cls(flora, some, beyond, _grown(flora, some), area, flora.one_leaf_area(some), None)
 
     @classmethod
     def of_branches(cls, flora: Flora, some: Branches, beyond: NDArray[np.float64]) -> _Sight:
         """Without what grows on the branches but leaves."""
         pieces, owner = open_subplants(flora, some)[2:]
-        area = np.bincount(owner, piece_amounts(flora, pieces).optical_area, len(some))
+        area = np.bincount(owner, piece_totals(flora, pieces).optical_area, len(some))
         return cls(flora, some, beyond, _grown(flora, some, orders=1), area, flora.one_leaf_area(some), pieces)
 
     def views(self) -> list[_View]:
@@ -347,11 +347,11 @@ class _Sight:
         return replace(branches, key=key, position=branches.position + number * self.beyond)
 
     @staticmethod
-    def least_shares(view: _View, facets: Facets) -> NDArray[np.float64]:
-        """For each ray that any of the facets can hold up, the least share of their area with which one does."""
+    def least_weights(view: _View, facets: Facets) -> NDArray[np.float64]:
+        """For each ray that any of the facets can hold up, the least weight of their area with which one does."""
         reach = CIRCUMRADIUS * facets.side[:, None]
         centre, a, b = view.flat(facets.centre), view.flat(facets.across * reach), view.flat(facets.along * reach)
-        largest = np.sqrt(_LARGEST_SHARE)
+        largest = np.sqrt(_LARGEST)
         across = SIN_60 * np.abs(a)
         low = np.ceil(centre - largest * np.maximum(across + np.abs(b) / 2, np.abs(b))).astype(np.int64)
         high = np.floor(centre + largest * np.maximum(across + np.abs(b) / 2, np.abs(b))).astype(np.int64)

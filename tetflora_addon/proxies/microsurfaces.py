@@ -24,7 +24,7 @@ from ..growth.branches import Branches
 from ..growth.foliage import leaf_start, mean_leaf_colours, outwardness, place_leaves, settled
 from ..growth.hashing import Draw, child_key, mix, signed, uniform
 from ..growth.wind import moment
-from ..refinement.contents import Amounts, piece_amounts, subplant_amounts
+from ..refinement.contents import Totals, piece_totals, subplant_totals
 from ..subplants.pieces import Pieces
 
 _FACET_PATH = 1 << 40  # child indices of facets start here
@@ -86,7 +86,7 @@ def subplant_facets(
     subplants: Branches,
     leaf_side: NDArray[np.float64],
     wood_side: NDArray[np.float64] | None = None,
-    share: NDArray[np.float64] | None = None,
+    weight: NDArray[np.float64] | None = None,
     real: NDArray[np.float64] | None = None,
 ) -> Facets:
     """Facets of sub-plants.
@@ -98,18 +98,18 @@ def subplant_facets(
     leaf_side, wood_side : (n,) float64
         Wanted side of a facet for leaves and for wood (the same if not given), metres; those for leaves are never
         smaller than the leaves that they stand for.
-    share : (n,) float64, optional
-        Share of their area that facets have, see `facet_shares`.
+    weight : (n,) float64, optional
+        Fraction of their area that facets get, see `facet_weights`.
     real : (n,) float64, optional
-        Share of each sub-plant that is drawn as it is; so many of its facets are left out, by numbers of their own.
+        Fraction of each sub-plant that is drawn as it is; so many of its facets are left out, by numbers of their own.
     """
-    amounts = subplant_amounts(flora, subplants)
-    part = np.ones(len(subplants)) if share is None else share
+    totals = subplant_totals(flora, subplants)
+    part = np.ones(len(subplants)) if weight is None else weight
     wood_side = leaf_side if wood_side is None else wood_side
     return concatenate_facets(
         [
-            _leaves_of_subplants(flora, subplants, amounts, leaf_side, part, real),
-            _wood_of_subplants(flora, subplants, amounts, wood_side, part, real),
+            _leaves_of_subplants(flora, subplants, totals, leaf_side, part, real),
+            _wood_of_subplants(flora, subplants, totals, wood_side, part, real),
         ]
     )
 
@@ -119,22 +119,22 @@ def piece_facets(
     pieces: Pieces,
     leaf_side: NDArray[np.float64],
     wood_side: NDArray[np.float64] | None = None,
-    share: NDArray[np.float64] | None = None,
+    weight: NDArray[np.float64] | None = None,
     real: NDArray[np.float64] | None = None,
     real_wood: NDArray[np.bool_] | None = None,
 ) -> Facets:
     """Facets of pieces of branches; parameters as for `subplant_facets`.
 
-    Here ``real`` is the share of the leaves, and ``real_wood`` (n,) says whose wood is drawn as it is.
+    Here ``real`` is the fraction of the leaves, and ``real_wood`` (n,) says whose wood is drawn as it is.
     """
-    amounts = piece_amounts(flora, pieces)
+    totals = piece_totals(flora, pieces)
     if real_wood is not None:
-        amounts = replace(amounts, wood_area=np.where(real_wood, 0.0, amounts.wood_area))
-    part = np.ones(len(pieces)) if share is None else share
+        totals = replace(totals, wood_area=np.where(real_wood, 0.0, totals.wood_area))
+    part = np.ones(len(pieces)) if weight is None else weight
     return concatenate_facets(
         [
-            _leaves_of_pieces(flora, pieces, amounts, leaf_side, part, real),
-            _wood_of_pieces(flora, pieces, amounts, leaf_side if wood_side is None else wood_side, part),
+            _leaves_of_pieces(flora, pieces, totals, leaf_side, part, real),
+            _wood_of_pieces(flora, pieces, totals, leaf_side if wood_side is None else wood_side, part),
         ]
     )
 
@@ -149,21 +149,21 @@ def kept_out_of_view(facets: Facets, clearance: Callable[[NDArray], NDArray], sm
     clearance : callable
         Distance (n,) of points (n, 3) from the view, metres.
     smallest : float
-        Least share of its side that a facet keeps, 0 to 1.
+        Minimum fraction of its side that a facet keeps, 0 to 1.
     """
     reach = CIRCUMRADIUS * facets.side
-    share = np.clip(clearance(facets.centre) / np.maximum(reach, 1e-12), smallest, 1.0)
-    return replace(facets, side=facets.side * share)
+    fraction = np.clip(clearance(facets.centre) / np.maximum(reach, 1e-12), smallest, 1.0)
+    return replace(facets, side=facets.side * fraction)
 
 
-def _trapped(colour: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Colour (n, 3) of clusters of surfaces that are seen by a share (n,) of their area.
+def _trapped(colour: NDArray[np.float64], weight: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Colour (n, 3) of clusters of surfaces that are seen by a fraction ``weight`` (n,) of their area.
 
-    What one surface scatters meets another of its cluster with the probability p = 1 − share, and is dimmed again:
+    What one surface scatters meets another of its cluster with the probability p = 1 − weight, and is dimmed again:
     ω (1 − p) / (1 − p ω) (Smolander and Stenberg, "Simple parameterizations of the radiation budget of uniform
     broadleaved and coniferous canopies", 2005).
     """
-    p = np.clip(1.0 - share, 0.0, 1.0)[:, None]
+    p = np.clip(1.0 - weight, 0.0, 1.0)[:, None]
     return colour * (1.0 - p) / (1.0 - p * colour)
 
 
@@ -173,7 +173,7 @@ def _numbers(
     """Owner, index, key and area of the facets that areas (n,) are cut into; their expected number is area / facet.
 
     Where it is 1 or more they share the area evenly; below, one facet stands for several sub-plants. Of owners of which
-    a share (n,) is real so many facets are left out.
+    a fraction (n,) is real so many facets are left out.
     """
     expected = area / facet
     counts = np.floor(expected + uniform(key, draw)).astype(np.int64)
@@ -226,12 +226,12 @@ def _picked(
 
 
 def _leaves_of_subplants(
-    flora: Flora, subplants: Branches, amounts: Amounts, side: NDArray, share: NDArray, real: NDArray | None
+    flora: Flora, subplants: Branches, totals: Totals, side: NDArray, weight: NDArray, real: NDArray | None
 ) -> Facets:
     rows, points = flora.rows, flora.samples.leaves
     one = flora.one_leaf_area(subplants)
     facet = np.maximum(side**2, one)
-    owner, index, key, area = _numbers(subplants.key, amounts.leaf_area, facet, _FACET_PATH, _LEAF_COUNT, real)
+    owner, index, key, area = _numbers(subplants.key, totals.leaf_area, facet, _FACET_PATH, _LEAF_COUNT, real)
     pick, place, base = _picked(flora, points, subplants, owner, index, key)
     leaf_row = points.row[pick]
     frame = base @ points.frame[pick].astype(np.float64)
@@ -244,15 +244,15 @@ def _leaves_of_subplants(
         centre,
         frame[:, :, 0],
         frame[:, :, 1],
-        np.sqrt(area * share[owner]),
-        _trapped(_facet_colours(flora, leaf_row, key, area / one.clip(1e-300)[owner], outward), share[owner]),
+        np.sqrt(area * weight[owner]),
+        _trapped(_facet_colours(flora, leaf_row, key, area / one.clip(1e-300)[owner], outward), weight[owner]),
         flora.leaf.transmission[leaf_row],
         _carried(flora, subplants, owner, centre),
     )
 
 
 def _leaves_of_pieces(
-    flora: Flora, pieces: Pieces, amounts: Amounts, side: NDArray, share: NDArray, real: NDArray | None
+    flora: Flora, pieces: Pieces, totals: Totals, side: NDArray, weight: NDArray, real: NDArray | None
 ) -> Facets:
     branches, rows = pieces.branches, flora.rows
     row = branches.row
@@ -260,7 +260,7 @@ def _leaves_of_pieces(
     one = (size**2 + variation**2 / 3) * flora.leaf.area[row] * branches.scale**2
     facet = np.maximum(side**2, one)
     start = leaf_start(rows, branches)
-    owner, index, key, area, t = _along(flora, pieces, amounts.leaf_area, facet, start, _FACET_PATH, _LEAF_COUNT, real)
+    owner, index, key, area, t = _along(flora, pieces, totals.leaf_area, facet, start, _FACET_PATH, _LEAF_COUNT, real)
     bearers = np.flatnonzero(np.bincount(owner, minlength=len(branches)))  # far from all pieces get a facet
     own = branches.take(bearers)
     lines = axes(rows, own)
@@ -269,32 +269,32 @@ def _leaves_of_pieces(
     centre = leaves.position + 0.5 * leaves.size[:, None] * frame[:, :, 1]
     outward = outwardness(rows, branches, owner, t)
     colour = _facet_colours(flora, row[owner], key, area / one.clip(1e-300)[owner], outward)
-    colour = _trapped(colour, share[owner])
+    colour = _trapped(colour, weight[owner])
     transmission = flora.leaf.transmission[row[owner]]
     velocity = None
     if own.later is not None:
         there = place_leaves(rows, own.moved(), lines.later, leaves.branch, index, key, t)
         velocity = (there.position - leaves.position) / moment(rows)
-    return Facets(centre, frame[:, :, 0], frame[:, :, 1], np.sqrt(area * share[owner]), colour, transmission, velocity)
+    return Facets(centre, frame[:, :, 0], frame[:, :, 1], np.sqrt(area * weight[owner]), colour, transmission, velocity)
 
 
 def _wood_of_subplants(
-    flora: Flora, subplants: Branches, amounts: Amounts, side: NDArray, share: NDArray, real: NDArray | None
+    flora: Flora, subplants: Branches, totals: Totals, side: NDArray, weight: NDArray, real: NDArray | None
 ) -> Facets:
     points = flora.samples.wood
-    wood = amounts.wood_area / 2
+    wood = totals.wood_area / 2
     owner, index, key, area = _numbers(subplants.key, wood, side**2, _WOOD_PATH, _WOOD_COUNT, real)
     pick, centre, base = _picked(flora, points, subplants, owner, index, key)
     axis = np.einsum("nij,nj->ni", base, points.frame[pick, :, 2].astype(np.float64))
     colour = flora.rows["branch_colour"][points.row[pick], 0]
     velocity = _carried(flora, subplants, owner, centre)
     return Facets(
-        centre, _across(axis, key), axis, np.sqrt(area * share[owner]), colour, np.zeros(len(owner)), velocity
+        centre, _across(axis, key), axis, np.sqrt(area * weight[owner]), colour, np.zeros(len(owner)), velocity
     )
 
 
-def _wood_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDArray, share: NDArray) -> Facets:
-    none, wood = np.zeros(len(pieces)), amounts.wood_area / 2
+def _wood_of_pieces(flora: Flora, pieces: Pieces, totals: Totals, side: NDArray, weight: NDArray) -> Facets:
+    none, wood = np.zeros(len(pieces)), totals.wood_area / 2
     owner, _, key, area, t = _along(flora, pieces, wood, side**2, none, _WOOD_PATH, _WOOD_COUNT)
     vector = (pieces.end - pieces.start)[owner]
     place = (t - pieces.t0[owner]) / np.maximum(pieces.t1 - pieces.t0, 1e-12)[owner]
@@ -306,7 +306,7 @@ def _wood_of_pieces(flora: Flora, pieces: Pieces, amounts: Amounts, side: NDArra
         lines = axes(flora.rows, pieces.branches)
         velocity = (lines.later.at(owner, t)[0] - lines.at(owner, t)[0]) / moment(flora.rows)
     return Facets(
-        centre, _across(axis, key), axis, np.sqrt(area * share[owner]), colour, np.zeros(len(owner)), velocity
+        centre, _across(axis, key), axis, np.sqrt(area * weight[owner]), colour, np.zeros(len(owner)), velocity
     )
 
 

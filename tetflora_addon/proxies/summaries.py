@@ -33,7 +33,7 @@ class Summaries:
     colour : (n, 3) float64
         Linear RGB.
     transmission : (n,) float64
-        Share of scattered light that goes through.
+        Fraction of scattered light that goes through.
     moment : (n, 3, 3) float64
         Mean of n nᵀ; its trace is 1 where there is anything.
     clumping : (n, 2) float64, optional
@@ -70,15 +70,15 @@ def summarise(flora: Flora, contents: Contents, index: NDArray[np.integer], coun
     subplants, pieces = contents.subplants.items, contents.pieces.items
     rows = flora.rows
     for cells, branches, own, every in (
-        (contents.subplants.cell, subplants, None, contents.subplants.amounts),
-        (contents.pieces.cell, pieces.branches, pieces, contents.pieces.amounts),
+        (contents.subplants.cell, subplants, None, contents.subplants.totals),
+        (contents.pieces.cell, pieces.branches, pieces, contents.pieces.totals),
     ):
         to = index[cells]
         keep = np.flatnonzero(to >= 0)
         if len(keep) == 0:  # what proxies need of plants is not worked out where there are none
             continue
         clumping = flora.clumping
-        to, branches, amounts = to[keep], branches.take(keep), every.take(keep)
+        to, branches, totals = to[keep], branches.take(keep), every.take(keep)
         row = branches.row
         # A sub-plant shows the mean of all that grows on it, a piece only its own bark and leaves.
         if own is None:
@@ -94,7 +94,7 @@ def summarise(flora: Flora, contents: Contents, index: NDArray[np.integer], coun
             wood_moment = (np.eye(3) - axis[:, :, None] * axis[:, None, :]) / 2
             transmission = flora.leaf.transmission[row]
             clumped = clumping.coefficients(branches, clumping.own)
-        leaf, wood = amounts.leaf_area, amounts.wood_area / 2
+        leaf, wood = totals.leaf_area, totals.wood_area / 2
         moment = leaf[:, None, None] * leaf_moment + wood[:, None, None] * wood_moment
         colour = leaf[:, None] * leaf_colour + wood[:, None] * wood_colour
         area = (leaf + wood)[:, None]
@@ -118,13 +118,13 @@ def _add_polygons(sums: NDArray[np.float64], contents: Contents, index: NDArray[
     for start in range(0, len(chosen), MEASURED_AT_ONCE):
         some = chosen[start : start + MEASURED_AT_ONCE]
         polygons = contents.polygons.items.take(some)
-        owner, triangle, share = polygons.triangles()
+        owner, triangle, fraction = polygons.triangles()
         face = polygons.face[owner]
         slot, solid = meshes.slot[face], meshes.solid[face]
         vector = meshes.vectors(triangle, polygons.instance[owner])
         area = np.linalg.norm(vector, axis=1)
         normal = vector / np.maximum(area, 1e-300)[:, None]
-        optical = (area * share * meshes.coverage[slot] * np.where(solid, 0.5, 1.0))[:, None]
+        optical = (area * fraction * meshes.coverage[slot] * np.where(solid, 0.5, 1.0))[:, None]
         moment = (normal[:, :, None] * normal[:, None, :]).reshape(-1, 9)
         even = np.broadcast_to([1.0, 0.0], (len(face), 2))
         seen = np.concatenate(

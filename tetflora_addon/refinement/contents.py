@@ -31,7 +31,7 @@ from .polygons import Polygons
 
 
 @dataclass(frozen=True)
-class Amounts(Arrays):
+class Totals(Arrays):
     """How much each thing (sub-plant or piece) or each tetrahedron holds.
 
     Attributes
@@ -64,11 +64,11 @@ class Amounts(Arrays):
         return self.leaf_area + self.wood_area / 2
 
 
-def subplant_amounts(flora: Flora, subplants: Branches) -> Amounts:
+def subplant_totals(flora: Flora, subplants: Branches) -> Totals:
     """Compiled means for sub-plants."""
     row = subplants.row
     leafy = flora.leaf_count[row] > 0
-    return Amounts(
+    return Totals(
         flora.leaf_areas(subplants),
         flora.wood_areas(subplants),
         flora.face_counts(subplants),
@@ -76,13 +76,13 @@ def subplant_amounts(flora: Flora, subplants: Branches) -> Amounts:
     )
 
 
-def piece_amounts(flora: Flora, pieces: Pieces) -> Amounts:
+def piece_totals(flora: Flora, pieces: Pieces) -> Totals:
     """Compiled means for pieces: the wood, and the leaves that the branch itself bears there."""
     branches = pieces.branches
     row, leaf = branches.row, flora.leaf
     size, variation = flora.rows["leaf_size"][row].T
     leaves = flora.rows["leaves"][row, 0] * fullness(flora.rows, branches) * leaf_fraction(flora, pieces)
-    return Amounts(
+    return Totals(
         leaves * (size**2 + variation**2 / 3) * leaf.area[row] * branches.scale**2 * _size_factors(flora, pieces),
         wood_areas(flora, pieces),
         leaves * leaf.polygons[row] + flora.rows["sides"][row],
@@ -90,14 +90,14 @@ def piece_amounts(flora: Flora, pieces: Pieces) -> Amounts:
     )
 
 
-def polygon_amounts(polygons: Polygons, width: NDArray[np.float64] | None = None) -> Amounts:
+def polygon_totals(polygons: Polygons, width: NDArray[np.float64] | None = None) -> Totals:
     """What explicit polygons are, as far as they are not transparent; ``width`` (n,) in place of the surfaces' own."""
     meshes, face = polygons.meshes, polygons.face
     area = polygons.areas() * meshes.coverage[meshes.slot[face]]
     solid = meshes.solid[face]
     if width is None:
         width = meshes.width[face] * meshes.mean_scale[polygons.instance]
-    return Amounts(np.where(solid, 0.0, area), np.where(solid, area, 0.0), np.ones(len(face)), width)
+    return Totals(np.where(solid, 0.0, area), np.where(solid, area, 0.0), np.ones(len(face)), width)
 
 
 def _size_factors(flora: Flora, pieces: Pieces) -> NDArray[np.float64] | float:
@@ -108,17 +108,17 @@ def _size_factors(flora: Flora, pieces: Pieces) -> NDArray[np.float64] | float:
     return own_leaf_integrals(flora.rows["leaf_size_tip"][pieces.branches.row], low, high)[0]
 
 
-def sums(amounts: Amounts, cells: NDArray[np.integer], number: int) -> Amounts:
+def sums(totals: Totals, cells: NDArray[np.integer], number: int) -> Totals:
     """Sums over the things (n,) in each of a number of cells, given by ``cells`` (n,); the width is a mean."""
-    area, fine = amounts.area, np.isfinite(amounts.width)
+    area, fine = totals.area, np.isfinite(totals.width)
     small = np.where(fine, area, 0.0)
     total = np.bincount(cells, small, number)
-    width = np.bincount(cells, small * np.where(fine, amounts.width, 0.0), number) / np.where(total > 0, total, 1)
+    width = np.bincount(cells, small * np.where(fine, totals.width, 0.0), number) / np.where(total > 0, total, 1)
     only_large = (total == 0) & (np.bincount(cells, ~fine, number) > 0)
-    return Amounts(
-        np.bincount(cells, amounts.leaf_area, number),
-        np.bincount(cells, amounts.wood_area, number),
-        np.bincount(cells, amounts.polygons, number),
+    return Totals(
+        np.bincount(cells, totals.leaf_area, number),
+        np.bincount(cells, totals.wood_area, number),
+        np.bincount(cells, totals.polygons, number),
         np.where(only_large, np.inf, width),
     )
 
@@ -139,17 +139,17 @@ class Held(Arrays, Generic[Kind]):
     items : Branches, Pieces or Polygons of n
     cell : (n,) int32
         Node that holds each.
-    amounts : Amounts of n
+    totals : Totals of n
     """
 
     items: Kind
     cell: NDArray[np.int32]
-    amounts: Amounts
+    totals: Totals
 
     @classmethod
     def none(cls, kind: type[Kind]) -> Held[Kind]:
         """Nothing of a kind."""
-        return cls(kind.empty(), _NONE, Amounts.empty())
+        return cls(kind.empty(), _NONE, Totals.empty())
 
 
 @dataclass(frozen=True)
@@ -171,10 +171,10 @@ class Contents:
     def of(
         cls, flora: Flora, subplants: Branches, subplant_cell: NDArray, pieces: Pieces, piece_cell: NDArray
     ) -> Contents:
-        """Parts of plants in cells, with their amounts."""
+        """Parts of plants in cells, with their totals."""
         return cls(
-            Held(subplants, subplant_cell, subplant_amounts(flora, subplants)),
-            Held(pieces, piece_cell, piece_amounts(flora, pieces)),
+            Held(subplants, subplant_cell, subplant_totals(flora, subplants)),
+            Held(pieces, piece_cell, piece_totals(flora, pieces)),
         )
 
     @classmethod
@@ -185,10 +185,10 @@ class Contents:
     @classmethod
     def of_polygons(cls, polygons: Polygons, large: NDArray[np.bool_] | None = None) -> Contents:
         """Polygons, all in the root; large ones (k,) are drawn as they are whatever is decided about their cells."""
-        amounts = polygon_amounts(polygons)
+        totals = polygon_totals(polygons)
         if large is not None:
-            amounts = replace(amounts, width=np.where(large, np.inf, amounts.width))
-        return cls(polygons=Held(polygons, np.zeros(len(polygons), np.int32), amounts))
+            totals = replace(totals, width=np.where(large, np.inf, totals.width))
+        return cls(polygons=Held(polygons, np.zeros(len(polygons), np.int32), totals))
 
     @property
     def kinds(self) -> tuple[Held[Branches], Held[Pieces], Held[Polygons]]:
@@ -215,10 +215,10 @@ class Contents:
             return parts[0] if parts else cls()
         return cls(*(Held.concatenate(kinds) for kinds in zip(*(p.kinds for p in parts), strict=True)))
 
-    def sums(self, nodes: int) -> Amounts:
+    def sums(self, nodes: int) -> Totals:
         """What each of a number of nodes holds."""
-        amounts = Amounts.concatenate([kind.amounts for kind in self.kinds])
-        return sums(amounts, np.concatenate([kind.cell for kind in self.kinds]), nodes)
+        totals = Totals.concatenate([kind.totals for kind in self.kinds])
+        return sums(totals, np.concatenate([kind.cell for kind in self.kinds]), nodes)
 
     def bounding_box(self, flora: Flora) -> NDArray[np.float64]:
         """Axis-aligned box (2, 3) of all that is there, metres."""

@@ -17,7 +17,7 @@ from ..arrays import Arrays
 from ..camera.camera import Camera
 from ..tetrahedra.geometry import squared_edges, volume
 from ..tetrahedra.tree import TetrahedralTree
-from .contents import Amounts
+from .contents import Totals
 from .settings import RefinementSettings
 from .visibility import AlphaBuffer
 
@@ -30,7 +30,7 @@ class Terminals(Arrays):
     ----------
     nodes : (n,) int
         Their nodes in the tree.
-    amounts : Amounts of n
+    totals : Totals of n
     pixels, opacity : (n,) float64
         As in `visibility.Outline`.
     feature : (n,) float64
@@ -44,7 +44,7 @@ class Terminals(Arrays):
     """
 
     nodes: NDArray[np.intp]
-    amounts: Amounts
+    totals: Totals
     pixels: NDArray[np.float64]
     opacity: NDArray[np.float64]
     feature: NDArray[np.float64]
@@ -54,24 +54,24 @@ class Terminals(Arrays):
 
     @classmethod
     def seen(
-        cls, tree: TetrahedralTree, nodes: NDArray[np.intp], amounts: Amounts, camera: Camera, buffer: AlphaBuffer
+        cls, tree: TetrahedralTree, nodes: NDArray[np.intp], totals: Totals, camera: Camera, buffer: AlphaBuffer
     ) -> Terminals:
         """Draw tetrahedra into the alpha buffer and keep what it says of each by itself."""
         vertices = tree.vertices(nodes)
-        outline = buffer.add(nodes, vertices, mean_extinction(amounts, volume(vertices)))
+        outline = buffer.add(nodes, vertices, mean_extinction(totals, volume(vertices)))
         span = np.sqrt(squared_edges(vertices).max(axis=1)) / camera.extent_around(vertices.mean(axis=1))
-        features = feature_pixels(vertices, amounts.width, camera)
-        return cls(nodes, amounts, outline.pixels, outline.opacity, *features, span, outline.whole)
+        features = feature_pixels(vertices, totals.width, camera)
+        return cls(nodes, totals, outline.pixels, outline.opacity, *features, span, outline.whole)
 
 
-def mean_extinction(amounts: Amounts, volumes: NDArray[np.float64]) -> NDArray[np.float64]:
+def mean_extinction(totals: Totals, volumes: NDArray[np.float64]) -> NDArray[np.float64]:
     """Extinction κ (n,) of tetrahedra in 1/m, as if surfaces faced all ways.
 
     Notes
     -----
     Randomly turned, a leaf shows half its one-sided area and a closed branch a quarter of its surface (Cauchy 1832).
     """
-    return (amounts.leaf_area / 2 + amounts.wood_area / 4) / volumes
+    return (totals.leaf_area / 2 + totals.wood_area / 4) / volumes
 
 
 def feature_pixels(
@@ -98,7 +98,7 @@ def feature_pixels(
 ACROSS_THE_BORDER = 1.5
 
 
-#: Share of all cells, share of the picture, and polygons, for which a pass of the loop is not worth its time.
+#: Fraction of all cells, fraction of the picture, and polygons, for which a pass of the loop is not worth its time.
 FEW, NO_GAIN, NO_POLYGONS = 0.005, 0.002, 20_000
 
 #: A tetrahedron of more blocks than this on each side is no one's last word on what it holds.
@@ -126,7 +126,7 @@ def decide(cells: Terminals, transmittance: NDArray[np.float64], settings: Refin
     ----------
     cells : Terminals of n
     transmittance : (n,) float64
-        Share of each one's light that nothing in front holds up; 0 out of view.
+        Fraction of each one's light that nothing in front blocks; 0 out of view.
     settings : RefinementSettings
 
     Returns
@@ -136,19 +136,19 @@ def decide(cells: Terminals, transmittance: NDArray[np.float64], settings: Refin
 
     Notes
     -----
-    A tetrahedron's *contribution* is the number of pixels that its contents change: its pixels × the share of them that
-    is not hidden × its own opacity. Of leaves wider than ``leaf_limit`` pixels some are drawn as leaves; a tetrahedron
-    full of them is divided down to ``block`` pixels so that its hidden parts are found out, and in depth until they are
-    about as large at its far end; then it is made explicit (`transition` says which leaves are real in it).
+    A tetrahedron's *contribution* is the number of pixels that its contents change: its pixels × the fraction of them
+    that is not hidden × its own opacity. Of leaves wider than ``leaf_limit`` pixels some are drawn as leaves. A
+    tetrahedron full of them is divided down to ``block`` pixels to find its hidden parts, and in depth until they are
+    about as large at its far end. Then it is made explicit; `emission.plants.Transition` picks the real leaves in it.
 
     What crosses the border of the view counts by its seen part. That may be small while the tetrahedron is not: then it
     is divided until the rest is known to be out of view, or all of it would be made as fine as what is seen.
     """
-    amounts = cells.amounts
-    holds = amounts.area > 0
+    totals = cells.totals
+    holds = totals.area > 0
     hidden = transmittance <= settings.hidden  # out of view: transmittance is 0
     large_leaves = cells.feature >= settings.leaf_limit
-    few = amounts.polygons <= settings.few_polygons
+    few = totals.polygons <= settings.few_polygons
     # Leaves that are large at the near end may be tiny at the far end, as in all of a small picture's view.
     deep = large_leaves & (cells.least_feature < settings.leaf_limit / DEEP) & ~few
     crossing = ~cells.whole & ~few & (cells.span > ACROSS_THE_BORDER * settings.block)
@@ -179,7 +179,7 @@ def gains_nothing(
     if splitting.sum() > FEW * len(cells):
         return False
     gain = contributions(cells, transmittance)[splitting].sum() / (camera.width * camera.height)
-    return bool(gain <= NO_GAIN and cells.amounts.polygons[splitting].sum() <= NO_POLYGONS)
+    return bool(gain <= NO_GAIN and cells.totals.polygons[splitting].sum() <= NO_POLYGONS)
 
 
 def without_splits(
@@ -191,7 +191,7 @@ def without_splits(
     whether hidden, they are.
     """
     leafy = cells.feature >= settings.leaf_limit
-    known = (cells.pixels <= (UNKNOWN * settings.block) ** 2) | (cells.amounts.polygons <= NO_POLYGONS)
+    known = (cells.pixels <= (UNKNOWN * settings.block) ** 2) | (cells.totals.polygons <= NO_POLYGONS)
     instead = np.where(leafy & known, Decision.EXPLICIT, Decision.PROXY)
     instead = np.where(transmittance <= settings.hidden, Decision.HIDDEN, instead)
     return np.where(decision == Decision.SPLIT, instead, decision).astype(np.int8)

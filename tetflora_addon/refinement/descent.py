@@ -23,8 +23,8 @@ from ..growth.branches import Branches
 from ..subplants.pieces import Pieces, clipped, open_subplants
 from ..subplants.sides import body_distances, bounding_bodies, crossing, sampled_bodies
 from ..tetrahedra.tree import TetrahedralTree
-from .contents import Amounts, Contents, Held, polygon_amounts
-from .polygons import Polygons, shares
+from .contents import Contents, Held, Totals, polygon_totals
+from .polygons import Polygons, area_fractions
 
 
 def cut(
@@ -73,7 +73,7 @@ def cut(
     )
     sides = (d[:, 0] >= 0).astype(np.int64)
     from_, side = np.tile(some, 3), np.concatenate([sides, 1 - sides, 1 - sides])
-    kept = np.flatnonzero(shares(made) > 0)  # a cut through a corner leaves pieces of no size
+    kept = np.flatnonzero(area_fractions(made) > 0)  # a cut through a corner leaves pieces of no size
     made, from_, side = made[kept], from_[kept], side[kept]
     new = Polygons.fragments(polygons.meshes, whole.face[from_], whole.instance[from_], whole.triangle[from_], made)
     larger = (high[stays] >= -low[stays]).astype(np.int64)
@@ -89,7 +89,7 @@ OPENED_AT_ONCE = 40_000
 LOWERED_AT_ONCE = 200_000
 #: A sub-plant that reaches no further than this many slacks is known well enough by its samples.
 _SMALL = 16.0
-#: One whose middle is closer to a plane than this share of its reach crosses it, whatever its seed.
+#: One whose middle is closer to a plane than this fraction of its reach crosses it, whatever its seed.
 _DEEP = 0.3
 
 
@@ -127,10 +127,10 @@ def push_down(flora: Flora, tree: TetrahedralTree, contents: Contents, slack: Sl
         subplants, cells = Branches.concatenate(parts), np.concatenate(part_cells)
     pieces, piece_cells = _push_down_pieces(tree, Pieces.concatenate(loose), np.concatenate(loose_cells), slack)
     plants = Contents.of(flora, Branches.concatenate(placed), np.concatenate(placed_cells), pieces, piece_cells)
-    polygons, cells, amounts = _push_down_polygons(
-        tree, contents.polygons.items, contents.polygons.cell, contents.polygons.amounts, slack
+    polygons, cells, totals = _push_down_polygons(
+        tree, contents.polygons.items, contents.polygons.cell, contents.polygons.totals, slack
     )
-    return replace(plants, polygons=Held(polygons, cells, amounts))
+    return replace(plants, polygons=Held(polygons, cells, totals))
 
 
 def _lowered(
@@ -222,10 +222,10 @@ def _push_down_pieces(
 
 
 def _push_down_polygons(
-    tree: TetrahedralTree, polygons: Polygons, cells: NDArray, amounts: Amounts, slack: Slack | None
-) -> tuple[Polygons, NDArray[np.int32], Amounts]:
+    tree: TetrahedralTree, polygons: Polygons, cells: NDArray, totals: Totals, slack: Slack | None
+) -> tuple[Polygons, NDArray[np.int32], Totals]:
     placed: list[Polygons] = []
-    placed_cells, placed_amounts = [np.zeros(0, np.int32)], [Amounts.empty()]
+    placed_cells, placed_totals = [np.zeros(0, np.int32)], [Totals.empty()]
     while len(polygons):
         cells, crosses = cells.copy(), np.zeros(len(polygons), bool)
         for start in range(0, len(polygons), LOWERED_AT_ONCE):
@@ -233,13 +233,13 @@ def _push_down_polygons(
             cells[some], crosses[some] = _lowered_polygons(tree, polygons.take(some), cells[some], slack)
         placed.append(polygons.take(~crosses))
         placed_cells.append(cells[~crosses])
-        placed_amounts.append(amounts.take(~crosses))
-        polygons, cells, width = polygons.take(crosses), cells[crosses], amounts.width[crosses]
+        placed_totals.append(totals.take(~crosses))
+        polygons, cells, width = polygons.take(crosses), cells[crosses], totals.width[crosses]
         loose = 0.0 if slack is None else slack(polygons.centre)
         owner, side, polygons = cut(polygons, tree.planes(cells), loose)
         cells = tree.children[cells[owner], side]
-        amounts = polygon_amounts(polygons, width[owner])
-    return Polygons.concatenate(placed), np.concatenate(placed_cells), Amounts.concatenate(placed_amounts)
+        totals = polygon_totals(polygons, width[owner])
+    return Polygons.concatenate(placed), np.concatenate(placed_cells), Totals.concatenate(placed_totals)
 
 
 def _lowered_polygons(

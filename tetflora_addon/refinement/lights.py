@@ -57,7 +57,7 @@ class Light:
         Linear RGB times energy: for the sun W/m² on a surface that faces it, for the others the W/sr that they send
         ahead, so that a surface at distance r that faces them gets colour / r² W/m².
     blend : float
-        Share of a spot's cone over which it fades, 0 to 1.
+        Fraction of a spot's cone over which it fades, 0 to 1.
     span : (2, 3) float64
         Half edges of an area, or half axes of an ellipse, metres.
     ellipse : bool
@@ -183,10 +183,10 @@ def decide_by_shadows(
     decision: NDArray[np.int8], shadows: Shadows, cells: Terminals, settings: RefinementSettings
 ) -> NDArray[np.int8]:
     """Decisions (n,) where hidden tetrahedra are divided or made explicit for their shadows."""
-    amounts, out = cells.amounts, decision.copy()
+    totals, out = cells.totals, decision.copy()
     counts = (decision == Decision.HIDDEN) & (shadows.pixels > settings.shadow_cutoff**2)
     large = shadows.feature >= settings.shadow_cutoff
-    few = amounts.polygons <= settings.few_polygons
+    few = totals.polygons <= settings.few_polygons
     explicit = counts & (few | (large & (shadows.pixels <= settings.block**2)))
     out[counts & ~explicit] = Decision.SPLIT
     out[explicit] = Decision.EXPLICIT
@@ -225,7 +225,7 @@ def shadows_of(
     hidden = decision == Decision.HIDDEN
     if not hidden.any():
         return Shadows(pixels, feature)
-    extinction = mean_extinction(cells.amounts, volume(vertices))
+    extinction = mean_extinction(cells.totals, volume(vertices))
     points = np.concatenate([ground, vertices[~hidden].mean(axis=1)])
     if not len(points):
         return Shadows(pixels, feature)
@@ -258,7 +258,7 @@ def shadows_of(
             pixels += np.bincount(cell, found.coverage[casts] * lit[cell] * (across / extent) ** 2, count)
             # A light that is close throws large shadows.
             larger = 1.0 if light.kind == "SUN" else far[at] / np.maximum(middle, view.near)
-            np.maximum.at(feature, cell, cells.amounts.width[cell] * larger / extent)
+            np.maximum.at(feature, cell, cells.totals.width[cell] * larger / extent)
     return Shadows(pixels, feature)
 
 

@@ -20,7 +20,7 @@ from ..camera.silhouette import expected_pixels
 from ..compiled.flora import Flora
 from ..growth.seeds import Seeds
 from ..tetrahedra.tree import TetrahedralTree
-from .contents import Amounts, Contents, Holdings, large_polygons
+from .contents import Contents, Holdings, Totals, large_polygons
 from .decisions import Decision, Terminals, decide, gains_nothing, without_splits
 from .descent import Slack, push_down
 from .lights import Light, decide_by_shadows, seen_ground, shadows_of
@@ -34,7 +34,7 @@ from .visibility import AlphaBuffer, Buffers
 GENERATIONS = 3
 #: Pixels of the picture by which things may reach beyond a plane at least. Smaller sub-plants thus stay whole.
 SLACK = 2.0
-#: Share of their pixels that counts for what is divided for its shadow: as often as can be, where it is in view.
+#: Fraction of their pixels that counts for what is divided for its shadow: as often as can be, where it is in view.
 ALWAYS = 1e30
 
 
@@ -52,7 +52,7 @@ class Refinement:
     cells : Terminals of t
         Terminal nodes that hold something.
     transmittance : (t,) float64
-        Share of each one's light that nothing in front of it holds up.
+        Fraction of each one's light that nothing in front of it blocks.
     decision : (t,) int8
         `Decision` for each of them.
     rank : (t,) int32
@@ -81,9 +81,9 @@ class Refinement:
         return self.cells.nodes
 
     @property
-    def amounts(self) -> Amounts:
+    def totals(self) -> Totals:
         """What each of them (t,) holds."""
-        return self.cells.amounts
+        return self.cells.totals
 
     @property
     def contents(self) -> Contents:
@@ -197,8 +197,8 @@ def refine(
             return replace(state, decision=as_it_is, complete=False)
         dividing = np.zeros(len(tree), bool)
         dividing[cells.nodes[splitting]] = True
-        shares = np.where(by_shadow, ALWAYS, transmittance * cells.opacity)[splitting]
-        _split(tree, cells.nodes[splitting], shares, camera, settings, deepest)
+        fractions = np.where(by_shadow, ALWAYS, transmittance * cells.opacity)[splitting]
+        _split(tree, cells.nodes[splitting], fractions, camera, settings, deepest)
         clock.lap("refinement")
         new = push_down(flora, tree, holdings.take_out(dividing), slack)
         holdings.put(new)
@@ -214,7 +214,7 @@ def _height(seeds: Seeds, polygons: Polygons | None) -> float:
     return float(np.median(np.concatenate(heights)))
 
 
-def _filled(tree: TetrahedralTree, new: Contents) -> tuple[NDArray[np.intp], Amounts]:
+def _filled(tree: TetrahedralTree, new: Contents) -> tuple[NDArray[np.intp], Totals]:
     """Nodes (n,) that have got something, and how much."""
     every = new.sums(len(tree))
     nodes = np.flatnonzero(every.area > 0)
@@ -227,15 +227,15 @@ def _drawn(
     buffer: AlphaBuffer | None,
     cells: Terminals | None,
     nodes: NDArray[np.intp],
-    amounts: Amounts,
+    totals: Totals,
 ) -> tuple[Terminals, AlphaBuffer]:
     """Terminals that are there and new ones, and the buffer into which all of them are drawn."""
     old = 0 if cells is None else len(cells)
     finer = buffers.fit(buffer, old + len(nodes))
     if old and finer is not buffer:
         nodes = np.concatenate([cells.nodes, nodes])
-        amounts, cells = Amounts.concatenate([cells.amounts, amounts]), None
-    new = Terminals.seen(tree, nodes, amounts, buffers.camera, finer)
+        totals, cells = Totals.concatenate([cells.totals, totals]), None
+    new = Terminals.seen(tree, nodes, totals, buffers.camera, finer)
     return (Terminals.concatenate([cells, new]) if cells is not None else new), finer
 
 
@@ -250,7 +250,7 @@ def _slack(camera: Camera, resolution: int) -> Slack:
 
 
 def _split(
-    tree: TetrahedralTree, nodes: NDArray, share: NDArray, camera: Camera, settings: RefinementSettings, deepest: int
+    tree: TetrahedralTree, nodes: NDArray, fraction: NDArray, camera: Camera, settings: RefinementSettings, deepest: int
 ) -> None:
     """Divide nodes: large ones into eight as suits their shape, others in two as often as it pays.
 
@@ -258,22 +258,22 @@ def _split(
     """
     pixels, _ = expected_pixels(tree.vertices(nodes), camera)
     # An eighth has a quarter of the pixels: where that is above the cutoff, all eight would be made anyway.
-    large = (pixels * share > 4.0 * settings.cutoff**2) & (tree.level[nodes] + GENERATIONS <= deepest)
+    large = (pixels * fraction > 4.0 * settings.cutoff**2) & (tree.level[nodes] + GENERATIONS <= deepest)
     # In an anchored tree the same place must be divided alike, whatever the camera sees of it.
     large &= not is_anchored(camera, settings)
     if large.any() and tree.tetrahedra_made + 8 * large.sum() <= settings.max_tetrahedra:
         tree.split_by_shape(nodes[large])
-        nodes, share = nodes[~large], share[~large]
+        nodes, fraction = nodes[~large], fraction[~large]
     for _ in range(GENERATIONS):
         if len(nodes) == 0 or tree.tetrahedra_made + 2 * len(nodes) > settings.max_tetrahedra:
             return
         nodes = tree.split(nodes).reshape(-1)
-        share = np.repeat(share, 2)
+        fraction = np.repeat(fraction, 2)
         pixels, whole = expected_pixels(tree.vertices(nodes), camera)
         # What is beside the view is divided for other reasons than its pixels.
-        large = (pixels * share > settings.cutoff**2) | (~whole & (share == 0.0))
+        large = (pixels * fraction > settings.cutoff**2) | (~whole & (fraction == 0.0))
         large &= tree.level[nodes] < deepest
-        nodes, share = nodes[large], share[large]
+        nodes, fraction = nodes[large], fraction[large]
 
 
 def step_of(state: Refinement) -> Step:
@@ -291,7 +291,7 @@ def step_of(state: Refinement) -> Step:
         subplants=subplants,
         pieces=pieces,
         foreign=polygons,
-        polygons=round(float(state.amounts.polygons[explicit].sum())),
+        polygons=round(float(state.totals.polygons[explicit].sum())),
         seconds=sum(state.seconds.values()),
         memory_mb=(state.tree.nbytes + state.holdings.nbytes) / 1e6,
     )

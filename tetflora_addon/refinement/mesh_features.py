@@ -18,9 +18,9 @@ MOST_BYTES = 128 << 20
 #: A flat sheet's boundary is longer than this, squared, in relation to its area (a disc has 4π, a half ball 2π): what
 #: has less is bent back upon itself.
 _SHEET = 2 * np.pi
-#: A face of a leaf has at least this share, squared, of the leaf's extent.
-_LEAF_SHARE = 1 / 16
-#: Leaves are many: none is larger than this share of the area of all in the mesh. A wall of one face is no leaf.
+#: A face of a leaf has at least this fraction, squared, of the leaf's extent.
+_LEAF_FRACTION = 1 / 16
+#: Leaves are many: none is larger than this fraction of the area of all in the mesh. A wall of one face is no leaf.
 _ONE_OF_MANY = 1 / 64
 #: How often curvature is averaged over neighbours: some faces around a branch.
 _ROUNDS = 6
@@ -91,7 +91,7 @@ def mesh_features(
     with np.errstate(divide="ignore"):
         local = np.where(curved > 0, 2.0 / np.maximum(curved, 1e-300), np.inf)
     width = np.where(solid, np.minimum(width, local), width)
-    leaf = ~solid & (area >= _LEAF_SHARE * extent[component] ** 2)
+    leaf = ~solid & (area >= _LEAF_FRACTION * extent[component] ** 2)
     leaf &= total[component] <= _ONE_OF_MANY * area[leaf].sum()
     return solid, leaf, width
 

@@ -21,7 +21,7 @@ from ..arrays import Arrays, spread
 
 #: Faces and triangles that are measured at a time; bounds what that takes to some hundred megabytes.
 MEASURED_AT_ONCE = 200_000
-#: A fragment that reaches beyond a plane by less than this share of its size is not cut again by rounding errors.
+#: A fragment that reaches beyond a plane by less than this fraction of its size is not cut again by rounding errors.
 _TOUCHING = 1e-9
 
 
@@ -46,7 +46,7 @@ class Surface:
     colours : (s, 3) float64
         Mean colour of each slot's material, linear RGB.
     transmission, coverage : (s,) float64
-        Share of scattered light that goes through, and of the surface that is there at all (1 without transparency).
+        Fraction of scattered light that goes through, and of the surface that is there at all (1 without transparency).
     solid : (f,) bool
         The face belongs to a closed or nearly closed surface, of which half is never seen; see `mesh_features`.
     leaf : (f,) bool
@@ -296,16 +296,16 @@ class Polygons(Arrays):
         owner : (k,) int64
             Polygon that each belongs to.
         triangle : (k,) int64
-        share : (k,) float64
+        fraction : (k,) float64
             Of the triangle's area: 1 except for fragments.
         """
         cut = self.part >= 0
         owner, index = spread(np.where(cut, 1, self.meshes.face_size[self.face] - 2))
-        triangle, share = self.meshes.face_triangle[self.face][owner] + index, np.ones(len(owner))
+        triangle, fraction = self.meshes.face_triangle[self.face][owner] + index, np.ones(len(owner))
         own = np.flatnonzero(cut[owner])
         rows = self.part[owner[own]]
-        triangle[own], share[own] = self.triangle[rows], shares(self.weights)[rows]
-        return owner, triangle, share
+        triangle[own], fraction[own] = self.triangle[rows], area_fractions(self.weights)[rows]
+        return owner, triangle, fraction
 
     def as_fragments(self) -> tuple[NDArray[np.int64], Polygons]:
         """Whole faces become their triangles; returns the polygon that each fragment comes from, and fragments."""
@@ -320,9 +320,9 @@ class Polygons(Arrays):
         areas = np.zeros(len(self))
         for start in range(0, len(self), MEASURED_AT_ONCE):
             some = self.take(slice(start, start + MEASURED_AT_ONCE))
-            owner, triangle, share = some.triangles()
+            owner, triangle, fraction = some.triangles()
             own = np.linalg.norm(self.meshes.vectors(triangle, some.instance[owner]), axis=1)
-            areas[start : start + len(some)] = np.bincount(owner, share * own, len(some))
+            areas[start : start + len(some)] = np.bincount(owner, fraction * own, len(some))
         return areas
 
     def bounding_box(self) -> NDArray[np.float64]:
@@ -357,8 +357,8 @@ class Polygons(Arrays):
         return _TOUCHING * self.reach
 
 
-def shares(weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Share (n,) of its triangle's area that a fragment with weights (n, 3, 3) takes."""
+def area_fractions(weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Fraction (n,) of its triangle's area that a fragment with weights (n, 3, 3) takes."""
     a, b = weights[:, 1, 1:] - weights[:, 0, 1:], weights[:, 2, 1:] - weights[:, 0, 1:]
     return np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 

@@ -29,7 +29,7 @@ from .visibility import AlphaBuffer, Buffers, Outline, fitting, hiding
 
 #: Side of a face for the longer side of a buffer. A face spans a quarter of the way round; in its corners its pixels
 #: are several times as dense as in the middle.
-FACE_SHARE = 0.5
+FACE_FRACTION = 0.5
 
 #: Directions and upward directions of the six faces in camera space (x right, y up, z back).
 _FACES = (
@@ -47,13 +47,12 @@ def face_cameras(camera: Camera, side: int) -> list[Camera]:
 
     Their near planes are closer than the panorama's near sphere, which they touch from within at the corners.
     """
-    cameras = []
-    for ahead, up in _FACES:
-        turn = np.stack([np.cross(ahead, up), up, np.negative(ahead)], axis=1).astype(np.float64)
-        frame, near = camera.frame @ turn, camera.near / np.sqrt(3.0)
-        window, room = (-1, 1, -1, 1), camera.room
-        cameras.append(Camera("PERSP", camera.position, frame, window, near, camera.far, side, side, room=room))
-    return cameras
+    turns = [np.stack([np.cross(ahead, up), up, np.negative(ahead)], axis=1).astype(np.float64) for ahead, up in _FACES]
+    window, near, radius = (-1, 1, -1, 1), camera.near / np.sqrt(3.0), camera.cell_radius
+    return [
+        Camera("PERSP", camera.position, camera.frame @ t, window, near, camera.far, side, side, cell_radius=radius)
+        for t in turns
+    ]
 
 
 def pixels_per_solid_angle(camera: Camera, directions: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -98,7 +97,7 @@ class PanoramaBuffer:
         count, extinction = len(vertices), np.asarray(extinction, np.float64)
         pixels, opacity = np.zeros((2, count))
         if count:
-            self._make_room(int(np.max(cells)) + 1)
+            self._grow(int(np.max(cells)) + 1)
         for number, face in enumerate(self.faces):
             some = np.flatnonzero(_may_be_in(vertices, face.camera))
             outline = face.add(cells[some], vertices[some], extinction[some])
@@ -115,14 +114,14 @@ class PanoramaBuffer:
             face.remove(chosen)
 
     def transmittance(self, rank: NDArray[np.integer]) -> NDArray[np.float64]:
-        """Share of each tetrahedron's light that nothing in front holds up; as `AlphaBuffer.transmittance`."""
-        self._make_room(len(rank))
+        """Fraction of each tetrahedron's light that nothing in front blocks; as `AlphaBuffer.transmittance`."""
+        self._grow(len(rank))
         weight = self._weight[:, : len(rank)]
         seen = sum(w * face.transmittance(rank) for w, face in zip(weight, self.faces, strict=True))
         total = weight.sum(axis=0)
         return seen / np.where(total > 0.0, total, 1.0)
 
-    def _make_room(self, numbers: int) -> None:
+    def _grow(self, numbers: int) -> None:
         if numbers > self._weight.shape[1]:
             grown = np.zeros((len(self.faces), max(numbers, 2 * self._weight.shape[1])))
             grown[:, : self._weight.shape[1]] = self._weight
@@ -155,7 +154,7 @@ class PanoramaBuffers:
 
 def face_side(resolution: int) -> int:
     """Side in pixels of the faces for the longer side of a flat picture's buffer."""
-    return max(1, round(FACE_SHARE * resolution))
+    return max(1, round(FACE_FRACTION * resolution))
 
 
 def _may_be_in(vertices: NDArray[np.float64], camera: Camera) -> NDArray[np.bool_]:
@@ -168,7 +167,7 @@ def _may_be_in(vertices: NDArray[np.float64], camera: Camera) -> NDArray[np.bool
 def widened_for(
     camera: Camera, margin: float, flora: Flora, subplants: Branches, polygons: Polygons | None = None
 ) -> Camera:
-    """The camera with a margin, in shares of the picture, and what depth of field and motion blur add to it.
+    """The camera with a margin, in fractions of the picture, and what depth of field and motion blur add to it.
 
     Polygons count by their centres: what is one large face from the eye to the horizon asks for no margin.
     """

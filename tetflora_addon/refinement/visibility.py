@@ -87,9 +87,9 @@ class AlphaBuffer:
         if self.end is not None and len(self.end) != self.width * self.height:
             raise ValueError(f"the depth buffer of the occluders must have {self.width} × {self.height} pixels")
         self._cell, self._pixel = np.zeros((2, 0), np.int32)
-        # Optical depth that a fragment brings into its pixel, its share of its tetrahedron as far as it is not
+        # Optical depth that a fragment brings into its pixel, its fraction of its tetrahedron as far as it is not
         # occluded, and the transmittance of what is before it.
-        self._depth, self._share, self._before = np.zeros((3, 0))
+        self._depth, self._fraction, self._before = np.zeros((3, 0))
         self._changed = np.zeros(self.width * self.height, bool)
 
     def add(self, cells: NDArray[np.integer], vertices: NDArray[np.float64], extinction: ArrayLike) -> Outline:
@@ -111,10 +111,10 @@ class AlphaBuffer:
         count = len(vertices)
         fragments = tetrahedron_fragments(vertices, self.camera, self.width, self.height)
         cell, pixel, coverage = fragments.cell, fragments.pixel, fragments.coverage
-        share = np.ones(len(fragments))
+        fraction = np.ones(len(fragments))
         if self.end is not None:
             behind = (self.end[pixel] - fragments.entry) / np.maximum(fragments.thickness, 1e-12)
-            share = np.clip(behind, 0.0, 1.0)
+            fraction = np.clip(behind, 0.0, 1.0)
         with np.errstate(invalid="ignore"):
             depth = np.asarray(extinction, np.float64)[cell] * fragments.thickness
         # 0 · ∞ where a ray touches an opaque cell in a point: nothing.
@@ -128,13 +128,13 @@ class AlphaBuffer:
         if self.worth is not None:
             exact, final = np.zeros(count, bool), 1.0
         # What lies behind an occluder neither is seen nor hides anything.
-        open_ones = slice(None) if self.end is None else np.flatnonzero(share)
+        open_ones = slice(None) if self.end is None else np.flatnonzero(fraction)
         self._changed[pixel[open_ones]] = True
         for name, values in (
             ("_cell", np.asarray(cells, np.int32)[cell]),
             ("_pixel", pixel),
-            ("_depth", own * np.minimum(coverage * share, 1.0) * (fragments.entry >= self.camera.hides_from)),
-            ("_share", counted * share / np.maximum(weight, 1e-300)[cell]),
+            ("_depth", own * np.minimum(coverage * fraction, 1.0) * (fragments.entry >= self.camera.hides_from)),
+            ("_fraction", counted * fraction / np.maximum(weight, 1e-300)[cell]),
             ("_before", np.ones(len(cell))),
         ):
             setattr(self, name, np.concatenate([getattr(self, name), values[open_ones]]))
@@ -147,11 +147,11 @@ class AlphaBuffer:
         if go.any():
             self._changed[self._pixel[go]] = True
             stay = np.flatnonzero(~go)
-            for name in ("_cell", "_pixel", "_depth", "_share", "_before"):
+            for name in ("_cell", "_pixel", "_depth", "_fraction", "_before"):
                 setattr(self, name, np.take(getattr(self, name), stay))
 
     def transmittance(self, rank: NDArray[np.integer]) -> NDArray[np.float64]:
-        """Share of each tetrahedron's light, 0 to 1, that nothing in front holds up; 0 out of view.
+        """Fraction of each tetrahedron's light, 0 to 1, that nothing in front blocks; 0 out of view.
 
         Parameters
         ----------
@@ -167,7 +167,7 @@ class AlphaBuffer:
         some = np.flatnonzero(self._changed[self._pixel])
         self._changed[:] = False
         self._before[some] = np.exp(-self._depth_before(some, rank))
-        return np.bincount(self._cell, self._share * self._before, len(rank))
+        return np.bincount(self._cell, self._fraction * self._before, len(rank))
 
     def _depth_before(self, some: NDArray[np.intp], rank: NDArray[np.integer]) -> NDArray[np.float64]:
         """Optical depth in front of some fragments (n,), among which are all of their pixels."""

@@ -56,7 +56,7 @@ def rooms(scene):
     for frame in range(1, FRAMES + 1):
         scene.frame_set(frame)
         given = contents.read_scene(scene, depsgraph(), depsgraph().view_layer)
-        found.append(frame_cache.shared_camera(scene, depsgraph(), given).room)
+        found.append(frame_cache.shared_camera(scene, depsgraph(), given).cell_radius)
     return found
 
 
@@ -70,7 +70,7 @@ def test_each_frame_of_a_flight_is_the_frame_alone(flight):
 
 @pytest.mark.parametrize("thing", ["plant", "mesh", "tall plant"])
 def test_cells_are_larger_far_from_all_that_is_refined(flight, thing):
-    small = frame_cache.shared_camera(flight, depsgraph()).room
+    small = frame_cache.shared_camera(flight, depsgraph()).cell_radius
     assert min(rooms(flight)) >= 2.0 * small
     if thing == "plant":
         add_plant("near", seed=3, location=(0.0, -57.0, 0.0))

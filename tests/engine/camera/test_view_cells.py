@@ -54,7 +54,7 @@ def far_points(rng: np.random.Generator, camera: Camera, cell: Camera) -> tuple[
     """Points (n, 3) that a camera sees far from the eyes of its cell, and their distances (n,)."""
     points = picture(rng, camera)
     away = np.linalg.norm(points - camera.position, axis=1)
-    return points[away > 8.0 * cell.room], away[away > 8.0 * cell.room]
+    return points[away > 8.0 * cell.cell_radius], away[away > 8.0 * cell.cell_radius]
 
 
 def same(a: Camera, b: Camera) -> bool:
@@ -110,7 +110,7 @@ def test_blur_reaches_as_far_into_its_picture_as_into_that_of_any_of_its_cameras
     camera = replace(camera, lens_radius=rng.uniform(0.005, 0.05), focus=rng.uniform(3.0, 30.0) * away)
     cell = cell_camera(camera, CELLS)
     assume(cell is not None)
-    assume(away > 1.5 * cell.room)
+    assume(away > 1.5 * cell.cell_radius)
     margins = [
         np.array(blur_margins(viewer, centre, reach))
         * (viewer.window[1] - viewer.window[0], viewer.window[3] - viewer.window[2])
@@ -125,7 +125,7 @@ def test_it_takes_nothing_to_be_farther_away_than_any_of_its_cameras(rng):
     cell = cell_camera(camera, CELLS)
     assume(cell is not None)
     points = picture(rng, camera)
-    points = points[np.linalg.norm(points - camera.position, axis=1) > 4.0 * cell.room]
+    points = points[np.linalg.norm(points - camera.position, axis=1) > 4.0 * cell.cell_radius]
     # Towards the border of a wide picture depth changes with the direction as well.
     border = 1.0 + np.tan(CELLS.turn) * 2.0 * np.abs(camera.window).max()
     assert (cell.extent_around(points) <= camera.extent_around(points) * border).all()
@@ -138,7 +138,7 @@ def test_nor_much_nearer_than_it_is(rng):
     cell = cell_camera(camera, CELLS)
     assume(cell is not None)
     points, away = far_points(rng, camera, cell)
-    least = (1.0 - 2.5 * cell.room / away) * 2.0 ** (-1.0 / 16.0) * 0.9
+    least = (1.0 - 2.5 * cell.cell_radius / away) * 2.0 ** (-1.0 / 16.0) * 0.9
     assert (cell.extent_around(points) >= camera.extent_around(points) * least).all()
 
 
@@ -226,13 +226,13 @@ def test_all_cameras_of_a_larger_cell_get_the_same_one_and_things_stay_clear_of_
     cell = cell_camera(camera, CELLS, around)
     assume(cell is not None)
     small = cell_camera(camera, CELLS)
-    if cell.room > small.room:
+    if cell.cell_radius > small.cell_radius:
         away = np.linalg.norm(centres - cell.eye, axis=1) - radii
-        assert (away >= CLEAR * cell.room * (1.0 - 1e-9)).all()
-    assert np.linalg.norm(camera.position - cell.eye) <= cell.room * (1.0 + 1e-9)
-    assert float(np.log2(cell.room / small.room)).is_integer()
+        assert (away >= CLEAR * cell.cell_radius * (1.0 - 1e-9)).all()
+    assert np.linalg.norm(camera.position - cell.eye) <= cell.cell_radius * (1.0 + 1e-9)
+    assert float(np.log2(cell.cell_radius / small.cell_radius)).is_integer()
     for _ in range(8):
-        other = replace(camera, position=cell.eye + rng.uniform(-1.0, 1.0, 3) * cell.room)
+        other = replace(camera, position=cell.eye + rng.uniform(-1.0, 1.0, 3) * cell.cell_radius)
         shared = cell_camera(other, CELLS, around)
         inside = np.linalg.norm(cell.eye - shared.eye) < 1e-9 * np.linalg.norm(cell.eye)
         assert same(shared, cell) or not inside
@@ -281,7 +281,7 @@ def test_only_what_is_far_enough_hides_others_from_all_cameras_of_a_cell(opaque)
         buffer.add(np.array([0, 1]), np.array([far, solid[[0, 2, 1, 3]]]), [1.0, np.inf])
         return float(buffer.transmittance(np.array([1, 0]))[0])
 
-    near, beyond = cell.room, 4.0 * cell.room + 2.0
+    near, beyond = cell.cell_radius, 4.0 * cell.cell_radius + 2.0
     assert seen(near, camera) == pytest.approx(0.0, abs=1e-20)
     assert seen(beyond, camera) == pytest.approx(0.0, abs=1e-20)
     assert seen(near, cell) == pytest.approx(1.0)

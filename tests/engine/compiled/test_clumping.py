@@ -194,8 +194,8 @@ def test_summaries_weigh_factors_by_area() -> None:
     both = summarise(flora, contents, np.zeros(1, np.int64), 1)
     volumes = np.array([8.0])
     found = flora.clumping.coefficients(contents.subplants.items, flora.clumping.whole)
-    amounts = contents.subplants.amounts
-    weight = amounts.leaf_area + amounts.wood_area / 2
+    totals = contents.subplants.totals
+    weight = totals.leaf_area + totals.wood_area / 2
     np.testing.assert_allclose(both.clumping[0], weight @ found / weight.sum())
     assert both.optical_area[0] == pytest.approx(weight.sum())
     even = replace(both, clumping=None)

@@ -13,7 +13,7 @@ from tests.engine import support
 from tetflora_addon.compiled.orientation import leaf_moments, wood_moments
 from tetflora_addon.compiled.samples import Points
 from tetflora_addon.growth.branches import Branches
-from tetflora_addon.refinement.contents import subplant_amounts
+from tetflora_addon.refinement.contents import subplant_totals
 from tetflora_addon.subplants.pieces import chunks, open_subplants, wood_areas
 
 
@@ -36,7 +36,7 @@ def samples_of_plants(species: int, count: int) -> dict[str, np.ndarray]:
         out["leaf_area"].append(np.bincount(of_plant, size**2 * flora.leaf.area[row], number))
         out["polygons"].append(faces + np.bincount(of_plant, flora.leaf.polygons[row], number))
         out["wood"].append(wood)
-        out["wood_expected"].append(subplant_amounts(flora, branches).wood_area)
+        out["wood_expected"].append(subplant_totals(flora, branches).wood_area)
     return {name: np.concatenate(values).astype(float) for name, values in out.items()}
 
 
@@ -64,10 +64,10 @@ def test_averages_hold_where_counts_follow_the_length(follow: float, whorl: int)
     tubes, leaves = support.meshes(flora, pieces)
     assert sum(m.polygons for m in leaves) == pytest.approx(1500 * flora.leaf_count[0], rel=0.02)
     assert sum(m.polygons for m in (*tubes, *leaves)) == pytest.approx(1500 * flora.polygons[0], rel=0.02)
-    amounts = subplant_amounts(flora, trunk)
-    assert wood_areas(flora, pieces).sum() == pytest.approx(amounts.wood_area.sum(), rel=0.02)
+    totals = subplant_totals(flora, trunk)
+    assert wood_areas(flora, pieces).sum() == pytest.approx(totals.wood_area.sum(), rel=0.02)
     children, *_ = open_subplants(flora, trunk)
-    assert subplant_amounts(flora, children).leaf_area.sum() == pytest.approx(amounts.leaf_area.sum(), rel=0.02)
+    assert subplant_totals(flora, children).leaf_area.sum() == pytest.approx(totals.leaf_area.sum(), rel=0.02)
 
 
 def test_a_species_without_variation_is_known_exactly() -> None:
@@ -85,7 +85,7 @@ def test_a_species_without_variation_is_known_exactly() -> None:
     assert sum(m.polygons for m in leaves) == pytest.approx(40 * flora.leaf_count[0])
     expected = 40 * flora.area_nodes[0, 0]
     assert sum(support.face_areas(m).sum() for m in leaves) == pytest.approx(expected, rel=1e-5)
-    assert wood_areas(flora, pieces).sum() == pytest.approx(subplant_amounts(flora, trunk).wood_area.sum(), rel=0.01)
+    assert wood_areas(flora, pieces).sum() == pytest.approx(subplant_totals(flora, trunk).wood_area.sum(), rel=0.01)
 
 
 def test_colours_are_means_weighted_by_area() -> None:
@@ -124,7 +124,7 @@ def test_orientation_of_subplants_at_any_tilt(species: int) -> None:
     for group in np.array_split(steepness, 3):
         some = boughs.take(group[:40])
         _, leaves = support.meshes(flora, support.expanded(flora, some))
-        weight = subplant_amounts(flora, some).leaf_area
+        weight = subplant_totals(flora, some).leaf_area
         expected = np.einsum("n,nij->ij", weight, leaf_moments(flora.orientation, some))
         np.testing.assert_allclose(support.moment(*leaves), expected / weight.sum(), atol=0.05)
 
@@ -137,7 +137,7 @@ def test_orientation_of_standing_plants_to_a_hundredth(name: str) -> None:
     number = int(np.clip(1e6 / flora.polygons[flora.first_row[species]], 4, 60))
     boughs, *_ = open_subplants(flora, support.trunks(flora.rows, support.plants(np.arange(number), species)))
     _, leaves = support.meshes(flora, support.expanded(flora, boughs))
-    weight = subplant_amounts(flora, boughs).leaf_area
+    weight = subplant_totals(flora, boughs).leaf_area
     expected = np.einsum("n,nij->ij", weight, leaf_moments(flora.orientation, boughs)) / weight.sum()
     # How far they face up; which way to the side is the chance of a few plants.
     assert support.moment(*leaves)[2, 2] == pytest.approx(expected[2, 2], abs=0.01)
@@ -159,7 +159,7 @@ def test_orientation_of_branches_turned_any_way(name: str) -> None:
     for group in np.array_split(np.argsort(turn[:, 2, 2]), 3):
         part = some.take(group)
         _, leaves = support.meshes(flora, support.expanded(flora, part))
-        weight = subplant_amounts(flora, part).leaf_area
+        weight = subplant_totals(flora, part).leaf_area
         expected = np.einsum("n,nij->ij", weight, leaf_moments(flora.orientation, part)) / weight.sum()
         np.testing.assert_allclose(support.moment(*leaves), expected, atol=0.02)
 

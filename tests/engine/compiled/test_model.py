@@ -22,7 +22,7 @@ from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.foliage import leaf_keys, leaf_places, outwardness, place_leaves, settled
 from tetflora_addon.growth.growth import branch_counts, children, leaf_counts, radius_at
 from tetflora_addon.growth.rows import FORK, LATERAL, SPUR, without_variation
-from tetflora_addon.refinement.contents import piece_amounts, subplant_amounts
+from tetflora_addon.refinement.contents import piece_totals, subplant_totals
 from tetflora_addon.species.members import expected_members, expected_polygons
 from tetflora_addon.subplants.leaf_meshes import leaf_meshes
 from tetflora_addon.subplants.pieces import Pieces, clipped, open_subplants, wood_areas
@@ -56,16 +56,16 @@ def test_averages_of_everything_at_once() -> None:
     tubes, blades = support.meshes(flora, pieces)
     areas = [support.face_areas(m) for m in blades]
     assert sum(m.polygons for m in (*tubes, *blades)) == pytest.approx(600 * flora.polygons[0], rel=0.025)
-    amounts = subplant_amounts(flora, trunk)
-    assert sum(a.sum() for a in areas) == pytest.approx(amounts.leaf_area.sum(), rel=0.03)
-    assert wood_areas(flora, pieces).sum() == pytest.approx(amounts.wood_area.sum(), rel=0.03)
+    totals = subplant_totals(flora, trunk)
+    assert sum(a.sum() for a in areas) == pytest.approx(totals.leaf_area.sum(), rel=0.03)
+    assert wood_areas(flora, pieces).sum() == pytest.approx(totals.wood_area.sum(), rel=0.03)
     colour = sum(a @ m.attributes["tf_colour"][1] for a, m in zip(areas, blades, strict=True))
     expected = flora.leaf_colours(trunk)[0]
     np.testing.assert_allclose(colour / sum(a.sum() for a in areas), expected, rtol=0.02)
 
 
 @pytest.mark.parametrize("level", [1, 2, 3])
-def test_amounts_are_kept_when_subplants_are_opened(level: int) -> None:
+def test_totals_are_kept_when_subplants_are_opened(level: int) -> None:
     """What a sub-plant is expected to hold is what its children and its own branch are expected to, on average."""
     flora = rich()
     subplants = support.trunks(flora.rows, support.plants(np.arange(4000)))
@@ -73,7 +73,7 @@ def test_amounts_are_kept_when_subplants_are_opened(level: int) -> None:
         subplants, *_ = open_subplants(flora, subplants)
         subplants = subplants.take(np.s_[:: max(len(subplants) // 4000, 1)])
     grown, _, pieces, _ = open_subplants(flora, subplants)
-    whole, own, parts = subplant_amounts(flora, subplants), piece_amounts(flora, pieces), subplant_amounts(flora, grown)
+    whole, own, parts = subplant_totals(flora, subplants), piece_totals(flora, pieces), subplant_totals(flora, grown)
     for name, tolerance in (("leaf_area", 0.02), ("wood_area", 0.03), ("polygons", 0.02)):
         opened = getattr(own, name).sum() + getattr(parts, name).sum()
         assert opened == pytest.approx(getattr(whole, name).sum(), rel=tolerance), name
@@ -81,7 +81,7 @@ def test_amounts_are_kept_when_subplants_are_opened(level: int) -> None:
 
 @given(st.integers(0, 10**6), st.lists(st.floats(0.01, 0.99), min_size=1, max_size=5))
 @settings(deadline=None, max_examples=30)
-def test_amounts_of_pieces_add_up_exactly(seed: int, cuts: list[float]) -> None:
+def test_totals_of_pieces_add_up_exactly(seed: int, cuts: list[float]) -> None:
     flora = rich()
     _, pieces = support.grown(flora, support.plants(seed))
     parts = pieces
@@ -90,7 +90,7 @@ def test_amounts_of_pieces_add_up_exactly(seed: int, cuts: list[float]) -> None:
         lower, upper = clipped(parts, np.full(n, -cut), np.full(n, 1 - cut))
         parts = Pieces.concatenate([lower, upper])
     for name in ("leaf_area", "wood_area"):
-        before, after = (getattr(piece_amounts(flora, p), name).sum() for p in (pieces, parts))
+        before, after = (getattr(piece_totals(flora, p), name).sum() for p in (pieces, parts))
         assert after == pytest.approx(before, rel=1e-9), name
 
 
@@ -102,14 +102,14 @@ def test_moments_of_what_depends_on_the_sky() -> None:
     for group in np.array_split(np.argsort(boughs.frame[:, 2, 2]), 4):
         some = boughs.take(group[:250])
         tubes, blades = support.meshes(flora, support.expanded(flora, some))
-        amounts = subplant_amounts(flora, some)
-        weight = amounts.leaf_area
+        totals = subplant_totals(flora, some)
+        weight = totals.leaf_area
         expected = np.einsum("n,nij->ij", weight, leaf_moments(flora.orientation, some)) / weight.sum()
         areas = [support.face_areas(m).sum() for m in blades]
         found = sum(a * support.moment(m) for a, m in zip(areas, blades, strict=True)) / sum(areas)
         np.testing.assert_allclose(found, expected, atol=0.04)
-        expected = np.einsum("n,nij->ij", amounts.wood_area, wood_moments(flora.orientation, some))
-        np.testing.assert_allclose(support.moment(tubes[0]), expected / amounts.wood_area.sum(), atol=0.05)
+        expected = np.einsum("n,nij->ij", totals.wood_area, wood_moments(flora.orientation, some))
+        np.testing.assert_allclose(support.moment(tubes[0]), expected / totals.wood_area.sum(), atol=0.05)
 
 
 def test_samples_lie_where_attracted_boughs_have_their_leaves() -> None:
@@ -126,7 +126,7 @@ def test_samples_lie_where_attracted_boughs_have_their_leaves() -> None:
         area = found.size**2 * flora.leaf.area[tips.branches.row[owner]]
         height = np.average(found.position[:, 2], weights=area)
         first, number = points.runs(some)
-        weight, total, sampled = subplant_amounts(flora, some).leaf_area, 0.0, 0.0
+        weight, total, sampled = subplant_totals(flora, some).leaf_area, 0.0, 0.0
         for i in range(len(some)):
             run = points.position[first[i] : first[i] + number[i]].astype(float)
             z = some.position[i, 2] + some.length[i] * (run @ some.frame[i, 2])
@@ -338,4 +338,4 @@ def test_limbs_that_fork_are_as_long_as_those_that_do_not() -> None:
         length.append(np.linalg.norm(limbs.end - limbs.start, axis=1).sum())
     assert length[0] == pytest.approx(length[1], rel=1e-6)
     trunk, pieces = support.grown(forked, seeds)
-    assert wood_areas(forked, pieces).sum() == pytest.approx(subplant_amounts(forked, trunk).wood_area.sum(), rel=0.05)
+    assert wood_areas(forked, pieces).sum() == pytest.approx(subplant_totals(forked, trunk).wood_area.sum(), rel=0.05)

@@ -41,13 +41,13 @@ def test_a_budget_that_suffices_changes_nothing() -> None:
 
 @given(st.floats(0.03, 1.2))
 @examples(deadline=None, max_examples=12)
-def test_what_is_made_fits(share: float) -> None:
+def test_what_is_made_fits(fraction: float) -> None:
     """Polygons and facets together, whatever the budget; and most of it is used where there is use for it."""
     whole = sum(made(0)[:2])
-    limit = int(share * whole)
+    limit = int(fraction * whole)
     leaves, proxies, side, fitted = made(limit)
     assert leaves + proxies <= limit
-    if share < 0.9:
+    if fraction < 0.9:
         assert leaves + proxies > 0.6 * limit
     assert side >= SETTINGS.facet
     assert not (fitted.decision == Decision.SPLIT).any()
@@ -56,11 +56,11 @@ def test_what_is_made_fits(share: float) -> None:
 def test_more_is_better() -> None:
     """Real leaves become more with the budget, facets finer, and what is kept gains more than what is not."""
     whole = sum(made(0)[:2])
-    results = [made(int(share * whole)) for share in (0.1, 0.3, 0.6, 0.9)]
+    results = [made(int(fraction * whole)) for fraction in (0.1, 0.3, 0.6, 0.9)]
     assert [r[0] for r in results] == sorted(r[0] for r in results)
     *_, first = scene()
     wanted = first.decision == Decision.EXPLICIT
-    gain = contributions(first.cells, first.transmittance) / first.amounts.polygons
+    gain = contributions(first.cells, first.transmittance) / first.totals.polygons
     for *_, fitted in results:
         kept = fitted.decision == Decision.EXPLICIT
         assert not (kept & ~wanted).any()
@@ -73,7 +73,7 @@ def test_shells_are_not_made_larger() -> None:
     fitted, side = afford(flora, result, camera, replace(SETTINGS, max_polygons=20_000), faces=4.0)
     assert side == SETTINGS.facet
     kept = fitted.decision == Decision.EXPLICIT
-    assert fitted.amounts.polygons[kept].sum() + 4 * (~kept).sum() <= 20_000
+    assert fitted.totals.polygons[kept].sum() + 4 * (~kept).sum() <= 20_000
 
 
 def test_memory_and_polygons_limit_each_other() -> None:

@@ -21,7 +21,7 @@ from tetflora_addon.emission.forms import Refined, facet_blocks
 from tetflora_addon.emission.plants import expanded_blocks, explicit_blocks
 from tetflora_addon.emission.shells import proxy_shells
 from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.proxies.facet_weights import COUNTS, FacetShares
+from tetflora_addon.proxies.facet_weights import COUNTS, FacetWeights
 from tetflora_addon.proxies.summaries import summarise
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.loop import Refinement
@@ -102,7 +102,7 @@ def test_a_block_holds_about_as_many_polygons_as_asked_for(monkeypatch: pytest.M
 def test_explicit_polygons_are_about_as_many_as_expected() -> None:
     flora, _, _, result = scene()
     made = sum(b.buffers.polygons for b in explicit_blocks(flora, result))
-    expected = result.amounts.polygons[result.decision == Decision.EXPLICIT].sum()
+    expected = result.totals.polygons[result.decision == Decision.EXPLICIT].sum()
     assert made == pytest.approx(expected, rel=0.05)
 
 
@@ -116,7 +116,7 @@ def test_facets_have_the_area_of_what_is_not_explicit(monkeypatch: pytest.Monkey
     optical = (every.leaf_area + every.wood_area / 2)[proxies].sum()
     assert 0.4 * optical < support.face_areas(mesh).sum() < 1.05 * optical
     ones = np.ones((len(flora.rows), len(COUNTS)))
-    monkeypatch.setattr(facets, "facet_shares", lambda _: FacetShares(ones, ones))
+    monkeypatch.setattr(facets, "facet_weights", lambda _: FacetWeights(ones, ones))
     mesh = support.facet_buffers(flora, result, camera)
     assert support.face_areas(mesh).sum() == pytest.approx(optical, rel=0.05)
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Between real leaves and facets nothing pops: shares grow smoothly, what is real stays real, and areas add up."""
+"""Between real leaves and facets nothing pops: fractions grow smoothly, what is real stays real, and areas add up."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ from tetflora_addon.emission import facets as facet_emission
 from tetflora_addon.emission.facets import facet_parts
 from tetflora_addon.emission.plants import BAND, Transition, explicit_blocks
 from tetflora_addon.growth.growth import trunks
-from tetflora_addon.proxies.facet_weights import COUNTS, FacetShares
+from tetflora_addon.proxies.facet_weights import COUNTS, FacetWeights
 from tetflora_addon.refinement.decisions import Decision
 
 
@@ -27,21 +27,21 @@ def scene(**options):
 
 
 @given(st.floats(0.01, 100.0), st.floats(0.01, 100.0), st.floats(0.1, 4.0))
-def test_shares_grow_with_the_width(a: float, b: float, limit: float) -> None:
+def test_fractions_grow_with_the_width(a: float, b: float, limit: float) -> None:
     """None up to the limit, all beyond the band, monotonous between."""
     flora = support.small_flora()
     camera = support.camera((0, -50, 0), (0, 0, 0))
     transition = Transition(flora, camera, limit)
     place = np.zeros((2, 3))
     width = np.array([a, b]) * camera.extent_around(place)
-    share = transition.share(width, place)
-    assert ((share >= 0) & (share <= 1)).all()
-    for one, pixels in zip(share, (a, b), strict=True):
+    fraction = transition.fraction(width, place)
+    assert ((fraction >= 0) & (fraction <= 1)).all()
+    for one, pixels in zip(fraction, (a, b), strict=True):
         if pixels <= limit:
             assert one == pytest.approx(0.0, abs=1e-12)
         if pixels >= limit * BAND * (1 + 1e-9):
             assert one == pytest.approx(1.0)
-    assert (share[0] - share[1]) * (a - b) >= 0
+    assert (fraction[0] - fraction[1]) * (a - b) >= 0
 
 
 def leaf_area(blocks) -> float:
@@ -60,18 +60,18 @@ def test_real_leaves_and_facets_together_are_all_leaves(monkeypatch: pytest.Monk
     every = replace(result, decision=np.full_like(result.decision, Decision.EXPLICIT))
     whole = leaf_area(explicit_blocks(flora, every))
     ones = np.ones((len(flora.rows), len(COUNTS)))
-    monkeypatch.setattr(facet_emission, "facet_shares", lambda _: FacetShares(ones, ones))
+    monkeypatch.setattr(facet_emission, "facet_weights", lambda _: FacetWeights(ones, ones))
     pixels = float(np.median(result.cells.feature))
-    shares = []
+    fractions = []
     for limit in pixels * np.array([3.0, 0.9, 0.7, 0.5, 0.1]):
         transition = Transition(flora, camera, float(limit))
         real = leaf_area(explicit_blocks(flora, every, transition))
-        shares.append(real / whole)
+        fractions.append(real / whole)
         assert real + facets_of_leaves(flora, every, camera, transition) == pytest.approx(whole, rel=0.08)
-    assert shares == sorted(shares)
-    assert shares[0] == 0.0
-    assert 0.02 < shares[2] < 0.98
-    assert shares[-1] == pytest.approx(1.0)
+    assert fractions == sorted(fractions)
+    assert fractions[0] == 0.0
+    assert 0.02 < fractions[2] < 0.98
+    assert fractions[-1] == pytest.approx(1.0)
 
 
 def test_what_is_real_stays_real_as_the_limit_falls() -> None:

@@ -14,7 +14,7 @@ from tests.engine import support
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.growth.rows import MAX_DRAWN, MAX_SEGMENTS, drawn_lines
-from tetflora_addon.refinement.contents import bounding_cylinders, subplant_amounts
+from tetflora_addon.refinement.contents import bounding_cylinders, subplant_totals
 from tetflora_addon.species.schema import species_from_dict
 from tetflora_addon.species.skeletons import Skeleton, drawn_branches, skeleton_from_edges
 from tetflora_addon.subplants.pieces import open_subplants, wood_areas
@@ -81,14 +81,14 @@ def test_the_computer_fills_in_what_is_not_drawn() -> None:
     assert len(limbs[0]) != len(limbs[1]) or np.abs(limbs[0] - limbs[1]).max() > 0.01
 
 
-def test_compiled_amounts_are_those_of_grown_plants() -> None:
+def test_compiled_totals_are_those_of_grown_plants() -> None:
     one = flora()
     trunk, pieces = support.grown(one, support.plants(np.arange(400)))
     tubes, leaves = support.meshes(one, pieces)
-    amounts = subplant_amounts(one, trunk)
-    assert wood_areas(one, pieces).sum() == pytest.approx(amounts.wood_area.sum(), rel=0.02)
-    assert sum(support.face_areas(m).sum() for m in leaves) == pytest.approx(amounts.leaf_area.sum(), rel=0.03)
-    assert sum(m.polygons for m in (*tubes, *leaves)) == pytest.approx(amounts.polygons.sum(), rel=0.03)
+    totals = subplant_totals(one, trunk)
+    assert wood_areas(one, pieces).sum() == pytest.approx(totals.wood_area.sum(), rel=0.02)
+    assert sum(support.face_areas(m).sum() for m in leaves) == pytest.approx(totals.leaf_area.sum(), rel=0.03)
+    assert sum(m.polygons for m in (*tubes, *leaves)) == pytest.approx(totals.polygons.sum(), rel=0.03)
 
 
 @pytest.mark.parametrize("drawn", [4, len(POINTS)])

@@ -25,7 +25,7 @@ from tetflora_addon.growth.foliage import leaf_keys, leaf_places, place_leaves, 
 from tetflora_addon.growth.growth import Stems, leaf_counts
 from tetflora_addon.growth.rows import ROW_DTYPE
 from tetflora_addon.growth.wind import Wind, gusts, leant, sway, widest_sway
-from tetflora_addon.proxies.facet_weights import facet_shares
+from tetflora_addon.proxies.facet_weights import facet_weights
 from tetflora_addon.proxies.microsurfaces import Facets, concatenate_facets, facet_mesh, piece_facets, subplant_facets
 from tetflora_addon.subplants.leaf_meshes import leaf_meshes
 from tetflora_addon.subplants.pieces import Pieces, expand, open_subplants
@@ -256,7 +256,7 @@ def test_one_compile_serves_all_times_and_proxies_keep_their_mean() -> None:
         assert getattr(first, name) is getattr(second, name)
     assert first.samples is flora.samples
     assert first.orientation is second.orientation is flora.orientation
-    assert facet_shares(first) is facet_shares(flora)
+    assert facet_weights(first) is facet_weights(flora)
     assert first.rows["air"]["time"][0] != second.rows["air"]["time"][0]
 
 

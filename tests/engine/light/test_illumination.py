@@ -23,7 +23,7 @@ from tetflora_addon.light.scattering import (
     harmonics,
     irradiance,
     particle_ambient,
-    scattered_shares,
+    scattered_fractions,
     sphere_phase,
 )
 from tetflora_addon.light.sources import Near, World, arriving, buffers_of, split_areas
@@ -166,10 +166,10 @@ def test_light_is_linear_within_a_tetrahedron() -> None:
     cloud = box(0.5, 1)
     found = shadow_pass(cloud, [], World.of(lambda d: 1.0 + d[:, 2:] * [1.0, 0.5, 0.2]), resolution=64)
     ends = np.array([cloud.key_points[2, 0], cloud.key_points[2, 3]])
-    share = np.linspace(0.0, 1.0, 5)[:, None]
-    points = ends[0] * (1 - share) + ends[1] * share
+    fraction = np.linspace(0.0, 1.0, 5)[:, None]
+    points = ends[0] * (1 - fraction) + ends[1] * fraction
     samples = found.ambient[2, [0, 3]].reshape(2, -1)
-    wanted = samples[:1] * (1 - share) + samples[1:] * share
+    wanted = samples[:1] * (1 - fraction) + samples[1:] * fraction
     assert found.around(points, np.full(5, 2)).reshape(5, -1) == pytest.approx(wanted, abs=1e-6)
 
 
@@ -276,9 +276,9 @@ def test_phases_keep_all_light() -> None:
     assert 2 * np.pi * (weight * sphere_phase(x)).sum() == pytest.approx(1.0, abs=1e-4)
     even = np.tile(World.plain((1, 1, 1)).parts.sum(axis=0), (1, 1, 1))
     for transmission in (0.0, 0.4):
-        shares = scattered_shares(np.full((1, 3), 0.5), np.array([transmission]))
-        total = shares[0] + shares[1] + shares[2][:, None]
-        assert particle_ambient(shares, even, np.array([[0.0, 0.6, 0.8]])) == pytest.approx(total, rel=1e-3)
+        fractions = scattered_fractions(np.full((1, 3), 0.5), np.array([transmission]))
+        total = fractions[0] + fractions[1] + fractions[2][:, None]
+        assert particle_ambient(fractions, even, np.array([[0.0, 0.6, 0.8]])) == pytest.approx(total, rel=1e-3)
 
 
 def test_nothing_to_light() -> None:

@@ -69,8 +69,8 @@ def test_shadows_from_beside_the_view_keep_their_area(clearance: float) -> None:
     flora = support.small_flora()
     beside, contents = sizes(clearance, COARSE)
     mesh = facet_mesh(subplant_facets(flora, contents.subplants.items, *beside.sides(PIXELS)))
-    amounts = contents.subplants.amounts
-    optical = (amounts.leaf_area + amounts.wood_area / 2).sum()
+    totals = contents.subplants.totals
+    optical = (totals.leaf_area + totals.wood_area / 2).sum()
     assert support.face_areas(mesh).sum() == pytest.approx(optical, rel=0.05)
     assert mesh.polygons == pytest.approx(beside.counts(PIXELS).sum(), rel=0.05)
     assert mesh.polygons >= 4 * PLANTS

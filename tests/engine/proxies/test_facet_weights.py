@@ -16,7 +16,7 @@ from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.proxies import facet_weights as subject
 from tetflora_addon.proxies.microsurfaces import CIRCUMRADIUS, facet_mesh, piece_facets, subplant_facets
-from tetflora_addon.refinement.contents import piece_amounts, subplant_amounts
+from tetflora_addon.refinement.contents import piece_totals, subplant_totals
 from tetflora_addon.refinement.rasterise import occluder_depth
 from tetflora_addon.species.catalogue import list_species, load_species
 from tetflora_addon.subplants.pieces import open_subplants
@@ -33,7 +33,7 @@ def triangles(buffers) -> np.ndarray:
 
 
 def held_up(parts: list[np.ndarray], reach: float, pixels: int = 120) -> float:
-    """Share of level rays from four sides that meet something within a window around the origin."""
+    """Weight of level rays from four sides that meet something within a window around the origin."""
     total = 0.0
     for turn in (0.3, 1.1, 1.9, 2.7):
         right = np.array([np.cos(turn), np.sin(turn), 0.0])
@@ -45,26 +45,26 @@ def held_up(parts: list[np.ndarray], reach: float, pixels: int = 120) -> float:
     return total / 4
 
 
-def as_facets(flora: Flora, seeds, opened: int, side: float, shares: subject.FacetShares | None) -> list[np.ndarray]:
+def as_facets(flora: Flora, seeds, opened: int, side: float, weights: subject.FacetWeights | None) -> list[np.ndarray]:
     """A plant opened some orders deep, as facets."""
     some, out = trunks(flora.rows, seeds), []
     for _ in range(opened):
         some, _, pieces, _ = open_subplants(flora, some)
-        amounts = piece_amounts(flora, pieces)
-        whole = (amounts.leaf_area + amounts.wood_area / 2) / np.maximum(pieces.t1 - pieces.t0, 1e-12)
-        share = None if shares is None else shares.of_pieces(pieces.branches.row, whole / side**2)
-        out.append(piece_facets(flora, pieces, np.full(len(pieces), side), share=share))
-    amounts = subplant_amounts(flora, some)
-    area = amounts.leaf_area + amounts.wood_area / 2
-    share = None if shares is None else shares.of_subplants(some.row, area / side**2)
-    out.append(subplant_facets(flora, some, np.full(len(some), side), share=share))
+        totals = piece_totals(flora, pieces)
+        whole = (totals.leaf_area + totals.wood_area / 2) / np.maximum(pieces.t1 - pieces.t0, 1e-12)
+        weight = None if weights is None else weights.of_pieces(pieces.branches.row, whole / side**2)
+        out.append(piece_facets(flora, pieces, np.full(len(pieces), side), weight=weight))
+    totals = subplant_totals(flora, some)
+    area = totals.leaf_area + totals.wood_area / 2
+    weight = None if weights is None else weights.of_subplants(some.row, area / side**2)
+    out.append(subplant_facets(flora, some, np.full(len(some), side), weight=weight))
     return [triangles(facet_mesh(f)) for f in out if len(f)]
 
 
 @pytest.mark.parametrize("identifier", ["aspen", "birch"])
 def test_opened_plants_of_other_seeds_are_as_opaque(identifier: str) -> None:
     flora = compile_species([load_species(identifier)])
-    shares = subject.facet_shares(flora)
+    weights = subject.facet_weights(flora)
     truth, fitted, full = [], [], []
     for seed in (901, 905):
         seeds = replace(support.plants(seed), species=np.zeros(1, np.int32))
@@ -72,7 +72,7 @@ def test_opened_plants_of_other_seeds_are_as_opaque(identifier: str) -> None:
         reach = float(max(np.abs(part).max() for part in real)) / 2
         truth.append(held_up(real, reach))
         side = 2 * reach / 40
-        fitted.append(held_up(as_facets(flora, seeds, 1, side, shares), reach))
+        fitted.append(held_up(as_facets(flora, seeds, 1, side, weights), reach))
         full.append(held_up(as_facets(flora, seeds, 1, side, None), reach))
     error = abs(np.mean(fitted) - np.mean(truth)) / np.mean(truth)
     assert error < 0.08
@@ -83,7 +83,7 @@ def test_tables_of_shipped_species_are_those_of_today() -> None:
     """Run ``python -m devtools.facet_tables`` and raise `_METHOD` after changes of species or of facets."""
     flora = compile_species([load_species("flower")])
     known = subject.shipped()[subject.digest(flora, 0)]
-    fitted = subject.fitted_shares(flora, np.zeros(1, np.int32))
+    fitted = subject.fitted_weights(flora, np.zeros(1, np.int32))
     assert len(fitted) == len(known["whole"])
     for row, (whole, own) in fitted.items():
         np.testing.assert_allclose(whole, known["whole"][row], atol=0.05)
@@ -96,17 +96,17 @@ def test_every_shipped_species_has_a_table() -> None:
 
 
 @given(st.floats(0.05, 1.6), st.floats(1e-3, 1e6))
-def test_between_known_numbers_shares_follow_the_logarithm(level: float, count: float) -> None:
+def test_between_known_numbers_weights_follow_the_logarithm(level: float, count: float) -> None:
     table = np.full((2, len(subject.COUNTS)), level)
-    shares = subject.FacetShares(table, table)
-    assert shares.of_subplants(np.array([1]), np.array([count]))[0] == pytest.approx(level)
+    weights = subject.FacetWeights(table, table)
+    assert weights.of_subplants(np.array([1]), np.array([count]))[0] == pytest.approx(level)
     rising = np.tile(np.arange(len(subject.COUNTS), dtype=float), (2, 1))
-    shares = subject.FacetShares(rising, rising)
+    weights = subject.FacetWeights(rising, rising)
     place = np.clip(np.log(count / subject.COUNTS[0]) / np.log(4), 0, len(subject.COUNTS) - 1)
-    assert shares.of_pieces(np.array([0]), np.array([count]))[0] == pytest.approx(place)
+    assert weights.of_pieces(np.array([0]), np.array([count]))[0] == pytest.approx(place)
 
 
-def test_the_least_share_with_which_a_triangle_reaches_a_ray() -> None:
+def test_the_least_weight_with_which_a_triangle_reaches_a_ray() -> None:
     """Seen face on: at its middle none is needed, at the middle of a side and at its corners all."""
     facets = subplant_facets(
         support.small_flora(), trunks(support.small_flora().rows, support.plants(1)), np.array([1.0])
@@ -124,20 +124,20 @@ def test_the_least_share_with_which_a_triangle_reaches_a_ray() -> None:
         moved = replace(one, centre=np.array([[-point[0] * 1.0, -point[1] * 1.0, 0.0]]))
         view = subject._View(np.array([1.0, 0, 0]), np.array([0, 1.0, 0]), 1000.0)
         far = replace(moved, centre=moved.centre + 0.0)
-        least = subject._Sight.least_shares(view, far)
+        least = subject._Sight.least_weights(view, far)
         assert len(least) == 1
         assert least[0] == pytest.approx(expected, abs=1e-9)
 
 
 def test_a_species_is_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Compiled again, alone or beside others, it has the shares that were found before."""
+    """Compiled again, alone or beside others, it has the weights that were found before."""
     asked = []
-    real = subject.fitted_shares
-    monkeypatch.setattr(subject, "fitted_shares", lambda f, n: asked.append(n.tolist()) or real(f, n))
+    real = subject.fitted_weights
+    monkeypatch.setattr(subject, "fitted_weights", lambda f, n: asked.append(n.tolist()) or real(f, n))
     monkeypatch.setattr(subject, "shipped", dict)
     monkeypatch.setattr(subject, "_found", {})
-    alone = subject.facet_shares(compile_species([load_species("flower")]))
-    again = subject.facet_shares(compile_species([load_species("grass"), load_species("flower")]))
+    alone = subject.facet_weights(compile_species([load_species("flower")]))
+    again = subject.facet_weights(compile_species([load_species("grass"), load_species("flower")]))
     assert asked == [[0], [0]]
     rows = len(alone.whole)
     np.testing.assert_array_equal(again.whole[-rows:], alone.whole)

@@ -19,7 +19,7 @@ from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.proxies.facet_sizes import COARSE, piece_facet_sizes, subplant_facet_sizes
 from tetflora_addon.proxies.microsurfaces import facet_mesh, piece_facets, subplant_facets
-from tetflora_addon.refinement.contents import Contents, bounding_cylinders, subplant_amounts
+from tetflora_addon.refinement.contents import Contents, bounding_cylinders, subplant_totals
 
 
 def facets(flora: Flora, subplants: Branches, side: float) -> MeshBuffers:
@@ -46,29 +46,29 @@ def test_area_is_kept_at_any_size(name: str, side: float) -> None:
     plants = trunks(flora.rows, support.plants(np.arange(number), species))
     mesh = facets(flora, plants, side)
     check_topology(mesh)
-    amounts, areas = subplant_amounts(flora, plants), support.face_areas(mesh)
-    for leaves, expected in ((True, amounts.leaf_area), (False, amounts.wood_area / 2)):
+    totals, areas = subplant_totals(flora, plants), support.face_areas(mesh)
+    for leaves, expected in ((True, totals.leaf_area), (False, totals.wood_area / 2)):
         found = areas[part(mesh, leaves)]
         error = np.sqrt(number) / 2 * side**2  # of rounding a number of facets up or down, at most
         assert found.sum() == pytest.approx(expected.sum(), abs=4 * error + 1e-3 * expected.sum())
 
 
-def test_small_shares_are_met_on_average_and_from_all_samples() -> None:
+def test_small_numbers_are_met_on_average_and_from_all_samples() -> None:
     """Sub-plants of a tenth of a facet: one in ten gets one, and they do not crowd at a few places."""
     still = {"leaf_light": 0}
     upright = {"length": [3, 0], "angle": [0, 0], "branches": [7, 0]}
     flora = support.compiled(support.small(order0=upright, order1=still, order2=still))
     n = 20_000
     plants = trunks(flora.rows, support.plants(np.arange(n)))
-    side = np.sqrt(subplant_amounts(flora, plants).leaf_area * 10)
+    side = np.sqrt(subplant_totals(flora, plants).leaf_area * 10)
     mesh = facet_mesh(subplant_facets(flora, plants, side))
     leaves = part(mesh, True)
     assert leaves.sum() == pytest.approx(n / 10, abs=4 * np.sqrt(n * 0.09))
     heights = support.face_centres(mesh)[leaves][:, 2]
     assert len(np.unique(np.round(heights, 5))) > 500  # each height is that of one sample
-    amounts = subplant_amounts(flora, plants)
+    totals = subplant_totals(flora, plants)
     total = support.face_areas(mesh)[leaves].sum()
-    assert total == pytest.approx(amounts.leaf_area.sum(), rel=0.1)
+    assert total == pytest.approx(totals.leaf_area.sum(), rel=0.1)
 
 
 @pytest.mark.parametrize("name", ["birch", "bush", "conifer", "oak", "spruce"])
@@ -108,9 +108,9 @@ def test_facets_stay_by_their_plant(seed: int, side: float, scale: float) -> Non
     across = np.linalg.norm(offset - along[:, None] * plant.frame[0, :, 2], axis=1)
     assert np.abs(along).max() <= half_height[0] * (1 + 1e-5)
     assert across.max() <= radius[0] * (1 + 1e-5)
-    colour, share = (mesh.attributes[n][1] for n in ("tf_colour", "tf_transmission"))
+    colour, weight = (mesh.attributes[n][1] for n in ("tf_colour", "tf_transmission"))
     assert 0 <= colour.min() <= colour.max() <= 1
-    assert set(np.unique(share)) <= {np.float32(0), np.float32(flora.transmission[0])}
+    assert set(np.unique(weight)) <= {np.float32(0), np.float32(flora.transmission[0])}
     assert support.face_areas(mesh).min() > 0
 
 
@@ -122,20 +122,20 @@ def test_hidden_wood_gets_no_more_facets_than_it_has_faces() -> None:
     camera = SimpleNamespace(
         extent_around=lambda points: np.full(len(points), 1e-3), clearance=lambda points: np.zeros(len(points))
     )
-    for sizes_of, make, things, faces, amounts in (
+    for sizes_of, make, things, faces, totals in (
         (
             subplant_facet_sizes,
             subplant_facets,
             plants,
             100 * (flora.polygons[0] - flora.leaf_count[0] * flora.leaf.polygons[0]),
-            contents.subplants.amounts,
+            contents.subplants.totals,
         ),
         (
             piece_facet_sizes,
             piece_facets,
             pieces,
             flora.rows["sides"][pieces.branches.row].sum(),
-            contents.pieces.amounts,
+            contents.pieces.totals,
         ),
     ):
         sizes = sizes_of(flora, contents, camera, np.array([COARSE]))
@@ -143,7 +143,7 @@ def test_hidden_wood_gets_no_more_facets_than_it_has_faces() -> None:
         assert made.polygons == pytest.approx(sizes.counts(1.0).sum(), rel=0.02)
         wood = part(made, False)
         assert wood.sum() <= faces * 1.01
-        assert support.face_areas(made)[wood].sum() == pytest.approx(amounts.wood_area.sum() / 2, rel=0.1)
+        assert support.face_areas(made)[wood].sum() == pytest.approx(totals.wood_area.sum() / 2, rel=0.1)
         seen = sizes_of(flora, contents, camera, np.ones(1))
         assert part(facet_mesh(make(flora, things, *seen.sides(3.0))), False).sum() > faces * 5
         assert (seen.sides(3.0)[0] >= np.sqrt(seen.one_leaf)).all()
@@ -153,7 +153,7 @@ def test_facets_are_equilateral_and_share_the_area_of_their_plant() -> None:
     """As large as asked for or as a leaf, but for what it takes to have exactly the area of each plant."""
     flora = support.small_flora()
     plant = trunks(flora.rows, support.plants(np.arange(5)))
-    amounts = subplant_amounts(flora, plant)
+    totals = subplant_totals(flora, plant)
     leaf = flora.area_nodes[0, 0] / flora.leaf_count[0]
     for side in (1e-2, 0.1):
         mesh = facets(flora, plant, side)
@@ -163,17 +163,17 @@ def test_facets_are_equilateral_and_share_the_area_of_their_plant() -> None:
         areas, leafy = support.face_areas(mesh), part(mesh, True)
         expected = np.where(leafy, max(side**2, leaf), side**2)
         assert (np.abs(areas / expected - 1) < 0.5).all()
-        assert areas[leafy].sum() == pytest.approx(amounts.leaf_area.sum(), rel=1e-4)
-        assert areas[~leafy].sum() == pytest.approx(amounts.wood_area.sum() / 2, rel=1e-4)
+        assert areas[leafy].sum() == pytest.approx(totals.leaf_area.sum(), rel=1e-4)
+        assert areas[~leafy].sum() == pytest.approx(totals.wood_area.sum() / 2, rel=1e-4)
 
 
-def test_a_share_of_the_area_is_that_and_darkens_as_a_cluster_does() -> None:
-    """Recollision: none where all is seen, all light lost within for black shares; white stays white."""
+def test_a_fraction_of_the_area_is_that_and_darkens_as_a_cluster_does() -> None:
+    """Recollision: none where all is seen, all light lost within for black weights; white stays white."""
     flora = support.small_flora()
     plant = trunks(flora.rows, support.plants(np.arange(5)))
     side = np.full(5, 0.05)
     whole = subplant_facets(flora, plant, side)
-    part_of = subplant_facets(flora, plant, side, share=np.full(5, 0.5))
+    part_of = subplant_facets(flora, plant, side, weight=np.full(5, 0.5))
     np.testing.assert_allclose(part_of.side**2, 0.5 * whole.side**2)
     leafy = whole.transmission > 0
     c = whole.colour[leafy]

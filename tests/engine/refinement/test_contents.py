@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tests.engine import support
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.refinement.contents import Contents, Holdings, bounding_box, piece_amounts, subplant_amounts
+from tetflora_addon.refinement.contents import Contents, Holdings, bounding_box, piece_totals, subplant_totals
 from tetflora_addon.refinement.descent import Slack, push_down
 from tetflora_addon.subplants.pieces import Pieces, wood_areas
 from tetflora_addon.tetrahedra.geometry import volume
@@ -142,14 +142,14 @@ def test_terminals_fill_the_root(view: tuple[int, str]) -> None:
     assert after.sum() == pytest.approx(before, rel=1e-12)
 
 
-def test_expected_amounts_do_not_depend_on_how_contents_are_cut() -> None:
+def test_expected_totals_do_not_depend_on_how_contents_are_cut() -> None:
     """Sums over nodes are sums over things; opening sub-plants moves them only by chance, over many plants."""
     flora = support.small_flora()
     seeds = support.grove(300, 1.5)
-    whole = subplant_amounts(flora, Contents.of_plants(flora, seeds).subplants.items)
+    whole = subplant_totals(flora, Contents.of_plants(flora, seeds).subplants.items)
     tree, contents = divided(flora, seeds, 3, "PERSP", rounds=3)
     every = contents.sums(len(tree))
-    things = [subplant_amounts(flora, contents.subplants.items), piece_amounts(flora, contents.pieces.items)]
+    things = [subplant_totals(flora, contents.subplants.items), piece_totals(flora, contents.pieces.items)]
     for name in ("leaf_area", "wood_area", "polygons"):
         total = getattr(every, name).sum()
         assert total == pytest.approx(sum(getattr(t, name).sum() for t in things))
@@ -160,10 +160,10 @@ def test_expected_amounts_do_not_depend_on_how_contents_are_cut() -> None:
     assert (every.width[filled] > 0).all()
 
 
-def test_amounts_of_a_piece_add_up_to_its_branch() -> None:
+def test_totals_of_a_piece_add_up_to_its_branch() -> None:
     flora = support.small_flora()
     trunk, pieces = support.grown(flora, support.plants([1]))
-    own = piece_amounts(flora, pieces)
+    own = piece_totals(flora, pieces)
     branches = pieces.t0 == 0
     size, spread = flora.rows["leaf_size"][pieces.branches.row].T
     leaves = flora.rows["leaves"][pieces.branches.row, 0]
@@ -171,7 +171,7 @@ def test_amounts_of_a_piece_add_up_to_its_branch() -> None:
     assert own.leaf_area.sum() == pytest.approx(expected[branches].sum())
     assert own.wood_area.sum() == pytest.approx(wood_areas(flora, pieces).sum())
     assert (own.wood_area > 0).all()
-    assert subplant_amounts(flora, trunk).leaf_area[0] == pytest.approx(flora.area_nodes[0, 0])
+    assert subplant_totals(flora, trunk).leaf_area[0] == pytest.approx(flora.area_nodes[0, 0])
 
 
 def test_selection_and_joining() -> None:
@@ -190,7 +190,7 @@ def test_selection_and_joining() -> None:
 @given(st.integers(0, 2**31))
 @settings(deadline=None, max_examples=20)
 def test_holdings_give_and_take(seed: int) -> None:
-    """Whatever is taken out and put back, in whatever order, everything is there once, with its own amounts."""
+    """Whatever is taken out and put back, in whatever order, everything is there once, with its own totals."""
     flora = support.small_flora()
     tree, contents = divided(flora, support.grove(4, 2.0), 1, "PERSP")
     rng = np.random.default_rng(seed)
@@ -205,7 +205,7 @@ def test_holdings_give_and_take(seed: int) -> None:
         assert not chosen[left.pieces.cell].any()
         held.put(out)
     for name in ("subplants", "pieces"):
-        whole, found = ((k.items, k.amounts) for k in (getattr(c, name) for c in (contents, held.contents)))
+        whole, found = ((k.items, k.totals) for k in (getattr(c, name) for c in (contents, held.contents)))
         key = [(c[0] if name == "subplants" else c[0].branches).key for c in (whole, found)]
         order = [np.lexsort([c[1].polygons, c[1].wood_area, k]) for c, k in zip((whole, found), key, strict=True)]
         assert (key[0][order[0]] == key[1][order[1]]).all()

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from tests.engine import support
-from tetflora_addon.refinement.contents import Amounts
+from tetflora_addon.refinement.contents import Totals
 from tetflora_addon.refinement.decisions import (
     Decision,
     Terminals,
@@ -45,11 +45,11 @@ def become(
     settings: RefinementSettings = SETTINGS,
 ) -> Decision:
     """One tetrahedron; by default leaves of a tenth of a pixel, seen in full."""
-    amounts = Amounts(*(np.array([v], float) for v in (leaf, wood, polygons, width)))
+    totals = Totals(*(np.array([v], float) for v in (leaf, wood, polygons, width)))
     span = np.array([np.sqrt(2) / (0.001 * depth)])  # of the unit corner, 1 mm a pixel at 1 m
     seen = (np.array([v], float) for v in (pixels, opacity))
     cells = Terminals(
-        np.array([0]), amounts, *seen, *feature_pixels(cell(depth), amounts.width, CAMERA), span, np.array([True])
+        np.array([0]), totals, *seen, *feature_pixels(cell(depth), totals.width, CAMERA), span, np.array([True])
     )
     return Decision(decide(cells, np.array([transmittance]), settings)[0])
 
@@ -122,10 +122,10 @@ def test_what_can_never_be(case: dict, cutoff: float) -> None:
 def test_a_limit_leaves_what_is_hidden_hidden_and_makes_no_forest_of_leaves() -> None:
     """Nor large space full of leaves of which nobody knows how far away they are."""
     count = 4
-    amounts = Amounts(*(np.array(v, float) for v in ([1] * 4, [0.1] * 4, [1e6, 1e4, 1e6, 1e6], [1] * 4)))
+    totals = Totals(*(np.array(v, float) for v in ([1] * 4, [0.1] * 4, [1e6, 1e4, 1e6, 1e6], [1] * 4)))
     pixels, feature = np.array([1e6, 1e6, 900.0, 1e6]), np.array([2.0, 2.0, 2.0, 0.1])
     one = np.ones(count)
-    cells = Terminals(np.arange(count), amounts, pixels, one, feature, feature, one, np.ones(count, bool))
+    cells = Terminals(np.arange(count), totals, pixels, one, feature, feature, one, np.ones(count, bool))
     split = np.full(count, Decision.SPLIT, np.int8)
     seen = without_splits(split, cells, np.ones(count), SETTINGS)
     assert seen.tolist() == [Decision.PROXY, Decision.EXPLICIT, Decision.EXPLICIT, Decision.PROXY]
@@ -136,11 +136,11 @@ def test_a_limit_leaves_what_is_hidden_hidden_and_makes_no_forest_of_leaves() ->
 
 def test_leaves_that_are_large_only_at_the_near_end_are_told_from_the_rest() -> None:
     """All of a small picture's view may be one block: then it is divided in depth, not made explicit as a whole."""
-    amounts = Amounts(*(np.full(1, v) for v in (100.0, 1.0, 1e6, 0.05)))
+    totals = Totals(*(np.full(1, v) for v in (100.0, 1.0, 1e6, 0.05)))
     one = np.ones(1)
 
     def decided(least: float, polygons: float) -> int:
-        holds = replace(amounts, polygons=np.array([polygons]))
+        holds = replace(totals, polygons=np.array([polygons]))
         cells = Terminals(np.arange(1), holds, 900.0 * one, one, 5.0 * one, least * one, one, np.ones(1, bool))
         return int(decide(cells, one, SETTINGS)[0])
 
@@ -152,9 +152,9 @@ def test_leaves_that_are_large_only_at_the_near_end_are_told_from_the_rest() -> 
 def test_the_last_few_cells_are_not_worth_a_pass() -> None:
     """Only if they are few among many, change next to nothing of the picture and hold next to nothing."""
     count = 1000
-    amounts = Amounts(*(np.full(count, v) for v in (1.0, 0.1, 1000.0, 0.1)))
+    totals = Totals(*(np.full(count, v) for v in (1.0, 0.1, 1000.0, 0.1)))
     cells = Terminals(
-        np.arange(count), amounts, *(np.full(count, v) for v in (1000.0, 1.0, 0.1, 0.1, 1.0)), np.ones(count, bool)
+        np.arange(count), totals, *(np.full(count, v) for v in (1000.0, 1.0, 0.1, 0.1, 1.0)), np.ones(count, bool)
     )
     seen, splitting = np.ones(count), np.zeros(count, bool)
     splitting[:2] = True  # 2,000 of a million pixels, 2,000 polygons
@@ -163,4 +163,4 @@ def test_the_last_few_cells_are_not_worth_a_pass() -> None:
     many[:20] = True
     assert not gains_nothing(many, cells, 0.01 * seen, CAMERA)
     assert not gains_nothing(splitting, replace(cells, pixels=1200.0 * seen), seen, CAMERA)
-    assert not gains_nothing(splitting, replace(cells, amounts=replace(amounts, polygons=2e4 * seen)), seen, CAMERA)
+    assert not gains_nothing(splitting, replace(cells, totals=replace(totals, polygons=2e4 * seen)), seen, CAMERA)

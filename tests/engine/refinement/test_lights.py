@@ -60,9 +60,9 @@ def test_shadows_that_fall_into_the_picture_are_refined(kind: str, anchored: boo
         assert parts == pytest.approx(measures(flora, support.grown(flora, seeds)[1]), rel=1e-6)
     assert not refined(plain).any()
     middle = result.tree.vertices(result.nodes).mean(axis=1)
-    shown = result.amounts.polygons[refined(result) & (middle[:, 0] < 20)].sum()
-    aside = result.amounts.polygons[refined(result) & (middle[:, 0] > 40)].sum()
-    assert shown > 0.5 * result.amounts.polygons[middle[:, 0] < 20].sum()
+    shown = result.totals.polygons[refined(result) & (middle[:, 0] < 20)].sum()
+    aside = result.totals.polygons[refined(result) & (middle[:, 0] > 40)].sum()
+    assert shown > 0.5 * result.totals.polygons[middle[:, 0] < 20].sum()
     # A piece of space with few polygons may reach from one to the other.
     assert aside <= RefinementSettings().few_polygons
 
@@ -78,7 +78,7 @@ def test_a_penumbra_needs_no_leaves() -> None:
     """The wider the sun, the less is divided."""
     flora, seeds = support.small_flora(), support.plants(np.arange(3), position=BEHIND)
     made = [last(flora, seeds, [Light("SUN", NOWHERE, SLANT, width)]) for width in (0.0, 0.1, 1.0)]
-    polygons = [r.amounts.polygons[r.decision == Decision.EXPLICIT].sum() for r in made]
+    polygons = [r.totals.polygons[r.decision == Decision.EXPLICIT].sum() for r in made]
     assert polygons == sorted(polygons, reverse=True)
     assert polygons[-1] < 0.8 * polygons[0]
 
@@ -99,7 +99,7 @@ def test_a_limit_leaves_shadows_coarse(limit: int) -> None:
     )
     check(flora, result)
     assert not result.complete
-    explicit = [r.amounts.polygons[refined(r)].sum() for r in (free, result)]
+    explicit = [r.totals.polygons[refined(r)].sum() for r in (free, result)]
     assert explicit[1] <= explicit[0]
 
 

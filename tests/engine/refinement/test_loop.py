@@ -16,7 +16,7 @@ from tests.engine.refinement.test_contents import expanded, measures
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.refinement.contents import Amounts, Contents, bounding_box
+from tetflora_addon.refinement.contents import Contents, Totals, bounding_box
 from tetflora_addon.refinement.decisions import Decision, feature_pixels, mean_extinction
 from tetflora_addon.refinement.loop import Refinement, refine, step_of
 from tetflora_addon.refinement.settings import RefinementSettings
@@ -48,7 +48,7 @@ def check(flora: Flora, result: Refinement) -> None:
     held = np.concatenate([result.contents.subplants.cell, result.contents.pieces.cell])
     assert np.isin(held, result.nodes).all()
     assert volume(tree.vertices(tree.terminals())).min() > 0
-    for array in (result.cells.pixels, result.transmittance, result.amounts.leaf_area, result.amounts.width):
+    for array in (result.cells.pixels, result.transmittance, result.totals.leaf_area, result.totals.width):
         assert len(array) == len(result.nodes)
         assert np.isfinite(array).all()
     masks = [result.chosen(d) for d in (Decision.PROXY, Decision.HIDDEN, Decision.EXPLICIT)]
@@ -84,7 +84,7 @@ def test_cameras(place: str, number: int, anchored: bool) -> None:
     assert parts == pytest.approx(whole, rel=1e-6)
     if "turned away" in place and anchored:
         # A piece of space that reaches into the view may keep a few polygons rather than be divided.
-        assert (result.amounts.polygons[result.decision != Decision.HIDDEN] <= RefinementSettings().few_polygons).all()
+        assert (result.totals.polygons[result.decision != Decision.HIDDEN] <= RefinementSettings().few_polygons).all()
     elif "turned away" in place:
         assert (result.decision == Decision.HIDDEN).all()
         assert result.passes == 1
@@ -93,7 +93,7 @@ def test_cameras(place: str, number: int, anchored: bool) -> None:
     elif place == "far away":
         # A root that reaches to the eye may keep a few polygons rather than be divided.
         few = RefinementSettings().few_polygons
-        assert (result.amounts.polygons[result.decision == Decision.EXPLICIT] <= few).all()
+        assert (result.totals.polygons[result.decision == Decision.EXPLICIT] <= few).all()
 
 
 @pytest.mark.parametrize("eye", [(0.2, 0.1, 2.2), (0.0, 0.0, 0.5), (0.0, 0.0, 2.0)])
@@ -110,7 +110,7 @@ def test_an_eye_in_the_crown(sort: str, eye: tuple[float, ...]) -> None:
     assert result.complete
     parts = measures(flora, expanded(flora, result.contents))
     assert parts == pytest.approx(measures(flora, support.grown(flora, seeds)[1]), rel=1e-6)
-    large = feature_pixels(result.tree.vertices(result.nodes), result.amounts.width, camera)[0] >= 0.5
+    large = feature_pixels(result.tree.vertices(result.nodes), result.totals.width, camera)[0] >= 0.5
     seen = result.transmittance > RefinementSettings().hidden
     assert not (large & seen & (result.decision == Decision.PROXY)).any()
     assert not (seen & (result.decision == Decision.HIDDEN)).any()
@@ -130,7 +130,7 @@ def test_random_views(seed: int, cutoff: float) -> None:
     states, result = run(flora, seeds, camera, cutoff=cutoff)
     check(flora, result)
     assert [s.passes for s in [*states, result]] == list(range(1, len(states) + 2))
-    large = feature_pixels(result.tree.vertices(result.nodes), result.amounts.width, camera)[0] >= 0.5
+    large = feature_pixels(result.tree.vertices(result.nodes), result.totals.width, camera)[0] >= 0.5
     seen = result.transmittance > RefinementSettings().hidden
     assert not (large & seen & (result.decision == Decision.PROXY)).any()
     assert not (seen & (result.decision == Decision.HIDDEN)).any()
@@ -240,15 +240,15 @@ def test_what_stands_behind_a_wall_is_hidden() -> None:
 
 
 def test_dense_plants_hide_those_behind() -> None:
-    """Two rows of bushes: the share that is hidden grows towards the back."""
+    """Two rows of bushes: the fraction that is hidden grows towards the back."""
     flora = support.flora()
     species = support.SPECIES.index("bush")
     rows = np.repeat([0.0, 30.0], 12)
     seeds = support.plants(np.arange(24), species, np.stack([np.tile(np.arange(12) - 5.5, 2), rows, 0 * rows], axis=1))
     _, result = run(flora, seeds, support.camera((0, -12, 0.8), (0, 0, 0.8), pixels=200, view=0.5))
     depth = result.tree.vertices(result.nodes).mean(axis=1)[:, 1]
-    share, area, seen = result.transmittance, result.amounts.leaf_area + 1e-12, result.cells.pixels > 0
-    front, back = (np.average(share[m], weights=area[m]) for m in (seen & (depth < 10), seen & (depth > 20)))
+    fraction, area, seen = result.transmittance, result.totals.leaf_area + 1e-12, result.cells.pixels > 0
+    front, back = (np.average(fraction[m], weights=area[m]) for m in (seen & (depth < 10), seen & (depth > 20)))
     assert back < 0.5 * front
 
 
@@ -269,7 +269,7 @@ def test_mean_extinction() -> None:
     a, b, c = 0.2, 0.3, 4.0
     shadows = 3.0 * ways[:, 2] + ways @ [b * c, a * c, a * b]
     one = np.ones(1)
-    held = Amounts(leaf_area=3.0 * one, wood_area=2.0 * (b * c + a * c + a * b) * one, polygons=one, width=one)
+    held = Totals(leaf_area=3.0 * one, wood_area=2.0 * (b * c + a * c + a * b) * one, polygons=one, width=one)
     assert mean_extinction(held, 5.0 * one) == pytest.approx(shadows.mean() / 5.0, rel=0.01)
 
 

@@ -161,5 +161,5 @@ def test_a_grove_all_around(window: tuple[float, ...]) -> None:
     assert (len(sectors) >= 10) == (window == SPHERE)
     assert explicit.any()
     if window == PART:
-        many = result.amounts.polygons > RefinementSettings().few_polygons
+        many = result.totals.polygons > RefinementSettings().few_polygons
         assert (result.decision[many & (camera.clearance(middle) > 3.0)] == Decision.HIDDEN).all()

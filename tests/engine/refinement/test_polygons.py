@@ -24,7 +24,7 @@ from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.descent import cut, push_down
 from tetflora_addon.refinement.loop import Refinement, refine
 from tetflora_addon.refinement.mesh_features import mesh_features
-from tetflora_addon.refinement.polygons import Meshes, Polygons, Surface, shares
+from tetflora_addon.refinement.polygons import Meshes, Polygons, Surface, area_fractions
 from tetflora_addon.refinement.settings import RefinementSettings
 from tetflora_addon.refinement.views import widened_for
 from tetflora_addon.tetrahedra.roots import view_root
@@ -114,7 +114,7 @@ def divided(polygons: Polygons, seed: int, slack: float | None, rounds: int = 4)
 @given(SEEDS, st.sampled_from([None, 0.02, 0.5]))
 @settings(deadline=None, max_examples=25)
 def test_area_colour_and_moment_are_exact_under_any_cuts(seed: int, slack: float | None) -> None:
-    """To 1e-6, as sums over all tetrahedra; amounts are those of the fragments, and all is in terminal nodes."""
+    """To 1e-6, as sums over all tetrahedra; totals are those of the fragments, and all is in terminal nodes."""
     polygons = Polygons.everything(placed(thicket(seed), seed))
     tree, contents = divided(polygons, seed, slack)
     parts = contents.polygons.items
@@ -122,9 +122,9 @@ def test_area_colour_and_moment_are_exact_under_any_cuts(seed: int, slack: float
     assert len(parts) > len(polygons)
     assert parts.areas().sum() == pytest.approx(polygons.areas().sum(), rel=1e-9)
     assert sums(parts) == pytest.approx(sums(polygons), rel=1e-6, abs=1e-9)
-    amounts = contents.sums(len(tree))
-    assert amounts.area.sum() == pytest.approx(polygons.areas().sum(), rel=1e-9)
-    assert amounts.polygons.sum() == len(parts)
+    totals = contents.sums(len(tree))
+    assert totals.area.sum() == pytest.approx(polygons.areas().sum(), rel=1e-9)
+    assert totals.polygons.sum() == len(parts)
 
 
 @given(SEEDS)
@@ -161,13 +161,13 @@ def test_texture_coordinates_and_attributes_are_interpolated(seed: int) -> None:
 @given(SEEDS)
 @settings(deadline=None, max_examples=25)
 def test_a_plane_leaves_each_piece_on_one_side(seed: int) -> None:
-    """Shares of a face's triangles add up to 1, and no fragment reaches across."""
+    """Fractions of a face's triangles add up to 1, and no fragment reaches across."""
     rng = np.random.default_rng(seed)
     polygons = Polygons.everything(placed(thicket(seed), seed))
     normal = rng.normal(size=(len(polygons), 3))
     planes = np.c_[normal / np.linalg.norm(normal, axis=1, keepdims=True), rng.uniform(-1, 1, len(polygons))]
     owner, side, parts = cut(polygons, planes)
-    total = np.bincount(owner, shares(parts.weights)[parts.part], len(polygons))
+    total = np.bincount(owner, area_fractions(parts.weights)[parts.part], len(polygons))
     np.testing.assert_allclose(total, polygons.meshes.face_size[polygons.face] - 2, atol=1e-12)
     distance = parts.corner_distances(planes[owner]) * np.where(side, 1, -1)[:, None]
     assert distance.min() > -1e-8
@@ -264,7 +264,7 @@ def test_near_polygons_stay_and_far_ones_become_facets_of_the_same_area(anchored
     assert chance < 0.1 * drawn
     assert 0.1 < kept / (kept + drawn) < 0.95
     # Facets beside the view may have been made smaller, so that they do not reach into it.
-    loss = 0.5 * proxies.polygons.amounts.area[beside].sum()
+    loss = 0.5 * proxies.polygons.totals.area[beside].sum()
     assert whole.areas().sum() - loss - chance <= kept + drawn <= whole.areas().sum() + chance
     assert sum(b.polygons for b in blocks) + len(facets) < 0.7 * len(whole)
     near = whole.take(np.linalg.norm(whole.centre - camera.position, axis=1) < 7)

@@ -72,15 +72,15 @@ def cast(vertices, extinction, camera, width, height, occluders=None):
         start = np.maximum(start, (camera.near / (directions[part] @ ahead))[:, None])
         length = np.maximum(end - start, 0.0)
         hit = length > 0
-        share = np.ones_like(length)
+        fraction = np.ones_like(length)
         if occluders is not None:
-            share = np.clip((occluders[part, None] - start) / np.where(hit, length, 1.0), 0.0, 1.0)
+            fraction = np.clip((occluders[part, None] - start) / np.where(hit, length, 1.0), 0.0, 1.0)
         order = np.argsort(np.where(hit, start, np.inf), axis=1)
-        depth = np.take_along_axis(length * extinction * share, order, axis=1)
+        depth = np.take_along_axis(length * extinction * fraction, order, axis=1)
         before = np.zeros_like(depth)
         np.put_along_axis(before, order, np.cumsum(depth, axis=1) - depth, axis=1)
         count += hit.sum(0)
-        seen += (np.exp(-before) * share * hit).sum(0)
+        seen += (np.exp(-before) * fraction * hit).sum(0)
         alpha[part] = 1 - np.exp(-depth.sum(1))
     return count * camera.width * camera.height / (width * height), seen / np.maximum(count, 1), alpha
 

@@ -112,7 +112,7 @@ def test_what_is_beside_the_view_is_coarse_and_what_is_in_it_fine() -> None:
     clearance = camera.widened(0.04).clearance(middle)
     explicit = result.decision == Decision.EXPLICIT
     assert explicit.any()
-    many = result.amounts.polygons > RefinementSettings().few_polygons
+    many = result.totals.polygons > RefinementSettings().few_polygons
     wide = ACROSS_THE_BORDER * RefinementSettings().block * camera.extent_around(middle)
     assert (clearance[explicit & many] <= wide[explicit & many]).all()
     assert (result.decision[many & (clearance > 20)] == Decision.HIDDEN).all()
@@ -126,5 +126,5 @@ def test_the_view_is_as_with_its_own_root() -> None:
     flora, seeds = support.small_flora(), support.grove(16, 2.0)
     camera = support.camera((0, -14, 3), (0, 0, 1.5), pixels=400)
     own, anchored = (run(flora, seeds, camera, anchored=flag)[1] for flag in (False, True))
-    polygons = [r.amounts.polygons[r.decision == Decision.EXPLICIT].sum() for r in (own, anchored)]
+    polygons = [r.totals.polygons[r.decision == Decision.EXPLICIT].sum() for r in (own, anchored)]
     assert polygons[1] == pytest.approx(polygons[0], rel=0.3)

@@ -16,7 +16,7 @@ from ...emission import plants, polygons
 from ...emission.budget import afford
 from ...emission.forms import Refined
 from ...emission.plants import Transition
-from ...proxies.facet_weights import facet_shares
+from ...proxies.facet_weights import facet_weights
 from ...refinement.decisions import Decision
 from ...refinement.loop import Refinement, step_of
 from ...refinement.loop import refine as refine_loop
@@ -187,7 +187,7 @@ def _write_refined(
     refined = Refined(flora, refinement, camera)
     if own.facets:
         yield Progress(_LOOP_FRACTION, "Analyzing leaf clustering")
-        facet_shares(flora)
+        facet_weights(flora)
         transition = Transition(flora, camera, settings.leaf_limit)
         refined = Refined(flora, refinement, camera, facet_pixels, transition, drawn_disc(scene.render.engine))
     results.open()
