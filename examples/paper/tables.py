@@ -85,11 +85,11 @@ TABLES: dict[str, tuple[tuple[str, ...], tuple[Row, ...]]] = {
         (
             ("first frame: model and refine", "21 min", _seconds("first_refine_s")),
             ("first frame: render", "6 min", _seconds("first_render_s")),
-            ("later frames, mean, in all", "6.64 min", _seconds("later_refine_s", "later_render_s")),
-            ("of it model and refine", "–", lambda f: f"{f['later_refine_s']:.2f} s"),
-            ("frames that are refined anew", "all", lambda f: f"{f['refined']:.0f} of {f['frames']:.0f}"),
+            ("later frames, mean, total", "6.64 min", _seconds("later_refine_s", "later_render_s")),
+            ("of which model and refine", "–", lambda f: f"{f['later_refine_s']:.2f} s"),
+            ("frames refined again", "all", lambda f: f"{f['refined']:.0f} of {f['frames']:.0f}"),
             (
-                "tetrahedra divided that the frame before did not divide",
+                "tetrahedra divided that the previous frame did not divide",
                 "40 to 70",
                 lambda f: (
                     f"{f['divided_anew_min']:.0f} to {f['divided_anew_max']:.0f}, mean {f['divided_anew_mean']:.0f}, "
@@ -102,7 +102,7 @@ TABLES: dict[str, tuple[tuple[str, ...], tuple[Row, ...]]] = {
         ("figure6", "figure9"),
         (
             (
-                "polygons of a picture of 512 × 512 pixels (figure 9)",
+                "polygons of an image of 512 × 512 pixels (figure 9)",
                 "on the order of 4 million",
                 lambda f: f"{f['figure9.polygons_meshed']:,.0f} and {f['figure9.polygons_proxy']:,.0f} facets",
             ),
@@ -120,11 +120,11 @@ TABLES: dict[str, tuple[tuple[str, ...], tuple[Row, ...]]] = {
                 lambda f: f"{f['refine_s']:.1f} s + {f['render_s']:.1f} s",
             ),
             (
-                "all in the render: deferred, light by tetrahedra included",
+                "everything in the render: deferred, with light by tetrahedra",
                 "about the same",
                 _seconds("deferred_render_s"),
             ),
-            ("FLIP between the two pictures, where plants are", "–", lambda f: f"{f['flip']:.3f}"),
+            ("FLIP between the two images, where plants are", "–", lambda f: f"{f['flip']:.3f}"),
         ),
     ),
 }

@@ -151,7 +151,7 @@ def test_tables_hold_what_was_measured_and_nothing_else_changes(tmp_path):
     tables.write_tables(tmp_path, page)
     once = page.read_text()
     assert "| polygons in the image | 784,049 (20.7 %) | 250 (25.0 %) |" in once
-    assert "| later frames, mean, in all | 6.64 min | 3.8 s |" in once
+    assert "| later frames, mean, total | 6.64 min | 3.8 s |" in once
     assert "| 3 to 9, mean 6, of 1,234 |" in once
     assert "| all | 2 of 48 |" in once
     assert "10 MB (1/21)" in once
