@@ -30,47 +30,43 @@ MAX_LINES = 36_300
 MAX_ROOM_LINES = 3_500
 MAX_LEVELS = 9
 
-_SHARED = ("",)  # arrays, buffers, errors, storage
-_PLANTS = (*_SHARED, "species", "growth", "compiled", "subplants")
-_ENGINE = (*_PLANTS, "tetrahedra", "camera", "refinement")
-#: What each room may import besides itself. Names are folders below ``tetflora_addon``; the empty name stands for its
-#: own files. ``blender`` alone stands for the files at the top of that folder.
-ARROWS: dict[str, tuple[str, ...]] = {
-    "": (),
-    "species": _SHARED,
-    "growth": (*_SHARED, "species"),
-    "compiled": (*_SHARED, "species", "growth"),
-    "subplants": (*_SHARED, "species", "growth", "compiled"),
-    "tetrahedra": _SHARED,
-    "camera": (*_SHARED, "tetrahedra"),
-    "refinement": (*_PLANTS, "tetrahedra", "camera"),
-    "preview": _ENGINE,
-    "planting": (*_SHARED, "growth"),
-    "proxies": _ENGINE,
-    "light": (*_ENGINE, "proxies"),
-    "emission": (*_ENGINE, "proxies", "light"),
+_LOW = "blender blender/materials blender/species blender/scene"
+_HIGH = "blender/results blender/placing blender/job"
+#: What each room may import besides itself: folders below ``tetflora_addon`` in words separated by spaces. A dot stands
+#: for the files beside these folders, and ``blender`` alone for the files at the top of that folder.
+_TABLE = {
+    ".": "",
+    "species": ".",
+    "growth": ". species",
+    "compiled": ". species growth",
+    "subplants": ". species growth compiled",
+    "tetrahedra": "",
+    "camera": ". tetrahedra",
+    "refinement": ". growth compiled subplants tetrahedra camera",
+    "preview": "growth compiled subplants tetrahedra camera refinement",
+    "planting": ". growth",
+    "proxies": ". species growth compiled subplants camera refinement",
+    "light": "compiled tetrahedra camera refinement proxies",
+    "emission": ". species growth compiled subplants tetrahedra camera refinement proxies light",
+    "blender": ". growth camera refinement",
+    "blender/materials": ". light emission blender",
+    "blender/species": ". species blender",
+    "blender/scene": ". species growth camera refinement planting light emission "
+    "blender blender/materials blender/species",
+    "blender/results": f". species refinement emission {_LOW}",
+    "blender/placing": f". species growth planting {_LOW}",
+    "blender/job": f". species growth compiled camera refinement proxies emission {_LOW} blender/results",
+    "blender/viewport": f". species growth compiled tetrahedra camera refinement preview {_LOW} {_HIGH}",
+    "blender/cli": ". blender blender/scene blender/job",
+    "operators": ". species camera refinement preview planting blender blender/species blender/scene "
+    f"{_HIGH} blender/viewport",
+    "panels": f". species blender blender/species blender/scene {_HIGH} blender/viewport operators",
 }
+ARROWS = {room: tuple(others.split()) for room, others in _TABLE.items()}
 #: Rooms of the engine: numpy and the standard library only, never Blender.
-ENGINE = tuple(ARROWS)
-_BRIDGE = ("blender", "blender/materials", "blender/species", "blender/scene")
-ARROWS |= {
-    "blender/materials": (*ENGINE, "blender"),
-    "blender/species": (*ENGINE, "blender"),
-    "blender/scene": (*ENGINE, "blender", "blender/materials", "blender/species"),
-    "blender/results": (*ENGINE, *_BRIDGE),
-    "blender/placing": (*ENGINE, *_BRIDGE, "blender/results"),
-    "blender/job": (*ENGINE, *_BRIDGE, "blender/results", "blender/placing"),
-    "blender/viewport": (*ENGINE, *_BRIDGE, "blender/results", "blender/placing", "blender/job"),
-    "blender/cli": (*ENGINE, *_BRIDGE, "blender/results", "blender/job"),
-}
-#: Files at the top of ``blender`` that gather parts of the rooms; all others are tools that rooms use.
-GATHERERS = ("blender/__init__.py", "blender/properties.py")
-BLENDER_ROOMS = tuple(room for room in ARROWS if room.startswith("blender/"))
-ARROWS |= {
-    "blender": ENGINE,
-    "operators": ("blender", *BLENDER_ROOMS, *ENGINE),
-    "panels": ("operators", "blender", *BLENDER_ROOMS, *ENGINE),
-}
+ENGINE = tuple(room for room in ARROWS if not room.startswith(("blender", "operators", "panels")))
+#: Files at the top of ``blender`` that gather parts of all its rooms; the others are tools that its rooms use.
+GATHERERS = (f"{ADDON}/blender/__init__.py", f"{ADDON}/blender/properties.py")
 
 
 @cache
@@ -87,12 +83,14 @@ def sources() -> dict[str, Path]:
 def room_of(path: Path) -> str:
     """The room that a file of the product lies in, by its name in `ARROWS`; ``extension`` for the root's own."""
     folder = path.relative_to(ROOT).parent.as_posix()
-    return "extension" if folder == "." else folder.removeprefix(ADDON).removeprefix("/")
+    return "extension" if folder == "." else folder.removeprefix(ADDON).removeprefix("/") or "."
 
 
 def _imported(name: str, path: Path) -> Iterator[str]:
     """Dotted names of the product's modules that a file imports, wherever in it."""
-    package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
+    package = [part for part in name.split(".") if part]
+    if path.name != "__init__.py":
+        package.pop()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if not isinstance(node, ast.ImportFrom) or not node.level:
             continue
@@ -162,22 +160,38 @@ def classes() -> dict[str, list[str]]:
     return dict(found)
 
 
+def arrows() -> dict[tuple[str, str], list[str]]:
+    """Imports between rooms as they are: for each pair of rooms, what imports what."""
+    found = defaultdict(list)
+    for name, others in imports().items():
+        path = sources()[name].relative_to(ROOT).as_posix()
+        room = room_of(sources()[name])
+        for other in others if room != "extension" and path not in GATHERERS else ():
+            there = room_of(sources()[other])
+            if there != room:
+                found[room, there].append(f"{path} imports {other}")
+    return dict(found)
+
+
 def forbidden() -> list[str]:
     """Imports between rooms that `ARROWS` does not allow, one line each."""
-    found = []
-    for name, others in imports().items():
-        path = sources()[name]
-        room = room_of(path)
-        if (
-            room == "extension"
-            or path.relative_to(ROOT / ADDON if room not in PRODUCT else ROOT).as_posix() in GATHERERS
-        ):
-            continue
-        for other in others:
-            there = room_of(sources()[other])
-            if there not in (room, *ARROWS.get(room, ())):
-                found.append(f"{path.relative_to(ROOT).as_posix()}: {room or ADDON} may not import {other}")
-    return sorted(found)
+    return sorted(
+        f"{room} may not import {there}: {use}"
+        for (room, there), uses in arrows().items()
+        for use in uses
+        if there not in ARROWS.get(room, ())
+    )
+
+
+def unused() -> list[str]:
+    """Arrows that are allowed and that no file needs any more, one line each."""
+    used = arrows()
+    return [
+        f"{room} imports nothing of {there}"
+        for room, all in ARROWS.items()
+        for there in all
+        if (room, there) not in used
+    ]
 
 
 def problems() -> list[str]:
@@ -216,6 +230,27 @@ def heights() -> dict[str, int]:
     return {room: height(room) for room in ARROWS}
 
 
+#: Where rooms stand across the picture, so that few arrows pass behind a third room; 0 is left.
+_LANES = {
+    **dict.fromkeys(("species", "growth", "compiled", "subplants", ".", "blender/placing"), 0.3),
+    **dict.fromkeys(("tetrahedra", "camera"), 0.62),
+    **dict.fromkeys(("preview", "blender/viewport"), 0.12),
+    **dict.fromkeys(("blender/species", "blender"), 0.9),
+    **dict.fromkeys(("blender/results", "blender/job"), 0.68),
+    "planting": 0.78,
+    "blender/scene": 0.6,
+    "blender/cli": 0.85,
+    "operators": 0.3,
+    "panels": 0.3,
+}
+
+
+@cache
+def _reached(room: str) -> frozenset[str]:
+    """Rooms that a room imports, and those that they import in turn."""
+    return frozenset(ARROWS[room]).union(*(_reached(other) for other in ARROWS[room]))
+
+
 def draw(path: Path) -> None:
     """The allowed arrows as a picture: rooms in rows, each above all that it may import.
 
@@ -226,40 +261,32 @@ def draw(path: Path) -> None:
     matplotlib.use("Agg")
     from matplotlib import pyplot as plt
 
-    rows = defaultdict(list)
-    for room, height in heights().items():
-        rows[height].append(room)
-    place = {}
-    for height, names in rows.items():
-        for i, room in enumerate(names):
-            place[room] = ((i + 1) / (len(names) + 1) * 10.0 + 0.35 * (height % 2), float(height))
-    counted = lines()
-    figure, axes = plt.subplots(figsize=(10, 1.0 + 0.72 * len(rows)), dpi=110)
-    for room, others in ARROWS.items():
-        reached = {far for other in others for far in ARROWS[other]}
-        for other in set(others) - reached:
-            axes.annotate(
-                "",
-                place[other],
-                place[room],
-                zorder=1,
-                arrowprops={"arrowstyle": "-|>", "color": "#7a8a99", "shrinkA": 14, "shrinkB": 14, "lw": 1.1},
-            )
-    for room, (x, y) in place.items():
-        colour = "#dcebd6" if room in ENGINE else "#d9e4f2" if room.startswith("blender") else "#f3e2cf"
-        axes.text(
-            x,
-            y,
-            f"{room or ADDON}\n{counted[room]:,} lines",
+    rows, counted = heights(), lines()
+    figure, axes = plt.subplots(figsize=(6.4, 0.66 * (max(rows.values()) + 1)), dpi=110)
+    axes.set(xlim=(0, 1), ylim=(-0.5, max(rows.values()) + 0.5))
+    axes.axis("off")
+    boxes = {}
+    for room, height in rows.items():
+        fill = "#dcebd6" if room in ENGINE else "#d9e4f2" if room.startswith("blender") else "#f3e2cf"
+        boxes[room] = axes.text(
+            _LANES.get(room, 0.5),
+            height,
+            f"{ADDON if room == '.' else room}\n{counted[room]:,} lines",
             ha="center",
             va="center",
             fontsize=8,
             zorder=2,
-            bbox={"boxstyle": "round,pad=0.35", "fc": colour, "ec": "#44515c", "lw": 0.8},
+            bbox={"boxstyle": "round,pad=0.35", "fc": fill, "ec": "#44515c", "lw": 0.8},
         )
-    axes.set(xlim=(0, 10.6), ylim=(-0.6, max(rows) + 0.6))
-    axes.axis("off")
-    figure.tight_layout(pad=0.3)
+    figure.tight_layout(pad=0.2)
+    figure.canvas.draw()  # boxes get their sizes
+    for room, others in ARROWS.items():
+        for other in set(others) - set().union(*(_reached(other) for other in others)):
+            arrow = {"arrowstyle": "-|>", "color": "#7a8a99", "lw": 1.1, "shrinkA": 1, "shrinkB": 1}
+            patches = {"patchA": boxes[room].get_bbox_patch(), "patchB": boxes[other].get_bbox_patch()}
+            axes.annotate(
+                "", boxes[other].get_position(), boxes[room].get_position(), arrowprops=arrow | patches, zorder=1
+            )
     figure.savefig(path)
     plt.close(figure)
 
