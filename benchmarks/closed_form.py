@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devtools import session
+from devtools.formats import set_format
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.materials import shell
 from tetflora_addon.blender.results import meshes
@@ -113,7 +114,7 @@ def _picture() -> NDArray[np.float64]:
     settings = bpy.context.scene.render
     with tempfile.TemporaryDirectory() as folder:
         path = str(Path(folder) / "picture.exr")
-        compat.set_still_format(settings.image_settings, 'OPEN_EXR')
+        set_format(settings.image_settings, 'OPEN_EXR')
         settings.image_settings.color_depth = '32'
         settings.filepath = path
         bpy.ops.render.render(write_still=True)

@@ -14,7 +14,7 @@ from math import pi, tau
 import bpy
 
 from tetflora_addon.blender import compat
-from tetflora_addon.blender.materials import materials
+from tetflora_addon.blender.materials import bark, materials
 
 from .report import Targets
 
@@ -32,7 +32,7 @@ def run(quick: bool) -> dict[str, float]:
     trunk, plain = _trunk_scene(scene), _plain_material()
     scene.cycles.samples = 8 if quick else 32
     ratios = {}
-    for character in materials.BARKS:
+    for character in bark.BARKS:
         pair = (plain, materials.bark_material(f"Trunk of {character} bark", character))
         seconds = [[_processor_seconds(trunk, m) for m in pair] for _ in range(2)]
         plain_s, bark_s = (min(column) for column in zip(*seconds, strict=True))

@@ -15,6 +15,7 @@ from tetflora_addon.blender.materials import materials
 from tetflora_addon.blender.results import leaf_objects, meshes
 from tetflora_addon.growth import growth
 from tetflora_addon.proxies import microsurfaces
+from tetflora_addon.refinement.statistics import at_once
 from tetflora_addon.species import catalogue
 from tetflora_addon.subplants import leaf_meshes, tubes
 from tetflora_addon.subplants import pieces as expansion
@@ -44,8 +45,8 @@ def species_cell(
         empty.tetflora.is_plant, empty.tetflora.species, empty.tetflora.seed = True, identifier, seed
         scene.collection.objects.link(empty)
         bpy.context.view_layer.update()
-        make = plant_mesh.make_plant_meshes
-        (plant,) = make(scene, bpy.context.evaluated_depsgraph_get(), [empty])
+        steps = plant_mesh.make_plant_mesh_steps(scene, bpy.context.evaluated_depsgraph_get(), [empty])
+        (plant,) = at_once(steps)
         polygons[identifier] = len(plant.data.polygons)
         return _points(plant.data), f"{name}\n{polygons[identifier]:,} polygons"
 

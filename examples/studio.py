@@ -14,6 +14,7 @@ import numpy as np
 from mathutils import Vector
 
 from devtools import session
+from devtools.formats import set_format
 from tetflora_addon.blender import compat
 
 from .row80 import add_daylight
@@ -118,7 +119,7 @@ def render_cells(
             scene.render.engine = 'CYCLES'
             scene.cycles.samples, scene.cycles.use_denoising = samples, True
             scene.render.resolution_x, scene.render.resolution_y = width, height
-            compat.set_still_format(scene.render.image_settings, 'PNG')
+            set_format(scene.render.image_settings, 'PNG')
             scene.render.filepath = str(Path(folder) / f"{number}.png")
             bpy.ops.render.render(write_still=True)
             image = bpy.data.images.load(scene.render.filepath)

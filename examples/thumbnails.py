@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from devtools import session
+from devtools.formats import set_format
 
 FOLDER = session.ROOT / "tetflora_addon" / "catalogue" / "thumbnails"
 SIDE, SAMPLES, SEED = 128, 96, 11
@@ -28,8 +29,8 @@ def render_thumbnail(identifier: str, path: Path) -> None:
     import numpy as np
     from mathutils import Vector
 
-    from tetflora_addon.blender import compat
     from tetflora_addon.blender.job import plant_mesh
+    from tetflora_addon.refinement.statistics import at_once
 
     from .row80 import add_daylight
 
@@ -39,8 +40,8 @@ def render_thumbnail(identifier: str, path: Path) -> None:
     empty.tetflora.is_plant, empty.tetflora.species, empty.tetflora.seed = True, identifier, SEED
     scene.collection.objects.link(empty)
     bpy.context.view_layer.update()
-    make = plant_mesh.make_plant_meshes
-    (plant,) = make(scene, bpy.context.evaluated_depsgraph_get(), [empty])
+    steps = plant_mesh.make_plant_mesh_steps(scene, bpy.context.evaluated_depsgraph_get(), [empty])
+    (plant,) = at_once(steps)
     points = np.zeros((len(plant.data.vertices), 3), np.float32)
     plant.data.vertices.foreach_get("co", points.reshape(-1))
     # A few twigs that reach far out must not make the rest small.
@@ -62,7 +63,7 @@ def render_thumbnail(identifier: str, path: Path) -> None:
     scene.view_settings.exposure = 1.1
     scene.render.resolution_x = scene.render.resolution_y = SIDE
     image = scene.render.image_settings
-    compat.set_still_format(image, 'PNG')
+    set_format(image, 'PNG')
     image.color_mode, image.color_depth, image.compression = 'RGBA', '8', 100
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)

@@ -17,7 +17,7 @@ import bpy
 import numpy as np
 
 from devtools import session
-from tetflora_addon.blender import compat
+from devtools.formats import set_format
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.results import collection as emit
 
@@ -156,7 +156,7 @@ def save_film(pictures: list[Path], rate: int, path: Path) -> None:
     scene.frame_start, scene.frame_end = 1, len(pictures)
     scene.view_settings.view_transform = 'Standard'  # pictures are what they should look like
     render.fps, render.filepath, render.use_file_extension = rate, str(path), False
-    compat.set_film_format(render.image_settings)
+    set_format(render.image_settings, 'FFMPEG')
     render.ffmpeg.format, render.ffmpeg.codec = 'MPEG4', 'H264'
     render.ffmpeg.constant_rate_factor = 'MEDIUM'
     bpy.ops.render.render(animation=True, scene=scene.name)

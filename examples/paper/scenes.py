@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 
 from devtools import session
-from tetflora_addon.blender import compat
+from devtools.formats import set_format
 from tetflora_addon.blender.job import refine
 
 from .. import row80
@@ -41,7 +41,7 @@ def choose_cycles(scene: bpy.types.Scene, samples: int) -> None:
     scene.render.engine = 'CYCLES'
     scene.cycles.samples, scene.cycles.use_denoising = samples, True
     scene.cycles.use_adaptive_sampling = False
-    compat.set_still_format(scene.render.image_settings, 'PNG')
+    set_format(scene.render.image_settings, 'PNG')
 
 
 def rendered(scene: bpy.types.Scene, path: Path, samples: int) -> float:

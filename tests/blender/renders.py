@@ -11,6 +11,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from devtools.formats import set_format
 from tetflora_addon.blender import compat
 
 
@@ -51,7 +52,7 @@ def picture() -> np.ndarray:
     settings = bpy.context.scene.render
     with tempfile.TemporaryDirectory() as folder:
         path = str(Path(folder) / "picture.exr")
-        compat.set_still_format(settings.image_settings, 'OPEN_EXR')
+        set_format(settings.image_settings, 'OPEN_EXR')
         settings.image_settings.color_depth = '32'
         settings.filepath = path
         bpy.ops.render.render(write_still=True)

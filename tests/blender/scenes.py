@@ -7,7 +7,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from tetflora_addon.blender import compat
+from devtools.formats import set_format
 
 SPECIES = "bush"
 
@@ -64,7 +64,7 @@ def tiny_render(samples=1, size=16):
     scene.render.resolution_percentage = 100
     scene.cycles.samples = samples
     scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
-    compat.set_still_format(scene.render.image_settings, "PNG")
+    set_format(scene.render.image_settings, "PNG")
     return scene
 
 

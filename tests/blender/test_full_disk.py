@@ -12,9 +12,10 @@ import bpy
 import pytest
 
 from devtools import session
+from devtools.formats import set_format
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, select, tiny_render
 from tests.limits import full_disk
-from tetflora_addon.blender import compat, preferences
+from tetflora_addon.blender import preferences
 from tetflora_addon.blender.cli import command
 from tetflora_addon.species import catalogue
 
@@ -167,7 +168,7 @@ def test_command_refine_saves_nothing_or_all(tmp_path, capfd, compress):
 @pytest.mark.parametrize("form", ['PNG', 'OPEN_EXR', 'JPEG'])
 def test_command_render_does_not_take_half_a_picture_for_one(tmp_path, capfd, form):
     scene = _refined(samples=4)
-    compat.set_still_format(scene.render.image_settings, form)
+    set_format(scene.render.image_settings, form)
     scene.render.image_settings.quality = 100
     arguments = ("render", "--frames", "1-2", "--output", tmp_path / "frame_####")
     with full_disk(4_000):

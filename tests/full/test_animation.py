@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 
 from devtools import session
+from devtools.formats import set_format
 from tests.blender.scenes import add_camera, add_plant
-from tetflora_addon.blender import compat
 
 Run = Callable[..., subprocess.CompletedProcess]
 
@@ -48,7 +48,7 @@ def film(path: Path, persistent: bool = False, blur: bool = False) -> Path:
     render.resolution_x, render.resolution_y = 96, 54
     scene.cycles.samples, scene.cycles.seed = 4, 7
     scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
-    compat.set_still_format(render.image_settings, "PNG")
+    set_format(render.image_settings, "PNG")
     scene.frame_start, scene.frame_end = 1, FRAMES
     scene.frame_set(1)
     bpy.ops.wm.save_as_mainfile(filepath=str(path))

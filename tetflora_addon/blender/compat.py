@@ -13,7 +13,7 @@ EEVEE_ENGINES = ("BLENDER_EEVEE", "BLENDER_EEVEE_NEXT")
 
 
 def eevee_engine() -> str:
-    """Identifier of EEVEE for ``scene.render.engine``: 4.x called its rewrite "next"."""
+    """Identifier of EEVEE for ``scene.render.engine``; 4.x called its rewrite "next"."""
     known = {item.identifier for item in bpy.types.RenderSettings.bl_rna.properties["engine"].enum_items}
     for identifier in EEVEE_ENGINES:
         if identifier in known:
@@ -40,28 +40,14 @@ def tree_in_use(owner: bpy.types.Material | bpy.types.World | bpy.types.Light) -
 
 
 def sky_model(node: bpy.types.ShaderNodeTexSky) -> str:
-    """Type of a sky by its name of today: 4.5 has Nishita's for what is nearly the same."""
+    """Type of a sky by its current name; 4.5 calls nearly the same Nishita."""
     return 'SINGLE_SCATTERING' if node.sky_type == 'NISHITA' else node.sky_type
 
 
-def set_still_format(settings: bpy.types.ImageFormatSettings, file_format: str) -> None:
-    """Choose a still picture's file format: from 5.0 on the media type has to allow it first."""
-    if hasattr(settings, "media_type"):
-        settings.media_type = "IMAGE"
-    settings.file_format = file_format
-
-
-def set_film_format(settings: bpy.types.ImageFormatSettings) -> None:
-    """Choose films as output, which FFmpeg writes: from 5.0 on the media type has to allow it first."""
-    if hasattr(settings, "media_type"):
-        settings.media_type = "VIDEO"
-    settings.file_format = 'FFMPEG'
-
-
 def disable_bump_correction(material: bpy.types.Material) -> None:
-    """Let a material's custom normals be; Cycles otherwise darkens them as if they were bump maps.
+    """Keep Cycles from darkening a material's custom normals as if they were bump maps.
 
-    The setting belongs to the Cycles add-on, which may be switched off; then there is nothing to correct.
+    The setting belongs to the Cycles add-on; without it there is nothing to correct.
     """
     cycles = getattr(material, "cycles", None)
     if cycles is not None and hasattr(cycles, "use_bump_map_correction"):
@@ -69,14 +55,14 @@ def disable_bump_correction(material: bpy.types.Material) -> None:
 
 
 def can_resize_point_clouds() -> bool:
-    """Whether point clouds can be filled from Python; without, only geometry nodes make points."""
+    """Whether Python can fill point clouds; otherwise only geometry nodes make points."""
     return "resize" in bpy.types.PointCloud.bl_rna.functions
 
 
 def blend_in_mesh_order(material: bpy.types.Material) -> None:
-    """Let EEVEE draw a material's faces one over another in their order in the mesh, with exact opacity.
+    """Let EEVEE blend a material's faces in their order in the mesh, with exact opacity.
 
-    The other way, dithering, needs hundreds of samples for what is a few cells deep. Cycles has no such setting.
+    Dithering, the other way, needs hundreds of samples for a few cells in depth. Cycles has no such setting.
     """
     material.surface_render_method = 'BLENDED'
     material.use_transparency_overlap = True
@@ -92,7 +78,7 @@ def drawn_disc(engine: str) -> float:
 
 
 def dot_shader() -> str:
-    """Built-in shader for coloured points: before 5.0, the one for everything of flat colours draws them as well."""
+    """Built-in shader for coloured points; before 5.0 the one for all flat colours draws them."""
     try:
         gpu.shader.from_builtin('POINT_FLAT_COLOR')
     except ValueError:

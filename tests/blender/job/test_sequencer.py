@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
+from devtools.formats import set_format
 from tests.blender.scenes import add_camera, add_plant, datablocks, depsgraph, tiny_render
 from tetflora_addon import errors
 from tetflora_addon.blender import compat
@@ -38,7 +39,7 @@ def film(tmp_path):
     film.frame_start, film.frame_end = 1, FRAMES
     film.render.resolution_x = film.render.resolution_y = 16
     film.render.engine, film.cycles.samples = 'CYCLES', 1
-    compat.set_still_format(film.render.image_settings, "PNG")
+    set_format(film.render.image_settings, "PNG")
     film.render.filepath = str(tmp_path / "frame_####")
     strips = film.sequence_editor_create().strips
     strips.new_scene("wood", wood, 1, 1)

@@ -10,7 +10,7 @@ from devtools import session
 from tests.blender.renders import picture, small_scene
 from tetflora_addon import buffers, errors
 from tetflora_addon.blender import compat
-from tetflora_addon.blender.materials import materials, microsphere, nodes, shell
+from tetflora_addon.blender.materials import bark, materials, microsphere, nodes, shell
 from tetflora_addon.blender.results import meshes
 from tetflora_addon.species import species
 
@@ -191,7 +191,7 @@ def test_names_and_marks():
         materials.bark_material("Oak"),
         materials.proxy_material(),
         shell.shell_material(),
-        materials.scatter_group(),
+        microsphere.scatter_group(),
     ]
     names = ["TetFlora Oak leaf", "TetFlora Oak bark", "TetFlora proxy", "TetFlora shell", "TetFlora Scatter"]
     assert [m.name for m in made] == names
@@ -241,4 +241,4 @@ def test_every_link_is_valid_and_every_species_shares_the_group():
 
 def test_every_bark_that_species_may_name_is_there():
     """In the same order: the number of a character is part of its materials' version."""
-    assert materials.BARKS == species.BARKS
+    assert bark.BARKS == species.BARKS

@@ -12,6 +12,7 @@ from tests.blender.scenes import add_camera, add_plant, depsgraph
 from tetflora_addon import errors
 from tetflora_addon.blender.job import plant_mesh, refine
 from tetflora_addon.blender.scene import plants
+from tetflora_addon.refinement.statistics import at_once
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -65,7 +66,7 @@ def test_plants_of_one_species_with_and_without_a_form():
 def test_a_drawn_plant_as_a_real_mesh():
     plant = add_plant("tree", "bush", 3, (1.0, 2.0, 0.0))
     plant.tetflora.form = _form()
-    (made,) = plant_mesh.make_plant_meshes(bpy.context.scene, depsgraph(), [plant])
+    (made,) = at_once(plant_mesh.make_plant_mesh_steps(bpy.context.scene, depsgraph(), [plant]))
     points = _positions(made)
     assert np.linalg.norm(points - [0.5, 0.0, 2.0], axis=1).min() < 0.3
     assert [m.name for m in made.data.materials] == ["TetFlora Bush bark", "TetFlora Bush leaf"]

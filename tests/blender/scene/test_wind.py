@@ -8,9 +8,10 @@ import bpy
 import numpy as np
 import pytest
 
+from devtools.formats import set_format
 from tests.blender.scenes import add_camera, add_plant, depsgraph, tiny_render
 from tetflora_addon import buffers
-from tetflora_addon.blender import compat, settings
+from tetflora_addon.blender import settings
 from tetflora_addon.blender.job import contents, frame_cache, refine
 from tetflora_addon.blender.results import collection, meshes
 from tetflora_addon.blender.viewport import auto
@@ -162,7 +163,7 @@ def blurred_render(scene, path, size=128, samples=64):
     scene.render.film_transparent = True
     scene.render.use_motion_blur, scene.render.motion_blur_position = True, 'CENTER'
     scene.render.motion_blur_shutter = 0.5
-    compat.set_still_format(scene.render.image_settings, "PNG")
+    set_format(scene.render.image_settings, "PNG")
     scene.render.image_settings.color_mode = 'RGBA'
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)

@@ -114,18 +114,6 @@ def plant_mesh(scene: bpy.types.Scene, name: str, species: Species, parts: list[
     return mesh
 
 
-def make_plant_meshes(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, plants: Iterable[bpy.types.Object]
-) -> list[bpy.types.Object]:
-    """Make ordinary mesh objects of plants at once; see `make_plant_mesh_steps`."""
-    steps = make_plant_mesh_steps(scene, depsgraph, plants)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as stop:
-            return stop.value
-
-
 def make_plant_mesh_steps(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, plants: Iterable[bpy.types.Object]
 ) -> Generator[Progress, object, list[bpy.types.Object]]:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bark by nodes: patterns that follow each branch by its UV map, fade on thin twigs, and keep the mean colour.
 
-A pattern lives on a cylinder of radius 1, of which the branch is a rolled-out picture: (cos 2πu, sin 2πu, 2πv). It
+A pattern lives on a cylinder of radius 1, of which the branch is an unrolled image: (cos 2πu, sin 2πu, 2πv). It
 therefore closes without a seam at u = 0, is as wide as it is high, and grows with the branch. How thick the branch is
 where it is seen follows from the slope of u along the surface, which Bump nodes know: no mesh carries it.
 """
@@ -17,14 +17,14 @@ from typing import Any
 import bpy
 
 from ...errors import SpeciesError
-from .nodes import Graph, add_socket, find_socket, get_or_create, new_group
+from .nodes import Graph, find_socket, shader_group
 
 GIRTH = "TetFlora Bark Place"
 
 # Raise this when nodes of a group change; `bark_version` then makes new materials as well.
 _VERSION = 2
 
-# A perimeter of this length tilts the Bump node's normal by 45 degrees: the middle of what is to be told apart, metres.
+# A perimeter of this length tilts the Bump node's normal by 45 degrees: the middle of the range that matters, metres.
 _REFERENCE = 0.25
 # Longest perimeter that counts, metres; that of a trunk of 2 m.
 _THICKEST = 6.0
@@ -82,10 +82,7 @@ def place_group() -> bpy.types.NodeTree:
         tan θ = D |∇u| = D / P (Mikkelsen 2010, "Bump mapping unparametrized surfaces on the GPU").
     """
 
-    def build(tree: bpy.types.NodeTree) -> None:
-        tree.interface.new_socket(name="Place", in_out='OUTPUT', socket_type="NodeSocketVector")
-        tree.interface.new_socket(name="Perimeter", in_out='OUTPUT', socket_type="NodeSocketFloat")
-        graph = Graph(tree)
+    def build(graph: Graph, _given: Any) -> dict[str, Any]:
         uv = graph.node("ShaderNodeSeparateXYZ", {"Vector": graph.attribute("UVMap", "Vector")}).outputs
         angle = graph.math('MULTIPLY', uv["X"], tau)
         x, y, z = graph.math('COSINE', angle), graph.math('SINE', angle), graph.math('MULTIPLY', uv["Y"], tau)
@@ -99,10 +96,9 @@ def place_group() -> bpy.types.NodeTree:
         sine = graph.math('SQRT', graph.math('SUBTRACT', 1.0, graph.math('MULTIPLY', cosine, cosine)))
         cotangent = graph.math('DIVIDE', cosine, graph.math('MAXIMUM', sine, 1e-3))
         perimeter = graph.math('MINIMUM', graph.math('MULTIPLY', cotangent, _REFERENCE), _THICKEST)
-        graph.node("NodeGroupOutput", {"Place": place, "Perimeter": perimeter})
-        graph.arrange()
+        return {"Place": place, "Perimeter": perimeter}
 
-    return get_or_create(bpy.data.node_groups, GIRTH, _VERSION, new_group, build)
+    return shader_group(GIRTH, _VERSION, (), (("Place", 'Vector'), ("Perimeter", 'Float')), build)
 
 
 def bark_group(character: str) -> bpy.types.NodeTree:
@@ -125,26 +121,20 @@ def bark_group(character: str) -> bpy.types.NodeTree:
         There is no such bark.
     """
     bark = _bark(character)
+    inputs = (
+        ("Colour", 'Color', (0.16, 0.11, 0.07, 1.0), None, "Mean color"),
+        ("Scale", 'Float', bark.scale, (0.0, 1000.0), "Number of features per branch radius"),
+        ("Stretch", 'Float', bark.stretch, (0.01, 100.0), "Length to width of the features"),
+        ("Contrast", 'Float', bark.contrast, (0.0, 4.0), "Contrast around the mean color"),
+        ("Depth", 'Float', bark.depth, (0.0, 1.0), "Depth of the relief, in perimeters"),
+        ("Smooth Under", 'Float', bark.smooth, (0.0, 10.0), "Perimeter of a young branch (m)"),
+        ("Full Over", 'Float', bark.full, (0.0, 10.0), "Perimeter of an old branch (m)"),
+    )
 
-    def build(tree: bpy.types.NodeTree) -> None:
-        add_socket(tree, "Colour", "NodeSocketColor", (0.16, 0.11, 0.07, 1.0), None, "Mean color")
-        add_socket(tree, "Scale", "NodeSocketFloat", bark.scale, (0.0, 1000.0), "Number of features per branch radius")
-        add_socket(tree, "Stretch", "NodeSocketFloat", bark.stretch, (0.01, 100.0), "Length to width of the features")
-        add_socket(tree, "Contrast", "NodeSocketFloat", bark.contrast, (0.0, 4.0), "Contrast around the mean color")
-        add_socket(tree, "Depth", "NodeSocketFloat", bark.depth, (0.0, 1.0), "Depth of the relief, in perimeters")
-        add_socket(tree, "Smooth Under", "NodeSocketFloat", bark.smooth, (0.0, 10.0), "Perimeter of a young branch (m)")
-        add_socket(tree, "Full Over", "NodeSocketFloat", bark.full, (0.0, 10.0), "Perimeter of an old branch (m)")
-        tree.interface.new_socket(name="Colour", in_out='OUTPUT', socket_type="NodeSocketColor")
-        tree.interface.new_socket(name="Normal", in_out='OUTPUT', socket_type="NodeSocketVector")
-        graph = Graph(tree)
-        given = graph.node("NodeGroupInput").outputs
+    def build(graph: Graph, given: Any) -> dict[str, Any]:
         where = graph.node("ShaderNodeGroup", node_tree=place_group()).outputs
         tone, height = bark.pattern(graph, where["Place"], given["Scale"], given["Stretch"])
-        age = graph.node(
-            "ShaderNodeMapRange",
-            {"Value": where["Perimeter"], "From Min": given["Smooth Under"], "From Max": given["Full Over"]},
-            interpolation_type='SMOOTHSTEP',
-        )
+        age = smooth_step(graph, where["Perimeter"], given["Smooth Under"], given["Full Over"])
         around_zero = graph.math('SUBTRACT', tone, bark.mean)
         change = graph.math('MULTIPLY', around_zero, graph.math('MULTIPLY', given["Contrast"], age))
         factor = graph.vector('ADD', graph.vector('SCALE', bark.hue, change), (1.0, 1.0, 1.0))
@@ -152,15 +142,14 @@ def bark_group(character: str) -> bpy.types.NodeTree:
         depth = graph.math('MULTIPLY', where["Perimeter"], given["Depth"])
         depth = graph.math('MULTIPLY', depth, age)
         bump = graph.node("ShaderNodeBump", {"Strength": 1.0, "Distance": depth, "Height": height})
-        graph.node("NodeGroupOutput", {"Colour": graph.tinted(given["Colour"], factor), "Normal": bump})
-        graph.arrange()
+        return {"Colour": graph.tinted(given["Colour"], factor), "Normal": bump}
 
     name = f"TetFlora {character.capitalize()} Bark"
-    return get_or_create(bpy.data.node_groups, name, _VERSION, new_group, build)
+    return shader_group(name, _VERSION, inputs, (("Colour", 'Color'), ("Normal", 'Vector')), build)
 
 
 def bark_version(character: str) -> int:
-    """Version of a material with that bark: another character is another version, beside which the old one is kept."""
+    """Version of a material with that bark: another character is another version, and the old one stays beside it."""
     _bark(character)
     return 100 * _VERSION + BARKS.index(character)
 
@@ -184,7 +173,7 @@ def _noise(graph: Graph, place: Socket, detail: float, roughness: float, distort
     return find_socket(graph.node("ShaderNodeTexNoise", inputs).outputs, "Fac")
 
 
-def smooth_step(graph: Graph, value: Socket, low: float, high: float) -> Socket:
+def smooth_step(graph: Graph, value: Socket, low: Socket | float, high: Socket | float) -> Socket:
     """0 under `low`, 1 over `high`, smooth between; falls where `low` is above `high`."""
     inputs = {"Value": value, "From Min": low, "From Max": high}
     return graph.node("ShaderNodeMapRange", inputs, interpolation_type='SMOOTHSTEP').outputs[0]
@@ -242,9 +231,8 @@ def _ringed(graph: Graph, place: Socket, scale: Socket, stretch: Socket) -> tupl
     along = graph.node("ShaderNodeSeparateXYZ", {"Vector": place}).outputs["Z"]
     turn = graph.math('FRACT', graph.math('MULTIPLY_ADD', noise, 1.2, graph.math('MULTIPLY', along, 3.6)))
     scar = graph.math('MULTIPLY', smooth_step(graph, turn, 0.0, 0.2), smooth_step(graph, turn, 1.0, 0.5))
-    return graph.math('MULTIPLY', scar, graph.math('MULTIPLY_ADD', noise, 1.6, 0.0)), graph.math(
-        'MULTIPLY_ADD', noise, 0.3, scar
-    )
+    tone = graph.math('MULTIPLY', scar, graph.math('MULTIPLY_ADD', noise, 1.6, 0.0))
+    return tone, graph.math('MULTIPLY_ADD', noise, 0.3, scar)
 
 
 def _jointed(graph: Graph, place: Socket, scale: Socket, stretch: Socket) -> tuple[Socket, Socket]:

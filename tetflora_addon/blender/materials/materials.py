@@ -1,11 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Materials of leaves, bark, microsurfaces and microspheres: one scattering group for all, so that they match.
+"""Materials of leaves, bark, microsurfaces, microspheres and baked light.
 
-The material of baked light: the camera sees precomputed emission, free of noise.
-
-For all other rays it is the proxies' own material, so that ground and meshes get the light and the shadows of plants as
-ever. Nothing that it emits lights anything.
+All share one scattering group, so that proxies match what they replace.
 """
 
 from __future__ import annotations
@@ -16,30 +13,22 @@ import bpy
 
 from ...emission.light import BACK, FRONT
 from ...light.scattering import GLOSS
-from ..compat import disable_bump_correction, shader_tree
-from .bark import BARKS, bark_group, bark_version, smooth_step
+from ..compat import disable_bump_correction
+from .bark import bark_group, bark_version, smooth_step
 from .microsphere import scatter_group
-from .nodes import Graph, add_socket, find_socket, get_or_create, new_group
-
-__all__ = [
-    "BARKS",
-    "bark_material",
-    "leaf_material",
-    "proxy_material",
-    "scatter_group",
-    "sphere_material",
-]
+from .nodes import LEAF_GREEN, Graph, find_socket, shader_group, surface_material
 
 BLADE = "TetFlora Leaf Blade"
 PROXY = "TetFlora proxy"
 SPHERE = "TetFlora microsphere"
+BAKED = "TetFlora baked"
 
 # Raise these when what they count changes: existing files then get the new nodes beside the old ones.
 _LEAF_VERSION = 2
 _BLADE_VERSION = 1
 _PROXY_VERSION = 2
 _SPHERE_VERSION = 1
-
+_BAKED_VERSION = 1
 
 # How much more than the mean of both sides a leaf's underside reflects, and the upper side less: fewer pigments lie
 # under its surface, hence most in blue, of which a leaf has least.
@@ -63,17 +52,15 @@ def blade_group() -> bpy.types.NodeTree:
         models have it. Over the leaf the mean of Colour is that of the input, and over both sides the mean of the tint
         is 1: light lines lie in darker surroundings.
     """
+    inputs = (
+        ("Colour", 'Color', LEAF_GREEN, None, "Mean color"),
+        ("Transmission", 'Float', 0.4, (0.0, 1.0), "Thick leaves show no veins"),
+        ("Midrib", 'Float', MIDRIB, (0.0, 2.0), "How much lighter the midrib is"),
+        ("Veins", 'Float', VEINS, (0.0, 1.0), "How much lighter the veins are"),
+        ("Paler Underside", 'Float', 1.0, (0.0, 4.0)),
+    )
 
-    def build(tree: bpy.types.NodeTree) -> None:
-        add_socket(tree, "Colour", "NodeSocketColor", (0.1, 0.25, 0.05, 1.0), None, "Mean color")
-        add_socket(tree, "Transmission", "NodeSocketFloat", 0.4, (0.0, 1.0), "Thick leaves show no veins")
-        add_socket(tree, "Midrib", "NodeSocketFloat", MIDRIB, (0.0, 2.0), "How much lighter the midrib is")
-        add_socket(tree, "Veins", "NodeSocketFloat", VEINS, (0.0, 1.0), "How much lighter the veins are")
-        add_socket(tree, "Paler Underside", "NodeSocketFloat", 1.0, (0.0, 4.0))
-        for name in ("Colour", "Reflected Tint"):
-            tree.interface.new_socket(name=name, in_out='OUTPUT', socket_type="NodeSocketColor")
-        graph = Graph(tree)
-        given = graph.node("NodeGroupInput").outputs
+    def build(graph: Graph, given: Any) -> dict[str, Any]:
         uv = graph.node("ShaderNodeSeparateXYZ", {"Vector": graph.attribute("UVMap", "Vector")}).outputs
         aside = graph.math('ABSOLUTE', graph.math('SUBTRACT', uv["X"], 0.5))
         # The halo is three times as wide as the rib and a third as dark as that is light, so that the mean stays.
@@ -90,10 +77,10 @@ def blade_group() -> bpy.types.NodeTree:
         back = graph.node("ShaderNodeNewGeometry").outputs["Backfacing"]
         side = graph.math('MULTIPLY', graph.math('MULTIPLY_ADD', back, 2.0, -1.0), given["Paler Underside"])
         tint = graph.vector('ADD', graph.vector('SCALE', PALER, side), (1.0, 1.0, 1.0))
-        graph.node("NodeGroupOutput", {"Colour": graph.scaled(given["Colour"], factor), "Reflected Tint": tint})
-        graph.arrange()
+        return {"Colour": graph.scaled(given["Colour"], factor), "Reflected Tint": tint}
 
-    return get_or_create(bpy.data.node_groups, BLADE, _BLADE_VERSION, new_group, build)
+    outputs = ("Colour", 'Color'), ("Reflected Tint", 'Color')
+    return shader_group(BLADE, _BLADE_VERSION, inputs, outputs, build)
 
 
 def leaf_material(species_name: str) -> bpy.types.Material:
@@ -105,20 +92,15 @@ def leaf_material(species_name: str) -> bpy.types.Material:
         Name as the artist reads it; each species has a material of its own to edit.
     """
 
-    def build(material: bpy.types.Material) -> None:
-        graph = Graph(shader_tree(material))
-        geometry = graph.node("ShaderNodeNewGeometry").outputs
-        colour, transmission = graph.attribute("tf_colour", "Color"), graph.attribute("tf_transmission", "Fac")
-        blade = graph.node("ShaderNodeGroup", node_tree=blade_group())
-        graph.feed(find_socket(blade.inputs, "Colour"), colour)
-        graph.feed(find_socket(blade.inputs, "Transmission"), transmission)
-        looks = {name: blade.outputs[name] for name in ("Colour", "Reflected Tint")}
-        _finish(graph, {**looks, "Transmission": transmission, "Normal": geometry["Normal"]})
-        material.diffuse_color = (0.1, 0.25, 0.05, 1.0)
+    def build(graph: Graph, _material: bpy.types.Material) -> None:
+        normal = graph.node("ShaderNodeNewGeometry").outputs["Normal"]
+        inputs = {"Colour": graph.attribute("tf_colour", "Color")}
+        inputs["Transmission"] = graph.attribute("tf_transmission", "Fac")
+        blade = graph.node("ShaderNodeGroup", inputs, node_tree=blade_group()).outputs
+        looks = {name: blade[name] for name in ("Colour", "Reflected Tint")}
+        _lead_out(graph, _scattered(graph, {**inputs, **looks, "Normal": normal}))
 
-    return get_or_create(
-        bpy.data.materials, f"TetFlora {species_name} leaf", _LEAF_VERSION, bpy.data.materials.new, build
-    )
+    return surface_material(f"TetFlora {species_name} leaf", _LEAF_VERSION, build)
 
 
 def bark_material(species_name: str, character: str = "ridged") -> bpy.types.Material:
@@ -129,7 +111,7 @@ def bark_material(species_name: str, character: str = "ridged") -> bpy.types.Mat
     species_name : str
         Name as the artist reads it.
     character : str
-        One of `BARKS`. A species whose character changed gets a new material; the old one is kept beside it.
+        One of `bark.BARKS`. A species whose character changed gets a new material; the old one stays beside it.
 
     Raises
     ------
@@ -141,80 +123,51 @@ def bark_material(species_name: str, character: str = "ridged") -> bpy.types.Mat
     The pattern varies the colour around its mean, so that bark and its microsurfaces agree from afar.
     """
 
-    def build(material: bpy.types.Material) -> None:
-        graph = Graph(shader_tree(material))
-        bark = graph.node("ShaderNodeGroup", node_tree=bark_group(character))
-        graph.feed(find_socket(bark.inputs, "Colour"), graph.attribute("tf_colour", "Color"))
-        looks = {name: bark.outputs[name] for name in ("Colour", "Normal")}
-        _finish(graph, {**looks, "Transmission": 0.0, "Gloss": 0.0})
-        # The correction takes up to a tenth of the light away from what is rough, which proxies know nothing of.
+    def build(graph: Graph, material: bpy.types.Material) -> None:
+        colour = graph.attribute("tf_colour", "Color")
+        bark = graph.node("ShaderNodeGroup", {"Colour": colour}, node_tree=bark_group(character)).outputs
+        looks = {name: bark[name] for name in ("Colour", "Normal")}
+        _lead_out(graph, _scattered(graph, {**looks, "Transmission": 0.0, "Gloss": 0.0}))
+        # The correction takes up to a tenth of the light away from what is rough, unlike for proxies.
         disable_bump_correction(material)
         material.diffuse_color = (0.18, 0.12, 0.08, 1.0)
 
-    return get_or_create(
-        bpy.data.materials, f"TetFlora {species_name} bark", bark_version(character), bpy.data.materials.new, build
-    )
+    return surface_material(f"TetFlora {species_name} bark", bark_version(character), build)
 
 
 def proxy_material() -> bpy.types.Material:
     """Material "TetFlora proxy" of all microsurfaces: as a leaf where ``tf_transmission`` is above 0, else as bark."""
-    return get_or_create(bpy.data.materials, PROXY, _PROXY_VERSION, bpy.data.materials.new, _build_proxy)
+
+    def build(graph: Graph, _material: bpy.types.Material) -> None:
+        normal = graph.node("ShaderNodeNewGeometry").outputs["Normal"]
+        _lead_out(graph, _scattered(graph, _proxy_looks(graph, normal)))
+
+    return surface_material(PROXY, _PROXY_VERSION, build)
 
 
 def sphere_material() -> bpy.types.Material:
-    """Material "TetFlora microsphere" of all microspheres: what microsurfaces have, with the sphere's own normal.
+    """Material "TetFlora microsphere" of all microspheres: that of microsurfaces with the sphere's own normal.
 
-    Cycles meets spheres of a point cloud from outside alone. So what falls on a sphere is reflected by the half that it
-    falls on or, for the share ``tf_transmission``, comes out of the other half, and nothing is lost within. EEVEE does
-    the same for a slab as thick as the sphere; without that the sphere would shade its own other half.
+    Cycles meets spheres of a point cloud only from outside. So light that falls on a sphere is reflected by the half
+    that it falls on or, for the fraction ``tf_transmission``, comes out of the other half, and nothing is lost within.
+    EEVEE does the same for a slab as thick as the sphere; without that the sphere would shade its own other half.
     """
 
-    def build(material: bpy.types.Material) -> None:
-        _build_proxy(material, "radius")
+    def build(graph: Graph, material: bpy.types.Material) -> None:
+        looks = _proxy_looks(graph, graph.node("ShaderNodeNewGeometry").outputs["Normal"])
+        thickness = graph.math('MULTIPLY', graph.attribute("radius", "Fac"), 2.0)
+        _lead_out(graph, _scattered(graph, looks), thickness)
         material.thickness_mode = 'SLAB'
 
-    return get_or_create(bpy.data.materials, SPHERE, _SPHERE_VERSION, bpy.data.materials.new, build)
-
-
-def _build_proxy(material: bpy.types.Material, half_thickness: str | None = None) -> None:
-    """Nodes of proxies; an attribute says how thick they are."""
-    graph = Graph(shader_tree(material))
-    geometry = graph.node("ShaderNodeNewGeometry").outputs
-    colour, transmission = graph.attribute("tf_colour", "Color"), graph.attribute("tf_transmission", "Fac")
-    gloss = graph.math('MULTIPLY', graph.math('GREATER_THAN', transmission, 0.0), GLOSS)
-    inputs = {"Colour": colour, "Transmission": transmission, "Gloss": gloss, "Normal": geometry["Normal"]}
-    thickness = None
-    if half_thickness is not None:
-        thickness = graph.math('MULTIPLY', graph.attribute(half_thickness, "Fac"), 2.0)
-    _finish(graph, inputs, thickness)
-    material.diffuse_color = (0.1, 0.25, 0.05, 1.0)
-
-
-def _finish(graph: Graph, inputs: dict, thickness: bpy.types.NodeSocket | None = None) -> None:
-    """Feed the scatter group and lead it to the output; sheets have no thickness."""
-    scatter = graph.node("ShaderNodeGroup", node_tree=scatter_group())
-    for key, value in inputs.items():
-        graph.feed(find_socket(scatter.inputs, key), value)
-    if thickness is None:
-        # EEVEE otherwise takes the whole mesh's extent for the thickness of each leaf.
-        value = graph.node("ShaderNodeValue")
-        value.outputs[0].default_value = 0.0
-        thickness = value.outputs[0]
-    graph.node("ShaderNodeOutputMaterial", {"Surface": scatter, "Thickness": thickness})
-    graph.arrange()
-
-
-BAKED = "TetFlora baked"
-
-# Raise this when what it counts changes: existing files then get the new nodes beside the old ones.
-_VERSION = 1
+    return surface_material(SPHERE, _SPHERE_VERSION, build)
 
 
 def baked_material() -> bpy.types.Material:
-    """Material "TetFlora baked": `FRONT` and `BACK` to the camera, to all else as the material of proxies.
+    """Material "TetFlora baked": `FRONT` and `BACK` to the camera, the material of proxies to all other rays.
 
     Both are FLOAT_VECTOR attributes on FACE or on POINT, of meshes or point clouds: linear radiance as a pixel shows
-    it. What has no front and back carries the same in both, see `baked_emission.baked_attributes`.
+    it. What has no front and back has the same in both, see `emission.light.baked_attributes`. Other rays see the
+    proxies' material so that ground and meshes get the usual light and shadows of plants.
 
     Notes
     -----
@@ -222,8 +175,7 @@ def baked_material() -> bpy.types.Material:
     reflections see the emission. Cycles must not sample the faces as lights, which they are not.
     """
 
-    def build(material: bpy.types.Material) -> None:
-        graph = Graph(shader_tree(material))
+    def build(graph: Graph, material: bpy.types.Material) -> None:
         geometry = graph.node("ShaderNodeNewGeometry").outputs
         side = graph.node(
             "ShaderNodeMix",
@@ -234,32 +186,29 @@ def baked_material() -> bpy.types.Material:
             },
             data_type='RGBA',
         )
-        seen = graph.node("ShaderNodeEmission", {"Color": find_socket(side.outputs, "Result_Color")})
-        graph.feed(find_socket(seen.inputs, "Strength"), 1.0)
+        seen = graph.node("ShaderNodeEmission", {"Color": find_socket(side.outputs, "Result_Color"), "Strength": 1.0})
         camera = graph.node("ShaderNodeLightPath").outputs["Is Camera Ray"]
-        surface = graph.mix(camera, _scattering(graph, geometry["Normal"]), seen)
-        thin = graph.node("ShaderNodeValue")
-        thin.outputs[0].default_value = 0.0
-        graph.node("ShaderNodeOutputMaterial", {"Surface": surface, "Thickness": thin})
-        graph.arrange()
-        without_light_sampling(material)
-        material.diffuse_color = (0.1, 0.25, 0.05, 1.0)
+        scattered = _scattered(graph, _proxy_looks(graph, geometry["Normal"]))
+        _lead_out(graph, graph.mix(camera, scattered, seen))
+        cycles = getattr(material, "cycles", None)  # there only while the Cycles add-on is enabled
+        if cycles is not None and hasattr(cycles, "emission_sampling"):
+            cycles.emission_sampling = 'NONE'
 
-    return get_or_create(bpy.data.materials, BAKED, _VERSION, bpy.data.materials.new, build)
+    return surface_material(BAKED, _BAKED_VERSION, build)
 
 
-def _scattering(graph: Graph, normal: Any) -> bpy.types.Node:
-    """What the material of proxies does with ``tf_colour`` and ``tf_transmission``."""
+def _proxy_looks(graph: Graph, normal: Any) -> dict[str, Any]:
+    """What proxies feed the scatter group with: gloss where light goes through, as in leaves."""
     colour, transmission = graph.attribute("tf_colour", "Color"), graph.attribute("tf_transmission", "Fac")
     gloss = graph.math('MULTIPLY', graph.math('GREATER_THAN', transmission, 0.0), GLOSS)
-    scatter = graph.node("ShaderNodeGroup", node_tree=scatter_group())
-    for key, value in {"Colour": colour, "Transmission": transmission, "Gloss": gloss, "Normal": normal}.items():
-        graph.feed(find_socket(scatter.inputs, key), value)
-    return scatter
+    return {"Colour": colour, "Transmission": transmission, "Gloss": gloss, "Normal": normal}
 
 
-def without_light_sampling(material: bpy.types.Material) -> None:
-    """Keep Cycles from sampling an emitting material as a light; the setting is there only while Cycles is enabled."""
-    cycles = getattr(material, "cycles", None)
-    if cycles is not None and hasattr(cycles, "emission_sampling"):
-        cycles.emission_sampling = 'NONE'
+def _scattered(graph: Graph, looks: dict[str, Any]) -> bpy.types.Node:
+    return graph.node("ShaderNodeGroup", looks, node_tree=scatter_group())
+
+
+def _lead_out(graph: Graph, shader: Any, thickness: Any = None) -> None:
+    """Link a shader to the output. EEVEE would take the extent of the whole mesh for a thickness that is not linked."""
+    thickness = graph.value(0.0) if thickness is None else thickness
+    graph.node("ShaderNodeOutputMaterial", {"Surface": shader, "Thickness": thickness})

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a material looks like from afar: its mean colour, how much light goes through it, how much of it is there.
+"""What a material looks like from afar: mean colour, transmission and coverage.
 
-Materials of the artist's are node trees without end. What is read is what nearly all of them have: the first shader
-with a colour, and where that comes from an image or a colour attribute, the mean of it. Nodes on the way that change
-colours are passed over.
+The artist's node trees can be arbitrary. Only what nearly all of them have is read: the first shader with a colour and,
+where that comes from an image or a colour attribute, its mean. Nodes in between that change colours are ignored.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from .nodes import active_output, upstream
 
 #: What Blender shows where there is no material.
 GREY = (0.8, 0.8, 0.8)
-#: Share of light that goes through a translucent shader, as a rule one of two that are mixed.
+#: Fraction of light that goes through a translucent shader, which is usually one of two that are mixed.
 TRANSLUCENT = 0.5
 #: Pixels of an image that are looked at, about.
 _PIXELS = 1 << 18
@@ -31,7 +30,7 @@ _TRANSPARENT = {'BSDF_TRANSPARENT'}
 
 @dataclass(frozen=True)
 class Look:
-    """Means over a material: linear RGB, transmission (NaN where it cannot be told), share that is not transparent."""
+    """Means over a material: linear RGB, transmission (NaN if unknown), fraction that is not transparent."""
 
     colour: tuple[float, float, float] = GREY
     transmission: float = np.nan
@@ -72,18 +71,18 @@ class Looks:
     def _coverage(self, output: bpy.types.Node, shader: bpy.types.Node, attributes: dict[str, NDArray]) -> float:
         covered = 1.0
         if (alpha := shader.inputs.get("Alpha")) is not None:
-            covered = self._share(alpha, attributes)
+            covered = self._number(alpha, attributes)
         for node in upstream(output.inputs["Surface"]):
             if node.type == 'MIX_SHADER':
                 sides = [socket.links[0].from_node.type if socket.is_linked else "" for socket in node.inputs[1:3]]
-                factor = self._share(node.inputs[0], attributes)
+                factor = self._number(node.inputs[0], attributes)
                 if sides[0] in _TRANSPARENT:
                     covered *= factor
                 elif sides[1] in _TRANSPARENT:
                     covered *= 1 - factor
         return float(np.clip(covered, 0, 1))
 
-    def _share(self, socket: bpy.types.NodeSocket, attributes: dict[str, NDArray]) -> float:
+    def _number(self, socket: bpy.types.NodeSocket, attributes: dict[str, NDArray]) -> float:
         """Mean of a number; that of an image's alpha or lightness if it comes from there."""
         if not socket.is_linked:
             return float(socket.default_value)

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How a cloud of microspheres and planes scatters light (paper, section 7), as one node group for every form of proxy.
+"""Node groups that scatter light: the paper's cloud of microspheres and planes (section 7), and a thin sheet.
 
-The group knows nothing of thickness: what is transparent, and how much, is the business of whoever uses it. It
-returns exactly as much light as it takes from uniform surroundings, whatever the renderer samples: lamps, a constant
-world, pictures of the sky, other surfaces.
+The cloud has no thickness: whoever uses the group decides what is transparent. It returns exactly as much light as it
+takes from uniform surroundings, whatever the renderer samples: lamps, a constant world, an image of the sky, surfaces.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ import bpy
 
 from ...light import scattering
 from ...light.scattering import GLOSS, GLOSS_ROUGHNESS
-from .nodes import Graph, add_socket, get_or_create, new_group
+from .nodes import LEAF_GREEN, Graph, shader_group
 
 MICROSPHERE = "TetFlora Microsphere"
 SCATTER = "TetFlora Scatter"
@@ -24,8 +23,18 @@ _VERSION = 1
 _SCATTER_VERSION = 2
 
 WHITE = (1.0, 1.0, 1.0, 1.0)
+UNIT = (0.0, 1.0)
 #: The engine's, as a colour of a socket.
 THROUGH_TINT = (*scattering.THROUGH_TINT.tolist(), 1.0)
+#: Inputs of the cloud that the shell's group has as well.
+LOBE_INPUTS = (
+    ("p", 'Float', 1.0, UNIT, "Diffuse weight of the particle and plane terms"),
+    ("s", 'Float', 0.04, UNIT, "Specular weight of the plane term"),
+    ("spear", 'Float', 7.5, (0.0, 1000.0), "Exponent of the plane term's highlight"),
+    ("Through Tint", 'Color', THROUGH_TINT, None, "Multiplies the color of passing light"),
+)
+#: Outputs of groups whose shader differs between the engines.
+ENGINES = ("Cycles", 'Shader'), ("EEVEE", 'Shader')
 
 # Cosines between the highlight's direction and the face: under the first there is no highlight, over the second all.
 _GLANCING, _CLEAR = 0.0, 0.35
@@ -45,33 +54,22 @@ def microsphere_group() -> bpy.types.NodeTree:
     -----
     Particles scatter p cos φ, planes p cos α + s cos^spear β, blended by Plane (paper, section 7; φ is the angle
     between light and viewer, α that between light and plane, β that between viewer and reflection). Of what is
-    scattered the share Transmission leaves on the other side. Cycles cuts each lobe off at the face's own horizon; of
-    a cosine lobe around m the share (1 − |m·n|) / 2 lies beyond it, n being the face's normal. That share is given
+    scattered the fraction Transmission leaves on the other side. Cycles cuts each lobe off at the face's own horizon;
+    of a cosine lobe around m the fraction (1 − |m·n|) / 2 lies beyond it, n being the face's normal. That fraction goes
     to an even lobe on the face's far side, so nothing is lost and nothing counts twice. EEVEE has no such horizon.
     """
-
-    def build(tree: bpy.types.NodeTree) -> None:
-        unit = (0.0, 1.0)
-        add_socket(tree, "Colour", "NodeSocketColor", (0.1, 0.25, 0.05, 1.0), None, "Mean color of the contents")
-        add_socket(tree, "Transmission", "NodeSocketFloat", 0.0, unit, "Fraction of scattered light that passes")
-        add_socket(tree, "Normal", "NodeSocketVector", (0.0, 0.0, 1.0), None, "Axis of the planes, of either sign")
-        add_socket(tree, "Plane", "NodeSocketFloat", 0.0, unit, "Weight of the plane term; the rest are particles")
-        add_socket(tree, "p", "NodeSocketFloat", 1.0, unit, "Diffuse weight of the particle and plane terms")
-        add_socket(tree, "s", "NodeSocketFloat", 0.04, unit, "Specular weight of the plane term")
-        add_socket(tree, "spear", "NodeSocketFloat", 7.5, (0.0, 1000.0), "Exponent of the plane term's highlight")
-        add_socket(tree, "Through Tint", "NodeSocketColor", THROUGH_TINT, None, "Multiplies the color of passing light")
-        about = "0: particles face the viewer, as in the paper; 1: particles are round from all sides"
-        add_socket(tree, "Roundness", "NodeSocketFloat", 1.0, unit, about)
-        about = "Normal of particles with their own surface; at zero, particles face the viewer"
-        add_socket(tree, "Facing", "NodeSocketVector", (0.0, 0.0, 0.0), None, about)
-        for name in ("Cycles", "EEVEE"):
-            tree.interface.new_socket(name=name, in_out='OUTPUT', socket_type="NodeSocketShader")
-        graph = Graph(tree)
-        given = graph.node("NodeGroupInput").outputs
-        graph.node("NodeGroupOutput", _shaders(graph, given))
-        graph.arrange()
-
-    return get_or_create(bpy.data.node_groups, MICROSPHERE, _VERSION, new_group, build)
+    about = "0: particles face the viewer, as in the paper; 1: particles are round from all sides"
+    facing = "Normal of particles with their own surface; at zero, particles face the viewer"
+    inputs = (
+        ("Colour", 'Color', LEAF_GREEN, None, "Mean color of the contents"),
+        ("Transmission", 'Float', 0.0, UNIT, "Fraction of scattered light that passes"),
+        ("Normal", 'Vector', (0.0, 0.0, 1.0), None, "Axis of the planes, of either sign"),
+        ("Plane", 'Float', 0.0, UNIT, "Weight of the plane term; the rest are particles"),
+        *LOBE_INPUTS,
+        ("Roundness", 'Float', 1.0, UNIT, about),
+        ("Facing", 'Vector', (0.0, 0.0, 0.0), None, facing),
+    )
+    return shader_group(MICROSPHERE, _VERSION, inputs, ENGINES, _shaders)
 
 
 def _shaders(graph: Graph, given: Any) -> dict[str, bpy.types.NodeSocket]:
@@ -79,9 +77,9 @@ def _shaders(graph: Graph, given: Any) -> dict[str, bpy.types.NodeSocket]:
     geometry = graph.node("ShaderNodeNewGeometry").outputs
     incoming, face = geometry["Incoming"], geometry["True Normal"]
     back = graph.scaled(given["Colour"], given["p"])
-    share = given["Transmission"]
-    through = graph.vector('SCALE', graph.tinted(back, given["Through Tint"]), share)
-    back = graph.vector('SCALE', back, graph.math('SUBTRACT', 1.0, share))
+    transmission = given["Transmission"]
+    through = graph.vector('SCALE', graph.tinted(back, given["Through Tint"]), transmission)
+    back = graph.vector('SCALE', back, graph.math('SUBTRACT', 1.0, transmission))
 
     particle = _particle_normal(graph, given, geometry)
     axis = graph.vector('NORMALIZE', given["Normal"])
@@ -137,13 +135,9 @@ def _particle_normal(graph: Graph, given: Any, geometry: Any) -> bpy.types.NodeS
     reach = graph.math('MULTIPLY', given["Roundness"], 0.999)
     seen = graph.vector('ADD', geometry["Incoming"], graph.vector('SCALE', around, reach))
     unset = graph.math('LESS_THAN', graph.vector('LENGTH', given["Facing"]), 0.5)
-    return graph.vector(
-        'NORMALIZE', graph.vector('ADD', graph.vector('SCALE', seen, unset), _only(graph, given["Facing"], unset))
-    )
-
-
-def _only(graph: Graph, vector: Any, unset: Any) -> bpy.types.NodeSocket:
-    return graph.vector('SCALE', vector, graph.math('SUBTRACT', 1.0, unset))
+    seen = graph.vector('SCALE', seen, unset)
+    own = graph.vector('SCALE', given["Facing"], graph.math('SUBTRACT', 1.0, unset))
+    return graph.vector('NORMALIZE', graph.vector('ADD', seen, own))
 
 
 def _sign(graph: Graph, first: Any, second: Any) -> bpy.types.NodeSocket:
@@ -172,7 +166,7 @@ def _highlight_width(graph: Graph, given: Any) -> bpy.types.NodeSocket:
 
 
 def _gloss_weight(graph: Graph, given: Any, directions: tuple[Any, Any, Any], width: Any) -> tuple[Any, Any]:
-    """Share of all light that the highlight gets, Plane · s, and what of it is left above the face's horizon.
+    """Fraction of all light that the highlight gets, Plane · s, and what of it is left above the face's horizon.
 
     Planes whose highlight would dip under the face have none. What the horizon cuts off of the others, the plane
     scatters diffusely: .29 e^{−1.3 x α^{−.66}} for a mirrored direction at cosine x from the face's normal, fitted to
@@ -217,22 +211,20 @@ def scatter_group() -> bpy.types.NodeTree:
     -------
     bpy.types.NodeTree
         Inputs Colour, Transmission, Reflected Tint, Through Tint, Gloss, Gloss Roughness, Normal; output Shader. Of the
-        light that arrives, (1 − Gloss) · Colour is scattered, evenly over the side of the light or, for the share
+        light that arrives, (1 − Gloss) · Colour is scattered, evenly over the side of the light or, for the fraction
         Transmission, over the other side, each times its tint; Gloss is mirrored. No more comes out than went in.
     """
+    inputs = (
+        ("Colour", 'Color', LEAF_GREEN),
+        ("Transmission", 'Float', 0.0, UNIT, "Fraction of scattered light that passes"),
+        ("Reflected Tint", 'Color', WHITE, None, "Multiplies the color of reflected light"),
+        ("Through Tint", 'Color', THROUGH_TINT, None, "Multiplies the color of passing light"),
+        ("Gloss", 'Float', GLOSS, UNIT, "Fraction of light that is reflected"),
+        ("Gloss Roughness", 'Float', GLOSS_ROUGHNESS, UNIT),
+        ("Normal", 'Vector', None, None, "Must be linked, for example to Geometry"),
+    )
 
-    def build(tree: bpy.types.NodeTree) -> None:
-        unit = (0.0, 1.0)
-        add_socket(tree, "Colour", "NodeSocketColor", (0.1, 0.25, 0.05, 1.0))
-        add_socket(tree, "Transmission", "NodeSocketFloat", 0.0, unit, "Fraction of scattered light that passes")
-        add_socket(tree, "Reflected Tint", "NodeSocketColor", WHITE, None, "Multiplies the color of reflected light")
-        add_socket(tree, "Through Tint", "NodeSocketColor", THROUGH_TINT, None, "Multiplies the color of passing light")
-        add_socket(tree, "Gloss", "NodeSocketFloat", GLOSS, unit, "Fraction of light that is reflected")
-        add_socket(tree, "Gloss Roughness", "NodeSocketFloat", GLOSS_ROUGHNESS, unit)
-        add_socket(tree, "Normal", "NodeSocketVector", None, None, "Must be linked, for example to Geometry")
-        tree.interface.new_socket(name="Shader", in_out='OUTPUT', socket_type="NodeSocketShader")
-        graph = Graph(tree)
-        given = graph.node("NodeGroupInput").outputs
+    def build(graph: Graph, given: Any) -> dict[str, Any]:
         colour, normal = given["Colour"], given["Normal"]
         back = graph.tinted(colour, given["Reflected Tint"])
         reflected = graph.node("ShaderNodeBsdfDiffuse", {"Color": back, "Normal": normal})
@@ -241,8 +233,6 @@ def scatter_group() -> bpy.types.NodeTree:
         sheet = graph.mix(given["Transmission"], reflected, transmitted)
         roughness = given["Gloss Roughness"]
         gloss = graph.node("ShaderNodeBsdfAnisotropic", {"Color": WHITE, "Roughness": roughness, "Normal": normal})
-        result = graph.mix(given["Gloss"], sheet, gloss)
-        graph.node("NodeGroupOutput", {"Shader": result})
-        graph.arrange()
+        return {"Shader": graph.mix(given["Gloss"], sheet, gloss)}
 
-    return get_or_create(bpy.data.node_groups, SCATTER, _SCATTER_VERSION, new_group, build)
+    return shader_group(SCATTER, _SCATTER_VERSION, inputs, [("Shader", 'Shader')], build)

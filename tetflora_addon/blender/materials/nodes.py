@@ -1,18 +1,22 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shorthand for node trees built by code, and the mark that tells our datablocks from the artist's."""
+"""Shorthand for node trees built by code, and the mark on datablocks that TetFlora made."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 
 import bpy
+
+from ..compat import shader_tree
 
 # Not plain "tetflora": on 4.5 a registered property group lives among the custom properties under its own name, so
 # every empty with plant settings would look as if we had made it.
 MADE = "tetflora_made"
 VERSION = "tetflora_version"
+#: Color of leaves where there is no other.
+LEAF_GREEN = (0.1, 0.25, 0.05, 1.0)
 
 Datablock = TypeVar("Datablock", bound=bpy.types.ID)
 
@@ -65,9 +69,9 @@ def get_or_create(
     Returns
     -------
     bpy.types.ID
-        What an artist edited or put there under this name comes back untouched. An outdated datablock of ours is kept
-        under another name, because somebody may have edited it, and is the artist's from then on; one that is linked
-        from another file keeps its name, which is none of this file's.
+        What an artist edited or put there under this name comes back untouched. An outdated datablock of ours gets
+        another name, because somebody may have edited it, and is the artist's from then on; one that is linked from
+        another file keeps its name.
     """
     found = collection.get((name, None)) or collection.get(name)
     if found is not None:
@@ -80,11 +84,6 @@ def get_or_create(
     made[VERSION] = version
     tag(made)
     return made
-
-
-def new_group(name: str) -> bpy.types.NodeTree:
-    """An empty group of shader nodes."""
-    return bpy.data.node_groups.new(name, "ShaderNodeTree")
 
 
 class Graph:
@@ -125,6 +124,12 @@ class Graph:
         """Output ``'Color'``, ``'Vector'`` or ``'Fac'`` of a mesh attribute."""
         return find_socket(self.node("ShaderNodeAttribute", attribute_name=name).outputs, output)
 
+    def value(self, number: float) -> bpy.types.NodeSocket:
+        """A number for an input that has to be linked."""
+        socket = self.node("ShaderNodeValue").outputs[0]
+        socket.default_value = number
+        return socket
+
     def math(self, operation: str, *values: Any) -> bpy.types.NodeSocket:
         """Scalar operation on sockets or numbers."""
         node = self.node("ShaderNodeMath", operation=operation)
@@ -149,7 +154,7 @@ class Graph:
         return node.outputs[0]
 
     def tinted(self, colour: Any, tint: Any) -> bpy.types.NodeSocket:
-        """Product of two colours, kept under 1 so that no surface returns more light than it gets."""
+        """Product of two colours, at most 1 so that no surface returns more light than it gets."""
         node = self.node(
             "ShaderNodeMix",
             {"Factor_Float": 1.0, "A_Color": colour, "B_Color": tint},
@@ -160,7 +165,7 @@ class Graph:
         return find_socket(node.outputs, "Result_Color")
 
     def scaled(self, colour: Any, factor: Any) -> bpy.types.NodeSocket:
-        """Colour times a number, kept under 1."""
+        """Colour times a number, at most 1."""
         grey = self.node("ShaderNodeCombineColor", {"Red": factor, "Green": factor, "Blue": factor})
         return self.tinted(colour, grey)
 
@@ -206,7 +211,42 @@ def find_socket(sockets: Any, key: str) -> bpy.types.NodeSocket:
     raise KeyError(f"No socket {key} among {', '.join(socket.name for socket in sockets)}")
 
 
-def add_socket(
+def shader_group(
+    name: str,
+    version: int,
+    inputs: Sequence[tuple],
+    outputs: Sequence[tuple[str, str]],
+    build: Callable[[Graph, Any], dict[str, Any]],
+) -> bpy.types.NodeTree:
+    """A group of shader nodes, as `get_or_create` finds or makes it.
+
+    Parameters
+    ----------
+    inputs : sequence of tuple
+        Name, kind (``'Float'``, ``'Color'``, ``'Vector'``), default, and if needed a range and a description.
+    outputs : sequence of tuple
+        Name and kind.
+    build : callable
+        Gets the graph and the sockets of the inputs; returns what to link to the outputs, by name.
+    """
+
+    def fill(tree: bpy.types.NodeTree) -> None:
+        for socket in inputs:
+            _add_input(tree, *socket)
+        for output, kind in outputs:
+            tree.interface.new_socket(name=output, in_out='OUTPUT', socket_type=f"NodeSocket{kind}")
+        graph = Graph(tree)
+        given = graph.node("NodeGroupInput").outputs if inputs else ()
+        graph.node("NodeGroupOutput", build(graph, given))
+        graph.arrange()
+
+    def new(name: str) -> bpy.types.NodeTree:
+        return bpy.data.node_groups.new(name, "ShaderNodeTree")
+
+    return get_or_create(bpy.data.node_groups, name, version, new, fill)
+
+
+def _add_input(
     tree: bpy.types.NodeTree,
     name: str,
     kind: str,
@@ -214,9 +254,22 @@ def add_socket(
     limits: tuple[float, float] | None = None,
     description: str = "",
 ) -> None:
-    """Add an input to a group's interface; `limits` are the least and greatest number."""
-    socket = tree.interface.new_socket(name=name, description=description, in_out='INPUT', socket_type=kind)
+    made = tree.interface.new_socket(
+        name=name, description=description, in_out='INPUT', socket_type=f"NodeSocket{kind}"
+    )
     if limits is not None:
-        socket.min_value, socket.max_value = limits
+        made.min_value, made.max_value = limits
     if default is not None:
-        socket.default_value = default
+        made.default_value = default
+
+
+def surface_material(name: str, version: int, build: Callable[[Graph, bpy.types.Material], None]) -> bpy.types.Material:
+    """A material with nodes, as `get_or_create` finds or makes it; `build` may change its viewport colour."""
+
+    def fill(made: bpy.types.Material) -> None:
+        made.diffuse_color = LEAF_GREEN
+        graph = Graph(shader_tree(made))
+        build(graph, made)
+        graph.arrange()
+
+    return get_or_create(bpy.data.materials, name, version, bpy.data.materials.new, fill)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shell materials: a proxy tetrahedron drawn as a cloud of constant density (paper, section 7).
 
-"TetFlora shell" is lit by the scene's lights; "TetFlora baked shell" gives off light that was computed before.
+The scene's lights illuminate "TetFlora shell"; "TetFlora baked shell" emits baked light.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from typing import Any
 
 import bpy
 
-from ..compat import blend_in_mesh_order, disable_bump_correction, shader_tree
-from .microsphere import THROUGH_TINT, microsphere_group
-from .nodes import Graph, add_socket, find_socket, get_or_create, new_group
+from ..compat import blend_in_mesh_order, disable_bump_correction
+from .microsphere import ENGINES, LOBE_INPUTS, UNIT, microsphere_group
+from .nodes import Graph, find_socket, shader_group, surface_material
 
 SHELL = "TetFlora Shell"
 SHELL_MATERIAL = "TetFlora shell"
@@ -29,7 +29,7 @@ _BAKED_VERSION = 1
 _NEVER = 1e9
 # A slope under which the ray runs along a face, 1/m.
 _ALONG = 1e-9
-# An eye nearer to the exit face than this share of the way through the cell is inside of the cell.
+# An eye nearer to the exit face than this fraction of the way through the cell is inside of the cell.
 _INSIDE = 0.999
 # Optical depth under which the weights of both ends are taken from their series; both forms are within 1e-5 there.
 _THIN = 0.05
@@ -37,20 +37,14 @@ _THIN = 0.05
 
 def shell_group() -> bpy.types.NodeTree:
     """The group "TetFlora Shell": everything between the attributes of ``shell_buffers`` and a shader."""
+    inputs = (
+        *LOBE_INPUTS,
+        ("Roundness", 'Float', 1.0, UNIT, "0: particles face the viewer; 1: they are round"),
+        ("Variation", 'Float', 0.05, UNIT, "Variation of lightness between cells"),
+        ("Stochastic", 'Float', 1.0, UNIT, "1: samples are opaque or clear, much faster"),
+    )
 
-    def build(tree: bpy.types.NodeTree) -> None:
-        unit = (0.0, 1.0)
-        add_socket(tree, "p", "NodeSocketFloat", 1.0, unit, "Diffuse weight of the particle and plane terms")
-        add_socket(tree, "s", "NodeSocketFloat", 0.04, unit, "Specular weight of the plane term")
-        add_socket(tree, "spear", "NodeSocketFloat", 7.5, (0.0, 1000.0), "Exponent of the plane term's highlight")
-        add_socket(tree, "Through Tint", "NodeSocketColor", THROUGH_TINT, None, "Color of transmitted light")
-        add_socket(tree, "Roundness", "NodeSocketFloat", 1.0, unit, "0: particles face the viewer; 1: they are round")
-        add_socket(tree, "Variation", "NodeSocketFloat", 0.05, unit, "Variation of lightness between cells")
-        add_socket(tree, "Stochastic", "NodeSocketFloat", 1.0, unit, "1: samples are opaque or clear, much faster")
-        for name in ("Cycles", "EEVEE"):
-            tree.interface.new_socket(name=name, in_out='OUTPUT', socket_type="NodeSocketShader")
-        graph = Graph(tree)
-        given = graph.node("NodeGroupInput").outputs
+    def build(graph: Graph, given: Any) -> dict[str, Any]:
         geometry = graph.node("ShaderNodeNewGeometry").outputs
         spheres = graph.node("ShaderNodeGroup", node_tree=microsphere_group())
         inputs = {name: given[name] for name in ("p", "s", "spear", "Through Tint", "Roundness")}
@@ -67,10 +61,9 @@ def shell_group() -> bpy.types.NodeTree:
             # EEVEE blends opacity as it is; what it draws by chance, it draws so by itself.
             alpha = _decided(graph, opacity, geometry, given["Stochastic"]) if engine == "Cycles" else opacity
             shaders[engine] = graph.mix(alpha, clear, find_socket(spheres.outputs, engine))
-        graph.node("NodeGroupOutput", shaders)
-        graph.arrange()
+        return shaders
 
-    return get_or_create(bpy.data.node_groups, SHELL, _GROUP_VERSION, new_group, build)
+    return shader_group(SHELL, _GROUP_VERSION, inputs, ENGINES, build)
 
 
 def baked_shell_group() -> bpy.types.NodeTree:
@@ -82,13 +75,9 @@ def baked_shell_group() -> bpy.types.NodeTree:
     cell of optical depth τ = κℓ adds B = w₀ J₀ + w₁ J₁ to T = e^{−τ} times what is behind it (paper, section 7), where
     w₁ = (1 − e^{−τ}(1 + τ)) / τ and w₀ = 1 − (1 − e^{−τ}) / τ.
     """
+    inputs = [("Strength", 'Float', 1.0, (0.0, 1000.0), "Multiplies the baked light")]
 
-    def build(tree: bpy.types.NodeTree) -> None:
-        add_socket(tree, "Strength", "NodeSocketFloat", 1.0, (0.0, 1000.0), "Multiplies the baked light")
-        for name in ("Cycles", "EEVEE"):
-            tree.interface.new_socket(name=name, in_out='OUTPUT', socket_type="NodeSocketShader")
-        graph = Graph(tree)
-        given = graph.node("NodeGroupInput").outputs
+    def build(graph: Graph, given: Any) -> dict[str, Any]:
         geometry = graph.node("ShaderNodeNewGeometry").outputs
         lights = [graph.attribute(f"tf_light{k}", "Vector") for k in range(4)]
         shaders = {}
@@ -108,46 +97,37 @@ def baked_shell_group() -> bpy.types.NodeTree:
             # Not a mix, which would make the emission weaker by the opacity that it contains already.
             added = graph.node("ShaderNodeAddShader", {"Shader": emission, "Shader_001": clear})
             shaders[engine] = added.outputs[0]
-        graph.node("NodeGroupOutput", shaders)
-        graph.arrange()
+        return shaders
 
-    return get_or_create(bpy.data.node_groups, BAKED_SHELL, _BAKED_VERSION, new_group, build)
+    return shader_group(BAKED_SHELL, _BAKED_VERSION, inputs, ENGINES, build)
 
 
 def shell_material() -> bpy.types.Material:
-    """Material "TetFlora shell" of the mesh that ``shading.shells.shell_buffers`` describes, for Cycles and EEVEE.
+    """Material "TetFlora shell" of the mesh that `emission.shells.shell_buffers` describes, for Cycles and EEVEE.
 
     A ray meets two faces a cell: the scene's ``cycles.transparent_max_bounces`` has to allow for that. EEVEE blends
     faces in their order in the mesh: give ``shell_buffers`` the cells' ranks.
     """
-    return get_or_create(
-        bpy.data.materials, SHELL_MATERIAL, _MATERIAL_VERSION, bpy.data.materials.new, _builder(shell_group)
-    )
+    return surface_material(SHELL_MATERIAL, _MATERIAL_VERSION, _builder(shell_group))
 
 
 def baked_shell_material() -> bpy.types.Material:
     """Material "TetFlora baked shell": the light of ``shell_buffers(light=...)``, without noise, unlit."""
-    return get_or_create(
-        bpy.data.materials, BAKED_SHELL_MATERIAL, _BAKED_VERSION, bpy.data.materials.new, _builder(baked_shell_group)
-    )
+    return surface_material(BAKED_SHELL_MATERIAL, _BAKED_VERSION, _builder(baked_shell_group))
 
 
 def _builder(group: Any) -> Any:
     """What leads a group's two outputs to those of a material."""
 
-    def build(material: bpy.types.Material) -> None:
-        graph = Graph(shader_tree(material))
+    def build(graph: Graph, material: bpy.types.Material) -> None:
         shell = graph.node("ShaderNodeGroup", node_tree=group())
         # EEVEE otherwise takes the whole mesh's extent for the thickness of each cell, and halves what passes through.
-        thin = graph.node("ShaderNodeValue")
-        thin.outputs[0].default_value = 0.0
+        thin = graph.value(0.0)
         for engine, name in (('CYCLES', "Cycles"), ('EEVEE', "EEVEE")):
             surface = find_socket(shell.outputs, name)
             graph.node("ShaderNodeOutputMaterial", {"Surface": surface, "Thickness": thin}, target=engine)
-        graph.arrange()
         disable_bump_correction(material)
         blend_in_mesh_order(material)
-        material.diffuse_color = (0.1, 0.25, 0.05, 1.0)
 
     return build
 
