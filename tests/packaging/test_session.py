@@ -32,7 +32,7 @@ def test_plain_names_are_blenders_own_modules(blender: ModuleType) -> None:
     from tetflora_addon import blender as bridge
     from tetflora_addon.blender.job import refine
 
-    own = sys.modules[f"{session.PACKAGE}.tetflora_addon.blender.job"]
+    own = sys.modules[f"{session.PACKAGE}.tetflora_addon.blender.job.refine"]
     assert refine is own
     assert sys.modules["tetflora_addon.blender"] is bridge is blender.blender
     assert own.__spec__.name == own.__name__

@@ -94,7 +94,7 @@ def test_the_zip_holds_the_extension_and_nothing_else(shot, tmp_path):
     (path,) = (tmp_path / "job" / "tetflora").glob("tetflora-*.zip")
     with zipfile.ZipFile(path) as archive:
         names = archive.namelist()
-    assert {"blender_manifest.toml", "__init__.py", "tetflora_addon/blender/farm_installer.py"} <= set(names)
+    assert {"blender_manifest.toml", "__init__.py", "tetflora_addon/blender/cli/farm_installer.py"} <= set(names)
     assert [n for n in names if "__pycache__" in n or n.startswith(("tests/", "docs/", ".", "benchmarks/"))] == []
     farm.write_zip(tmp_path / "again.zip")
     assert (tmp_path / "again.zip").read_bytes() == path.read_bytes()
