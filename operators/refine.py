@@ -71,7 +71,7 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
             f"{counted(statistics.plants, 'plant')}: {statistics.polygons_meshed:,} of {statistics.polygons_full:,} "
             f"polygons, {statistics.tetrahedra_proxy:,} proxies in {sum(statistics.seconds.values()):.1f} s",
         )
-        if not statistics.complete and statistics.levels:
+        if not statistics.complete and statistics.passes:
             self.report({'INFO'}, "Stopped early; click Refine again to complete the result")
         outside = _cut_off(context.scene) or _unseen(context.scene, statistics)
         for warning in (outside, few_bounces(context.scene), _unread_world(context.scene)):
@@ -90,7 +90,7 @@ def _unread_world(scene: bpy.types.Scene) -> str:
 
 def _unseen(scene: bpy.types.Scene, statistics: Statistics) -> str:
     """A warning if the camera sees no plant at all, so that nothing was divided after the first look; else empty."""
-    if statistics.levels != 1 or statistics.polygons_meshed or scene.tetflora.max_passes:
+    if statistics.passes != 1 or statistics.polygons_meshed or scene.tetflora.max_passes:
         return ""
     return (
         f'The camera "{scene.camera.name}" sees no plants. Press Numpad 0 to look through it, and check that it '

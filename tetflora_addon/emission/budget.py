@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A budget of polygons: the best picture that fits (beyond the paper, whose only limit is the cutoff).
+"""A budget of polygons: the best image that fits (beyond the paper, whose only limit is the cutoff).
 
 What refinement asks for may not fit. Then real leaves are given to the tetrahedra that gain most by them for each
 polygon, best first, until the budget is spent; all others become proxies, whose facets grow until they fit as well.

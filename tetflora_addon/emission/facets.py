@@ -129,7 +129,7 @@ def _facets(
             for seen in (True, False):
                 for i in _runs(expected, own[inside[own] & (wanted.seen[own] == seen)]):
                     yield species, make(flora, transition, things.take(i), wanted.take(i)), seen
-            # What is beside the view must not reach into the picture.
+            # What is beside the view must not reach into the image.
             for i in _runs(expected, own[~inside[own]]):
                 made = make(flora, transition, things.take(i), wanted.take(i))
                 yield species, kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5), False

@@ -125,7 +125,7 @@ def polygon_buffers(polygons: Polygons) -> MeshBuffers:
     whole, pieces = polygons.take(~cut), polygons.take(cut)
     corner, instance, size = _face_corners(whole)
     # Corners of faces that come to a vertex twice get vertices of their own, so that the mesh is valid.
-    own_place = np.repeat(meshes.knotted[whole.face], size)
+    own_place = np.repeat(meshes.degenerate[whole.face], size)
     count = len(meshes.positions)
     place = np.where(own_place, count + corner, meshes.corner_verts[corner])
     places = count + len(meshes.corner_verts)

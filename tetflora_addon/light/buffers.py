@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..camera.camera import Camera
 from ..refinement.rasterise import buffer_size, occluder_depth, tetrahedron_fragments
-from ..refinement.visibility import OPAQUE
+from ..refinement.visibility import OPAQUE, depth_in_front
 
 #: How far polygons' shadows begin behind them, in pixels of the buffer: none shadows what lies on it.
 BIAS = 1.5
@@ -95,13 +95,8 @@ class LightBuffer:
         # Sums need doubles; what is looked up does not.
         entry, thickness, depth = entry[order], thickness[order], depth[order]
         self._entry, self._thickness, self._depth = (a.astype(np.float32) for a in (entry, thickness, depth))
-        summed = np.cumsum(depth)
-        begins = np.flatnonzero(np.diff(self._pixel, prepend=-1))
-        length = np.diff(begins, append=len(order))
-        #: First fragment of each fragment's pixel.
-        self._first = np.repeat(begins, length).astype(np.int32)
-        before = summed - depth - np.repeat((summed - depth)[begins], length)
-        self._before = np.maximum(before, 0.0).astype(np.float32)
+        first, before = depth_in_front(self._pixel, depth)
+        self._first, self._before = first.astype(np.int32), before.astype(np.float32)
         own = self._cell * np.int64(self.width * self.height) + self._pixel
         self._by_cell = np.argsort(own).astype(np.int32)
         self._own_key = own[self._by_cell]

@@ -151,7 +151,7 @@ class Near:
 
 
 def light_resolution(camera: Camera) -> int:
-    """Longer side in pixels of a lamp's buffer: that of the picture (paper: "of proportional size")."""
+    """Longer side in pixels of a lamp's buffer: that of the image (paper: "of proportional size")."""
     return int(np.clip(max(camera.width, camera.height), *LAMP_PIXELS))
 
 

@@ -46,7 +46,7 @@ class Level:
     visibility : (t,) float32
         Fraction of each one's light that nothing in front blocks; 0 out of view.
     contribution : (t,) float32
-        Pixels of the picture that its contents change.
+        Pixels of the image that its contents change.
     extinction : (t,) float32
         κ of its contents spread evenly, 1/m; optical depth is κ times the way through it.
     colour : (t, 3) float32

@@ -51,7 +51,7 @@ class FacetSizes:
     coarse : (n,) float64
         How much larger than seen ones facets are; 1 where they are seen.
     clearance : (n,) float64
-        Metres from the space that the picture shows; negative within.
+        Metres from the space that the image shows; negative within.
     totals : Totals of n
     part : (n,) float64
         Which part of a branch, or of a sub-plant, each is.

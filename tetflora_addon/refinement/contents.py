@@ -1,12 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What tetrahedra hold: sub-plants, pieces of branches, explicit polygons, and how much they are (paper, section 6.5).
+"""Contents of tetrahedra: sub-plants, pieces of branches and explicit polygons, with their totals (paper, 6.5).
 
 A plant is held as a sub-plant while it lies on one side of every plane. Where it crosses one it is opened into the
 sub-plants of the next order and the pieces of its own branch, see `descent`. Polygons come from meshes that were
-modelled elsewhere.
-
-How much there is of things and in tetrahedra, as far as decisions need it: areas, polygons, size of features.
+modelled elsewhere. Totals are what decisions need: areas, numbers of polygons, and the width of features.
 """
 
 from __future__ import annotations
@@ -29,10 +27,16 @@ from ..subplants.pieces import Pieces, leaf_fraction, outward_ends, wood_areas
 from ..subplants.sides import bounding_bodies
 from .polygons import Polygons
 
+#: Side in pixels from which on a polygon is large: more than facets have, hidden ones included.
+LARGE = 2.0
+_NONE = np.zeros(0, np.int32)
+
+Kind = TypeVar("Kind", Branches, Pieces, Polygons)
+
 
 @dataclass(frozen=True)
 class Totals(Arrays):
-    """How much each thing (sub-plant or piece) or each tetrahedron holds.
+    """What each thing (sub-plant, piece, polygon) or each tetrahedron holds in total.
 
     Attributes
     ----------
@@ -60,7 +64,7 @@ class Totals(Arrays):
 
     @property
     def optical_area(self) -> NDArray[np.float64]:
-        """What can hold up light (n,), m²: leaves, and half of the wood, as closed branches show no more than that."""
+        """Area (n,) that can block light, m²: leaves, and half of the wood, since closed branches show no more."""
         return self.leaf_area + self.wood_area / 2
 
 
@@ -91,7 +95,7 @@ def piece_totals(flora: Flora, pieces: Pieces) -> Totals:
 
 
 def polygon_totals(polygons: Polygons, width: NDArray[np.float64] | None = None) -> Totals:
-    """What explicit polygons are, as far as they are not transparent; ``width`` (n,) in place of the surfaces' own."""
+    """Totals of explicit polygons, without what is transparent; ``width`` (n,) replaces that of the surfaces."""
     meshes, face = polygons.meshes, polygons.face
     area = polygons.areas() * meshes.coverage[meshes.slot[face]]
     solid = meshes.solid[face]
@@ -109,7 +113,7 @@ def _size_factors(flora: Flora, pieces: Pieces) -> NDArray[np.float64] | float:
 
 
 def sums(totals: Totals, cells: NDArray[np.integer], number: int) -> Totals:
-    """Sums over the things (n,) in each of a number of cells, given by ``cells`` (n,); the width is a mean."""
+    """Totals of each of a number of cells, from those (n,) of the things in ``cells`` (n,); the width is a mean."""
     area, fine = totals.area, np.isfinite(totals.width)
     small = np.where(fine, area, 0.0)
     total = np.bincount(cells, small, number)
@@ -121,13 +125,6 @@ def sums(totals: Totals, cells: NDArray[np.integer], number: int) -> Totals:
         np.bincount(cells, totals.polygons, number),
         np.where(only_large, np.inf, width),
     )
-
-
-#: Side in pixels from which on a polygon is large: more than facets have, even where nobody looks.
-LARGE = 2.0
-_NONE = np.zeros(0, np.int32)
-
-Kind = TypeVar("Kind", Branches, Pieces, Polygons)
 
 
 @dataclass(frozen=True)
@@ -154,14 +151,7 @@ class Held(Arrays, Generic[Kind]):
 
 @dataclass(frozen=True)
 class Contents:
-    """Sub-plants, pieces of branches and explicit polygons, each in one terminal tetrahedron.
-
-    Attributes
-    ----------
-    subplants : Held of Branches
-    pieces : Held of Pieces
-    polygons : Held of Polygons
-    """
+    """Sub-plants, pieces of branches and explicit polygons, each in one terminal tetrahedron."""
 
     subplants: Held[Branches] = field(default_factory=lambda: Held.none(Branches))
     pieces: Held[Pieces] = field(default_factory=lambda: Held.none(Pieces))
@@ -171,7 +161,7 @@ class Contents:
     def of(
         cls, flora: Flora, subplants: Branches, subplant_cell: NDArray, pieces: Pieces, piece_cell: NDArray
     ) -> Contents:
-        """Parts of plants in cells, with their totals."""
+        """Parts of plants in cells."""
         return cls(
             Held(subplants, subplant_cell, subplant_totals(flora, subplants)),
             Held(pieces, piece_cell, piece_totals(flora, pieces)),
@@ -184,7 +174,7 @@ class Contents:
 
     @classmethod
     def of_polygons(cls, polygons: Polygons, large: NDArray[np.bool_] | None = None) -> Contents:
-        """Polygons, all in the root; large ones (k,) are drawn as they are whatever is decided about their cells."""
+        """Polygons, all in the root; ``large`` ones (k,) stay polygons whatever is decided about their cells."""
         totals = polygon_totals(polygons)
         if large is not None:
             totals = replace(totals, width=np.where(large, np.inf, totals.width))
@@ -216,7 +206,7 @@ class Contents:
         return cls(*(Held.concatenate(kinds) for kinds in zip(*(p.kinds for p in parts), strict=True)))
 
     def sums(self, nodes: int) -> Totals:
-        """What each of a number of nodes holds."""
+        """Totals of each of a number of nodes."""
         totals = Totals.concatenate([kind.totals for kind in self.kinds])
         return sums(totals, np.concatenate([kind.cell for kind in self.kinds]), nodes)
 
@@ -228,13 +218,7 @@ class Contents:
 
 
 class Holdings:
-    """Contents of a tree that is being divided: what lies in divided nodes is taken out, the rest is never copied.
-
-    Parameters
-    ----------
-    contents : Contents
-        Of all terminal nodes.
-    """
+    """Contents of terminal nodes while a tree is divided: only what lies in divided nodes is taken out and copied."""
 
     def __init__(self, contents: Contents) -> None:
         self._parts = [contents]
@@ -253,7 +237,7 @@ class Holdings:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of all arrays, of what has been taken out but not yet left behind as well."""
+        """Bytes of all arrays, including what was taken out but is not yet dropped."""
         return sum(part.nbytes for part in self._parts)
 
     def put(self, contents: Contents) -> None:
@@ -269,7 +253,7 @@ class Holdings:
                 kept.append(part)
                 continue
             out.append(part.take(*masks))
-            # What is taken is only marked here; copying what stays would cost more than all else that moves.
+            # What is taken is only marked; copying what stays would cost more than all else that moves.
             kinds = zip(masks, part.kinds, strict=True)
             part = Contents(*(replace(kind, cell=np.where(m, np.int32(-1), kind.cell)) for m, kind in kinds))
             if 2 * sum((kind.cell < 0).sum() for kind in part.kinds) > sum(map(len, part.kinds)):
@@ -285,7 +269,7 @@ def _living(part: Contents) -> Contents:
 
 
 def large_polygons(polygons: Polygons, camera: Camera) -> NDArray[np.bool_]:
-    """Polygons (n,) for which no facet could stand, other than leaves, which several may be drawn as one."""
+    """Polygons (n,) too large for a facet; leaves never are, since one facet may stand for several."""
     meshes, face = polygons.meshes, polygons.face
     optical = polygons.areas() * np.where(meshes.solid[face], 0.5, 1.0)
     return ~meshes.leaf[face] & (optical >= (LARGE * camera.extent_around(polygons.centre)) ** 2)

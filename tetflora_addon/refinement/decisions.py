@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The refinement step: what becomes of each terminal tetrahedron (paper, section 6.4).
-
-Terminal tetrahedra that hold something, and what is known of each as long as it is not divided.
-"""
+"""The refinement step: what becomes of each terminal tetrahedron that holds something (paper, section 6.4)."""
 
 from __future__ import annotations
 
@@ -21,10 +18,29 @@ from .contents import Totals
 from .settings import RefinementSettings
 from .visibility import AlphaBuffer
 
+#: Longest edge, in sides of a block, from which on what crosses the border of the view is divided for its unseen part.
+ACROSS_THE_BORDER = 1.5
+#: Fraction of all cells, fraction of the image, and polygons, for which a pass of the loop is not worth its time.
+FEW, NO_GAIN, NO_POLYGONS = 0.005, 0.002, 20_000
+#: Of a tetrahedron of more blocks than this on each side, too little is known to make it explicit.
+UNKNOWN = 4.0
+#: How much smaller than the limit leaves are at the far end of a tetrahedron that is divided for it.
+DEEP = 1.5
+
+
+class Decision(IntEnum):
+    """What is done with a terminal tetrahedron."""
+
+    EMPTY = 0
+    PROXY = 1  # small in the image: drawn as an approximation
+    HIDDEN = 2  # not seen, or hardly: a coarse approximation
+    EXPLICIT = 3  # polygons are made of all in it
+    SPLIT = 4
+
 
 @dataclass(frozen=True)
 class Terminals(Arrays):
-    """Terminal tetrahedra that hold something.
+    """Terminal tetrahedra that hold something, and what is known of each until it is divided.
 
     Attributes
     ----------
@@ -40,7 +56,7 @@ class Terminals(Arrays):
     span : (n,) float64
         Longest edge in pixels at their distance.
     whole : (n,) bool
-        Whether all of each is in view. What crosses the border of the view has pixels of its seen part only.
+        Whether all of each is in view. What crosses the border has the pixels of its visible part only.
     """
 
     nodes: NDArray[np.intp]
@@ -56,7 +72,7 @@ class Terminals(Arrays):
     def seen(
         cls, tree: TetrahedralTree, nodes: NDArray[np.intp], totals: Totals, camera: Camera, buffer: AlphaBuffer
     ) -> Terminals:
-        """Draw tetrahedra into the alpha buffer and keep what it says of each by itself."""
+        """Draw tetrahedra into the alpha buffer and keep what it finds for each."""
         vertices = tree.vertices(nodes)
         outline = buffer.add(nodes, vertices, mean_extinction(totals, volume(vertices)))
         span = np.sqrt(squared_edges(vertices).max(axis=1)) / camera.extent_around(vertices.mean(axis=1))
@@ -77,46 +93,9 @@ def mean_extinction(totals: Totals, volumes: NDArray[np.float64]) -> NDArray[np.
 def feature_pixels(
     vertices: NDArray[np.float64], width: NDArray[np.float64], camera: Camera
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Size on the picture of what tetrahedra hold, where it is nearest to the eye and where it is farthest away.
-
-    Parameters
-    ----------
-    vertices : (n, 4, 3) float64
-    width : (n,) float64
-        Width of leaves or branches, metres.
-
-    Returns
-    -------
-    (n,), (n,) float64
-        Pixels.
-    """
+    """Widths (n,) in metres as pixels, where tetrahedra (n, 4, 3) are nearest to the eye and where farthest."""
     extent = camera.pixel_extent(vertices)
     return width / extent.min(axis=1), width / extent.max(axis=1)
-
-
-#: Longest edge, in sides of a block, from which on what crosses the border of the view is divided for its unseen part.
-ACROSS_THE_BORDER = 1.5
-
-
-#: Fraction of all cells, fraction of the picture, and polygons, for which a pass of the loop is not worth its time.
-FEW, NO_GAIN, NO_POLYGONS = 0.005, 0.002, 20_000
-
-#: A tetrahedron of more blocks than this on each side is no one's last word on what it holds.
-UNKNOWN = 4.0
-
-
-#: How much smaller than the limit leaves are at the far end of a tetrahedron that is divided for it.
-DEEP = 1.5
-
-
-class Decision(IntEnum):
-    """What is done with a terminal tetrahedron."""
-
-    EMPTY = 0
-    PROXY = 1  # small on the picture: drawn as an approximation
-    HIDDEN = 2  # not seen, or hardly: a coarse approximation
-    EXPLICIT = 3  # polygons are made of all in it
-    SPLIT = 4
 
 
 def decide(cells: Terminals, transmittance: NDArray[np.float64], settings: RefinementSettings) -> NDArray[np.int8]:
@@ -141,21 +120,21 @@ def decide(cells: Terminals, transmittance: NDArray[np.float64], settings: Refin
     tetrahedron full of them is divided down to ``block`` pixels to find its hidden parts, and in depth until they are
     about as large at its far end. Then it is made explicit; `emission.plants.Transition` picks the real leaves in it.
 
-    What crosses the border of the view counts by its seen part. That may be small while the tetrahedron is not: then it
-    is divided until the rest is known to be out of view, or all of it would be made as fine as what is seen.
+    What crosses the border of the view counts by its visible part. That may be small while the tetrahedron is not: then
+    it is divided until the rest is out of view, or all of it would be made as fine as the visible part.
     """
     totals = cells.totals
     holds = totals.area > 0
     hidden = transmittance <= settings.hidden  # out of view: transmittance is 0
     large_leaves = cells.feature >= settings.leaf_limit
     few = totals.polygons <= settings.few_polygons
-    # Leaves that are large at the near end may be tiny at the far end, as in all of a small picture's view.
+    # Leaves that are large at the near end may be tiny at the far end, as in all of a small image's view.
     deep = large_leaves & (cells.least_feature < settings.leaf_limit / DEEP) & ~few
     crossing = ~cells.whole & ~few & (cells.span > ACROSS_THE_BORDER * settings.block)
     no_gain = few | ((cells.pixels <= settings.block**2) & ~crossing)
     small = (contributions(cells, transmittance) <= settings.cutoff**2) & ~crossing
     out = np.full(len(holds), Decision.SPLIT, dtype=np.int8)
-    # Large leaves never become a proxy: a block of them that is hardly seen is divided until its hidden parts show.
+    # Large leaves never become a proxy: a barely visible block of them is divided until its hidden parts show.
     out[small & ~large_leaves & (cells.span <= settings.proxy_block)] = Decision.PROXY
     out[large_leaves & no_gain & (~deep | small)] = Decision.EXPLICIT
     out[hidden] = Decision.HIDDEN
@@ -172,10 +151,7 @@ def contributions(cells: Terminals, transmittance: NDArray[np.float64]) -> NDArr
 def gains_nothing(
     splitting: NDArray[np.bool_], cells: Terminals, transmittance: NDArray[np.float64], camera: Camera
 ) -> bool:
-    """Whether the picture gains nothing by dividing the last few cells: next to none of its pixels would change.
-
-    Nor may they hold much, as they become polygons or proxies whole.
-    """
+    """Whether dividing the last few cells would change almost no pixels, and they hold few polygons."""
     if splitting.sum() > FEW * len(cells):
         return False
     gain = contributions(cells, transmittance)[splitting].sum() / (camera.width * camera.height)
@@ -185,10 +161,9 @@ def gains_nothing(
 def without_splits(
     decision: NDArray[np.int8], cells: Terminals, transmittance: NDArray[np.float64], settings: RefinementSettings
 ) -> NDArray[np.int8]:
-    """What becomes of tetrahedra that would be divided when a limit forbids it: leaves of a pixel stay leaves.
+    """Decisions (n,) without divisions, where a limit forbids them: leaves of a pixel stay leaves.
 
-    Unless there are very many of them in a tetrahedron that is still large: of most it is not known how far away, and
-    whether hidden, they are.
+    Very many leaves in a tetrahedron that is still large become a proxy: most may be far away or hidden.
     """
     leafy = cells.feature >= settings.leaf_limit
     known = (cells.pixels <= (UNKNOWN * settings.block) ** 2) | (cells.totals.polygons <= NO_POLYGONS)

@@ -3,10 +3,8 @@
 """The update step: handing contents of divided tetrahedra on to their children (paper, section 6.5).
 
 What lies on one side of a plane goes there whole. Sub-plants that cross it are opened into the sub-plants of the next
-order and the pieces of their own branch; pieces and polygons that cross are clipped. The picture cannot tell what is
-smaller than a pixel of the alpha buffer: what reaches beyond a plane by less than such a *slack* does not cross it.
-
-Clipping explicit polygons by the planes of divided tetrahedra (paper, section 6.5).
+order and the pieces of their own branch; pieces and polygons that cross are clipped. Nothing smaller than a pixel of
+the alpha buffer shows in the image: what reaches beyond a plane by less than such a *slack* does not cross it.
 """
 
 from __future__ import annotations
@@ -23,22 +21,27 @@ from ..growth.branches import Branches
 from ..subplants.pieces import Pieces, clipped, open_subplants
 from ..subplants.sides import body_distances, bounding_bodies, crossing, sampled_bodies
 from ..tetrahedra.tree import TetrahedralTree
-from .contents import Contents, Held, Totals, polygon_totals
+from .contents import Contents, Held, polygon_totals
 from .polygons import Polygons, area_fractions
+
+#: Metres (n,) at points (n, 3) that make no difference in the image.
+Slack = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+#: Sub-plants that are opened, and that are lowered, at a time; bounds what that takes to some hundred megabytes.
+OPENED_AT_ONCE = 40_000
+LOWERED_AT_ONCE = 200_000
+#: A sub-plant that reaches no further than this many slacks is known well enough by its samples.
+_SMALL = 16.0
+#: One whose middle is closer to a plane than this fraction of its reach crosses it, whatever its seed.
+_DEEP = 0.3
 
 
 def cut(
     polygons: Polygons, planes: NDArray[np.float64], slack: NDArray[np.float64] | float = 0.0
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], Polygons]:
-    """Clip polygons by a plane each.
+    """Clip polygons (n,) by a plane (n, 4) each.
 
-    Parameters
-    ----------
-    polygons : Polygons of n
-    planes : (n, 4) float64
-        Signed distances are n·x + d.
-    slack : (n,) float64
-        Triangles that reach beyond their plane by no more than this stay whole, metres.
+    Triangles that reach beyond their plane by no more than ``slack`` (n,), in metres, stay whole.
 
     Returns
     -------
@@ -81,34 +84,11 @@ def cut(
     return np.concatenate([owner[stays], owner[from_]]), np.concatenate([larger, side]), parts
 
 
-#: Metres (n,) at points (n, 3) that the picture cannot tell.
-Slack = Callable[[NDArray[np.float64]], NDArray[np.float64]]
-
-#: Sub-plants that are opened, and that are lowered, at a time; bounds what that takes to some hundred megabytes.
-OPENED_AT_ONCE = 40_000
-LOWERED_AT_ONCE = 200_000
-#: A sub-plant that reaches no further than this many slacks is known well enough by its samples.
-_SMALL = 16.0
-#: One whose middle is closer to a plane than this fraction of its reach crosses it, whatever its seed.
-_DEEP = 0.3
-
-
 def push_down(flora: Flora, tree: TetrahedralTree, contents: Contents, slack: Slack | None = None) -> Contents:
     """Hand contents of divided nodes on until all lie in terminal ones.
 
-    Parameters
-    ----------
-    flora : Flora
-    tree : TetrahedralTree
-    contents : Contents
-        In any nodes of the tree.
-    slack : callable, optional
-        What reaches no further beyond a plane stays whole. Without it everything is exact to the last leaf.
-
-    Returns
-    -------
-    Contents
-        The same plants and polygons in terminal nodes; nothing is lost or held twice.
+    What reaches no further than ``slack`` beyond a plane stays whole; without it everything is exact to the last leaf.
+    Nothing is lost or held twice.
     """
     placed, placed_cells = [Branches.empty()], [np.zeros(0, np.int32)]
     loose, loose_cells = [contents.pieces.items], [contents.pieces.cell]
@@ -127,10 +107,7 @@ def push_down(flora: Flora, tree: TetrahedralTree, contents: Contents, slack: Sl
         subplants, cells = Branches.concatenate(parts), np.concatenate(part_cells)
     pieces, piece_cells = _push_down_pieces(tree, Pieces.concatenate(loose), np.concatenate(loose_cells), slack)
     plants = Contents.of(flora, Branches.concatenate(placed), np.concatenate(placed_cells), pieces, piece_cells)
-    polygons, cells, totals = _push_down_polygons(
-        tree, contents.polygons.items, contents.polygons.cell, contents.polygons.totals, slack
-    )
-    return replace(plants, polygons=Held(polygons, cells, totals))
+    return replace(plants, polygons=_push_down_polygons(tree, contents.polygons, slack))
 
 
 def _lowered(
@@ -138,7 +115,7 @@ def _lowered(
 ) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
     """Nodes (n,) that sub-plants come down to whole, and whether they cross the planes of these."""
     cells, crosses = cells.copy(), np.zeros(len(subplants), bool)
-    order = np.argsort(subplants.row, kind="stable")  # all of a row together, as they are looked at
+    order = np.argsort(subplants.row, kind="stable")  # tests run row by row
     for start in range(0, len(order), LOWERED_AT_ONCE):
         some = order[start : start + LOWERED_AT_ONCE]
         cells[some], crosses[some] = _lowered_together(flora, tree, subplants.take(some), cells[some], slack)
@@ -221,25 +198,19 @@ def _push_down_pieces(
     return Pieces.concatenate(placed), np.concatenate(placed_cells)
 
 
-def _push_down_polygons(
-    tree: TetrahedralTree, polygons: Polygons, cells: NDArray, totals: Totals, slack: Slack | None
-) -> tuple[Polygons, NDArray[np.int32], Totals]:
-    placed: list[Polygons] = []
-    placed_cells, placed_totals = [np.zeros(0, np.int32)], [Totals.empty()]
-    while len(polygons):
-        cells, crosses = cells.copy(), np.zeros(len(polygons), bool)
+def _push_down_polygons(tree: TetrahedralTree, held: Held[Polygons], slack: Slack | None) -> Held[Polygons]:
+    placed = [Held.none(Polygons)]
+    while len(held):
+        polygons, cells, crosses = held.items, held.cell.copy(), np.zeros(len(held), bool)
         for start in range(0, len(polygons), LOWERED_AT_ONCE):
             some = slice(start, start + LOWERED_AT_ONCE)
             cells[some], crosses[some] = _lowered_polygons(tree, polygons.take(some), cells[some], slack)
-        placed.append(polygons.take(~crosses))
-        placed_cells.append(cells[~crosses])
-        placed_totals.append(totals.take(~crosses))
-        polygons, cells, width = polygons.take(crosses), cells[crosses], totals.width[crosses]
+        placed.append(replace(held, cell=cells).take(~crosses))
+        polygons, cells, width = polygons.take(crosses), cells[crosses], held.totals.width[crosses]
         loose = 0.0 if slack is None else slack(polygons.centre)
         owner, side, polygons = cut(polygons, tree.planes(cells), loose)
-        cells = tree.children[cells[owner], side]
-        totals = polygon_totals(polygons, width[owner])
-    return Polygons.concatenate(placed), np.concatenate(placed_cells), Totals.concatenate(placed_totals)
+        held = Held(polygons, tree.children[cells[owner], side], polygon_totals(polygons, width[owner]))
+    return Held.concatenate(placed)
 
 
 def _lowered_polygons(
@@ -253,7 +224,7 @@ def _lowered_polygons(
         planes = tree.planes(cells[moving])
         distance = np.einsum("ni,ni->n", np.take(centre, moving, axis=0), planes[:, :3]) + planes[:, 3]
         whole = np.abs(distance) > np.take(reach, moving)
-        # The sphere is no more than a first guess; the slack is not worked out for what it settles, nor are corners.
+        # The sphere is a first guess; slack and corners are computed only for what it leaves open.
         unclear = np.flatnonzero(~whole)
         some = moving[unclear]
         loose = touching[some] if slack is None else np.maximum(touching[some], slack(centre[some]))

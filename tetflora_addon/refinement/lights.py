@@ -1,14 +1,12 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lights, and the flat cameras through which they look at what they shine on.
-
-Shadows in the picture from what the camera does not see (paper, section 6.1).
+"""Lights, the flat cameras through which they see, and shadows of what the camera does not see (paper, section 6.1).
 
 "If any light sources fall outside of the viewing pyramid, the space between them also needs to be refined in order to
 calculate accurate shadows." A tree behind the camera is hidden, and its shadow is as coarse as its proxy. Each light
-therefore looks at the same tetrahedra through an alpha buffer of its own. What is hidden from the camera but lit, with
-something behind it that the camera sees, counts by the pixels that its shadow has there, and is decided on as if it
-were seen: leaves whose shadows have a shape become leaves, and the rest is divided until its shadow is small.
+therefore draws the same tetrahedra into an alpha buffer of its own. What is hidden from the camera but lit, with
+something behind it that the camera sees, counts by the pixels of its shadow there. It is treated as if it were seen:
+leaves whose shadows have a shape become leaves, and the rest is divided until its shadow is small.
 """
 
 from __future__ import annotations
@@ -29,9 +27,14 @@ from .settings import RefinementSettings
 from .views import face_cameras
 from .visibility import AlphaBuffer
 
-#: Spots wider than this half angle, radians, are looked at as if they shone all around.
+#: Pixels of a light's buffer along each side of a field that receives light as a whole: points that the camera sees
+#: lie farther apart than the pixels of a light.
+FIELD = 4
+#: Longer side of the small image whose pixels find visible ground.
+GROUND = 160
+#: Spots wider than this half angle, radians, count as lights that shine all around.
 _WIDE = 1.2
-#: Points farther than this from the middle of a view, as the tangent of the angle, are looked at by six views instead.
+#: Points farther than this from the middle of a view, as the tangent of the angle, need six views.
 _STEEP = 2.5
 #: Nearest that a lamp's view sees, metres.
 _NEAR = 1e-2
@@ -63,7 +66,7 @@ class Light:
     ellipse : bool
         Whether an area is a disk or an ellipse instead of a square or a rectangle.
     shadow : bool
-        Whether anything stands in its light; without, everything is lit.
+        Whether it casts shadows; without, everything is lit.
     """
 
     kind: Literal["SUN", "SPOT", "POINT", "AREA"]
@@ -91,12 +94,12 @@ def light_views(
     points : (m, 3) float64
         What receives it, metres.
     resolution : int
-        Longer side of their pictures, pixels.
+        Longer side of their images, pixels.
 
     Returns
     -------
     list of Camera
-        None where nothing stands between the sun and what receives its light.
+        Empty where nothing stands between the sun and what receives its light.
     """
     frame = frame_towards(light.direction)
     if light.kind == "SUN":
@@ -109,19 +112,23 @@ def light_views(
         depth = np.concatenate([received[:, 2], corners[:, 2]])
         start, far = depth.max() + 1.0, float(np.ptp(depth)) + 2.0
         window = (float(low[0]), float(high[0]), float(low[1]), float(high[1]))
-        return [Camera("ORTHO", frame[:, 2] * start, frame, window, 0.1, far, *_shape(*(high - low)))]
+        return [Camera("ORTHO", frame[:, 2] * start, frame, window, 0.1, far, *image_size(*(high - low)))]
     distance = np.linalg.norm(np.concatenate([vertices.reshape(-1, 3), points]) - light.position, axis=1)
     far = float(distance.max()) + 1.0
     if light.kind == "SPOT" and light.angle < _WIDE:
         side = float(np.tan(max(light.angle, 1e-3)))
         window = (-side, side, -side, side)
         return [Camera("PERSP", light.position, frame, window, _NEAR, far, resolution, resolution)]
-    around = Camera("PANO", light.position, frame, (-np.pi, np.pi, -np.pi / 2, np.pi / 2), _NEAR, far, 4, 2)
-    return face_cameras(around, resolution)
+    return _all_around(light.position, frame, far, resolution)
 
 
-def _shape(width: float, height: float) -> tuple[int, int]:
-    """Size in pixels of a picture with square pixels; how large does not matter."""
+def _all_around(position: NDArray[np.float64], frame: NDArray[np.float64], far: float, resolution: int) -> list[Camera]:
+    panorama = Camera("PANO", position, frame, (-np.pi, np.pi, -np.pi / 2, np.pi / 2), _NEAR, far, 4, 2)
+    return face_cameras(panorama, resolution)
+
+
+def image_size(width: float, height: float) -> tuple[int, int]:
+    """Size in pixels of an image with square pixels for a window of any size; only the ratio matters."""
     scale = 4096 / max(width, height)
     return max(round(width * scale), 1), max(round(height * scale), 1)
 
@@ -149,28 +156,18 @@ def lamp_views(position: NDArray[np.float64], points: NDArray[np.float64], resol
         if np.abs(flat).max() < _STEEP:
             low, high = flat.min(axis=0) - 1e-4, flat.max(axis=0) + 1e-4
             window = (float(low[0]), float(high[0]), float(low[1]), float(high[1]))
-            return [Camera("PERSP", position, frame, window, _NEAR, far, *_shape(*(high - low)))]
-    around = Camera("PANO", position, frame, (-np.pi, np.pi, -np.pi / 2, np.pi / 2), _NEAR, far, 4, 2)
-    return face_cameras(around, resolution)
-
-
-__all__ = ["Light", "Shadows", "decide_by_shadows", "seen_ground", "shadows_of"]
-
-#: Pixels of a light's buffer along each side of a field of which is known what receives its light: points that the
-#: camera sees lie less close together than the pixels of a light.
-FIELD = 4
-#: Longer side of the small picture whose pixels tell where ground is seen.
-GROUND = 160
+            return [Camera("PERSP", position, frame, window, _NEAR, far, *image_size(*(high - low)))]
+    return _all_around(position, frame, far, resolution)
 
 
 @dataclass(frozen=True)
 class Shadows:
-    """What the shadows of tetrahedra (n,) are in the picture, all lights together.
+    """Shadows of tetrahedra (n,) in the image, all lights together.
 
     Attributes
     ----------
     pixels : (n,) float64
-        Pixels of the final picture that are darkened if all of it is opaque and nothing else is in the light.
+        Pixels of the final image that are darkened if all of it is opaque and nothing else is in the light.
     feature : (n,) float64
         Width in pixels of the shadows of what they hold, 0 where it is lost in the light's penumbra.
     """
@@ -202,23 +199,10 @@ def shadows_of(
     ground: NDArray[np.float64],
     settings: RefinementSettings,
 ) -> Shadows:
-    """Shadows of hidden tetrahedra on what the camera sees.
+    """Shadows (n,) of hidden tetrahedra on what the camera sees.
 
-    Parameters
-    ----------
-    tree : TetrahedralTree
-    cells : Terminals of n
-    decision : (n,) int8
-        `Decision` for each of them.
-    lights : sequence of Light
-    camera : Camera
-    ground : (m, 3) float64
-        Points that the camera sees beside the plants, see `seen_ground`, metres.
-    settings : RefinementSettings
-
-    Returns
-    -------
-    Shadows of n
+    ``decision`` (n,) holds the `Decision` for each of ``cells``; ``ground`` (m, 3) are points that the camera sees
+    beside the plants, see `seen_ground`, metres.
     """
     count, vertices = len(cells), tree.vertices(cells.nodes)
     pixels, feature = np.zeros(count), np.zeros(count)
@@ -229,7 +213,7 @@ def shadows_of(
     points = np.concatenate([ground, vertices[~hidden].mean(axis=1)])
     if not len(points):
         return Shadows(pixels, feature)
-    # Metres that a pixel of the picture spans where light is received.
+    # Metres that a pixel of the image spans where light is received.
     receiving = camera.extent_around(points), camera.extent_around(vertices.mean(axis=1))
     for light in (one for one in lights if one.shadow):
         for view in light_views(light, vertices, points, settings.visibility_resolution):
@@ -247,7 +231,7 @@ def shadows_of(
             casts = np.flatnonzero(~seen & (far[field] > found.entry) & (lit[found.cell] > settings.hidden))
             cell, at = found.cell[casts], field[casts]
             middle = found.entry[casts] + found.thickness[casts] / 2.0
-            # Detail that is smaller than the penumbra is not seen, however large the picture is.
+            # Detail that is smaller than the penumbra is not seen, however large the image is.
             if light.kind == "SUN":
                 blur = light.width * (far[at] - middle)
                 across = view.pixel_size * view.width / size[0]
@@ -263,15 +247,9 @@ def shadows_of(
 
 
 def seen_ground(camera: Camera, occluders: NDArray[np.float64] | None, height: float) -> NDArray[np.float64]:
-    """Points (m, 3) that rays through the picture meet: polygons that hide plants, or else level ground.
+    """Points (m, 3) where rays through the image meet occluders, triangles (t, 3, 3), or else level ground at a height.
 
-    Parameters
-    ----------
-    camera : Camera
-    occluders : (t, 3, 3) float64 or None
-        Triangles, metres.
-    height : float
-        Of the level ground that is assumed where there are none, metres.
+    All in metres, world space.
     """
     views = face_cameras(camera, GROUND // 2) if camera.kind == "PANO" else [camera]
     found = []
@@ -304,7 +282,7 @@ def _receive(
     far: NDArray[np.float64],
     fine: NDArray[np.float64],
 ) -> None:
-    """Put points that receive light into the fields: how far away they are, and how fine the picture is there."""
+    """Put points that receive light into the fields: how far away they are, and how fine the image is there."""
     local = view.to_camera_space(points)
     left, right, bottom, top = view.window
     depth = local[:, 2]

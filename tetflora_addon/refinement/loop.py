@@ -1,10 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The main loop: visibility, refinement, update, until the picture gains nothing more (paper, section 6.2).
+"""The main loop: visibility, refinement, update, until the image gains nothing more (paper, section 6.2).
 
 A pass costs what it changes: only divided tetrahedra give their contents away, only new ones are drawn and summed up.
-
-The state of the loop after a pass in figures, as statistics keep them.
 """
 
 from __future__ import annotations
@@ -32,9 +30,9 @@ from .visibility import AlphaBuffer, Buffers
 
 #: Bisections between two visibility steps; three together divide a tetrahedron into eight parts.
 GENERATIONS = 3
-#: Pixels of the picture by which things may reach beyond a plane at least. Smaller sub-plants thus stay whole.
+#: Pixels of the image by which things may always reach beyond a plane; smaller sub-plants stay whole.
 SLACK = 2.0
-#: Fraction of their pixels that counts for what is divided for its shadow: as often as can be, where it is in view.
+#: Weight of the pixels of what is divided for its shadow: as often as possible, where it is in view.
 ALWAYS = 1e30
 
 
@@ -42,7 +40,7 @@ ALWAYS = 1e30
 class Refinement:
     """State of the loop after a pass; the last one is the result.
 
-    The tree and what it holds grow with the loop: of a state on the way they are right until the next one is asked for.
+    The tree and its contents grow with the loop: those of an intermediate state are valid until the next one is made.
 
     Attributes
     ----------
@@ -82,7 +80,7 @@ class Refinement:
 
     @property
     def totals(self) -> Totals:
-        """What each of them (t,) holds."""
+        """Totals (t,) of these nodes."""
         return self.cells.totals
 
     @property
@@ -93,7 +91,7 @@ class Refinement:
     @property
     def in_view(self) -> NDArray[np.bool_]:
         """Mask over all nodes of the tree (nodes,): those that hold something and are within the view, if in part."""
-        # The pieces of a view's own root know whether they are part of it. Others are where pixels of them are.
+        # The pieces of a view's own root know whether they are part of it; others are in view where they have pixels.
         if self.tree.inside.any():
             return self.tree.inside
         mask = np.zeros(len(self.tree), dtype=bool)
@@ -118,7 +116,7 @@ def refine(
 ) -> Generator[Refinement, bool | None, Refinement]:
     """Run the loop; yields the state after the decisions of each pass and returns the last.
 
-    Sending it True ends it there: what was to be divided is taken as it is, and the result is not complete.
+    Sending True ends it there: what was to be divided stays as it is, and the result is not complete.
 
     Parameters
     ----------
@@ -131,7 +129,7 @@ def refine(
     occluders : (t, 3, 3) float64, optional
         Triangles of explicit polygons that hide what is behind them, metres.
     polygons : Polygons, optional
-        Explicit polygons that take part.
+        Explicit polygons to refine along with the plants.
     lights : sequence of Light
         Whose shadows of what is hidden are refined if ``settings.shadow_cutoff`` is above 0.
     """
@@ -169,8 +167,7 @@ def refine(
             shadows = shadows_of(tree, cells, decision, lights, camera, ground, settings)
             decision = decide_by_shadows(decision, shadows, cells, settings)
             splitting = decision == Decision.SPLIT
-        room = settings.max_tetrahedra - tree.tetrahedra_made
-        full = bool(room < 2 * splitting.sum())
+        full = bool(settings.max_tetrahedra - tree.tetrahedra_made < 2 * splitting.sum())
         last = passes == settings.max_passes
         barred = splitting & (full | last | (tree.level[cells.nodes] >= deepest))
         limited = bool(barred.any())
@@ -179,17 +176,8 @@ def refine(
             decision = np.where(barred, instead, decision).astype(np.int8)
             splitting &= ~barred
         clock.lap("refinement")
-        state = Refinement(
-            tree,
-            holdings,
-            cells,
-            transmittance,
-            decision,
-            rank[cells.nodes],
-            passes,
-            not limited,
-            dict(clock.seconds),
-        )
+        ranks, seconds = rank[cells.nodes], dict(clock.seconds)
+        state = Refinement(tree, holdings, cells, transmittance, decision, ranks, passes, not limited, seconds)
         if not splitting.any():
             return state
         if (yield state):
@@ -215,7 +203,7 @@ def _height(seeds: Seeds, polygons: Polygons | None) -> float:
 
 
 def _filled(tree: TetrahedralTree, new: Contents) -> tuple[NDArray[np.intp], Totals]:
-    """Nodes (n,) that have got something, and how much."""
+    """Nodes (n,) that received something, and their totals."""
     every = new.sums(len(tree))
     nodes = np.flatnonzero(every.area > 0)
     return nodes, every.take(nodes)
@@ -240,7 +228,7 @@ def _drawn(
 
 
 def _slack(camera: Camera, resolution: int) -> Slack:
-    """A pixel of the alpha buffer, in metres: nothing smaller can be told apart by what is decided from it."""
+    """A pixel of the alpha buffer, in metres: nothing smaller changes decisions."""
     pixels = max(pixels_of_buffer(camera, resolution), SLACK)
 
     def slack(points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -277,7 +265,7 @@ def _split(
 
 
 def step_of(state: Refinement) -> Step:
-    """Figures of a state; has to be asked for before the loop goes on."""
+    """Figures of a state, valid only before the loop goes on."""
     numbers = np.bincount(state.decision, minlength=len(Decision))
     explicit = state.decision == Decision.EXPLICIT
     subplants, pieces, polygons = state.holdings.sizes

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the faces of a mesh from elsewhere are part of: sheets such as leaves, or solids such as trunks, and how wide.
+"""What the faces of any mesh are part of: sheets such as leaves, or solids such as trunks, and how wide these are.
 
-A species says which of its polygons are leaves. Of other meshes only the connections between faces are known, after
-vertices at the same place are taken for one, for many files split them at seams.
+A species says which of its polygons are leaves. Of other meshes only the connections between faces are known, once
+vertices at the same place are merged: many files split them at seams.
 """
 
 from __future__ import annotations
@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from ..storage import keeping
 
-#: Bytes that are kept of what is known of meshes, ten a face: each frame of a film asks for the same again.
+#: Bytes of cached features, ten a face: each frame of an animation needs the same again.
 MOST_BYTES = 128 << 20
-#: A flat sheet's boundary is longer than this, squared, in relation to its area (a disc has 4π, a half ball 2π): what
-#: has less is bent back upon itself.
+#: Squared boundary over area of a flat sheet, at least (a disc has 4π, a half ball 2π): with less it is bent back.
 _SHEET = 2 * np.pi
 #: A face of a leaf has at least this fraction, squared, of the leaf's extent.
 _LEAF_FRACTION = 1 / 16
@@ -52,7 +51,7 @@ def mesh_features(
     Components are connected faces. The width of a sheet is its area over its extent. That of a solid is 1 / H, with
     Steiner's mean curvature H of polyhedra (half the sum of edge length × signed angle, over the area) averaged over
     neighbours: 2 r for a long tube, r for a ball, no less for rough ground, where bumps and hollows cancel. Edges of
-    no, one or many faces, faces of no area and faces that touch themselves are all taken as they come.
+    no, one or many faces, faces of no area and faces that touch themselves are all allowed.
     """
     faces = len(face_offsets) - 1
     if not faces:
@@ -108,7 +107,7 @@ def _welded(positions: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def _components(face: NDArray, vertex: NDArray, following: NDArray) -> NDArray[np.int64]:
-    """Connected component (f,) of each face: labels of vertices sink to the least along edges, and are followed."""
+    """Connected component (f,) of each face: labels of vertices sink to the minimum along edges, and are followed."""
     label = np.arange(int(vertex.max()) + 1)
     a, b = vertex, vertex[following]
     while True:

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Explicit polygons (paper, sections 5 and 6.1): faces of meshes that were modelled elsewhere, and fragments of them.
+"""Explicit polygons (paper, sections 5 and 6.1): faces of meshes that were modelled elsewhere, and their fragments.
 
 Nothing is copied when polygons move from tetrahedron to tetrahedron. A whole face is two numbers, the face and the
 instance of its mesh. A fragment, clipped off by a plane, is a triangle in the barycentric coordinates of one of the
-triangles of its face: places, texture coordinates and all other attributes of its corners follow from these, are
-affine by construction, and the fragments of a face add up to it whatever the sequence of cuts.
+triangles of its face. Positions, texture coordinates and all other attributes of its corners follow from these; the
+fragments of a face add up to it whatever the sequence of cuts.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ class Surface:
     colours : (s, 3) float64
         Mean colour of each slot's material, linear RGB.
     transmission, coverage : (s,) float64
-        Fraction of scattered light that goes through, and of the surface that is there at all (1 without transparency).
+        Fraction of scattered light that passes through, and of the surface that is opaque.
     solid : (f,) bool
-        The face belongs to a closed or nearly closed surface, of which half is never seen; see `mesh_features`.
+        The face belongs to a nearly closed surface, of which half is never seen; see `mesh_features`.
     leaf : (f,) bool
-        The face is a good part of one of many like things, such as leaves, of which several may be drawn as one.
+        The face is a good part of one of many similar things, such as leaves; several may be drawn as one.
     width : (f,) float64
         Width of the feature that the face belongs to, in the mesh's own units.
     attributes : mapping of str to (c, k) float32
@@ -135,13 +135,14 @@ class Meshes:
         self.face_triangle = np.cumsum(self.face_size - 2) - (self.face_size - 2)
         self.slot = joined([s.material + self.first_slot[i] for i, s in every], none)
         self.colours = joined([s.colours for s in surfaces], flat)
-        self.transmission = joined([s.transmission for s in surfaces], np.zeros(0))
-        self.coverage = joined([s.coverage for s in surfaces], np.zeros(0))
-        self.solid = joined([s.solid for s in surfaces], np.zeros(0, bool))
-        self.leaf = joined([s.leaf for s in surfaces], np.zeros(0, bool))
-        self.width = joined([s.width for s in surfaces], np.zeros(0))
+        self.transmission, self.coverage, self.width = (
+            joined([getattr(s, name) for s in surfaces], np.zeros(0)) for name in ("transmission", "coverage", "width")
+        )
+        self.solid, self.leaf = (
+            joined([getattr(s, k) for s in surfaces], np.zeros(0, bool)) for k in ("solid", "leaf")
+        )
 
-    # What follows is measured when it is asked for: a frame of a film that shares what another made never asks.
+    # What follows is measured on demand: frames of an animation that reuse the result of another never need it.
 
     @cached_property
     def area_vectors(self) -> NDArray[np.float64]:
@@ -168,8 +169,8 @@ class Meshes:
         return np.maximum.reduceat(away, self.face_start)
 
     @cached_property
-    def knotted(self) -> NDArray[np.bool_]:
-        """Faces (f,) that come to a vertex twice, which a valid mesh does not have."""
+    def degenerate(self) -> NDArray[np.bool_]:
+        """Faces (f,) with a vertex twice, which a valid mesh does not have."""
         face = np.repeat(np.arange(len(self.face_start)), self.face_size)
         order = np.lexsort([self.corner_verts, face])
         twice = (np.diff(face[order]) == 0) & (np.diff(self.corner_verts[order]) == 0)
@@ -297,7 +298,7 @@ class Polygons(Arrays):
             Polygon that each belongs to.
         triangle : (k,) int64
         fraction : (k,) float64
-            Of the triangle's area: 1 except for fragments.
+            Of the triangle's area; 1 except for fragments.
         """
         cut = self.part >= 0
         owner, index = spread(np.where(cut, 1, self.meshes.face_size[self.face] - 2))
@@ -308,7 +309,7 @@ class Polygons(Arrays):
         return owner, triangle, fraction
 
     def as_fragments(self) -> tuple[NDArray[np.int64], Polygons]:
-        """Whole faces become their triangles; returns the polygon that each fragment comes from, and fragments."""
+        """The polygon (k,) that each fragment comes from, and fragments; whole faces become their triangles."""
         owner, triangle, _ = self.triangles()
         weights = np.broadcast_to(np.eye(3), (len(owner), 3, 3)).copy()
         own = np.flatnonzero(self.part[owner] >= 0)
@@ -326,7 +327,7 @@ class Polygons(Arrays):
         return areas
 
     def bounding_box(self) -> NDArray[np.float64]:
-        """Axis-aligned box (2, 3) around all of them, metres; there must be one at least."""
+        """Axis-aligned box (2, 3) around all of them, at least one, metres."""
         return np.stack([(self.centre.T - self.reach).min(axis=1), (self.centre.T + self.reach).max(axis=1)])
 
     def distances(self, planes: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -10,32 +10,30 @@ along it. Nothing nearer than the near plane or beyond the far plane is seen.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Arrays, column
 from ..camera.camera import Camera
 from ..camera.silhouette import silhouette_area, window_bounds
 from ..tetrahedra.geometry import face_area_vectors, projected_area, volume
 
-#: Pairs of a primitive and a pixel of its bounding box that are looked at together; some 100 bytes each.
+#: Pairs of a primitive and a pixel of its bounding box that are tested together; some 100 bytes each.
 PAIRS_AT_ONCE = 1 << 19
-
 #: Primitives whose bounding boxes are computed together.
 PRIMITIVES_AT_ONCE = 1 << 17
-
 #: Shift of the sample from the pixel's centre, in pixels. The view pyramid's own planes run exactly through centres of
 #: pixels; shifted by next to nothing, each ray is on one side of every such plane.
 SHIFT = (1.7e-6, 2.9e-6)
-
 #: Up to this many pixels of silhouette, a tetrahedron counts by its area and mean thickness instead of by samples:
 #: then the optical depth that it brings into the image is exact, however the pixels' centres fall.
 SMALL = 4.0
 
 
 @dataclass(frozen=True)
-class Fragments:
+class Fragments(Arrays):
     """Tetrahedra as seen from pixels, in no particular order.
 
     Attributes
@@ -52,37 +50,21 @@ class Fragments:
         Pixels that the fragment stands for: 1, or for small tetrahedra their area divided among their fragments.
     """
 
-    cell: NDArray[np.int32]
-    pixel: NDArray[np.int32]
+    cell: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
+    pixel: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
     entry: NDArray[np.float64]
     thickness: NDArray[np.float64]
     coverage: NDArray[np.float64]
 
-    def __len__(self) -> int:
-        return len(self.cell)
-
 
 def buffer_size(camera: Camera, resolution: int) -> tuple[int, int]:
-    """Width and height in pixels of a small image whose longer side is ``resolution``, shaped as the picture."""
+    """Width and height in pixels of a small image whose longer side is ``resolution``, shaped as the final image."""
     scale = resolution / max(camera.width, camera.height)
     return max(1, round(camera.width * scale)), max(1, round(camera.height * scale))
 
 
 def pixel_rays(camera: Camera, width: int, height: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Rays through the pixels' centres.
-
-    Parameters
-    ----------
-    camera : Camera
-        Whose window the image shows.
-    width, height : int
-        Size of the image, pixels.
-
-    Returns
-    -------
-    origins, directions : (height · width, 3) float64
-        World space; directions are unit vectors.
-    """
+    """Origins and unit directions (height · width, 3) of the rays through the pixels' centres, world space."""
     x, y = _centres(camera, width, height)
     grid = np.stack([np.tile(x, height), np.repeat(y, width), np.zeros(width * height)], axis=1)
     frame = camera.frame * np.array([1.0, 1.0, -1.0])
@@ -100,9 +82,8 @@ def tetrahedron_fragments(vertices: NDArray[np.float64], camera: Camera, width: 
     vertices : (n, 4, 3) float64
         Positively oriented tetrahedra, metres, world space. They may hold the eye or cross its plane.
     camera : Camera
-        The view.
     width, height : int
-        Size of the image, pixels.
+        Size of the small image, pixels.
 
     Returns
     -------
@@ -112,36 +93,21 @@ def tetrahedron_fragments(vertices: NDArray[np.float64], camera: Camera, width: 
 
     Notes
     -----
-    A tetrahedron of few pixels (`SMALL`) has as coverage its silhouette's area, shared by its fragments, and as
-    thickness its mean chord V / A: so Σ coverage · thickness over all pixels is its volume, per area of a pixel.
+    A tetrahedron of few pixels (`SMALL`) has its silhouette's area as coverage, divided among its fragments, and its
+    mean chord V / A as thickness: Σ coverage · thickness over all pixels is its volume, per area of a pixel.
     """
     parts = []
     for start in range(0, len(vertices), PRIMITIVES_AT_ONCE):
         part = _fragments(vertices[start : start + PRIMITIVES_AT_ONCE], camera, width, height)
-        parts.append((part[0] + np.int32(start), *part[1:]))
-    if not parts:
-        parts = [(np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros(0), np.zeros(0), np.zeros(0))]
-    cell, pixel, entry, thickness, coverage = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    return Fragments(cell, pixel, entry, thickness, coverage)
+        parts.append(replace(part, cell=part.cell + np.int32(start)))
+    return Fragments.concatenate(parts)
 
 
 def occluder_depth(triangles: NDArray[np.float64], camera: Camera, width: int, height: int) -> NDArray[np.float64]:
-    """Where each pixel's ray first meets an opaque triangle.
+    """Where each pixel's ray first meets an opaque triangle (height · width,), metres along it; infinite for none.
 
-    Parameters
-    ----------
-    triangles : (t, 3, 3) float64
-        Two-sided triangles, metres, world space. They may cross the eye's plane; those without area or with
-        coordinates that are not finite are ignored.
-    camera : Camera
-        The view.
-    width, height : int
-        Size of the image, pixels.
-
-    Returns
-    -------
-    (height · width,) float64
-        Metres along the ray; infinite where there is nothing.
+    The triangles (t, 3, 3) are two-sided, in metres, world space. They may cross the eye's plane; those without area
+    or with coordinates that are not finite are ignored.
     """
     nearest = np.full(width * height, np.inf)
     for start in range(0, len(triangles), PRIMITIVES_AT_ONCE):
@@ -150,10 +116,8 @@ def occluder_depth(triangles: NDArray[np.float64], camera: Camera, width: int, h
     return nearest
 
 
-def _fragments(
-    vertices: NDArray[np.float64], camera: Camera, width: int, height: int
-) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
-    """Fragments of as many tetrahedra as fit into memory: cell, pixel, entry, thickness, coverage."""
+def _fragments(vertices: NDArray[np.float64], camera: Camera, width: int, height: int) -> Fragments:
+    """Fragments of as many tetrahedra as fit into memory."""
     local = camera.to_camera_space(vertices)
     low, high, middle = window_bounds(local, camera)
     box = _pixel_box(low, high, camera, width, height)
@@ -162,9 +126,9 @@ def _fragments(
     on_face = local[:, [1, 0, 0, 0]]
     offset = -np.sum(inward * on_face, axis=2)
     x, y = _centres(camera, width, height)
-    cells, pixels, entries, thicknesses = [], [], [], []
-    for cell, column, row in _pairs(box):
-        px, py = x[column], y[row]
+    parts = [Fragments.empty()]
+    for cell, col, row in _pairs(box):
+        px, py = x[col], y[row]
         enter, leave = np.full(len(cell), camera.near), np.full(len(cell), camera.far)
         for face in range(4):
             nx, ny, nz = (inward[:, face, i][cell] for i in range(3))
@@ -183,15 +147,12 @@ def _fragments(
         hit = np.flatnonzero(leave > enter)
         metres = _ray_metres(camera, px[hit], py[hit])
         # Half the memory of intp; a heavy scene has millions of fragments.
-        cells.append(cell[hit].astype(np.int32))
-        pixels.append((row[hit] * width + column[hit]).astype(np.int32))
-        entries.append(enter[hit] * metres)
-        thicknesses.append((leave[hit] - enter[hit]) * metres)
-    cell, pixel = (np.concatenate([np.zeros(0, np.int32), *arrays]) for arrays in (cells, pixels))
-    entry, thickness = (np.concatenate([np.zeros(0), *arrays]) for arrays in (entries, thicknesses))
-    return _with_small_ones(
-        vertices, local, camera, (width, height), (low, high, middle), (cell, pixel, entry, thickness)
-    )
+        which, pixel = cell[hit].astype(np.int32), (row[hit] * width + col[hit]).astype(np.int32)
+        parts.append(
+            Fragments(which, pixel, enter[hit] * metres, (leave[hit] - enter[hit]) * metres, np.ones(len(hit)))
+        )
+    found = Fragments.concatenate(parts)
+    return _with_small_ones(vertices, local, camera, (width, height), (low, high, middle), found)
 
 
 def _with_small_ones(
@@ -200,24 +161,23 @@ def _with_small_ones(
     camera: Camera,
     size: tuple[int, int],
     bounds: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
-    fragments: tuple[NDArray, NDArray, NDArray, NDArray],
-) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
+    found: Fragments,
+) -> Fragments:
     """Add fragments for tetrahedra between the pixels' centres, and set the coverage of all."""
-    cell, pixel, entry, thickness = fragments
     (width, height), (low, high, middle) = size, bounds
-    left, right, bottom, top = camera.window
-    corner, step = np.array([left, bottom]), np.array([(right - left) / width, (top - bottom) / height])
-    count = np.bincount(cell, minlength=len(vertices))
+    corner, step = _grid(camera, width, height)
+    count = np.bincount(found.cell, minlength=len(vertices))
     area, whole = silhouette_area(local, low, high, camera)
     area = area / np.prod(step)
     # Of what is partly out of view only the box is known; a tetrahedron fills half of it or less.
-    seen = np.clip((np.minimum(high, [right, top]) - np.maximum(low, corner)) / step, 0.0, None)
+    far_corner = [camera.window[1], camera.window[3]]
+    seen = np.clip((np.minimum(high, far_corner) - np.maximum(low, corner)) / step, 0.0, None)
     area = np.where(whole, area, np.minimum(1.0, np.prod(seen, axis=1) / 2.0))
     with np.errstate(invalid="ignore"):
         place = (middle - corner) / step
         visible = ((place >= 0.0) & (place <= [width, height])).all(axis=1) & (area > 0.0)
     missed = np.flatnonzero((count == 0) & visible)
-    column, row = np.minimum(place[missed].astype(np.int64), [width - 1, height - 1]).T
+    col, row = np.minimum(place[missed].astype(np.int64), [width - 1, height - 1]).T
     depth = np.clip(local[missed, :, 2].mean(axis=1), camera.near, camera.far)
     along = depth * _ray_metres(camera, *middle[missed].T)
     by_area = whole & (area < SMALL) & (count > 0)
@@ -232,14 +192,14 @@ def _with_small_ones(
     across = projected_area(vertices[small], direction)
     chord[small] = volume(vertices[small]) / np.where(across > 0.0, across, 1.0)
 
-    cell = np.concatenate([cell, missed.astype(np.int32)])
-    pixel = np.concatenate([pixel, (row * width + column).astype(np.int32)])
-    entry = np.concatenate([entry, np.maximum(along - chord[missed] / 2.0, 0.0)])
-    thickness = np.concatenate([thickness, chord[missed]])
+    cell = np.concatenate([found.cell, missed.astype(np.int32)])
+    pixel = np.concatenate([found.pixel, (row * width + col).astype(np.int32)])
+    entry = np.concatenate([found.entry, np.maximum(along - chord[missed] / 2.0, 0.0)])
+    thickness = np.concatenate([found.thickness, chord[missed]])
     by_area = by_area[cell]
     thickness = np.where(by_area, chord[cell], thickness)
     coverage = np.where(by_area, area[cell] / np.maximum(count[cell], 1), 1.0)
-    return cell, pixel, entry, thickness, coverage
+    return Fragments(cell, pixel, entry, thickness, coverage)
 
 
 def _draw_triangles(
@@ -258,8 +218,8 @@ def _draw_triangles(
     sides = np.cross(flat, np.roll(flat, -1, axis=1))
     near, far = camera.near, camera.far
     x, y = _centres(camera, width, height)
-    for cell, column, row in _pairs(box):
-        px, py = x[column], y[row]
+    for cell, col, row in _pairs(box):
+        px, py = x[col], y[row]
         lowest, highest = np.full(len(cell), np.inf), np.full(len(cell), -np.inf)
         for side in range(3):
             a, b, c = (sides[:, side, i][cell] for i in range(3))
@@ -276,15 +236,19 @@ def _draw_triangles(
         # Comparisons with what is not a number are false: triangles seen edge-on drop out here.
         seen = np.flatnonzero((depth >= near) & (depth <= far))
         hit = hit[seen]
-        np.minimum.at(nearest, row[hit] * width + column[hit], depth[seen] * _ray_metres(camera, px[seen], py[seen]))
+        np.minimum.at(nearest, row[hit] * width + col[hit], depth[seen] * _ray_metres(camera, px[seen], py[seen]))
+
+
+def _grid(camera: Camera, width: int, height: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lower left corner of the window (2,), and the size of a pixel on it (2,)."""
+    left, right, bottom, top = camera.window
+    return np.array([left, bottom]), np.array([(right - left) / width, (top - bottom) / height])
 
 
 def _centres(camera: Camera, width: int, height: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Window coordinates of the pixels' centres: x by column, y by row."""
-    left, right, bottom, top = camera.window
-    x = left + (np.arange(width) + 0.5 + SHIFT[0]) * ((right - left) / width)
-    y = bottom + (np.arange(height) + 0.5 + SHIFT[1]) * ((top - bottom) / height)
-    return x, y
+    corner, step = _grid(camera, width, height)
+    return tuple(corner[i] + (np.arange((width, height)[i]) + 0.5 + SHIFT[i]) * step[i] for i in (0, 1))
 
 
 def _ray_metres(camera: Camera, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64] | float:
@@ -296,9 +260,7 @@ def _pixel_box(
     low: NDArray[np.float64], high: NDArray[np.float64], camera: Camera, width: int, height: int
 ) -> NDArray[np.int64]:
     """First and last column, first and last row ``(n, 4)`` of the pixels whose centres lie in boxes on the window."""
-    left, right, bottom, top = camera.window
-    corner, step = np.array([left, bottom]), np.array([(right - left) / width, (top - bottom) / height])
-    size = np.array([width, height])
+    (corner, step), size = _grid(camera, width, height), np.array([width, height])
     # A hair wider than the box: a centre on a side must not be lost to rounding. Clipped before the conversion,
     # because the box of what starts at the near plane may be wider than integers go, and that of nothing infinite.
     first = np.ceil(np.clip((low - corner) / step - 0.5 - 1e-5, 0, size))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a refinement did: one object that the panel, the command line and the benchmarks all read."""
+"""Statistics of a refinement, for the panel, the command line and the benchmarks; progress and time of jobs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Step:
     split, proxy, hidden, explicit : int
         Tetrahedra that hold something, by what was decided on them.
     subplants, pieces, foreign : int
-        Things that they hold: sub-plants, pieces of branches, polygons of meshes that are not ours.
+        Their contents: sub-plants, pieces of branches, polygons of other meshes.
     polygons : int
         Expected polygons of what is to be explicit.
     seconds : float
@@ -55,23 +55,21 @@ class Statistics:
     plants : int
         Plants that took part.
     polygons_full : int
-        Polygons if every plant were expanded (compiled estimate).
-    polygons_meshed : int
-        Polygons of the plants' meshes that were made.
-    polygons_proxy : int
-        Faces that proxies are drawn with.
+        Polygons of all plants expanded (compiled estimate).
+    polygons_meshed, polygons_proxy : int
+        Polygons of the plants' meshes, and faces of proxies.
     tetrahedra_made, tetrahedra_terminal, tetrahedra_proxy : int
-        All tetrahedra ever made; those that are not divided further; those of them that are drawn as approximations.
-    levels : int
-        Passes through the loop.
+        All tetrahedra ever made; those that are not divided; those of them that are drawn as proxies.
+    passes : int
+        Passes through the loop; ``levels`` in `as_dict`, as in saved files and the output of the command line.
     facet_pixels : float
-        Side of the facets of proxies, pixels; larger than asked for where a budget made them so; 0 for shells.
+        Side of the facets of proxies, pixels, which a budget may have increased; 0 for shells.
     complete : bool
         False where a limit of the settings stopped the loop.
     seconds : dict of str to float
         Wall clock by stage: ``read``, ``compile``, ``refine``, ``emit``.
     memory_mb : float
-        Estimated megabytes of the meshes that were handed to Blender.
+        Estimated megabytes of the meshes in Blender.
     steps : list of Step
         One for each pass through the loop.
     """
@@ -83,7 +81,7 @@ class Statistics:
     tetrahedra_made: int = 0
     tetrahedra_terminal: int = 0
     tetrahedra_proxy: int = 0
-    levels: int = 0
+    passes: int = 0
     facet_pixels: float = 0.0
     complete: bool = True
     seconds: dict[str, float] = field(default_factory=dict)
@@ -92,7 +90,7 @@ class Statistics:
 
     def as_dict(self) -> dict:
         """Plain dictionary, ready for JSON."""
-        return asdict(self)
+        return {"levels" if name == "passes" else name: value for name, value in asdict(self).items()}
 
 
 @dataclass(frozen=True)
@@ -104,7 +102,7 @@ class Progress:
     fraction : float
         0 to 1, an estimate.
     message : str
-        What is being done, for the status bar.
+        For the status bar.
     """
 
     fraction: float
@@ -133,7 +131,7 @@ class Stopwatch:
         self._last = time.perf_counter()
 
     def lap(self, stage: str) -> None:
-        """Give the time since the last lap to a stage."""
+        """Add the time since the last lap to a stage."""
         now = time.perf_counter()
         self.seconds[stage] = self.seconds.get(stage, 0.0) + now - self._last
         self._last = now

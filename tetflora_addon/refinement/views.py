@@ -1,14 +1,11 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Visibility all around the eye: six square views, the faces of a cube, with an alpha buffer each.
+"""What depends on the type of camera: the margin of the view, the root of space, and the buffers that are drawn into.
 
-The views share the eye, so that the tree's front-to-back order is that of all of them. What a tetrahedron affects is
-summed over the faces: the solid angle of each fragment times the pixels that the picture has for a solid angle there,
-which in an equirectangular panorama grow with one over the cosine of the latitude.
-
-What the loop starts from: how wide the view is, the root of space, and the buffers into which it is drawn.
-
-All that depends on the sort of camera, so that the loop itself need not know it.
+Panoramas have six square views, the faces of a cube, with an alpha buffer each. The views have one eye, so that the
+tree's front-to-back order is that of all of them. What a tetrahedron affects is summed over the faces: the solid angle
+of each fragment times the pixels that the image has for a solid angle there, which in an equirectangular panorama grow
+with one over the cosine of the latitude.
 """
 
 from __future__ import annotations
@@ -43,9 +40,9 @@ _FACES = (
 
 
 def face_cameras(camera: Camera, side: int) -> list[Camera]:
-    """Six perspective cameras at the eye of a panorama, whose square pictures fill the sphere.
+    """Six perspective cameras at the eye of a panorama, whose square images fill the sphere.
 
-    Their near planes are closer than the panorama's near sphere, which they touch from within at the corners.
+    Their near planes lie within the panorama's near sphere and touch it at the corners.
     """
     turns = [np.stack([np.cross(ahead, up), up, np.negative(ahead)], axis=1).astype(np.float64) for ahead, up in _FACES]
     window, near, radius = (-1, 1, -1, 1), camera.near / np.sqrt(3.0), camera.cell_radius
@@ -56,7 +53,7 @@ def face_cameras(camera: Camera, side: int) -> list[Camera]:
 
 
 def pixels_per_solid_angle(camera: Camera, directions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Pixels (n,) of a panorama for each steradian around directions (n, 3) in world space; 0 beside the picture."""
+    """Pixels (n,) of a panorama for each steradian around directions (n, 3) in world space; 0 beside the image."""
     local = (directions @ camera.frame) * np.array([1.0, 1.0, -1.0])
     longitude, latitude = camera.longitude_latitude(local)
     left, right, bottom, top = camera.window
@@ -70,11 +67,11 @@ class PanoramaBuffer:
     Parameters
     ----------
     camera : Camera
-        A panorama, with the size of the final picture.
+        A panorama.
     side : int
         Of each of the six faces, pixels.
     occluders : (t, 3, 3) float64, optional
-        Triangles of explicit polygons that hide what is behind them, metres.
+        Opaque triangles, metres.
     """
 
     def __init__(self, camera: Camera, side: int, occluders: NDArray[np.float64] | None = None) -> None:
@@ -129,23 +126,14 @@ class PanoramaBuffer:
 
 
 class PanoramaBuffers:
-    """Buffers as fine as what is drawn into them; to be used as `visibility.Buffers`.
-
-    Parameters
-    ----------
-    camera : Camera
-    resolution : int
-        Longer side of the finest buffer of a flat picture, pixels.
-    occluders : (t, 3, 3) float64, optional
-        Triangles of explicit polygons that hide what is behind them, metres.
-    """
+    """Panorama buffers as fine as what is drawn into them; parameters and use as for `visibility.Buffers`."""
 
     def __init__(self, camera: Camera, resolution: int, occluders: NDArray[np.float64] | None = None) -> None:
         self.camera, self.occluders = camera, occluders
         self.side = face_side(resolution)
 
     def fit(self, buffer: PanoramaBuffer | None, cells: int) -> PanoramaBuffer:
-        """The buffer itself if it is fine enough for a number of tetrahedra, or a finer one that is empty."""
+        """As `visibility.Buffers.fit`."""
         wanted = fitting(cells // 2, self.side)
         if buffer is not None and buffer.width >= wanted:
             return buffer
@@ -153,7 +141,7 @@ class PanoramaBuffers:
 
 
 def face_side(resolution: int) -> int:
-    """Side in pixels of the faces for the longer side of a flat picture's buffer."""
+    """Side in pixels of the faces, given the longer side of a flat image's buffer."""
     return max(1, round(FACE_FRACTION * resolution))
 
 
@@ -167,9 +155,9 @@ def _may_be_in(vertices: NDArray[np.float64], camera: Camera) -> NDArray[np.bool
 def widened_for(
     camera: Camera, margin: float, flora: Flora, subplants: Branches, polygons: Polygons | None = None
 ) -> Camera:
-    """The camera with a margin, in fractions of the picture, and what depth of field and motion blur add to it.
+    """The camera with a margin, in fractions of the image, and what depth of field and motion blur add to it.
 
-    Polygons count by their centres: what is one large face from the eye to the horizon asks for no margin.
+    Polygons count by their centres: one large face from the eye to the horizon needs no margin.
     """
     if not (camera.lens_radius > 0.0 or camera.shutter):
         return camera.widened(margin)
@@ -199,7 +187,7 @@ def buffers_for(
 
 
 def pixels_of_buffer(camera: Camera, resolution: int) -> float:
-    """Side of a pixel of the finest alpha buffer, in pixels of the final picture."""
+    """Side of a pixel of the finest alpha buffer, in pixels of the final image."""
     if camera.kind == "PANO":
         return 2.0 / face_side(resolution) / camera.pixel_size
     return camera.width / buffer_size(camera, resolution)[0]

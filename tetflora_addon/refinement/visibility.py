@@ -19,25 +19,35 @@ from ..camera.camera import Camera
 from ..camera.silhouette import silhouette_pixels
 from .rasterise import buffer_size, occluder_depth, tetrahedron_fragments
 
-#: Optical depth of one fragment at most. e^−60 is no light at all, and larger numbers, or infinite ones, would take
-#: the precision from the cumulative sum over the whole image.
+#: Optical depth of one fragment at most. e^−60 is no light at all, and larger or infinite numbers would cost the
+#: cumulative sum over the whole image its precision.
 OPAQUE = 60.0
-
 #: Longer side of the coarsest buffer, pixels.
 COARSEST = 32
-
-#: Pixels of a buffer along each side for every tetrahedron along it, were they spread over the picture side by side.
+#: Pixels of a buffer along each side for every tetrahedron along it, were they spread over the image side by side.
 _ACROSS = 8.0
+
+
+def depth_in_front(pixel: NDArray[np.integer], depth: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray]:
+    """First fragment of its pixel, and optical depth before it, for each of fragments (n,).
+
+    Fragments are sorted by ``pixel`` and front to back. What all earlier pixels hold is subtracted again from one
+    cumulative sum; rounding must not leave less than nothing.
+    """
+    summed = np.cumsum(depth)
+    begins = np.flatnonzero(np.diff(pixel, prepend=-1))
+    first = np.repeat(begins, np.diff(begins, append=len(pixel)))
+    return first, np.maximum(summed - depth - (summed - depth)[first], 0.0)
 
 
 @dataclass(frozen=True)
 class Outline:
-    """What can be said of each tetrahedron (n,) without the others.
+    """What is known of each tetrahedron (n,) without the others.
 
     Attributes
     ----------
     pixels : (n,) float64
-        Area in pixels of the final picture that the tetrahedron affects, hidden or not; 0 out of view.
+        Area in pixels of the final image that the tetrahedron affects, hidden or not; 0 out of view.
     opacity : (n,) float64
         Mean of 1 − e^−τ over its own silhouette, 0 to 1; 0 out of view.
     whole : (n,) bool
@@ -55,13 +65,13 @@ class AlphaBuffer:
     Parameters
     ----------
     camera : Camera
-        The view, and the size of the final picture.
+        The view, and the size of the final image.
     resolution : int
         Longer side of the buffer, pixels; `buffer_size` gives both sides.
     occluders_depth : (height · width,) float64, optional
         Where each pixel's ray ends at an opaque polygon, as `occluder_depth` gives it for the same size.
     worth : (height · width,) float64, optional
-        Pixels of the final picture that each pixel stands for, where the picture is not the camera's own.
+        Pixels of the final image that each pixel stands for, where the image is not the camera's own.
 
     Attributes
     ----------
@@ -87,8 +97,8 @@ class AlphaBuffer:
         if self.end is not None and len(self.end) != self.width * self.height:
             raise ValueError(f"the depth buffer of the occluders must have {self.width} × {self.height} pixels")
         self._cell, self._pixel = np.zeros((2, 0), np.int32)
-        # Optical depth that a fragment brings into its pixel, its fraction of its tetrahedron as far as it is not
-        # occluded, and the transmittance of what is before it.
+        # Optical depth that a fragment brings into its pixel, the visible fraction of its tetrahedron that it covers,
+        # and the transmittance of what is before it.
         self._depth, self._fraction, self._before = np.zeros((3, 0))
         self._changed = np.zeros(self.width * self.height, bool)
 
@@ -98,15 +108,12 @@ class AlphaBuffer:
         Parameters
         ----------
         cells : (n,) int
-            Numbers by which they are known from now on, zero or positive, each new.
+            Their numbers from now on, zero or positive, each new.
         vertices : (n, 4, 3) float64
             Positively oriented, overlapping with none that is there, metres, world space.
         extinction : (n,) float64
             κ ≥ 0 along the way from the eye, 1/m; may be infinite.
 
-        Returns
-        -------
-        Outline
         """
         count = len(vertices)
         fragments = tetrahedron_fragments(vertices, self.camera, self.width, self.height)
@@ -127,7 +134,7 @@ class AlphaBuffer:
         exact = whole & (weight > 0.0)
         if self.worth is not None:
             exact, final = np.zeros(count, bool), 1.0
-        # What lies behind an occluder neither is seen nor hides anything.
+        # What lies behind an occluder is neither seen nor hides anything.
         open_ones = slice(None) if self.end is None else np.flatnonzero(fraction)
         self._changed[pixel[open_ones]] = True
         for name, values in (
@@ -170,23 +177,18 @@ class AlphaBuffer:
         return np.bincount(self._cell, self._fraction * self._before, len(rank))
 
     def _depth_before(self, some: NDArray[np.intp], rank: NDArray[np.integer]) -> NDArray[np.float64]:
-        """Optical depth in front of some fragments (n,), among which are all of their pixels."""
+        """Optical depth in front of some fragments (n,), which are all of their pixels."""
         pixel, depth = np.take(self._pixel, some), np.take(self._depth, some)
         # One number to sort by is several times as fast as two.
         key = pixel.astype(np.int64) * (int(rank.max(initial=0)) + 1) + np.take(rank, np.take(self._cell, some))
         order = np.argsort(key)
-        pixel, depth = np.take(pixel, order), np.take(depth, order)
-        summed = np.cumsum(depth)
-        # What all earlier pixels hold is taken off again. Rounding must not leave less than nothing.
-        begins = np.flatnonzero(np.diff(pixel, prepend=-1))
-        earlier = np.repeat((summed - depth)[begins], np.diff(begins, append=len(pixel)))
         before = np.zeros_like(depth)
-        before[order] = np.maximum(summed - depth - earlier, 0.0)
+        before[order] = depth_in_front(np.take(pixel, order), np.take(depth, order))[1]
         return before
 
 
 def hiding(camera: Camera) -> Camera:
-    """A camera that sees of opaque polygons those which hide others, be it from all eyes that it stands for."""
+    """A camera that sees only opaque polygons that hide others from all eyes that it stands for."""
     return replace(camera, near=max(camera.near, camera.hides_from))
 
 
@@ -199,7 +201,7 @@ def fitting(cells: int, finest: int) -> int:
 
 
 class Buffers:
-    """Alpha buffers as fine as what is drawn into them: a few large tetrahedra need no more than a few pixels each.
+    """Alpha buffers as fine as what is drawn into them: a few large tetrahedra need few pixels.
 
     Parameters
     ----------

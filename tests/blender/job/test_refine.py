@@ -59,7 +59,7 @@ def test_refining_again_replaces():
     for key, value in first.as_dict().items():
         if key == "steps":
             assert [{**s, "seconds": 0} for s in second.as_dict()[key]] == [{**s, "seconds": 0} for s in value]
-            assert len(value) == first.levels
+            assert len(value) == first.passes
         elif key != "seconds":
             assert second.as_dict()[key] == value
 
@@ -247,7 +247,7 @@ def test_a_job_that_is_told_to_stop_refining_makes_what_it_has():
     assert refine.has_results(scene)
     whole = _refine(scene)
     assert whole.complete
-    assert whole.levels > statistics.levels
+    assert whole.passes > statistics.passes
 
 
 def test_materials_show_the_colours_of_their_species_in_solid_viewports():

@@ -212,7 +212,7 @@ def _count(statistics: Statistics, refinement: Refinement) -> None:
     statistics.tetrahedra_made = int(refinement.tree.tetrahedra_made)
     statistics.tetrahedra_terminal = len(refinement.tree.terminals())
     statistics.tetrahedra_proxy = int(np.isin(refinement.decision, (Decision.PROXY, Decision.HIDDEN)).sum())
-    statistics.levels = refinement.passes
+    statistics.passes = refinement.passes
     statistics.complete = refinement.complete
 
 
