@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Everything below the operators that touches bpy: what the scene stores, reading it, writing results, rendering."""
+"""Everything below the operators that uses bpy: properties, reading scenes, writing results, rendering."""
 
 from . import preferences, properties, saved_files, translations
 from .cli import command

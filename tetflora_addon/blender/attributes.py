@@ -1,17 +1,16 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Attributes of meshes, point clouds and hair curves to arrays and back, at the speed of a copy.
+"""Arrays from and to Blender's datablocks: attributes of geometry, transforms of objects, pixels of images.
 
-Attributes are plain memory. ``foreach_get`` of a mesh's vertices, edges or corners is many times slower, but still
-holds what there was when edit mode was entered, where attributes are empty.
-
-Where objects are, and what rotation and scale their matrices amount to.
-
-Pixels of images as arrays of numbers, which they are not always: a sun in an EXR may be infinite.
+Attributes of meshes, point clouds and hair curves are plain memory, read and written at the speed of a copy.
+``foreach_get`` of a mesh's vertices, edges or corners is many times slower, but in Edit Mode, where attributes are
+empty, it still returns what there was when the mode was entered.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import NamedTuple
 
 import bpy
@@ -38,7 +37,7 @@ class Kind(NamedTuple):
     width: int = 1
 
 
-#: By Blender's name of the type. Colors of bytes as they are stored; their field "color" is linear.
+#: By Blender's name of the type. Byte colors as they are stored; their field "color" is linear.
 KINDS = {
     'FLOAT': Kind("value", np.float32),
     'INT': Kind("value", np.int32),
@@ -55,7 +54,7 @@ KINDS = {
 }
 # Geometry without elements lacks these.
 _BUILT_IN = {"position": 'FLOAT_VECTOR', ".edge_verts": 'INT32_2D', ".corner_vert": 'INT', ".corner_edge": 'INT'}
-# What arrays become, by dtype and trailing shape.
+# Types of attributes by dtype and trailing shape of the arrays.
 _TYPES = {
     (np.dtype(np.float32), ()): 'FLOAT',
     (np.dtype(np.float32), (2,)): 'FLOAT2',
@@ -63,6 +62,7 @@ _TYPES = {
     (np.dtype(np.int32), ()): 'INT',
     (np.dtype(np.bool_), ()): 'BOOLEAN',
 }
+_TINY = 1e-9  # shortest axis of an object's matrix that is not taken for a scale of 0
 
 
 def type_for(values: NDArray) -> str | None:
@@ -127,14 +127,11 @@ def _empty(kind: Kind, size: int) -> NDArray:
     return np.zeros(size if kind.width == 1 else (size, kind.width), kind.dtype)
 
 
-_TINY = 1e-9  # of an axis: no scale that anybody means
-
-
 def world_matrix(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> NDArray[np.float64]:
-    """An object's matrix in world space, (4, 4) float64, as the dependency graph evaluates it.
+    """An object's evaluated matrix in world space, (4, 4); float32 in some versions of Blender.
 
-    Objects that are switched off in viewports but render are not evaluated there, and their stored matrix may be old.
-    It is worked out from the transforms of the object and its parents then; constraints do not count.
+    Objects that are disabled in viewports but render are not evaluated, and their stored matrix may be old. Then it
+    follows from the transforms of the object and its parents; constraints do not count.
     """
     evaluated = obj.evaluated_get(depsgraph)
     if evaluated.is_evaluated:
@@ -156,11 +153,11 @@ def frames_of(linear: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray
     Returns
     -------
     frame : (n, 3, 3) float64
-        Proper rotations that keep the direction of z and the azimuth of x; shear and mirroring go.
+        Proper rotations that keep the direction of z and the azimuth of x, without shear and mirroring.
     scale : (n,) float64
         Mean length of the three axes.
     sound : (n,) bool
-        False where an axis has no length or is no number; the frame then means nothing.
+        False where an axis has no length or is not a number; the frame is then meaningless.
     """
     lengths = np.linalg.norm(linear, axis=1)  # (n, 3): of the columns
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
@@ -177,7 +174,7 @@ def frames_of(linear: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray
 def image_pixels(image: bpy.types.Image) -> NDArray[np.float32]:
     """Pixels (height, width, channels) of an image that has some, row 0 lowest, in its own colour space.
 
-    One with a channel that is infinite or no number is black and transparent, as in Cycles.
+    Pixels with a channel that is not finite, such as the sun in an EXR, are black and transparent, as in Cycles.
     """
     width, height, channels = *image.size, image.channels
     pixels = np.zeros(width * height * channels, np.float32)
@@ -199,3 +196,13 @@ def linear_rgb(image: bpy.types.Image, pixels: NDArray[np.floating]) -> NDArray[
 def face_offsets(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
     """First corner of each face, and the number of corners: (faces + 1,)."""
     return np.append(members(mesh.polygons, "loop_start", dtype=np.int32), np.int32(len(mesh.loops)))
+
+
+@contextmanager
+def evaluated_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Iterator[bpy.types.Mesh]:
+    """The mesh of an object with its modifiers, while the context lasts; without them if it is not evaluated."""
+    evaluated = obj.evaluated_get(depsgraph)
+    try:
+        yield evaluated.to_mesh()
+    finally:
+        evaluated.to_mesh_clear()

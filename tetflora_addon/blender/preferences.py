@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The add-on's preferences: where the user's own species are, what new scenes begin with, the cache, and the keys."""
+"""The add-on's preferences: folder of the user's own species, defaults of new scenes, and the cache on disk."""
 
 import os
 from pathlib import Path
@@ -11,11 +11,16 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 from .. import storage
 from ..errors import SpeciesError
 
-# Blender files preferences under the name of the extension's root package, two levels above this one. Only the name
-# is needed; nothing in tetflora_addon imports what lies above it.
+# Blender stores preferences under the name of the extension's root package, two levels above this one.
 ROOT_PACKAGE = __package__.rsplit(".", 2)[0]
-#: Variable of the environment that names the cache folder for farms, whatever the preferences say; "off" for none.
+#: Environment variable with the cache folder, which overrides the preferences on farms; "off" for no cache.
 CACHE_VARIABLE = "TETFLORA_CACHE"
+#: Qualities of refinement for a menu.
+QUALITY_ITEMS = (
+    ('DRAFT', "Draft", "Takes seconds, for placing plants; about 30 times fewer polygons than Final"),
+    ('PREVIEW', "Preview", "For judging light and composition"),
+    ('FINAL', "Final", "For final renders: proxies are indistinguishable from real plants"),
+)
 
 
 def _use_cache(_preferences: object = None, _context: object = None) -> None:
@@ -23,7 +28,7 @@ def _use_cache(_preferences: object = None, _context: object = None) -> None:
 
 
 class TetFloraPreferences(bpy.types.AddonPreferences):
-    """What belongs to the user and not to a scene."""
+    """Settings of the user, not of a scene."""
 
     bl_idname = ROOT_PACKAGE
 
@@ -40,11 +45,7 @@ class TetFloraPreferences(bpy.types.AddonPreferences):
     new_quality: EnumProperty(
         name="Quality of New Scenes",
         description="Refinement quality that a scene gets with its first plant; it can be changed in the sidebar",
-        items=(
-            ('DRAFT', "Draft", "Takes seconds, for placing plants; about 30 times fewer polygons than Final"),
-            ('PREVIEW', "Preview", "For judging light and composition"),
-            ('FINAL', "Final", "For final renders: proxies are indistinguishable from real plants"),
-        ),
+        items=QUALITY_ITEMS,
         default='FINAL',
     )
     new_memory: FloatProperty(
@@ -86,21 +87,21 @@ def preferences() -> TetFloraPreferences | None:
 
 
 def species_folders() -> tuple[Path, ...]:
-    """Folders of the user's own species that exist, for the catalogue's functions; empty outside of an extension."""
-    folder = _species_folder(create=False)
+    """Existing folders of the user's own species, for the catalogue's functions; none outside of an extension."""
+    folder = _folder("species")
     return (folder,) if folder is not None and folder.is_dir() else ()
 
 
 def own_species_folder() -> Path:
-    """The folder that the user's own species are saved in, made if there is none.
+    """The folder that the user's own species are saved in, created if missing.
 
     Raises
     ------
     SpeciesError
-        It cannot be made, or this is no installed extension.
+        It cannot be created, or TetFlora is not installed as an extension.
     """
     try:
-        folder = _species_folder(create=True)
+        folder = _folder("species", create=True)
         if folder is not None:
             folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -110,38 +111,30 @@ def own_species_folder() -> Path:
     return folder
 
 
-def _species_folder(create: bool) -> Path | None:
-    own = preferences()
-    if own is None:
-        return None
-    if own.species_folder:
-        return Path(bpy.path.abspath(own.species_folder))
-    return _user_folder("species", create)
-
-
 def _cache_folder() -> Path | None:
-    """Where results are kept: what the environment says, or the preferences; None for nowhere."""
+    """The cache folder of the environment or the preferences; None without a cache."""
     chosen = os.environ.get(CACHE_VARIABLE, "")
     if chosen:
         return None if chosen.lower() == "off" else Path(chosen).absolute()
     own = preferences()
-    if own is None or not own.use_cache:
+    return _folder("cache") if own is not None and own.use_cache else None
+
+
+def _folder(name: str, create: bool = False) -> Path | None:
+    """The folder in the preferences, or one of the extension that updates keep; None outside of an extension."""
+    own = preferences()
+    if own is None:
         return None
-    if own.cache_folder:
-        return Path(bpy.path.abspath(own.cache_folder))
-    return _user_folder("cache")
-
-
-def _user_folder(name: str, create: bool = False) -> Path | None:
-    """A folder that Blender keeps for this extension, also when it is updated."""
+    if chosen := getattr(own, f"{name}_folder"):
+        return Path(bpy.path.abspath(chosen))
     try:
         return Path(bpy.utils.extension_path_user(ROOT_PACKAGE, path=name, create=create))
-    except ValueError:  # an add-on of the old kind has no such folder
+    except ValueError:  # an add-on of the old kind
         return None
 
 
 def register() -> None:
-    """Register the preferences, and keep results where they say."""
+    """Register the preferences and use their cache folder."""
     bpy.utils.register_class(TetFloraPreferences)
     _use_cache()
 

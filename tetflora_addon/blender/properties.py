@@ -3,21 +3,14 @@
 """What TetFlora stores in a file: ``Object.tetflora`` on plants, fields and occluders, ``Scene.tetflora`` otherwise."""
 
 import bpy
-from bpy.props import (
-    BoolProperty,
-    CollectionProperty,
-    EnumProperty,
-    IntProperty,
-    PointerProperty,
-    StringProperty,
-)
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
 
 from . import settings
 from .placing import properties as placing_properties
 from .results import output_properties
 from .results.forms import form_property
 from .runtime import Listeners
-from .scene.explicit import PROPERTY as EXPLICIT
+from .scene.explicit import EXPLICIT_PROPERTY
 from .scene.skeletons import FORM_TYPES
 from .settings import AnimationProperties, RefinementProperties
 from .species import editor, edits
@@ -37,13 +30,12 @@ _FORM = {
     "poll": lambda _group, candidate: candidate.type in FORM_TYPES,
 }
 
-
-#: What overrides of linked objects may change; without, Blender forgets the change when the file is opened again.
+#: What overrides of linked objects may change; otherwise Blender forgets the change when the file is opened again.
 _OVERRIDES = {'LIBRARY_OVERRIDABLE'}
 
 
 class TetFloraFieldEntry(bpy.types.PropertyGroup, SpeciesChoice):
-    """One kind of plant of a field; the attribute ``species`` of its points counts through these."""
+    """One kind of plant of a field; the attribute ``species`` of its points is an index into these."""
 
     form: PointerProperty(**_FORM)
 
@@ -95,7 +87,7 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
         options=set(),
         override=_OVERRIDES,
     )
-    is_explicit: BoolProperty(**EXPLICIT, override=_OVERRIDES)
+    is_explicit: BoolProperty(**EXPLICIT_PROPERTY, override=_OVERRIDES)
     population: StringProperty(
         name="Population", description="Identity of the population that created this", options={'HIDDEN'}
     )
@@ -105,7 +97,7 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
 
 
 class TetFloraLeafObject(bpy.types.PropertyGroup, SpeciesChoice):
-    """A mesh of the user's that takes the place of a species' own leaf."""
+    """A mesh of the user's that replaces the leaf of a species."""
 
     leaf: PointerProperty(
         name="Leaf",
@@ -118,7 +110,7 @@ class TetFloraLeafObject(bpy.types.PropertyGroup, SpeciesChoice):
     )
 
 
-def _tell_auto_refine(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+def _notify_auto_refine(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
     auto_refine_switched.notify(self.id_data)
 
 
@@ -170,7 +162,7 @@ class TetFloraScene(RefinementProperties, AnimationProperties, bpy.types.Propert
             "restarts the work. Large forests keep the processor busy"
         ),
         default=False,
-        update=_tell_auto_refine,
+        update=_notify_auto_refine,
         options=set(),
     )
     expand_everything: BoolProperty(
@@ -225,14 +217,14 @@ _register, _unregister = bpy.utils.register_classes_factory(CLASSES)
 
 
 def register() -> None:
-    """Register the property groups and hang them on Blender's types."""
+    """Register the property groups and add them to Blender's types."""
     _register()
     bpy.types.Object.tetflora = PointerProperty(type=TetFloraObject, override=_OVERRIDES)
     bpy.types.Scene.tetflora = PointerProperty(type=TetFloraScene)
 
 
 def unregister() -> None:
-    """Take everything back; what is stored in the file stays there."""
+    """Remove them; what is stored in the file stays there."""
     del bpy.types.Scene.tetflora
     del bpy.types.Object.tetflora
     _unregister()

@@ -15,7 +15,7 @@ failed_frames: list[str] = []
 
 
 class Handlers:
-    """Functions that Blender calls, which stay when another file is loaded.
+    """Functions that Blender calls, which stay registered when another file is loaded.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class Handlers:
 
 
 class Listeners(list):
-    """Functions that a module above wants called when something changes; what changes need not know who listens."""
+    """Functions of modules above to call when something changes below."""
 
     def notify(self, *arguments: object) -> None:
         """Call all of them."""
@@ -52,15 +52,15 @@ class Listeners(list):
 
 
 def call_soon(function: Callable[[], float | None], seconds: float) -> None:
-    """Call a function of a module by a timer; requests while it waits are the same request."""
+    """Call a function of a module by a timer, once for all requests until then."""
     if not bpy.app.timers.is_registered(function):
         bpy.app.timers.register(function, first_interval=seconds)
 
 
 def call_off(function: Callable[[], float | None]) -> None:
-    """Drop what `call_soon` requested.
+    """Cancel a request of `call_soon`.
 
-    Call it before a file is loaded as well: Blender 4.5's wheel hangs at exit if Blender itself dropped the timer.
+    Do so before a file is loaded as well: Blender 4.5's wheel hangs at exit if Blender itself dropped the timer.
     """
     if bpy.app.timers.is_registered(function):
         bpy.app.timers.unregister(function)

@@ -1,18 +1,12 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether .blend files that Blender wrote are whole.
+"""Files that Blender wrote: whether they are complete, and which version of TetFlora's properties they hold.
 
-Where a disk is full, Blender notices when it writes a plain file, but takes a compressed one that ends in the middle
-for saved and puts it in place of the earlier one (tried on 4.5 and 5.2). Here such files are found out.
+On a full disk Blender reports plain .blend files that it cannot write, but not compressed ones: it takes a truncated
+file for saved and replaces the earlier one (tried on 4.5 and 5.2). Truncated PNG and OpenEXR files go unreported too.
 
 Source: Zstandard seekable format (github.com/facebook/zstd, contrib/seekable_format), which Blender writes: the file
 ends with the magic number of the table of its frames.
-
-Whether pictures that Blender wrote are whole.
-
-Blender renders on where a disk is full: PNG and OpenEXR files end in the middle, and nobody is told (tried on 5.2).
-
-Which version of the layout of properties a file has. A later version adds steps from earlier ones here.
 """
 
 from __future__ import annotations
@@ -30,6 +24,8 @@ from ..errors import SceneError
 from ..storage import PART
 from .runtime import Handlers, complain
 
+#: Version of the layout of properties; a later one adds steps from earlier ones to `migrate`.
+VERSION = 2
 _COMPRESSED = b"\x28\xb5\x2f\xfd"
 _END = b"\xb1\xea\x92\x8f"
 
@@ -47,7 +43,7 @@ def cut_off(path: Path) -> bool:
 
 
 def write_blend(path: Path, write: Callable[[str], object]) -> None:
-    """Let Blender write a .blend beside its place, and put it there when it is whole.
+    """Let Blender write a .blend beside its place, and move it there when it is complete.
 
     Parameters
     ----------
@@ -76,7 +72,7 @@ def write_blend(path: Path, write: Callable[[str], object]) -> None:
 
 
 def _on_save_post(path: str, _other: object = None) -> None:
-    """Blender has said that it saved the file; say so if it has not."""
+    """Report a file that Blender takes for saved but did not write completely."""
     saved = Path(path)
     if saved.name.endswith(PART[1]) or not cut_off(saved):
         return
@@ -87,14 +83,10 @@ def _on_save_post(path: str, _other: object = None) -> None:
     complain(text)
 
 
-_HANDLERS = Handlers(save_post=_on_save_post)
-register, unregister = _HANDLERS.register, _HANDLERS.unregister
-
-
 def damaged(scene: bpy.types.Scene, files: Iterable[Path]) -> list[Path]:
-    """Those of a scene's pictures that cannot be read; OpenEXR of several layers and films are not looked at."""
+    """Rendered images of a scene that cannot be read; movies and multilayer OpenEXR are not checked."""
     render = scene.render
-    # Blender reads no more of the former than their names until a layer is shown.
+    # Blender reads only the names of layers until one is shown.
     if render.is_movie_format or render.image_settings.file_format == 'OPEN_EXR_MULTILAYER':
         return []
     return [path for path in files if path.is_file() and not _whole(path)]
@@ -111,13 +103,10 @@ def _whole(path: Path) -> bool:
         bpy.data.images.remove(image)
 
 
-VERSION = 2
-
-
 def migrate() -> None:
     """Stamp all plants, fields, occluders and scenes of the open file with the version of this layout.
 
-    What a newer TetFlora saved is left alone and reported on stderr. Linked data belongs to another file.
+    Data of a newer TetFlora stays as it is and is reported on stderr. Linked data belongs to another file.
     """
     owners = [o for o in bpy.data.objects if o.tetflora.is_plant or o.tetflora.is_field or o.tetflora.is_occluder]
     owners += [s for s in bpy.data.scenes if s.is_property_set("tetflora")]
@@ -132,3 +121,7 @@ def migrate() -> None:
             f"TetFlora: a newer version saved {newer} of this file's objects and scenes; update the extension",
             file=sys.stderr,
         )
+
+
+_HANDLERS = Handlers(save_post=_on_save_post)
+register, unregister = _HANDLERS.register, _HANDLERS.unregister

@@ -1,16 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's properties, generated from the engine's dataclasses of settings.
+"""Settings of a scene that come from the engine: refinement with its qualities, animation, wind.
 
-Settings of refinement as properties of a scene: those of the engine, quality, and the look of shells.
-
-Qualities: names for sets of values; which one the settings have is read from the values themselves.
-
-Settings of animations as properties of a scene: what frames share, and the size of the frame cache.
-
-The wind of a scene: its settings, and what they are at a frame.
-
-What the user's preferences give to a scene when its first plant is added.
+Properties are generated from the engine's dataclasses, which hold their names, tooltips and ranges.
 """
 
 from __future__ import annotations
@@ -25,9 +17,11 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 from ..camera.view_cells import ViewCells
 from ..growth.wind import Wind
 from ..refinement.settings import QUALITIES, RefinementSettings
-from .preferences import preferences
+from .preferences import QUALITY_ITEMS, preferences
 
 _MAKERS = {bool: BoolProperty, int: IntProperty, float: FloatProperty}
+#: From the frame to the middle of the exposure, in times that the shutter is open, by position of the shutter.
+_MIDDLE = {'START': 0.5, 'CENTER': 0.0, 'END': -0.5}
 
 
 def properties_of(settings: type, **common: Any) -> SimpleNamespace:
@@ -52,6 +46,15 @@ def properties_of(settings: type, **common: Any) -> SimpleNamespace:
     return made
 
 
+_CELLS = properties_of(ViewCells)
+_WIND = properties_of(Wind)
+
+
+def _factor(name: str, description: str, default: float) -> Any:
+    """A property from 0 to 1."""
+    return FloatProperty(name=name, description=description, default=default, min=0.0, max=1.0, subtype='FACTOR')
+
+
 def quality_number(group: bpy.types.PropertyGroup) -> int:
     """Index of the quality whose values the settings have; the last one is that of others."""
     for number, values in enumerate(QUALITIES.values()):
@@ -73,36 +76,21 @@ class EngineSettings:
 
 
 class RefinementProperties(EngineSettings):
-    """Part of the settings of a scene."""
+    """Refinement settings of a scene: the engine's, quality, and the look of shells."""
 
     quality: EnumProperty(
         name="Quality",
         description="How fine the result is; sets Cutoff, Leaf Limit, Facet Size and Visibility Resolution",
-        items=(
-            ('DRAFT', "Draft", "Quick and coarse, for setting up a scene"),
-            ('PREVIEW', "Preview", "For judging light and composition"),
-            ('FINAL', "Final", "For final renders: proxies are indistinguishable from real plants"),
-            ('CUSTOM', "Custom", "Your own values"),
-        ),
+        items=(*QUALITY_ITEMS, ('CUSTOM', "Custom", "Your own values")),
         get=quality_number,
         set=set_quality,
     )
-    # How shells look: the user's values of the paper's shading (section 7).
-    shell_diffuse: FloatProperty(
-        name="Diffuse (p)",
-        description="Fraction of light that shells scatter evenly (p in the paper). Smaller values are darker",
-        subtype='FACTOR',
-        default=1.0,
-        min=0.0,
-        max=1.0,
+    # The paper's shading of shells (section 7).
+    shell_diffuse: _factor(
+        "Diffuse (p)", "Fraction of light that shells scatter evenly (p in the paper). Smaller values are darker", 1.0
     )
-    shell_gloss: FloatProperty(
-        name="Gloss (s)",
-        description="Fraction of light that shells of coplanar leaves reflect as a highlight (s in the paper)",
-        subtype='FACTOR',
-        default=0.04,
-        min=0.0,
-        max=1.0,
+    shell_gloss: _factor(
+        "Gloss (s)", "Fraction of light that shells of coplanar leaves reflect as a highlight (s in the paper)", 0.04
     )
     shell_spear: FloatProperty(
         name="Sharpness (spear)",
@@ -112,29 +100,14 @@ class RefinementProperties(EngineSettings):
         soft_max=100.0,
         max=1000.0,
     )
-    shell_roundness: FloatProperty(
-        name="Roundness",
-        description="How round the contents of shells are shaded: 1 as spheres, 0 as flat discs facing the camera",
-        subtype='FACTOR',
-        default=1.0,
-        min=0.0,
-        max=1.0,
+    shell_roundness: _factor(
+        "Roundness", "How round the contents of shells are shaded: 1 as spheres, 0 as flat discs facing the camera", 1.0
     )
-    shell_variation: FloatProperty(
-        name="Variation",
-        description="Random variation of brightness between shells",
-        subtype='FACTOR',
-        default=0.05,
-        min=0.0,
-        max=1.0,
-    )
-
-
-_CELLS = properties_of(ViewCells)
+    shell_variation: _factor("Variation", "Random variation of brightness between shells", 0.05)
 
 
 class AnimationProperties:
-    """Part of the settings of a scene."""
+    """Animation settings of a scene: what frames share, and the size of the frame cache."""
 
     share_frames: BoolProperty(
         name="Share Between Frames",
@@ -157,11 +130,6 @@ class AnimationProperties:
         soft_max=64.0,
         precision=1,
     )
-
-
-#: Where the middle of the exposure lies from the frame, in times that the shutter is open.
-_MIDDLE = {'START': 0.5, 'CENTER': 0.0, 'END': -0.5}
-_WIND = properties_of(Wind)
 
 
 class TetFloraWind(bpy.types.PropertyGroup):
@@ -189,10 +157,10 @@ class TetFloraWind(bpy.types.PropertyGroup):
 
 
 def wind_of(scene: bpy.types.Scene) -> Wind | None:
-    """The wind at the scene's frame, the part of a frame included; None where none blows.
+    """The wind at the scene's frame, subframe included; None without wind.
 
-    With motion blur it is that of the middle of the exposure, from which Cycles goes back and forth by velocities. The
-    scene's range of frames has no say: workers of a farm set it to the frames that they render.
+    With motion blur it is that of the middle of the exposure, from which Cycles goes back and forth by velocities. It
+    does not depend on the scene's range of frames, which workers of a farm set to the frames that they render.
     """
     group = scene.tetflora.wind
     if not group.enabled or group.speed == 0.0:
@@ -208,7 +176,7 @@ def wind_of(scene: bpy.types.Scene) -> Wind | None:
 
 
 def begin(scene: bpy.types.Scene) -> None:
-    """Give a scene that has no plants yet the user's quality and memory limit, unless it has its own already."""
+    """Give a scene that has no plants yet the quality and memory limit of the preferences, unless it has its own."""
     group, chosen = scene.tetflora, preferences()
     if chosen is None:
         return

@@ -31,7 +31,7 @@ def _plants():
 
 
 def _occluders():
-    return objects.read_occluders(bpy.context.scene, depsgraph())
+    return objects.read_occluders(depsgraph(), bpy.context.view_layer)
 
 
 @settings(

@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Read the active camera: its window, its lens, and how it moves while the shutter is open.
-
-The other eyes of a stereoscopic render, so that what only one of them sees is refined too.
-"""
+"""The active camera: its window, its lens, its movement while the shutter is open, and the other eyes of stereo."""
 
 from __future__ import annotations
 
@@ -19,8 +16,215 @@ from ...camera.camera import Camera
 from ...errors import SceneError
 from ..attributes import frames_of, world_matrix
 
+#: Paths of animation that place an object, and how many values each has.
+_CHANNELS = {
+    "location": 3,
+    "rotation_euler": 3,
+    "rotation_quaternion": 4,
+    "rotation_axis_angle": 4,
+    "scale": 3,
+}
 
-def stereo_views(scene: bpy.types.Scene, camera: Camera, depsgraph: bpy.types.Depsgraph) -> tuple[Camera, ...]:
+
+def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, region_only: bool = False) -> Camera:
+    """The active camera as it is evaluated now.
+
+    ``camera.view_frame`` already knows about lens shift, sensor fit and pixel aspect. A scaled or sheared camera is
+    taken without scale and shear, as renderers do. Panoramas other than equirectangular ones count as images of the
+    whole sphere with the same number of pixels per angle. Stereo counts as movement: the view is as wide as both eyes
+    need.
+
+    Parameters
+    ----------
+    region_only : bool
+        Of the render region, if there is one, instead of the whole image. Panoramas are always whole.
+
+    Raises
+    ------
+    SceneError
+        No camera, not a camera, an unknown type, no depth between the clip planes, or an invalid transform.
+    """
+    if scene.camera is None:
+        raise SceneError(
+            f'The scene "{scene.name}" has no active camera; add one (Add > Camera) '
+            "or choose one in the Scene properties"
+        )
+    evaluated = scene.camera.evaluated_get(depsgraph)
+    name, data = scene.camera.name, evaluated.data
+    if scene.camera.type != 'CAMERA':
+        raise SceneError(f'The active camera "{name}" is not a camera object; choose a camera in the Scene properties')
+    if data.type not in {'PERSP', 'ORTHO', 'PANO'}:
+        raise SceneError(
+            f'The camera "{name}" is not perspective, orthographic or panoramic; '
+            "change its Lens Type in the camera properties"
+        )
+    if not 0.0 < data.clip_start < data.clip_end:
+        raise SceneError(f'The camera "{name}" sees nothing; raise its Clip End above its Clip Start')
+    size = scene.render.resolution_percentage / 100.0
+    width = max(int(scene.render.resolution_x * size), 1)
+    height = max(int(scene.render.resolution_y * size), 1)
+    if data.type == 'PANO':
+        window, width, height = _panorama(data, width, height)
+    else:
+        corners = np.array(data.view_frame(scene=scene))  # (4, 3), camera space
+        plane = corners[:, :2] / -corners[:, 2:] if data.type == 'PERSP' else corners[:, :2]
+        (left, bottom), (right, top) = plane.min(axis=0).tolist(), plane.max(axis=0).tolist()
+        window = (left, right, bottom, top)
+        if region_only and scene.render.use_border:
+            window, width, height = _region(scene.render, window, width, height)
+    matrix = world_matrix(scene.camera, depsgraph).astype(np.float64)  # some versions give single precision
+    radius, focus = _lens(data, matrix, depsgraph)
+    camera = _placed(
+        Camera(
+            kind=data.type,
+            position=np.zeros(3),
+            frame=np.eye(3),
+            window=window,
+            near=float(data.clip_start),
+            far=float(data.clip_end),
+            width=width,
+            height=height,
+            lens_radius=radius,
+            focus=focus,
+        ),
+        matrix,
+    )
+    if camera is None:
+        raise SceneError(f'The camera "{name}" has zero scale or an invalid position; clear them with Alt S and Alt G')
+    others = (*_while_open(scene, camera, window, matrix), *_stereo_views(scene, camera, depsgraph))
+    return replace(camera, shutter=others)
+
+
+def _region(
+    render: bpy.types.RenderSettings, window: tuple[float, float, float, float], width: int, height: int
+) -> tuple[tuple[float, float, float, float], int, int]:
+    """The window of the render region, in whole pixels, and its size."""
+    first_x, last_x = math.floor(render.border_min_x * width), math.ceil(render.border_max_x * width)
+    first_y, last_y = math.floor(render.border_min_y * height), math.ceil(render.border_max_y * height)
+    if not (0 <= first_x < last_x <= width and 0 <= first_y < last_y <= height):
+        return window, width, height  # Blender renders all of it then
+    left, right, bottom, top = window
+    step_x, step_y = (right - left) / width, (top - bottom) / height
+    across = left + first_x * step_x, left + last_x * step_x
+    up = bottom + first_y * step_y, bottom + last_y * step_y
+    return (*across, *up), last_x - first_x, last_y - first_y
+
+
+def _placed(
+    camera: Camera, matrix: NDArray[np.float64], window: tuple[float, float, float, float] | None = None
+) -> Camera | None:
+    """The camera at the place of a matrix; None if that is invalid."""
+    frame, _, sound = frames_of(matrix[None, :3, :3])
+    if not (sound[0] and np.isfinite(matrix).all()):
+        return None
+    left, right, bottom, top = window or camera.window
+    if np.linalg.det(matrix[:3, :3]) < 0.0:
+        # A mirrored camera sees the same pyramid from the other side.
+        left, right = -right, -left
+    return replace(camera, position=matrix[:3, 3].copy(), frame=frame[0], window=(left, right, bottom, top))
+
+
+def _panorama(data: bpy.types.Camera, width: int, height: int) -> tuple[tuple[float, float, float, float], int, int]:
+    """Window in radians of longitude and latitude, and size of the image."""
+    if data.panorama_type == 'EQUIRECTANGULAR':
+        left, right = sorted((data.longitude_min, data.longitude_max))
+        bottom, top = sorted((data.latitude_min, data.latitude_max))
+        right = min(max(right, left + 1e-3), left + 2.0 * math.pi)
+        bottom, top = max(bottom, -math.pi / 2.0), min(max(top, bottom + 1e-3), math.pi / 2.0)
+        return (left, right, bottom, top), width, height
+    if data.panorama_type == 'FISHEYE_EQUIDISTANT':
+        angle = data.fisheye_fov / max(min(width, height), 1)
+    elif data.panorama_type == 'FISHEYE_EQUISOLID':
+        # r = 2 f sin(θ / 2): in the middle a pixel spans its size on the sensor over the focal length.
+        angle = data.sensor_width / max(width, height) / max(data.fisheye_lens, 1e-3)
+    else:
+        angle = 2.0 * math.pi / max(width, 2 * height)
+    pixels = max(round(math.pi / max(angle, 1e-5)), 1)
+    return (-math.pi, math.pi, -math.pi / 2.0, math.pi / 2.0), 2 * pixels, pixels
+
+
+def _lens(data: bpy.types.Camera, matrix: NDArray[np.float64], depsgraph: bpy.types.Depsgraph) -> tuple[float, float]:
+    """Radius of the aperture and distance of focus, metres; a radius of 0 without depth of field.
+
+    The lens's diameter is its focal length over the f-stop; Cycles takes 1 m for the focal length of an orthographic
+    camera.
+    """
+    dof = data.dof
+    if not dof.use_dof or dof.aperture_fstop <= 0.0:
+        return 0.0, math.inf
+    length = 1.0 if data.type == 'ORTHO' else data.lens * 1e-3
+    focus = dof.focus_distance
+    if dof.focus_object is not None:
+        towards = world_matrix(dof.focus_object, depsgraph)[:3, 3] - matrix[:3, 3]
+        back = matrix[:3, 2] / max(np.linalg.norm(matrix[:3, 2]), 1e-12)
+        focus = float(abs(towards @ back))
+    return length / (2.0 * dof.aperture_fstop), max(float(focus), 1e-3)
+
+
+def _while_open(
+    scene: bpy.types.Scene,
+    camera: Camera,
+    window: tuple[float, float, float, float],
+    matrix: NDArray[np.float64],
+) -> tuple[Camera, ...]:
+    """The camera when the shutter opens and closes, if motion blur is on and it is animated.
+
+    Nothing is evaluated and the scene does not change: only curves of the camera's own action are read at other times,
+    not constraints, drivers, the NLA, animated parents and lenses.
+    """
+    if not scene.render.use_motion_blur:
+        return ()
+    before, after = {'START': (0.0, 1.0), 'CENTER': (-0.5, 0.5), 'END': (-1.0, 0.0)}[scene.render.motion_blur_position]
+    now = scene.frame_current_final
+    here = _animated_basis(scene.camera, now)
+    if here is None or abs(here.determinant()) < 1e-12:
+        return ()
+    # What parents and constraints make of the camera's own transform, as it is now.
+    carried = matrix @ np.array(here.inverted(), np.float64)
+    found = []
+    for offset in (before, after):
+        basis = _animated_basis(scene.camera, now + offset * scene.render.motion_blur_shutter)
+        if basis is None or offset == 0.0:
+            continue
+        other = _placed(camera, carried @ np.array(basis, np.float64), window)
+        if other is not None:
+            found.append(other)
+    moving = any(
+        not (np.allclose(o.position, camera.position, atol=1e-6) and np.allclose(o.frame, camera.frame, atol=1e-7))
+        for o in found
+    )
+    return tuple(found) if moving else ()
+
+
+def _animated_basis(obj: bpy.types.Object, frame: float) -> Matrix | None:
+    """An object's own transform at a time, from the curves of its action; None if it has none."""
+    animation = obj.animation_data
+    if animation is None or animation.action is None or animation.action_slot is None:
+        return None
+    values = {path: list(getattr(obj, path)) for path in _CHANNELS}
+    curves = 0
+    for layer in animation.action.layers:
+        for strip in layer.strips:
+            bag = strip.channelbag(animation.action_slot)
+            for curve in [] if bag is None else bag.fcurves:
+                if not curve.mute and curve.array_index < _CHANNELS.get(curve.data_path, 0):
+                    values[curve.data_path][curve.array_index] = curve.evaluate(frame)
+                    curves += 1
+    if not curves:
+        return None
+    return Matrix.LocRotScale(values["location"], _rotation(obj, values), values["scale"])
+
+
+def _rotation(obj: bpy.types.Object, values: dict[str, list[float]]) -> Quaternion:
+    if obj.rotation_mode == 'QUATERNION':
+        return Quaternion(values["rotation_quaternion"]).normalized()
+    if obj.rotation_mode == 'AXIS_ANGLE':
+        angle, *axis = values["rotation_axis_angle"]
+        return Quaternion(axis, angle)
+    return Euler(values["rotation_euler"], obj.rotation_mode).to_quaternion()
+
+
+def _stereo_views(scene: bpy.types.Scene, camera: Camera, depsgraph: bpy.types.Depsgraph) -> tuple[Camera, ...]:
     """Cameras that a scene renders beside its active one; none without stereoscopy.
 
     Parameters
@@ -71,215 +275,7 @@ def _by_suffix(scene: bpy.types.Scene, camera: Camera, depsgraph: bpy.types.Deps
     for other in (scene.objects.get(base + suffix) for suffix in suffixes):
         if other is None or other.type != 'CAMERA' or other == scene.camera:
             continue
-        matrix = np.array(world_matrix(other, depsgraph), np.float64)
-        frame, _, sound = frames_of(matrix[None, :3, :3])
-        if sound[0] and np.isfinite(matrix).all():
-            found.append(replace(camera, position=matrix[:3, 3].copy(), frame=frame[0]))
+        matrix = world_matrix(other, depsgraph).astype(np.float64)
+        if (placed := _placed(camera, matrix)) is not None:
+            found.append(replace(placed, window=camera.window))
     return tuple(found)
-
-
-#: Paths of animation that place an object, and how many values each has.
-_CHANNELS = {
-    "location": 3,
-    "rotation_euler": 3,
-    "rotation_quaternion": 4,
-    "rotation_axis_angle": 4,
-    "scale": 3,
-}
-
-
-def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, region_only: bool = False) -> Camera:
-    """The active camera as it is evaluated now.
-
-    ``camera.view_frame`` already knows about lens shift, sensor fit and pixel aspect. A scaled or sheared camera is
-    taken without scale and shear, as renderers do. Panoramas other than equirectangular ones count as pictures of the
-    whole sphere with as many pixels for an angle. Stereo counts as movement: the view is as wide as both eyes need.
-
-    Parameters
-    ----------
-    region_only : bool
-        Of the render region, where there is one, and not of the whole picture. Panoramas are taken as a whole.
-
-    Raises
-    ------
-    SceneError
-        No camera, not a camera, a type that nobody knows, no extent in depth, or a transform that is not a number.
-    """
-    if scene.camera is None:
-        raise SceneError(
-            f'The scene "{scene.name}" has no active camera; add one (Add > Camera) '
-            "or choose one in the Scene properties"
-        )
-    evaluated = scene.camera.evaluated_get(depsgraph)
-    name, data = scene.camera.name, evaluated.data
-    if scene.camera.type != 'CAMERA':
-        raise SceneError(f'The active camera "{name}" is not a camera object; choose a camera in the Scene properties')
-    if data.type not in {'PERSP', 'ORTHO', 'PANO'}:
-        raise SceneError(
-            f'The camera "{name}" is not perspective, orthographic or panoramic; '
-            "change its Lens Type in the camera properties"
-        )
-    if not 0.0 < data.clip_start < data.clip_end:
-        raise SceneError(f'The camera "{name}" sees nothing; raise its Clip End above its Clip Start')
-    share = scene.render.resolution_percentage / 100.0
-    width = max(int(scene.render.resolution_x * share), 1)
-    height = max(int(scene.render.resolution_y * share), 1)
-    if data.type == 'PANO':
-        window, width, height = _panorama(data, width, height)
-    else:
-        corners = np.array(data.view_frame(scene=scene))  # (4, 3), camera space
-        picture = corners[:, :2] / -corners[:, 2:] if data.type == 'PERSP' else corners[:, :2]
-        (left, bottom), (right, top) = picture.min(axis=0).tolist(), picture.max(axis=0).tolist()
-        window = (left, right, bottom, top)
-        if region_only and scene.render.use_border:
-            window, width, height = _region(scene.render, window, width, height)
-    matrix = world_matrix(scene.camera, depsgraph).astype(np.float64)  # some versions give single precision
-    radius, focus = _lens(data, matrix, depsgraph)
-    camera = _placed(
-        Camera(
-            kind=data.type,
-            position=np.zeros(3),
-            frame=np.eye(3),
-            window=window,
-            near=float(data.clip_start),
-            far=float(data.clip_end),
-            width=width,
-            height=height,
-            lens_radius=radius,
-            focus=focus,
-        ),
-        matrix,
-    )
-    if camera is None:
-        raise SceneError(f'The camera "{name}" has zero scale or an invalid position; clear them with Alt S and Alt G')
-    others = (*_while_open(scene, camera, window, matrix), *stereo_views(scene, camera, depsgraph))
-    return replace(camera, shutter=others)
-
-
-def _region(
-    render: bpy.types.RenderSettings, window: tuple[float, float, float, float], width: int, height: int
-) -> tuple[tuple[float, float, float, float], int, int]:
-    """The window of the render region, in whole pixels, and its size."""
-    first_x, last_x = math.floor(render.border_min_x * width), math.ceil(render.border_max_x * width)
-    first_y, last_y = math.floor(render.border_min_y * height), math.ceil(render.border_max_y * height)
-    if not (0 <= first_x < last_x <= width and 0 <= first_y < last_y <= height):
-        return window, width, height  # Blender renders all of it then
-    left, right, bottom, top = window
-    step_x, step_y = (right - left) / width, (top - bottom) / height
-    across = left + first_x * step_x, left + last_x * step_x
-    up = bottom + first_y * step_y, bottom + last_y * step_y
-    return (*across, *up), last_x - first_x, last_y - first_y
-
-
-def _placed(
-    camera: Camera, matrix: NDArray[np.float64], window: tuple[float, float, float, float] | None = None
-) -> Camera | None:
-    """The camera where a matrix puts it; None where that is nowhere."""
-    frame, _, sound = frames_of(matrix[None, :3, :3])
-    if not (sound[0] and np.isfinite(matrix).all()):
-        return None
-    left, right, bottom, top = window or camera.window
-    if np.linalg.det(matrix[:3, :3]) < 0.0:
-        # A mirrored camera sees the same pyramid from the other side.
-        left, right = -right, -left
-    return replace(camera, position=matrix[:3, 3].copy(), frame=frame[0], window=(left, right, bottom, top))
-
-
-def _panorama(data: bpy.types.Camera, width: int, height: int) -> tuple[tuple[float, float, float, float], int, int]:
-    """Window in radians of longitude and latitude, and size of the picture."""
-    if data.panorama_type == 'EQUIRECTANGULAR':
-        left, right = sorted((data.longitude_min, data.longitude_max))
-        bottom, top = sorted((data.latitude_min, data.latitude_max))
-        right = min(max(right, left + 1e-3), left + 2.0 * math.pi)
-        bottom, top = max(bottom, -math.pi / 2.0), min(max(top, bottom + 1e-3), math.pi / 2.0)
-        return (left, right, bottom, top), width, height
-    if data.panorama_type == 'FISHEYE_EQUIDISTANT':
-        angle = data.fisheye_fov / max(min(width, height), 1)
-    elif data.panorama_type == 'FISHEYE_EQUISOLID':
-        # r = 2 f sin(θ / 2): in the middle a pixel spans its size on the sensor over the focal length.
-        angle = data.sensor_width / max(width, height) / max(data.fisheye_lens, 1e-3)
-    else:
-        angle = 2.0 * math.pi / max(width, 2 * height)
-    pixels = max(round(math.pi / max(angle, 1e-5)), 1)
-    return (-math.pi, math.pi, -math.pi / 2.0, math.pi / 2.0), 2 * pixels, pixels
-
-
-def _lens(data: bpy.types.Camera, matrix: NDArray[np.float64], depsgraph: bpy.types.Depsgraph) -> tuple[float, float]:
-    """Radius of the open lens and depth that is sharp, metres; a radius of 0 without depth of field.
-
-    The lens's diameter is its focal length over the f-stop; Cycles takes 1 m for the focal length of an orthographic
-    camera.
-    """
-    dof = data.dof
-    if not dof.use_dof or dof.aperture_fstop <= 0.0:
-        return 0.0, math.inf
-    length = 1.0 if data.type == 'ORTHO' else data.lens * 1e-3
-    focus = dof.focus_distance
-    if dof.focus_object is not None:
-        towards = world_matrix(dof.focus_object, depsgraph)[:3, 3] - matrix[:3, 3]
-        back = matrix[:3, 2] / max(np.linalg.norm(matrix[:3, 2]), 1e-12)
-        focus = float(abs(towards @ back))
-    return length / (2.0 * dof.aperture_fstop), max(float(focus), 1e-3)
-
-
-def _while_open(
-    scene: bpy.types.Scene,
-    camera: Camera,
-    window: tuple[float, float, float, float],
-    matrix: NDArray[np.float64],
-) -> tuple[Camera, ...]:
-    """The camera when the shutter opens and closes, if motion blur is on and it is animated.
-
-    Nothing is evaluated and the scene does not change: curves of the camera's own action are read at other times. What
-    moves it otherwise is not seen: constraints, drivers, the NLA, animated parents and lenses.
-    """
-    if not scene.render.use_motion_blur:
-        return ()
-    before, after = {'START': (0.0, 1.0), 'CENTER': (-0.5, 0.5), 'END': (-1.0, 0.0)}[scene.render.motion_blur_position]
-    now = scene.frame_current_final
-    here = _animated_basis(scene.camera, now)
-    if here is None or abs(here.determinant()) < 1e-12:
-        return ()
-    # What parents and constraints make of the camera's own transform, as it is now.
-    carried = matrix @ np.array(here.inverted(), np.float64)
-    found = []
-    for share in (before, after):
-        basis = _animated_basis(scene.camera, now + share * scene.render.motion_blur_shutter)
-        if basis is None or share == 0.0:
-            continue
-        other = _placed(camera, carried @ np.array(basis, np.float64), window)
-        if other is not None:
-            found.append(other)
-    moving = any(
-        not (np.allclose(o.position, camera.position, atol=1e-6) and np.allclose(o.frame, camera.frame, atol=1e-7))
-        for o in found
-    )
-    return tuple(found) if moving else ()
-
-
-def _animated_basis(obj: bpy.types.Object, frame: float) -> Matrix | None:
-    """An object's own transform at a time, from the curves of its action; None if it has none."""
-    animation = obj.animation_data
-    if animation is None or animation.action is None or animation.action_slot is None:
-        return None
-    values = {path: list(getattr(obj, path)) for path in _CHANNELS}
-    curves = 0
-    for layer in animation.action.layers:
-        for strip in layer.strips:
-            bag = strip.channelbag(animation.action_slot)
-            for curve in [] if bag is None else bag.fcurves:
-                if not curve.mute and curve.array_index < _CHANNELS.get(curve.data_path, 0):
-                    values[curve.data_path][curve.array_index] = curve.evaluate(frame)
-                    curves += 1
-    if not curves:
-        return None
-    return Matrix.LocRotScale(values["location"], _rotation(obj, values), values["scale"])
-
-
-def _rotation(obj: bpy.types.Object, values: dict[str, list[float]]) -> Quaternion:
-    if obj.rotation_mode == 'QUATERNION':
-        return Quaternion(values["rotation_quaternion"]).normalized()
-    if obj.rotation_mode == 'AXIS_ANGLE':
-        angle, *axis = values["rotation_axis_angle"]
-        return Quaternion(axis, angle)
-    return Euler(values["rotation_euler"], obj.rotation_mode).to_quaternion()

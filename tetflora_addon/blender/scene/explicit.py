@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Objects of the artist's own that take part in refinement (``tetflora.is_explicit``): trees from elsewhere, rocks.
+"""The artist's own objects that take part in refinement (``tetflora.is_explicit``): other trees, rocks, scans.
 
-All that has a surface counts, as it is evaluated, modifiers included. A marked object that collections or nodes
-instance takes part with every instance, and so does all else that such an instancer shows, because an instancer can
-only be hidden as a whole.
+All evaluated surfaces count. An object that collections or nodes instance takes part with every instance, and so does
+everything else that such an instancer shows, because an instancer can only be hidden as a whole.
 """
 
 from __future__ import annotations
@@ -24,8 +23,8 @@ from ..materials.means import Looks
 from ..materials.nodes import is_ours
 from .objects import may_instance, renderable_objects
 
-#: What `is_explicit` looks like to the artist.
-PROPERTY = {
+#: Of the property `is_explicit`.
+EXPLICIT_PROPERTY = {
     "name": "Refine This Mesh",
     "description": (
         "Refine the object's own polygons with the plants: kept where they are near, drawn as proxies where they are "
@@ -34,7 +33,7 @@ PROPERTY = {
     "options": set(),
 }
 SURFACE_TYPES = {'MESH', 'CURVE', 'SURFACE', 'FONT', 'META', 'CURVES'}
-#: Light that goes through sheets whose material does not tell.
+#: Transmission of sheets whose material leaves it open.
 _SHEET_TRANSMISSION = 0.3
 _TYPES = {'FLOAT', 'FLOAT2', 'FLOAT_VECTOR', 'FLOAT_COLOR', 'BYTE_COLOR'}
 _OWN = {"position", "custom_normal"}
@@ -177,7 +176,7 @@ def _surface(name: str, mesh: bpy.types.Mesh, materials: list[bpy.types.Material
     solid, leaf, width = mesh_features(positions, corner_verts, offsets)
     seen = [looks.of(material, attributes) for material in materials]
     transmission = np.array([look.transmission for look in seen], np.float64)
-    # Materials that do not tell: light goes through what is more sheet than solid.
+    # Unknown transmission: light goes through a material whose faces are mostly sheets.
     sheets = np.bincount(slot, ~solid, len(seen)) * 2 > np.bincount(slot, minlength=len(seen))
     transmission = np.where(np.isnan(transmission), np.where(sheets, _SHEET_TRANSMISSION, 0.0), transmission)
     normals = None

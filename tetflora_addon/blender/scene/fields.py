@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plant fields: objects whose points are plants, for numbers that empties cannot carry.
+"""Fields of plants: objects whose points are plants, for numbers of plants that empties cannot handle.
 
-A field is a mesh or point cloud whose object is marked as one. Attributes of its points say what grows there; whatever
-writes them will do. Nothing here goes from plant to plant.
+A field is a mesh or point cloud whose object is marked as one. Attributes of its points define the plants, whatever
+wrote them. Nothing here loops over plants.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .skeletons import kind_of, kind_of_choice
 
 #: Types of objects that can be marked as fields.
 FIELD_TYPES = {'MESH', 'POINTCLOUD'}
-#: An attribute of this beginning goes before the one without, where other tools use the short name otherwise.
+#: Attributes with this prefix override those without, which other tools may use differently.
 PREFIX = "tf_"
 #: Attributes of fields that TetFlora makes, with their types.
 FIELD_ATTRIBUTES = {"rotation": 'QUATERNION', "scale": 'FLOAT', "species": 'INT', "seed": 'INT'}
@@ -35,7 +35,7 @@ Points = bpy.types.Mesh | bpy.types.PointCloud
 
 
 def field_kinds(obj: bpy.types.Object) -> tuple[str, ...]:
-    """Kinds of plants that the attribute ``species`` of a field counts through; one at least."""
+    """Kinds of plants that the attribute ``species`` of a field is an index into; at least one."""
     return tuple(kind_of_choice(entry) for entry in obj.tetflora.field_species) or (kind_of(obj),)
 
 
@@ -45,7 +45,7 @@ def fields_of(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
 
 
 def stored_size(obj: bpy.types.Object) -> int:
-    """Number of points that a field stores, before modifiers; at no cost."""
+    """Number of points that a field stores, before modifiers; cheap."""
     return len(obj.data.points if obj.type == 'POINTCLOUD' else obj.data.vertices) if obj.type in FIELD_TYPES else 0
 
 
@@ -58,14 +58,14 @@ def read_field(
 ) -> Seeds:
     """Plants of a field, once for each of its places.
 
-    Of each point's transform the same is kept as of a plant that is an object.
+    Transforms of points count as those of plants that are objects.
 
     Parameters
     ----------
     obj : bpy.types.Object
         Original object.
     depsgraph : bpy.types.Depsgraph
-        Decides about modifiers. A field that it does not hold is taken without them.
+        Applies modifiers. A field that it does not evaluate is read without them.
     matrices : (k, 4, 4) float64
         Places of the field.
     keys : (k,) uint64, optional
@@ -76,8 +76,8 @@ def read_field(
     Raises
     ------
     SceneError
-        An attribute of a type or domain that cannot be used, or points without a place or size; the message names the
-        object, how many points and the first of them.
+        An attribute of the wrong type or domain, or points with an invalid position or scale; the message names the
+        object, the number of points and the first one.
     """
     geometry = geometry or geometry_of(obj, depsgraph)
     if geometry is not None and obj.type == 'MESH' and obj.data.is_editmode:
@@ -119,10 +119,10 @@ def write_field(
     identifiers: Sequence[str],
     forms: Sequence[bpy.types.Object | None] | None = None,
 ) -> bpy.types.Object:
-    """Make a field: an object with a mesh of vertices alone, linked to no collection yet.
+    """Make a field: an object with a mesh of vertices, not linked to any collection yet.
 
-    A mesh, and no point cloud: its vertices are seen as dots in the viewport and not at all in renders, and every
-    version of Blender can make it.
+    A mesh rather than a point cloud: its vertices are dots in the viewport and invisible in renders, and every version
+    of Blender can make it.
 
     Parameters
     ----------
@@ -206,17 +206,15 @@ def _integers(
 
 
 def _seeds(obj: bpy.types.Object, points: Points, size: int, first: int) -> NDArray[np.int64]:
-    """Seeds as stored; with a seed of the object's, or without stored ones, hashes of them or of the points' ids."""
+    """Stored seeds, hashed where the object has a seed; without stored ones, hashes of the points' ids."""
     roll = obj.tetflora.seed
-    if _attribute(obj, points, "seed", _INTEGERS) is not None:
-        seeds = _integers(obj, points, "seed", size, 0)
-        return new_seeds(seeds, roll).astype(np.int64) if roll else seeds
-    numbers = _integers(obj, points, "id", size, np.arange(first, first + size))
-    return new_seeds(numbers, roll).astype(np.int64)
+    stored = _attribute(obj, points, "seed", _INTEGERS) is not None
+    seeds = _integers(obj, points, "seed" if stored else "id", size, np.arange(first, first + size))
+    return new_seeds(seeds, roll).astype(np.int64) if roll or not stored else seeds
 
 
 def _rotations(obj: bpy.types.Object, points: Points, size: int) -> NDArray[np.float64]:
-    """Rotation of each point in the field's space, (3, 3, n): whole rows of numbers are what numpy is fast with."""
+    """Rotation of each point in the field's space, (3, 3, n): numpy is fast with long rows."""
     attribute = _attribute(obj, points, "rotation", {'QUATERNION', 'FLOAT_VECTOR'})
     if attribute is None:
         return np.repeat(np.eye(3)[:, :, None], size, axis=2)
@@ -225,7 +223,7 @@ def _rotations(obj: bpy.types.Object, points: Points, size: int) -> NDArray[np.f
 
 
 def _scales(obj: bpy.types.Object, points: Points, size: int, least: int) -> NDArray[np.float64]:
-    """Scale of each point along its axes, (3, n), or (1, n) where one number holds for all and ``least`` is 1."""
+    """Scale of each point along its axes, (3, n), or (1, n) if uniform and ``least`` is 1."""
     attribute = _attribute(obj, points, "scale", {'FLOAT', 'FLOAT_VECTOR'})
     if attribute is None:
         return np.ones((least, size))
@@ -237,7 +235,7 @@ def _scales(obj: bpy.types.Object, points: Points, size: int, least: int) -> NDA
 
 
 def _from_quaternions(q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rotations, (3, 3, n), of quaternions of any length, (4, n); one of no length turns nothing."""
+    """Rotations, (3, 3, n), of quaternions of any length, (4, n); that of length 0 is no rotation."""
     with np.errstate(invalid="ignore", divide="ignore"):
         squared = np.einsum("in,in->n", q, q)
         twice = np.where(squared == 0.0, 0.0, 2.0 / squared)
@@ -294,5 +292,5 @@ def _joined(parts: list[NDArray], empty: tuple[int, ...]) -> NDArray:
     """Arrays as one along the axis that is 0 in ``empty``, which is the shape where there are none."""
     if not parts:
         return np.zeros(empty, int)
-    # Millions of frames are not copied where there is nothing to join.
+    # Do not copy millions of frames where there is nothing to join.
     return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=empty.index(0))

@@ -1,17 +1,13 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Read the lights of a scene: where they are, and how much they give.
+"""The light of a scene: its lights, its world, and the ground that reflects them.
 
-Read what light the world gives: a plain colour, an image of the surroundings, or Blender's sky.
-
-Worlds are node trees without end. What is read is the background that leads to the output; of what feeds its colour,
-the first image or sky. Blender's skies cannot be evaluated outside of a render; they are described by a few numbers
-that were measured in renders.
+World node trees can be arbitrary. Only the background that leads to the output is read, and the first image or sky that
+feeds its colour. Blender's skies cannot be evaluated outside of a render; a few measured numbers describe them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import bpy
@@ -27,79 +23,12 @@ from ..materials.means import Looks
 from ..materials.nodes import active_output, upstream
 from .objects import read_occluders, renderable_objects
 
-
-def read_lights(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> tuple[Light, ...]:
-    """Lights that render and shine, by name.
-
-    Lights that collections or geometry nodes instance are not among them. A light that is placed nowhere is passed
-    over. Light linking, textures and the spread of areas do not count; of nodes, strength and colour of the emission
-    do where they are plain numbers.
-
-    Notes
-    -----
-    Energies are as Cycles takes them, measured on a white plane within .1 %: a sun's is its irradiance; a point or spot
-    of Φ watts sends Φ / 4π W/sr each way, an area Φ / π W/sr ahead.
-    """
-    found = []
-    for obj in sorted(renderable_objects(view_layer), key=lambda o: o.name_full):
-        if obj.type != 'LIGHT':
-            continue
-        data = obj.evaluated_get(depsgraph).data
-        matrix = world_matrix(obj, depsgraph).astype(np.float64)
-        length = float(np.linalg.norm(matrix[:3, 2]))
-        colour = _colour(data)
-        if not colour.any() or not np.isfinite(matrix).all() or length < 1e-9:
-            continue
-        given = {"position": matrix[:3, 3], "direction": -matrix[:3, 2] / length, "shadow": bool(data.use_shadow)}
-        if data.type == 'SUN':
-            found.append(Light('SUN', width=float(data.angle), colour=colour, **given))
-        elif data.type == 'AREA':
-            found.append(_area(data, matrix, colour, given))
-        else:
-            # Without "normalize" the energy is that of a unit surface.
-            radius = data.shadow_soft_size
-            share = 1.0 if data.normalize else np.pi * radius**2
-            spot = {"angle": data.spot_size / 2.0, "blend": data.spot_blend} if data.type == 'SPOT' else {}
-            colour = colour * share / (4.0 * np.pi)
-            found.append(Light(data.type, width=2.0 * radius, colour=colour, **given, **spot))
-    return tuple(found)
-
-
-def _area(data: bpy.types.AreaLight, matrix: NDArray[np.float64], colour: NDArray[np.float64], given: dict) -> Light:
-    ellipse = data.shape in {'DISK', 'ELLIPSE'}
-    sides = np.array([data.size, data.size_y if data.shape in {'RECTANGLE', 'ELLIPSE'} else data.size])
-    span = matrix[:3, :2].T * sides[:, None] / 2.0
-    if not data.normalize:
-        colour = colour * np.linalg.norm(np.cross(*span)) * (np.pi if ellipse else 4.0)
-    width = 2.0 * float(np.linalg.norm(span, axis=1).max())
-    return Light('AREA', width=width, colour=colour / np.pi, span=span, ellipse=ellipse, **given)
-
-
-def _colour(data: bpy.types.Light) -> NDArray[np.float64]:
-    """Linear RGB times energy, nodes and exposure included."""
-    colour = np.array(data.color[:]) * data.energy * 2.0 ** getattr(data, "exposure", 0.0)
-    if getattr(data, "use_temperature", False):
-        colour = colour * np.array(data.temperature_color[:])
-    for node in _emissions(data):
-        plain = np.array(node.inputs["Color"].default_value[:3]), node.inputs["Strength"].default_value
-        colour = colour * (1.0 if node.inputs["Color"].is_linked else plain[0])
-        colour = colour * (1.0 if node.inputs["Strength"].is_linked else plain[1])
-    return np.maximum(colour.astype(np.float64), 0.0)
-
-
-def _emissions(data: bpy.types.Light) -> Iterator[bpy.types.Node]:
-    """The emission that a light's own nodes lead to its output."""
-    output = active_output(tree_in_use(data), 'OUTPUT_LIGHT')
-    if output is not None and output.inputs["Surface"].is_linked:
-        node = output.inputs["Surface"].links[0].from_node
-        if node.type == 'EMISSION':
-            yield node
-
-
 #: What a scene without a world shows.
 BLACK = World.plain((0.0, 0.0, 0.0))
 #: Rows of an image that are looked at, about.
 _ROWS = 256
+#: Colour of ground whose material cannot be read.
+_GROUND = (0.2, 0.2, 0.2)
 # Sun's elevations, degrees, of the rows below.
 _ELEVATIONS = (2.0, 10.0, 30.0, 60.0, 90.0)
 # Radiance above the horizon M + B (z − ½) + C f, with z up and f towards the sun's azimuth; mean radiance D below it;
@@ -137,6 +66,71 @@ _SKIES: dict[str, tuple[tuple[float, ...], ...]] = {
 }
 
 
+def read_lights(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> tuple[Light, ...]:
+    """Lights that render and shine, by name.
+
+    Instances of lights and lights with an invalid transform are left out. Light linking, textures and the spread of
+    areas do not count; of nodes, strength and colour of the emission do where they are plain numbers.
+
+    Notes
+    -----
+    Energies are as Cycles takes them, measured on a white plane within .1 %: a sun's is its irradiance; a point or spot
+    of Φ watts sends Φ / 4π W/sr each way, an area Φ / π W/sr ahead.
+    """
+    found = []
+    for obj in sorted(renderable_objects(view_layer), key=lambda o: o.name_full):
+        if obj.type != 'LIGHT':
+            continue
+        data = obj.evaluated_get(depsgraph).data
+        matrix = world_matrix(obj, depsgraph).astype(np.float64)
+        length = float(np.linalg.norm(matrix[:3, 2]))
+        colour = _colour(data)
+        if not colour.any() or not np.isfinite(matrix).all() or length < 1e-9:
+            continue
+        given = {"position": matrix[:3, 3], "direction": -matrix[:3, 2] / length, "shadow": bool(data.use_shadow)}
+        if data.type == 'SUN':
+            found.append(Light('SUN', width=float(data.angle), colour=colour, **given))
+        elif data.type == 'AREA':
+            found.append(_area(data, matrix, colour, given))
+        else:
+            # Without "normalize" the energy is that of a unit surface.
+            radius = data.shadow_soft_size
+            surface = 1.0 if data.normalize else np.pi * radius**2
+            spot = {"angle": data.spot_size / 2.0, "blend": data.spot_blend} if data.type == 'SPOT' else {}
+            colour = colour * surface / (4.0 * np.pi)
+            found.append(Light(data.type, width=2.0 * radius, colour=colour, **given, **spot))
+    return tuple(found)
+
+
+def _area(data: bpy.types.AreaLight, matrix: NDArray[np.float64], colour: NDArray[np.float64], given: dict) -> Light:
+    ellipse = data.shape in {'DISK', 'ELLIPSE'}
+    sides = np.array([data.size, data.size_y if data.shape in {'RECTANGLE', 'ELLIPSE'} else data.size])
+    span = matrix[:3, :2].T * sides[:, None] / 2.0
+    if not data.normalize:
+        colour = colour * np.linalg.norm(np.cross(*span)) * (np.pi if ellipse else 4.0)
+    width = 2.0 * float(np.linalg.norm(span, axis=1).max())
+    return Light('AREA', width=width, colour=colour / np.pi, span=span, ellipse=ellipse, **given)
+
+
+def _colour(data: bpy.types.Light) -> NDArray[np.float64]:
+    """Linear RGB times energy, nodes and exposure included."""
+    colour = np.array(data.color[:]) * data.energy * 2.0 ** getattr(data, "exposure", 0.0)
+    if getattr(data, "use_temperature", False):
+        colour = colour * np.array(data.temperature_color[:])
+    if (emission := _emission(data)) is not None:
+        tint, strength = emission.inputs["Color"], emission.inputs["Strength"]
+        colour = colour * (1.0 if tint.is_linked else np.array(tint.default_value[:3]))
+        colour = colour * (1.0 if strength.is_linked else strength.default_value)
+    return np.maximum(colour.astype(np.float64), 0.0)
+
+
+def _emission(data: bpy.types.Light) -> bpy.types.Node | None:
+    """The emission that a light's own nodes link to its output."""
+    output = active_output(tree_in_use(data), 'OUTPUT_LIGHT')
+    node = next(upstream(output.inputs["Surface"]), None) if output is not None else None
+    return node if node is not None and node.type == 'EMISSION' else None
+
+
 @dataclass(frozen=True)
 class WorldLight:
     """Light of the world.
@@ -147,7 +141,7 @@ class WorldLight:
     suns : tuple of Light
         The sun's disc of a sky.
     note : str
-        What could not be understood and how it counts instead; empty where all was.
+        What is not supported and how it counts instead; empty if nothing.
     """
 
     world: World
@@ -261,20 +255,13 @@ def _turn(node: bpy.types.Node) -> float:
     return 0.0 if rotation is None or rotation.is_linked else float(rotation.default_value[2])
 
 
-#: Colour of ground whose material cannot be read.
-_GROUND = (0.2, 0.2, 0.2)
-
-
-def read_sources(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer | None = None
-) -> Sources:
-    """Lights, world, and meshes that are marked as hiding plants, which throw shadows and send light up."""
-    view_layer = view_layer or depsgraph.view_layer
+def read_sources(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Sources:
+    """Lights, world, and occluders, which cast shadows and reflect light upward."""
     world = read_world(scene)
     colours = [_ground_colour(o) for o in renderable_objects(view_layer) if o.tetflora.is_occluder]
     ground = np.mean(colours, axis=0) if colours else np.zeros(3)
     lights = (*read_lights(depsgraph, view_layer), *world.suns)
-    return Sources(lights, world.world, read_occluders(scene, depsgraph, view_layer), ground)
+    return Sources(lights, world.world, read_occluders(depsgraph, view_layer), ground)
 
 
 def _ground_colour(obj: bpy.types.Object) -> NDArray[np.float64]:
@@ -285,7 +272,7 @@ def _ground_colour(obj: bpy.types.Object) -> NDArray[np.float64]:
     tree = tree_in_use(material)
     nodes = tree.nodes if tree else ()
     if not any(n.type == 'TEX_IMAGE' and n.image is not None for n in nodes):
-        # What nodes make of noise nobody can tell but by their ramps.
+        # Only color ramps tell which colours noise becomes.
         stops = [stop.color[:3] for n in nodes if n.type == 'VALTORGB' for stop in n.color_ramp.elements]
         if stops:
             return np.mean(stops, axis=0)

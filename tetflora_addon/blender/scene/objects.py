@@ -1,13 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What of a scene renders and may take part in refinement, by view layer, and results that only some layers show.
+"""Objects of a scene that take part in refinement, by view layer; instances of plants; triangles of occluders.
 
-Where plants and fields of plants stand as instances: of collections, and of what geometry nodes make.
-
-Blender lists instances one by one (``Depsgraph.object_instances``). Here each thing that is instanced is visited once,
-and all of its places are worked out at once as arrays, so that a million instances cost what their numbers do.
-
-Triangles of mesh objects in world space: what hides plants, and what they stand on.
+Blender lists instances one by one (``Depsgraph.object_instances``). Here each object that is instanced is visited once,
+and all of its places are computed at once as arrays, so that a million instances take little time.
 """
 
 from __future__ import annotations
@@ -23,7 +19,12 @@ from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed
-from ..attributes import members, read, values_of, world_matrix
+from ..attributes import evaluated_mesh, members, read, values_of, world_matrix
+
+_ONE_BY_ONE = {'VERTS', 'FACES'}  # ways to instance whose places only Blender knows
+_OCCLUDER_REMEDY = (
+    "an occluder must be a mesh with faces. Add faces, or turn off Occluder in the TetFlora tab of the sidebar"
+)
 
 
 def view_layer_groups(scene: bpy.types.Scene) -> list[list[bpy.types.ViewLayer]]:
@@ -33,7 +34,7 @@ def view_layer_groups(scene: bpy.types.Scene) -> list[list[bpy.types.ViewLayer]]
     """
     layers = [layer for layer in scene.view_layers if layer.use] or list(scene.view_layers)
     if len(layers) == 1:
-        return [layers]  # at no cost: films of ten thousand objects have mostly one
+        return [layers]  # at no cost: animations of ten thousand objects mostly have one
     groups: dict[frozenset[int], list[bpy.types.ViewLayer]] = {}
     for layer in layers:
         rendered = list(renderable_objects(layer))
@@ -46,7 +47,7 @@ def view_layer_groups(scene: bpy.types.Scene) -> list[list[bpy.types.ViewLayer]]
 def show_in(
     scene: bpy.types.Scene, results: Sequence[bpy.types.Collection], layers: Sequence[bpy.types.ViewLayer]
 ) -> None:
-    """Leave results out of all rendered view layers of a scene but some."""
+    """Exclude results from all rendered view layers of a scene except some."""
     for layer in scene.view_layers:
         if layer.use and layer not in layers:
             for child in layer.layer_collection.children:
@@ -95,21 +96,18 @@ def has_nodes(obj: bpy.types.Object) -> bool:
 
 
 def may_instance(obj: bpy.types.Object) -> bool:
-    """Whether an object may stand for others."""
+    """Whether an object may instance others."""
     return obj.is_instancer or has_nodes(obj)
 
 
 def objects_within(collection: bpy.types.Collection) -> list[bpy.types.Object]:
     """Objects of a collection and of those within it, each once.
 
-    What ``Collection.all_objects`` says; but that fills a cache which Blender 4.5 to 5.2 leaves stale at undo, and the
-    next undo, or reading it, may then end in a crash.
+    ``Collection.all_objects`` fills a cache that Blender 4.5 to 5.2 leaves stale at undo; the next undo, or reading it,
+    may then crash.
     """
     homes = [collection, *collection.children_recursive]
     return list(dict.fromkeys(obj for home in homes for obj in home.objects))
-
-
-_ONE_BY_ONE = {'VERTS', 'FACES'}  # ways to instance whose places only Blender knows
 
 
 @dataclass(frozen=True)
@@ -135,7 +133,7 @@ class Copies:
 
 
 class _OneByOne(Exception):
-    """Something is instanced in a way that has no arrays."""
+    """Something is instanced in a way that cannot be read as arrays."""
 
 
 def copies_of(objects: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> list[Copies]:
@@ -245,7 +243,7 @@ class _Walk:
             if isinstance(target, bpy.types.Object):
                 self.object(target.original, places, names)
             elif isinstance(target, bpy.types.Collection):
-                # Of evaluated collections the objects are evaluated, too; the walk wants originals throughout.
+                # Objects of evaluated collections are evaluated too; the walk works on originals.
                 self.collection(target.original, places, names)
             else:
                 if owner.tetflora.is_field:
@@ -266,7 +264,7 @@ def _read_instances(points: bpy.types.PointCloud) -> tuple[NDArray[np.int32], ND
 
 
 def _one_by_one(instancers: set[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Iterator[Copies]:
-    """Instances on vertices and faces, and of particles: Blender's own list is the only one that has them."""
+    """Instances on vertices and faces, and of particles, which only Blender's own list has."""
     for instance in depsgraph.object_instances:
         if instance.is_instance and instance.show_self and instance.parent.original in instancers:
             obj, original = instance.object, instance.object.original
@@ -281,66 +279,22 @@ def _name_keys(objects: Sequence[bpy.types.Object]) -> NDArray[np.uint64]:
     return key_of_seed(np.array([crc32(obj.name_full.encode()) for obj in objects]))
 
 
-_OCCLUDER_REMEDY = (
-    "an occluder must be a mesh with faces. Add faces, or turn off Occluder in the TetFlora tab of the sidebar"
-)
-
-
-def mesh_triangles(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, remedy: str) -> NDArray[np.float64]:
-    """Triangles of a mesh object, modifiers applied.
-
-    Parameters
-    ----------
-    obj : bpy.types.Object
-        The original object.
-    depsgraph : bpy.types.Depsgraph
-        Decides about animation and modifiers. An object that it does not hold (switched off in viewports) is taken
-        without its modifiers.
-    remedy : str
-        What the artist can do if the object cannot be used; ends the message of the error.
-
-    Returns
-    -------
-    (t, 3, 3) float64
-        Corners in world space, metres.
-
-    Raises
-    ------
-    SceneError
-        Not a mesh (any more), or a mesh without faces.
-    """
+def _triangles(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> NDArray[np.float64]:
+    """Triangles of an occluder in world space, with its modifiers if it is evaluated."""
     if obj.type != 'MESH':
-        raise SceneError(f'"{obj.name}" is not a mesh; {remedy}')
-    evaluated = obj.evaluated_get(depsgraph)
-    mesh = evaluated.to_mesh()
-    try:
-        positions, corners = _triangles(mesh)
-    finally:
-        evaluated.to_mesh_clear()
-    if not len(corners):
-        raise SceneError(f'"{obj.name}" has no faces; {remedy}')
+        raise SceneError(f'"{obj.name}" is not a mesh; {_OCCLUDER_REMEDY}')
+    with evaluated_mesh(obj, depsgraph) as mesh:
+        if not len(mesh.polygons):
+            raise SceneError(f'"{obj.name}" has no faces; {_OCCLUDER_REMEDY}')
+        mesh.calc_loop_triangles()
+        corners = read(mesh, ".corner_vert")[members(mesh.loop_triangles, "loops", 3, np.int32)]
+        positions = read(mesh, "position").astype(np.float64)
     matrix = world_matrix(obj, depsgraph)
     return (positions @ matrix[:3, :3].T + matrix[:3, 3])[corners]
 
 
-def _triangles(mesh: bpy.types.Mesh) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Places (v, 3) of vertices, and the vertices (t, 3) of triangles."""
-    if not len(mesh.polygons):
-        return np.zeros((0, 3)), np.zeros((0, 3), np.int32)
-    mesh.calc_loop_triangles()
-    vertices = read(mesh, ".corner_vert")[members(mesh.loop_triangles, "loops", 3, np.int32)]
-    return read(mesh, "position").astype(np.float64), vertices
-
-
-def read_occluders(
-    _scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer | None = None
-) -> NDArray[np.float64]:
-    """Triangles of all meshes of a view layer that are marked as hiding plants and render.
-
-    Parameters
-    ----------
-    view_layer : bpy.types.ViewLayer or None
-        None takes the one that the depsgraph was made for.
+def read_occluders(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> NDArray[np.float64]:
+    """Triangles of all occluders of a view layer that render.
 
     Returns
     -------
@@ -352,6 +306,6 @@ def read_occluders(
     SceneError
         One of them has no faces or is no longer a mesh.
     """
-    marked = [o for o in renderable_objects(view_layer or depsgraph.view_layer) if o.tetflora.is_occluder]
+    marked = [o for o in renderable_objects(view_layer) if o.tetflora.is_occluder]
     marked.sort(key=lambda o: o.name_full)
-    return np.concatenate([np.zeros((0, 3, 3)), *(mesh_triangles(o, depsgraph, _OCCLUDER_REMEDY) for o in marked)])
+    return np.concatenate([np.zeros((0, 3, 3)), *(_triangles(o, depsgraph) for o in marked)])

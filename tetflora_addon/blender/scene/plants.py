@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Read from a scene what refinement needs: camera, plants and what hides them.
+"""The plants of a scene as arrays: single objects, instances and fields.
 
-Only here and in `plant_copies` does TetFlora loop over objects; what comes out are plain arrays.
+Only this file and `objects` loop over plants, and only over those that are objects.
 """
 
 from dataclasses import replace
@@ -24,7 +24,7 @@ _NAMED = 3  # objects that a message names before it only counts
 
 
 class NoPlantsError(SceneError):
-    """There is nothing to refine; a renderer may pass over it in silence."""
+    """There is nothing to refine; a render may go on without a message."""
 
 
 def read_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Seeds:
@@ -33,8 +33,8 @@ def read_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_lay
     Plants and fields that collections or geometry nodes instance take part; each instance becomes an individual of its
     own.
 
-    Of a plant's transform the direction of its z axis and the azimuth of its x axis are kept, and the mean of the
-    absolute scales: plants are neither stretched nor mirrored.
+    A plant has the direction of its z axis, the azimuth of its x axis, and the mean of its absolute scales: plants are
+    neither stretched nor mirrored.
 
     Raises
     ------
@@ -49,18 +49,15 @@ def read_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_lay
     single = [o for o in own if o.tetflora.is_plant and o.tetflora.enabled]
     read = [(single[0].name if single else "", single_plants(single, depsgraph))]
     copies = copies_of([o for o in objects if may_instance(o)], depsgraph)
-    read += [
-        (c.owner.name, _copied_plants(c))
-        for c in copies
-        if c.owner.tetflora.is_plant and c.geometry is None and _enabled(c)
-    ]
+    enabled = [c for c in copies if c.owner.tetflora.enabled]
+    read += [(c.owner.name, _copied_plants(c)) for c in enabled if c.owner.tetflora.is_plant and c.geometry is None]
     for obj in own:
         if obj.tetflora.is_field and obj.tetflora.enabled:
             read.append((obj.name, read_field(obj, depsgraph, world_matrix(obj, depsgraph)[None])))
     read += [
         (c.owner.name, read_field(c.owner, depsgraph, c.matrices, c.keys, c.geometry))
-        for c in copies
-        if c.owner.tetflora.is_field and _enabled(c)
+        for c in enabled
+        if c.owner.tetflora.is_field
     ]
     read = [(name, seeds) for name, seeds in read if len(seeds)]
     if not read:
@@ -86,10 +83,6 @@ def _none_left(off: bool, fields: list[str], hidden: int) -> str:
     )
 
 
-def _enabled(copies: Copies) -> bool:
-    return copies.owner.tetflora.enabled
-
-
 def single_plants(plants: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Seeds:
     """Plants that are objects, in their order.
 
@@ -103,13 +96,13 @@ def single_plants(plants: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph
     number = {kind: i for i, kind in enumerate(sorted(set(own)))}
     species = np.array([number[kind] for kind in own], dtype=np.int32)
     seeds = np.array([obj.tetflora.seed for obj in plants], dtype=np.int64)
-    # Matrices of Blender's become single precision in some versions; seeds are double throughout.
+    # Some versions of Blender give single precision.
     matrices = np.array([world_matrix(obj, depsgraph) for obj in plants], dtype=np.float64).reshape(-1, 4, 4)
     return _placed(names, tuple(number), species, seeds, matrices)
 
 
 def _copied_plants(copies: Copies) -> Seeds:
-    """A plant that is instanced. Copies shall not be the same individual: each instance's key joins the seed."""
+    """Instances of a plant, each an individual of its own: its key is added to the seed."""
     plant = copies.owner
     seeds = child_key(key_of_seed(plant.tetflora.seed), copies.keys).view(np.int64)
     return _placed([plant.name], (kind_of(plant),), np.zeros(len(seeds), np.int32), seeds, copies.matrices)
@@ -146,7 +139,7 @@ def _merged(read: list[tuple[str, Seeds]]) -> Seeds:
         to_all = np.zeros(len(seeds.identifiers), np.int32)
         to_all[list(table)] = [number[kind] for kind in table.values()]
         parts.append(replace(seeds, identifiers=identifiers, species=to_all[seeds.species]))
-    # Millions of frames are not copied where there is nothing to join.
+    # Do not copy millions of frames where there is nothing to join.
     return parts[0] if len(parts) == 1 else Seeds.concatenate(parts)
 
 

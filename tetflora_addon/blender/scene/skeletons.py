@@ -1,10 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plants formed by hand: curves, edges of meshes and hair curves of the artist's, read as skeletons.
+"""Plants modelled by hand: curves, mesh edges and hair curves as skeletons, and kinds of plants.
 
-What kind of plant an object is: its species, and its form where that is modelled by hand.
-
-Plants of one species and form are compiled once. A kind is told by a text, as the engine's seeds want it.
+A kind is a text of the species and, if there is one, the form: plants of one kind are compiled once.
 """
 
 from __future__ import annotations
@@ -16,14 +14,16 @@ from numpy.typing import NDArray
 from ...errors import SpeciesError
 from ...species.curves import Chains, bezier_chains, joined_edges, nurbs_chain, smooth_handles
 from ...species.skeletons import Skeleton, skeleton_from_edges
-from ..attributes import frames_of, members, values_of, world_matrix
+from ..attributes import evaluated_mesh, frames_of, members, values_of, world_matrix
 
+#: Types of objects that can be the form of a plant.
 FORM_TYPES = ('CURVE', 'CURVES', 'MESH')
-"""Types of objects that can be the form of a plant."""
 
 RADIUS = "radius"  # the attribute's name in hair curves and, by convention, in meshes
 _CATMULL_ROM, _POLY, _BEZIER, _NURBS = range(4)  # Blender's numbers for types of hair curves
 _DEFAULT_STEPS = 12
+# Neither identifiers of species nor names of objects contain a line break.
+_BREAK = "\n"
 
 
 def upright_turn(matrix: NDArray[np.float64]) -> float:
@@ -39,19 +39,19 @@ def read_skeleton(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skel
     obj : bpy.types.Object
         A curve, a mesh or hair curves; the original object.
     depsgraph : bpy.types.Depsgraph
-        Decides about animation and modifiers. An object that it does not hold is taken without its modifiers.
+        Applies animation and modifiers. An object that it does not evaluate is read without its modifiers.
 
     Returns
     -------
     Skeleton
-        About the object's origin, in metres, z up: its scale and tilt are applied, its place and its turn about
-        the vertical are left to the plant.
+        About the object's origin, in metres, z up: with its scale and tilt, without its position and its turn about
+        the vertical, which are the plant's.
 
     Raises
     ------
     SpeciesError
-        Another type of object, a mesh with faces, no edges, scale 0, or what `skeleton_from_edges` refuses; the message
-        names the object.
+        Another type of object, a mesh with faces, no edges, scale 0, or as `skeleton_from_edges`; the message names the
+        object.
     """
     if obj.type not in FORM_TYPES:
         raise SpeciesError(
@@ -75,14 +75,10 @@ def read_skeleton(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skel
 
 def _of_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Points (p, 4) with radii, 0 where there are none, and edges (e, 2)."""
-    evaluated = obj.evaluated_get(depsgraph)
-    mesh = evaluated.to_mesh()
-    try:
+    with evaluated_mesh(obj, depsgraph) as mesh:
         if not len(mesh.polygons):
             return _mesh_arrays(mesh)
-    finally:
-        evaluated.to_mesh_clear()
-    # A modifier such as Skin clothes the edges with faces: what was modelled is the skeleton.
+    # A modifier such as Skin adds faces around the edges: the modelled mesh is the skeleton.
     if len(obj.data.polygons):
         raise SpeciesError(
             f'"{obj.name}" cannot be used as the form of a plant: it has faces. Keep only edges along the centers of '
@@ -133,14 +129,14 @@ def _of_spline(spline: bpy.types.Spline) -> Chains:
 
 
 def _thickness(curve: bpy.types.Curve) -> float:
-    """What the radius of a curve's points is multiplied by to give the radius of its tube; 0 without a tube."""
+    """Factor from the radius of a curve's points to that of its tube; 0 without a tube."""
     if curve.bevel_mode == 'OBJECT':
         return max(curve.bevel_object.dimensions[:2]) / 2 if curve.bevel_object is not None else 0.0
     return curve.bevel_depth
 
 
 def _meant_radii(chains: Chains, thickness: float) -> Chains:
-    """Radii in the object's measure; 0 where all are equal and nothing shows them, as in curves newly made."""
+    """Radii in the object's space; 0 where all are equal and nothing shows them, as in new curves."""
     points = chains.points.copy()
     if thickness > 0:
         points[:, 3] *= thickness
@@ -191,17 +187,13 @@ def _attribute(curves: bpy.types.Curves, name: str, default: NDArray) -> NDArray
     return default if values is None or values.shape != default.shape else values.astype(default.dtype)
 
 
-# Neither identifiers of species nor names that anyone types hold a line break.
-_BREAK = "\n"
-
-
 def kind_of(plant: bpy.types.Object) -> str:
     """Kind of a plant."""
     return kind_of_choice(plant.tetflora)
 
 
 def kind_of_choice(group: bpy.types.PropertyGroup) -> str:
-    """Kind that a group of properties with a species and a form says."""
+    """Kind of a group of properties with a species and a form."""
     return group.species if group.form is None else f"{group.species}{_BREAK}{group.form.name_full}"
 
 
@@ -211,6 +203,6 @@ def species_of(kind: str) -> str:
 
 
 def form_of(kind: str) -> bpy.types.Object | None:
-    """Object that has the form of a kind of plant, or None where it is grown."""
+    """Object with the form of a kind of plant; None without one."""
     name = kind.partition(_BREAK)[2]
     return next((o for o in bpy.data.objects if o.name_full == name), None) if name else None
