@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import warnings
+from collections.abc import Iterable
 from typing import Any
 
 import bpy
@@ -41,6 +42,8 @@ PASSING = frozenset(
         # reading it then gives None or ends in a crash (5.2 and 4.5).
         "all_objects",
         "particle_edit",  # its object follows the mouse
+        # The same as `species`, for panels. Blender lists the whole catalogue, with pictures, each time it is read.
+        "species_choice",
     }
 )
 #: Lists of `bpy.data` that belong to the window or the session and not to what the artist makes.
@@ -76,6 +79,13 @@ def everything() -> dict[str, dict[str, Any]]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of what Blender means to drop, as long as it has it
         return _everything()
+
+
+def these(datablocks: Iterable[bpy.types.ID]) -> dict[str, dict[str, Any]]:
+    """Some datablocks by name, as in `everything`."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return {d.name_full: _struct(d, 0) for d in datablocks}
 
 
 def _everything() -> dict[str, dict[str, Any]]:

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.digests import everything
+from tests.blender.digests import these
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import frame_cache, render
@@ -57,12 +57,12 @@ def made(monkeypatch):
 def results(scene):
     """What a frame is rendered with, datablock by datablock."""
     (collection,) = emit.result_collections(scene, 'RENDER')
-    every = everything()
-    kept = {"objects": {o.name for o in collection.objects}}
-    kept["meshes"] = {o.data.name for o in collection.objects if o.type == 'MESH'}
-    kept["pointclouds"] = {o.data.name for o in collection.objects if o.type == 'POINTCLOUD'}
-    kept["materials"] = {m.name for o in collection.objects if o.data for m in o.data.materials if m}
-    found = {kind: {name: every[kind][name] for name in names} for kind, names in kept.items()}
+    bpy.context.view_layer.update()
+    objects = collection.objects
+    found = {"objects": these(objects)}
+    found["meshes"] = these(o.data for o in objects if o.type == 'MESH')
+    found["pointclouds"] = these(o.data for o in objects if o.type == 'POINTCLOUD')
+    found["materials"] = these({m for o in objects if o.data for m in o.data.materials if m})
     assert found["objects"]
     return collection.name, found
 

@@ -40,7 +40,7 @@ def test_a_budget_that_suffices_changes_nothing() -> None:
 
 
 @given(st.floats(0.03, 1.2))
-@examples(deadline=None, max_examples=12)
+@examples(deadline=None, max_examples=8)
 def test_what_is_made_fits(fraction: float) -> None:
     """Polygons and facets together, whatever the budget; and most of it is used where there is use for it."""
     whole = sum(made(0)[:2])

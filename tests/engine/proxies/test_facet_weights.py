@@ -81,7 +81,7 @@ def test_opened_plants_of_other_seeds_are_as_opaque(identifier: str) -> None:
 
 def test_tables_of_shipped_species_are_those_of_today() -> None:
     """Run ``python -m devtools.facet_tables`` and raise `_METHOD` after changes of species or of facets."""
-    flora = compile_species([load_species("flower")])
+    flora = compile_species([load_species("birch")])
     known = subject.shipped()[subject.digest(flora, 0)]
     fitted = subject.fitted_weights(flora, np.zeros(1, np.int32))
     assert len(fitted) == len(known["whole"])
@@ -136,8 +136,8 @@ def test_a_species_is_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(subject, "fitted_weights", lambda f, n: asked.append(n.tolist()) or real(f, n))
     monkeypatch.setattr(subject, "shipped", dict)
     monkeypatch.setattr(subject, "_found", {})
-    alone = subject.facet_weights(compile_species([load_species("flower")]))
-    again = subject.facet_weights(compile_species([load_species("grass"), load_species("flower")]))
+    alone = subject.facet_weights(compile_species([load_species("birch")]))
+    again = subject.facet_weights(compile_species([load_species("dead_tree"), load_species("birch")]))
     assert asked == [[0], [0]]
     rows = len(alone.whole)
     np.testing.assert_array_equal(again.whole[-rows:], alone.whole)

@@ -145,7 +145,7 @@ def test_hidden_wood_gets_no_more_facets_than_it_has_faces() -> None:
         assert wood.sum() <= faces * 1.01
         assert support.face_areas(made)[wood].sum() == pytest.approx(totals.wood_area.sum() / 2, rel=0.1)
         seen = sizes_of(flora, contents, camera, np.ones(1))
-        assert part(facet_mesh(make(flora, things, *seen.sides(3.0))), False).sum() > faces * 5
+        assert part(facet_mesh(make(flora, things, *seen.sides(12.0))), False).sum() > faces * 5
         assert (seen.sides(3.0)[0] >= np.sqrt(seen.one_leaf)).all()
 
 

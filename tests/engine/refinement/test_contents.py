@@ -59,7 +59,7 @@ def measures(flora: Flora, pieces: Pieces) -> tuple[float, float, int, int]:
 
 
 @given(views)
-@settings(deadline=None, max_examples=20)
+@settings(deadline=None, max_examples=12)
 def test_nothing_is_lost_or_held_twice(view: tuple[int, str]) -> None:
     """Leaves exactly, wood within 1e-6, over all terminals against plants grown whole; every piece's ends meet."""
     flora = support.compiled(support.SMALL, support.shipped("bush"))
@@ -87,7 +87,7 @@ def test_nothing_is_lost_or_held_twice(view: tuple[int, str]) -> None:
 
 
 @given(views)
-@settings(deadline=None, max_examples=20)
+@settings(deadline=None, max_examples=12)
 def test_everything_is_on_the_right_side(view: tuple[int, str]) -> None:
     """Ends of pieces and vertices of sub-plants, against every plane from their terminal up to the root."""
     flora = support.small_flora()
@@ -215,7 +215,7 @@ def test_holdings_give_and_take(seed: int) -> None:
 
 
 @given(views, st.floats(0.01, 0.5))
-@settings(deadline=None, max_examples=15)
+@settings(deadline=None, max_examples=8)
 def test_what_reaches_a_little_beyond_a_plane_stays_whole(view: tuple[int, str], far: float) -> None:
     """Nothing is lost or doubled, and hardly anything lies further beyond than allowed."""
     flora = support.compiled(support.SMALL, support.shipped("bush"))
