@@ -1,13 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Add one plant.
-
-Make a curve or skeleton that the artist drew the form of plants.
-
-A small complete forest to begin with.
-
-Populate a terrain with plants: a new population, and its plants, in one step.
-"""
+"""Add plants: a single one, one grown on a drawn form, a first forest, or a population on a terrain."""
 
 import bpy
 import numpy as np
@@ -27,20 +20,19 @@ from ..tetflora_addon.blender.species.values import present_species
 from ..tetflora_addon.errors import SceneError, TetFloraError
 from ..tetflora_addon.planting.places import Placement, new_seeds
 from ..tetflora_addon.planting.rules import Rules
-from .base import Reporting, counted, in_object_mode, select_only, selected_plants
+from .base import Reporting, counted, in_object_mode, need, select_only, selected_plants
 from .populations import ground_selected, report_made, selected_grounds
 
 
 class TETFLORA_OT_add_plant(Reporting, bpy.types.Operator):
-    """Add an empty that stands for a plant at the 3D cursor."""
+    """Add a plant at the 3D cursor.
+
+    It is stored as an empty with a species and seed; Refine or rendering creates its branches and leaves.
+    """
 
     bl_idname = "tetflora.add_plant"
     bl_label = "Add Plant"
-    bl_description = (
-        "Add a plant at the 3D cursor. It is stored as an empty with a species and seed; Refine or rendering creates "
-        "its branches and leaves"
-    )
-    bl_options = {'REGISTER', 'UNDO'}
+    needs = (in_object_mode,)
 
     species: EnumProperty(name="Species", description="Species from the catalog", items=operator_items)
     seed: IntProperty(
@@ -67,10 +59,6 @@ class TETFLORA_OT_add_plant(Reporting, bpy.types.Operator):
         options={'SKIP_SAVE'},
     )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return in_object_mode(cls, context)
-
     def run(self, context: bpy.types.Context) -> set[str]:
         properties = self.properties
         if not properties.is_property_set("location"):
@@ -92,24 +80,21 @@ class TETFLORA_OT_add_plant(Reporting, bpy.types.Operator):
 
 
 class TETFLORA_OT_use_as_form(Reporting, bpy.types.Operator):
-    """Make the active curve or mesh of edges the form of the selected plants, or of a new one in its place."""
+    """Use the active curve, hair curves or mesh of edges as trunk and limbs of the selected plants or, if none is
+    selected, of a new plant in its place; the species grows the rest.
+
+    The form is no longer rendered.
+    """
 
     bl_idname = "tetflora.use_as_form"
     bl_label = "Make Plant from Form"
-    bl_description = (
-        "Use the active curve, hair curves or mesh of edges as trunk and limbs of the selected plants or, if none is "
-        "selected, of a new plant in its place; the species grows the rest. The form is no longer rendered"
+    needs = (
+        in_object_mode,
+        need(
+            lambda context: context.active_object is not None and context.active_object.type in FORM_TYPES,
+            "The active object must be a curve, hair curves or a mesh of edges; select it last",
+        ),
     )
-    bl_options = {'REGISTER', 'UNDO'}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not in_object_mode(cls, context):
-            return False
-        if context.active_object is not None and context.active_object.type in FORM_TYPES:
-            return True
-        cls.poll_message_set("The active object must be a curve, hair curves or a mesh of edges; select it last")
-        return False
 
     def run(self, context: bpy.types.Context) -> set[str]:
         form, depsgraph = context.active_object, context.evaluated_depsgraph_get()
@@ -125,8 +110,7 @@ class TETFLORA_OT_use_as_form(Reporting, bpy.types.Operator):
         form.hide_render = True
         select_only(context, plants)
         made = f"{counted(len(skeleton.points), 'point')} drawn"
-        self.report({'INFO'}, f'"{form.name}" is now the form of {counted(len(plants), "plant")}: {made}')
-        return {'FINISHED'}
+        return self.done(f'"{form.name}" is now the form of {counted(len(plants), "plant")}: {made}')
 
 
 def _in_place_of(form: bpy.types.Object, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Placement:
@@ -148,35 +132,28 @@ def _species(scene: bpy.types.Scene) -> str:
 
 
 class TETFLORA_OT_first_forest(Reporting, bpy.types.Operator):
-    """Make a small complete forest."""
+    """Create a small complete scene with ground, about ninety plants of four species, camera, sun and sky, ready for
+    Refine and F12.
+
+    Existing objects remain: if the scene is not empty, a new scene is added.
+    """
 
     bl_idname = "tetflora.first_forest"
     bl_label = "First Forest"
-    bl_description = (
-        "Create a small complete scene with ground, about ninety plants of four species, camera, sun and sky, ready "
-        "for Refine and F12. Existing objects remain: if the scene is not empty, a new scene is added"
-    )
-    bl_options = {'REGISTER', 'UNDO'}
+    needs = (in_object_mode,)
 
     seed: IntProperty(name="Seed", description="A different seed gives a different forest", options={'SKIP_SAVE'})
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return in_object_mode(cls, context)
-
     def run(self, context: bpy.types.Context) -> set[str]:
-        scene, said = build(context, self.seed)
+        scene, note = build(context, self.seed)
         _activate_ground(scene)
         plants = sum(o.tetflora.is_plant for o in scene.objects)
         screen = context.screen
         for area in screen.areas if screen and not bpy.app.background else ():
             if area.type == 'VIEW_3D':
                 area.spaces.active.region_3d.view_perspective = 'CAMERA'
-        said = f" ({said})" if said else ""
-        self.report(
-            {'INFO'}, f"Created a forest of {plants} plants{said}. Click Refine to show it, press F12 to render it"
-        )
-        return {'FINISHED'}
+        note = f" ({note})" if note else ""
+        return self.done(f"Created a forest of {plants} plants{note}. Click Refine to show it, press F12 to render it")
 
 
 def _activate_ground(scene: bpy.types.Scene) -> None:
@@ -191,22 +168,21 @@ def _activate_ground(scene: bpy.types.Scene) -> None:
         layer.objects.active = ground
 
 
-# Of what is not given, the panel's settings are taken: defaults do not matter here.
+# What is not given comes from the panel's settings: defaults do not matter here.
 _RULES = properties_of(Rules, options={'SKIP_SAVE'})
 # Names that the operator shares with the scene's settings for populating.
 _SHARED = ("count", "as_field", "seed", "slope_limit", "min_distance", "scale_min", "scale_max")
 
 
 class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
-    """Scatter plants over the selected meshes."""
+    """Scatter plants over the selected meshes as a new population, which can be changed later.
+
+    Each plant is an empty, or a vertex of one mesh if there are many.
+    """
 
     bl_idname = "tetflora.populate"
     bl_label = "Populate"
-    bl_description = (
-        "Scatter plants over the selected meshes as a new population, which can be changed later. Each plant is an "
-        "empty, or a vertex of one mesh if there are many"
-    )
-    bl_options = {'REGISTER', 'UNDO'}
+    needs = (in_object_mode, ground_selected)
 
     count: _RULES.count
     as_field: EnumProperty(
@@ -227,23 +203,17 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
         options={'SKIP_SAVE'},
     )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not in_object_mode(cls, context):
-            return False
-        return ground_selected(cls, context)
-
     def run(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
         self._complete_from(scene)
-        shares = _parse_shares(self.species)
+        weights = _parse_weights(self.species)
         if self.as_field == 'EMPTIES' and self.count > MOST_EMPTIES:
             raise SceneError(
                 f"{self.count:,} plants exceed the limit of {MOST_EMPTIES:,} empties; "
                 "set Create As to Field, or use fewer plants"
             )
         grounds = selected_grounds(context)
-        population = self._population(scene, grounds, shares)
+        population = self._population(scene, grounds, weights)
         try:
             made = make_plants(scene, context.evaluated_depsgraph_get(), population)
         except TetFloraError:
@@ -252,11 +222,10 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
         select_only(context, [*made.objects, *grounds])
         # The terrain stays selected and active, so that Populate can follow Populate.
         context.view_layer.objects.active = grounds[0]
-        report_made(self, made)
-        return {'FINISHED'}
+        return report_made(self, made)
 
     def _population(
-        self, scene: bpy.types.Scene, grounds: list[bpy.types.Object], shares: dict[str, float]
+        self, scene: bpy.types.Scene, grounds: list[bpy.types.Object], weights: dict[str, float]
     ) -> bpy.types.PropertyGroup:
         """A new population with the settings for new ones, and over them what was given."""
         population = add_population(scene, grounds)
@@ -265,9 +234,9 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
         population.by_density = False
         population.mix.clear()
         given = {entry.species: entry for entry in scene.tetflora.populate.mix}
-        for identifier, share in shares.items():
+        for identifier, weight in weights.items():
             entry = population.mix.add()
-            entry.species, entry.weight = identifier, share
+            entry.species, entry.weight = identifier, weight
             if identifier in given:
                 copy_companion(given[identifier], entry)
         return population
@@ -280,22 +249,22 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
                 setattr(self, name, getattr(settings, "slope_max" if name == "slope_limit" else name))
         if not self.species:
             mix = [(entry.species, entry.weight) for entry in settings.mix if entry.species]
-            self.species = ", ".join(f"{name}:{share:g}" for name, share in mix) or default_species()
+            self.species = ", ".join(f"{name}:{weight:g}" for name, weight in mix) or default_species()
 
 
-def _parse_shares(text: str) -> dict[str, float]:
-    """``oak:3, spruce`` to shares by identifier; a species named twice gets both shares."""
+def _parse_weights(text: str) -> dict[str, float]:
+    """``oak:3, spruce`` to weights by identifier; the weights of a species named twice add up."""
     known = catalogue()
-    shares: dict[str, float] = {}
+    weights: dict[str, float] = {}
     for part in filter(None, (p.strip() for p in text.split(","))):
-        identifier, _, share = (p.strip() for p in part.partition(":"))
+        identifier, _, weight = (p.strip() for p in part.partition(":"))
         if identifier not in known:
             raise SceneError(f'Unknown species "{identifier}"; choose one of {", ".join(known)}')
         try:
-            shares[identifier] = shares.get(identifier, 0.0) + (float(share) if share else 1.0)
+            weights[identifier] = weights.get(identifier, 0.0) + (float(weight) if weight else 1.0)
         except ValueError:
             raise SceneError(f'"{part}" is not a species with a weight; write for example {identifier}:2') from None
-    return shares
+    return weights
 
 
 CLASSES = (

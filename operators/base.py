@@ -1,12 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What operators have in common: errors of the artist become reports, and the selection is read in one way.
-
-Operators that work step by step: at once in scripts, in the window between redraws, with progress and Esc.
-"""
+"""What operators share: tooltips, conditions, reports, the selection, and work in steps between redraws."""
 
 import time
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from typing import Any
 
 import bpy
@@ -15,54 +12,89 @@ from ..tetflora_addon.blender.placing.plant_objects import plants_of
 from ..tetflora_addon.errors import TetFloraError
 from ..tetflora_addon.refinement.statistics import Progress, at_once
 
+LINKED = (
+    "The plants are linked from another file; use Object > Relations > Make Local, or Object > Library Override > Make"
+)
+NO_VIEWPORT = "This tool requires a 3D viewport"
+NO_CAMERA = "The scene has no active camera; add one with Add > Camera"
+_SLICE = 0.05  # seconds of work between two looks at the keyboard
 
-class Reporting:
-    """Mix-in for operators: ``run`` does the work, and an error of the artist's becomes a report.
+#: A condition of an operator: why it is not available in a context, or an empty text.
+Need = Callable[[bpy.types.Context], str]
 
-    Blender counts the operator as cancelled then, and pushes no undo step.
-    """
+
+class Tool:
+    """Mix-in for operators: the docstring is the tooltip, and `needs` decides whether the operator is available."""
+
+    needs: tuple[Need, ...] = ()
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if "bl_description" not in vars(cls):
+            cls.bl_description = " ".join((cls.__doc__ or "").split()).removesuffix(".")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        reason = next(filter(None, (need(context) for need in cls.needs)), "")
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
+
+    def done(self, text: str) -> set[str]:
+        """Report what was done; the operator's result."""
+        self.report({'INFO'}, text)
+        return {'FINISHED'}
+
+    def refused(self, text: str) -> set[str]:
+        """Warn that there is nothing to do; the operator's result."""
+        self.report({'WARNING'}, text)
+        return {'CANCELLED'}
+
+    def failed(self, error: TetFloraError | str) -> set[str]:
+        """Report an error; the operator's result, for which Blender pushes no undo step."""
+        self.report({'ERROR'}, str(error))
+        return {'CANCELLED'}
+
+
+class Reporting(Tool):
+    """Mix-in for operators whose ``run`` does the work; a `TetFloraError` becomes a report."""
+
+    bl_options = {'REGISTER', 'UNDO'}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
             return self.run(context)
         except TetFloraError as error:
-            self.report({'ERROR'}, str(error))
-            return {'CANCELLED'}
+            return self.failed(error)
 
     def run(self, context: bpy.types.Context) -> set[str]:
         """Do it; the result of ``execute``."""
         raise NotImplementedError
 
 
-def in_object_mode(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """Poll: objects can be made and deleted now."""
-    if context.mode == 'OBJECT':
-        return True
-    cls.poll_message_set("Only available in Object Mode")
-    return False
+def need(test: Callable[[bpy.types.Context], object], message: str) -> Need:
+    """The condition that a test of the context is true."""
+    return lambda context: "" if test(context) else message
 
 
-LINKED = (
-    "The plants are linked from another file; use Object > Relations > Make Local, or Object > Library Override > Make"
-)
+in_object_mode = need(lambda context: context.mode == 'OBJECT', "Only available in Object Mode")
 
 
-def plants_selected(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """Poll: at least one plant is selected that this file may change."""
-    plants = plants_of(context.selected_objects)
-    if any(obj.library is None for obj in plants):
-        return True
-    cls.poll_message_set(LINKED if plants else "Select plants first")
-    return False
+def plants_selected(context: bpy.types.Context) -> str:
+    """At least one plant is selected that this file may change."""
+    return _editable(plants_of(context.selected_objects), "Select plants first")
 
 
-def plants_or_fields_selected(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """Poll: at least one plant or field of plants is selected that this file may change."""
+def plants_or_fields_selected(context: bpy.types.Context) -> str:
+    """At least one plant or field of plants is selected that this file may change."""
     found = [obj for obj in context.selected_objects if obj.tetflora.is_plant or obj.tetflora.is_field]
-    if any(obj.library is None for obj in found):
-        return True
-    cls.poll_message_set(LINKED if found else "Select plants or a field of plants first")
-    return False
+    return _editable(found, "Select plants or a field of plants first")
+
+
+def _editable(objects: list[bpy.types.Object], message: str) -> str:
+    if any(obj.library is None for obj in objects):
+        return ""
+    return LINKED if objects else message
 
 
 def selected_plants(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -83,12 +115,10 @@ def select_only(context: bpy.types.Context, objects: list[bpy.types.Object]) -> 
 
 
 def counted(number: int, what: str) -> str:
-    """``1 plant``, ``2 plants``."""
-    return f"{number:,} {what}{'' if number == 1 else 's'}"
-
-
-# Seconds of work between two looks at the keyboard.
-_SLICE = 0.05
+    """``1 plant``, ``2 plants``, ``2 proxies``."""
+    if number != 1:
+        what = what[:-1] + "ies" if what == "proxy" else what + "s"
+    return f"{number:,} {what}"
 
 
 class ModalJob(Reporting):
@@ -97,7 +127,7 @@ class ModalJob(Reporting):
     Closing the steps leaves everything as it was.
     """
 
-    #: What is reported after Esc, and what the status bar says of keys.
+    #: What is reported after Esc, and the status bar's text about keys.
     cancelled = "Cancelled; the scene is unchanged"
     keys = "Esc: Cancel"
 
@@ -106,7 +136,7 @@ class ModalJob(Reporting):
     _enough = False
 
     def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, Any]:
-        """The work; True is sent to it when the artist presses Return, if `keys` tells of it."""
+        """The work; True is sent to it when the artist presses Return."""
         raise NotImplementedError
 
     def finish(self, context: bpy.types.Context, result: Any) -> set[str]:
@@ -121,15 +151,14 @@ class ModalJob(Reporting):
             return self.execute(context)
         self._steps = self.steps(context)
         try:
-            # The scene is read in the second step: what is wrong with it is said while the artist still looks here.
+            # The scene is read in the second step: its errors are reported at once, while the artist still looks here.
             for _ in range(2):
                 progress = next(self._steps)
         except StopIteration as stop:
             self._steps = None
             return self.finish(context, stop.value)
         except TetFloraError as error:
-            self.report({'ERROR'}, str(error))
-            return {'CANCELLED'}
+            return self.failed(error)
         manager = context.window_manager
         manager.progress_begin(0.0, 1.0)
         self._show(context, progress)
@@ -157,8 +186,7 @@ class ModalJob(Reporting):
             return self.finish(context, stop.value)
         except TetFloraError as error:
             self.cancel(context)
-            self.report({'ERROR'}, str(error))
-            return {'CANCELLED'}
+            return self.failed(error)
         except BaseException:
             self.cancel(context)
             raise
@@ -166,7 +194,7 @@ class ModalJob(Reporting):
         return {'RUNNING_MODAL'}
 
     def cancel(self, context: bpy.types.Context) -> None:
-        """Esc, or Blender ends the operator: what was half made goes."""
+        """Discard what is half made, after Esc or when Blender ends the operator."""
         if self._steps is not None:
             self._steps.close()
         self._leave(context)
@@ -177,8 +205,7 @@ class ModalJob(Reporting):
 
     def _show(self, context: bpy.types.Context, progress: Progress) -> None:
         context.window_manager.progress_update(progress.fraction)
-        told = f"TetFlora {progress.fraction:4.0%}   {progress.message}   |   {self.keys}"
-        context.workspace.status_text_set(told)
+        context.workspace.status_text_set(f"TetFlora {progress.fraction:4.0%}   {progress.message}   |   {self.keys}")
 
     def _leave(self, context: bpy.types.Context) -> None:
         self._steps = None

@@ -16,13 +16,13 @@ from ..tetflora_addon.blender.placing.properties import MODES
 from ..tetflora_addon.blender.runtime import redraw
 from ..tetflora_addon.errors import SceneError, TetFloraError
 from ..tetflora_addon.planting.strokes import dabs_along
-from .base import counted
+from .base import NO_VIEWPORT, counted
 from .ground_tools import NAVIGATION, GroundTool
 
 _SPACING = 0.25  # radii from dab to dab
-_PATIENCE = 4.0  # times what showing the plants cost last time, before it is done again
-_FINER = 1.1  # by what a key or a notch of the wheel makes the brush wider
-_PIXELS = 0.01  # share of the radius that a pixel of the mouse adds after F
+_PATIENCE = 4.0  # multiple of the time that showing the plants took last, before it happens again
+_FINER = 1.1  # factor of the radius for a key or a notch of the wheel
+_PIXELS = 0.01  # fraction of the radius that a pixel of the mouse adds after F
 _COLOURS = {'PAINT': (0.35, 0.95, 0.3, 1.0), 'ERASE': (1.0, 0.3, 0.2, 1.0), 'THIN': (1.0, 0.8, 0.2, 1.0)}
 _MODE_KEYS = {'P': 'PAINT', 'E': 'ERASE', 'T': 'THIN'}
 _KEYS = (
@@ -34,15 +34,13 @@ _DONE = {'PAINT': "painted", 'ERASE': "erased", 'THIN': "thinned out"}
 
 
 class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
-    """Paint plants onto the ground."""
+    """Paint, erase or thin plants with a brush on the visible meshes.
+
+    Each stroke is one undo step; Esc or a right click finishes and keeps what was painted.
+    """
 
     bl_idname = "tetflora.paint_plants"
     bl_label = "Paint Plants"
-    bl_description = (
-        "Paint, erase or thin plants with a brush on the visible meshes. Each stroke is one undo step; Esc or a right "
-        "click finishes and keeps what was painted"
-    )
-    bl_options = {'REGISTER'}
 
     mode: EnumProperty(
         name="Mode",
@@ -69,8 +67,7 @@ class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         if not self.stroke:
-            self.report({'ERROR'}, "This tool requires a 3D viewport, or a stroke from a script")
-            return {'CANCELLED'}
+            return self.failed(f"{NO_VIEWPORT}, or a stroke from a script")
         if self.properties.is_property_set("mode"):
             context.scene.tetflora.brush.mode = self.mode
         try:
@@ -80,12 +77,10 @@ class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
                 self._dab(context, place, 1.0)
             stroke.finish()
         except TetFloraError as error:
-            self.report({'ERROR'}, str(error))
-            return {'CANCELLED'}
+            return self.failed(error)
         self._stroke = None
         remove_empty_collections()
-        self.report({'INFO'}, _said(stroke))
-        return {'FINISHED'}
+        return self.done(_result_of(stroke))
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if self.stroke:
@@ -104,7 +99,7 @@ class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
             return self._handle(context, event)
         except TetFloraError as error:
             self._stroke = None
-            self.report({'ERROR'}, str(error))
+            self.failed(error)
             return {'RUNNING_MODAL'}
         except BaseException:
             self.end(context)
@@ -200,7 +195,7 @@ class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
     def _end_stroke(self, context: bpy.types.Context) -> None:
         stroke, self._stroke = self._stroke, None
         stroke.finish()
-        self._done = _said(stroke)
+        self._done = _result_of(stroke)
         if stroke.added or stroke.removed:
             remove_empty_collections()
             self._changed = True
@@ -223,7 +218,7 @@ class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
 
 
 def _places(text: str) -> list[tuple[float, float, float]]:
-    """Places of a stroke that is written down."""
+    """Points of a stroke given as text."""
     try:
         places = [tuple(float(number) for number in part.split()) for part in text.split(",") if part.strip()]
     except ValueError:
@@ -233,7 +228,7 @@ def _places(text: str) -> list[tuple[float, float, float]]:
     return places
 
 
-def _said(stroke: Stroke) -> str:
+def _result_of(stroke: Stroke) -> str:
     number = stroke.added if stroke.mode == 'PAINT' else stroke.removed
     return f"{counted(number, 'plant')} {_DONE[stroke.mode]}"
 

@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What modal tools on the ground have in common: where the mouse points, keys that others keep, undo, leaving.
-
-Set plants one by one by clicking on the ground.
-"""
+"""Tools that point at the ground: what they share (pointing, undo, leaving), and placing plants by clicking."""
 
 from __future__ import annotations
 
@@ -22,7 +19,7 @@ from ..tetflora_addon.blender.species.edits import catalogue
 from ..tetflora_addon.blender.viewport.points import GroundCursor, circle
 from ..tetflora_addon.errors import TetFloraError
 from ..tetflora_addon.planting.places import Placement, new_seeds
-from .base import in_object_mode, select_only
+from .base import NO_VIEWPORT, Tool, in_object_mode, select_only
 
 # Turning and moving the view, which goes on while a tool runs.
 NAVIGATION = {
@@ -38,8 +35,11 @@ NAVIGATION = {
 }
 
 
-class GroundTool:
+class GroundTool(Tool):
     """Mix-in for modal operators in a 3D view that point at the ground."""
+
+    bl_options = {'REGISTER'}  # each plant or stroke is an undo step of its own
+    needs = (in_object_mode,)
 
     _cursor: GroundCursor | None = None
     _ground: Ground | None = None
@@ -48,18 +48,14 @@ class GroundTool:
     _undone: int = 0
     _hit: Hit | None = None
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return in_object_mode(cls, context)
-
     def begin(self, context: bpy.types.Context) -> bool:
-        """Start to listen and to draw; False, with a report, where that is impossible."""
+        """Start listening and drawing; False, with a report, where that is impossible."""
         if bpy.app.background or context.window is None or _view_of(context.screen) is None:
-            self.report({'ERROR'}, "This tool requires a 3D viewport")
+            self.failed(NO_VIEWPORT)
             return False
         self._look_around(context)
         if not len(self._ground):
-            self.report({'ERROR'}, "No mesh is visible to plant on; add a ground mesh, or show it")
+            self.failed("No mesh is visible to plant on; add a ground mesh, or show it")
             return False
         self._cursor, self._window = GroundCursor(), context.window
         self._steps = self._undone = 0
@@ -86,7 +82,7 @@ class GroundTool:
         self.end(context)
 
     def point(self, context: bpy.types.Context, event: bpy.types.Event) -> bool:
-        """Find the ground under the mouse; False where the mouse is not in a 3D view's picture."""
+        """Find the ground under the mouse; False where the mouse is not over a 3D view."""
         found = _region_at(context.screen, event.mouse_x, event.mouse_y)
         if found is None:
             self._hit = None
@@ -127,7 +123,7 @@ def _view_of(screen: bpy.types.Screen | None) -> bpy.types.Area | None:
 
 
 def _region_at(screen: bpy.types.Screen, x: int, y: int) -> tuple[bpy.types.Region, bpy.types.RegionView3D] | None:
-    """The picture of a 3D view at a place of the window, unless a sidebar, a header or a gizmo lies over it there."""
+    """The main region of a 3D view at a place of the window, unless a sidebar, header or gizmo covers it there."""
     for area in screen.areas:
         if area.type != 'VIEW_3D' or not _in(area, x, y):
             continue
@@ -153,15 +149,13 @@ _KEYS = (
 
 
 class TETFLORA_OT_place_plant(GroundTool, bpy.types.Operator):
-    """Click on the ground to set plants."""
+    """Click on the ground to add plants one by one, each a different individual.
+
+    The wheel rotates, Ctrl and the wheel scale; each plant is one undo step; Esc finishes.
+    """
 
     bl_idname = "tetflora.place_plant"
     bl_label = "Place Plants by Clicking"
-    bl_description = (
-        "Click on the ground to add plants one by one, each a different individual. The wheel rotates, Ctrl and the "
-        "wheel scale; each plant is one undo step; Esc finishes"
-    )
-    bl_options = {'REGISTER'}
 
     species: EnumProperty(name="Species", description="Species from the catalog", items=operator_items)
 
@@ -170,15 +164,13 @@ class TETFLORA_OT_place_plant(GroundTool, bpy.types.Operator):
     _height = 1.0
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
-        self.report({'ERROR'}, "This tool requires a 3D viewport; use tetflora.add_plant in scripts")
-        return {'CANCELLED'}
+        return self.failed(f"{NO_VIEWPORT}; use tetflora.add_plant in scripts")
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         try:
             chosen = default_species() if self.species in {"", NO_SPECIES} else self.species
         except TetFloraError as error:
-            self.report({'ERROR'}, str(error))
-            return {'CANCELLED'}
+            return self.failed(error)
         if not self.begin(context):
             return {'CANCELLED'}
         self._chosen, self._turn, self._scale, self._height = chosen, 0.0, 1.0, display_height(chosen)

@@ -1,15 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What operators have in common that mark the selected objects, and take the mark away when called again.
-
-Mark objects whose own polygons are refined.
-
-Mark meshes as occluders.
-
-Fields of plants: mark objects as fields, make a field of plants that are objects, and plants of a field.
-
-Add entries to the lists of the panels and remove them.
-"""
+"""Mark objects as refined meshes, occluders or fields of plants, convert fields, and edit the lists of the panels."""
 
 from typing import Any
 
@@ -30,7 +21,7 @@ from ..tetflora_addon.blender.scene.fields import FIELD_TYPES, fields_of
 from ..tetflora_addon.blender.scene.objects import may_instance
 from ..tetflora_addon.blender.species.catalogue import default_species
 from ..tetflora_addon.blender.species.edits import catalogue
-from .base import Reporting, counted, in_object_mode, plants_selected, select_only, selected_plants
+from .base import Reporting, counted, in_object_mode, need, plants_selected, select_only, selected_plants
 
 
 def action_property(mark: str, unmark: str) -> Any:
@@ -77,10 +68,9 @@ class Marking(Reporting):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if cls._chosen(context):
-            return True
-        cls.poll_message_set(cls.nothing)
-        return False
+        if not cls._chosen(context):
+            cls.poll_message_set(cls.nothing)
+        return bool(cls._chosen(context))
 
     def run(self, context: bpy.types.Context) -> set[str]:
         chosen = self._chosen(context)
@@ -89,8 +79,7 @@ class Marking(Reporting):
         for obj in chosen:
             setattr(obj.tetflora, self.mark, wanted and self.fits(obj))
         number = counted(len(chosen), "object")
-        self.report({'INFO'}, self.marked.format(number) if wanted else f"{number} unmarked")
-        return {'FINISHED'}
+        return self.done(self.marked.format(number) if wanted else f"{number} unmarked")
 
 
 def can_be_explicit(obj: bpy.types.Object) -> bool:
@@ -100,15 +89,14 @@ def can_be_explicit(obj: bpy.types.Object) -> bool:
 
 
 class TETFLORA_OT_mark_explicit(Marking, bpy.types.Operator):
-    """Let the selected objects' own polygons take part in refinement, or take the mark away."""
+    """Refine the polygons of the selected objects together with the plants: imported trees, rocks, scans, and objects
+    that instance them.
+
+    Use again to unmark.
+    """
 
     bl_idname = "tetflora.mark_explicit"
     bl_label = "Refine These Meshes"
-    bl_description = (
-        "Refine the polygons of the selected objects together with the plants: imported trees, rocks, scans, and "
-        "objects that instance them. Use again to unmark"
-    )
-    bl_options = {'REGISTER', 'UNDO'}
     mark, nothing, marked = "is_explicit", "Select meshes, or objects that instance them, first", "{} will be refined"
 
     action: action_property("Refine the polygons of the objects", "Leave the objects unchanged")
@@ -117,15 +105,14 @@ class TETFLORA_OT_mark_explicit(Marking, bpy.types.Operator):
 
 
 class TETFLORA_OT_mark_occluder(Marking, bpy.types.Operator):
-    """Mark the selected meshes as occluders of the plants behind them, or unmark them."""
+    """Mark the selected meshes, such as terrain and buildings, as occluders: plants behind them count as hidden and
+    cost next to nothing.
+
+    Use again to unmark.
+    """
 
     bl_idname = "tetflora.mark_occluder"
     bl_label = "Mark as Occluder"
-    bl_description = (
-        "Mark the selected meshes, such as terrain and buildings, as occluders: plants behind them count as hidden and "
-        "cost next to nothing. Use again to unmark"
-    )
-    bl_options = {'REGISTER', 'UNDO'}
     mark, nothing, marked = "is_occluder", "Select meshes first", "{} marked as occluder"
 
     action: action_property("Plants behind the meshes count as hidden", "The meshes do not affect refinement")
@@ -135,64 +122,56 @@ class TETFLORA_OT_mark_occluder(Marking, bpy.types.Operator):
         return obj.type == 'MESH'
 
 
+def can_be_field(obj: bpy.types.Object | None) -> bool:
+    """Whether an object has points that could be plants, or is marked as a field although it has none any more."""
+    return obj is not None and (obj.type in FIELD_TYPES or obj.tetflora.is_field)
+
+
 class TETFLORA_OT_mark_field(Reporting, bpy.types.Operator):
-    """Use the active mesh or point cloud as a field of plants, or no longer."""
+    """Use each point of the active mesh or point cloud, after modifiers, as a plant.
+
+    The attributes species, seed, rotation and scale define the plants. Use again to turn it off.
+    """
 
     bl_idname = "tetflora.mark_field"
     bl_label = "Use as Field of Plants"
-    bl_description = (
-        "Use each point of the active mesh or point cloud, after modifiers, as a plant. The attributes species, seed, "
-        "rotation and scale define the plants. Use again to turn it off"
+    needs = (
+        need(
+            lambda context: can_be_field(context.active_object),
+            "The active object must be a mesh or point cloud; select it last",
+        ),
     )
-    bl_options = {'REGISTER', 'UNDO'}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        active = context.active_object
-        if active is not None and (active.type in FIELD_TYPES or active.tetflora.is_field):
-            return True
-        cls.poll_message_set("The active object must be a mesh or point cloud; select it last")
-        return False
 
     def run(self, context: bpy.types.Context) -> set[str]:
         obj = context.active_object
         field = obj.tetflora
         field.is_field = not field.is_field
         if not field.is_field:
-            self.report({'INFO'}, f'"{obj.name}" is no longer a field of plants')
-            return {'FINISHED'}
+            return self.done(f'"{obj.name}" is no longer a field of plants')
         field.is_plant = False
         if not field.field_species:
             field.field_species.add().species = field.species or default_species()
         prepare_scene(context.scene)
-        self.report({'INFO'}, f'The points of "{obj.name}" are now plants')
-        return {'FINISHED'}
+        return self.done(f'The points of "{obj.name}" are now plants')
 
 
 class TETFLORA_OT_make_field(Reporting, bpy.types.Operator):
-    """Make one field of the selected plants."""
+    """Replace the selected plants with one object whose vertices are the same plants.
+
+    This keeps Blender fast with many plants; parents, constraints and animation of single plants are lost.
+    """
 
     bl_idname = "tetflora.make_field"
     bl_label = "Convert Plants to Field"
-    bl_description = (
-        "Replace the selected plants with one object whose vertices are the same plants. This keeps Blender fast with "
-        "many plants; parents, constraints and animation of single plants are lost"
-    )
-    bl_options = {'REGISTER', 'UNDO'}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return in_object_mode(cls, context) and plants_selected(cls, context)
+    needs = (in_object_mode, plants_selected)
 
     def run(self, context: bpy.types.Context) -> set[str]:
         selected = plants_of(context.selected_objects)
         plants = [o for o in selected_plants(context) if o.tetflora.enabled and not o.hide_render]
         if not plants:
-            self.report(
-                {'WARNING'},
+            return self.refused(
                 "The selected plants are disabled, hidden in renders, or linked; enable them first",
             )
-            return {'CANCELLED'}
         left = len(selected) - len(plants)
         owner = owner_of(context.scene, plants)
         home = collection_of(context.scene, owner) if owner else None
@@ -201,8 +180,7 @@ class TETFLORA_OT_make_field(Reporting, bpy.types.Operator):
             adopt(context.scene, owner, [field])
         select_only(context, [field])
         rest = f"; {counted(left, 'plant')} not converted: disabled, hidden in renders, or linked" if left else ""
-        self.report({'INFO'}, f'{counted(len(plants), "plant")} converted to the field "{field.name}"{rest}')
-        return {'FINISHED'}
+        return self.done(f'{counted(len(plants), "plant")} converted to the field "{field.name}"{rest}')
 
 
 class TETFLORA_OT_split_field(Reporting, bpy.types.Operator):
@@ -210,17 +188,11 @@ class TETFLORA_OT_split_field(Reporting, bpy.types.Operator):
 
     bl_idname = "tetflora.split_field"
     bl_label = "Convert Field to Objects"
+    needs = (
+        in_object_mode,
+        need(lambda context: fields_of(context.selected_objects), "Select a field of plants first"),
+    )
     bl_description = f"Replace the selected fields with one empty per plant. At most {MOST_EMPTIES:,} plants"
-    bl_options = {'REGISTER', 'UNDO'}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not in_object_mode(cls, context):
-            return False
-        if fields_of(context.selected_objects):
-            return True
-        cls.poll_message_set("Select a field of plants first")
-        return False
 
     def run(self, context: bpy.types.Context) -> set[str]:
         depsgraph = context.evaluated_depsgraph_get()
@@ -233,11 +205,9 @@ class TETFLORA_OT_split_field(Reporting, bpy.types.Operator):
                 adopt(context.scene, owner, plants)
             made += plants
         if not made:
-            self.report({'WARNING'}, "The selected fields are linked; make them local first")
-            return {'CANCELLED'}
+            return self.refused("The selected fields are linked; make them local first")
         select_only(context, made)
-        self.report({'INFO'}, f"{counted(len(made), 'plant')} made")
-        return {'FINISHED'}
+        return self.done(f"{counted(len(made), 'plant')} made")
 
 
 class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
@@ -273,8 +243,7 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> set[str]:
         owner, name = self._list(context)
         if owner is None:
-            self.report({'ERROR'}, "The active object must be a field of plants; select one")
-            return {'CANCELLED'}
+            return self.failed("The active object must be a field of plants; select one")
         entries, index = getattr(owner, name), f"{name}_index"
         if self.action == 'ADD':
             present = {entry.species for entry in entries}
@@ -284,8 +253,7 @@ class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
             return {'FINISHED'}
         active = getattr(owner, index)
         if not 0 <= active < len(entries):
-            self.report({'WARNING'}, "No active entry to remove")
-            return {'CANCELLED'}
+            return self.refused("No active entry to remove")
         entries.remove(active)
         setattr(owner, index, max(min(active, len(entries) - 1), 0))
         return {'FINISHED'}

@@ -1,15 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Change the species of plants.
-
-Re-roll the seeds of plants.
-
-Select plants by species.
-
-Remove plants.
-
-Let plants fall onto the ground.
-"""
+"""Change, re-roll, select and remove plants, and drop them to the ground."""
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
@@ -30,52 +21,40 @@ from .base import LINKED, Reporting, counted, in_object_mode, plants_or_fields_s
 
 
 class TETFLORA_OT_assign_species(Reporting, bpy.types.Operator):
-    """Give the selected plants, and those of selected fields, another species."""
+    """Assign this species to all selected plants and to all plants of selected fields.
+
+    Seeds, scales and positions do not change.
+    """
 
     bl_idname = "tetflora.assign_species"
     bl_label = "Change Species"
-    bl_description = (
-        "Assign this species to all selected plants and to all plants of selected fields. Seeds, scales and positions "
-        "do not change"
-    )
-    bl_options = {'REGISTER', 'UNDO'}
+    needs = (plants_or_fields_selected,)
 
     species: EnumProperty(name="Species", description="Species from the catalog", items=operator_items)
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return plants_or_fields_selected(cls, context)
-
     def run(self, context: bpy.types.Context) -> set[str]:
         if self.species in {"", NO_SPECIES}:
-            self.report({'ERROR'}, "Choose a species")
-            return {'CANCELLED'}
+            return self.failed("Choose a species")
         changed = assign_species(selected_plants(context), self.species)
         for field in fields_of(context.selected_objects):
             if assign_field_species(field, self.species):
                 changed += stored_size(field)
-        self.report({'INFO'}, f"{counted(changed, 'plant')} changed")
-        return {'FINISHED'}
+        return self.done(f"{counted(changed, 'plant')} changed")
 
 
 class TETFLORA_OT_reseed(Reporting, bpy.types.Operator):
-    """Make other individuals of the selected plants."""
+    """Turn each selected plant, and each plant of selected fields, into a different individual of its species.
+
+    Copies with the same seed become different.
+    """
 
     bl_idname = "tetflora.reseed"
     bl_label = "Re-roll Seeds"
-    bl_description = (
-        "Turn each selected plant, and each plant of selected fields, into a different individual of its species. "
-        "Copies with the same seed become different"
-    )
-    bl_options = {'REGISTER', 'UNDO'}
+    needs = (plants_or_fields_selected,)
 
     roll: IntProperty(
         name="Roll", description="A different number gives different plants", min=0, soft_max=100, options={'SKIP_SAVE'}
     )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return plants_or_fields_selected(cls, context)
 
     def run(self, context: bpy.types.Context) -> set[str]:
         number = reseed(selected_plants(context), self.roll)
@@ -83,17 +62,15 @@ class TETFLORA_OT_reseed(Reporting, bpy.types.Operator):
         for place, field in enumerate(fields):
             reseed_field(field, place, self.roll)
             number += stored_size(field)
-        self.report({'INFO'}, f"{counted(number, 'plant')} re-rolled")
-        return {'FINISHED'}
+        return self.done(f"{counted(number, 'plant')} re-rolled")
 
 
 class TETFLORA_OT_select_species(Reporting, bpy.types.Operator):
-    """Select all plants of a species."""
+    """Select all plants of the same species as the active plant."""
 
     bl_idname = "tetflora.select_species"
     bl_label = "Select Species"
-    bl_description = "Select all plants of the same species as the active plant"
-    bl_options = {'REGISTER', 'UNDO'}
+    needs = (in_object_mode,)
 
     species: StringProperty(
         name="Species",
@@ -102,19 +79,11 @@ class TETFLORA_OT_select_species(Reporting, bpy.types.Operator):
     )
     extend: BoolProperty(name="Extend", description="Extend the current selection", options={'SKIP_SAVE'})
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if context.mode != 'OBJECT':
-            cls.poll_message_set("Only available in Object Mode")
-            return False
-        return True
-
     def run(self, context: bpy.types.Context) -> set[str]:
         if not self.species:
             active = context.active_object
             if active is None or not active.tetflora.is_plant:
-                self.report({'ERROR'}, "The active object must be a plant; select one")
-                return {'CANCELLED'}
+                return self.failed("The active object must be a plant; select one")
             self.species = active.tetflora.species
         found = [o for o in plants_of(context.view_layer.objects) if o.tetflora.species == self.species]
         if not self.extend:
@@ -122,8 +91,7 @@ class TETFLORA_OT_select_species(Reporting, bpy.types.Operator):
                 obj.select_set(False)
         for obj in found:
             obj.select_set(True)
-        self.report({'INFO'}, f'{counted(len(found), "plant")} of species "{self.species}" selected')
-        return {'FINISHED'}
+        return self.done(f'{counted(len(found), "plant")} of species "{self.species}" selected')
 
 
 class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
@@ -131,7 +99,7 @@ class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
 
     bl_idname = "tetflora.remove_plants"
     bl_label = "Remove Plants"
-    bl_options = {'REGISTER', 'UNDO'}
+    needs = (in_object_mode,)
 
     which: EnumProperty(
         name="Which",
@@ -149,54 +117,41 @@ class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
     def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
         return properties.bl_rna.properties["which"].enum_items[properties.which].description
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return in_object_mode(cls, context)
-
     def run(self, context: bpy.types.Context) -> set[str]:
         objects = context.selected_objects if self.which == 'SELECTED' else context.scene.objects
         plants = [o for o in plants_of(objects) if self.which != 'SPECIES' or o.tetflora.species == self.species]
         fields = [] if self.which == 'SPECIES' else fields_of(objects)
         local = [o for o in (*plants, *fields) if o.library is None]
         if (plants or fields) and not local:
-            self.report({'WARNING'}, f"{LINKED}; nothing removed")
-            return {'CANCELLED'}
+            return self.refused(f"{LINKED}; nothing removed")
         if not local:
             none = {
                 'SELECTED': "Select plants first",
                 'SPECIES': f'The scene has no plants of species "{self.species}"',
                 'ALL': "The scene has no plants",
             }
-            self.report({'WARNING'}, f"{none[self.which]}; nothing removed")
-            return {'CANCELLED'}
+            return self.refused(f"{none[self.which]}; nothing removed")
         number = remove_plants(plants) + remove_fields(fields)
         recount(context.scene)
-        self.report({'INFO'}, f"{counted(number, 'plant')} removed")
-        return {'FINISHED'}
+        return self.done(f"{counted(number, 'plant')} removed")
 
 
 class TETFLORA_OT_drop_to_ground(Reporting, bpy.types.Operator):
-    """Move the selected plants up or down onto the ground."""
+    """Move the selected plants, and the plants of selected fields, vertically to the nearest visible mesh.
+
+    Plants, results and refined meshes do not count as ground.
+    """
 
     bl_idname = "tetflora.drop_to_ground"
     bl_label = "Drop Plants to Ground"
-    bl_description = (
-        "Move the selected plants, and the plants of selected fields, vertically to the nearest visible mesh. Plants, "
-        "results and refined meshes do not count as ground"
-    )
-    bl_options = {'REGISTER', 'UNDO'}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return in_object_mode(cls, context) and plants_or_fields_selected(cls, context)
+    needs = (in_object_mode, plants_or_fields_selected)
 
     def run(self, context: bpy.types.Context) -> set[str]:
         context.view_layer.update()
         depsgraph = context.evaluated_depsgraph_get()
         ground = Ground(context.view_layer, depsgraph)
         if not len(ground):
-            self.report({'ERROR'}, "No mesh is visible below or above the plants; add a ground mesh, or show it")
-            return {'CANCELLED'}
+            return self.failed("No mesh is visible below or above the plants; add a ground mesh, or show it")
         plants = selected_plants(context)
         fields = fields_of(context.selected_objects)
         moved, missed = drop_plants(plants, ground)
@@ -208,8 +163,8 @@ class TETFLORA_OT_drop_to_ground(Reporting, bpy.types.Operator):
         notes = [f"{counted(missed, 'plant')} had no ground below or above"] if missed else []
         if left:
             notes.append(f'"{left[0]}" was not moved: it has modifiers, or was not created by TetFlora')
-        said = f"{counted(moved, 'plant')} moved to the ground"
-        self.report({'WARNING' if notes else 'INFO'}, "; ".join([said, *notes]))
+        moves = f"{counted(moved, 'plant')} moved to the ground"
+        self.report({'WARNING' if notes else 'INFO'}, "; ".join([moves, *notes]))
         return {'FINISHED'} if moved else {'CANCELLED'}
 
 

@@ -1,102 +1,94 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compute the levels that viewports preview, forget them, and look at them from where they were refined for."""
+"""Compute the levels that viewports preview, clear them, and look through the camera that they belong to."""
 
 from collections.abc import Generator
 
 import bpy
 from mathutils import Matrix
 
-from ..tetflora_addon.blender.viewport import levels as preview_job
 from ..tetflora_addon.blender.viewport import state
+from ..tetflora_addon.blender.viewport.levels import level_steps
 from ..tetflora_addon.camera.camera import Camera
 from ..tetflora_addon.preview.levels import Levels
 from ..tetflora_addon.refinement.statistics import Progress
-from .base import ModalJob, counted
+from .base import NO_CAMERA, ModalJob, Reporting, counted, need
 
 #: Extent of a viewport's longer side at distance 1, times its focal length in millimetres.
 _VIEWPORT = 72.0
 
 
-def _camera_is_there(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    preview = state.find(context.scene)
-    if context.scene.camera is not None or (preview is not None and preview.frozen is not None):
-        return True
-    cls.poll_message_set("The scene has no active camera; add one with Add > Camera")
-    return False
+def _frozen(scene: bpy.types.Scene) -> Camera | None:
+    preview = state.find(scene)
+    return None if preview is None else preview.frozen
+
+
+def _levels_of(scene: bpy.types.Scene) -> Levels | None:
+    preview = state.find(scene)
+    return None if preview is None else preview.levels
+
+
+_camera_found = need(lambda context: context.scene.camera is not None or _frozen(context.scene) is not None, NO_CAMERA)
 
 
 class TETFLORA_OT_preview_levels(ModalJob, bpy.types.Operator):
-    """Refine without making anything."""
+    """Refine for the scene camera, or the frozen one, without creating meshes, and keep every level to step through in
+    viewports.
+
+    Takes as long as the first part of Refine; Esc cancels and keeps the previous levels.
+    """
 
     bl_idname = "tetflora.preview_levels"
     bl_label = "Compute Levels"
-    bl_description = (
-        "Refine for the scene camera, or the frozen one, without creating meshes, and keep every level to step "
-        "through in viewports. Takes as long as the first part of Refine; Esc cancels and keeps the previous levels"
-    )
+    needs = (_camera_found,)
     bl_options = {'REGISTER'}  # nothing in the file changes but the level that is shown
 
     cancelled = "Cancelled; the levels are unchanged"
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return _camera_is_there(cls, context)
-
     def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, Levels]:
-        return preview_job.level_steps(context.scene, context.evaluated_depsgraph_get(), context.view_layer)
+        return level_steps(context.scene, context.evaluated_depsgraph_get(), context.view_layer)
 
     def finish(self, context: bpy.types.Context, levels: Levels) -> set[str]:
-        context.scene.tetflora.preview.level = levels.levels[-1].number
         last = levels.levels[-1]
-        self.report(
-            {'INFO'},
+        context.scene.tetflora.preview.level = last.number
+        return self.done(
             f"{counted(len(levels), 'level')}, {len(last):,} tetrahedra with plants, {levels.nbytes / 1e6:.0f} MB",
         )
-        return {'FINISHED'}
 
 
-class TETFLORA_OT_forget_levels(bpy.types.Operator):
-    """Take the levels out of viewports and memory."""
+class TETFLORA_OT_forget_levels(Reporting, bpy.types.Operator):
+    """Remove the levels from viewports and memory. The file does not change."""
 
     bl_idname = "tetflora.forget_levels"
     bl_label = "Clear Levels"
-    bl_description = "Remove the levels from viewports and memory. The file does not change"
+    bl_options = set()
+    needs = (
+        need(lambda context: _levels_of(context.scene) is not None, "No levels to clear; click Compute Levels first"),
+    )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        preview = state.find(context.scene)
-        if preview is not None and preview.levels is not None:
-            return True
-        cls.poll_message_set("No levels to clear; click Compute Levels first")
-        return False
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         state.forget(context.scene)
         return {'FINISHED'}
 
 
-class TETFLORA_OT_look_through(bpy.types.Operator):
-    """Look at the preview from where it was made for."""
+class TETFLORA_OT_look_through(Reporting, bpy.types.Operator):
+    """Look through the scene camera or, if the camera is frozen, from the position and in the direction of the frozen
+    camera.
+    """
 
     bl_idname = "tetflora.look_through"
     bl_label = "Look Through Camera"
-    bl_description = (
-        "Look through the scene camera or, if the camera is frozen, from the position and in the direction of the "
-        "frozen camera"
+    bl_options = set()
+    needs = (
+        need(
+            lambda context: context.space_data is not None and context.space_data.type == 'VIEW_3D',
+            "Only available in a 3D viewport",
+        ),
+        _camera_found,
     )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if context.space_data is None or context.space_data.type != 'VIEW_3D':
-            cls.poll_message_set("Only available in a 3D viewport")
-            return False
-        return _camera_is_there(cls, context)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        scene, space = context.scene, context.space_data
-        preview = state.find(scene)
-        frozen = None if preview is None else preview.frozen
+    def run(self, context: bpy.types.Context) -> set[str]:
+        space, frozen = context.space_data, _frozen(context.scene)
         if frozen is None:
             space.region_3d.view_perspective = 'CAMERA'
         else:

@@ -1,15 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Refine the scene: at once in scripts, step by step with progress and Esc in the window.
-
-Clear what refinement made.
-
-Turn results into ordinary meshes of the artist's.
-
-Make ordinary meshes of the selected plants.
-
-Empty the cache folder.
-"""
+"""Refine the scene, clear or keep the results, convert plants to meshes, and clear the cache."""
 
 from collections.abc import Generator
 
@@ -29,31 +20,30 @@ from ..tetflora_addon.blender.scene.lights import read_world
 from ..tetflora_addon.blender.viewport import auto
 from ..tetflora_addon.errors import TetFloraError
 from ..tetflora_addon.refinement.statistics import Progress, Statistics
-from .base import ModalJob, Reporting, counted, in_object_mode, plants_selected, select_only, selected_plants
+from .base import (
+    NO_CAMERA,
+    ModalJob,
+    Reporting,
+    counted,
+    in_object_mode,
+    need,
+    plants_selected,
+    select_only,
+    selected_plants,
+)
 
 
 class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
-    """Make meshes and proxies of all plants, as fine as the scene's camera sees them."""
+    """Create meshes of plants near the scene camera and proxies of the others, replacing earlier results.
+
+    Esc cancels without changes; Return stops refining and creates what has been decided so far.
+    """
 
     bl_idname = "tetflora.refine"
     bl_label = "Refine"
-    bl_description = (
-        "Create meshes of plants near the scene camera and proxies of the others, replacing earlier results. Esc "
-        "cancels without changes; Return stops refining and creates what has been decided so far"
-    )
-    bl_options = {'REGISTER', 'UNDO'}
+    needs = (in_object_mode, need(lambda context: context.scene.camera is not None, NO_CAMERA))
 
     keys = "Esc: Cancel   |   Return: Finish Early"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if context.mode != 'OBJECT':
-            cls.poll_message_set("Only available in Object Mode")
-            return False
-        if context.scene.camera is None:
-            cls.poll_message_set("The scene has no active camera; add one with Add > Camera")
-            return False
-        return True
 
     def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, Statistics]:
         with auto.paused():
@@ -69,7 +59,7 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
         self.report(
             {'INFO'},
             f"{counted(statistics.plants, 'plant')}: {statistics.polygons_meshed:,} of {statistics.polygons_full:,} "
-            f"polygons, {statistics.tetrahedra_proxy:,} proxies in {sum(statistics.seconds.values()):.1f} s",
+            f"polygons, {counted(statistics.tetrahedra_proxy, 'proxy')} in {sum(statistics.seconds.values()):.1f} s",
         )
         if not statistics.complete and statistics.passes:
             self.report({'INFO'}, "Stopped early; click Refine again to complete the result")
@@ -115,58 +105,44 @@ def _cut_off(scene: bpy.types.Scene) -> str:
     )
 
 
+def _clearable(scene: bpy.types.Scene) -> bool:
+    """Whether there are results, or meshes that they left hidden when they were deleted by hand.
+
+    Only then are all objects looked through: a panel asks at every movement of the mouse.
+    """
+    return refine.has_results(scene) or bool(scene.tetflora.statistics and hiding.hidden_originals(scene))
+
+
 class TETFLORA_OT_clear(Reporting, bpy.types.Operator):
-    """Remove what Refine made."""
+    """Remove all meshes, materials and proxies that Refine created, and nothing else.
+
+    Plants remain, and hidden meshes are shown again.
+    """
 
     bl_idname = "tetflora.clear"
     bl_label = "Clear"
-    bl_description = (
-        "Remove all meshes, materials and proxies that Refine created, and nothing else. Plants remain, and hidden "
-        "meshes are shown again"
-    )
-    bl_options = {'REGISTER', 'UNDO'}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not in_object_mode(cls, context):
-            return False
-        # Results may have been deleted by hand, which leaves hidden what they stood for. Only then are all objects
-        # looked through: a panel asks at every movement of the mouse.
-        scene = context.scene
-        if not (refine.has_results(scene) or (scene.tetflora.statistics and hiding.hidden_originals(scene))):
-            cls.poll_message_set("No results to clear")
-            return False
-        return True
+    needs = (in_object_mode, need(lambda context: _clearable(context.scene), "No results to clear"))
 
     def run(self, context: bpy.types.Context) -> set[str]:
         auto.stop()
         hidden = hiding.hidden_originals(context.scene, 'VIEW')
         removed = f"{counted(refine.clear(context.scene), 'datablock')} removed"
         shown = sum(hiding.HIDDEN['VIEW'] not in original for original in hidden)
-        self.report({'INFO'}, f"{removed}, {counted(shown, 'object')} shown again" if shown else removed)
-        return {'FINISHED'}
+        return self.done(f"{removed}, {counted(shown, 'object')} shown again" if shown else removed)
 
 
 class TETFLORA_OT_keep_results(Reporting, bpy.types.Operator):
-    """Make ordinary meshes of what Refine made."""
+    """Turn the results into ordinary meshes that are saved in the file and can be edited.
+
+    Refine and Clear no longer change them. Turns off Refine at Render, to avoid rendering the plants twice.
+    """
 
     bl_idname = "tetflora.keep_results"
     bl_label = "Keep Results as Meshes"
-    bl_description = (
-        "Turn the results into ordinary meshes that are saved in the file and can be edited. Refine and Clear no "
-        "longer change them. Turns off Refine at Render, to avoid rendering the plants twice"
+    needs = (
+        in_object_mode,
+        need(lambda context: result_collections(context.scene, 'VIEW'), "No results to keep; click Refine first"),
     )
-    bl_options = {'REGISTER', 'UNDO'}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if context.mode != 'OBJECT':
-            cls.poll_message_set("Only available in Object Mode")
-            return False
-        if not result_collections(context.scene, 'VIEW'):
-            cls.poll_message_set("No results to keep; click Refine first")
-            return False
-        return True
 
     def run(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
@@ -176,24 +152,18 @@ class TETFLORA_OT_keep_results(Reporting, bpy.types.Operator):
         kept = keep_results(scene)
         scene.tetflora.refine_at_render = False
         scene.tetflora.statistics = ""
-        self.report({'INFO'}, f"{counted(kept, 'object')} kept as meshes; Refine at Render is off")
-        return {'FINISHED'}
+        return self.done(f"{counted(kept, 'object')} kept as meshes; Refine at Render is off")
 
 
 class TETFLORA_OT_make_plant_mesh(ModalJob, bpy.types.Operator):
-    """Turn the selected plants into meshes to edit, export and keep."""
+    """Create an ordinary mesh object of each selected plant, with every branch and leaf, to edit, export or animate.
+
+    The plant remains, but disabled; Clear does not remove the mesh. Esc cancels without changes.
+    """
 
     bl_idname = "tetflora.make_plant_mesh"
     bl_label = "Convert Plants to Meshes"
-    bl_description = (
-        "Create an ordinary mesh object of each selected plant, with every branch and leaf, to edit, export or "
-        "animate. The plant remains, but disabled; Clear does not remove the mesh. Esc cancels without changes"
-    )
-    bl_options = {'REGISTER', 'UNDO'}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return in_object_mode(cls, context) and plants_selected(cls, context)
+    needs = (in_object_mode, plants_selected)
 
     def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, list[bpy.types.Object]]:
         return make_plant_mesh_steps(context.scene, context.evaluated_depsgraph_get(), selected_plants(context))
@@ -202,30 +172,19 @@ class TETFLORA_OT_make_plant_mesh(ModalJob, bpy.types.Operator):
         context.view_layer.update()
         select_only(context, made)
         polygons = sum(len(obj.data.polygons) for obj in made)
-        self.report({'INFO'}, f"{counted(len(made), 'mesh object')} of {polygons:,} polygons made")
-        return {'FINISHED'}
+        return self.done(f"{counted(len(made), 'mesh object')} of {polygons:,} polygons made")
 
 
 class TETFLORA_OT_clear_cache(Reporting, bpy.types.Operator):
-    """Delete what was kept about species."""
+    """Delete all cached species analysis, and nothing else in the folder. It is computed again when needed."""
 
     bl_idname = "tetflora.clear_cache"
     bl_label = "Clear Cache"
-    bl_description = (
-        "Delete all cached species analysis, and nothing else in the folder. It is computed again when needed"
-    )
+    needs = (need(lambda _: storage.used() is not None, "The cache folder does not exist"),)
     bl_options = {'REGISTER'}
 
-    @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        if storage.used() is None:
-            cls.poll_message_set("The cache folder does not exist")
-            return False
-        return True
-
     def run(self, _context: bpy.types.Context) -> set[str]:
-        self.report({'INFO'}, f"{counted(storage.clear(), 'file')} deleted from {storage.used()}")
-        return {'FINISHED'}
+        return self.done(f"{counted(storage.clear(), 'file')} deleted from {storage.used()}")
 
 
 CLASSES = (

@@ -1,13 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Make a new species of the shown one, take edits back, add and remove orders.
-
-Species as presets: save, load, share and delete their files.
-
-Switch the live preview of the edited species on and off.
-
-Write the catalogue as an asset library.
-"""
+"""Edit species and their orders, keep them as files, preview them, and write the catalog as an asset library."""
 
 import copy
 from pathlib import Path
@@ -18,7 +11,14 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ..tetflora_addon.blender.placing.assets import add_to_preferences, write_asset_library
 from ..tetflora_addon.blender.placing.plant_objects import assign_species
-from ..tetflora_addon.blender.species import catalogue as species_files
+from ..tetflora_addon.blender.species.catalogue import (
+    ENDING,
+    delete_species_file,
+    load_species_file,
+    own_file,
+    save_species,
+    write_species,
+)
 from ..tetflora_addon.blender.species.edits import (
     catalogue,
     change_species,
@@ -32,24 +32,23 @@ from ..tetflora_addon.blender.species.values import orders_of, present_species
 from ..tetflora_addon.blender.viewport import species
 from ..tetflora_addon.species.schema import DEFAULT_SPUR
 from ..tetflora_addon.species.skeletons import MAX_ORDERS
-from .base import Reporting, counted, selected_plants
+from .base import Reporting, counted, need, selected_plants
 
 
-def species_shown(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """Poll: the editor shows a species that this user or this file has."""
-    if present_species(context.scene.tetflora.species_editor) in catalogue():
-        return True
-    cls.poll_message_set("Choose a species from the catalog first")
-    return False
+def shown(context: bpy.types.Context) -> str:
+    """Identifier of the species that the editor shows."""
+    return present_species(context.scene.tetflora.species_editor)
+
+
+species_shown = need(lambda context: shown(context) in catalogue(), "Choose a species from the catalog first")
 
 
 class TETFLORA_OT_duplicate_species(Reporting, bpy.types.Operator):
-    """Make a new species in this file."""
+    """Duplicate the shown species. The copy belongs to this file until you save it to your species."""
 
     bl_idname = "tetflora.duplicate_species"
     bl_label = "Duplicate as New Species"
-    bl_description = "Duplicate the shown species. The copy belongs to this file until you save it to your species"
-    bl_options = {'REGISTER', 'UNDO'}
+    needs = (species_shown,)
 
     name: StringProperty(
         name="Name",
@@ -61,10 +60,6 @@ class TETFLORA_OT_duplicate_species(Reporting, bpy.types.Operator):
         description="Assign the new species to the selected plants",
         options={'SKIP_SAVE'},
     )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return species_shown(cls, context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if not self.name:
@@ -82,53 +77,42 @@ class TETFLORA_OT_duplicate_species(Reporting, bpy.types.Operator):
         editor.species = identifier
         changed = assign_species(selected_plants(context), identifier) if self.assign else 0
         given = f", assigned to {counted(changed, 'plant')}" if self.assign else ""
-        self.report({'INFO'}, f'New species "{data["name"]}" ({identifier}){given}')
-        return {'FINISHED'}
+        return self.done(f'New species "{data["name"]}" ({identifier}){given}')
 
     @staticmethod
     def _suggestion(context: bpy.types.Context) -> str:
         known = catalogue()
-        old = known[present_species(context.scene.tetflora.species_editor)].name
+        old = known[shown(context)].name
         names = {info.name for info in known.values()}
         return next(name for n in range(2, len(names) + 3) if (name := f"{old} {n}") not in names)
 
 
 class TETFLORA_OT_revert_species(Reporting, bpy.types.Operator):
-    """Forget the edits of a species."""
+    """Discard the changes in this file and restore the species from the catalog.
+
+    Deletes a species that exists only in this file.
+    """
 
     bl_idname = "tetflora.revert_species"
     bl_label = "Revert"
-    bl_description = (
-        "Discard the changes in this file and restore the species from the catalog. Deletes a species that exists "
-        "only in this file"
-    )
-    bl_options = {'REGISTER', 'UNDO'}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if find_edit(context.scene, present_species(context.scene.tetflora.species_editor)) is None:
-            cls.poll_message_set("The species has no changes to revert")
-            return False
-        return True
+    needs = (need(lambda context: find_edit(context.scene, shown(context)), "The species has no changes to revert"),)
 
     def run(self, context: bpy.types.Context) -> set[str]:
         editor = context.scene.tetflora.species_editor
         identifier = present_species(editor)
         revert_species(identifier)
         if identifier in catalogue():
-            self.report({'INFO'}, f'"{identifier}" reverted to the catalog')
-        else:
-            editor.species = ""
-            self.report({'INFO'}, f'Species "{identifier}" removed from this file')
-        return {'FINISHED'}
+            return self.done(f'"{identifier}" reverted to the catalog')
+        editor.species = ""
+        return self.done(f'Species "{identifier}" removed from this file')
 
 
 class TETFLORA_OT_edit_orders(Reporting, bpy.types.Operator):
-    """Add an order of branches to the species, or remove the last one."""
+    """Add or remove an order of branches or the short shoots of the species."""
 
     bl_idname = "tetflora.edit_orders"
     bl_label = "Edit Orders"
-    bl_options = {'REGISTER', 'UNDO'}
+    needs = (species_shown,)
 
     action: EnumProperty(
         name="Action",
@@ -144,10 +128,6 @@ class TETFLORA_OT_edit_orders(Reporting, bpy.types.Operator):
     def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
         return properties.bl_rna.properties["action"].enum_items[properties.action].description
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return species_shown(cls, context)
-
     def run(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
         editor = scene.tetflora.species_editor
@@ -156,11 +136,9 @@ class TETFLORA_OT_edit_orders(Reporting, bpy.types.Operator):
             change_species(scene, present_species(editor), _toggle_spur)
             return {'FINISHED'}
         if self.action == 'ADD' and not 0 < number < MAX_ORDERS:
-            self.report({'WARNING'}, f"A species cannot have more than {MAX_ORDERS} orders")
-            return {'CANCELLED'}
+            return self.refused(f"A species cannot have more than {MAX_ORDERS} orders")
         if self.action == 'REMOVE' and number < 2:
-            self.report({'WARNING'}, "The trunk cannot be removed: a species has at least one order")
-            return {'CANCELLED'}
+            return self.refused("The trunk cannot be removed: a species has at least one order")
         change_species(scene, present_species(editor), _add if self.action == 'ADD' else _remove)
         editor.order_index = number if self.action == 'ADD' else min(editor.order_index, number - 2)
         return {'FINISHED'}
@@ -192,115 +170,88 @@ def _remove(data: dict) -> None:
 
 
 class TETFLORA_OT_save_species(Reporting, bpy.types.Operator):
-    """Save the shown species for all files."""
+    """Save the species to your species folder, for use in all files.
+
+    It replaces a built-in species of the same identifier, and an earlier version of your own.
+    """
 
     bl_idname = "tetflora.save_species"
     bl_label = "Save to My Species"
-    bl_description = (
-        "Save the species to your species folder, for use in all files. It replaces a built-in species of the same "
-        "identifier, and an earlier version of your own"
-    )
+    needs = (species_shown,)
     bl_options = {'REGISTER'}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return species_shown(cls, context)
-
     def run(self, context: bpy.types.Context) -> set[str]:
-        path = species_files.save_species(context.scene, present_species(context.scene.tetflora.species_editor))
-        self.report({'INFO'}, f"Saved as {path}")
-        return {'FINISHED'}
+        path = save_species(context.scene, shown(context))
+        return self.done(f"Saved as {path}")
 
 
 class TETFLORA_OT_load_species(Reporting, bpy.types.Operator, ImportHelper):
-    """Take a species file into the user's own species."""
+    """Copy a species file to your species folder, to use it in all files."""
 
     bl_idname = "tetflora.load_species"
     bl_label = "Load Species"
-    bl_description = "Copy a species file to your species folder, to use it in all files"
-    bl_options = {'REGISTER', 'UNDO'}
 
-    filename_ext = species_files.ENDING
+    filename_ext = ENDING
     filter_glob: StringProperty(default="*.json", options={'HIDDEN'})
     replace: BoolProperty(
         name="Replace", description="Replace your own species of the same file name", options={'SKIP_SAVE'}
     )
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        identifier = species_files.load_species_file(Path(bpy.path.abspath(self.filepath)), self.replace)
+        identifier = load_species_file(Path(bpy.path.abspath(self.filepath)), self.replace)
         context.scene.tetflora.species_editor.species = identifier
-        self.report({'INFO'}, f'Species "{catalogue()[identifier].name}" loaded')
-        return {'FINISHED'}
+        return self.done(f'Species "{catalogue()[identifier].name}" loaded')
 
 
 class TETFLORA_OT_export_species(Reporting, bpy.types.Operator, ExportHelper):
-    """Write the shown species to a file of the artist's choice."""
+    """Export the species to a file, to share it. The file name is the identifier of the species."""
 
     bl_idname = "tetflora.export_species"
     bl_label = "Export Species"
-    bl_description = "Export the species to a file, to share it. The file name is the identifier of the species"
+    needs = (species_shown,)
     bl_options = {'REGISTER'}
 
-    filename_ext = species_files.ENDING
+    filename_ext = ENDING
     filter_glob: StringProperty(default="*.json", options={'HIDDEN'})
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return species_shown(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if not self.filepath:
-            self.filepath = present_species(context.scene.tetflora.species_editor) + self.filename_ext
+            self.filepath = shown(context) + self.filename_ext
         return super().invoke(context, event)
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        identifier = present_species(context.scene.tetflora.species_editor)
+        identifier = shown(context)
         path = Path(bpy.path.abspath(self.filepath))
-        self.report({'INFO'}, f"Written to {species_files.write_species(context.scene, identifier, path)}")
-        return {'FINISHED'}
+        return self.done(f"Written to {write_species(context.scene, identifier, path)}")
 
 
 class TETFLORA_OT_delete_species(Reporting, bpy.types.Operator):
-    """Delete a species file of the user's own."""
+    """Delete the file of the species from your species folder. Built-in species remain. This cannot be undone."""
 
     bl_idname = "tetflora.delete_species"
     bl_label = "Delete from My Species"
-    bl_description = (
-        "Delete the file of the species from your species folder. Built-in species remain. This cannot be undone"
-    )
+    needs = (need(lambda context: own_file(shown(context)), "The species has no file in your species folder"),)
     bl_options = {'REGISTER'}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if species_files.own_file(present_species(context.scene.tetflora.species_editor)) is None:
-            cls.poll_message_set("The species has no file in your species folder")
-            return False
-        return True
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         return context.window_manager.invoke_confirm(self, event)
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        path = species_files.delete_species_file(present_species(context.scene.tetflora.species_editor))
-        self.report({'INFO'}, f"{path.name} deleted")
-        return {'FINISHED'}
+        path = delete_species_file(shown(context))
+        return self.done(f"{path.name} deleted")
 
 
 class TETFLORA_OT_preview_species(Reporting, bpy.types.Operator):
-    """Show one plant of the edited species."""
+    """Show one plant of the species at the 3D cursor, updated with every change.
+
+    It is never rendered or saved. Use again to hide it.
+    """
 
     bl_idname = "tetflora.preview_species"
     bl_label = "Preview Species"
-    bl_description = (
-        "Show one plant of the species at the 3D cursor, updated with every change. "
-        "It is never rendered or saved. Use again to hide it"
-    )
+    needs = (lambda context: "" if species.shown_in(context.scene) else species_shown(context),)
     # No undo: the preview is no part of the file.
     bl_options = {'REGISTER'}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return species.shown_in(context.scene) or species_shown(cls, context)
 
     def run(self, context: bpy.types.Context) -> set[str]:
         species.show(context.scene, not species.shown_in(context.scene))
@@ -308,14 +259,13 @@ class TETFLORA_OT_preview_species(Reporting, bpy.types.Operator):
 
 
 class TETFLORA_OT_create_asset_library(Reporting, bpy.types.Operator):
-    """Write a .blend with a plant of each species, to drag into scenes."""
+    """Create a file with one plant of each species, marked as assets with previews, in a folder of your choice.
+
+    Assets refer to species by name: using them requires TetFlora and the same species.
+    """
 
     bl_idname = "tetflora.create_asset_library"
     bl_label = "Create Asset Library"
-    bl_description = (
-        "Create a file with one plant of each species, marked as assets with previews, in a folder of your choice. "
-        "Assets refer to species by name: using them requires TetFlora and the same species"
-    )
     bl_options = {'REGISTER'}
 
     directory: StringProperty(name="Folder", description="Folder of the library", subtype='DIR_PATH')
@@ -333,13 +283,11 @@ class TETFLORA_OT_create_asset_library(Reporting, bpy.types.Operator):
 
     def run(self, _context: bpy.types.Context) -> set[str]:
         if not self.directory:
-            self.report({'ERROR'}, "Choose a folder")
-            return {'CANCELLED'}
+            return self.failed("Choose a folder")
         path, number = write_asset_library(Path(bpy.path.abspath(self.directory)))
         shown = self.add_library and add_to_preferences(path.parent)
         more = "; folder added to the asset libraries" if shown else ""
-        self.report({'INFO'}, f"{counted(number, 'plant')} written to {path}{more}")
-        return {'FINISHED'}
+        return self.done(f"{counted(number, 'plant')} written to {path}{more}")
 
 
 CLASSES = (
