@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A budget of polygons: the best image that fits (beyond the paper, whose only limit is the cutoff).
 
-What refinement asks for may not fit. Then real leaves are given to the tetrahedra that gain most by them for each
-polygon, best first, until the budget is spent; all others become proxies, whose facets grow until they fit as well.
+If the result of refinement does not fit, real leaves go to the tetrahedra that gain most by them for each polygon, best
+first, until the budget is spent. All others become proxies, whose facets grow until they fit as well.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from ..refinement.decisions import Decision, contributions
 from ..refinement.loop import Refinement
 from ..refinement.settings import RefinementSettings
 
-#: Bytes that a polygon takes in Blender and in a renderer together, about: 110 and 500.
+#: Approximate bytes of a polygon in Blender (110) and in a renderer (500) together.
 BYTES_PER_POLYGON = 610
-#: The same of a microsphere, as a point cloud.
+#: The same for a microsphere in a point cloud.
 BYTES_PER_SPHERE = 210
-#: Expected numbers are means; so much of the budget is kept back.
+#: Reserved fraction of the budget, since expected numbers are means.
 _RESERVE = 0.06
-#: Fraction of the budget that facets may take before real leaves get theirs.
+#: Fraction of the budget that facets may use before real leaves get theirs.
 _FACETS_FIRST = 0.5
 _STEPS = 12  # of bisection on the logarithm of the facets' side, between 1 and:
 _LARGEST = 64.0
@@ -58,17 +58,17 @@ def afford(
     faces : float, optional
         Faces of each proxy tetrahedron; by default proxies are facets or spheres, whose number follows their size.
     primitive_bytes : float
-        Memory that one facet or sphere takes.
+        Memory of one facet or sphere.
 
     Returns
     -------
     Refinement
-        The same with other decisions, or the very same.
+        With other decisions, or the same object.
     float
         Side of a facet in pixels.
     """
     side = settings.facet
-    # What counts as a part of a polygon for memory is a whole one for those who limit polygons: a budget for each.
+    # A sphere is a whole polygon for the limit on polygons, but only a part of one for memory: a budget for each.
     memory = replace(settings, max_polygons=0), primitive_bytes / BYTES_PER_POLYGON
     for limits, weight in ((replace(settings, max_memory=0.0), 1.0), memory):
         allowed = (1 - _RESERVE) * polygons_allowed(limits)
@@ -86,10 +86,9 @@ def _fitted(
     weight: float,
     faces: float | None,
 ) -> tuple[Refinement, float]:
-    """Decisions and a side of facets, no less than the one given; a facet counts as ``weight`` polygons."""
+    """Decisions and a side of facets, at least ``side``; a facet counts as ``weight`` polygons."""
     explicit = result.decision == Decision.EXPLICIT
     polygons = np.where(explicit, result.totals.polygons, 0.0)
-
     count = _Facets(flora, result, camera) if faces is None else None
     fixed = None if faces is None else faces + _large(result)
 
@@ -107,7 +106,7 @@ def _fitted(
     spent = np.cumsum(np.maximum(cost[order], 0.0)) + proxies(factor).sum()
     kept = np.zeros(len(explicit), bool)
     kept[order[spent <= allowed]] = True
-    if count:  # what real leaves have left over makes facets finer again
+    if count:  # what real leaves leave over makes facets finer again
         left = allowed - polygons[kept].sum()
         factor = _smallest(lambda f: proxies(f)[~kept].sum() <= left)
     decision = np.where(explicit & ~kept, Decision.PROXY, result.decision).astype(np.int8)
@@ -115,7 +114,7 @@ def _fitted(
 
 
 def _large(result: Refinement) -> NDArray[np.float64]:
-    """Polygons (cells,) that stay as they are although their cell is a proxy."""
+    """Polygons (cells,) that stay polygons although their cell is a proxy."""
     contents = result.contents
     large = np.isinf(contents.polygons.totals.width)
     return np.bincount(contents.polygons.cell[large], minlength=len(result.tree))[result.nodes].astype(np.float64)
@@ -137,14 +136,14 @@ class _Facets:
         self.polygon_cell = index[contents.polygons.cell]
 
     def by_cell(self, pixels: float, weight: float = 1.0) -> NDArray[np.float64]:
-        """Facets (cells,) where those that are seen have so many pixels; each counts as much as the weight says."""
+        """Facets (cells,), each counted with a weight, where those that are seen have so many pixels."""
         made = sum(np.bincount(cell, sizes.counts(pixels), self.number) for sizes, cell in self.plants)
         kept, counts = self.polygons.kept(pixels), self.polygons.counts(pixels)
         return weight * made + np.bincount(self.polygon_cell, np.where(kept, 1.0, weight) * counts, self.number)
 
 
 def _smallest(fits: Callable[[float], bool]) -> float:
-    """Least factor from 1 on for which something fits; the largest where nothing does."""
+    """Minimum factor from 1 on that fits, or the largest where none does."""
     if fits(1.0):
         return 1.0
     low, high = 0.0, np.log(_LARGEST)

@@ -4,8 +4,8 @@
 
 The paper renders the scene from each light front to back, collects volume shadow in a gray buffer and polygon shadow
 in a z-buffer, and takes samples on the way. Here all fragments are sorted by pixel and distance once. Optical depth in
-front of any point is a cumulative sum, and what arrives there of the light that the tetrahedra themselves scatter
-comes from the same order. Samples are blended between the four nearest pixels.
+front of any point is a cumulative sum; the light that tetrahedra scatter to it follows from the same order. Samples
+are blended between the four nearest pixels.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from ..camera.camera import Camera
 from ..refinement.rasterise import buffer_size, occluder_depth, tetrahedron_fragments
 from ..refinement.visibility import OPAQUE, depth_in_front
 
-#: How far polygons' shadows begin behind them, in pixels of the buffer: none shadows what lies on it.
+#: Distance behind polygons at which their shadows begin, in pixels of the buffer: none shadows what lies on it.
 BIAS = 1.5
 #: Points that are looked up together; some 500 bytes each.
 POINTS_AT_ONCE = 1 << 18
-#: Parts along each side of a sheet at most, and the fraction of a pixel that one covers at most.
+#: Maximum number of parts along each side of a sheet, and maximum fraction of a pixel that a sheet covers.
 _MOST_CUTS, _MOST_COVERED = 64, 0.98
 
 
@@ -53,8 +53,8 @@ class LightBuffer:
     occluders : (t, 3, 3) float64, optional
         Opaque triangles, metres.
     sheets : (m, 4, 3) float64, optional
-        Corners of opaque facets or leaves, which count by the fraction of each pixel that they cover. They are owners
-        n to n + m − 1, after the tetrahedra.
+        Corners of opaque facets or leaves, which count by the fraction of each pixel that they cover. Their numbers
+        are n to n + m − 1, after the tetrahedra.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class LightBuffer:
     ) -> None:
         self.camera = camera
         self.width, self.height = buffer_size(camera, resolution)
-        # What throws no shadow need not be drawn.
+        # What casts no shadow need not be drawn.
         there = np.flatnonzero(extinction > 0.0).astype(np.int32)
         found = tetrahedron_fragments(vertices[there], camera, self.width, self.height)
         own = there[found.cell]
@@ -86,10 +86,10 @@ class LightBuffer:
         if sheets is not None and len(sheets):
             parts += [(own + np.int32(len(vertices)), *rest) for own, *rest in self._sheet_fragments(sheets)]
         cell, pixel, entry, thickness, depth = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-        # One number to sort and to look up by: the pixel, and the distance as its fraction.
+        # One number to sort and look up by: the pixel, with the distance as its fraction.
         self._reach = float(entry.max(initial=0.0)) * 1.001 + 1e-9
         key = self._key(pixel, entry)
-        order = np.argsort(key, kind="stable")  # others put equal ones in an order that depends on the processor
+        order = np.argsort(key, kind="stable")  # other sorts order equal keys by processor
         self._order_key, self._cell = key[order], cell[order]
         self._pixel = pixel[order].astype(np.int32)
         # Sums need doubles; what is looked up does not.
@@ -122,7 +122,7 @@ class LightBuffer:
             # Beside the middle of a flat view a pixel sees less of the sphere.
             pixel_area = (across * distance) ** 2 * np.abs(away @ self.camera.frame[:, 2] / distance) ** 3
         longest = np.linalg.norm(sheets - np.roll(sheets, 1, axis=1), axis=2).max(axis=1)
-        # Smaller than a pixel, it is where its middle is; larger, no pixel between its parts may go without.
+        # Below the size of a pixel a sheet is where its middle is; above, its parts leave no pixel between them out.
         pixels = longest / np.sqrt(np.maximum(pixel_area, 1e-18))
         cuts = np.where(pixels <= 1.0, 1, np.clip(np.ceil(2.0 * pixels), 1, _MOST_CUTS)).astype(int)
         covered = seen / pixel_area
@@ -157,7 +157,7 @@ class LightBuffer:
         return owner[first], nearest[first], metres, fraction
 
     def _near_view(self, sheets: NDArray[np.floating], margin: float) -> NDArray[np.bool_]:
-        """Which sheets (m,) may reach into a sun's view, which may be a part of the scene; of other lights all."""
+        """Sheets (m,) that may reach into a sun's view, which may show part of the scene; for other lights all."""
         if self.camera.kind != "ORTHO":
             return np.ones(len(sheets), bool)
         left, right, bottom, top = self.camera.window
@@ -178,7 +178,7 @@ class LightBuffer:
     def transmittance(
         self, points: NDArray[np.float64], cells: NDArray[np.integer], own_depth: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Fraction of the light that arrives at points.
+        """Fraction of the light that reaches points.
 
         Parameters
         ----------
@@ -188,7 +188,7 @@ class LightBuffer:
             Tetrahedron that holds each or sheet on which it lies, −1 where there is none.
         own_depth : (m,) float64
             Optical depth of that tetrahedron between where light enters it and the point. However coarse the pixels,
-            none darkens itself by more, and no point is darkened by less.
+            no tetrahedron darkens itself by more, and no point is darkened by less.
 
         Returns
         -------
@@ -201,28 +201,25 @@ class LightBuffer:
         for start in range(0, len(points), POINTS_AT_ONCE):
             part = slice(start, start + POINTS_AT_ONCE)
             taps, inside = self._taps(points[part])
-            place, found = self._last_before(taps)
-            depth = np.where(found, self._up_to(place, taps), 0.0)
-            own, has = self._own(taps, cells[part][inside])
-            # Small ones may overlap; what begins before the last fragment was counted in full.
-            counted = np.where(own < place, self._depth[own], self._partly(own, taps)) if len(self) else 0.0
-            drawn, exact = np.where(has & (own <= place), counted, 0.0), own_depth[part][inside][:, None]
-            # Where the point's own tetrahedron does not reach into a pixel, its neighbours do, or nothing is there.
-            depth = np.maximum(np.maximum(depth - drawn, 0.0) + np.minimum(drawn, exact), exact)
+            depth = exact = own_depth[part][inside][:, None]
+            if len(self):
+                place, found = self._last_before(taps)
+                depth = np.where(found, self._up_to(place, taps), 0.0)
+                own, has = self._own(taps, cells[part][inside])
+                # Small ones may overlap; what begins before the last fragment was counted in full.
+                counted = np.where(own < place, self._depth[own], self._partly(own, taps))
+                drawn = np.where(has & (own <= place), counted, 0.0)
+                # Where the point's own tetrahedron does not reach into a pixel, its neighbours do, or nothing is there.
+                depth = np.maximum(np.maximum(depth - drawn, 0.0) + np.minimum(drawn, exact), exact)
             some = np.flatnonzero(inside) + start
             result[some] = (np.exp(-depth) * taps.weight).sum(axis=1)
             seen[some] = True
         return result, seen
 
     def light_up(self, sources: NDArray[np.float64], polygons: NDArray[np.float64]) -> None:
-        """Let tetrahedra, sheets and polygons shine, for `scattered`.
+        """Let tetrahedra and sheets (n + m, 3) and polygons (3,) shine, for `scattered`.
 
-        Parameters
-        ----------
-        sources : (n + m, 3) float64
-            Radiance J of each tetrahedron, were it thick, and of each sheet: they give J (1 − e^−τ).
-        polygons : (3,) float64
-            Radiance of all polygons.
+        Sources are radiances J that thick tetrahedra and sheets would have; they emit J (1 − e^−τ).
         """
         if len(self):
             emitted = np.where((self._cell >= 0)[:, None], sources[np.maximum(self._cell, 0)], polygons)
@@ -296,8 +293,6 @@ class LightBuffer:
 
     def _last_before(self, taps: _Taps) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
         """The last fragment (k, 4) that begins in front of each point in each pixel, and whether there is one."""
-        if not len(self):
-            return np.zeros(taps.pixel.shape, np.intp), np.zeros(taps.pixel.shape, bool)
         key = self._key(taps.pixel, taps.metres[:, None])
         place = np.searchsorted(self._order_key, key.ravel(), side="right").reshape(key.shape) - 1
         found = place >= 0
@@ -306,8 +301,6 @@ class LightBuffer:
 
     def _own(self, taps: _Taps, cells: NDArray[np.integer]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
         """Fragment (k, 4) of each point's own tetrahedron in each pixel, and whether there is one."""
-        if not len(self):
-            return np.zeros(taps.pixel.shape, np.intp), np.zeros(taps.pixel.shape, bool)
         key = cells.astype(np.int64)[:, None] * (self.width * self.height) + taps.pixel
         place = np.searchsorted(self._own_key, key.ravel()).reshape(key.shape)
         place = np.minimum(place, len(self) - 1)
@@ -315,11 +308,9 @@ class LightBuffer:
 
     def _partly(self, place: NDArray[np.intp], taps: _Taps) -> NDArray[np.float64]:
         """Optical depth of fragments as far as it lies in front of the points."""
-        if not len(self):
-            return np.zeros(place.shape)
         inside = (taps.metres[:, None] - self._entry[place]) / np.maximum(self._thickness[place], 1e-9)
         return self._depth[place] * np.clip(inside, 0.0, 1.0)
 
     def _up_to(self, place: NDArray[np.intp], taps: _Taps) -> NDArray[np.float64]:
         """Optical depth in front of the points, through the last fragment that begins there."""
-        return 0.0 if not len(self) else self._before[place] + self._partly(place, taps)
+        return self._before[place] + self._partly(place, taps)

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the shadow pass finds (paper, section 7): light in tetrahedra, and what facets and clouds make of it.
+"""The result of the shadow pass (paper, section 7): light in tetrahedra, and the radiance of facets and clouds in it.
 
-Every lamp looks at the scene through a buffer. The sky does so from 24 directions, whose samples become harmonics.
-What tetrahedra scatter lights the others: it is gathered in the same 24 buffers, order by order, and what more orders
-would add is the sum of the geometric series that the last ones begin. There is no factor to be tuned.
+Every lamp sees the scene through a buffer, and so does the sky from 24 directions, whose samples become harmonics.
+Light that tetrahedra scatter to others is gathered in the same 24 buffers, order by order. Further orders are the sum
+of the geometric series that the last ones begin. There is no factor to tune.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from .scattering import (
 )
 from .sources import World, arriving, to_eye
 
-#: Greatest fraction of an order that the next one has: 1 would never end.
+#: Maximum ratio of an order of scattering to the one before: 1 would never end.
 _MOST_AGAIN = 0.97
 #: Facets that are shaded together; some 1 kB each.
 _AT_ONCE = 1 << 16
@@ -43,22 +43,22 @@ _AT_ONCE = 1 << 16
 
 @dataclass(frozen=True)
 class Lit:
-    """A lamp and its buffers: one, or six all around; none where nothing stands in its light."""
+    """A lamp and its buffers: one, six all around, or none where nothing blocks its light."""
 
     light: Light
     buffers: list[LightBuffer]
 
 
 class Illumination:
-    """Light in a scene, as `shadow_pass.shadow_steps` finds it.
+    """Light in a scene, as `emission.light.shadow_steps` finds it.
 
     Attributes
     ----------
     clouds : Clouds of n
     sheets : Sheets
-        What stands in the light in place of some of the clouds.
+        What blocks light in place of some of the clouds.
     lamps : list of Lit
-        Areas are several of them.
+        Area lights are several of them.
     ambient : (n, 4, 9, 3) float32
         Light from the sky and from what is lit, at the tetrahedra's key points, by harmonic and colour.
     """
@@ -73,7 +73,7 @@ class Illumination:
         fewer: tuple[Sheets, NDArray[np.int64]],
     ) -> None:
         self.clouds, self.sheets, self.lamps = clouds, sheets, lamps
-        # Of the sky's buffers: their sheets, and the number of each of the others among these.
+        # Sheets of the sky's buffers, and the number that each of ``sheets`` has among them.
         self._sky, self._world, (self._sky_sheets, self._number) = sky, world, fewer
         self._ground = np.zeros(3)
         self.ambient = np.zeros((len(clouds), 4, HARMONICS, 3), np.float32)
@@ -114,8 +114,8 @@ class Illumination:
     def around(self, points: NDArray[np.float64], cells: NDArray[np.integer]) -> NDArray[np.float64]:
         """Light from all sides at points, as harmonics (m, 9, 3): sky, and what tetrahedra and polygons scatter.
 
-        In a tetrahedron it is linear between the samples of its key points (paper, section 7); elsewhere the sky's
-        buffers are looked up again. Parameters as for `direct`.
+        Linear between the samples of a tetrahedron's key points (paper, section 7); elsewhere the sky's buffers are
+        looked up again. Parameters as for `direct`.
         """
         result = np.zeros((len(points), HARMONICS, 3))
         inside = np.flatnonzero(cells >= 0)
@@ -159,11 +159,11 @@ class Illumination:
         colour : (m, 3) float64
             Linear RGB.
         transmission : (m,) float64
-            Fraction of the scattered light that goes through; 0 for bark.
+            Fraction of the scattered light that passes through; 0 for bark.
         cells : (m,) int
             As for `direct`.
         camera : Camera, optional
-            For the gloss; without, it is spread evenly.
+            For the gloss; without, it is even.
         sheets : (m,) int, optional
             As for `direct`.
 
@@ -236,31 +236,14 @@ class Illumination:
         """
         cells = np.repeat(np.arange(len(self.clouds)), 4)
         c = self.clouds
-        made = self.cloud_radiance(
-            c.key_points.reshape(-1, 3),
-            c.colour[cells],
-            c.transmission[cells],
-            cells,
-            camera,
-            c.normal[cells],
-            c.plane[cells],
-        )
-        return made.reshape(-1, 4, 3)
+        points, means = c.key_points.reshape(-1, 3), (c.colour[cells], c.transmission[cells])
+        return self.cloud_radiance(points, *means, cells, camera, c.normal[cells], c.plane[cells]).reshape(-1, 4, 3)
 
     def scatter(self, ground: NDArray[np.float64], orders: int) -> Iterator[float]:
-        """Sample the sky at the key points and let light be scattered; what `shadow_pass.shadow_steps` does last.
+        """Sample the sky at the key points, then scatter; the last step of `emission.light.shadow_steps`.
 
-        Parameters
-        ----------
-        ground : (3,) float64
-            Colour of polygons.
-        orders : int
-            Gathered one by one; the rest is their geometric series.
-
-        Yields
-        ------
-        float
-            Fraction that is done.
+        Light is reflected by polygons of colour ``ground`` (3,). So many ``orders`` are gathered one by one; the rest
+        is their geometric series. Yields the fraction that is done.
         """
         count = len(self.clouds)
         points, cells, sheets, keys = self.sheets.samples(self.clouds)
@@ -284,8 +267,8 @@ class Illumination:
             before, every = last, keys.means(self._from_clouds(points))
             last, gathered = every - gathered, every
             if order == orders - 1:
-                fraction = self._again(fluence(before), fluence(last))
-                gathered = gathered + last * (fraction / (1.0 - fraction))
+                ratio = self._again(fluence(before), fluence(last))
+                gathered = gathered + last * (ratio / (1.0 - ratio))
             yield (order + 2.0) / (orders + 1)
         passing = keys.by_cell(first + fluence(gathered))
         self._shine(self.clouds.albedo * passing / (4.0 * np.pi))
@@ -296,8 +279,7 @@ class Illumination:
         c = self.clouds
         weight = np.repeat(np.sqrt(np.maximum(c.matrices[:, :3].sum(axis=1), 0.0)) * volume(c.vertices), 4)
         former = weight @ before
-        fraction = (weight @ last) / np.where(former > 0.0, former, np.inf)
-        return np.clip(fraction, 0.0, _MOST_AGAIN)
+        return np.clip((weight @ last) / np.where(former > 0.0, former, np.inf), 0.0, _MOST_AGAIN)
 
     def _through(
         self,
@@ -336,7 +318,7 @@ class Illumination:
         return result
 
     def _shine(self, sources: NDArray[np.float64]) -> None:
-        """Let tetrahedra and their sheets give off their radiance (n, 3)."""
+        """Let tetrahedra and their sheets emit their radiance (n, 3)."""
         emitted = np.concatenate([sources, sources[self._sky_sheets.cell]])
         for buffer in self._sky:
             if buffer is not None:

@@ -1,11 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tetrahedra as clouds in the light: what the shadow pass needs to know of each.
-
-Facets and leaves that stand in the light as they are drawn, and where light is sampled on them.
+"""What receives and blocks light: tetrahedra as clouds, and sheets, which are facets and leaves as they are drawn.
 
 Leaves sit in clusters, and so do the facets that stand for them: half of the light that an even cloud would let
-through to its surfaces does not reach those of a crown. Where sheets are drawn, they and not their tetrahedra shadow.
+through to its surfaces does not reach those of a crown. Where sheets are drawn, they cast shadows in place of their
+tetrahedra.
 """
 
 from __future__ import annotations
@@ -16,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Arrays
 from ..compiled.flora import Flora
 from ..proxies.summaries import extinction_matrices, summarise
 from ..refinement.loop import Refinement
@@ -27,11 +27,15 @@ from .scattering import albedo
 INWARDS = 1.0 / np.sqrt(5.0)
 # Barycentric coordinates of the key points.
 _KEYS = (1.0 - INWARDS) / 4.0 + INWARDS * np.eye(4)
+#: Maximum number of sheets of a tetrahedron on which light from all sides is sampled, and about that of all of them.
+SAMPLES, ALL_SAMPLES = 8, 32_000
+# Side of a pixel over that of a sheet: most sheets then lie in one pixel alone.
+_ROOMY = 1.5
 
 
 @dataclass(frozen=True)
-class Clouds:
-    """Tetrahedra that stand in the light, explicit ones included: n of them, without overlap.
+class Clouds(Arrays):
+    """Tetrahedra in the light, explicit ones included: n of them, without overlap.
 
     Attributes
     ----------
@@ -41,7 +45,7 @@ class Clouds:
         S of κ(ω) = √(ωᵀSω), as `summaries.extinction_matrices` gives it, 1/m².
     colour : (n, 3) float64
     transmission : (n,) float64
-        Means of what they hold.
+        Means of their contents.
     normal : (n, 3) float64
         Axis in which most normals lie.
     plane : (n,) float64
@@ -55,20 +59,17 @@ class Clouds:
     normal: NDArray[np.float64]
     plane: NDArray[np.float64]
 
-    def __len__(self) -> int:
-        return len(self.vertices)
-
     @classmethod
     def of(cls, flora: Flora, refinement: Refinement, even: NDArray[np.bool_] | None = None) -> Clouds:
-        """Everything that the loop left, in the order of ``refinement.nodes``.
+        """All cells of a refinement, in the order of ``refinement.nodes``.
 
-        Where ``even`` (n,) is set, a cloud is all that stands for its leaves, and dims what they scatter as their
+        Where ``even`` (n,) is set, nothing else stands for the leaves, and the cloud dims what they scatter as their
         clumps do: what leaves one surface meets another of its clump with the probability p = 1 − effective / whole
-        area, so that of the colour ω there comes ω (1 − p) / (1 − p ω) (Smolander and Stenberg, "Simple
-        parameterizations of the radiation budget of uniform broadleaved and coniferous canopies", 2005).
+        area, so that the colour ω becomes ω (1 − p) / (1 − p ω) (Smolander and Stenberg, "Simple parameterizations of
+        the radiation budget of uniform broadleaved and coniferous canopies", 2005).
         """
         nodes, contents = refinement.nodes, refinement.contents
-        # Large polygons are walls, not fog: they come as occluders.
+        # Large polygons are walls, not fog: they are occluders.
         fine = np.isfinite(contents.polygons.totals.width)
         if not fine.all():
             contents = replace(contents, polygons=contents.polygons.take(fine))
@@ -112,12 +113,7 @@ class Clouds:
     ) -> NDArray[np.float64]:
         """Optical depth (m,) between points and where light enters their tetrahedra; 0 where the cell is −1.
 
-        Parameters
-        ----------
-        points : (m, 3) float64
-        cells : (m,) int
-        towards : (3,) or (m, 3) float64
-            Unit vectors to the light.
+        ``towards`` (3,) or (m, 3) are unit vectors to the light.
         """
         result = np.zeros(len(points))
         some = np.flatnonzero(cells >= 0)
@@ -132,10 +128,7 @@ class Clouds:
         return result
 
     def weights(self, points: NDArray[np.float64], cells: NDArray[np.integer]) -> NDArray[np.float64]:
-        """Weights (m, 4) of the key points' samples for points in tetrahedra: linear between the key points.
-
-        Beyond them the sample of the nearest side stays: nothing is extrapolated.
-        """
+        """Weights (m, 4) of the key points' samples for points in tetrahedra: linear in between, constant beyond."""
         inside = barycentric(self.vertices[cells], points)
         inside = np.maximum((inside - (1.0 - INWARDS) / 4.0) / INWARDS, 0.0)
         return inside / np.maximum(inside.sum(axis=1, keepdims=True), 1e-12)
@@ -146,12 +139,6 @@ def cell_of_node(refinement: Refinement) -> NDArray[np.int64]:
     index = np.full(len(refinement.tree), -1, dtype=np.int64)
     index[refinement.nodes] = np.arange(len(refinement.nodes))
     return index
-
-
-#: Sheets of a tetrahedron on which light from all sides is sampled, at most, and of all of them, about.
-SAMPLES, ALL_SAMPLES = 8, 32_000
-# Side of a pixel for one sheet: most sheets then lie in one pixel alone.
-_ROOMY = 1.5
 
 
 @dataclass(frozen=True)
@@ -165,7 +152,7 @@ class Sheets:
     cell : (m,) int64
         Tetrahedron (index into the clouds) of each, none negative; the nearest where it lies in none.
     replaced : (n,) bool
-        Tetrahedra that throw no shadow themselves, since their sheets do.
+        Tetrahedra that cast no shadow themselves, since their sheets do.
     """
 
     corners: NDArray[np.float64]
@@ -187,7 +174,7 @@ class Sheets:
         return cls(corners, np.maximum(cell, 0).astype(np.int64), replaced)
 
     def pixels(self, limits: tuple[int, int]) -> int:
-        """Longer side of a buffer that sees all sheets, of which a pixel is somewhat larger than one."""
+        """Longer side of a buffer that sees all sheets, with pixels somewhat larger than a sheet."""
         if not len(self):
             return limits[0]
         vector = np.cross(self.corners[:, 2] - self.corners[:, 0], self.corners[:, 3] - self.corners[:, 1])
@@ -200,7 +187,7 @@ class Sheets:
         step = -(-len(self) // most)
         if step <= 1:
             return self, np.arange(len(self))
-        # Evenly among those of each tetrahedron, whatever their order means.
+        # Evenly among those of each tetrahedron, in whatever order they come.
         order = np.argsort(self.cell, kind="stable")[step // 2 :: step]
         number = np.full(len(self), -1)
         number[order] = np.arange(len(order))
@@ -227,7 +214,7 @@ class Sheets:
         cell = self.cell[order]
         counts = np.bincount(cell, minlength=len(clouds))
         place = np.arange(len(cell)) - (np.cumsum(counts) - counts)[cell]
-        # Evenly among those of a tetrahedron, whatever their order means.
+        # Evenly among those of a tetrahedron, in whatever order they come.
         most = int(np.clip(ALL_SAMPLES // max(len(clouds), 1), 1, SAMPLES))
         step = np.maximum(-(-counts[cell] // most), 1)
         chosen = order[(place % step == 0) & self.replaced[cell]]
@@ -240,15 +227,7 @@ class Sheets:
 
 
 class KeyMeans:
-    """Means of samples over what counts for each of the 4 n key points.
-
-    Parameters
-    ----------
-    key : (k,) int64
-        Key point of each sample.
-    count : int
-        Number n of tetrahedra.
-    """
+    """Means of samples by key point: ``key`` (k,) is that of each sample, among the 4 n of ``count`` tetrahedra."""
 
     def __init__(self, key: NDArray[np.int64], count: int) -> None:
         self._key, self._count = key, count

@@ -1,16 +1,14 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Directions from which the sky is looked at, and light from all sides as few numbers: spherical harmonics.
+"""Light from all sides as spherical harmonics, and how leaves, bark and clouds scatter light (paper, section 7).
 
 Irradiance changes so slowly with the normal that nine numbers a colour hold it within a few percent (Ramamoorthi and
 Hanrahan, "An Efficient Representation for Irradiance Environment Maps", 2001).
 
-What leaves, bark and clouds of them send to the eye of the light that arrives (paper, section 7).
-
 A facet is a sheet that scatters as the material of proxies does: evenly over the side of the light or, for the fraction
 of its transmission, over the other side, with a little gloss. A cloud is the paper's blend of a particle term and a
-plane term, in the forms of `docs/architecture.md`. All radiances are such that light of radiance 1 from all sides gives
-what is white a radiance of 1.
+plane term, in the forms of `docs/architecture.md`. White surfaces in light of radiance 1 from all sides
+have radiance 1.
 """
 
 from __future__ import annotations
@@ -20,14 +18,22 @@ from itertools import permutations, product
 import numpy as np
 from numpy.typing import NDArray
 
-#: Numbers of harmonics up to the second band, and the band of each.
+#: Reflected (n, 3), transmitted (n, 3) and mirrored (n,) fractions of light, see `scattered_fractions`.
+Fractions = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+
+#: Number of harmonics up to the second band, and the band of each.
 HARMONICS = 9
 BAND = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2])
-#: What the cosine lobe max(0, n·l) leaves of each band (Ramamoorthi and Hanrahan 2001, equation 8).
+#: Factors of the cosine lobe max(0, n·l) on each band (Ramamoorthi and Hanrahan 2001, equation 8).
 _COSINE = np.array([np.pi, 2.0 * np.pi / 3.0, np.pi / 4.0])[BAND]
 # McLaren's improved snub cube (Hardin and Sloane, "McLaren's Improved Snub Cube and Other New Spherical Designs in
 # Three Dimensions", 1996): means over its 24 points are exact for polynomials up to degree 7.
 _SNUB = (0.8662468181078206, 0.4225186537611115, 0.2666354015167047)
+#: Light that has passed through a leaf lost more of its blue than light that was reflected: chlorophyll and carotenoids
+#: absorb on the whole way. Products over 1 are cut off.
+THROUGH_TINT = np.array([1.15, 1.1, 0.55])
+#: Fraction of the waxy surface's own, colourless reflection (4 % at a refractive index of 1.5), and its roughness.
+GLOSS, GLOSS_ROUGHNESS = 0.04, 0.6
 
 
 def _directions() -> NDArray[np.float64]:
@@ -68,19 +74,9 @@ def harmonics(directions: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def irradiance(light: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Irradiance of surfaces in light from all sides.
+    """Irradiance (..., 3) of surfaces with unit normals (..., 3), W/m², not below 0.
 
-    Parameters
-    ----------
-    light : (..., 9, 3) float
-        Radiance by harmonic and colour.
-    normals : (..., 3) float64
-        Unit vectors.
-
-    Returns
-    -------
-    (..., 3) float64
-        W/m², not below 0.
+    ``light`` (..., 9, 3) is the radiance from all sides by harmonic and colour.
     """
     return np.maximum(np.einsum("...k,...kc->...c", harmonics(normals) * _COSINE, light), 0.0)
 
@@ -95,17 +91,8 @@ def nearest_direction(directions: NDArray[np.float64]) -> NDArray[np.intp]:
     return np.argmax(directions @ DIRECTIONS.T, axis=1)
 
 
-#: Light that has passed through a leaf lost more of its blue than light that was reflected: chlorophyll and carotenoids
-#: absorb on the whole way. Products over 1 are cut off.
-THROUGH_TINT = np.array([1.15, 1.1, 0.55])
-#: Fraction of the waxy surface's own, colourless reflection (4 % at a refractive index of 1.5), and its roughness.
-GLOSS, GLOSS_ROUGHNESS = 0.04, 0.6
-
-
-def scattered_fractions(
-    colour: NDArray[np.float64], transmission: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Fractions of light that sheets reflect (n, 3) and let through (n, 3) diffusely, and that they mirror (n,)."""
+def scattered_fractions(colour: NDArray[np.float64], transmission: NDArray[np.float64]) -> Fractions:
+    """Fractions of light that sheets reflect (n, 3) and transmit (n, 3) diffusely, and that they mirror (n,)."""
     through = transmission[:, None]
     gloss = np.where(transmission > 0.0, GLOSS, 0.0)
     rest = (1.0 - gloss)[:, None]
@@ -130,7 +117,7 @@ def sphere_phase(cosine: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _bands() -> NDArray[np.float64]:
-    """2π ∫ p(x) Pₗ(x) dx for l = 0, 1, 2: what the phase function leaves of each band of harmonics."""
+    """2π ∫ p(x) Pₗ(x) dx for l = 0, 1, 2: factors of the phase function on the bands of harmonics."""
     x, weight = np.polynomial.legendre.leggauss(64)
     return np.array([2.0 * np.pi * (weight * sphere_phase(x) * p).sum() for p in (1.0, x, (3.0 * x * x - 1.0) / 2.0)])
 
@@ -140,27 +127,15 @@ _PHASE_BANDS = _bands()
 
 def facet_direct(
     normal: NDArray[np.float64],
-    fractions: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    fractions: Fractions,
     towards: NDArray[np.float64],
     arriving: NDArray[np.float64],
     view: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Radiance of the front and the back of facets by one light.
+    """Radiance of the front, where normals point, and of the back of facets (n, 3 each) by one light.
 
-    Parameters
-    ----------
-    normal : (n, 3) float64
-        Unit normals; the front is where they point.
-    fractions : tuple
-        Of `scattered_fractions`.
-    towards, arriving : (n, 3) float64
-        Unit vectors to the light; W/m² on a surface that faces it.
-    view : (n, 3) float64, optional
-        Unit vectors to the eye, for the gloss; without, it is spread as evenly as what is scattered.
-
-    Returns
-    -------
-    front, back : (n, 3) float64
+    All vectors (n, 3) are unit vectors; ``arriving`` (n, 3) is W/m² on a surface that faces the light. Without a
+    ``view`` to the eye the gloss is as even as what is scattered.
     """
     reflected, through, gloss = fractions
     cosine = np.sum(normal * towards, axis=1)
@@ -174,7 +149,7 @@ def facet_direct(
 
 def facet_ambient(
     normal: NDArray[np.float64],
-    fractions: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    fractions: Fractions,
     light: NDArray[np.float64],
     view: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -184,7 +159,7 @@ def facet_ambient(
     if view is None:
         mirrored = front, back
     else:
-        # So broad a lobe is about as wide as a cosine's.
+        # The lobe is about as broad as a cosine's.
         across = np.sum(normal * view, axis=1, keepdims=True)
         seen = irradiance(light, 2.0 * across * normal - view) / np.pi
         mirrored = seen, seen
@@ -209,17 +184,17 @@ def _mirrored(
     masking = inwards * np.sqrt(alpha + (1.0 - alpha) * eye * eye) + outwards * np.sqrt(
         alpha + (1.0 - alpha) * light * light
     )
-    # Light and eye on different sides see nothing of it.
+    # None where light and eye are on different sides.
     return np.where(light * eye > 0.0, density * inwards / (2.0 * np.maximum(masking, 1e-9)), 0.0)
 
 
 def particle_direct(
-    fractions: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    fractions: Fractions,
     towards: NDArray[np.float64],
     arriving: NDArray[np.float64],
     view: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Radiance (n, 3) of a thick cloud of sheets that face all ways, by one light; the gloss goes all ways as well."""
+    """Radiance (n, 3) of a thick cloud of sheets that face all ways, by one light; the gloss is even."""
     reflected, through, gloss = fractions
     cosine = np.sum(towards * view, axis=1)
     phase = reflected * sphere_phase(cosine)[:, None] + through * sphere_phase(-cosine)[:, None]
@@ -227,7 +202,7 @@ def particle_direct(
 
 
 def particle_ambient(
-    fractions: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    fractions: Fractions,
     light: NDArray[np.float64],
     view: NDArray[np.float64],
 ) -> NDArray[np.float64]:

@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light as it would arrive with nothing in its way: from lamps to points, and from the sky by direction.
-
-Which views a light takes of the scene, and the buffers that it sees it in.
-"""
+"""Unblocked light from lamps to points and from the sky by direction, and the buffers in which lights see a scene."""
 
 from __future__ import annotations
 
@@ -14,16 +11,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..camera.camera import Camera
-from ..refinement.lights import Light, lamp_views, light_views
+from ..refinement.lights import Light, image_size, lamp_views, light_views
 from .buffers import LightBuffer
 from .receivers import Clouds, Sheets
 from .scattering import DIRECTIONS, HARMONICS, harmonics, nearest_direction
 
-#: Points on an area light along the longer and the shorter of its sides.
+#: Maximum number of points on an area light along each of its sides.
 AREA_POINTS = 3
-#: Points (evenly spread) by which the sky is read.
+#: Points (evenly spread) at which the sky is sampled.
 SKY_POINTS = 1 << 14
-#: Fraction of a spot's cosine range over which it fades at least, as in Cycles: none has an edge without width.
+#: Limits of the longer side of a lamp's buffer, pixels.
+LAMP_PIXELS = (64, 2048)
+#: Minimum fraction of a spot's cosine range over which it fades, as in Cycles.
 _LEAST_BLEND = 1e-3
 
 
@@ -57,12 +56,12 @@ def _disk_points() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def arriving(light: Light, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Light at points with nothing in between.
+    """Unblocked light at points.
 
     Parameters
     ----------
     light : Light
-        An area counts as the single point in its middle, see `split_areas`.
+        An area counts as the point in its middle, see `split_areas`.
     points : (m, 3) float64
         Metres.
 
@@ -86,8 +85,8 @@ def arriving(light: Light, points: NDArray[np.float64]) -> tuple[NDArray[np.floa
         falloff = falloff * np.maximum(ahead, 0.0)
     elif light.kind == "SPOT":
         edge = np.cos(light.angle)
-        fraction = np.clip((ahead - edge) / max((1.0 - edge) * light.blend, _LEAST_BLEND), 0.0, 1.0)
-        falloff = falloff * fraction * fraction * (3.0 - 2.0 * fraction)
+        blend = np.clip((ahead - edge) / max((1.0 - edge) * light.blend, _LEAST_BLEND), 0.0, 1.0)
+        falloff = falloff * blend * blend * (3.0 - 2.0 * blend)
     return towards, falloff[:, None] * light.colour
 
 
@@ -98,8 +97,7 @@ class World:
     Attributes
     ----------
     parts : (24, 9, 3) float64
-        Radiance of each part by harmonic and colour: their sum is the whole sky's, and a part that is hidden is left
-        out of it.
+        Radiance of each part by harmonic and colour; the sum over the visible parts is that of the sky.
     """
 
     parts: NDArray[np.float64]
@@ -130,21 +128,9 @@ class World:
         return not self.parts[:, 0].any()
 
 
-#: Limits of the longer side of a lamp's buffer, pixels.
-LAMP_PIXELS = (64, 2048)
-
-
 @dataclass(frozen=True)
 class Near:
-    """Where light counts most: around the eye.
-
-    Attributes
-    ----------
-    eye : (3,) float64
-        Metres.
-    radii : tuple of float
-        Of what suns see in views of their own, metres, the smallest first.
-    """
+    """The surroundings of an eye (3,), which suns see in views of their own, by radii, the smallest first; metres."""
 
     eye: NDArray[np.float64]
     radii: tuple[float, ...] = ()
@@ -171,9 +157,9 @@ def buffers_of(
     resolution: int,
     near: Near | None = None,
 ) -> list[LightBuffer]:
-    """Buffers in which a light sees tetrahedra, sheets and polygons: one, six all around, or none without any.
+    """Buffers in which a light sees tetrahedra, sheets and polygons: one, six all around, or none.
 
-    A sun has further ones before it for what is ``near``, in which the same pixels are smaller.
+    A sun has further ones before it for what is ``near``, with smaller pixels.
     """
     views = _views(light, clouds, occluders, resolution) if len(clouds) else []
     if light.kind == "SUN" and near is not None:
@@ -185,13 +171,13 @@ def _views(light: Light, clouds: Clouds, occluders: NDArray[np.float64] | None, 
     corners = clouds.vertices.reshape(-1, 3)
     if light.kind != "SUN":
         return lamp_views(light.position, corners, resolution)
-    # Where occluders are decides how far the view reaches, not how wide it is.
+    # Occluders affect how far the view reaches, not how wide it is.
     every = corners if occluders is None or not len(occluders) else np.concatenate([corners, occluders.reshape(-1, 3)])
     return light_views(light, clouds.vertices, every, resolution)
 
 
 def _closer(view: Camera, near: Near) -> list[Camera]:
-    """Parts of a sun's view."""
+    """Parts of a sun's view around an eye."""
     left, right, bottom, top = view.window
     made = []
     x, y = (near.eye @ view.frame)[:2]
@@ -199,9 +185,8 @@ def _closer(view: Camera, near: Near) -> list[Camera]:
         window = max(left, x - radius), min(right, x + radius), max(bottom, y - radius), min(top, y + radius)
         width, height = window[1] - window[0], window[3] - window[2]
         if min(width, height) > 0.0 and max(width, height) < 0.7 * max(right - left, top - bottom):
-            scale = 4096 / max(width, height)
-            shape = {"width": max(round(width * scale), 1), "height": max(round(height * scale), 1)}
-            made.append(replace(view, window=window, **shape))
+            columns, rows = image_size(width, height)
+            made.append(replace(view, window=window, width=columns, height=rows))
     return made
 
 

@@ -1,22 +1,22 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The states of the loop, one after the other, as small as a preview needs them (paper, figure 8).
+"""The states of the loop, one after the other, as small as a preview needs them (paper, figure 8), and their colours.
 
-What plants and pieces the tetrahedra hold is gone; how many, how dark and of which colour they are stays. Corners and
-the order of drawing come from the last state's tree: nodes keep their numbers, and a tetrahedron that is divided later
-stands in the tree's order where its parts stand.
-
-Colours in which a preview shows tetrahedra; all are RGB as a screen shows them (sRGB), 0 to 1.
+Plants and pieces are gone; the number, extinction and colour of the tetrahedra stay. Corners and the order of drawing
+come from the last state's tree: nodes keep their numbers, and a tetrahedron that is divided later stands in the tree's
+order where its parts stand. Colours are RGB as a screen shows them (sRGB), 0 to 1.
 """
 
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Arrays
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..refinement.contents import Contents
@@ -29,10 +29,21 @@ from ..tetrahedra.tree import TetrahedralTree
 
 #: Bytes that all levels may take together, beside the tree; levels in between are left out beyond.
 MOST_BYTES = 256_000_000
+#: By what was decided; the overlay's text has the same colours. Blue and orange, which few eyes confuse.
+FORMS: dict[Decision, tuple[float, float, float]] = {
+    Decision.SPLIT: (0.95, 0.95, 0.95),
+    Decision.EXPLICIT: (0.35, 0.85, 0.25),
+    Decision.PROXY: (1.0, 0.6, 0.1),
+    Decision.HIDDEN: (0.4, 0.6, 1.0),
+}
+#: From little to much, evenly apart in lightness.
+_RAMP = np.array([(0.25, 0.1, 0.45), (0.2, 0.35, 0.75), (0.1, 0.65, 0.65), (0.5, 0.85, 0.35), (1.0, 0.92, 0.3)])
+#: Contributions are shown by their logarithm between these, pixels.
+_LEAST, _MOST = 0.25, 1_024.0
 
 
 @dataclass(frozen=True)
-class Level:
+class Level(Arrays):
     """The tetrahedra that hold something after one pass.
 
     Attributes
@@ -40,7 +51,7 @@ class Level:
     nodes : (t,) int32
         Their nodes in the tree.
     depth : (t,) int16
-        How many planes lie between the root and each.
+        Planes between the root and each.
     decision : (t,) int8
         `Decision`; in all levels but the last some are still to be divided.
     visibility : (t,) float32
@@ -66,15 +77,6 @@ class Level:
     colour: NDArray[np.float32]
     figures: Step
     number: int
-
-    def __len__(self) -> int:
-        return len(self.nodes)
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of the arrays."""
-        values = (getattr(self, f.name) for f in fields(self))
-        return sum(v.nbytes for v in values if isinstance(v, np.ndarray))
 
 
 class Levels:
@@ -115,13 +117,7 @@ class Levels:
         return self.tree.vertices(level.nodes[chosen]).astype(np.float32)
 
     def back_to_front(self, level: Level, camera: Camera, chosen: NDArray | None = None) -> NDArray[np.intp]:
-        """Places (t,) in a level in the order in which a painter draws them for any camera; exact.
-
-        Parameters
-        ----------
-        chosen : (k,) int, optional
-            Only these places.
-        """
+        """Exact back-to-front order for any camera of a level's places (t,), or only of those ``chosen`` (k,)."""
         some = np.arange(len(level)) if chosen is None else chosen
         rank = self.tree.order(**camera.line_of_sight, back_to_front=True)
         return some[np.argsort(rank[self._below[level.nodes[some]]], kind="stable")]
@@ -130,16 +126,7 @@ class Levels:
 def gather(
     loop: Generator[Refinement, None, Refinement], flora: Flora, camera: Camera
 ) -> Generator[Level, None, Levels]:
-    """Run the loop to its end and keep a level of each state; yields each level, returns all.
-
-    Parameters
-    ----------
-    loop : generator of Refinement
-        As `refinement.loop.refine` gives it.
-    flora : Flora
-    camera : Camera
-        The loop's.
-    """
+    """Run the loop of `refinement.loop.refine` to its end; yields a level of each state, returns all."""
     levels: list[Level] = []
     while True:
         try:
@@ -178,18 +165,17 @@ def _level(flora: Flora, state: Refinement) -> Level:
 def mean_colours(flora: Flora, contents: Contents, nodes: NDArray[np.integer], size: int) -> NDArray[np.float64]:
     """Mean colours (t, 3) of what nodes (t,) hold, weighted by what shows: leaves once, closed surfaces half.
 
-    Unlike `shading.summaries` without orientation and clumping, which a preview does not show.
+    Unlike `proxies.summaries` without orientation and clumping, which a preview does not show.
     """
     row, piece_row = contents.subplants.items.row, contents.pieces.items.branches.row
     parts = []
-    for cells, totals, leaf, wood in (
-        (contents.subplants.cell, contents.subplants.totals, flora.leaf_colours, flora.wood_colour[row]),
-        (contents.pieces.cell, contents.pieces.totals, None, flora.rows["branch_colour"][piece_row, 0]),
+    for held, leaf_colours, wood in (
+        (contents.subplants, flora.leaf_colours, flora.wood_colour[row]),
+        (contents.pieces, partial(piece_leaf_colours, flora), flora.rows["branch_colour"][piece_row, 0]),
     ):
-        if len(cells) == 0:
-            continue
-        leaves = leaf(contents.subplants.items) if leaf else piece_leaf_colours(flora, contents.pieces.items)
-        parts += [(cells, totals.leaf_area, leaves), (cells, totals.wood_area / 2, wood)]
+        if len(held):
+            parts.append((held.cell, held.totals.leaf_area, leaf_colours(held.items)))
+            parts.append((held.cell, held.totals.wood_area / 2, wood))
     if len(contents.polygons.cell):
         polygons, totals = contents.polygons.items, contents.polygons.totals
         colours = polygons.meshes.colours[polygons.meshes.slot[polygons.face]]
@@ -202,21 +188,8 @@ def mean_colours(flora: Flora, contents: Contents, nodes: NDArray[np.integer], s
     return sums[nodes] / np.where(area > 0.0, area, 1.0)[nodes, None]
 
 
-#: By what was decided; the overlay's text has the same colours. Blue and orange, so that few eyes mix them up.
-FORMS: dict[Decision, tuple[float, float, float]] = {
-    Decision.SPLIT: (0.95, 0.95, 0.95),
-    Decision.EXPLICIT: (0.35, 0.85, 0.25),
-    Decision.PROXY: (1.0, 0.6, 0.1),
-    Decision.HIDDEN: (0.4, 0.6, 1.0),
-}
-#: From little to much, evenly apart in lightness.
-_RAMP = np.array([(0.25, 0.1, 0.45), (0.2, 0.35, 0.75), (0.1, 0.65, 0.65), (0.5, 0.85, 0.35), (1.0, 0.92, 0.3)])
-#: Contributions are shown by their logarithm between these, pixels.
-_LEAST, _MOST = 0.25, 1_024.0
-
-
 def ramp(fraction: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Colours (n, 3) for fractions (n,), dark violet at 0 over green to bright yellow at 1."""
+    """Colours (n, 3) for fractions (n,): dark violet at 0, through green, to bright yellow at 1."""
     at = np.clip(fraction, 0.0, 1.0) * (len(_RAMP) - 1)
     low = np.minimum(at.astype(np.intp), len(_RAMP) - 2)
     return (_RAMP[low] + (_RAMP[low + 1] - _RAMP[low]) * (at - low)[:, None]).astype(np.float32)
@@ -229,10 +202,10 @@ def colours_of(level: Level, mode: str, deepest: int) -> NDArray[np.float32]:
     ----------
     level : Level
     mode : {'LEVEL', 'VISIBILITY', 'FORM', 'CONTRIBUTION'}
-        By how often space was divided, by the fraction that is seen, by what was decided, or by the logarithm of the
-        pixels that are changed.
+        By how often space was divided, by visibility, by what was decided, or by the logarithm of the pixels that are
+        changed.
     deepest : int
-        Depth that is brightest, so that colours stay while one steps through levels.
+        Depth of the brightest colour: colours stay from level to level.
 
     Raises
     ------

@@ -19,7 +19,7 @@ from ..growth.growth import trunks
 from ..growth.seeds import Seeds
 from .levels import as_shown
 
-#: Plants that a preview shows; of more, every second, third and so on.
+#: Plants that a preview shows; of more, every second, third and so on is shown.
 MOST_PLANTS = 50_000
 #: Corners of each of a crown's rings.
 SIDES = 4
@@ -27,7 +27,7 @@ SIDES = 4
 _RINGS, _BAND = (0.25, 0.65), 0.2
 #: Fraction of the leaves that lie below a crown, and above it, and within its rings.
 _BELOW, _ABOVE, _WITHIN = 0.03, 0.995, 0.85
-#: Where light comes from, and what fraction of it is there without.
+#: Direction to the light, and the fraction of light in its shade.
 _SUN, _SHADE = np.array([-0.45, -0.35, 0.82]), 0.45
 
 
@@ -58,16 +58,10 @@ class Shapes:
 def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
     """Plants as crowns and trunks of some twenty triangles each, in the mean colours of their species.
 
-    Parameters
-    ----------
-    flora : Flora
-        Compiled species, in the order of ``seeds.identifiers``.
-    seeds : Seeds
-    most : int
-        Plants that are shown at most.
+    Of more than ``most`` plants only some are shown; ``flora`` has the species in the order of ``seeds.identifiers``.
     """
-    seeds, of = _some(seeds, most)
-    stems = trunks(flora.rows, seeds)
+    of, seeds = len(seeds), seeds.take(slice(None, None, max(-(-len(seeds) // most), 1)))
+    trunk = trunks(flora.rows, seeds)
     profile = np.stack([_profile(flora, int(row)) for row in flora.first_row])[seeds.species]  # (n, 6)
     angle = np.arange(SIDES) * 2.0 * np.pi / SIDES
     around = np.stack([np.cos(angle), np.sin(angle), np.zeros(SIDES)], axis=1)
@@ -81,18 +75,18 @@ def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
     crown.append(np.stack([0 * high, 0 * high, high], axis=1)[:, None])
     outward.append(np.broadcast_to([0.0, 0.0, 1.0], (len(seeds), 1, 3)))
     # The wood's own radius would be less than a pixel from where a forest is looked at.
-    radius = np.maximum(stems.radius / stems.length, 0.012)[:, None, None]
+    radius = np.maximum(trunk.radius / trunk.length, 0.012)[:, None, None]
     foot = radius * around
     middle = (low + 0.5 * (high - low))[:, None, None] * np.array([[0.0, 0.0, 1.0]])
-    local = np.concatenate([*crown, foot, middle], axis=1) * stems.length[:, None, None]
+    local = np.concatenate([*crown, foot, middle], axis=1) * trunk.length[:, None, None]
     normals = np.concatenate([*outward, np.broadcast_to(around, foot.shape), 0 * middle], axis=1)
-    positions = np.einsum("nij,nvj->nvi", stems.frame, local) + stems.position[:, None]
-    light = np.clip(np.einsum("nij,nvj->nvi", stems.frame, normals) @ (_SUN / np.linalg.norm(_SUN)), 0.0, 1.0)
+    positions = np.einsum("nij,nvj->nvi", trunk.frame, local) + trunk.position[:, None]
+    light = np.clip(np.einsum("nij,nvj->nvi", trunk.frame, normals) @ (_SUN / np.linalg.norm(_SUN)), 0.0, 1.0)
     light = _SHADE + (1.0 - _SHADE) * light
-    leafy = flora.leaf_count[stems.row] > 0
-    leaves = np.where(leafy[:, None], flora.leaf_colours(stems), flora.wood_colour[stems.row])
+    leafy = flora.leaf_count[trunk.row] > 0
+    leaves = np.where(leafy[:, None], flora.leaf_colours(trunk), flora.wood_colour[trunk.row])
     corners = 2 * SIDES + 2
-    base = np.repeat(np.stack([leaves, flora.wood_colour[stems.row]], axis=1), (corners, SIDES + 1), axis=1)
+    base = np.repeat(np.stack([leaves, flora.wood_colour[trunk.row]], axis=1), (corners, SIDES + 1), axis=1)
     return Shapes(
         positions.reshape(-1, 3).astype(np.float32),
         as_shown(base * light[:, :, None]).reshape(-1, 3),
@@ -103,17 +97,17 @@ def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
 
 
 def bounds_of_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
-    """Compiled bounds of plants as edges of boxes: what their samples reach, in the direction of their trunks."""
-    seeds, of = _some(seeds, most)
-    stems = trunks(flora.rows, seeds)
-    radius, low, high = flora.sampled_bound[stems.row].T * stems.length
+    """Compiled bounds of plants as edges of boxes: the extent of their samples in the direction of their trunks."""
+    of, seeds = len(seeds), seeds.take(slice(None, None, max(-(-len(seeds) // most), 1)))
+    trunk = trunks(flora.rows, seeds)
+    radius, low, high = flora.sampled_bound[trunk.row].T * trunk.length
     corner = np.array([(x, y, z) for z in (0, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))], float)
     local = corner * [1.0, 1.0, 0.0] * radius[:, None, None]
     local[:, :, 2] = np.where(corner[:, 2] > 0.0, high[:, None], low[:, None])
-    positions = np.einsum("nij,nvj->nvi", stems.frame, local) + stems.position[:, None]
+    positions = np.einsum("nij,nvj->nvi", trunk.frame, local) + trunk.position[:, None]
     edges = [(i, (i + 1) % 4) for i in range(4)]
     edges += [(a + 4, b + 4) for a, b in edges] + [(i, i + 4) for i in range(4)]
-    colours = np.repeat(as_shown(np.maximum(flora.leaf_colours(stems), flora.wood_colour[stems.row])), 8, axis=0)
+    colours = np.repeat(as_shown(np.maximum(flora.leaf_colours(trunk), flora.wood_colour[trunk.row])), 8, axis=0)
     indices = _repeated(np.array(edges), 8, len(seeds))
     return Shapes(positions.reshape(-1, 3).astype(np.float32), colours, indices, len(seeds), of)
 
@@ -157,12 +151,3 @@ def _repeated(indices: NDArray[np.integer], corners: int, times: int) -> NDArray
     """The same faces or edges for each of many plants of so many corners."""
     every = indices[None] + corners * np.arange(times)[:, None, None]
     return every.reshape(-1, indices.shape[1]).astype(np.int32)
-
-
-def _some(seeds: Seeds, most: int) -> tuple[Seeds, int]:
-    """Plants that are shown, evenly taken from all, and how many there are."""
-    step = -(-len(seeds) // most)
-    if step <= 1:
-        return seeds, len(seeds)
-    names = ("species", "seed", "position", "frame", "scale")
-    return Seeds(seeds.identifiers, *(getattr(seeds, name)[::step] for name in names)), len(seeds)

@@ -70,15 +70,7 @@ class Projected:
 
 
 def drawable(vertices: NDArray[np.floating], camera: Camera) -> NDArray[np.bool_]:
-    """Tetrahedra (n,) that lie in front of the near plane whole; others, the eye's own among them, have no projection.
-
-    Parameters
-    ----------
-    vertices : (n, 4, 3) float
-        Metres, world space.
-    camera : Camera
-        Perspective or orthographic.
-    """
+    """Tetrahedra (n, 4, 3) that lie whole in front of the near plane of a flat camera; others have no projection."""
     back = camera.frame[:, 2]
     depth = (np.asarray(camera.position) @ back) - vertices @ back.astype(vertices.dtype)
     return depth.min(axis=1) > camera.near
@@ -114,10 +106,7 @@ def project(vertices: NDArray[np.float64], extinction: NDArray[np.float64], came
     else:
         # Every coordinate is 0 on the face opposite its vertex, so any vertex of that face may be the origin.
         on_face = vertices[:, [1, 2, 3, 0]]
-        weights, origin = (
-            ((camera.position - on_face) * gradients).sum(axis=2),
-            np.broadcast_to(camera.position, (1, 3)),
-        )
+        weights, origin = ((camera.position - on_face) * gradients).sum(axis=2), camera.position[None]
     sides = np.stack([np.maximum(weights, 0.0), np.maximum(-weights, 0.0)])
     total = sides.sum(axis=2)
     # From the origin, so that what lies far from it, or is as thin as a needle, loses no precision.
@@ -127,7 +116,7 @@ def project(vertices: NDArray[np.float64], extinction: NDArray[np.float64], came
     first = (reach[0] @ toward > reach[1] @ toward).astype(np.intp)
     front = reach[first, np.arange(len(vertices))] + origin
     thickness = np.linalg.norm(reach[0] - reach[1], axis=1)
-    # What has no volume has no thickness either, nor triangles.
+    # What has no volume has neither thickness nor triangles.
     flat = (total <= 0.0).any(axis=0)
     thickness = np.where(flat, 0.0, thickness)
     front[flat] = vertices[flat, 0]

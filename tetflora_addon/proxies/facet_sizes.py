@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How large the facets are that stand for sub-plants, pieces and polygons, and how many that will make.
+"""Sizes of the facets that stand for sub-plants, pieces and polygons, and how many that will make.
 
-Less than a pixel is wide there; three times that where nobody looks, and there one stands for several leaves, for
-hidden plants only cast shadows and light up others. They grow further the deeper it is hidden, and the farther it is
-from the view: a forest has far more of it than anybody sees.
+Facets are less than a pixel wide where they are seen. Hidden ones are three times as wide and stand for several leaves,
+because hidden plants only cast shadows and light up others. They grow with the depth at which they are hidden and with
+the distance from the view.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
-from ..refinement.contents import Contents, Totals, bounding_cylinders
+from ..refinement.contents import Contents, Held, Totals, bounding_cylinders
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 
-#: How much larger facets of hidden tetrahedra are: at an optical depth in front of them that hides them, and at most,
-#: in proportion to the depth; but no more pixels wide than this for the depth's sake. Some of what is deeply hidden can
-#: be seen between crowns after all, and where a budget makes facets large it would be blots.
+#: How much larger facets of hidden tetrahedra are: where the optical depth in front just hides them, and at most, in
+#: proportion to the depth. For the depth alone they are never wider than so many pixels: some of what is deeply hidden
+#: shows between crowns after all, and would be blots where a budget makes facets large.
 COARSE, COARSEST = 3.0, 9.0
 _WIDEST = 3.0
 _HIDING_DEPTH = 4.0  # e^−4 = .02 is left
@@ -38,7 +38,7 @@ HIDDEN_FACES = 4
 
 @dataclass(frozen=True)
 class FacetSizes:
-    """What sizes and numbers of facets follow from, for one kind of things.
+    """What determines sizes and numbers of facets of sub-plants or pieces.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class FacetSizes:
     one_leaf : (n,) float64
         Area of a leaf, m².
     least_wood : (n,) float64
-        Side of facets of which there are as many as the wood has faces, metres.
+        Side of facets that are as many as the faces of the wood, metres.
     coarse : (n,) float64
         How much larger than seen ones facets are; 1 where they are seen.
     clearance : (n,) float64
@@ -67,7 +67,7 @@ class FacetSizes:
 
     @property
     def hidden(self) -> NDArray[np.bool_]:
-        """Where (n,) nobody looks."""
+        """Things (n,) that are not seen."""
         return self.coarse > 1.0
 
     @property
@@ -81,8 +81,8 @@ class FacetSizes:
         blurred = np.minimum(_SOFT * np.maximum(self.clearance, 0.0), np.sqrt(self.totals.optical_area / _FEWEST))
         unseen = np.maximum(blurred, np.sqrt(HIDDEN_LEAVES * self.one_leaf))
         side = np.where(self.hidden, np.maximum(side, unseen), side)
-        # Where nobody looks, wood is cut into no more facets than it has faces. Elsewhere it is cut as fine as the
-        # side asks for, or thin twigs would become blots.
+        # Hidden wood is cut into no more facets than it has faces. Elsewhere it is cut as fine as the side requires, or
+        # thin twigs would become blots.
         wood = np.where(self.hidden, np.maximum(side, self.least_wood), side)
         return np.maximum(side, np.sqrt(self.one_leaf)), wood
 
@@ -96,7 +96,7 @@ class FacetSizes:
 
 @dataclass(frozen=True)
 class PolygonFacetSizes:
-    """What sizes and numbers of facets follow from, for explicit polygons.
+    """What determines sizes and numbers of facets of explicit polygons.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ class PolygonFacetSizes:
     face : (n,) float64
         Area of the face that each is, or is a fragment of, m².
     leaf, hidden : (n,) bool
-        Faces of leaves; where nobody looks.
+        Faces of leaves; faces that are not seen.
     optical : (n,) float64
         Area that facets stand for, m²: of solids half, as the far side is never seen.
     solid : (n,) bool
@@ -149,7 +149,7 @@ def coarseness(result: Refinement) -> NDArray[np.float64]:
 
 
 def polygon_facet_sizes(contents: Contents, camera: Camera, hidden: NDArray[np.bool_]) -> PolygonFacetSizes:
-    """Facets of the polygons of contents; ``hidden`` (nodes,) says in which nodes nobody looks."""
+    """Facets of the polygons of contents; ``hidden`` (nodes,) marks nodes that are not seen."""
     own, totals = contents.polygons.items, contents.polygons.totals
     meshes = own.meshes
     return PolygonFacetSizes(
@@ -164,19 +164,21 @@ def polygon_facet_sizes(contents: Contents, camera: Camera, hidden: NDArray[np.b
 
 def subplant_facet_sizes(flora: Flora, contents: Contents, camera: Camera, coarse: NDArray[np.float64]) -> FacetSizes:
     """Facets of the sub-plants of contents; ``coarse`` (nodes,) as `coarseness` gives it."""
-    own = contents.subplants.items
-    totals, faces = contents.subplants.totals, flora.branch_faces(own)
-    least = np.sqrt(totals.wood_area / 2 / np.maximum(faces, 1))
-    place, coarse = bounding_cylinders(flora, own)[0], coarse[contents.subplants.cell]
-    extent, away = camera.extent_around(place), camera.clearance(place)
-    return FacetSizes(extent, flora.one_leaf_area(own), least, coarse, away, totals, np.ones(len(own)))
+    held, own = contents.subplants, contents.subplants.items
+    place, faces = bounding_cylinders(flora, own)[0], flora.branch_faces(own)
+    return _facet_sizes(held, place, flora.one_leaf_area(own), faces, np.ones(len(own)), camera, coarse)
 
 
 def piece_facet_sizes(flora: Flora, contents: Contents, camera: Camera, coarse: NDArray[np.float64]) -> FacetSizes:
     """Facets of the pieces of contents; parameters as for `subplant_facet_sizes`."""
-    own = contents.pieces.items
-    totals, faces = contents.pieces.totals, flora.rows["sides"][own.branches.row]
-    least = np.sqrt(totals.wood_area / 2 / np.maximum(faces, 1))
-    place, coarse = (own.start + own.end) / 2, coarse[contents.pieces.cell]
+    held, own = contents.pieces, contents.pieces.items
+    place, faces = (own.start + own.end) / 2, flora.rows["sides"][own.branches.row]
+    return _facet_sizes(held, place, flora.one_leaf_area(own.branches), faces, own.t1 - own.t0, camera, coarse)
+
+
+def _facet_sizes(
+    held: Held, place: NDArray, one_leaf: NDArray, faces: NDArray, part: NDArray, camera: Camera, coarse: NDArray
+) -> FacetSizes:
+    least = np.sqrt(held.totals.wood_area / 2 / np.maximum(faces, 1))
     extent, away = camera.extent_around(place), camera.clearance(place)
-    return FacetSizes(extent, flora.one_leaf_area(own.branches), least, coarse, away, totals, own.t1 - own.t0)
+    return FacetSizes(extent, one_leaf, least, coarse[held.cell], away, held.totals, part)

@@ -36,48 +36,46 @@ from ..storage import remembered
 from ..subplants.pieces import Pieces, open_subplants
 from .microsurfaces import CIRCUMRADIUS, SIN_60, Facets, piece_facets, subplant_facets
 
-#: Weights of the shipped species, made by ``python -m devtools.facet_tables``. Raise the number when facets or weights
-#: are made in another way.
+#: Weights of the shipped species, made by ``python -m devtools.facet_tables``. Raise `_METHOD` when facets or weights
+#: are made differently.
 TABLE = Path(__file__).resolve().parent.parent / "catalogue" / "tables" / "facet_weights.json"
 _METHOD = 2
-#: Facets of a sub-plant for which weights are known; between them they follow the logarithm.
+#: Facets of a sub-plant for which weights are known; in between, weights are linear in the logarithm.
 COUNTS = 4.0 ** np.arange(-2, 6)
-#: Under so many facets of a sub-plant its neighbours count, and not only its siblings.
+#: With fewer facets for a sub-plant its neighbours count, and not only its siblings.
 _FEW = 4.0
-#: Families of a row that are looked at, and polygons that all may have; members of one at most, siblings or neighbours.
+#: Families of a row that are tested, and polygons of all of them; maximum members of one, siblings or neighbours.
 _FAMILIES, _POLYGONS = 6, 50_000.0
 _SIBLINGS, _NEIGHBOURS = 12, 60
-#: Facets that stand for each number, over all families: as many copies are made as it takes for the first, if that is
-#: possible at all for the second; numbers that would need more than the third are not tried.
+#: Facets for each number, over all families: copies are made up to the first; with fewer than the second a number is
+#: skipped; after more than the third no larger number is tried.
 _WANTED, _NEEDED, _MOST = 250.0, 60.0, 5_000.0
 _COPIES = 16
 #: Rays across a family, and directions of rays.
 _RAYS, _DIRECTIONS = 36, 4
-#: Weights are never more than this.
+#: Maximum weight.
 _LARGEST = 1.6
 
 
 @dataclass(frozen=True)
 class FacetWeights:
-    """Weights of the area by row and number of facets.
+    """Fraction of their area that facets get, by row and number of facets.
 
     Attributes
     ----------
-    whole : (r, k) float64
-        Of sub-plants, for each of `COUNTS`.
-    own : (r, k) float64
-        Of what branches themselves bear, by the number of facets of a whole branch.
+    whole, own : (r, k) float64
+        For each of `COUNTS`, of sub-plants, and of what branches themselves bear, by the facets of a whole branch.
     """
 
     whole: NDArray[np.float64]
     own: NDArray[np.float64]
 
     def of_subplants(self, row: NDArray[np.integer], count: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Weights (n,) for sub-plants of rows (n,) that are cut into so many (n,) facets each."""
+        """Weights (n,) for sub-plants of rows (n,) and numbers of facets (n,)."""
         return _between(self.whole, row, count)
 
     def of_pieces(self, row: NDArray[np.integer], count: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Weights (n,) for pieces of branches of which a whole one would be cut into so many (n,) facets."""
+        """Weights (n,) for pieces of branches, by rows (n,) and the numbers of facets (n,) of whole branches."""
         return _between(self.own, row, count)
 
 
@@ -88,16 +86,15 @@ def _between(table: NDArray[np.float64], row: NDArray[np.integer], count: NDArra
     return table[row, low] + (place - low) * (table[row, low + 1] - table[row, low])
 
 
-#: Weights (2, r, k) of species that are not shipped: a scene is compiled anew for each refinement.
+#: Weights (2, r, k) of other species by digest: a scene is compiled anew for each refinement.
 _found: dict[str, NDArray[np.float64]] = {}
 _REMEMBERED = 256
 
 
 def facet_weights(flora: Flora) -> FacetWeights:
-    """Weights for a flora; found when first asked for, and kept as long as the flora may be asked for again.
+    """Weights for a flora, cached in memory.
 
-    Those of the species that come with TetFlora are read from `TABLE`; it takes some seconds to find those of one, so
-    that these are kept on disk as well.
+    Those of the shipped species are read from `TABLE`. Others take some seconds a species and are cached on disk too.
     """
     return _of_flora(flora.at_rest)
 
@@ -114,7 +111,7 @@ def _of_flora(flora: Flora) -> FacetWeights:
 
 
 def _of_species(flora: Flora, number: int, name: str) -> NDArray[np.float64]:
-    """Weights (2, r, k) of one species: the same whatever other species the flora has, and wherever they were found."""
+    """Weights (2, r, k) of one species, which do not depend on the other species of the flora."""
     if name not in _found:
         rows = np.flatnonzero(flora.rows["species"] == number)
 
@@ -130,7 +127,7 @@ def _of_species(flora: Flora, number: int, name: str) -> NDArray[np.float64]:
 
 
 def digest(flora: Flora, number: int) -> str:
-    """What tells a species of a flora from all others: its parameters and the forms of its leaves."""
+    """Fingerprint of a species of a flora: its parameters and the forms of its leaves."""
     return fingerprint(flora.rows[flora.rows["species"] == number], flora.forms[number], _METHOD)
 
 
@@ -158,7 +155,7 @@ def fitted_weights(
 
 
 def _families(flora: Flora, species: NDArray[np.int32], siblings: bool) -> dict[int, list[Branches]]:
-    """Sub-plants of each row of some species as they grow together, in a few plants or on a few parents of each row."""
+    """Sub-plants of each row of some species that grow together, in a few plants or on a few parents of each row."""
     which = np.repeat(species, _FAMILIES)
     n = len(which)
     names = tuple(s.identifier for s in flora.species)
@@ -182,7 +179,7 @@ def _families(flora: Flora, species: NDArray[np.int32], siblings: bool) -> dict[
 def _siblings(
     level: Branches, own: NDArray[np.int64], parent: NDArray[np.int64], most: float
 ) -> Iterator[NDArray[np.int64]]:
-    """Those in the middle of some parents."""
+    """Sub-plants in the middle of some parents."""
     members = int(np.clip(most, 1, _SIBLINGS))
     parents = np.unique(parent[own])
     for p in parents[np.argsort(mix(parents.astype(np.uint64)))[:_FAMILIES]]:
@@ -194,7 +191,7 @@ def _siblings(
 def _neighbours(
     level: Branches, own: NDArray[np.int64], plant: NDArray[np.int64], most: float
 ) -> Iterator[NDArray[np.int64]]:
-    """Those that are next to one of each plant."""
+    """Sub-plants next to one of each plant."""
     members = int(np.clip(most, 1, _NEIGHBOURS))
     for p in np.unique(plant[own]):
         kin = own[plant[own] == p]
@@ -214,7 +211,7 @@ def _apart(flora: Flora, families: list[Branches]) -> tuple[Branches, NDArray[np
     """All families, so far from each other that no ray meets two of them, and the way (3,) beyond the last."""
     reach = np.hypot(flora.bound[:, 0], np.maximum(-flora.bound[:, 1], flora.bound[:, 2]))
     extent = max(float(np.ptp(f.position, axis=0).max() + 2 * (reach[f.row] * f.length).max()) for f in families)
-    # Level, and longer than the least that a view from a sixth above the horizon makes of it.
+    # Level, and long enough to stay apart in a view from a sixth above the horizon.
     step = 8.0 * extent * np.array([0.8, 0.6, 0.0])
     moved = [replace(f, position=f.position - f.position.mean(axis=0) + n * step) for n, f in enumerate(families)]
     return Branches.concatenate(moved), len(families) * step
@@ -242,7 +239,7 @@ def _fitted(sight: _Sight) -> NDArray[np.float64]:
 
 
 def _weight(least: NDArray[np.float64], met: int) -> float:
-    """Weight with which so many rays are held up, from the least weight (n,) with which each ray is."""
+    """Weight with which ``met`` rays are blocked, from the least weight (n,) with which each ray is."""
     return float(np.partition(least, met - 1)[met - 1]) if met <= len(least) else _LARGEST
 
 
@@ -268,9 +265,9 @@ class _Sight:
     flora : Flora
     some : Branches of n
     beyond : (3,) float64
-        Where there is room for others of the same size, metres.
+        Offset at which a copy meets none of them, metres.
     things : Things
-        Leaves and wood in truth.
+        The real leaves and wood.
     area, leaf : (n,) float64
         Optical area of each, and area of one of its leaves, m².
     pieces : Pieces or None
@@ -287,13 +284,13 @@ class _Sight:
 
     @classmethod
     def of_subplants(cls, flora: Flora, some: Branches, beyond: NDArray[np.float64]) -> _Sight:
-        """To the last leaf."""
+        """Whole sub-plants."""
         area = subplant_totals(flora, some).optical_area
         return cls(flora, some, beyond, _grown(flora, some), area, flora.one_leaf_area(some), None)
 
     @classmethod
     def of_branches(cls, flora: Flora, some: Branches, beyond: NDArray[np.float64]) -> _Sight:
-        """Without what grows on the branches but leaves."""
+        """Branches with their own leaves only."""
         pieces, owner = open_subplants(flora, some)[2:]
         area = np.bincount(owner, piece_totals(flora, pieces).optical_area, len(some))
         return cls(flora, some, beyond, _grown(flora, some, orders=1), area, flora.one_leaf_area(some), pieces)
@@ -324,23 +321,16 @@ class _Sight:
         return len(np.unique(_ray_numbers(np.concatenate(rays))))
 
     def facets(self, side: float, copies: int) -> Facets:
-        """Facets of a side, metres; others for each of some copies of all, which stand beside each other."""
+        """Facets of a side in metres for several copies of all side by side, each copy with other facets."""
         if self.pieces is None:
             several = Branches.concatenate([self._copy(self.some, n) for n in range(copies)])
             return subplant_facets(self.flora, several, np.full(len(several), side))
-        beyond = [n * self.beyond for n in range(copies)]
-        several = Pieces.concatenate(
-            [
-                replace(
-                    self.pieces,
-                    branches=self._copy(self.pieces.branches, n),
-                    start=self.pieces.start + way,
-                    end=self.pieces.end + way,
-                )
-                for n, way in enumerate(beyond)
-            ]
-        )
-        return piece_facets(self.flora, several, np.full(len(several), side))
+        several = []
+        for n in range(copies):
+            start, end = (place + n * self.beyond for place in (self.pieces.start, self.pieces.end))
+            several.append(replace(self.pieces, branches=self._copy(self.pieces.branches, n), start=start, end=end))
+        pieces = Pieces.concatenate(several)
+        return piece_facets(self.flora, pieces, np.full(len(pieces), side))
 
     def _copy(self, branches: Branches, number: int) -> Branches:
         key = mix(branches.key + np.uint64(number + 1))
@@ -348,7 +338,7 @@ class _Sight:
 
     @staticmethod
     def least_weights(view: _View, facets: Facets) -> NDArray[np.float64]:
-        """For each ray that any of the facets can hold up, the least weight of their area with which one does."""
+        """For each ray that any of the facets can block, the least weight with which one does."""
         reach = CIRCUMRADIUS * facets.side[:, None]
         centre, a, b = view.flat(facets.centre), view.flat(facets.across * reach), view.flat(facets.along * reach)
         largest = np.sqrt(_LARGEST)
@@ -373,7 +363,7 @@ class _Sight:
 
 
 def _grown(flora: Flora, some: Branches, orders: int | None = None) -> Things:
-    """Leaves and wood of sub-plants of one species, to the last twig or so many orders only."""
+    """Leaves and wood of sub-plants of one species, of all orders or the given number."""
     rows = len(flora.rows)
     forms = flora.forms[int(flora.species_of(some.row[:1])[0])]
     return things_of(flora.rows, forms, some, np.zeros(rows, np.intp), 0, np.ones(rows), orders)

@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Microsurfaces: few facets that stand for the many surfaces of what is not made explicit (paper, sections 1 and 7).
 
-Each facet takes place, orientation and colour from a leaf or branch that the compiled species expects in the sub-plant;
-there are as many as the area asks for, and they are about as large as a pixel. Area and orientation are kept on
-average.
+Each facet takes its place, orientation and colour from a leaf or branch that the compiled species expects in the
+sub-plant. Facets are about as large as a pixel; on average they keep the area and orientation of the plants.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from ..subplants.pieces import Pieces
 
 _FACET_PATH = 1 << 40  # child indices of facets start here
 _WOOD_PATH = 1 << 41
-# Draws of this module. Wood and leaves have counts of their own; none may meet another, or facets bunch up.
+# Draws of this module. Wood and leaves have draws of their own; none may coincide, or facets bunch up.
 _LEAF_COUNT, _WOOD_COUNT, _TURN, _START, _PLACE = 201, 202, 203, 204, 205
 _MOVE = 211  # three draws from here on
 _GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
@@ -55,7 +54,7 @@ class Facets(Arrays):
     colour : (n, 3) float64
     transmission : (n,) float64
     velocity : (n, 3) float64 or None
-        Metres a second, where it is asked how plants move.
+        Metres a second; None for plants at rest.
     """
 
     centre: NDArray[np.float64]
@@ -96,12 +95,12 @@ def subplant_facets(
     flora : Flora
     subplants : Branches of n
     leaf_side, wood_side : (n,) float64
-        Wanted side of a facet for leaves and for wood (the same if not given), metres; those for leaves are never
-        smaller than the leaves that they stand for.
+        Side of a facet for leaves and for wood (the same if not given), metres; facets for leaves are never smaller
+        than the leaves.
     weight : (n,) float64, optional
         Fraction of their area that facets get, see `facet_weights`.
     real : (n,) float64, optional
-        Fraction of each sub-plant that is drawn as it is; so many of its facets are left out, by numbers of their own.
+        Fraction of each sub-plant that is drawn as it is; as many of its facets are left out at random.
     """
     totals = subplant_totals(flora, subplants)
     part = np.ones(len(subplants)) if weight is None else weight
@@ -125,7 +124,7 @@ def piece_facets(
 ) -> Facets:
     """Facets of pieces of branches; parameters as for `subplant_facets`.
 
-    Here ``real`` is the fraction of the leaves, and ``real_wood`` (n,) says whose wood is drawn as it is.
+    Here ``real`` is the fraction of the leaves, and ``real_wood`` (n,) marks pieces whose wood is drawn as it is.
     """
     totals = piece_totals(flora, pieces)
     if real_wood is not None:
@@ -140,16 +139,9 @@ def piece_facets(
 
 
 def kept_out_of_view(facets: Facets, clearance: Callable[[NDArray], NDArray], smallest: float) -> Facets:
-    """Shrink facets of what is out of view where they would reach into it.
+    """Facets that are out of view, shrunk where they would reach into it, but to no less than a fraction of their side.
 
-    Parameters
-    ----------
-    facets : Facets
-        Of `subplant_facets`, `piece_facets` or `polygon_facets`.
-    clearance : callable
-        Distance (n,) of points (n, 3) from the view, metres.
-    smallest : float
-        Minimum fraction of its side that a facet keeps, 0 to 1.
+    ``clearance`` gives the distance (n,) of points (n, 3) from the view in metres.
     """
     reach = CIRCUMRADIUS * facets.side
     fraction = np.clip(clearance(facets.centre) / np.maximum(reach, 1e-12), smallest, 1.0)
@@ -172,8 +164,8 @@ def _numbers(
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """Owner, index, key and area of the facets that areas (n,) are cut into; their expected number is area / facet.
 
-    Where it is 1 or more they share the area evenly; below, one facet stands for several sub-plants. Of owners of which
-    a fraction (n,) is real so many facets are left out.
+    From 1 on they divide the area evenly; below, one facet stands for several sub-plants. Facets are left out by the
+    fraction (n,) of their owner that is real.
     """
     expected = area / facet
     counts = np.floor(expected + uniform(key, draw)).astype(np.int64)
@@ -187,7 +179,7 @@ def _numbers(
 
 
 def _facet_colours(flora: Flora, row: NDArray, key: NDArray, leaves: NDArray, outward: NDArray) -> NDArray[np.float64]:
-    """Colours of facets that stand for a number of leaves (n,) each: their mean varies less than one leaf's colour."""
+    """Colours of facets that stand for several leaves (n,) each: a mean varies less than the colour of one leaf."""
     deviation = signed(key, Draw.LEAF_COLOUR) / np.sqrt(np.maximum(leaves, 1))
     mean = mean_leaf_colours(flora.rows, row, outward)
     return np.clip(mean + flora.rows["leaf_colour"][row, 1] * deviation[:, None], 0, 1)
@@ -196,14 +188,11 @@ def _facet_colours(flora: Flora, row: NDArray, key: NDArray, leaves: NDArray, ou
 def _picked(
     flora: Flora, points: Points, subplants: Branches, owner: NDArray, index: NDArray, key: NDArray[np.uint64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Samples for facets: runs of them are spread over a sub-plant, and each sub-plant starts its run elsewhere.
+    """Samples (m,) for facets, their places (m, 3) in the world, and the rotations (m, 3, 3) from their axes to it.
 
-    Returns
-    -------
-    (m,) int64, (m, 3) float64, (m, 3, 3) float64
-        Sample, its place in the world, and the rotation from its own axes to the world's. Where a sub-plant has more
-        facets than there are samples, none may lie upon another: whole plants are turned about their trunk, which is as
-        likely a plant; in others places are moved by a little.
+    Runs of samples are spread over a sub-plant, and each sub-plant starts its run elsewhere. Where it has more facets
+    than there are samples, none may lie upon another: whole plants are turned about their trunk, which gives an equally
+    likely plant; in others places are moved a little.
     """
     first, number = points.runs(subplants)
     start = (uniform(subplants.key, _START) * number).astype(np.int64)
@@ -238,7 +227,7 @@ def _leaves_of_subplants(
     frame = settled(rows, leaf_row, frame, points.light[pick].astype(np.float64), _SKY)
     half_leaf = 0.5 * rows["leaf_size"][leaf_row, 0] * subplants.scale[owner]
     centre = place + half_leaf[:, None] * frame[:, :, 1]
-    # Sub-plants beyond the limbs know how far outside they are, and all that grows on them is there.
+    # Sub-plants beyond the limbs know how far outside they are, which holds for all that grows on them.
     outward = np.where(rows["outward"][subplants.row[owner]], points.outward[pick], subplants.outward[owner])
     return Facets(
         centre,
@@ -261,7 +250,7 @@ def _leaves_of_pieces(
     facet = np.maximum(side**2, one)
     start = leaf_start(rows, branches)
     owner, index, key, area, t = _along(flora, pieces, totals.leaf_area, facet, start, _FACET_PATH, _LEAF_COUNT, real)
-    bearers = np.flatnonzero(np.bincount(owner, minlength=len(branches)))  # far from all pieces get a facet
+    bearers = np.flatnonzero(np.bincount(owner, minlength=len(branches)))  # many pieces get no facet
     own = branches.take(bearers)
     lines = axes(rows, own)
     leaves = place_leaves(rows, own, lines, np.searchsorted(bearers, owner), index, key, t)
@@ -313,7 +302,7 @@ def _wood_of_pieces(flora: Flora, pieces: Pieces, totals: Totals, side: NDArray,
 def _carried(
     flora: Flora, subplants: Branches, owner: NDArray[np.int64], centre: NDArray[np.float64]
 ) -> NDArray[np.float64] | None:
-    """Velocities (m, 3) of points (m, 3) of sub-plants that move with their bases; None where nobody asks."""
+    """Velocities (m, 3) of points (m, 3) of sub-plants that move with their bases; None for plants at rest."""
     if subplants.later is None:
         return None
     own = subplants.take(owner)
@@ -334,9 +323,9 @@ def _along(
 ) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
     """Owner, index, key, area and place along the branch of the facets of pieces, see `_numbers`.
 
-    They are those of whole segments of branches, of which a piece has what lies on it: so they do not depend on where
-    a branch is cut. What they stand for begins at fractions ``start`` (n,) of the branches. Along a segment they follow
-    the golden section, and stay when others are added.
+    They are those of whole segments of branches, of which a piece has what lies on it: they do not depend on where a
+    branch is cut. What they stand for begins at fractions ``start`` (n,) of the branches. Along a segment they follow
+    the golden section and stay when others are added.
     """
     segments = flora.rows["segments"][pieces.branches.row]
     number = np.minimum(np.floor((pieces.t0 + pieces.t1) / 2 * segments), segments - 1)
@@ -352,7 +341,7 @@ def _along(
 
 
 def _across(axis: NDArray[np.float64], key: NDArray[np.uint64]) -> NDArray[np.float64]:
-    """Unit vectors perpendicular to axes, turned about them at random: closed tubes face all ways around."""
+    """Unit vectors perpendicular to axes, turned about them at random, since closed tubes face all ways around."""
     a = perpendicular(axis)
     turn = 2 * np.pi * uniform(key, _TURN)[:, None]
     return np.cos(turn) * a + np.sin(turn) * np.cross(axis, a)

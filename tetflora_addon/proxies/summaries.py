@@ -15,7 +15,7 @@ from ..compiled.flora import Flora
 from ..compiled.orientation import leaf_moments, own_leaf_moments, wood_moments
 from ..refinement.contents import Contents
 from ..refinement.polygons import MEASURED_AT_ONCE
-from ..subplants.pieces import piece_leaf_colours
+from ..subplants.pieces import Pieces, piece_leaf_colours
 
 #: κ along an axis is ⟨|n·e|⟩, the moment gives ⟨(n·e)²⟩. The power of the second that is the first at 0, ⅓ (all ways:
 #: ½) and 1; at ½ (normals around a circle) it gives .646 for 2/π = .637.
@@ -37,8 +37,8 @@ class Summaries:
     moment : (n, 3, 3) float64
         Mean of n nᵀ; its trace is 1 where there is anything.
     clumping : (n, 2) float64, optional
-        What the factor on their extinction follows from, see `plants.clumping.factors`; 1 where not given, and for what
-        polygons contribute.
+        Determines the factor on their extinction, see `compiled.clumping.factors`; the factor is 1 where not given,
+        and for what polygons contribute.
     """
 
     optical_area: NDArray[np.float64]
@@ -48,7 +48,7 @@ class Summaries:
     clumping: NDArray[np.float64] | None = None
 
     def effective_area(self, volumes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Area (n,) that an even fog in tetrahedra of given volumes (n,) would have, to be as dark as they are; m²."""
+        """Area (n,) of an even fog, as dark as the tetrahedra, in given volumes (n,); m²."""
         if self.clumping is None:
             return self.optical_area
         return self.optical_area * factors(self.clumping, volumes)
@@ -62,34 +62,28 @@ def summarise(flora: Flora, contents: Contents, index: NDArray[np.integer], coun
     flora : Flora
     contents : Contents
     index : (nodes,) int
-        Number of the summary that each node of the tree contributes to; contents of nodes with −1 are passed over.
+        Number of the summary that each node of the tree contributes to; contents of nodes with −1 are skipped.
     count : int
         Number of summaries.
     """
     sums = np.zeros((count, 16))  # area, then times area: colour, transmission, moment, clumping
-    subplants, pieces = contents.subplants.items, contents.pieces.items
-    rows = flora.rows
-    for cells, branches, own, every in (
-        (contents.subplants.cell, subplants, None, contents.subplants.totals),
-        (contents.pieces.cell, pieces.branches, pieces, contents.pieces.totals),
-    ):
-        to = index[cells]
-        keep = np.flatnonzero(to >= 0)
-        if len(keep) == 0:  # what proxies need of plants is not worked out where there are none
+    for held in (contents.subplants, contents.pieces):
+        keep = np.flatnonzero(index[held.cell] >= 0)
+        if len(keep) == 0:  # clumping and orientation are computed only for plants
             continue
-        clumping = flora.clumping
-        to, branches, totals = to[keep], branches.take(keep), every.take(keep)
+        held, clumping = held.take(keep), flora.clumping
+        own, totals = held.items, held.totals
+        branches = own.branches if isinstance(own, Pieces) else own
         row = branches.row
         # A sub-plant shows the mean of all that grows on it, a piece only its own bark and leaves.
-        if own is None:
+        if branches is own:
             leaf_colour, wood_colour = flora.leaf_colours(branches), flora.wood_colour[row]
             leaf_moment = leaf_moments(flora.orientation, branches)
             wood_moment, transmission = wood_moments(flora.orientation, branches), flora.transmission[row]
             clumped = clumping.coefficients(branches, clumping.whole)
         else:
-            own = own.take(keep)
             axis = unit(own.end - own.start)
-            leaf_colour, wood_colour = piece_leaf_colours(flora, own), rows["branch_colour"][row, 0]
+            leaf_colour, wood_colour = piece_leaf_colours(flora, own), flora.rows["branch_colour"][row, 0]
             leaf_moment = own_leaf_moments(flora.orientation, row, axis)
             wood_moment = (np.eye(3) - axis[:, :, None] * axis[:, None, :]) / 2
             transmission = flora.leaf.transmission[row]
@@ -99,7 +93,7 @@ def summarise(flora: Flora, contents: Contents, index: NDArray[np.integer], coun
         colour = leaf[:, None] * leaf_colour + wood[:, None] * wood_colour
         area = (leaf + wood)[:, None]
         values = [area, colour, (leaf * transmission)[:, None], moment.reshape(-1, 9), area * clumped]
-        _add(sums, to, np.concatenate(values, axis=1))
+        _add(sums, index[held.cell], np.concatenate(values, axis=1))
     _add_polygons(sums, contents, index)
     area = sums[:, 0]
     mean = sums / np.where(area > 0, area, 1)[:, None]
