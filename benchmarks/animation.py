@@ -24,8 +24,8 @@ import numpy as np
 from devtools import session
 from examples import fly_through, landscape
 from tetflora_addon.blender.job import contents, frame_cache, refine
-from tetflora_addon.blender.job import render as handlers
-from tetflora_addon.blender.results import collection as emit
+from tetflora_addon.blender.job.render import on_render_end, on_render_pre
+from tetflora_addon.blender.results.output import result_collections
 
 from .compare import flip_map, read_picture, render
 from .report import Targets, peak_mb
@@ -73,11 +73,11 @@ def _timed(name: str) -> dict[str, float]:
     for frame in range(1, FRAMES + 1):
         scene.frame_set(frame)
         start = time.perf_counter()
-        handlers.on_render_pre(scene)
+        on_render_pre(scene)
         seconds.append(time.perf_counter() - start)
-        cells.add(emit.result_collections(scene, 'RENDER')[0].name)
+        cells.add(result_collections(scene, 'RENDER')[0].name)
     polygons = json.loads(scene.tetflora.statistics)["polygons_meshed"]
-    handlers.on_render_end(scene)
+    on_render_end(scene)
     first, later = seconds[0], np.array(seconds[1:])
     return {
         "first_frame_s": first,
@@ -113,7 +113,7 @@ def _flight() -> dict[str, int]:
 def fingerprint(scene: bpy.types.Scene) -> dict[str, list]:
     """Numbers of vertices and faces of all meshes of a frame, and hashes of where the vertices are."""
     found = {}
-    for collection in emit.result_collections(scene, 'RENDER'):
+    for collection in result_collections(scene, 'RENDER'):
         for obj in collection.objects:
             if obj.type == 'MESH':
                 places = np.empty(3 * len(obj.data.vertices), np.float32)
@@ -132,7 +132,7 @@ def frame_alone(frame: int) -> dict[str, list]:
 
 def _prepared(scene: bpy.types.Scene, frame: int) -> dict[str, list]:
     scene.frame_set(frame)
-    handlers.on_render_pre(scene)
+    on_render_pre(scene)
     return fingerprint(scene)
 
 
@@ -146,7 +146,7 @@ def _film(chosen: list[int]) -> tuple[dict[int, dict[str, list]], int]:
         names.append(min(made))
         if frame in chosen:
             found[frame] = made
-    handlers.on_render_end(scene)
+    on_render_end(scene)
     changes = [n for n in range(1, FRAMES) if names[n] != names[n - 1]]
     return found, (changes[0] if changes else FRAMES // 2) + 1
 

@@ -17,12 +17,12 @@ import bpy
 import numpy as np
 
 from examples import landscape
-from tetflora_addon.blender.job import contents as scene_contents
 from tetflora_addon.blender.job import refine
+from tetflora_addon.blender.job.contents import compile_for
 from tetflora_addon.blender.results import meshes
-from tetflora_addon.blender.scene import plants as scene_reader
-from tetflora_addon.emission import plants as emission
+from tetflora_addon.blender.scene.plants import read_plants
 from tetflora_addon.emission.forms import Refined, facet_blocks
+from tetflora_addon.emission.plants import explicit_blocks
 
 from .report import Targets
 
@@ -71,9 +71,9 @@ def run(quick: bool) -> dict[str, float]:
         begun = time.process_time()
 
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    seeds = scene_reader.read_plants(scene, depsgraph, depsgraph.view_layer)
+    seeds = read_plants(scene, depsgraph, depsgraph.view_layer)
     lap("read", held(seeds))
-    flora = scene_contents.compile_for(seeds.identifiers, scene, depsgraph)
+    flora = compile_for(seeds.identifiers, scene, depsgraph)
     lap("compile", held([flora.rows, flora.bound]))
     lap("sample", held([flora.samples, flora.orientation]))
     wall = time.perf_counter()
@@ -85,7 +85,7 @@ def run(quick: bool) -> dict[str, float]:
     for stage, share in result.seconds.items():  # told by the clock; together they are what the processor took
         seconds[stage], left[stage] = share / wall * taken, sizes[stage]
     begun = time.process_time()
-    for block in emission.explicit_blocks(flora, result):
+    for block in explicit_blocks(flora, result):
         lap("polygons", block.buffers.nbytes)
         meshes.write_mesh("block", block.buffers)
         lap("write", block.buffers.nbytes)

@@ -12,7 +12,7 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from tetflora_addon.blender.job import refine
-from tetflora_addon.blender.scene import plants as scene_reader
+from tetflora_addon.blender.scene.plants import read_plants
 from tetflora_addon.refinement import decisions
 
 #: Colours of the lines by decision, linear RGB, and the height at which they lie, so that the rarer are on top.
@@ -42,7 +42,7 @@ def render_top_view(scene: bpy.types.Scene, path: Path, width: int = 1600, sampl
     decision = decisions.Decision
     drawing = bpy.data.scenes.new("Top view")
     try:
-        plants = scene_reader.read_plants(scene, depsgraph, depsgraph.view_layer)
+        plants = read_plants(scene, depsgraph, depsgraph.view_layer)
         far = np.linalg.norm(plants.position[:, :2] - camera.position[:2], axis=1).max() + 20
         centre_line = plants.position[:, :2].mean(axis=0) - camera.position[:2]
         centre_line /= np.linalg.norm(centre_line)

@@ -12,7 +12,7 @@ from ..tetflora_addon.blender.job.plant_mesh import make_plant_mesh_steps
 from ..tetflora_addon.blender.job.render import forget_render_errors
 from ..tetflora_addon.blender.placing.plant_objects import plants_of, prepare_scene
 from ..tetflora_addon.blender.results import hiding
-from ..tetflora_addon.blender.results.collection import result_collections
+from ..tetflora_addon.blender.results.collection import has_results, result_collections
 from ..tetflora_addon.blender.results.forms import few_bounces
 from ..tetflora_addon.blender.results.hiding import keep_results
 from ..tetflora_addon.blender.runtime import redraw
@@ -110,7 +110,7 @@ def _clearable(scene: bpy.types.Scene) -> bool:
 
     Only then are all objects looked through: a panel asks at every movement of the mouse.
     """
-    return refine.has_results(scene) or bool(scene.tetflora.statistics and hiding.hidden_originals(scene))
+    return has_results(scene) or bool(scene.tetflora.statistics and hiding.hidden_originals(scene))
 
 
 class TETFLORA_OT_clear(Reporting, bpy.types.Operator):

@@ -19,7 +19,7 @@ import numpy as np
 from devtools import session
 from devtools.formats import set_format
 from tetflora_addon.blender.job import refine
-from tetflora_addon.blender.results import collection as emit
+from tetflora_addon.blender.results.output import result_collections
 
 from .. import fly_through
 from .pictures import save_sheet
@@ -98,7 +98,7 @@ class _Frames:
 
     def _has_plants(self, scene: bpy.types.Scene, *_: object) -> None:
         self.ready.append(time.perf_counter())
-        found = emit.result_collections(scene, 'RENDER')
+        found = result_collections(scene, 'RENDER')
         self.results += [collection.name for collection in found[:1]]
 
     def _write(self, *_: object) -> None:

@@ -11,11 +11,11 @@ import pytest
 
 from devtools import build
 from tetflora_addon.blender import preferences, properties
-from tetflora_addon.blender import settings as wind_properties
-from tetflora_addon.blender.cli import command as command_line
+from tetflora_addon.blender.cli.command import main
 from tetflora_addon.blender.placing import properties as brush_properties
 from tetflora_addon.blender.placing import properties as population_properties
 from tetflora_addon.blender.results import output_properties
+from tetflora_addon.blender.settings import TetFloraWind
 from tetflora_addon.blender.viewport import state
 
 MANUAL = (build.ROOT / "docs" / "manual.md").read_text(encoding="utf-8")
@@ -34,7 +34,7 @@ GROUPS = (
     output_properties.TetFloraSpeciesOutput,
     state.TetFloraPreview,
     brush_properties.TetFloraBrush,
-    wind_properties.TetFloraWind,
+    TetFloraWind,
     preferences.TetFloraPreferences,
 )
 
@@ -63,7 +63,7 @@ def test_every_default_is_the_one_that_is_told(clean_file):
 def test_every_option_of_the_command_line_is_told(blender, capsys):
     told = set(re.findall(r"`(--[a-z-]+)", MANUAL))
     for command in ("refine", "render", "stats", "farm"):
-        assert command_line.main([command, "--help"]) == 0
+        assert main([command, "--help"]) == 0
         options = set(re.findall(r"^ +(--[a-z-]+)", capsys.readouterr().out, re.MULTILINE))
         assert "--json" in options
         assert sorted(options - told) == []

@@ -11,11 +11,11 @@ import pytest
 
 from tests.blender.scenes import add_mesh, add_plant
 from tetflora_addon.blender import preferences, properties, saved_files
-from tetflora_addon.blender import settings as wind_properties
 from tetflora_addon.blender.job import contents
 from tetflora_addon.blender.placing import properties as brush_properties
 from tetflora_addon.blender.placing import properties as population_properties
 from tetflora_addon.blender.results import leaf_objects
+from tetflora_addon.blender.settings import TetFloraWind
 from tetflora_addon.blender.species import catalogue, edits
 from tetflora_addon.growth import wind
 from tetflora_addon.planting import rules, strokes
@@ -51,7 +51,7 @@ def _without_labels(settings_class):
         (settings.RefinementSettings, properties.TetFloraScene, {"hidden_block", "proxy_block", "margin"}),
         (rules.Rules, population_properties.TetFloraPopulation, {"density", "shares", "companions"}),
         (strokes.Brush, brush_properties.TetFloraBrush, {"density", "scale_min", "scale_max", "shares"}),
-        (wind.Wind, wind_properties.TetFloraWind, {"time", "loop", "moving"}),
+        (wind.Wind, TetFloraWind, {"time", "loop", "moving"}),
     ],
     ids=lambda value: getattr(value, "__name__", ""),
 )

@@ -15,7 +15,7 @@ sys.path.append(str(Path(__file__).resolve().parents[2]))
 from devtools.aliases import INSTALLED, alias
 
 alias(INSTALLED)
-from tetflora_addon.blender.job import refine as job  # noqa: E402  (the same)
+from tetflora_addon.blender.job.refine import refine, refine_steps  # noqa: E402  (the same)
 
 what, moment, times = sys.argv[-3:]
 left = int(times)
@@ -40,16 +40,16 @@ def save() -> None:
         now()
 
 
-def refine() -> None:
+def save_between_steps() -> None:
     """Save where the message of a step begins with the moment."""
-    for step in job.refine_steps(scene, bpy.context.evaluated_depsgraph_get()):
+    for step in refine_steps(scene, bpy.context.evaluated_depsgraph_get()):
         if step.message.startswith(moment):
             save()
 
 
 def save_again_and_again() -> None:
     """Files of some megabytes."""
-    job.refine(scene, bpy.context.evaluated_depsgraph_get())
+    refine(scene, bpy.context.evaluated_depsgraph_get())
     bpy.app.handlers.save_pre.append(lambda *_: now())
     while True:
         bpy.ops.wm.save_mainfile(compress=moment == "compressed")
@@ -61,6 +61,6 @@ def render() -> None:
     bpy.ops.render.render(animation=True)
 
 
-{"refine": refine, "save": save_again_and_again, "render": render}[what]()
+{"refine": save_between_steps, "save": save_again_and_again, "render": render}[what]()
 while True:
     pass

@@ -18,8 +18,8 @@ import pytest
 from benchmarks.compare import difference
 from devtools import session
 from examples import row80
-from tetflora_addon.blender.job import contents as scene_contents
 from tetflora_addon.blender.job import frame_cache, refine
+from tetflora_addon.blender.job.contents import read_scene
 
 Run = Callable[..., subprocess.CompletedProcess]
 
@@ -55,7 +55,7 @@ def expected(seeds: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     scene = bpy.context.scene
     scene.tetflora.refine_at_render = False
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    given = scene_contents.read_scene(scene, depsgraph, bpy.context.view_layer)
+    given = read_scene(scene, depsgraph, bpy.context.view_layer)
     camera = frame_cache.shared_camera(scene, depsgraph, given)
     refine.refine(scene, depsgraph, view_layer=bpy.context.view_layer, camera=camera)
     path = tmp_path_factory.mktemp("expected") / "expected.png"

@@ -23,7 +23,7 @@ import pytest
 from devtools import session
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, tiny_render
 from tetflora_addon.blender.job import refine
-from tetflora_addon.blender.results import collection as emit
+from tetflora_addon.blender.results.output import result_collections
 
 Run = Callable[..., subprocess.CompletedProcess]
 
@@ -98,15 +98,15 @@ def assert_sound(path: Path) -> None:
     assert sum(obj.tetflora.is_plant for obj in scene.objects) == 4
     assert (scene.cycles.transparent_max_bounces, scene.cycles.min_transparent_bounces) == (BOUNCES, BOUNCES)
     assert scene.tetflora.refine_at_render
-    assert emit.result_collections(scene, 'RENDER') == []
-    results = emit.result_collections(scene, 'VIEW')
+    assert result_collections(scene, 'RENDER') == []
+    results = result_collections(scene, 'VIEW')
     assert len(results) == scene.tetflora.output.save_results
     assert not any(collection.hide_render for collection in results)
     assert stone.hide_render == stone.hide_viewport == bool(results)
     statistics = refine.refine(scene, depsgraph())
     assert statistics.plants == 4
     assert statistics.complete
-    assert len(emit.result_collections(scene, 'VIEW')) == 1
+    assert len(result_collections(scene, 'VIEW')) == 1
     assert stone.hide_render
     refine.clear(scene)
     assert not stone.hide_render

@@ -15,6 +15,7 @@ from devtools.aliases import INSTALLED, alias
 alias(INSTALLED)
 from tests.blender.scenes import add_plant, datablocks  # noqa: E402  (found only now)
 from tetflora_addon.blender.job import refine  # noqa: E402
+from tetflora_addon.blender.results.collection import has_results  # noqa: E402
 from tetflora_addon.errors import SpeciesError  # noqa: E402
 from tetflora_addon.refinement.statistics import Progress  # noqa: E402
 
@@ -56,7 +57,7 @@ def steps(ui):
     yield from ui.until(lambda: any("Refining, pass" in message for message in messages), 60, "first pass")
     ui.press('RET')
     yield from ui.until(lambda: not running(ui), 60, "end after Return")
-    ui.values["stopped"] = [refine.has_results(scene), json.loads(scene.tetflora.statistics)["complete"]]
+    ui.values["stopped"] = [has_results(scene), json.loads(scene.tetflora.statistics)["complete"]]
     refine.clear(scene)
 
     odd = add_plant("odd", "quercus")

@@ -11,8 +11,9 @@ import bpy
 import pytest
 
 from tests.blender.scenes import add_camera, add_plant, datablocks, tiny_render
-from tetflora_addon.blender.cli import command as command_line
+from tetflora_addon.blender.cli.command import main
 from tetflora_addon.blender.job import refine
+from tetflora_addon.blender.results.collection import has_results
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -28,7 +29,7 @@ def forest():
 
 
 def _run(*arguments) -> int:
-    return command_line.main([str(a) for a in arguments])
+    return main([str(a) for a in arguments])
 
 
 def _figures(capfd) -> dict:
@@ -54,7 +55,7 @@ def test_refine_saves_a_copy_with_the_result(forest, tmp_path, capfd):
     assert set(figures["seconds"]) >= {"read", "refine", "emit"}
     assert (forest.tetflora.cutoff, forest.tetflora.proxy_form) == (8.0, 'SHELLS')
     bpy.ops.wm.open_mainfile(filepath=str(path))
-    assert refine.has_results(bpy.context.scene)
+    assert has_results(bpy.context.scene)
     assert refine.clear(bpy.context.scene) > 0
 
 

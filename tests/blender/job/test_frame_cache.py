@@ -14,10 +14,9 @@ import pytest
 from tests.blender.digests import these
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph
 from tetflora_addon.blender import compat
-from tetflora_addon.blender.job import frame_cache, render
-from tetflora_addon.blender.job import refine as job
-from tetflora_addon.blender.results import collection as emit
-from tetflora_addon.blender.scene import camera as camera_reader
+from tetflora_addon.blender.job import frame_cache, refine, render
+from tetflora_addon.blender.results.output import result_collections
+from tetflora_addon.blender.scene.camera import read_camera
 
 FRAMES = 12
 
@@ -44,19 +43,19 @@ def film(clean_file):
 @pytest.fixture
 def made(monkeypatch):
     """Frames for which something was refined."""
-    frames, real = [], job.refine
+    frames, real = [], refine.refine
 
-    def refine(scene, *arguments, **options):
+    def counted(scene, *arguments, **options):
         frames.append(scene.frame_current)
         return real(scene, *arguments, **options)
 
-    monkeypatch.setattr(job, "refine", refine)
+    monkeypatch.setattr(refine, "refine", counted)
     return frames
 
 
 def results(scene):
     """What a frame is rendered with, datablock by datablock."""
-    (collection,) = emit.result_collections(scene, 'RENDER')
+    (collection,) = result_collections(scene, 'RENDER')
     bpy.context.view_layer.update()
     objects = collection.objects
     found = {"objects": these(objects)}
@@ -119,7 +118,7 @@ def test_what_was_not_seen_for_longest_goes_first(film, made):
     sizes = []
     for n in (1, FRAMES // 2, FRAMES):
         at(film, n)
-        sizes.append(sum(entry.megabytes for entry in frame_cache._kept.values()))
+        sizes.append(sum(entry.megabytes for entry in frame_cache._entries.values()))
     render.on_render_end(film)
     made.clear()
     film.tetflora.kept_memory = (sizes[-1] - sizes[0] / 2.0) / 1e3  # room for two of three
@@ -138,7 +137,7 @@ def test_nothing_is_left_when_the_render_ends(film):
         at(film, n)
     render.on_render_end(film)
     assert datablocks() == before
-    assert frame_cache._kept == {}
+    assert frame_cache._entries == {}
 
 
 def test_nothing_that_is_kept_goes_into_a_file(film, tmp_path):
@@ -208,7 +207,7 @@ def test_a_camera_that_stands_still_is_refined_for_exactly(film, made):
     film.camera.animation_data_clear()
     film.camera.location = (0.0, -8.0, 1.0)
     depsgraph()
-    exact = camera_reader.read_camera(film, depsgraph(), region_only=True)
+    exact = read_camera(film, depsgraph(), region_only=True)
     shared = frame_cache.shared_camera(film, depsgraph())
     assert shared.position.tolist() == exact.position.tolist()
     assert (shared.window, shared.width, shared.setback) == (exact.window, exact.width, 0.0)
@@ -262,7 +261,7 @@ def test_a_frame_that_fails_leaves_nothing_and_the_next_one_is_right(film, made)
     camera, film.camera = film.camera, None
     render.on_render_pre(film)
     assert len(render.render_errors()) == 1
-    assert emit.result_collections(film, 'RENDER') == []
+    assert result_collections(film, 'RENDER') == []
     film.camera = camera
     render.on_render_init(film)
     assert at(film, 1) == good
@@ -321,7 +320,7 @@ def test_materials_of_leaf_objects_are_noticed(film, made):
 def test_digests_tell_values_apart(one, other):
     digests = hashlib.sha256(), hashlib.sha256()
     for digest, value in zip(digests, (one, other), strict=True):
-        frame_cache.digest_of(digest, value)
+        frame_cache.add_to_digest(digest, value)
     assert digests[0].digest() != digests[1].digest()
 
 
@@ -337,9 +336,9 @@ def test_shells_that_come_back_are_shaded_as_they_were(film, made):
 
 def test_materials_put_on_the_artists_results_do_not_change_the_next_frame(film, made):
     film.tetflora.leaf_limit = 0.05
-    job.refine(film, depsgraph())
+    refine.refine(film, depsgraph())
     made.clear()
-    (results_of_artist,) = emit.result_collections(film, 'VIEW')
+    (results_of_artist,) = result_collections(film, 'VIEW')
     leaves = next(o for o in results_of_artist.objects if o.get("tetflora_kind") == "leaf")
     leaves.material_slots[0].material = bpy.data.materials.new("mine")
     first = at(film, 1)
@@ -381,10 +380,10 @@ def test_scenes_that_are_rendered_within_a_render_leave_its_results_alone(film, 
     for prop in ("leaf_limit", "cutoff", "visibility_resolution", "cell_length"):
         setattr(other.tetflora, prop, getattr(film.tetflora, prop))
     other.render.resolution_x, other.render.resolution_y = 64, 36
-    names = {collection.name for collection in emit.result_collections(film)}
+    names = {collection.name for collection in result_collections(film)}
     render.on_render_pre(other)
     assert render.render_errors() == []
-    theirs = {collection.name for collection in emit.result_collections(other)}
+    theirs = {collection.name for collection in result_collections(other)}
     assert theirs
     assert not theirs & names
     render.on_render_end(other)

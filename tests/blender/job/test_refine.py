@@ -15,6 +15,7 @@ from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks
 from tetflora_addon import errors
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import contents, refine
+from tetflora_addon.blender.results.collection import has_results
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -44,10 +45,10 @@ def test_clear_removes_all_that_was_made_and_nothing_else():
     before = datablocks()
     _refine(scene)
     assert _made(scene)
-    assert refine.has_results(scene)
+    assert has_results(scene)
     refine.clear(scene)
     assert datablocks() == before
-    assert not refine.has_results(scene)
+    assert not has_results(scene)
 
 
 def test_refining_again_replaces():
@@ -244,7 +245,7 @@ def test_a_job_that_is_told_to_stop_refining_makes_what_it_has():
             progress = next(steps)
     statistics = stop.value.value
     assert not statistics.complete
-    assert refine.has_results(scene)
+    assert has_results(scene)
     whole = _refine(scene)
     assert whole.complete
     assert whole.passes > statistics.passes

@@ -16,8 +16,8 @@ from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import refine, render
 from tetflora_addon.blender.materials import nodes
 from tetflora_addon.blender.results import collection, forms, hiding
-from tetflora_addon.blender.scene import camera as camera_reader
 from tetflora_addon.blender.scene import plants
+from tetflora_addon.blender.scene.camera import read_camera
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -46,7 +46,7 @@ class _Stub:
         assert for_render
         if self.error is not None:
             raise self.error
-        camera = camera_reader.read_camera(scene, depsgraph)
+        camera = read_camera(scene, depsgraph)
         seeds = plants.read_plants(scene, depsgraph, view_layer)
         self.cameras.append(camera.position.round(4).tolist())
         self.plants.append(seeds.position.round(4).tolist())

@@ -60,7 +60,7 @@ def test_scenes_in_a_sequencer_show_their_plants(film, tmp_path):
     bpy.ops.render.render(animation=True, scene=outer.name)
     pictures = [picture(tmp_path, n) for n in range(1, FRAMES + 1)]
     assert datablocks() == before
-    assert frame_cache._kept == {}
+    assert frame_cache._entries == {}
     assert render.render_errors() == []
     for values in pictures:  # white sky and the plant before it
         assert values.max() > 0.7

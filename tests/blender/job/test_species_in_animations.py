@@ -12,7 +12,7 @@ import pytest
 from tests.blender.scenes import add_camera, add_plant, depsgraph
 from tetflora_addon.blender import preferences
 from tetflora_addon.blender.job import render
-from tetflora_addon.blender.results import collection as emit
+from tetflora_addon.blender.results.output import result_collections
 from tetflora_addon.blender.species import edits
 
 
@@ -37,7 +37,7 @@ def prepared(scene):
     """Names of what the frame is rendered with."""
     render.on_render_pre(scene)
     assert render.render_errors() == []
-    (collection,) = emit.result_collections(scene, 'RENDER')
+    (collection,) = result_collections(scene, 'RENDER')
     return {obj.name for obj in collection.objects}
 
 

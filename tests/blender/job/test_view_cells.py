@@ -10,7 +10,7 @@ import pytest
 
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph
 from tetflora_addon.blender.job import contents, frame_cache, render
-from tetflora_addon.blender.results import collection as emit
+from tetflora_addon.blender.results.output import result_collections
 
 FRAMES = 9
 
@@ -39,7 +39,7 @@ def at(scene, frame):
     scene.frame_set(frame)
     render.on_render_pre(scene)
     assert render.render_errors() == []
-    (collection,) = emit.result_collections(scene, 'RENDER')
+    (collection,) = result_collections(scene, 'RENDER')
     found = {}
     for obj in collection.objects:
         if obj.type == 'MESH':

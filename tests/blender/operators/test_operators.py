@@ -13,6 +13,7 @@ import operators
 from panels import results
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, select, tiny_render
 from tetflora_addon.blender.job import refine, render
+from tetflora_addon.blender.results.collection import has_results
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -164,7 +165,7 @@ def test_refine_makes_meshes_and_figures_and_clear_takes_them_back():
     scene = _small_forest()
     before = datablocks()
     assert _ops().refine() == {'FINISHED'}
-    assert refine.has_results(scene)
+    assert has_results(scene)
     figures = json.loads(scene.tetflora.statistics)
     assert figures["plants"] == 2
     assert figures["polygons_meshed"] + figures["polygons_proxy"] > 0
@@ -203,7 +204,7 @@ def test_clear_shows_what_results_that_were_deleted_by_hand_hid(unlinked):
         rock.use_fake_user = True
         scene.collection.objects.unlink(rock)
         scene.name = "renamed"
-    assert not refine.has_results(scene)
+    assert not has_results(scene)
     assert _ops().clear() == {'FINISHED'}
     assert (rock.hide_render, rock.hide_viewport) == (False, False)
     assert not _ops().clear.poll()
@@ -218,7 +219,7 @@ def test_clear_shows_a_mesh_only_when_no_scene_has_results_in_its_place():
     second.camera = first.camera
     with bpy.context.temp_override(scene=second, view_layer=second.view_layers[0]):
         refine.refine(second, bpy.context.evaluated_depsgraph_get())
-    assert refine.has_results(second)
+    assert has_results(second)
     second.name = "other"
     _ops().clear()
     assert (rock.hide_render, rock.hide_viewport) == (True, True)

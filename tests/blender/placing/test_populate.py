@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from tests.blender.scenes import add_mesh, add_plant, select
 from tetflora_addon import errors
-from tetflora_addon.blender.scene import plants as scene_reader
+from tetflora_addon.blender.scene.plants import read_plants
 from tetflora_addon.planting import places, rules, terrain
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -208,7 +208,7 @@ def _populated(**options):
     bpy.ops.tetflora.populate(count=60, seed=3, min_distance=1.0, species="bush:2, conifer", **options)
     bpy.context.view_layer.update()
     graph = bpy.context.evaluated_depsgraph_get()
-    read = scene_reader.read_plants(bpy.context.scene, graph, bpy.context.view_layer)
+    read = read_plants(bpy.context.scene, graph, bpy.context.view_layer)
     order = np.lexsort(np.round(read.position.T, 3))
     return read.identifiers, read.species[order], read.seed[order], read.position[order], read.frame[order]
 

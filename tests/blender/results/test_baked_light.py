@@ -16,7 +16,7 @@ from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.materials import materials, nodes
 from tetflora_addon.blender.scene import lights
-from tetflora_addon.emission import light as baked_emission
+from tetflora_addon.emission.light import baked_attributes
 from tetflora_addon.light import scattering, sources
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -142,7 +142,7 @@ def test_what_cannot_be_read_is_said():
 
 def baked_square(front, back, colour=0.5):
     square = add_mesh(size=0.5, z=1.0)
-    attributes = baked_emission.baked_attributes('FACE', np.array([front], np.float32), np.array([back], np.float32))
+    attributes = baked_attributes('FACE', np.array([front], np.float32), np.array([back], np.float32))
     attributes = {**attributes, "tf_colour": ('FACE', np.full((1, 3), colour, np.float32))}
     for name, (domain, values) in attributes.items():
         square.data.attributes.new(name, 'FLOAT_VECTOR', domain).data.foreach_set("vector", values.ravel())

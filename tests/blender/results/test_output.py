@@ -10,9 +10,10 @@ import bpy
 import pytest
 
 from tests.blender.scenes import add_mesh, add_plant, datablocks, depsgraph
-from tetflora_addon.blender.job import refine as job
-from tetflora_addon.blender.results import collection as emit
+from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.results import output
+from tetflora_addon.blender.results.collection import has_results
+from tetflora_addon.blender.results.output import result_collections
 
 
 @pytest.fixture
@@ -28,25 +29,25 @@ def scene(clean_file):
     return scene
 
 
-def refine(scene):
-    job.refine(scene, depsgraph())
+def refined(scene):
+    refine.refine(scene, depsgraph())
     bpy.context.view_layer.update()
     return [o for o in scene.objects if o.get("tetflora_kind", "species") != "species"]
 
 
 def test_files_hold_results_only_if_asked(scene, tmp_path):
     path = str(tmp_path / "forest.blend")
-    refine(scene)
+    refined(scene)
     bpy.ops.wm.save_as_mainfile(filepath=path)
     light = (tmp_path / "forest.blend").stat().st_size
-    assert job.has_results(scene)
+    assert has_results(scene)
     bpy.ops.wm.open_mainfile(filepath=path)
     scene = bpy.context.scene
-    assert not job.has_results(scene)
+    assert not has_results(scene)
     assert scene.tetflora.statistics == ""
     assert sorted(o.name for o in bpy.data.objects) == ["camera", "plant", "plant.001"]
     scene.tetflora.output.save_results = True
-    made = len(refine(scene))
+    made = len(refined(scene))
     bpy.ops.wm.save_as_mainfile(filepath=path)
     assert (tmp_path / "forest.blend").stat().st_size > 2 * light
     bpy.ops.wm.open_mainfile(filepath=path)
@@ -57,7 +58,7 @@ def test_files_hold_results_only_if_asked(scene, tmp_path):
 def test_a_mesh_that_is_hidden_for_results_is_shown_where_the_file_lacks_them(scene, tmp_path):
     rock = add_mesh("rock")
     rock.tetflora.is_explicit = True
-    refine(scene)
+    refined(scene)
     assert rock.hide_render
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "rock.blend"))
     assert rock.hide_render  # here results still stand for it
@@ -68,28 +69,28 @@ def test_a_mesh_that_is_hidden_for_results_is_shown_where_the_file_lacks_them(sc
 
 def test_an_edited_material_outlives_files_without_results(scene, tmp_path):
     path = str(tmp_path / "edited.blend")
-    made = next(o for o in refine(scene) if o["tetflora_kind"] == "bark")
+    made = next(o for o in refined(scene) if o["tetflora_kind"] == "bark")
     name = made.data.materials[0].name
     made.data.materials[0].diffuse_color = (1.0, 0.0, 0.0, 1.0)
     for _ in range(2):  # the second time nothing uses it
         bpy.ops.wm.save_as_mainfile(filepath=path)
         bpy.ops.wm.open_mainfile(filepath=path)
     scene = bpy.context.scene
-    again = next(o for o in refine(scene) if o.data.materials[0].name == name)
+    again = next(o for o in refined(scene) if o.data.materials[0].name == name)
     assert tuple(again.data.materials[0].diffuse_color) == (1.0, 0.0, 0.0, 1.0)
     assert not again.data.materials[0].use_fake_user
-    job.clear(scene)
+    refine.clear(scene)
     assert name not in bpy.data.materials
 
 
 def test_settings_reach_results_that_are_there_and_new_ones(scene):
-    made = refine(scene)
+    made = refined(scene)
     output = scene.tetflora.output
     output.shadow, output.camera, output.pass_index, output.light_group = False, False, 7, "forest"
     entry = output.species.add()
     entry.species, entry.pass_index, entry.light_group = "conifer", 9, "conifers"
     for again in (False, True):
-        objects = refine(scene) if again else made
+        objects = refined(scene) if again else made
         own = {o["tetflora_species"]: (o.pass_index, o.lightgroup) for o in objects}
         assert own["bush"] == (7, "forest")
         assert own["conifer"] == (9, "conifers")
@@ -98,13 +99,13 @@ def test_settings_reach_results_that_are_there_and_new_ones(scene):
 
 
 def test_hidden_results_are_hidden(scene):
-    refine(scene)
+    refined(scene)
     scene.tetflora.output.show_viewport = False
-    collection = emit.result_collections(scene, 'VIEW')[0]
+    collection = result_collections(scene, 'VIEW')[0]
     assert collection.hide_viewport
     assert not collection.hide_render
-    refine(scene)
-    assert emit.result_collections(scene, 'VIEW')[0].hide_viewport
+    refined(scene)
+    assert result_collections(scene, 'VIEW')[0].hide_viewport
 
 
 @pytest.mark.parametrize("form", ['AUTOMATIC', 'MICROSURFACES', 'MICROSPHERES'])
@@ -112,7 +113,7 @@ def test_every_object_has_one_species_and_its_parent(scene, form):
     """Cryptomatte's assets are parents: one for each species, with its name."""
     scene.tetflora.proxy_form = form
     scene.tetflora.leaf_limit = 4.0
-    made = refine(scene)
+    made = refined(scene)
     assert {o["tetflora_species"] for o in made} == {"bush", "conifer"}
     assert any(o["tetflora_kind"] == "proxy" for o in made)
     for obj in made:
@@ -122,38 +123,38 @@ def test_every_object_has_one_species_and_its_parent(scene, form):
 
 def test_parents_keep_their_names_and_go_with_the_last_results(scene):
     before = datablocks()
-    names = [{o.parent.name for o in refine(scene)} for _ in range(2)]
-    job.refine(scene, depsgraph(), for_render=True)
-    render = emit.result_collections(scene, 'RENDER')[0]
+    names = [{o.parent.name for o in refined(scene)} for _ in range(2)]
+    refine.refine(scene, depsgraph(), for_render=True)
+    render = result_collections(scene, 'RENDER')[0]
     names.append({o.parent.name for o in render.objects if o.parent is not None})
     assert names[0] == names[1] == names[2]
-    job.clear(scene, for_render=True)
+    refine.clear(scene, for_render=True)
     assert names[0] <= {o.name for o in bpy.data.objects}
-    job.clear(scene)
+    refine.clear(scene)
     assert datablocks() == before
 
 
 def test_materials_of_the_artist_take_the_place_of_ours(scene):
     given = bpy.data.materials.new("wax")
     scene.tetflora.leaf_limit = 0.05
-    made = next(o for o in refine(scene) if (o["tetflora_kind"], o["tetflora_species"]) == ("leaf", "bush"))
+    made = next(o for o in refined(scene) if (o["tetflora_kind"], o["tetflora_species"]) == ("leaf", "bush"))
     made.material_slots[0].material = given  # by hand, on the result
-    again = [o for o in refine(scene) if (o["tetflora_kind"], o["tetflora_species"]) == ("leaf", "bush")]
+    again = [o for o in refined(scene) if (o["tetflora_kind"], o["tetflora_species"]) == ("leaf", "bush")]
     assert [o.data.materials[0].name for o in again] == ["wax"] * len(again)
     assert scene.tetflora.output.species[0].leaf == given
     scene.tetflora.output.species[0].leaf = None
-    again = [o for o in refine(scene) if o["tetflora_kind"] == "leaf"]
+    again = [o for o in refined(scene) if o["tetflora_kind"] == "leaf"]
     assert "wax" not in {o.data.materials[0].name for o in again}
 
 
 def test_kept_results_are_the_artists(scene, tmp_path):
     rock = add_mesh("rock")
     rock.tetflora.is_explicit = True
-    made = refine(scene)
+    made = refined(scene)
     assert bpy.ops.tetflora.keep_results() == {'FINISHED'}
-    assert not job.has_results(scene)
+    assert not has_results(scene)
     assert not scene.tetflora.refine_at_render
-    assert job.clear(scene) == 0
+    assert refine.clear(scene) == 0
     assert rock.hide_render
     assert all(not o.hide_select for o in made)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "kept.blend"))

@@ -14,13 +14,13 @@ from tests.blender import renders
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import refine
-from tetflora_addon.blender.scene import camera as camera_reader
+from tetflora_addon.blender.scene.camera import read_camera
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
 def _read():
-    return camera_reader.read_camera(bpy.context.scene, depsgraph())
+    return read_camera(bpy.context.scene, depsgraph())
 
 
 def test_a_pinhole_that_stands_still_has_neither_lens_nor_shutter():

@@ -14,7 +14,7 @@ from tetflora_addon import errors
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import refine, render
 from tetflora_addon.blender.materials import means
-from tetflora_addon.blender.scene import explicit as explicit_objects
+from tetflora_addon.blender.scene.explicit import read_explicit
 from tetflora_addon.blender.species import edits
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -78,7 +78,7 @@ def _area(objects):
 
 
 def _read():
-    return explicit_objects.read_explicit(depsgraph(), bpy.context.view_layer)
+    return read_explicit(depsgraph(), bpy.context.view_layer)
 
 
 def test_near_meshes_come_out_as_they_are_without_any_plant():

@@ -18,7 +18,7 @@ from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, sel
 from tetflora_addon import errors
 from tetflora_addon.blender.job import contents
 from tetflora_addon.blender.scene import fields, objects
-from tetflora_addon.blender.scene import plants as scene_reader
+from tetflora_addon.blender.scene.plants import NoPlantsError, read_plants
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -67,7 +67,7 @@ def _instance_on_points(obj, instanced):
 
 
 def _plants():
-    return scene_reader.read_plants(bpy.context.scene, depsgraph(), bpy.context.view_layer)
+    return read_plants(bpy.context.scene, depsgraph(), bpy.context.view_layer)
 
 
 def _same(first, second):
@@ -167,7 +167,7 @@ def test_point_cloud_objects():
         obj = bpy.data.objects.new("probe", cloud)
         bpy.context.scene.collection.objects.link(obj)
         obj.tetflora.is_field = True
-        with pytest.raises(scene_reader.NoPlantsError):
+        with pytest.raises(NoPlantsError):
             _plants()
         return
     _field(cloud=True, seed=('INT', [4, 5, 6]), kinds=("conifer",))

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.blender.scenes import depsgraph
-from tetflora_addon.blender.scene import lights as light_reader
+from tetflora_addon.blender.scene.lights import read_lights
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -25,7 +25,7 @@ def _add(name, kind, **properties):
 
 
 def _read():
-    return light_reader.read_lights(depsgraph(), bpy.context.view_layer)
+    return read_lights(depsgraph(), bpy.context.view_layer)
 
 
 def test_every_kind_of_light_is_read_by_name():

@@ -10,9 +10,9 @@ import pytest
 
 from tests.blender.scenes import add_plant, datablocks, depsgraph
 from tetflora_addon.blender.job import frame_cache, render
-from tetflora_addon.blender.results import collection as emit
-from tetflora_addon.blender.scene import camera as camera_reader
+from tetflora_addon.blender.results.output import result_collections
 from tetflora_addon.blender.scene import objects
+from tetflora_addon.blender.scene.camera import read_camera
 
 
 @pytest.fixture
@@ -81,7 +81,7 @@ def test_layers_with_different_plants_are_refined_one_by_one(scene, tmp_path):
     before, made = datablocks(), []
 
     def look(_scene, _depsgraph=None):
-        for collection in emit.result_collections(scene, 'RENDER'):
+        for collection in result_collections(scene, 'RENDER'):
             shown = [not layer.layer_collection.children[collection.name].exclude for layer in scene.view_layers]
             made.append(shown)
 
@@ -97,7 +97,7 @@ def test_layers_with_different_plants_are_refined_one_by_one(scene, tmp_path):
 
 
 def test_a_render_region_is_refined_alone(scene, tmp_path):
-    read = camera_reader.read_camera
+    read = read_camera
     whole = read(scene, depsgraph())
     scene.render.use_border = True
     scene.render.border_min_x, scene.render.border_max_x = 0.5, 1.0
@@ -123,7 +123,7 @@ def test_both_eyes_lie_within_what_is_refined(scene, mode, pivot):
     stereo = scene.camera.data.stereo
     stereo.interocular_distance, stereo.convergence_distance, stereo.convergence_mode = 0.5, 4.0, mode
     stereo.pivot = pivot
-    camera = camera_reader.read_camera(scene, depsgraph())
+    camera = read_camera(scene, depsgraph())
     assert len(camera.shutter) == (2 if pivot == 'CENTER' else 1)
     for eye in camera.shutter:
         away = np.linalg.norm(eye.position - camera.position)
@@ -141,7 +141,7 @@ def test_cameras_of_multi_view_are_found_by_their_suffix(scene):
     scene.collection.objects.link(other)
     other.location, other.rotation_euler = (1.0, -14.0, 1.5), scene.camera.rotation_euler
     scene.render.use_multiview, scene.render.views_format = True, 'MULTIVIEW'
-    (seen,) = camera_reader.read_camera(scene, depsgraph()).shutter
+    (seen,) = read_camera(scene, depsgraph()).shutter
     assert seen.position == pytest.approx((1.0, -14.0, 1.5))
 
 

@@ -15,19 +15,19 @@ from mathutils import Vector
 from devtools import session
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph
 from tetflora_addon import errors
-from tetflora_addon.blender.scene import camera as camera_reader
 from tetflora_addon.blender.scene import objects
-from tetflora_addon.blender.scene import plants as scene_reader
+from tetflora_addon.blender.scene.camera import read_camera
+from tetflora_addon.blender.scene.plants import read_plants
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
 def _camera():
-    return camera_reader.read_camera(bpy.context.scene, depsgraph())
+    return read_camera(bpy.context.scene, depsgraph())
 
 
 def _plants():
-    return scene_reader.read_plants(bpy.context.scene, depsgraph(), bpy.context.view_layer)
+    return read_plants(bpy.context.scene, depsgraph(), bpy.context.view_layer)
 
 
 def _occluders():

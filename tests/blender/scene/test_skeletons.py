@@ -10,7 +10,7 @@ import pytest
 
 from tests.blender.scenes import add_mesh, add_plant, depsgraph, select
 from tetflora_addon import errors
-from tetflora_addon.blender.scene import skeletons as plant_form
+from tetflora_addon.blender.scene.skeletons import read_skeleton
 from tetflora_addon.species import skeletons
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -50,7 +50,7 @@ def add_curve(*splines, kind='POLY', radius=None, bevel=0.0, name="curve"):
 
 
 def read(obj):
-    return plant_form.read_skeleton(obj, depsgraph())
+    return read_skeleton(obj, depsgraph())
 
 
 def branches(skeleton):

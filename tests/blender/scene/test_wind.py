@@ -125,7 +125,7 @@ def test_a_plant_is_made_into_a_mesh_at_rest(scene):
     """Meshes that are made of plants, and previews, do not depend on the frame."""
     flora = contents.compile_for(("bush",), scene, depsgraph())
     assert flora.calm is None
-    assert contents.blown(scene, flora).calm is flora
+    assert contents.in_wind(scene, flora).calm is flora
 
 
 def test_velocities_are_there_where_there_is_motion_blur(scene):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a scene gives to refinement: plants, meshes, lights, their flora and the settings."""
+"""Input of refinement from a scene: plants, meshes, lights, compiled species and settings."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from ..settings import wind_of
 
 @dataclass(frozen=True)
 class Given:
-    """What a scene holds; ``explicit`` is None where no mesh takes part, ``sources`` where no light is baked."""
+    """Contents of a scene; ``explicit`` is None where no mesh takes part, ``sources`` where no light is baked."""
 
     seeds: Seeds
     explicit: Explicit | None
@@ -50,8 +50,12 @@ class Given:
 
     def polygons_full(self, flora: Flora) -> int:
         """Polygons of everything, expanded: expected ones of plants, and those of meshes."""
-        plants = round(flora.polygons[trunks(flora.rows, self.seeds).row].sum())
-        return plants + (self.explicit.meshes.faces if self.explicit else 0)
+        return round(expected_polygons(flora, self.seeds)) + (self.explicit.meshes.faces if self.explicit else 0)
+
+
+def expected_polygons(flora: Flora, seeds: Seeds) -> float:
+    """Approximate number of faces of plants."""
+    return float(flora.polygons[trunks(flora.rows, seeds).row].sum())
 
 
 def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer) -> Given:
@@ -81,8 +85,8 @@ def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_laye
 def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Flora:
     """Load and compile species, leaf objects of the scene included.
 
-    Without any, for meshes alone, it is a shipped one, of which nothing grows: the artist's own files and edits
-    must not cost time or raise errors where the scene does not use them.
+    Without any, for meshes alone, it is a shipped one of which nothing grows: the artist's own files and edits that the
+    scene does not use must not take time or raise errors.
 
     Raises
     ------
@@ -94,14 +98,14 @@ def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph:
     return compile_species([resolved_species(scene, identifier, depsgraph) for identifier in identifiers])
 
 
-def blown(scene: bpy.types.Scene, flora: Flora) -> Flora:
+def in_wind(scene: bpy.types.Scene, flora: Flora) -> Flora:
     """A flora in the scene's wind at its frame."""
     wind = wind_of(scene)
     return flora if wind is None else flora.in_wind(wind)
 
 
 def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statistics:
-    """Count plants and polygons of the expanded scene, without growing anything.
+    """Count plants and polygons of the expanded scene without growing anything.
 
     Raises
     ------
@@ -114,14 +118,14 @@ def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statisti
 
 
 def settings_from(scene: bpy.types.Scene) -> RefinementSettings:
-    """The scene's settings as the engine takes them."""
+    """The scene's settings for the engine."""
     group = scene.tetflora
-    # A field that has no property of its own keeps the engine's value.
+    # A field without a property keeps the engine's value.
     names = [f.name for f in fields(RefinementSettings) if f.name in group.bl_rna.properties]
     return RefinementSettings(**{name: getattr(group, name) for name in names})
 
 
 def refinement_settings(scene: bpy.types.Scene) -> RefinementSettings:
-    """The scene's settings, as fine as its proxy form needs them."""
+    """The scene's settings, with the block sizes of its proxy form."""
     emission = form_of(scene).emission
     return replace(settings_from(scene), hidden_block=emission.hidden_block, proxy_block=emission.proxy_block)

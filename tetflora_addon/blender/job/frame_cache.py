@@ -1,12 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Results that a render keeps from frame to frame: what is there already is not refined again.
+"""The frame cache: results of a render that later frames use again, found by a digest of all that they depend on.
 
-Results are known by a digest of all that they depend on. A frame whose digest is that of an earlier one gets its
-results back, and what nobody has seen for longest goes first when the memory for them is full. The camera counts by the
-cell that it is in (`refinement.view_cells`), so that neighbouring frames have the same digest.
-
-A number for all that a refinement depends on: where two are equal, refining again would make the same.
+A frame with the digest of an earlier one gets its results back; the least recently used go first when the cache is
+full. The camera counts by its cell (`camera.view_cells`), so that neighbouring frames have the same digest.
 """
 
 from __future__ import annotations
@@ -32,10 +29,27 @@ from ..settings import wind_of
 from ..species.edits import species_for
 from .contents import Given, read_scene, settings_from
 
-#: Digests of species by number of the object, which is held so that no other gets its number.
-_of_species: dict[int, tuple[Species, str]] = {}
-_MOST_SPECIES = 64
+_MAX_SPECIES = 64
 _CHOICES = ("proxy_form", "baked_light", "expand_everything")
+#: Settings of a scene that results do not depend on.
+_IGNORED = {"statistics", "share_frames", "cell_length", "cell_turn", "kept_memory", "refine_at_render", "auto_refine"}
+
+
+@dataclass
+class _Entry:
+    """Results of one digest; names, because references are invalid after a file is loaded."""
+
+    scene: int  # its number in this session: scenes of a sequencer are rendered while another one is
+    collection: str
+    originals: list[str]
+    megabytes: float
+    statistics: str
+
+
+#: By digest, least recently used first.
+_entries: dict[str, _Entry] = {}
+#: Digests of species by id of the object, which is held so that no other gets its id.
+_of_species: dict[int, tuple[Species, str]] = {}
 
 
 def scene_digest(
@@ -45,16 +59,16 @@ def scene_digest(
     camera: Camera | None = None,
     given: Given | None = None,
 ) -> str:
-    """Digest of camera, plants, meshes that take part or hide plants, lamps, settings, species, materials and wind.
+    """Digest of camera, plants, meshes that take part, occluders, lights, settings, species, materials and wind.
 
-    In the wind it is another at each frame.
+    In the wind it changes with each frame.
 
     Parameters
     ----------
     camera : Camera, optional
-        Which one counts, if it is not the scene's as it stands.
+        Instead of the scene's current one.
     given : Given, optional
-        What `read_scene` returned for the scene.
+        From `read_scene` for the scene.
 
     Raises
     ------
@@ -67,8 +81,8 @@ def scene_digest(
     explicit = ()
     if given.explicit is not None:
         meshes = given.explicit.meshes
-        worn = [[getattr(material, "name_full", "") for material in slots] for slots in given.explicit.materials]
-        explicit = meshes.surfaces, meshes.surface, meshes.linear, meshes.origin, worn
+        slots = [[getattr(material, "name_full", "") for material in slots] for slots in given.explicit.materials]
+        explicit = meshes.surfaces, meshes.surface, meshes.linear, meshes.origin, slots
     species = [resolved_species(scene, identifier, depsgraph) for identifier in given.species]
     for part in (
         camera or read_camera(scene, depsgraph),
@@ -81,12 +95,12 @@ def scene_digest(
         [_digest_of_species(one) for one in species],
         [brought_materials(scene, identifier) for identifier in given.species],
     ):
-        digest_of(content, part)
+        add_to_digest(content, part)
     return content.hexdigest()
 
 
 def choices(scene: bpy.types.Scene) -> list:
-    """What of it a scene's own settings say, without a look at objects; cheap enough for every change."""
+    """Settings of a scene in its digest, without any object; cheap enough for every change."""
     group = scene.tetflora
     materials = [(e.species, *(getattr(getattr(e, k), "name", "") for k in REPLACED)) for e in group.output.species]
     chosen = [getattr(group, name) for name in _CHOICES]
@@ -96,71 +110,52 @@ def choices(scene: bpy.types.Scene) -> list:
 def _digest_of_species(species: Species) -> str:
     """Digest of a species; species never change, so it is computed once."""
     if id(species) not in _of_species:
-        content = hashlib.sha256()
-        digest_of(content, species)
-        if len(_of_species) >= _MOST_SPECIES:
+        if len(_of_species) >= _MAX_SPECIES:
             _of_species.clear()
+        content = hashlib.sha256()
+        add_to_digest(content, species)
         _of_species[id(species)] = species, content.hexdigest()
     return _of_species[id(species)][1]
 
 
-def digest_of(content: hashlib._Hash, value: object) -> None:
-    """Add a value of numbers, texts, arrays, or of sequences, mappings or dataclasses of these."""
+def add_to_digest(content: hashlib._Hash, value: object) -> None:
+    """Add a number, text or array to a digest, or a sequence, mapping or dataclass of these."""
     if isinstance(value, np.ndarray):
         content.update(f"{value.dtype}{value.shape}".encode())
         content.update(np.ascontiguousarray(value) if value.dtype != object else repr(value.tolist()).encode())
     elif is_dataclass(value):
         for field in fields(value):
             content.update(field.name.encode())
-            digest_of(content, getattr(value, field.name))
+            add_to_digest(content, getattr(value, field.name))
     elif isinstance(value, list | tuple):
         content.update(f"{len(value)}:".encode())
         for item in value:
-            digest_of(content, item)
+            add_to_digest(content, item)
     elif isinstance(value, Mapping):
-        digest_of(content, [part for item in value.items() for part in item])
+        add_to_digest(content, [part for item in value.items() for part in item])
     else:
         content.update(f"{value!r};".encode())  # or 1, 11 would be 11, 1
 
 
-#: What a scene's settings say that results do not depend on.
-_ASIDE = {"statistics", "share_frames", "cell_length", "cell_turn", "kept_memory", "refine_at_render", "auto_refine"}
-
-
-@dataclass
-class _Kept:
-    """Results of one digest; names, because references do not outlive a load."""
-
-    scene: int  # its number in this session: scenes of a sequencer are rendered while another one is
-    collection: str
-    originals: list[str]
-    megabytes: float
-    statistics: str
-
-
-#: By digest, least recently seen first.
-_kept: dict[str, _Kept] = {}
-
-
 def shared_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, given: Given | None = None) -> Camera:
-    """The active camera, or the one that stands for all that are nearly alike if it moves and the scene asks for it.
+    """The active camera, or the one of its cell if it moves and the scene shares results between frames.
 
-    More cameras are alike where what is given is far from them.
+    Cells are larger where the contents given are far from them.
 
     Raises
     ------
     SceneError
-        As `camera_reader.read_camera`.
+        As `scene.camera.read_camera`.
     """
     camera, settings = read_camera(scene, depsgraph, region_only=True), scene.tetflora
     if not (settings.share_frames and camera_moves(scene)) or wind_of(scene) is not None:
-        return camera  # in the wind, no two frames are alike
+        return camera  # in the wind, no two frames are equal
     around = None if given is None else _around(scene, given)
     return cell_camera(camera, ViewCells(settings.cell_length, settings.cell_turn), around) or camera
 
 
 def _around(scene: bpy.types.Scene, given: Given) -> Around:
-    """Spheres about the feet of plants, as large as branches are long on the way to the last twig, and about meshes."""
+    """Spheres around meshes, and around plants with the length of all branches on the way to the last twig."""
     seeds, meshes = given.seeds, None if given.explicit is None else given.explicit.meshes
     # Lengths are in metres for trunks, and in those of their parents for all others.
     orders = [species_for(scene, species_of(kind)).orders for kind in seeds.identifiers]
@@ -176,7 +171,7 @@ def _around(scene: bpy.types.Scene, given: Given) -> Around:
 def camera_moves(scene: bpy.types.Scene) -> bool:
     """Whether anything may move a scene's camera or change its lens from frame to frame.
 
-    It depends on the file alone, so that all frames of a film, and each of them alone, are refined in the same way.
+    It depends on the file alone, so that a frame is refined in the same way within an animation and alone.
     """
     carrier = scene.camera
     if carrier is not None and _is_animated(carrier.data):
@@ -200,38 +195,38 @@ def key_of(
     camera: Camera,
     given: Given,
 ) -> str:
-    """Digest of all that results for view layers depend on; camera and what is given are theirs.
+    """Digest of all that results for view layers depend on, with their camera and contents.
 
     Raises
     ------
     TetFloraError
-        As `scene_digest.scene_digest`.
+        As `scene_digest`.
     """
     content = hashlib.sha256(scene_digest(scene, depsgraph, layers[0], camera, given).encode())
-    digest_of(content, [scene.name, *(layer.name for layer in layers)])
+    add_to_digest(content, [scene.name, *(layer.name for layer in layers)])
     for group in (scene.tetflora, scene.tetflora.output, *scene.tetflora.output.species):
-        digest_of(content, _values(group))
+        add_to_digest(content, _values(group))
     return content.hexdigest()
 
 
 def _values(group: bpy.types.PropertyGroup) -> list[object]:
-    """Values of a scene's settings; those in groups are told by others or say nothing of results."""
+    """Values of a scene's settings, except groups: `scene_digest` has those that matter."""
     found: list[object] = []
     for prop in group.bl_rna.properties:
         name = prop.identifier
-        if name not in _ASIDE and prop.type not in {'POINTER', 'COLLECTION'}:
+        if name not in _IGNORED and prop.type not in {'POINTER', 'COLLECTION'}:
             value = getattr(group, name)
             found.append((name, list(value) if getattr(prop, "is_array", False) else value))
     return found
 
 
 def stow(scene: bpy.types.Scene, wanted: Collection[str]) -> None:
-    """Take results of a render out of a scene unless they are wanted for its frame."""
-    stay = {_kept[key].collection for key in wanted if key in _kept}
+    """Unlink results of a render from a scene unless they are wanted for its frame."""
+    stay = {_entries[key].collection for key in wanted if key in _entries}
     away = [c for c in result_collections(scene, 'RENDER') if c.name not in stay]
     if away or len(result_collections(scene, 'RENDER')) < len(wanted):
         show_originals(scene, 'RENDER')
-    known = {entry.collection for entry in _kept.values()}
+    known = {entry.collection for entry in _entries.values()}
     for collection in away:
         if collection.name in known:
             scene.collection.children.unlink(collection)
@@ -240,12 +235,12 @@ def stow(scene: bpy.types.Scene, wanted: Collection[str]) -> None:
 
 
 def recall(scene: bpy.types.Scene, key: str) -> bpy.types.Collection | None:
-    """Put results of a digest into a scene again; None if there are none."""
-    entry = _kept.pop(key, None)
+    """Link results of a digest to a scene again; None if there are none."""
+    entry = _entries.pop(key, None)
     collection = bpy.data.collections.get((entry.collection, None)) if entry is not None else None
     if collection is None:
         return None
-    _kept[key] = entry  # most recently seen
+    _entries[key] = entry  # most recently used
     if collection.name not in scene.collection.children:
         scene.collection.children.link(collection)
     shade_again(scene, collection)
@@ -254,46 +249,46 @@ def recall(scene: bpy.types.Scene, key: str) -> bpy.types.Collection | None:
     return collection
 
 
-def keep(scene: bpy.types.Scene, key: str, collection: bpy.types.Collection, megabytes: float) -> None:
-    """Remember new results of a scene, and let older ones go for which there is no memory."""
+def store(scene: bpy.types.Scene, key: str, collection: bpy.types.Collection, megabytes: float) -> None:
+    """Add new results of a scene, and remove the least recently used ones beyond the limit."""
     originals = [o.name for o in hidden_originals(scene, 'RENDER')]
-    _kept[key] = _Kept(scene.session_uid, collection.name, originals, megabytes, scene.tetflora.statistics)
+    _entries[key] = _Entry(scene.session_uid, collection.name, originals, megabytes, scene.tetflora.statistics)
     wind = wind_of(scene)
-    # In a wind without a loop nothing comes back.
+    # In a wind without a loop no frame returns.
     limit = scene.tetflora.kept_memory * 1e3 if wind is None or wind.loop > 0.0 else 0.0
     for other in _stowed(scene):
-        if sum(entry.megabytes for entry in _kept.values()) <= limit:
+        if sum(entry.megabytes for entry in _entries.values()) <= limit:
             break
         _forget(scene, other)
 
 
 def hide_for(scene: bpy.types.Scene, keys: Sequence[str]) -> None:
-    """Hide objects in whose place results of some digests are."""
-    names = dict.fromkeys(name for key in keys if key in _kept for name in _kept[key].originals)
+    """Hide objects that results of some digests replace."""
+    names = dict.fromkeys(name for key in keys if key in _entries for name in _entries[key].originals)
     hide_originals(scene, 'RENDER', [o for name in names if (o := bpy.data.objects.get((name, None))) is not None])
 
 
-def forget_all(scene: bpy.types.Scene) -> None:
-    """Remove all that was kept for a scene and is not shown in it; what is shown is `job.clear`'s business."""
+def clear(scene: bpy.types.Scene) -> None:
+    """Remove a scene's cached results except those in it, which are left to `refine.clear`."""
     for key in _stowed(scene):
         _forget(scene, key)
-    for key in [k for k, entry in _kept.items() if entry.scene == scene.session_uid]:
-        del _kept[key]
+    for key in [k for k, entry in _entries.items() if entry.scene == scene.session_uid]:
+        del _entries[key]
 
 
-def forget_names() -> None:
-    """Another file is open: nothing of what was kept is there any more."""
-    _kept.clear()
+def reset() -> None:
+    """Forget all entries, whose datablocks are gone, after another file was loaded."""
+    _entries.clear()
 
 
 def _stowed(scene: bpy.types.Scene) -> list[str]:
-    """Digests of results that a scene has but does not show, least recently seen first."""
+    """Digests of a scene's results that are not in it, least recently used first."""
     shown = {c.name for c in result_collections(scene, 'RENDER')}
-    own = [key for key, entry in _kept.items() if entry.scene == scene.session_uid]
-    return [key for key in own if _kept[key].collection not in shown]
+    own = [key for key, entry in _entries.items() if entry.scene == scene.session_uid]
+    return [key for key in own if _entries[key].collection not in shown]
 
 
 def _forget(scene: bpy.types.Scene, key: str) -> None:
-    collection = bpy.data.collections.get((_kept.pop(key).collection, None))
+    collection = bpy.data.collections.get((_entries.pop(key).collection, None))
     if collection is not None:
         remove_collection(scene, collection)

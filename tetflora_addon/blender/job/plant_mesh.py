@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Single plants as ordinary meshes, wood and leaves in one: for the species preview, and for artists to keep."""
+"""Single plants as ordinary meshes with branches and leaves: for the species preview and for Convert to Meshes."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from ...buffers import MeshBuffers, concatenate_buffers
 from ...compiled.flora import Flora
-from ...emission import plants as emission
+from ...emission.plants import expanded_blocks
 from ...errors import SceneError
-from ...growth.growth import trunks
 from ...growth.seeds import Seeds
 from ...refinement.statistics import Progress
 from ...species.species import Species
@@ -24,16 +23,16 @@ from ..attributes import frames_of, world_matrix, write
 from ..results.leaf_objects import materials_of
 from ..results.meshes import write_mesh
 from ..scene.skeletons import kind_of
-from .contents import compile_for
+from .contents import compile_for, expected_polygons
 
-#: Polygons that are made at once at most; more would fill the memory of most computers.
+#: Most polygons of one conversion; more would fill the memory of most computers.
 MOST_POLYGONS = 30_000_000
 
 _UPRIGHT = np.eye(3)
 
 
 def single_seed(identifier: str, seed: int, frame: NDArray[np.float64] = _UPRIGHT) -> Seeds:
-    """One plant at the origin, of scale 1; its leaves turn to the sky, so that its tilt (3, 3) matters."""
+    """One plant at the origin, of scale 1; its frame (3, 3) matters because leaves turn to the sky."""
     return Seeds(
         identifiers=(identifier,),
         species=np.zeros(1, np.int32),
@@ -44,14 +43,9 @@ def single_seed(identifier: str, seed: int, frame: NDArray[np.float64] = _UPRIGH
     )
 
 
-def expected_polygons(flora: Flora, seeds: Seeds) -> float:
-    """Faces that plants will have, about."""
-    return float(flora.polygons[trunks(flora.rows, seeds).row].sum())
-
-
 @dataclass(frozen=True)
 class Part:
-    """Polygons of a plant that have materials of their own.
+    """Polygons of a plant with the same materials.
 
     Attributes
     ----------
@@ -71,31 +65,17 @@ def plant_parts(flora: Flora, seeds: Seeds) -> list[Part]:
     """All polygons of one plant at the origin, in its own space."""
     frame = seeds.frame[0].astype(np.float32)
     found: dict[tuple[str, int], list[MeshBuffers]] = {}
-    for block in emission.expanded_blocks(flora, seeds):
+    for block in expanded_blocks(flora, seeds):
         found.setdefault((block.kind, block.form), []).append(block.buffers)
     joined = [(*what, concatenate_buffers(buffers)) for what, buffers in sorted(found.items())]
-    # Row vectors times the frame are turned back by it.
+    # Row vectors times the frame are rotated back.
     return [Part(kind, form, replace(b, positions=b.positions @ frame)) for kind, form, b in joined if b is not None]
 
 
 def plant_mesh(scene: bpy.types.Scene, name: str, species: Species, parts: list[Part]) -> bpy.types.Mesh:
-    """One mesh of the parts of a plant, with materials for each.
+    """One mesh of the parts of a plant (`plant_parts`), in its own space, with the materials of Refine.
 
-    Parameters
-    ----------
-    scene : bpy.types.Scene
-        Whose leaf objects count.
-    name : str
-        Of the datablock.
-    species : Species
-        Materials are the species' own, as Refine makes them.
-    parts : list of Part
-        What `plant_parts` gives.
-
-    Returns
-    -------
-    bpy.types.Mesh
-        In the space of the plant. Wood is shaded smooth, leaves flat.
+    Wood is shaded smooth, leaves flat. The scene's leaf objects and output settings count.
     """
     numbered, materials = [], []
     for part in parts:
@@ -119,26 +99,24 @@ def make_plant_mesh_steps(
 ) -> Generator[Progress, object, list[bpy.types.Object]]:
     """Make ordinary mesh objects of plants, in their places and collections; the plants are disabled, not deleted.
 
-    A step for each plant; closed before its end, it takes back what was made.
+    A step for each plant; closing the generator early removes what was made.
 
     Parameters
     ----------
     scene : bpy.types.Scene
-        Whose edited species and leaf objects count.
+        With edited species and leaf objects.
     depsgraph : bpy.types.Depsgraph
-        Says where the plants are.
     plants : iterable of bpy.types.Object
-        Plants; each gives an object of its own, whose mesh nobody shares.
 
     Returns
     -------
     list of bpy.types.Object
-        In the order of the plants.
+        In the order of the plants, each with a mesh of its own.
 
     Raises
     ------
     TetFloraError
-        A species or place that cannot be used, or too many polygons; nothing is made then.
+        An invalid species or transform, or too many polygons; nothing is made.
     """
     plants = list(plants)
     world = np.array([world_matrix(p, depsgraph) for p in plants]).reshape(-1, 4, 4)
@@ -180,7 +158,7 @@ def _placed(
     obj = bpy.data.objects.new(mesh.name, mesh)
     for collection in plant.users_collection:
         collection.objects.link(obj)
-    if plant.parent is not None:  # what carries the plant carries its mesh
+    if plant.parent is not None:
         obj.parent = plant.parent
         obj.parent_type, obj.parent_bone = plant.parent_type, plant.parent_bone
         obj.matrix_parent_inverse = plant.matrix_parent_inverse

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The whole way from a scene of plants and meshes to results, as steps that can be shown, stopped and undone."""
+"""From a scene of plants and meshes to results, in steps that can be shown, stopped and undone."""
 
 from __future__ import annotations
 
@@ -10,31 +10,30 @@ from collections.abc import Generator, Sequence
 import bpy
 import numpy as np
 
+from ...buffers import MeshBuffers
 from ...camera.camera import Camera
 from ...compiled.flora import Flora
-from ...emission import plants, polygons
 from ...emission.budget import afford
 from ...emission.forms import Refined
-from ...emission.plants import Transition
+from ...emission.plants import Transition, expanded_blocks, explicit_blocks
+from ...emission.polygons import polygon_blocks
 from ...proxies.facet_weights import facet_weights
+from ...refinement import loop
 from ...refinement.decisions import Decision
 from ...refinement.loop import Refinement, step_of
-from ...refinement.loop import refine as refine_loop
 from ...refinement.settings import RefinementSettings
 from ...refinement.statistics import Progress, Statistics, Stopwatch, at_once
 from ..compat import drawn_disc
 from ..materials.materials import baked_material
-from ..results.collection import Results, has_results, result_collections
+from ..results.collection import Results
 from ..results.forms import form_of
 from ..results.hiding import hide_originals, remove_results
 from ..results.leaf_objects import materials_of
-from ..results.output import adopt_materials, release_materials
+from ..results.output import adopt_materials, release_materials, result_collections
 from ..results.proxies import Baking, write_proxies
 from ..scene.camera import read_camera
 from ..scene.explicit import Explicit
-from .contents import Given, blown, compile_for, read_scene, refinement_settings
-
-__all__ = ["clear", "has_results", "partition", "refine", "refine_steps"]
+from .contents import Given, compile_for, in_wind, read_scene, refinement_settings
 
 #: Fraction of the progress bar that the loop takes; the rest is for writing meshes.
 _LOOP_FRACTION = 0.6
@@ -53,26 +52,26 @@ def refine_steps(
 ) -> Generator[Progress, bool | None, Statistics]:
     """Refine a scene step by step.
 
-    Closing the generator, or an error, leaves the scene as it was. Earlier results are replaced when all is done.
-    Sending it True while it refines makes it go on with what there is; the statistics say that it is not complete.
+    Closing the generator, or an error, leaves the scene as it was. Earlier results are replaced at the end. Send True
+    while it refines to go on to meshes with the current state; the statistics are then not complete.
 
     Parameters
     ----------
     scene : bpy.types.Scene
     depsgraph : bpy.types.Depsgraph
-        Evaluated for the frame that is wanted.
+        Evaluated for the frame.
     view_layer : bpy.types.ViewLayer, optional
-        Whose plants count; by default the dependency graph's.
+        By default the dependency graph's.
     for_render : bool
-        Results live beside those of the artist, in a collection of their own, and are refined for the render region.
+        Results get a collection of their own beside the artist's, and are refined for the render region.
     beside : sequence of bpy.types.Collection
         Earlier results that stay: those of other view layers.
     camera : Camera, optional
-        In place of the scene's as it stands.
+        Instead of the scene's current one.
     given : Given, optional
-        What `read_scene` returned for it.
+        From `read_scene` for the scene.
     mark : str
-        Comes after the names of results.
+        Suffix of the names of results.
 
     Raises
     ------
@@ -87,7 +86,7 @@ def refine_steps(
         given = read_scene(scene, depsgraph, view_layer or depsgraph.view_layer)
     clock.lap("read")
     yield Progress(0.02, "Compiling species")
-    flora = blown(scene, compile_for(given.species, scene, depsgraph))
+    flora = in_wind(scene, compile_for(given.species, scene, depsgraph))
     clock.lap("compile")
     full = given.polygons_full(flora)
     statistics = Statistics(plants=len(given.seeds), polygons_full=full, seconds=clock.seconds)
@@ -98,13 +97,13 @@ def refine_steps(
     try:
         if scene.tetflora.expand_everything:
             results.open()
-            # Explicit objects are what they are; they stay in view by themselves.
-            yield from _write_blocks(results, flora, plants.expanded_blocks(flora, given.seeds), statistics, 0.05)
+            # Explicit objects stay visible themselves.
+            yield from _write_blocks(results, flora, expanded_blocks(flora, given.seeds), statistics, 0.05)
         else:
             originals = given.explicit.originals if given.explicit is not None else []
             yield from _write_refined(results, flora, given, camera, statistics, clock)
         clock.lap("emit")
-    except BaseException:  # an error, Esc (GeneratorExit) or Ctrl+C: nothing of ours may stay behind
+    except BaseException:  # an error, Esc (GeneratorExit) or Ctrl+C
         results.discard()
         raise
     remove_results(scene, results.purpose, keep=(results.collection, *beside))
@@ -122,7 +121,7 @@ def refine(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, **options: ob
 
 
 def partition(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[Camera, Refinement]:
-    """Camera and state of space after refinement, without making anything; for pictures of the partition.
+    """Camera and tetrahedra after refinement, without making anything; for images of the partition.
 
     Raises
     ------
@@ -130,12 +129,12 @@ def partition(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[C
         As `refine_steps`.
     """
     camera, given = read_camera(scene, depsgraph), read_scene(scene, depsgraph, depsgraph.view_layer)
-    flora = blown(scene, compile_for(given.species, scene, depsgraph))
+    flora = in_wind(scene, compile_for(given.species, scene, depsgraph))
     return camera, at_once(_run_loop(flora, given, camera, refinement_settings(scene), Statistics()))
 
 
 def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:
-    """Remove what refinement made for a scene, and nothing else.
+    """Remove only what refinement made for a scene.
 
     Parameters
     ----------
@@ -157,18 +156,18 @@ def _run_loop(
     flora: Flora, given: Given, camera: Camera, settings: RefinementSettings, statistics: Statistics
 ) -> Generator[Progress, bool | None, Refinement]:
     """Refine; the statistics get a step for each pass."""
-    loop = refine_loop(flora, given.seeds, camera, settings, given.occluders, given.polygons, given.lights)
+    passes = loop.refine(flora, given.seeds, camera, settings, given.occluders, given.polygons, given.lights)
     fraction, enough = 0.05, None
     while True:
         try:
-            state, last = loop.send(enough), False
+            state, last = passes.send(enough), False
         except StopIteration as stop:
             state, last = stop.value, True
         statistics.steps.append(step_of(state))
         if last:
             return state
         waiting = int((state.decision == Decision.SPLIT).sum())
-        fraction += 0.15 * (_LOOP_FRACTION - fraction)  # nobody knows how many passes will follow
+        fraction += 0.15 * (_LOOP_FRACTION - fraction)  # the number of passes is unknown
         enough = yield Progress(
             fraction, f"Refining, pass {state.passes}: {state.tree.tetrahedra_made:,} tetrahedra, {waiting:,} to split"
         )
@@ -177,7 +176,7 @@ def _run_loop(
 def _write_refined(
     results: Results, flora: Flora, given: Given, camera: Camera, statistics: Statistics, clock: Stopwatch
 ) -> Generator[Progress, bool | None, None]:
-    """Refine, and make meshes and proxies of what was decided."""
+    """Refine, and make meshes and proxies."""
     scene, form, settings = results.scene, form_of(results.scene), refinement_settings(results.scene)
     refinement = yield from _run_loop(flora, given, camera, settings, statistics)
     own = form.emission
@@ -194,11 +193,11 @@ def _write_refined(
     baking = None
     if given.sources is not None:
         baking = Baking(given.sources, leaves=scene.tetflora.baked_light == 'ALL')
-    blocks = plants.explicit_blocks(flora, refinement, refined.transition)
+    blocks = explicit_blocks(flora, refinement, refined.transition)
     yield from _write_blocks(results, flora, blocks, statistics, _LOOP_FRACTION, baking)
     if given.explicit is not None:
-        kept = polygons.polygon_blocks(refinement, camera, refined.facet_pixels)
-        yield from _write_polygons(results, given.explicit, kept, statistics, baking)
+        blocks = polygon_blocks(refinement, camera, refined.facet_pixels)
+        yield from _write_polygons(results, given.explicit, blocks, statistics, baking)
     if baking is not None:
         clock.lap("emit")
         yield from _bake(baking, refined)
@@ -228,10 +227,7 @@ def _write_blocks(
             materials[what] = made
         name = f"{species.name} {block.kind} {block.number:03d}"
         obj = results.add(name, block.kind, block.buffers, materials[what], species)
-        if baking is not None:
-            baking.add(obj, block.buffers, lit=True)
-        statistics.polygons_meshed += block.buffers.polygons
-        statistics.memory_mb += block.buffers.nbytes / 1e6
+        _made(obj, block.buffers, statistics, baking, lit=True)
         yield Progress(start + (0.95 - start) * block.fraction, f"Making polygons: {statistics.polygons_meshed:,}")
 
 
@@ -242,15 +238,21 @@ def _write_polygons(
         name = explicit.meshes.surfaces[block.surface].name
         materials = explicit.materials[block.surface]
         obj = results.add(f"{name} {block.number:03d}", "explicit", block.buffers, materials)
-        if baking is not None:
-            baking.add(obj, block.buffers, lit=False)
-        statistics.polygons_meshed += block.buffers.polygons
-        statistics.memory_mb += block.buffers.nbytes / 1e6
+        _made(obj, block.buffers, statistics, baking, lit=False)
         yield Progress(0.95, f"Keeping polygons: {statistics.polygons_meshed:,}")
 
 
+def _made(
+    obj: bpy.types.Object, buffers: MeshBuffers, statistics: Statistics, baking: Baking | None, lit: bool
+) -> None:
+    if baking is not None:
+        baking.add(obj, buffers, lit)
+    statistics.polygons_meshed += buffers.polygons
+    statistics.memory_mb += buffers.nbytes / 1e6
+
+
 def _bake(baking: Baking, refined: Refined) -> Generator[Progress, None, None]:
-    """Find the light of everything that is drawn, and give it to meshes."""
+    """Compute the light of everything, and write that of meshes."""
     if refined.facet_pixels is not None:
         for count in baking.add_facets(refined):
             yield Progress(0.9, f"Baking light: {count:,} facets")

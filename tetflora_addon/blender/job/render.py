@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Refine at render: what Blender calls before and after each frame that it renders, on load and on save.
+"""Refine at Render: handlers before and after each rendered frame, on load and on save.
 
-Tried on 4.5 and 5.2, and the reason for the order of things here:
+Their order has these reasons (tried on 4.5 and 5.2):
 
-- ``render_pre`` comes before Blender goes to the frame: in animations the camera still stands where it stood a frame
-  ago, so the handler goes to the frame itself. Objects made there reach the picture of that frame.
+- ``render_pre`` comes before Blender goes to the frame: in animations the camera is still that of the frame before, so
+  the handler goes to the frame itself. Objects made there are in the image of that frame.
 - 5.2 crashes if objects that were rendered are deleted in ``render_post`` or ``render_write``, while the renderer still
-  holds them. They go in the next ``render_pre``, and in ``render_complete`` or ``render_cancel`` after the last frame.
-- What is made for a render is marked as runtime data, which Blender never writes into a file, whenever somebody saves.
+  holds them. They are deleted in the next ``render_pre``, and in ``render_complete`` or ``render_cancel`` at the end.
+- Results of a render are marked as runtime data, which Blender never writes into a file.
 """
 
 import sys
@@ -40,7 +40,7 @@ from .contents import read_scene
 
 @dataclass
 class _Rendering:
-    """What has to be undone when a render ends; names, because references do not outlive a load."""
+    """What to undo when a render ends; names, because references are invalid after a file is loaded."""
 
     busy: bool = False
     hidden: list[str] = field(default_factory=list)
@@ -52,22 +52,22 @@ class _Rendering:
 
 
 _rendering = _Rendering()
-#: Notified when a render shows no plants because nothing is refined for it.
+#: Notified when a render shows no plants because nothing is refined.
 nothing_refined = Listeners()
 
 
 def render_errors() -> list[str]:
-    """Messages of all frames of the last render that went without their plants."""
+    """Messages of the frames of the last render that were rendered without their plants."""
     return list(failed_frames)
 
 
 def forget_render_errors() -> None:
-    """What stood in the way of the last render is gone: Refine has made the plants."""
+    """Clear the messages, after Refine has made the plants."""
     failed_frames.clear()
 
 
 def on_render_init(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
-    """A render starts: earlier errors are past, unless it is part of another one."""
+    """When a render starts: clear earlier errors, unless it is part of another render."""
     if _rendering.outer not in {"", scene.name}:
         return
     failed_frames.clear()
@@ -75,7 +75,7 @@ def on_render_init(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
 
 
 def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
-    """Before a frame: refine for its camera, unless what an earlier frame left serves it as well."""
+    """Before a frame: refine for its camera, unless the frame cache has its results."""
     if _rendering.busy:
         return
     _rendering.busy = True
@@ -92,11 +92,11 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
         elif not scene.tetflora.refine_at_render and has_contents(scene) and not _has_meshes(scene):
             _warn(scene)
     except NoPlantsError:
-        pass  # all of them are disabled or hidden: the artist wants no forest
+        pass  # the artist has disabled or hidden all of them
     except TetFloraError as error:
         _complain(scene, str(error))
     except Exception as error:
-        # Blender would print it and render on; the count of errors and the message in the window must not miss it.
+        # Blender would only print it and go on.
         traceback.print_exc()
         _complain(scene, f"unexpected error, please report it as a bug: {error!r}")
     finally:
@@ -108,8 +108,7 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
 def on_render_end(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     """After the last frame, or when the render was cancelled: leave all scenes as they were.
 
-    Not yet where only a scene ends that a sequencer shows: the render around it goes on, and Blender 5.2 crashes if
-    what it has rendered is gone before that ends as well.
+    Not yet after a scene of a sequencer: Blender 5.2 crashes if its objects are gone before the outer render ends.
     """
     if _rendering.busy or _rendering.outer not in {"", scene.name}:
         return
@@ -125,7 +124,7 @@ def on_render_end(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
 
 
 def on_save_pre(_path: object, _other: object = None) -> None:
-    """Before a file is written: what is only hidden or raised for a render is stored as it was."""
+    """Before a file is written: undo what is hidden or raised for a render."""
     _show_hidden()
     for name in _rendering.bounces:
         _set_bounces(name)
@@ -135,7 +134,7 @@ def on_save_pre(_path: object, _other: object = None) -> None:
 
 
 def on_save_post(_path: object, _other: object = None) -> None:
-    """After a file was written, in the middle of a render: hide and raise it again."""
+    """After a file was written: hide and raise it again for a render that goes on."""
     for collection in _named(_rendering.hidden):
         collection.hide_render = True
     for name in _rendering.bounces:
@@ -147,17 +146,14 @@ def on_save_post(_path: object, _other: object = None) -> None:
 
 
 def on_load_post(_path: object, _other: object = None) -> None:
-    """After a file was read: nothing of an earlier render counts any more; bring old properties up to date.
-
-    Meshes that are hidden for results which the file does not hold are shown.
-    """
+    """After a file was read: forget earlier renders, show objects whose results it lacks, migrate properties."""
     _rendering.busy, _rendering.outer = False, ""
     _rendering.scenes.clear()
     _rendering.bounces.clear()
     _rendering.hidden.clear()
     _rendering.lifted.clear()
     failed_frames.clear()
-    frame_cache.forget_names()
+    frame_cache.reset()
     unpack_override_marks()
     show_left_over()
     for scene in bpy.data.scenes:
@@ -167,16 +163,16 @@ def on_load_post(_path: object, _other: object = None) -> None:
 
 
 def _make(scene: bpy.types.Scene) -> None:
-    """Results for the frame that is about to be rendered; those that the artist made for another view are hidden."""
-    # Also where nothing is animated: it is what the renderer does next, and the only way to a depsgraph of this frame.
+    """Make results for the frame to be rendered, and hide the artist's own results."""
+    # Also where nothing is animated: the renderer does so next, and only this gives a depsgraph of the frame.
     scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
     for earlier in result_collections(scene, 'VIEW'):
-        adopt_materials(scene, earlier)  # first of all, or the next frame would count as changed
-    with originals_shown(scene):  # the frame before has hidden some
+        adopt_materials(scene, earlier)  # before all else, or the next frame would count as changed
+    with originals_shown(scene):  # the previous frame has hidden some
         groups = view_layer_groups(scene)
     wanted = []
     for layers in groups:
-        layers[0].update()  # going to the frame brings only the active layer's depsgraph up to date, if others have any
+        layers[0].update()  # going to the frame updates only the active layer's depsgraph
         depsgraph = layers[0].depsgraph
         given = read_scene(scene, depsgraph, layers[0])
         read = frame_cache.shared_camera(scene, depsgraph, given), given
@@ -191,16 +187,15 @@ def _make(scene: bpy.types.Scene) -> None:
             statistics = refine.refine(scene, layer.depsgraph, beside=before, **options)
             new = [c for c in result_collections(scene, 'RENDER') if c not in before]
             for collection in new:
-                frame_cache.keep(scene, key, collection, statistics.memory_mb)
+                frame_cache.store(scene, key, collection, statistics.memory_mb)
         show_in(scene, new, layers)
     frame_cache.hide_for(scene, [key for key, *_ in wanted])
     if len(scene.view_layers) > 1 or _rendering.outer != scene.name:
-        # Without, Blender crashes when it renders a layer that is not the window's, or one for a sequencer, and objects
-        # are new in it.
+        # Otherwise Blender crashes when it renders new objects in a layer that is not the window's, or for a sequencer.
         for layer in scene.view_layers:
             layer.update()
     _rendering.bounces.setdefault(scene.name, {}).update(raise_bounces(scene))
-    # Hidden only now: if refinement failed, yesterday's trees are better than none.
+    # Hidden only now: if refinement fails, earlier results are better than none.
     _rendering.hidden += [c.name for c in result_collections(scene, 'VIEW') if not c.hide_render]
     for collection in _named(_rendering.hidden):
         collection.hide_render = True
@@ -211,7 +206,7 @@ def _take_back(scene: bpy.types.Scene) -> None:
     _rendering.hidden.clear()
     _set_bounces(scene.name)
     _rendering.bounces.pop(scene.name, None)
-    frame_cache.forget_all(scene)
+    frame_cache.clear(scene)
     refine.clear(scene, for_render=True)
 
 
@@ -230,12 +225,12 @@ def _named(names: list[str]) -> list[bpy.types.Collection]:
 
 
 def _has_meshes(scene: bpy.types.Scene) -> bool:
-    """Whether plants are there as meshes: results, or some that the artist kept."""
+    """Whether a scene has plants as meshes: results, or meshes that were results."""
     return any(KIND in obj for obj in scene.objects)
 
 
 def _warn(scene: bpy.types.Scene) -> None:
-    """Say, once a session of renders, that the picture will have no plants; nothing is wrong, but it looks so."""
+    """Warn, once in a render of many frames, that the image will have no plants."""
     text = "nothing is refined and Refine at Render is off, so the render shows no plants"
     if text in _rendering.warnings:
         return

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Results in the scene: a collection of objects that refinement makes, replaces and clears, and nothing else."""
+"""Result collections: what refinement adds to a scene, replaces and clears, and nothing else."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from .output import (
     result_collections,
 )
 
-#: Bytes of a name that Blender 4.5 takes (5.0 takes more), but for those with which it tells the same names apart.
+#: Bytes of a name in Blender 4.5 (5.0 takes more), less those of the number that it appends to equal names.
 _LONGEST = 59
-#: Custom property of those that are being made.
+#: Custom property of collections under construction.
 UNFINISHED = "tetflora_unfinished"
 NAMES = {'VIEW': "TetFlora", 'RENDER': "TetFlora render"}
 
@@ -32,15 +32,15 @@ NAMES = {'VIEW': "TetFlora", 'RENDER': "TetFlora render"}
 class Results:
     """A result collection under construction.
 
-    It is linked to the scene at once, so that an object reaches the render as soon as it is made; `discard` takes
-    everything back.
+    It is linked to the scene at once, so that an object reaches the render as soon as it is made; `discard` removes
+    everything.
 
     Parameters
     ----------
     scene : bpy.types.Scene
     purpose : {'VIEW', 'RENDER'}
     mark : str
-        Comes after the names of all that is made, where results of several cameras are there at the same time.
+        Suffix of all names, where there are results of several cameras at the same time.
     """
 
     def __init__(self, scene: bpy.types.Scene, purpose: str, mark: str = "") -> None:
@@ -81,7 +81,7 @@ class Results:
         return self._link(point_object(self._name(name), buffers, *materials), kind, species)
 
     def _name(self, name: str) -> str:
-        """A name that ends in a number, with the mark; Blender must not cut it off where names are too long."""
+        """A name that ends in a number, with the mark; shortened so that Blender does not cut off the end."""
         if not self.mark:
             return name
         stem, _, number = name.rpartition(" ")
@@ -93,30 +93,29 @@ class Results:
         if species is not None:
             made.parent = parent_of(self.collection, species.identifier, species.name)
         made[KIND] = kind
-        made.hide_select = True  # millions of polygons under the cursor; the plants are what is edited
+        made.hide_select = True  # artists select and edit plants, not millions of polygons
         tag(made)
         dress(self.scene, made, "" if species is None else species.identifier)
         self.collection.objects.link(made)
         return made
 
     def finish(self) -> None:
-        """All is made: results of a render are no part of files, those of the artist are what the scene says."""
-        if self.collection is not None:
-            del self.collection[UNFINISHED]
-        if self.collection is not None and self.purpose == 'VIEW':
+        """Everything is made: the output settings decide about the artist's results; files never hold a render's."""
+        del self.collection[UNFINISHED]
+        if self.purpose == 'VIEW':
             dress_collection(self.scene, self.collection)
-        elif self.collection is not None:
+        else:
             mark_runtime(self.collection, True)
 
     def discard(self) -> None:
-        """Remove all that was made."""
+        """Remove everything made so far."""
         if self.collection is not None:
             remove_collection(self.scene, self.collection)
             self.collection = None
 
 
 def dress_results(scene: bpy.types.Scene) -> None:
-    """Bring the artist's results of a scene in step with its output settings."""
+    """Apply the output settings of a scene to the artist's results."""
     for collection in result_collections(scene, 'VIEW'):
         dress_collection(scene, collection)
 
@@ -127,14 +126,14 @@ def has_results(scene: bpy.types.Scene) -> bool:
 
 
 def leave_out_of_file() -> None:
-    """Before a file is written: results that it shall not hold are marked as such, and their materials kept.
+    """Before a file is written, mark results that it must not hold, and let it hold their materials.
 
-    Here and not only when they are made, because undo brings datablocks back without the mark.
+    Not only when they are made, because undo brings datablocks back without the mark.
     """
     for scene in bpy.data.scenes:
         saved = scene.tetflora.output.save_results
         for collection in result_collections(scene) if scene.library is None else ():
-            # Of a refinement that goes on, the file has what there was before it.
+            # While refinement runs, the file gets the earlier results.
             runtime = collection[PURPOSE] == 'RENDER' or not saved or UNFINISHED in collection
             mark_runtime(collection, runtime)
             if runtime and collection[PURPOSE] == 'VIEW':

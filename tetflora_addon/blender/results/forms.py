@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The table of proxy forms: one row for each item of the setting Proxies. A new form is a new row.
+"""Proxy forms: a table with a row for each item of the setting Proxies, and the bounces of Cycles that they need.
 
-Transparent bounces of Cycles: a ray passes two faces of each shell, and is black where it runs out of bounces.
-
-Shells with baked light need as many. EEVEE has no bounces.
+A new form is a new row. Transparent bounces matter for shells: a ray passes two faces of each, and is black where it
+runs out of bounces. EEVEE has no bounces.
 """
 
 from __future__ import annotations
@@ -14,13 +13,17 @@ from dataclasses import dataclass, field
 
 import bpy
 
-from ...emission import forms as emission_forms
-from ...emission.forms import EmissionForm
+from ...emission.forms import AUTOMATIC, MICROSPHERES, MICROSURFACES, SHELLS, EmissionForm
 from ..materials.materials import baked_material, proxy_material, sphere_material
 from ..materials.shell import baked_shell_material, shell_material
 
 #: The form of new scenes, and of scenes whose own form is not registered.
 DEFAULT = 'AUTOMATIC'
+#: Fraction of a form's bounces below which the artist is warned.
+FEW = 0.5
+#: Settings of Cycles: the number at which rays end, and the number below which they go on to their ends. Beyond that,
+#: weak light goes on by chance, as noise.
+_SETTINGS = ("transparent_max_bounces", "min_transparent_bounces")
 
 _Material = Callable[[], bpy.types.Material]
 
@@ -34,16 +37,15 @@ class ProxyForm:
     identifier, label, description, icon : str
         Of the item in the setting Proxies.
     number : int
-        Value of the item in saved files: never change it, never use one twice.
+        Value of the item in saved files: never change or reuse it.
     emission : EmissionForm
         How buffers are made.
     material : callable
-        Makes the material of meshes, or returns the one that is there.
+        Returns the material of meshes, made if needed.
     point_material, baked_material : callable
         The same for point clouds, and for either where light is baked.
     sockets : mapping of str to str
-        Properties of ``scene.tetflora`` by the sockets of `material` that follow them; the panel Proxy Shading shows
-        them.
+        Properties of ``scene.tetflora``, shown in the panel Proxy Shading, by the sockets of `material` that they set.
     bounces : int
         Transparent bounces that Cycles needs for a ray through many proxies; 0 for opaque ones.
     """
@@ -70,7 +72,7 @@ _FORMS = {
             "Microsurfaces",
             "Small facets with the area, directions and colors of the leaves that they replace",
             'MESH_GRID',
-            emission_forms.MICROSURFACES,
+            MICROSURFACES,
         ),
         ProxyForm(
             'SHELLS',
@@ -78,7 +80,7 @@ _FORMS = {
             "Shells",
             "A translucent volume for each tetrahedron, as in the paper. Slower to render; suits haze",
             'MESH_CONE',
-            emission_forms.SHELLS,
+            SHELLS,
             material=shell_material,
             baked_material=baked_shell_material,
             sockets={
@@ -96,7 +98,7 @@ _FORMS = {
             "Microspheres",
             "A point cloud of opaque spheres of about one pixel, one for each facet. Uses the least memory",
             'POINTCLOUD_DATA',
-            emission_forms.MICROSPHERES,
+            MICROSPHERES,
         ),
         ProxyForm(
             'AUTOMATIC',
@@ -104,7 +106,7 @@ _FORMS = {
             "Automatic",
             "Microsurfaces where the camera sees them, which match the plants best; microspheres elsewhere",
             'SHADERFX',
-            emission_forms.AUTOMATIC,
+            AUTOMATIC,
         ),
     )
 }
@@ -116,7 +118,7 @@ def forms() -> tuple[ProxyForm, ...]:
 
 
 def form_of(scene: bpy.types.Scene) -> ProxyForm:
-    """The form that a scene asks for; the default one where nobody has registered that."""
+    """The form of a scene; the default one if its own is not registered."""
     return _FORMS.get(scene.tetflora.proxy_form, _FORMS[DEFAULT])
 
 
@@ -153,25 +155,12 @@ def unregister_form(identifier: str) -> None:
 
 def _redefine() -> None:
     settings = bpy.types.PropertyGroup.bl_rna_get_subclass_py("TetFloraScene")
-    if settings is not None:  # else the property is going to be defined from the table
+    if settings is not None:  # else the property is not defined yet
         settings.proxy_form = form_property()
 
 
-#: Fraction of a form's bounces below which the artist is warned.
-FEW = 0.5
-#: Settings of Cycles: where rays end, and up to where none is given up at random. Below that number Cycles follows
-#: rays through what is transparent to their ends; beyond it, light that has become weak goes on by chance, as noise.
-_SETTINGS = ("transparent_max_bounces", "min_transparent_bounces")
-
-
 def raise_bounces(scene: bpy.types.Scene) -> dict[str, int]:
-    """Raise what is too low for a scene's proxies.
-
-    Returns
-    -------
-    dict of str to int
-        Settings of ``scene.cycles`` that were changed, as they were.
-    """
+    """Raise bounces that are too few for a scene's proxies; returns the changed settings of ``scene.cycles`` before."""
     cycles, bounces = getattr(scene, "cycles", None), form_of(scene).bounces
     if scene.tetflora.expand_everything or cycles is None:
         return {}

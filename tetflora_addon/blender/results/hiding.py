@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Objects that results replace: hidden while there are results, and shown again as they were.
 
-How visible they were is stored with them in custom properties, so that it outlives a file, a rename, and results that
-somebody deleted by hand; whatever removes results gives it back. An object may be hidden for several scenes: it is
-shown when the last of them has no results any more.
+Their earlier visibility is stored in custom properties, so that it survives saving, renaming, and deleting results by
+hand. An object can be hidden for several scenes: it is shown when the last of them has no results any more.
 """
 
 from __future__ import annotations
@@ -18,20 +17,20 @@ import bpy
 from ..materials.nodes import is_own, untag
 from .output import KIND, PARENT, PURPOSE, mark_runtime, remove_collection, result_collections
 
-#: Custom properties of objects that results stand for, as JSON: hide_render and hide_viewport as they were before
-#: ("flags"), and the names of the scenes whose results they are ("scenes"). Results of a render come last and go first.
+#: Custom properties of hidden objects, as JSON: hide_render and hide_viewport before ("flags"), and the names of the
+#: scenes with the results ("scenes"). Results of a render come last and go first.
 HIDDEN = {'VIEW': "tetflora_hidden", 'RENDER': "tetflora_hidden_for_render"}
-#: Custom property of scenes in files: marks of library overrides, which Blender does not store with them.
+#: Custom property of scenes in files: marks of library overrides, which Blender does not store with these.
 OVERRIDES = "tetflora_hidden_overrides"
 
 
 def hide_originals(scene: bpy.types.Scene, purpose: str, originals: Sequence[bpy.types.Object]) -> None:
-    """Hide objects whose place results take, in viewports too unless they are made for a render alone."""
+    """Hide objects that results replace, in viewports too unless the results are only for a render."""
     for original in originals:
-        # Hidden for another scene already: how it looks now is not how the artist left it.
+        # Where it is hidden for another scene already, its current visibility is not the artist's.
         flags, scenes = _marker(original, purpose) or ([original.hide_render, original.hide_viewport], [])
         if scene.name in scenes and original.hide_render:
-            continue  # writing the same again would make Blender evaluate it again
+            continue  # writing equal values would make Blender evaluate it again
         _mark(original, purpose, flags, sorted({*scenes, scene.name}))
         original.hide_render = True
         original.hide_viewport = original.hide_viewport or purpose == 'VIEW'
@@ -40,10 +39,7 @@ def hide_originals(scene: bpy.types.Scene, purpose: str, originals: Sequence[bpy
 def remove_results(
     scene: bpy.types.Scene, purpose: str | None = None, keep: Sequence[bpy.types.Collection] = ()
 ) -> int:
-    """Remove result collections with what was made for them; returns the number of datablocks removed.
-
-    What was hidden for their sake is shown again as it was.
-    """
+    """Remove result collections and show what they replace; returns the number of datablocks removed."""
     for which in ('RENDER', 'VIEW'):
         if purpose in {None, which}:
             show_originals(scene, which)
@@ -51,16 +47,16 @@ def remove_results(
 
 
 def hidden_originals(scene: bpy.types.Scene, purpose: str | None = None) -> list[bpy.types.Object]:
-    """Objects that Clear would show, or release, in a scene: hidden for its results, or for results that are no more.
+    """Objects that are hidden for a scene's results, or for results that no longer exist.
 
-    Wherever they are: somebody may have unlinked them from the scene meanwhile.
+    They may not be in the scene any more.
     """
     purposes = HIDDEN if purpose is None else [purpose]
     return [o for which in purposes for o in _marked(which) if _concerns(scene, o, which)]
 
 
 def show_originals(scene: bpy.types.Scene, purpose: str) -> None:
-    """Show what is hidden for a scene's results of one purpose as it was."""
+    """Show what is hidden for a scene's results of one purpose."""
     for original in hidden_originals(scene, purpose):
         flags, _ = _marker(original, purpose)
         others = _others(scene, original, purpose)
@@ -76,12 +72,12 @@ def _show(original: bpy.types.Object, purpose: str) -> None:
 
 
 def _marked(purpose: str) -> list[bpy.types.Object]:
-    """Objects of this file that are hidden; a library's own marks are the business of its file."""
+    """Objects of this file, not of its libraries, that are hidden."""
     return [o for o in bpy.data.objects if HIDDEN[purpose] in o and o.library is None]
 
 
 def _marker(original: bpy.types.Object, purpose: str) -> tuple[list[bool], list[str]] | None:
-    """Flags before it was hidden, and names of scenes; None if it is not hidden."""
+    """Flags before it was hidden, and names of scenes; None for an object that is not hidden."""
     stored = original.get(HIDDEN[purpose])
     if stored is None:
         return None
@@ -98,7 +94,7 @@ def _concerns(scene: bpy.types.Scene, original: bpy.types.Object, purpose: str) 
 
 
 def _others(scene: bpy.types.Scene, original: bpy.types.Object, purpose: str) -> list[str]:
-    """Names of other scenes with results in the place of an object."""
+    """Names of other scenes whose results replace an object."""
     names = _marker(original, purpose)[1]
     renamed = any(name not in bpy.data.scenes for name in names)
     return [
@@ -111,10 +107,7 @@ def _others(scene: bpy.types.Scene, original: bpy.types.Object, purpose: str) ->
 
 
 def keep_results(scene: bpy.types.Scene) -> int:
-    """Make the artist's results of a scene the artist's own; of how many objects.
-
-    Explicit objects in whose place they are stay hidden.
-    """
+    """Turn a scene's results into ordinary meshes; returns their number. Objects that they replace stay hidden."""
     for original in _marked('VIEW'):
         if _concerns(scene, original, 'VIEW') and not _others(scene, original, 'VIEW'):
             del original[HIDDEN['VIEW']]
@@ -135,7 +128,7 @@ def keep_results(scene: bpy.types.Scene) -> int:
 
 
 def lift_marks() -> dict[tuple[str, str], str]:
-    """Show everything that is hidden for results that files do not hold: of renders, and of the artist unless asked.
+    """Show what is hidden for results that files do not hold: those of renders, and the artist's unless saved.
 
     Returns
     -------
@@ -163,7 +156,7 @@ def restore_marks(lifted: dict[tuple[str, str], str]) -> None:
 
 
 def show_left_over() -> None:
-    """Show what is hidden for results that are not there: a file was read, which does not hold them."""
+    """Show what is hidden for results that the file that was just read does not hold."""
     for original in _marked('RENDER'):
         _show(original, 'RENDER')
     for original in _marked('VIEW'):
@@ -174,9 +167,9 @@ def show_left_over() -> None:
 
 
 def pack_override_marks() -> None:
-    """Put marks of library overrides where a file keeps them: of overrides Blender stores flags, but no new property.
+    """Store marks of library overrides, whose new properties Blender does not save, with a scene.
 
-    While a file is written and no longer: what a scene refers to by a property could not be deleted.
+    Only while a file is written, because objects that a property refers to cannot be deleted.
     """
     packed = [{"object": o, "mark": o[HIDDEN['VIEW']]} for o in _marked('VIEW') if o.override_library is not None]
     home = next((scene for scene in bpy.data.scenes if scene.library is None), None)
@@ -185,7 +178,7 @@ def pack_override_marks() -> None:
 
 
 def unpack_override_marks() -> None:
-    """Give library overrides back what `pack_override_marks` kept."""
+    """Restore the marks that `pack_override_marks` stored."""
     for scene in bpy.data.scenes:
         if scene.library is not None or OVERRIDES not in scene:
             continue
@@ -198,9 +191,9 @@ def unpack_override_marks() -> None:
 
 @contextmanager
 def originals_shown(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> Iterator[None]:
-    """While the scene is read, objects that results hide, be it those of another scene, are as the artist left them.
+    """Show objects that results of any scene hide as the artist left them, while the context lasts.
 
-    None for the dependency graph will do where nothing that is evaluated is read.
+    The dependency graph is updated if it is given, which only evaluated data requires.
     """
     marked = {purpose: _marked(purpose) for purpose in ('RENDER', 'VIEW')}
     before = {o: (o.hide_render, o.hide_viewport) for every in marked.values() for o in every}

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Leaves and blossoms that are mesh objects of the artist's: their polygons, and the materials that they bring."""
+"""Leaves and blossoms that are the artist's mesh objects: their polygons and materials."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import bpy
 from ...errors import SpeciesError
 from ...species.leaf_models import LeafModel, leaf_model
 from ...species.species import LEAF_KINDS, Species
+from ..attributes import evaluated_mesh
 from ..materials.materials import bark_material, leaf_material
 from ..materials.nodes import is_ours
 from ..scene.skeletons import form_of, read_skeleton, species_of
@@ -20,7 +21,7 @@ from .meshes import UV_MAP, read_mesh_arrays
 from .output import replaced_material
 
 _INDEX = "material_index"
-_COLOURED = "tetflora_coloured"  # on materials that have got their viewport colour; another is the artist's choice
+_COLOURED = "tetflora_coloured"  # on materials whose viewport colour is set; another is the artist's choice
 
 
 def leaf_objects(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
@@ -34,7 +35,7 @@ def resolved_species(scene: bpy.types.Scene, kind_of_plant: str, depsgraph: bpy.
     Parameters
     ----------
     kind_of_plant : str
-        See `plant_kinds.kind_of`.
+        See `scene.skeletons.kind_of`.
 
     Raises
     ------
@@ -50,15 +51,13 @@ def resolved_species(scene: bpy.types.Scene, kind_of_plant: str, depsgraph: bpy.
         species = replace(species, leaf=(_model_of(species, chosen, depsgraph, "leaf"),))
     for kind in LEAF_KINDS:
         forms = getattr(species, kind)
-        if not all(isinstance(form, LeafModel) for form in forms):
-            models = (_resolved(species, form, depsgraph, kind) for form in forms)
+        if any(isinstance(form, str) for form in forms):
+            models = (_named(species, f, depsgraph, kind) if isinstance(f, str) else f for f in forms)
             species = replace(species, **{kind: tuple(models)})
     return species
 
 
-def _resolved(species: Species, form: LeafModel | str, depsgraph: bpy.types.Depsgraph, kind: str) -> LeafModel:
-    if isinstance(form, LeafModel):
-        return form
+def _named(species: Species, form: str, depsgraph: bpy.types.Depsgraph, kind: str) -> LeafModel:
     found = bpy.data.objects.get(form)
     if found is None:
         raise SpeciesError(
@@ -71,12 +70,8 @@ def _resolved(species: Species, form: LeafModel | str, depsgraph: bpy.types.Deps
 def _model_of(species: Species, source: bpy.types.Object, depsgraph: bpy.types.Depsgraph, kind: str) -> LeafModel:
     if source.type != 'MESH':
         raise SpeciesError(f'"{source.name}", the {kind} of "{species.name}", is not a mesh object; choose a mesh')
-    evaluated = source.evaluated_get(depsgraph)
-    mesh = evaluated.to_mesh()
-    try:
+    with evaluated_mesh(source, depsgraph) as mesh:
         arrays = read_mesh_arrays(mesh)
-    finally:
-        evaluated.to_mesh_clear()
     if arrays.polygons == 0:
         raise SpeciesError(
             f'"{source.name}", the {kind} of "{species.name}", has no faces; add faces or choose another mesh'
@@ -92,15 +87,13 @@ def _model_of(species: Species, source: bpy.types.Object, depsgraph: bpy.types.D
 
 
 def materials_of(scene: bpy.types.Scene, species: Species, kind: str, form: int) -> list[bpy.types.Material]:
-    """Materials for polygons of a kind: the artist's for the species; an object's own where leaves are copies of it.
-
-    Else the species' own, as TetFlora makes them.
+    """Materials for polygons of a kind: the artist's for the species, else a leaf object's own, else TetFlora's.
 
     Parameters
     ----------
     scene : bpy.types.Scene
     species : Species
-        Resolved or not; its identifier says where its leaves come from.
+        Resolved or not; its identifier determines where its leaves come from.
     kind : str
         ``'bark'`` or one of `LEAF_KINDS`.
     form : int
@@ -118,14 +111,14 @@ def materials_of(scene: bpy.types.Scene, species: Species, kind: str, form: int)
 
 
 def brought_materials(scene: bpy.types.Scene, kind_of_plant: str) -> list[list[str]]:
-    """Names of the materials in the slots of objects that are leaves of a species, form by form."""
+    """Names of the materials of a species' leaf objects, form by form and slot by slot."""
     identifier = species_of(kind_of_plant)
     forms = [(k, n) for k in LEAF_KINDS for n in range(len(species_for(scene, identifier).forms(LEAF_KINDS.index(k))))]
     return [[getattr(m, "name_full", "") for m in _brought(scene, identifier, kind, form)] for kind, form in forms]
 
 
 def _brought(scene: bpy.types.Scene, identifier: str, kind: str, form: int) -> list[bpy.types.Material | None]:
-    """Materials of the object whose copies leaves of a form are, slot by slot; empty where it is none."""
+    """Materials of the leaf object of a form, slot by slot; empty without one."""
     source = leaf_objects(scene).get(identifier) if kind == "leaf" else None
     if source is None:
         named = species_for(scene, identifier).forms(LEAF_KINDS.index(kind))[form]
@@ -134,7 +127,7 @@ def _brought(scene: bpy.types.Scene, identifier: str, kind: str, form: int) -> l
 
 
 def _in_viewports(material: bpy.types.Material, species: Species, kind: str) -> bpy.types.Material:
-    """The material, with the mean colour of the species in solid viewports and exports that know no nodes."""
+    """The material, with the mean colour of the species for solid viewports and exports without nodes."""
     if is_ours(material) and material.get(_COLOURED) is None:
         material[_COLOURED] = True
         every = [*species.orders, *([] if species.spur is None else [species.spur])]

@@ -1,10 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Arrays in and out of Blender meshes, at the speed of a copy.
+"""Meshes and point clouds from buffers, and buffers from meshes, at the speed of a copy.
 
-Buffers of points as objects that are drawn as spheres: point clouds, or vertices that nodes make one of.
-
-Versions of Blender whose point clouds cannot be given a size get a mesh of vertices and a group of geometry nodes.
+Where Python cannot resize point clouds, geometry nodes make them from the vertices of a mesh.
 """
 
 from __future__ import annotations
@@ -22,15 +20,16 @@ from ..materials.nodes import Graph, get_or_create
 
 UV_MAP = "UVMap"
 
+SPHERES = "TetFlora Spheres"
+_SPHERES_VERSION = 1
 _DOMAINS = ("POINT", "FACE", "CORNER")
 
 
 def write_mesh(name: str, buffers: MeshBuffers, materials: Sequence[bpy.types.Material | None] = ()) -> bpy.types.Mesh:
     """Make a mesh datablock from buffers.
 
-    Topology is copied as it comes, edges included, so nothing has to be worked out by Blender. Positions and indices
-    go through the mesh's attributes, which are plain memory; the older ``vertices`` and ``loops`` collections are
-    many times slower.
+    Topology is copied, edges included, so that Blender computes nothing. Positions and indices are written through the
+    mesh's attributes, which are plain memory; the collections ``vertices`` and ``loops`` are many times slower.
 
     Parameters
     ----------
@@ -50,8 +49,8 @@ def write_mesh(name: str, buffers: MeshBuffers, materials: Sequence[bpy.types.Ma
     Raises
     ------
     ValueError
-        Arrays of wrong shape or type, or indices out of range; no datablock is left behind. Checked here because
-        Blender takes whatever it is given and crashes later.
+        Arrays of wrong shape or type, or indices out of range, with which Blender would crash later; no datablock is
+        left behind.
     """
     check_buffers(buffers)
     mesh = bpy.data.meshes.new(name)
@@ -81,19 +80,13 @@ def _fill(mesh: bpy.types.Mesh, buffers: MeshBuffers) -> None:
             mesh.uv_layers.new(name=UV_MAP, do_init=False)
         write(mesh, key, values, domain)
     if not buffers.smooth and buffers.polygons:
-        # Smooth is what a mesh without this layer is; `shade_flat` does the same far more slowly.
+        # A mesh without this layer is smooth; `shade_flat` does the same far more slowly.
         write(mesh, "sharp_face", np.ones(buffers.polygons, bool), "FACE")
     mesh.update()
 
 
 def check_buffers(buffers: MeshBuffers) -> None:
-    """Raise ValueError unless Blender can take the buffers as they are.
-
-    Parameters
-    ----------
-    buffers : MeshBuffers
-        What to look at: shapes, types, ranges of indices, sizes of faces and of attributes.
-    """
+    """Raise ValueError unless shapes, dtypes, indices, faces and attributes of buffers are valid in Blender."""
     corners, faces, vertices = len(buffers.corner_verts), buffers.polygons, len(buffers.positions)
     for key, shape, dtype in (
         ("positions", (vertices, 3), np.float32),
@@ -138,13 +131,13 @@ def read_mesh_arrays(mesh: bpy.types.Mesh) -> MeshBuffers:
     Parameters
     ----------
     mesh : bpy.types.Mesh
-        Any mesh, of an object or evaluated. In edit mode it holds what was there when the mode was entered; call
-        ``obj.update_from_editmode()`` first. Positions stay in the mesh's own space.
+        Of an object or evaluated. In Edit Mode, call ``obj.update_from_editmode()`` first. Positions stay in the mesh's
+        own space.
 
     Returns
     -------
     MeshBuffers
-        Arrays of the caller's own; ``attributes`` may have ``UVMap`` and ``material_index``; ``smooth`` if any face is.
+        Copies; ``attributes`` may have ``UVMap`` and ``material_index``; ``smooth`` if any face is.
     """
     positions = members(mesh.vertices, "co", 3)
     edges = members(mesh.edges, "vertices", 2, np.int32)
@@ -160,17 +153,13 @@ def read_mesh_arrays(mesh: bpy.types.Mesh) -> MeshBuffers:
     return MeshBuffers(positions, edges, corner_verts, corner_edges, face_offsets(mesh), attributes, bool(smooth.any()))
 
 
-SPHERES = "TetFlora Spheres"
-_SPHERES_VERSION = 1
-
-
 def point_object(
     name: str,
     buffers: PointBuffers,
     material: bpy.types.Material,
     by_nodes: bool | None = None,
 ) -> bpy.types.Object:
-    """Make an object of points, not linked to any collection.
+    """Make an object of points that render as spheres, not linked to any collection.
 
     Parameters
     ----------
@@ -180,12 +169,12 @@ def point_object(
     material : bpy.types.Material
         Of all points.
     by_nodes : bool, optional
-        Vertices with nodes, or a point cloud; by default what this Blender can do best.
+        Vertices with geometry nodes instead of a point cloud; by default only where Blender requires it.
 
     Returns
     -------
     bpy.types.Object
-        Its data is a point cloud, or a mesh that a modifier makes one of.
+        Its data is a point cloud, or a mesh with a modifier.
 
     Raises
     ------
@@ -225,7 +214,7 @@ def _write_cloud(name: str, vertices: MeshBuffers) -> bpy.types.PointCloud:
 
 
 def spheres_group(material: bpy.types.Material) -> bpy.types.NodeTree:
-    """The group "TetFlora Spheres" of geometry nodes: vertices become points of the radius that they carry."""
+    """The group "TetFlora Spheres" of geometry nodes: vertices become points with the radius in their attribute."""
 
     def build(tree: bpy.types.NodeTree) -> None:
         for in_out in ('INPUT', 'OUTPUT'):
@@ -234,7 +223,7 @@ def spheres_group(material: bpy.types.Material) -> bpy.types.NodeTree:
         given = graph.node("NodeGroupInput").outputs["Geometry"]
         named = graph.node("GeometryNodeInputNamedAttribute", {"Name": "radius"}, data_type='FLOAT')
         points = graph.node("GeometryNodeMeshToPoints", {"Mesh": given, "Radius": named}, mode='VERTICES')
-        # Points that are made of vertices take no material over.
+        # Points made of vertices do not inherit the material.
         graph.node("NodeGroupOutput", {"Geometry": graph.node("GeometryNodeSetMaterial", {"Geometry": points})})
         graph.arrange()
 

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Result objects dressed as the scene's output settings ask: visibility, indices, groups, parents for Cryptomatte.
+"""Output settings applied to result objects: visibility, pass indices, light groups, materials; removing results.
 
-All objects of a species have one parent, an empty with the species' name: what renderers call the asset in
-Cryptomatte's third layer. Results of a render and those of the artist share it, so that its name, and with it the
-matte, is the same in both.
+All objects of a species have one parent, an empty with the species' name, which is the asset of Cryptomatte's third
+layer. Results of a render and the artist's results share it, so that its name, and thus the matte, is the same in both.
 """
 
 from __future__ import annotations
@@ -17,56 +16,43 @@ from ..materials.nodes import is_ours, is_own, tag
 
 #: Custom property of a result object: 'leaf', 'blossom', 'bark', 'explicit' or 'proxy', or the parent of a species.
 KIND = "tetflora_kind"
-#: Custom properties of result objects: the identifier of their species, and the name of the material that they got.
+#: Custom properties of result objects: the identifier of their species, and the name of the material that they have.
 SPECIES = "tetflora_species"
 MATERIAL = "tetflora_material"
 PARENT = "species"
-#: Custom property of a result collection: 'VIEW' for what the artist keeps, 'RENDER' for what lives while rendering.
+#: Custom property of a result collection: 'VIEW' for the artist's results, 'RENDER' for those of a running render.
 PURPOSE = "tetflora_purpose"
-_KEPT = "tetflora_kept"  # on materials that a file keeps for the results that it does not hold
+_KEPT = "tetflora_kept"  # on materials that a file holds although it does not hold the results that use them
 #: Kinds of which a species' materials can be replaced.
 REPLACED = ("leaf", "blossom", "bark")
 
-#: Switches by what Blender calls them after ``visible_``: what artists read about them.
+_RAYS = {
+    "camera": "Visible to camera rays. Otherwise plants only cast shadows and appear in reflections",
+    "diffuse": "Visible to diffuse rays, which light matte surfaces",
+    "glossy": "Visible to glossy rays, as in reflections",
+    "transmission": "Visible to transmission rays, as through glass",
+    "volume_scatter": "Visible to volume scatter rays, which light fog and clouds",
+    "shadow": "Plants cast shadows",
+}
+#: Properties by the end of Blender's own names, which begin with ``visible_``.
 SWITCHES = {
-    "camera": {
-        "name": "Camera",
-        "description": "Visible to camera rays. Otherwise plants only cast shadows and appear in reflections",
-        "default": True,
-    },
-    "diffuse": {
-        "name": "Diffuse",
-        "description": "Visible to diffuse rays, which light matte surfaces",
-        "default": True,
-    },
-    "glossy": {"name": "Glossy", "description": "Visible to glossy rays, as in reflections", "default": True},
-    "transmission": {
-        "name": "Transmission",
-        "description": "Visible to transmission rays, as through glass",
-        "default": True,
-    },
-    "volume_scatter": {
-        "name": "Volume Scatter",
-        "description": "Visible to volume scatter rays, which light fog and clouds",
-        "default": True,
-    },
-    "shadow": {"name": "Shadow", "description": "Plants cast shadows", "default": True},
+    ray: {"name": ray.replace("_", " ").title(), "description": about, "default": True} for ray, about in _RAYS.items()
 }
 
 
 def entry_of(scene: bpy.types.Scene, identifier: str) -> Any | None:
-    """What a scene has to say about a species' output; None if nothing."""
+    """Output settings of a species in a scene; None without any."""
     return next((entry for entry in scene.tetflora.output.species if entry.species == identifier), None)
 
 
 def replaced_material(scene: bpy.types.Scene, identifier: str, kind: str) -> bpy.types.Material | None:
-    """The artist's material for ``'leaf'``, ``'blossom'`` or ``'bark'`` of a species, if there is one."""
+    """The artist's material for ``'leaf'``, ``'blossom'`` or ``'bark'`` of a species; None without one."""
     entry = entry_of(scene, identifier)
     return getattr(entry, kind) if entry is not None and kind in REPLACED else None
 
 
 def dress(scene: bpy.types.Scene, made: bpy.types.Object, identifier: str) -> None:
-    """Give a result object what the scene's output settings say; ``identifier`` is empty where species are mixed."""
+    """Apply a scene's output settings to a result object; ``identifier`` is empty where species are mixed."""
     output, entry = scene.tetflora.output, entry_of(scene, identifier)
     for name in SWITCHES:
         setattr(made, f"visible_{name}", getattr(output, name))
@@ -79,7 +65,7 @@ def dress(scene: bpy.types.Scene, made: bpy.types.Object, identifier: str) -> No
 
 def parent_of(collection: bpy.types.Collection, identifier: str, name: str) -> bpy.types.Object:
     """The parent of a species' results, in a result collection; one for all of the file."""
-    # Of all objects of the file only once for a collection: there may be hundreds of thousands.
+    # Search all objects of the file only once for a collection: there may be hundreds of thousands.
     for objects in (collection.objects, bpy.data.objects):
         found = next((o for o in objects if o.get(KIND) == PARENT and o.get(SPECIES) == identifier and is_own(o)), None)
         if found is not None:
@@ -96,7 +82,7 @@ def parent_of(collection: bpy.types.Collection, identifier: str, name: str) -> b
 
 
 def dress_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
-    """Bring a collection of results in step with the output settings: shown or not, in files or not, and how."""
+    """Apply a scene's output settings to a result collection."""
     output = scene.tetflora.output
     collection.hide_viewport, collection.hide_render = not output.show_viewport, not output.show_render
     mark_runtime(collection, not output.save_results)
@@ -106,9 +92,9 @@ def dress_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) -
 
 
 def mark_runtime(collection: bpy.types.Collection, runtime: bool) -> None:
-    """Say of a result collection and all it holds whether Blender leaves it out of files.
+    """Set whether Blender leaves a result collection and its contents out of files.
 
-    What another collection holds too, and meshes with other users, are that one's business.
+    Objects in other collections too, and meshes with other users, stay in.
     """
     collection.is_runtime_data = runtime
     for obj in collection.objects:
@@ -119,7 +105,7 @@ def mark_runtime(collection: bpy.types.Collection, runtime: bool) -> None:
 
 
 def adopt_materials(scene: bpy.types.Scene, collection: bpy.types.Collection) -> list[str]:
-    """Keep materials that the artist put on results in place of TetFlora's; of which species' parts, for a report."""
+    """Store materials that the artist put on results in the output settings; returns their parts for a report."""
     adopted = []
     for obj in collection.objects:
         part, identifier = obj.get(KIND), obj.get(SPECIES, "")
@@ -139,7 +125,7 @@ def adopt_materials(scene: bpy.types.Scene, collection: bpy.types.Collection) ->
 
 
 def keep_materials(collection: bpy.types.Collection) -> None:
-    """Let a file hold the materials of results that it does not hold: somebody may have edited them."""
+    """Let a file hold the materials of results that it does not hold: the artist may have edited them."""
     for obj in collection.objects:
         for material in obj.data.materials if obj.data is not None else ():
             if material is not None and is_own(material) and not material.use_fake_user:
@@ -147,7 +133,7 @@ def keep_materials(collection: bpy.types.Collection) -> None:
 
 
 def release_materials() -> None:
-    """Take back what `keep_materials` did: from here on results use them, or nobody does."""
+    """Undo `keep_materials`: from now on results use the materials, or nothing does."""
     for material in bpy.data.materials:
         if material.library is None and material.get(_KEPT):
             material.use_fake_user = False
@@ -155,24 +141,24 @@ def release_materials() -> None:
 
 
 def result_collections(scene: bpy.types.Scene, purpose: str | None = None) -> list[bpy.types.Collection]:
-    """Result collections of a scene, of one purpose or of all; those that are linked from other files are none."""
+    """Result collections of a scene and this file, of one purpose or of all."""
     made = [c for c in scene.collection.children if is_own(c) and PURPOSE in c]
     return [c for c in made if purpose is None or c[PURPOSE] == purpose]
 
 
 def remove_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) -> int:
-    """Remove results, be they linked to the scene or not; returns the number of datablocks removed."""
+    """Remove a result collection, linked to the scene or not; returns the number of datablocks removed."""
     data, objects, groups = [], [], set()
     for held in list(collection.objects):
         if is_own(held) and held.get(KIND) == PARENT and len(held.users_collection) > 1:
-            continue  # other results have it too
+            continue  # other results use it too
         if is_own(held):
             objects.append(held)
             if held.data is not None and is_own(held.data):
                 data.append(held.data)
             groups |= {m.node_group for m in held.modifiers if m.type == 'NODES' and m.node_group is not None}
         elif held.name not in scene.collection.objects:
-            scene.collection.objects.link(held)  # the artist put it here; it stays in the scene
+            scene.collection.objects.link(held)  # the artist's own object stays in the scene
     for child in list(collection.children):
         if child.name not in scene.collection.children:
             scene.collection.children.link(child)
@@ -183,7 +169,7 @@ def remove_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) 
 
 
 def _remove_unused(materials: set[bpy.types.Material], groups: set[bpy.types.NodeTree]) -> int:
-    """Remove groups and materials of ours that nothing uses any more, and the node groups of these."""
+    """Remove TetFlora's groups and materials that nothing uses any more, and the node groups of these."""
     removed = _remove_groups(groups)  # first: groups of geometry nodes use materials
     unused = [m for m in materials if m.users == 0]
     groups = {n.node_tree for m in unused for n in m.node_tree.nodes if n.type == 'GROUP' and n.node_tree is not None}

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How results appear in the file, in renders and in compositing: settings of a scene, and of single species."""
+"""Output settings of a scene and of single species: how results appear in files, renders and compositing."""
 
 from __future__ import annotations
 
@@ -16,6 +16,9 @@ def _changed(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None
     dress_results(self.id_data)
 
 
+_COMMON = {"update": _changed, "options": set()}
+
+
 def _replaced(kind: str) -> dict:
     return {
         "name": f"{kind} Material",
@@ -28,7 +31,7 @@ def _replaced(kind: str) -> dict:
 
 
 class TetFloraSpeciesOutput(bpy.types.PropertyGroup, SpeciesChoice):
-    """What is special about one species in renders."""
+    """Output settings of one species."""
 
     pass_index: IntProperty(
         name="Pass Index",
@@ -36,14 +39,12 @@ class TetFloraSpeciesOutput(bpy.types.PropertyGroup, SpeciesChoice):
         default=1,
         min=0,
         max=32767,
-        update=_changed,
-        options=set(),
+        **_COMMON,
     )
     light_group: StringProperty(
         name="Light Group",
         description="Light group of this species' meshes and proxies; if empty, that of all results",
-        update=_changed,
-        options=set(),
+        **_COMMON,
     )
     leaf: PointerProperty(**_replaced("Leaf"))
     blossom: PointerProperty(**_replaced("Blossom"))
@@ -51,7 +52,7 @@ class TetFloraSpeciesOutput(bpy.types.PropertyGroup, SpeciesChoice):
 
 
 class TetFloraOutput(bpy.types.PropertyGroup):
-    """How results appear."""
+    """Output settings of all results."""
 
     save_results: BoolProperty(
         name="Save Results in File",
@@ -60,43 +61,38 @@ class TetFloraOutput(bpy.types.PropertyGroup):
             "makes the same meshes again"
         ),
         default=False,
-        update=_changed,
-        options=set(),
+        **_COMMON,
     )
     show_viewport: BoolProperty(
         name="Show Results in Viewports",
         description="Show meshes and proxies in 3D viewports. Hide them to work with the plants alone at full speed",
         default=True,
-        update=_changed,
-        options=set(),
+        **_COMMON,
     )
     show_render: BoolProperty(
         name="Show Results in Renders",
         description="Show meshes and proxies in renders",
         default=True,
-        update=_changed,
-        options=set(),
+        **_COMMON,
     )
-    camera: BoolProperty(**SWITCHES["camera"], update=_changed, options=set())
-    diffuse: BoolProperty(**SWITCHES["diffuse"], update=_changed, options=set())
-    glossy: BoolProperty(**SWITCHES["glossy"], update=_changed, options=set())
-    transmission: BoolProperty(**SWITCHES["transmission"], update=_changed, options=set())
-    volume_scatter: BoolProperty(**SWITCHES["volume_scatter"], update=_changed, options=set())
-    shadow: BoolProperty(**SWITCHES["shadow"], update=_changed, options=set())
+    camera: BoolProperty(**SWITCHES["camera"], **_COMMON)
+    diffuse: BoolProperty(**SWITCHES["diffuse"], **_COMMON)
+    glossy: BoolProperty(**SWITCHES["glossy"], **_COMMON)
+    transmission: BoolProperty(**SWITCHES["transmission"], **_COMMON)
+    volume_scatter: BoolProperty(**SWITCHES["volume_scatter"], **_COMMON)
+    shadow: BoolProperty(**SWITCHES["shadow"], **_COMMON)
     pass_index: IntProperty(
         name="Pass Index",
         description="Object index of all meshes and proxies, except for species with their own",
         default=0,
         min=0,
         max=32767,
-        update=_changed,
-        options=set(),
+        **_COMMON,
     )
     light_group: StringProperty(
         name="Light Group",
         description="Light group of all meshes and proxies; matters where they emit light, as with baked lighting",
-        update=_changed,
-        options=set(),
+        **_COMMON,
     )
     species: CollectionProperty(
         name="Species",

@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Proxies of a refinement as objects, in the form and with the light that the scene asks for.
-
-Baked light in a job: collect what is drawn, and give meshes the light that the camera sees.
-"""
+"""Proxies of a refinement as objects, in the scene's form, and baked light of proxies and meshes."""
 
 from __future__ import annotations
 
@@ -50,7 +47,7 @@ class Baking:
     def add_facets(self, refined: Refined) -> Iterator[int]:
         """Add the facets of all proxies; yields how many there are so far.
 
-        They are made once more for the meshes, not kept: all of them at once may not fit into memory.
+        They are made again for the meshes: all of them at once may not fit into memory.
         """
         count = 0
         for parts in refined.facet_parts():
@@ -60,15 +57,15 @@ class Baking:
             yield count
 
     def look(self, refined: Refined) -> Generator[float, None, None]:
-        """Find the light; yields the fraction that is done."""
+        """Compute the light; yields the fraction that is done."""
         scene = refined.flora, refined.refinement, refined.camera
         facets = refined.facet_pixels is not None
         self.light = yield from baked_light(*scene, self.sources, self.sheets, facets)
 
     def light_meshes(self) -> Iterator[float]:
-        """Give meshes their light, each to itself; yields the fraction that is done."""
+        """Write the light of meshes; yields the fraction that is done."""
         for number, (made, first) in enumerate(self._meshes):
-            for part in _light_mesh(made.data, self.light, first, rounded=made["tetflora_kind"] == "bark"):
+            for part in _light_mesh(made.data, self.light, first, rounded=made[KIND] == "bark"):
                 yield (number + part) / len(self._meshes)
 
 
@@ -103,7 +100,7 @@ def write_proxies(
     statistics : Statistics
         Gets the number of faces or points, and their memory.
     baking : Baking, optional
-        With the light that proxies show. Their facets must be the last that were added to it.
+        With the light of proxies. Their facets must have been added last.
 
     Yields
     ------
@@ -142,7 +139,7 @@ def set_sockets(material: bpy.types.Material, scene: bpy.types.Scene, sockets: M
 
 
 def shade_again(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
-    """`set_sockets` for results that come back: their material is that of later ones too."""
+    """`set_sockets` for results from the frame cache, which share their material with later ones."""
     sockets = form_of(scene).sockets
     if not sockets or scene.tetflora.baked_light != 'OFF':
         return
