@@ -1,11 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From decisions to the facets of proxies, block by block; `emission_forms` makes buffers of them.
+"""From decisions to the facets of proxies, block by block, and to microspheres in their place; `forms` makes buffers.
 
-Microspheres: the facets of microsurfaces as opaque spheres, the particles of the paper's volumes (paper, section 7).
-
-A facet covers the more the more it faces the eye, a sphere covers the same from everywhere. So a sphere can take over
-what its facet covers as the camera sees it, but not from all lights as well.
+Microspheres are opaque spheres, the particles of the paper's volumes (section 7). A facet covers the more the more it
+faces the eye; a sphere covers the same from everywhere. A sphere can therefore cover what its facet covers for the
+camera, but not for all lights as well.
 """
 
 from __future__ import annotations
@@ -32,12 +31,14 @@ from ..subplants.pieces import Pieces, chunks, open_subplants
 from .plants import Transition
 from .polygons import polygon_facets
 
-#: Facets that are made at a time, about; thick wood close to the eye is cut into very many.
+#: Approximate number of facets that are made at a time; thick wood close to the eye is cut into very many.
 FACETS_AT_ONCE = 200_000
-
-#: Pixels down to which sub-plants are opened that are seen. What is smaller, the loop does not open either.
+#: Pixels down to which visible sub-plants are opened; the loop does not open smaller ones either.
 DETAIL = SLACK
-
+#: Minimum fraction of a facet's area that its sphere covers, where the facet is seen from its edge.
+LEAST_COVER = 0.1
+#: Mean of |cos| over all directions.
+MEAN_COVER = 0.5
 
 #: Some facets, and whether the camera sees them: neither hidden nor beside the view.
 Part = tuple[Facets, bool]
@@ -45,7 +46,7 @@ Part = tuple[Facets, bool]
 
 @dataclass(frozen=True)
 class Parts:
-    """Facets of one species, or of meshes where that is None."""
+    """Facets of one species, or of other meshes where that is None."""
 
     species: int | None
     facets: tuple[Part, ...]
@@ -57,10 +58,10 @@ class Parts:
 def facet_parts(
     flora: Flora, result: Refinement, camera: Camera, facet_pixels: float, transition: Transition | None = None
 ) -> Iterator[Parts]:
-    """Facets of all that is not explicit, and of no polygon that is kept as it is; no block is empty.
+    """Facets of all that is not explicit and of no polygon that is kept as it is; no block is empty.
 
-    Blocks have about `BLOCK_POLYGONS` facets each, so that only one of them is held at a time beside Blender's own.
-    Each is of one species, or of meshes.
+    Blocks have about `BLOCK_POLYGONS` facets each, so that only one of them is in memory beside Blender's own data.
+    Each is of one species, or of other meshes.
 
     Parameters
     ----------
@@ -68,10 +69,10 @@ def facet_parts(
     result : Refinement
     camera : Camera
     facet_pixels : float
-        Side of a facet that is seen, in pixels; see `shading.facet_sizes` for the others.
+        Side of a facet that is seen, in pixels; see `proxies.facet_sizes` for the others.
     transition : Transition, optional
-        With it, what is too small in explicit tetrahedra gets facets too, and thick wood elsewhere gets none; as
-        `emission.explicit_blocks` with the same makes the rest.
+        With it, what is too small in explicit tetrahedra gets facets too, and thick wood elsewhere gets none;
+        `plants.explicit_blocks` with the same transition makes the rest.
     """
     parts: list[Part] = []
     current = None
@@ -98,27 +99,20 @@ def _facets(
         contents = _in_detail(contents, explicit, result.in_view & ~hidden, transition)
     weights, coarse = facet_weights(flora), coarseness(result)
     every = []
-    for things, cell, row, sizes, fraction_of, make in (
+    for held, row, sizes_of, weight_of, make in (
         (
-            contents.subplants.items,
-            contents.subplants.cell,
+            contents.subplants,
             contents.subplants.items.row,
-            subplant_facet_sizes(flora, contents, camera, coarse),
+            subplant_facet_sizes,
             weights.of_subplants,
             _of_subplants,
         ),
-        (
-            contents.pieces.items,
-            contents.pieces.cell,
-            contents.pieces.items.branches.row,
-            piece_facet_sizes(flora, contents, camera, coarse),
-            weights.of_pieces,
-            _of_pieces,
-        ),
+        (contents.pieces, contents.pieces.items.branches.row, piece_facet_sizes, weights.of_pieces, _of_pieces),
     ):
-        inside, side = result.in_view[cell], sizes.sides(facet_pixels)
-        fraction = fraction_of(row, sizes.whole_optical / np.maximum(side[0], 1e-12) ** 2)
-        wanted = _Wanted(*side, fraction, explicit[cell], inside & ~sizes.hidden)
+        things, sizes = held.items, sizes_of(flora, contents, camera, coarse)
+        inside, side = result.in_view[held.cell], sizes.sides(facet_pixels)
+        weight = weight_of(row, sizes.whole_optical / np.maximum(side[0], 1e-12) ** 2)
+        wanted = _Wanted(*side, weight, explicit[held.cell], inside & ~sizes.hidden)
         of_species = flora.rows["species"][row]
         order = np.argsort(of_species, kind="stable")
         first = np.searchsorted(of_species[order], np.arange(len(flora.species) + 1))
@@ -129,7 +123,7 @@ def _facets(
             for seen in (True, False):
                 for i in _runs(expected, own[inside[own] & (wanted.seen[own] == seen)]):
                     yield species, make(flora, transition, things.take(i), wanted.take(i)), seen
-            # What is beside the view must not reach into the image.
+            # Facets beside the view must not reach into the image.
             for i in _runs(expected, own[~inside[own]]):
                 made = make(flora, transition, things.take(i), wanted.take(i))
                 yield species, kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5), False
@@ -142,10 +136,10 @@ def _facets(
 def _in_detail(
     contents: Contents, explicit: NDArray[np.bool_], seen: NDArray[np.bool_], transition: Transition
 ) -> Contents:
-    """Contents without what is real altogether, and with small sub-plants only of what is seen.
+    """Contents without what is entirely real, with sub-plants opened where they are seen.
 
-    How far sub-plants are opened follows from their own size here, not from the tetrahedra that they are in: facets
-    stay the same while the division of space changes. Explicit tetrahedra are not divided as far as others anyway.
+    How far they are opened depends on their own size, not on the tetrahedra that they are in: facets stay the same
+    while the division of space changes. Explicit tetrahedra are not divided as far as others anyway.
     """
     flora, camera = transition.flora, transition.camera
     some, cell = contents.subplants.items, contents.subplants.cell
@@ -181,22 +175,22 @@ def _in_detail(
 
 @dataclass(frozen=True)
 class _Wanted(Arrays):
-    """What is asked of the facets of sub-plants or pieces (n,).
+    """Properties that the facets of sub-plants or pieces (n,) are to have.
 
-    ``leaf`` and ``wood`` are the sides of facets, metres; ``fraction`` is that of the area that they have. ``explicit``
-    says what is in tetrahedra of which polygons are made, and ``seen`` what the camera looks at.
+    ``leaf`` and ``wood`` are the sides of facets, metres; ``weight`` is the fraction of their area that they get.
+    ``explicit`` marks what is in tetrahedra of which polygons are made, and ``seen`` what the camera sees.
     """
 
     leaf: NDArray[np.float64]
     wood: NDArray[np.float64]
-    fraction: NDArray[np.float64]
+    weight: NDArray[np.float64]
     explicit: NDArray[np.bool_]
     seen: NDArray[np.bool_]
 
     @property
     def sizes(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Sides of facets of leaves and of wood, and the fraction of the area."""
-        return self.leaf, self.wood, self.fraction
+        """Sides of facets of leaves and of wood, and the weight."""
+        return self.leaf, self.wood, self.weight
 
 
 def _of_subplants(flora: Flora, transition: Transition | None, subplants: Branches, wanted: _Wanted) -> Facets:
@@ -225,28 +219,17 @@ def _runs(expected: NDArray[np.float64], chosen: NDArray[np.int64]) -> Iterator[
         yield chosen[run]
 
 
-#: Least fraction of a facet's area that its sphere covers, where the facet is seen from its edge.
-LEAST_COVER = 0.1
-#: Mean of |cos| over all directions.
-MEAN_COVER = 0.5
-
-
 def spheres(parts: Sequence[tuple[Facets, bool]], camera: Camera, disc: float = np.pi) -> PointBuffers:
-    """Spheres in the place of facets, one each, with their colours and transmission.
+    """Spheres in the place of facets, one each, with their colours, transmission and velocity.
 
     Parameters
     ----------
     parts : sequence of (Facets, bool)
-        Facets, n in all, and whether the camera sees them. Spheres of those cover what facets cover for it, others what
-        facets cover as a mean over all directions: they only cast shadows and light up others.
+        Facets, and whether the camera sees them. Spheres of those cover what the facets cover for the camera; others,
+        which only cast shadows and light up others, cover the mean of their facets over all directions.
     camera : Camera
     disc : float
-        Area that a renderer draws for a sphere of radius 1; some draw fewer pixels than there are in a circle.
-
-    Returns
-    -------
-    PointBuffers of n
-        With ``tf_colour`` and ``tf_transmission``, and ``velocity`` where facets have one.
+        Area that a renderer draws for a sphere of radius 1; some draw fewer pixels than a circle has.
     """
     cover = np.concatenate([cover_of(facets, camera if seen else None) for facets, seen in parts])
     facets = concatenate_facets([facets for facets, _ in parts])

@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Forms that proxies can take, as far as the engine is concerned: which buffers are made, how large, how many.
-
-`blender.proxy_forms` adds materials and labels to each.
-"""
+"""Forms of proxies in the engine: buffers, sizes and memory. `blender.results.forms` adds materials and labels."""
 
 from __future__ import annotations
 
@@ -30,7 +27,7 @@ Buffers = MeshBuffers | PointBuffers
 
 @dataclass(frozen=True)
 class Refined:
-    """A refined scene, as forms of proxies take it.
+    """A refined scene, the input of all forms of proxies.
 
     Attributes
     ----------
@@ -40,7 +37,7 @@ class Refined:
     facet_pixels : float or None
         Side of facets and spheres, pixels; None in forms that have none.
     transition : Transition or None
-        As for `emission.explicit_blocks`; None in forms without facets.
+        As for `plants.explicit_blocks`; None in forms without facets.
     disc : float
         Area that the renderer draws of a sphere of radius 1.
     """
@@ -104,8 +101,8 @@ def sphere_blocks(refined: Refined) -> Iterator[PointBuffers]:
 def mixed_blocks(refined: Refined) -> Iterator[Buffers]:
     """Proxies in the form that suits each: facets where they are seen, spheres where they are not.
 
-    In the fidelity benchmark facets come closer to the plants wherever they are seen. What is hidden only casts
-    shadows and lights other plants, for which spheres serve as well and take a third of the memory.
+    In the fidelity benchmark facets come closer to the plants wherever they are seen. Hidden proxies only cast shadows
+    and light other plants; spheres do that as well with a third of the memory.
     """
     for parts in refined.facet_parts():
         facets, hidden = [some for some, seen in parts if seen], [part for part in parts if not part[1]]

@@ -1,11 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Baked light: from what refinement made to what the camera sees of it, without a renderer (paper, section 7).
+"""Baked light: the radiance of a refined scene as the camera sees it, without a renderer (paper, section 7).
 
-What will be drawn is collected first, as sheets (`SheetList`); then `baked_light` looks at the scene from all its
-lights, and `BakedLight` answers for facets, spheres, shells and faces of meshes.
-
-The shadow pass (paper, section 7): a scene as all of its lights see it, one buffer after the other.
+All surfaces that will be drawn are collected first, as sheets (`SheetList`). `baked_light` then renders them from each
+light, which is the paper's shadow pass, and `BakedLight` gives the light of facets, spheres, shells and faces.
 """
 
 from __future__ import annotations
@@ -32,10 +30,19 @@ from ..refinement.loop import Refinement
 SKY_FRACTION = 0.1
 #: Its limits, pixels, of clouds alone and of sheets.
 SKY_PIXELS, SKY_SHEET_PIXELS = (32, 96), (32, 384)
-#: Sheets that stand in the sky's light at most, each for several: it comes from all sides, and details drown in it.
+#: Maximum number of sheets in the sky's light, each for several: details do not show in light from all sides.
 SKY_SHEETS = 40_000
 #: Orders of scattering that are gathered one by one.
 ORDERS = 2
+#: Attributes of baked light: linear radiance of the side to which normals point, and of the other side.
+FRONT, BACK = "tf_light_front", "tf_light_back"
+#: Facets and faces whose light is computed together; some 2 kB each.
+AT_ONCE = 1 << 16
+#: Maximum longer side in pixels of a lamp's buffer, with ground in it and without.
+GROUND_PIXELS, OPEN_PIXELS = 1024, 4096
+#: Suns have views of their own of what is nearer to the camera than these fractions of the distance to the farthest
+#: leaf, if so many sheets are there.
+NEAR_FRACTIONS, NEAR_SHEETS = (1 / 32, 1 / 8), 1000
 
 
 def shadow_steps(
@@ -49,7 +56,9 @@ def shadow_steps(
     sheets: Sheets | None = None,
     near: Near | None = None,
 ) -> Generator[float, None, Illumination]:
-    """Look at a scene from all of its lights.
+    """Render a scene from all of its lights; yields the fraction that is done.
+
+    Penumbras of the sun and of lamps that are no areas are as sharp as the buffer.
 
     Parameters
     ----------
@@ -66,24 +75,10 @@ def shadow_steps(
     orders : int
         Orders of scattering that are gathered one by one, at least 1.
     sheets : Sheets, optional
-        Facets and leaves as they are drawn. Clumps that are smaller than tetrahedra shadow themselves, which an even
-        cloud does not know of; with sheets the resolution should be such that a pixel is about as large as one.
-
+        Facets and leaves as they are drawn. Clumps smaller than tetrahedra shadow themselves, which an even cloud does
+        not; a pixel should be about as large as a sheet.
     near : Near, optional
         Part of the scene that gets buffers of its own from suns.
-
-    Yields
-    ------
-    float
-        Fraction that is done.
-
-    Returns
-    -------
-    Illumination
-
-    Notes
-    -----
-    Penumbras of the sun and of lamps that are no areas are as sharp as the buffer.
     """
     sheets = Sheets.none(len(clouds)) if sheets is None else sheets
     lamps = []
@@ -107,20 +102,9 @@ def shadow_steps(
     return found
 
 
-#: Attributes of baked light: linear radiance of the side to which normals point, and of the other side.
-FRONT, BACK = "tf_light_front", "tf_light_back"
-#: Facets and faces whose light is computed together; some 2 kB each.
-AT_ONCE = 1 << 16
-#: Longer side in pixels of a lamp's buffer at most, with ground in it and without.
-GROUND_PIXELS, OPEN_PIXELS = 1024, 4096
-#: Suns see what is nearer to the camera than these fractions of the distance to the farthest leaf in views of its
-#: own, if so many sheets are there.
-NEAR_FRACTIONS, NEAR_SHEETS = (1 / 32, 1 / 8), 1000
-
-
 @dataclass(frozen=True)
 class Sources:
-    """What lights a scene, and what of it is opaque.
+    """Lights and opaque polygons of a scene.
 
     Attributes
     ----------
@@ -139,7 +123,7 @@ class Sources:
 
 
 class SheetList:
-    """Small opaque surfaces as they are going to be drawn, in the order in which they are added."""
+    """Small opaque surfaces that will be drawn, in the order in which they are added."""
 
     def __init__(self) -> None:
         self._parts: list[NDArray[np.float32]] = []
@@ -189,15 +173,8 @@ class BakedLight:
 
     def of_facets(self, facets: Facets, sheets: NDArray[np.integer]) -> tuple[NDArray, NDArray]:
         """Radiance (n, 3) of the fronts and of the backs of facets, which are these sheets (n,) of the list."""
-        return self.illumination.facet_radiance(
-            facets.centre,
-            facets.normal,
-            facets.colour,
-            facets.transmission,
-            self.cell[sheets],
-            self.camera,
-            sheets,
-        )
+        surface = facets.centre, facets.normal, facets.colour, facets.transmission
+        return self.illumination.facet_radiance(*surface, self.cell[sheets], self.camera, sheets)
 
     def of_spheres(self, facets: Facets, sheets: NDArray[np.integer]) -> NDArray:
         """Radiance (n, 3) of spheres in the place of facets, which are these sheets (n,) of the list.
@@ -223,27 +200,13 @@ class BakedLight:
     ) -> tuple[NDArray, NDArray]:
         """Radiance (f, 3) of the fronts and of the backs of a mesh's faces, which are these sheets (f,) of the list.
 
-        Parameters
-        ----------
-        positions, corner_verts, offsets
-            In the layout of `buffers.MeshBuffers`.
-        colour : (f, 3) float
-        transmission : (f,) float
-        sheets : (f,) int
+        The mesh is in the layout of `buffers.MeshBuffers`, with a colour (f, 3) and transmission (f,) for each face.
         """
         corners = positions[corner_verts[_four_corners(offsets)]].astype(np.float64)
         normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
-        centre = _middles(corners)
-        return self.illumination.facet_radiance(
-            centre,
-            normal,
-            colour.astype(np.float64),
-            transmission.astype(np.float64),
-            self.cell[sheets],
-            self.camera,
-            sheets,
-        )
+        surface = _middles(corners), normal, colour.astype(np.float64), transmission.astype(np.float64)
+        return self.illumination.facet_radiance(*surface, self.cell[sheets], self.camera, sheets)
 
 
 def at_vertices(values: NDArray[np.floating], corner_verts: NDArray, offsets: NDArray, vertices: int) -> NDArray:
@@ -256,15 +219,10 @@ def at_vertices(values: NDArray[np.floating], corner_verts: NDArray, offsets: ND
 def baked_attributes(
     domain: str, front: NDArray[np.floating], back: NDArray[np.floating] | None = None
 ) -> Mapping[str, tuple[str, NDArray[np.float32]]]:
-    """Attributes for buffers that carry baked light, in the layout of `buffers.MeshBuffers`.
+    """Attributes of baked light on a domain 'FACE' or 'POINT', in the layout of `buffers.MeshBuffers`.
 
-    Parameters
-    ----------
-    domain : {'FACE', 'POINT'}
-    front : (n, 3) float
-        Linear radiance of the side to which the normals point, or of all sides.
-    back : (n, 3) float, optional
-        Of the other side; by default the same.
+    ``front`` (n, 3) is the linear radiance of the side to which normals point, ``back`` that of the other; by default
+    both are the same.
     """
     back = front if back is None else back
     return {FRONT: (domain, front.astype(np.float32)), BACK: (domain, back.astype(np.float32))}
@@ -279,23 +237,9 @@ def _middles(corners: NDArray[np.floating]) -> NDArray[np.float64]:
 def baked_light(
     flora: Flora, refinement: Refinement, camera: Camera, sources: Sources, made: SheetList, facets: bool
 ) -> Generator[float, None, BakedLight]:
-    """Look at a refined scene from all of its lights.
+    """Render a refined scene from all of its lights; yields the fraction that is done.
 
-    Parameters
-    ----------
-    flora : Flora
-    refinement : Refinement
-    camera : Camera
-    sources : Sources
-    made : SheetList
-        All that is drawn as facets or polygons.
-    facets : bool
-        Whether proxies are drawn so as well; otherwise they stand in the light as clouds.
-
-    Yields
-    ------
-    float
-        Fraction that is done.
+    All that is drawn as facets or polygons is in ``made``. Without ``facets``, proxies are clouds in the light instead.
     """
     corners, cell = made.corners(), cell_of_node(refinement)
     replaced = ~np.isin(refinement.decision, (Decision.PROXY, Decision.HIDDEN)) | facets

@@ -1,18 +1,14 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From decisions to buffers: polygons of what is explicit, block by block.
+"""From decisions to buffers: polygons of explicit plants, block by block, and the transition from leaves to facets.
 
-Blocks are runs of tetrahedra in front-to-back order, so that each is one region of space and one block's buffers at a
-time are held in memory. Proxies have files of their own: `facet_emission` and `shell_emission`.
-
-Where leaves are neither all real nor all facets: a band of sizes in which a number of each leaf's own decides.
+Blocks are runs of tetrahedra in front-to-back order: each is one region of space, and only one block's buffers are in
+memory at a time. Proxies are in `facets` and `shells`.
 
 A leaf whose width in pixels is below the limit is a facet, one that is wider by `BAND` is real, and in between
 a fraction of them is real that grows with the width. Real leaves and facets are thinned out by hashes of their own
 keys: what has become real stays real as the camera comes closer, nothing pops, and the area is the same on average.
-
-Wood goes by its own width or that of the leaves on it, whichever is larger: a trunk is a tube even among leaves that
-are too small to be seen.
+Wood goes by its own width or that of its leaves, whichever is larger: a trunk is a tube even among invisible leaves.
 """
 
 from __future__ import annotations
@@ -38,7 +34,7 @@ from ..subplants.leaf_meshes import leaf_meshes
 from ..subplants.pieces import Pieces, chunks, expand
 from ..subplants.tubes import tube_buffers
 
-#: Width of the leaves that are all real over that of the leaves of which none is.
+#: Width from which on all leaves are real over the width up to which none is.
 BAND = 2.5
 
 
@@ -70,7 +66,7 @@ class Transition:
         return self.fraction(self._width(branches), branches.position)
 
     def of_wood(self, pieces: Pieces, among_leaves: bool = True) -> NDArray[np.bool_]:
-        """Pieces (n,) whose wood is real; with or without regard to the leaves that grow on their branch."""
+        """Pieces (n,) whose wood is real, by its own width or also by that of the leaves on the branch."""
         return self._kept(pieces.branches, (pieces.start + pieces.end) / 2.0, among_leaves)
 
     def of_twigs(self, branches: Branches) -> NDArray[np.bool_]:
@@ -115,9 +111,9 @@ class Block:
 
 
 def explicit_blocks(flora: Flora, result: Refinement, transition: Transition | None = None) -> Iterator[Block]:
-    """Polygons of all tetrahedra that are flagged for them, and thick wood of those that are drawn as proxies.
+    """Polygons of all explicit tetrahedra, and thick wood of those that are drawn as proxies.
 
-    With a transition, leaves that are small all the same are left to facets, by a number of each one's own.
+    With a transition, small leaves are left to facets, by a random number of each leaf.
     """
     explicit = result.decision == Decision.EXPLICIT
     nodes, rank, polygons = result.nodes, result.rank, np.where(explicit, result.totals.polygons, 0.0)
@@ -149,7 +145,7 @@ def _thick_wood(result: Refinement, transition: Transition) -> Contents:
 
 
 def expanded_blocks(flora: Flora, seeds: Seeds) -> Iterator[Block]:
-    """Polygons of all plants, whatever the camera sees; for comparison."""
+    """Polygons of all plants, seen or not; for comparison."""
     plants = trunks(flora.rows, seeds)
     runs = list(chunks(flora.polygons[plants.row], BLOCK_POLYGONS))
     for number, run in enumerate(runs):
@@ -166,7 +162,7 @@ def _block(
     bare: Pieces | None = None,
     transition: Transition | None = None,
 ) -> Iterator[Block]:
-    """Meshes of pieces and stems of any species, and of the wood alone of others."""
+    """Meshes of pieces and stems of any species, and of the wood alone of ``bare`` pieces."""
     bare = Pieces.empty() if bare is None else bare
     of_pieces, of_bare = flora.species_of(pieces.branches.row), flora.species_of(bare.branches.row)
     of_stems = [flora.species_of(some.branches.row) for some in stems]
@@ -183,7 +179,7 @@ def _block(
         cut = Pieces.concatenate([cut, bare.take(of_bare == s)])
         made.append(("bark", 0, int(s), tube_buffers(flora, cut, whole)))
         del cut, whole
-    # Whoever takes a block copies it into Blender: what it was made from, and what was taken, is not kept meanwhile.
+    # The caller copies each block into Blender; meanwhile its sources and the blocks already taken are not kept.
     del pieces, stems, bare
     while made:
         kind, form, s, buffers = made.pop(0)

@@ -1,15 +1,14 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Explicit polygons that refinement keeps: where they are seen, and where a facet would be no smaller.
+"""Explicit polygons that refinement keeps, and facets that stand for the others.
 
-A face whose fragments are all kept comes out as the face that it was: what nobody needed to cut is not cut.
+Polygons are kept where they are seen and where a facet would be no smaller. A face whose fragments are all kept comes
+out as the face that it was.
 
-Facets that stand for explicit polygons: stochastic simplification (Cook, Halstead, Planck and Ryu, SIGGRAPH 2007).
-
-Of many small triangles few are chosen by chance, in proportion to their area, and the facets of
-each make up for those that are left out. What a triangle gets follows from its own number and nothing else, so that its
-facets stay where they are when others come into view or are kept as they are. Chances are spread evenly along the
-triangles of a mesh, so that the area of all is that of the mesh with little noise.
+Facets are a stochastic simplification (Cook, Halstead, Planck and Ryu, SIGGRAPH 2007): of many small triangles few are
+chosen at random, in proportion to their area, and their facets make up for the rest. The facets of a triangle depend
+only on its own number: they stay when others come into view or are kept. Chances are spread evenly along the triangles
+of a mesh, which keeps its area with little noise.
 """
 
 from __future__ import annotations
@@ -32,10 +31,12 @@ from ..refinement.loop import Refinement
 from ..refinement.polygons import Polygons, area_fractions
 from ..subplants.pieces import chunks
 
-#: Attributes by their numbers of components; a fourth and further ones are none that a mesh could hold.
+#: Shapes of attributes by their number of components; a mesh cannot hold others.
 _FLOATS = {1: (), 2: (2,), 3: (3,)}
-#: What is missing of a face by rounding errors alone.
+#: Part of a face that may be missing through rounding errors alone.
 _WHOLE = 1e-6
+#: Draws of the place of a facet in its triangle.
+_PLACE_U, _PLACE_V = 222, 223
 
 
 @dataclass(frozen=True)
@@ -116,15 +117,15 @@ def mended(polygons: Polygons) -> Polygons:
 def polygon_buffers(polygons: Polygons) -> MeshBuffers:
     """Polygons of one surface as a mesh in world space.
 
-    Whole faces share vertices and edges as in the surface, unless they come to one twice; fragments are triangles by
-    themselves. Faces of mirrored instances are turned around, as Blender does it for objects. Normals, where the
-    surface has any, are the attribute ``custom_normal``.
+    Whole faces share vertices and edges as in the surface, unless they have one twice; fragments are separate. Faces of
+    mirrored instances are turned around, as in Blender. Normals, where the surface has any, are the attribute
+    ``custom_normal``.
     """
     meshes = polygons.meshes
     cut = polygons.part >= 0
     whole, pieces = polygons.take(~cut), polygons.take(cut)
     corner, instance, size = _face_corners(whole)
-    # Corners of faces that come to a vertex twice get vertices of their own, so that the mesh is valid.
+    # Corners of faces with a vertex twice get vertices of their own, which keeps the mesh valid.
     own_place = np.repeat(meshes.degenerate[whole.face], size)
     count = len(meshes.positions)
     place = np.where(own_place, count + corner, meshes.corner_verts[corner])
@@ -200,23 +201,12 @@ def _at_corners(
     return np.concatenate([values[corner].astype(np.float64), between])
 
 
-_PLACE_U, _PLACE_V = 222, 223
-
-
 def polygon_facets(
     contents: Contents, result: Refinement, camera: Camera, facet_pixels: float, at_once: float = np.inf
 ) -> Iterator[tuple[Facets, bool]]:
-    """Facets of the polygons of proxies (``contents``) that are not kept as they are, see `facet_sizes`.
+    """Facets of the polygons of proxies (``contents``) that are not kept, about ``at_once`` at a time.
 
-    Parameters
-    ----------
-    at_once : float
-        Facets that are made at a time, about.
-
-    Yields
-    ------
-    (Facets, bool)
-        Some of them, and whether they are seen: neither hidden nor beside the view.
+    Yields facets and whether they are seen: neither hidden nor beside the view.
     """
     sizes = polygon_facet_sizes(contents, camera, result.chosen(Decision.HIDDEN))
     side, inside = sizes.sides(facet_pixels), result.in_view[contents.polygons.cell]
@@ -234,16 +224,9 @@ def polygon_facets(
 
 
 def chosen_facets(polygons: Polygons, optical: NDArray[np.float64], side: NDArray[np.float64]) -> Facets:
-    """Facets of polygons.
+    """Facets of polygons (n,) that stand for an area ``optical`` (n,) in m², with sides (n,) in metres.
 
-    Parameters
-    ----------
-    polygons : Polygons of n
-        Whole faces and fragments, in any order.
-    optical : (n,) float64
-        Area that they stand for, m².
-    side : (n,) float64
-        Of facets, metres. Their number is a matter of chance; its expectation is the area over that of a facet.
+    Their number is random; its expectation is the area over that of a facet.
     """
     meshes = polygons.meshes
     owner, triangle, fraction = polygons.triangles()
@@ -269,18 +252,12 @@ def chosen_facets(polygons: Polygons, optical: NDArray[np.float64], side: NDArra
     longest = np.linalg.norm(edges, axis=2).argmax(axis=1)
     along = unit(edges[np.arange(len(pick)), longest])
     slot = meshes.slot[face]
-    return Facets(
-        centre,
-        np.cross(along, normal),
-        along,
-        side[thing],
-        meshes.colours[slot],
-        meshes.transmission[slot],
-    )
+    material = meshes.colours[slot], meshes.transmission[slot]
+    return Facets(centre, np.cross(along, normal), along, side[thing], *material)
 
 
 def _keys(polygons: Polygons, owner: NDArray[np.int64]) -> NDArray[np.uint64]:
-    """Keys (m,) of the instances that triangles of polygons (m,) belong to, and of the very fragments that they are."""
+    """Keys (m,) of triangles of polygons by their instance and, for fragments, by their corners."""
     key = key_of_seed(polygons.instance)
     cut = np.flatnonzero(polygons.part >= 0)
     corners = polygons.weights[polygons.part[cut]].reshape(-1, 9) + 0.0  # no negative zeros, which have other bits

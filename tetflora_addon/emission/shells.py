@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shells: tetrahedra as closed surfaces that carry what a shader needs to see the cloud inside (paper, section 7).
-
-From decisions to buffers: proxies as shells, the tetrahedra themselves.
-"""
+"""Shells: proxies as closed tetrahedra with the attributes that a shader needs to show the cloud inside (paper, 7)."""
 
 from __future__ import annotations
 
@@ -21,39 +18,30 @@ from ..refinement.loop import Refinement
 from ..tetrahedra.geometry import EDGES, FACES, volume
 from .light import BakedLight
 
+#: Fraction of its size by which a shell is smaller than its tetrahedron, minimum and maximum.
+GAP, MOST_GAP = 1e-3, 0.05
+# Minimum distance of faces, in steps between neighbouring numbers of single precision.
+_STEPS = 8.0
 # As a mesh stores them, with the edge from each corner to the next, in the order of faces.
 _FACES, _EDGES = FACES.astype(np.int32), EDGES.astype(np.int32)
 _FACE_EDGES = np.array([[3, 5, 4], [2, 5, 1], [0, 4, 2], [1, 3, 0]], dtype=np.int32)
 _BARYCENTRIC = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float32)
 
-# Six times the volume over the cube of the longest edge: beneath this a cell is flat as far as doubles can tell.
+# Six times the volume over the cube of the longest edge: below this a cell is flat within the precision of doubles.
 _FLAT = 1e-13
-# Directions of the mean over the sphere, and cells at a time, so that their product stays small.
+# Directions of the mean over the sphere, and cells at a time, to bound memory.
 _DIRECTIONS = 64
 _CHUNK = 65_536
 
 
-def mean_extinction(S: ArrayLike) -> NDArray[np.float64]:
-    """Mean over all directions of κ(ω) = √(ωᵀSω).
+def directional_mean(S: ArrayLike) -> NDArray[np.float64]:
+    """Mean (n,) over all directions of κ(ω) = √(ωᵀSω), 1/m, with S (n, 6) as in `shell_buffers`.
 
-    Parameters
-    ----------
-    S : (n, 6) float
-        Symmetric matrices as (Sxx, Syy, Szz, Sxy, Sxz, Syz), 1/m².
-
-    Returns
-    -------
-    (n,) float64
-        Mean extinction, 1/m; within 1.3 % of the integral, which single orientations reach.
-
-    Notes
-    -----
-    A mean over points of a Fibonacci lattice on the half sphere; κ(ω) = κ(−ω). The form of κ is that of Heitz,
-    Dupuy, Crassin and Dachsbacher, "The SGGX Microflake Distribution", 2015.
+    Within 1.3 % of the integral, which single orientations reach: a mean over points of a Fibonacci lattice on the half
+    sphere; κ(ω) = κ(−ω). The form of κ is that of Heitz, Dupuy, Crassin and Dachsbacher, "The SGGX Microflake
+    Distribution", 2015.
     """
     matrices = np.asarray(S, dtype=np.float64)
-    if matrices.ndim != 2 or matrices.shape[1] != 6:
-        raise ValueError(f"S must have shape (n, 6), not {matrices.shape}")
     index = np.arange(_DIRECTIONS) + 0.5
     z = index / _DIRECTIONS
     turn = np.pi * (1.0 + np.sqrt(5.0)) * index
@@ -66,20 +54,11 @@ def mean_extinction(S: ArrayLike) -> NDArray[np.float64]:
     return result
 
 
-def barycentric_gradients(vertices: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Gradients of λ1, λ2, λ3, the barycentric coordinates of each tetrahedron's vertices 1 to 3.
+def cell_gradients(vertices: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Gradients (n, 3, 3) of the barycentric coordinates of vertices 1 to 3, and cells (n,) without volume.
 
-    Parameters
-    ----------
-    vertices : (n, 4, 3) float
-        Corners, metres. Only differences are used, so the distance from the origin costs no precision.
-
-    Returns
-    -------
-    gradients : (n, 3, 3) float64
-        ``gradients[i, k]`` is ∇λ(k+1) of cell i, 1/m; zero for flat cells.
-    flat : (n,) bool
-        Cells without volume.
+    In 1/m; zero for flat cells. Only differences of vertices (n, 4, 3) are used: the distance from the origin costs no
+    precision.
     """
     corners = np.asarray(vertices, dtype=np.float64)
     a, b, c = (corners[:, k] - corners[:, 0] for k in (1, 2, 3))
@@ -94,8 +73,8 @@ def barycentric_gradients(vertices: ArrayLike) -> tuple[NDArray[np.float64], NDA
 
 
 def _cell_noise(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Even random number (n,) in [0, 1) of each cell (n, 4, 3): the same wherever the same cell comes up again."""
-    # Corners as Blender stores them, so that the last bits of doubles do not matter; adding up forgets their order.
+    """Random number (n,) in [0, 1) of each cell (n, 4, 3): the same wherever the same cell comes up again."""
+    # Corners as Blender stores them, without the last bits of doubles; a sum does not depend on their order.
     places = np.ascontiguousarray(corners, dtype=np.float32) + np.float32(0.0)  # no negative zeros
     bits = places.view(np.uint32).astype(np.uint64)
     key = mix(bits[..., 0])
@@ -115,9 +94,10 @@ def shell_buffers(
     rank: ArrayLike | None = None,
     light: ArrayLike | None = None,
 ) -> MeshBuffers:
-    """One mesh of all proxy tetrahedra, with the attributes that the shell material reads.
+    """One mesh of all proxy tetrahedra, with the attributes of the shell material (paper, section 7).
 
-    Each cell has vertices of its own: barycentric coordinates differ from cell to cell at a shared corner.
+    Names and units of the attributes are in ``docs/architecture.md``. Each cell has vertices of its own: barycentric
+    coordinates differ from cell to cell at a shared corner.
 
     Parameters
     ----------
@@ -149,42 +129,31 @@ def shell_buffers(
     Raises
     ------
     ValueError
-        Shapes that do not fit together.
-
-    Notes
-    -----
-    Paper, section 7, and ``docs/architecture.md`` for the names and units of the attributes.
+        If shapes do not fit together.
     """
     corners = np.asarray(vertices, dtype=np.float64)
     if corners.ndim != 3 or corners.shape[1:] != (4, 3):
         raise ValueError(f"vertices must have shape (n, 4, 3), not {corners.shape}")
     count = len(corners)
-    values = {
-        "colour": (np.asarray(colour, dtype=np.float64), (count, 3)),
-        "transmission": (np.asarray(transmission, dtype=np.float64), (count,)),
-        "S": (np.asarray(S, dtype=np.float64), (count, 6)),
-        "normal": (np.asarray(normal, dtype=np.float64), (count, 3)),
-        "plane": (np.asarray(plane, dtype=np.float64), (count,)),
-    }
-    if light is not None:
-        values["light"] = (np.asarray(light, dtype=np.float64), (count, 4, 3))
-    if rank is not None:
-        values["rank"] = (np.asarray(rank), (count,))
-    for name, (array, shape) in values.items():
+    columns = {"colour": (3,), "transmission": (), "S": (6,), "normal": (3,), "plane": (), "light": (4, 3), "rank": ()}
+    given = dict(zip(columns, (colour, transmission, S, normal, plane, light, rank), strict=True))
+    values = {name: np.asarray(value, np.float64) for name, value in given.items() if value is not None}
+    for name, array in values.items():
+        shape = (count, *columns[name])
         if array.shape != shape:
             raise ValueError(f"{name} must have shape {shape} for {count} tetrahedra, not {array.shape}")
 
     if rank is not None:
-        order = np.argsort(values["rank"][0], kind='stable')[::-1]
+        order = np.argsort(values["rank"], kind='stable')[::-1]
         corners = corners[order]
-        values = {name: (array[order], shape) for name, (array, shape) in values.items()}
+        values = {name: array[order] for name, array in values.items()}
     spans = corners[:, 1:] - corners[:, :1]
     inverted = np.einsum("ij,ij->i", spans[:, 0], np.cross(spans[:, 1], spans[:, 2])) < 0.0
     random = _cell_noise(corners)
     corners = np.where(inverted[:, None, None], corners[:, [0, 2, 1, 3]], corners)
-    gradients, flat = barycentric_gradients(corners)
-    matrices = np.where(flat[:, None], 0.0, values["S"][0])
-    axes = values["normal"][0]
+    gradients, flat = cell_gradients(corners)
+    matrices = np.where(flat[:, None], 0.0, values["S"])
+    axes = values["normal"]
     length = np.sqrt(np.einsum("ij,ij->i", axes, axes))
     axes = np.where(length[:, None] > 0.0, axes / np.where(length > 0.0, length, 1.0)[:, None], (0.0, 0.0, 1.0))
 
@@ -193,9 +162,9 @@ def shell_buffers(
 
     baked = {}
     if light is not None:
-        given = values["light"][0]
-        given = np.where(inverted[:, None, None], given[:, [0, 2, 1, 3]], given)
-        baked = {f"tf_light{k}": per_face(given[:, k]) for k in range(4)}
+        shown = values["light"]
+        shown = np.where(inverted[:, None, None], shown[:, [0, 2, 1, 3]], shown)
+        baked = {f"tf_light{k}": per_face(shown[:, k]) for k in range(4)}
     first_vertex = np.arange(count, dtype=np.int32)[:, None, None] * 4
     first_edge = np.arange(count, dtype=np.int32)[:, None, None] * 6
     return MeshBuffers(
@@ -205,13 +174,13 @@ def shell_buffers(
         corner_edges=(_FACE_EDGES + first_edge).ravel(),
         face_offsets=np.arange(0, 12 * count + 1, 3, dtype=np.int32),
         attributes={
-            "tf_colour": per_face(values["colour"][0]),
-            "tf_transmission": per_face(values["transmission"][0]),
-            "tf_kappa": per_face(mean_extinction(matrices)),
+            "tf_colour": per_face(values["colour"]),
+            "tf_transmission": per_face(values["transmission"]),
+            "tf_kappa": per_face(directional_mean(matrices)),
             "tf_s0": per_face(matrices[:, :3]),
             "tf_s1": per_face(matrices[:, 3:]),
             "tf_normal": per_face(axes),
-            "tf_plane": per_face(values["plane"][0]),
+            "tf_plane": per_face(values["plane"]),
             "tf_random": per_face(random),
             "tf_bary": ("POINT", np.tile(_BARYCENTRIC, (count, 1))),
             "tf_g1": per_face(gradients[:, 0]),
@@ -223,17 +192,11 @@ def shell_buffers(
     )
 
 
-#: Fraction of its size by which a shell is smaller than its tetrahedron, at least and at most.
-GAP, MOST_GAP = 1e-3, 0.05
-# Steps between neighbouring numbers of single precision by which faces stand apart at least.
-_STEPS = 8.0
-
-
 def proxy_shells(flora: Flora, result: Refinement, light: BakedLight | None = None) -> MeshBuffers | None:
     """Proxies as shells: the tetrahedra themselves, filled with a cloud of their extinction, colour and orientation.
 
-    They are written back to front, which is how EEVEE blends them. Tetrahedra that hold nothing but large polygons have
-    an extinction of 0. With ``light`` shells carry the radiance of their contents, for the material of baked light.
+    They are written back to front, as EEVEE blends them. Tetrahedra with nothing but large polygons have an extinction
+    of 0. With ``light`` shells carry the radiance of their contents, for the material of baked light.
     """
     proxies = np.isin(result.decision, (Decision.PROXY, Decision.HIDDEN))
     nodes = result.nodes[proxies]
@@ -261,8 +224,8 @@ def set_apart(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Tetrahedra (n, 4, 3) a little smaller, and their S (n, 6) so much larger that they are as dark as before.
 
-    Of faces at the very same distance Cycles meets only one: where a ray leaves one shell and enters the next through a
-    face that both have, the second would be lost, and with it a good part of a crown.
+    Of faces at the same distance Cycles meets only one: where a ray leaves one shell and enters the next through a
+    common face, the second would be lost, and with it a good part of a crown.
     """
     middle = vertices.mean(axis=1, keepdims=True)
     away = vertices - middle

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tetflora_addon.emission.shells import barycentric_gradients, mean_extinction, shell_buffers
+from tetflora_addon.emission.shells import cell_gradients, directional_mean, shell_buffers
 
 
 def cells(seed: int, count: int = 20, origin: float = 0.0) -> np.ndarray:
@@ -84,7 +84,7 @@ def test_exit_distance_from_the_attributes_is_the_true_one(seed, origin):
 
 def test_gradients_are_those_of_barycentric_coordinates():
     vertices = cells(3, 50)
-    gradients, flat = barycentric_gradients(vertices)
+    gradients, flat = cell_gradients(vertices)
     spans = vertices[:, 1:] - vertices[:, :1]
     np.testing.assert_allclose(np.einsum("nki,nji->nkj", gradients, spans), np.tile(np.eye(3), (50, 1, 1)), atol=1e-9)
     assert not flat.any()
@@ -100,13 +100,13 @@ def test_flat_cells_hold_nothing():
     assert (buffers.attributes["tf_kappa"][1][:4] > 0).all()
 
 
-def test_mean_extinction():
-    np.testing.assert_allclose(mean_extinction([[4.0, 4.0, 4.0, 0.0, 0.0, 0.0]]), 2.0, rtol=1e-12)
+def test_directional_mean():
+    np.testing.assert_allclose(directional_mean([[4.0, 4.0, 4.0, 0.0, 0.0, 0.0]]), 2.0, rtol=1e-12)
     # Flakes of one orientation: the mean of |cos| over the sphere is one half, whatever the orientation.
     axes = np.random.default_rng(0).normal(size=(20, 3))
     x, y, z = (axes / np.linalg.norm(axes, axis=1)[:, None]).T
     np.testing.assert_allclose(
-        mean_extinction(np.stack([x * x, y * y, z * z, x * y, x * z, y * z], axis=1)), 0.5, rtol=0.02
+        directional_mean(np.stack([x * x, y * y, z * z, x * y, x * z, y * z], axis=1)), 0.5, rtol=0.02
     )
 
 
