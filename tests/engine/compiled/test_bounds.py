@@ -77,9 +77,9 @@ def check_sides(flora: Flora, subplants: Branches, seed: int, directions: int = 
 
 @pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
 def test_every_vertex_of_many_plants_is_inside_the_bound(species: int) -> None:
-    """As many as half a million polygons make, at most 100; `benchmarks bounds` takes a thousand of each."""
+    """As many as a quarter of a million polygons make, at most 100; `benchmarks bounds` takes a thousand of each."""
     flora = support.flora()
-    number = min(100, max(1, int(5e5 / flora.polygons[flora.first_row[species]])))
+    number = min(100, max(1, int(2.5e5 / flora.polygons[flora.first_row[species]])))
     trunk = support.trunks(flora.rows, support.plants(np.arange(number), species))
     assert outside(flora, trunk) < _FLOAT32
 
