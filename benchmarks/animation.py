@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A film at walking speed: what later frames cost, whether each is the frame alone, and whether it flickers.
+"""An animation at walking speed: what later frames cost, whether each is the frame alone, and whether it flickers.
 
 Frames are prepared as a render prepares them, by the handler that Blender calls before each; what is measured is all of
 it: reading the scene, refining, writing meshes, and what is kept.
@@ -30,11 +30,11 @@ from tetflora_addon.blender.results.output import result_collections
 from .compare import flip_map, read_picture, render
 from .report import Targets, peak_mb
 
-#: Frames that are timed: five seconds of film, in which the camera goes some seven metres.
+#: Frames that are timed: five seconds of animation, in which the camera goes some seven metres.
 FRAMES = 120
-#: Frames that are made alone, each in a process of its own, and compared with the film's.
+#: Frames that are made alone, each in a process of its own, and compared with the animation's.
 ALONE, QUICK_ALONE = 20, 3
-#: Frames next to each other whose pictures are compared, around one at which the row is refined anew.
+#: Frames next to each other whose images are compared, around one at which the row is refined anew.
 AROUND, QUICK_AROUND = 4, 1
 SAMPLES, PERCENT = 16, 50
 #: A flight over the landscape, at so many metres a second, so much higher than the landscape's own camera.
@@ -124,7 +124,7 @@ def fingerprint(scene: bpy.types.Scene) -> dict[str, list]:
 
 
 def frame_alone(frame: int) -> dict[str, list]:
-    """A frame of the row's film, made in this process as its first."""
+    """A frame of the row's animation, made in this process as its first."""
     scene = bpy.context.scene
     fly_through.build(scene, FRAMES, "row80")
     return _prepared(scene, frame)
@@ -137,7 +137,7 @@ def _prepared(scene: bpy.types.Scene, frame: int) -> dict[str, list]:
 
 
 def _film(chosen: list[int]) -> tuple[dict[int, dict[str, list]], int]:
-    """Fingerprints of chosen frames in the course of the film, and the second frame at which it was refined."""
+    """Fingerprints of chosen frames in the course of the animation, and the second frame at which it was refined."""
     scene = bpy.context.scene
     fly_through.build(scene, FRAMES, "row80")
     found, names = {}, []
@@ -172,7 +172,7 @@ def _alone(frame: int) -> dict[str, list]:
 
 
 def _flicker(changes_at: int, around: int) -> dict[str, float]:
-    """FLIP from frame to frame of the refined film, beyond that of the expanded one; all samples have the same seed."""
+    """FLIP between frames of the refined animation minus that of the expanded one; all samples have the same seed."""
     scene = bpy.context.scene
     fly_through.build(scene, FRAMES, "row80")
     scene.render.resolution_percentage = PERCENT

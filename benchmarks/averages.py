@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What compiled species foretell, against a thousand plants grown: areas, colours and orientation by order.
+"""Predictions of compiled species against a thousand grown plants: areas, colours and orientation by order.
 
-All sub-plants of one order together are foretold from their rows, and compared with the leaves and branches that really
-grow on them. Errors are relative; that of orientation is the largest entry of the difference of both moments.
+All sub-plants of one order together are predicted from their rows and compared with the leaves and branches that grow
+on them. Errors are relative; that of orientation is the largest entry of the difference of both moments.
 
 A thousand plants have a mean that chance moves, too. Beside each error therefore stands its standard error ("noise"),
 from how much groups of plants differ (ratio estimator; Cochran, "Sampling Techniques", 1977), and the excess: what the
@@ -17,17 +17,16 @@ from typing import Any
 import numpy as np
 
 from tetflora_addon.arrays import spread
-from tetflora_addon.compiled import flora as compiled
 from tetflora_addon.compiled import orientation
+from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.growth import foliage, growth
 from tetflora_addon.growth.axes import axes
 from tetflora_addon.refinement import contents
 from tetflora_addon.species import catalogue
 from tetflora_addon.subplants import pieces
-from tetflora_addon.subplants import pieces as expansion
+from tetflora_addon.subplants.pieces import chunks, open_subplants
 
-from .plants import Targets
-from .plants import plants as planted
+from .plants import Targets, plants_of
 
 SEEDS, QUICK_SEEDS = 1000, 100
 #: Polygons that are grown at a time, and leaves of each species whose orientation is looked at.
@@ -47,7 +46,7 @@ def run(quick: bool) -> dict[str, float]:
     """Measure all species."""
     figures: dict[str, float] = {}
     for name in catalogue.list_species():
-        flora = compiled.compile_species([catalogue.load_species(name)])
+        flora = compile_species([catalogue.load_species(name)])
         for kind, found in species_errors(flora, QUICK_SEEDS if quick else SEEDS).items():
             figures |= {f"{kind}_{what}_{name}": value for what, value in found.items()}
     worst = {
@@ -60,10 +59,10 @@ def run(quick: bool) -> dict[str, float]:
 
 def species_errors(flora: Any, seeds: int) -> dict[str, dict[str, float]]:
     """Largest error over the orders of each kind, its standard error, and the largest excess."""
-    trunks = growth.trunks(flora.rows, planted(flora, seeds * float(flora.polygons[flora.first_row[0]])))
+    trunks = growth.trunks(flora.rows, plants_of(flora, seeds * float(flora.polygons[flora.first_row[0]])))
     polygons = flora.polygons[trunks.row]
-    groups = list(expansion.chunks(polygons, min(AT_ONCE, polygons.sum() / GROUPS)))
-    found, told = np.zeros((2, len(groups), 8, _FIELDS))
+    groups = list(chunks(polygons, min(AT_ONCE, polygons.sum() / GROUPS)))
+    found, predicted = np.zeros((2, len(groups), 8, _FIELDS))
     leaves, looked_at = 0, 0
     for g, group in enumerate(groups):
         level, depth = trunks.take(group), 0
@@ -71,19 +70,19 @@ def species_errors(flora: Any, seeds: int) -> dict[str, dict[str, float]]:
         oriented = leaves < ORIENTED
         looked_at += oriented
         while len(level):
-            told[g, depth] = foretold(flora, level, oriented)
-            level, _, pieces, _ = expansion.open_subplants(flora, level)
+            predicted[g, depth] = prediction(flora, level, oriented)
+            level, _, pieces, _ = open_subplants(flora, level)
             found[g, depth], number = grown(flora, pieces, oriented)
             leaves += number
             depth += 1
     # What grows on an order is what its branches bear themselves and all that the orders beyond bear.
     found = np.cumsum(found[:, ::-1], axis=1)[:, ::-1]
-    held, wood = told.sum(axis=0)[:, 0] > 1e-9, told.sum(axis=0)[:, 1] > 1e-9
-    found, told, bark = found[:, held], told[:, held], (found[:, wood, 1:2], told[:, wood, 1:2])
-    area = found[..., :1], told[..., :1]
-    colour = [deviations(sums[..., 2:5], whole) for sums, whole in zip((found, told), area, strict=True)]
+    held, wood = predicted.sum(axis=0)[:, 0] > 1e-9, predicted.sum(axis=0)[:, 1] > 1e-9
+    found, predicted, bark = found[:, held], predicted[:, held], (found[:, wood, 1:2], predicted[:, wood, 1:2])
+    area = found[..., :1], predicted[..., :1]
+    colour = [deviations(sums[..., 2:5], whole) for sums, whole in zip((found, predicted), area, strict=True)]
     scale = colour[1][0].max(axis=1, keepdims=True)
-    turned = [sums[:looked_at, :, 5:] for sums in (found, told)]
+    turned = [sums[:looked_at, :, 5:] for sums in (found, predicted)]
     moment = [deviations(sums, sums[..., [0, 4, 8]].sum(axis=2, keepdims=True)) for sums in turned]
     return {
         "leaf_area": summed_up(*of_ratio(*area)),
@@ -100,9 +99,9 @@ def deviations(sums: np.ndarray, whole: np.ndarray) -> tuple[np.ndarray, np.ndar
     return ratio, (sums - ratio * whole) / np.where(total > 0, total, 1)
 
 
-def of_ratio(found: np.ndarray, told: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Relative error of what is foretold, and by how much each group moves it."""
-    ratio, each = deviations(found, told)
+def of_ratio(found: np.ndarray, predicted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Relative error of what is predicted, and by how much each group moves it."""
+    ratio, each = deviations(found, predicted)
     return ratio - 1, each
 
 
@@ -119,7 +118,7 @@ def summed_up(error: np.ndarray, each: np.ndarray) -> dict[str, float]:
     }
 
 
-def foretold(flora: Any, subplants: Any, oriented: bool) -> np.ndarray:
+def prediction(flora: Any, subplants: Any, oriented: bool) -> np.ndarray:
     """Expected sums over sub-plants."""
     expected = contents.subplant_totals(flora, subplants)
     out = np.zeros(_FIELDS)

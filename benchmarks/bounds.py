@@ -20,13 +20,13 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 from tetflora_addon.arrays import spread
 from tetflora_addon.compiled import bounds
-from tetflora_addon.compiled import flora as compiled
+from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.growth import foliage, growth
 from tetflora_addon.growth.branches import Branches
 from tetflora_addon.species import catalogue
 from tetflora_addon.subplants import pieces, sides, tubes
 
-from .plants import plants as planted
+from .plants import plants_of
 from .report import Targets
 
 SEEDS, QUICK_SEEDS = 1000, 20
@@ -50,7 +50,7 @@ def run(quick: bool) -> dict[str, float]:
     cylinders: list[float] = []
     seconds = 0.0
     for name in catalogue.list_species():
-        flora = compiled.compile_species([catalogue.load_species(name)])
+        flora = compile_species([catalogue.load_species(name)])
         begun = time.perf_counter()
         beyond += vertices_outside(flora, QUICK_SEEDS if quick else SEEDS)
         seconds += time.perf_counter() - begun
@@ -107,7 +107,7 @@ def vertices_outside(flora: Any, seeds: int) -> int:
     Plants whose spheres around leaves and around the ends of wood lie inside have none; others are looked at whole.
     """
     bodies_of = sides.bounding_bodies
-    trunks = growth.trunks(flora.rows, planted(flora, seeds * float(flora.polygons[0])))
+    trunks = growth.trunks(flora.rows, plants_of(flora, seeds * float(flora.polygons[0])))
     wide = np.maximum(1 + flora.rows["flare"], bounds.ring_stretch(flora.rows))
     out = 0
     for chunk in pieces.chunks(flora.polygons[trunks.row], AT_ONCE):
@@ -142,7 +142,7 @@ def excess(bodies: NDArray[np.float64], which: NDArray, points: NDArray[np.float
 def subplants(flora: Any, number: int, polygons: float) -> dict[int, Any]:
     """Sub-plants by order (100 for short shoots), from several plants."""
     rng = np.random.default_rng(0)
-    level = growth.trunks(flora.rows, planted(flora, 30 * float(flora.polygons[0])))
+    level = growth.trunks(flora.rows, plants_of(flora, 30 * float(flora.polygons[0])))
     kinds: dict[int, list[Any]] = {}
     while len(level):
         orders = flora.rows["order"][level.row]

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Budgets of polygons: the result fits, and the error falls as the budget grows.
 
-On the landscape seen close: refined without a limit it has more polygons than any of the budgets, and that picture is
+On the landscape seen close: refined without a limit it has more polygons than any of the budgets, and that image is
 the reference.
 """
 
@@ -40,7 +40,7 @@ def run(quick: bool) -> dict[str, float]:
     figures: dict[str, float] = {}
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
-        # Finer than any budget allows, and refined for the full size even where the picture is made smaller.
+        # Finer than any budget allows, and refined for the full size even where the image is made smaller.
         scene.tetflora.leaf_limit, scene.tetflora.facet = 0.25, 0.4
         free, seconds = timed_refine(scene, max_polygons=0)
         figures["polygons_free"] = free.polygons_meshed + free.polygons_proxy

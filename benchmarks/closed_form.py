@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shells against closed formulas, in Cycles and EEVEE: transmittance, white furnace, baked light.
 
-Pictures are of single rays through the centres of pixels, so that what differs from the formula is the shader's.
+Images are of single rays through the centres of pixels, so that what differs from the formula is the shader's.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ KINDS = ("one", "stack")
 
 
 def run(quick: bool) -> dict[str, float]:
-    """RMS differences of pictures from the formulas, worst engine and by engine; ``furnace_error`` is of means."""
+    """RMS differences of images from the formulas, worst engine and by engine; ``furnace_error`` is of means."""
     engines = {"cycles": 'CYCLES', "eevee": compat.eevee_engine()}
     figures: dict[str, float] = {}
     for name, engine in engines.items():

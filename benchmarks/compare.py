@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures compared by numbers: FLIP (Andersson et al., 2020) where plants are, and where plants are."""
+"""Images compared by numbers: FLIP (Andersson et al., 2020) where plants are, and where plants are."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 
 def read_picture(path: Path) -> NDArray[np.float32]:
-    """RGBA (height, width, 4) of an 8-bit picture as it is stored (sRGB), top row first."""
+    """RGBA (height, width, 4) of an 8-bit image as it is stored (sRGB), top row first."""
     image = bpy.data.images.load(str(path), check_existing=False)
     try:
         image.colorspace_settings.name = "Non-Color"
@@ -29,14 +29,14 @@ def read_picture(path: Path) -> NDArray[np.float32]:
 
 @dataclass(frozen=True)
 class Difference:
-    """How far a picture is from its reference.
+    """How far an image is from its reference.
 
     Attributes
     ----------
     flip : float
         Mean FLIP over the mask.
     flip_all : float
-        Mean FLIP over the whole picture.
+        Mean FLIP over the whole image.
     colour : float
         Difference of the masked mean colours (linear light), relative to the reference's mean.
     """
@@ -47,7 +47,7 @@ class Difference:
 
 
 def difference(reference: Path, test: Path, mask: NDArray[np.bool_] | None = None) -> Difference:
-    """Compare two 8-bit pictures of equal size; ``mask`` is (height, width), by default all."""
+    """Compare two 8-bit images of equal size; ``mask`` is (height, width), by default all."""
     a, b = (read_picture(p)[:, :, :3] for p in (reference, test))
     error = flip_map(a, b)
     mask = np.ones(a.shape[:2], bool) if mask is None else mask
@@ -55,13 +55,13 @@ def difference(reference: Path, test: Path, mask: NDArray[np.bool_] | None = Non
 
 
 def flip_map(reference: NDArray[np.floating], test: NDArray[np.floating]) -> NDArray[np.float32]:
-    """FLIP (height, width) of each pixel of two pictures (height, width, 3) as they are stored (sRGB)."""
+    """FLIP (height, width) of each pixel of two images (height, width, 3) as they are stored (sRGB)."""
     a, b = (np.ascontiguousarray(p[:, :, :3]) for p in (reference, test))
     return np.asarray(flip_evaluator.evaluate(a, b, "LDR", inputsRGB=True, applyMagma=False)[0]).reshape(a.shape[:2])
 
 
 def linear_light(stored: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Radiance from what an sRGB picture stores, any shape."""
+    """Radiance from what an sRGB image stores, any shape."""
     return np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4)
 
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Endurance: two hundred frames of an animation, refined for each, in memory that does not grow.
 
-The camera goes to and fro before a row of plants, so that both halves see the same; pictures are tiny, so that what is
+The camera goes to and fro before a row of plants, so that both halves see the same; images are tiny, so that what is
 measured is refinement, emission, and what Blender does with meshes that come and go. Frames share no results: each is
 refined anew.
 """

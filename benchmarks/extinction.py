@@ -5,7 +5,7 @@
 Rays are cast through the polygons of whole plants, and through tetrahedra of several sizes that are filled evenly with
 the polygons whose middle they hold. |dT| is the difference of what both let through, as a mean over the rays that meet
 a polygon or a tetrahedron with contents: the error of the mean opacity of a plant's silhouette. *before* has the
-extinction that follows from the area alone, *after* the one that is fitted (`plants.clumping`). *crown* are tetrahedra
+extinction that follows from the area alone, *after* the fitted one (`compiled.clumping`). *crown* are tetrahedra
 of a sixteenth of the plant's extent, *fine* those of three leaves, *coarse* those of a sixth of the extent, seen from
 3, 17, 37 and 64 degrees above the horizon. Neither seeds nor directions are those of the fit. With a few thousand rays,
 chance alone makes .005.
@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from tetflora_addon.compiled import clumping, rays
-from tetflora_addon.compiled import flora as compiled
+from tetflora_addon.compiled.flora import _compiled
 from tetflora_addon.growth import growth, seeds
 from tetflora_addon.refinement import contents
 from tetflora_addon.species import catalogue
@@ -51,7 +51,7 @@ def run(quick: bool) -> dict[str, float]:
     all_errors: dict[str, list[float]] = {f"{kind}_{when}": [] for kind in KINDS for when in ("before", "after")}
     taken = []
     for name in QUICK_SPECIES if quick else SPECIES:
-        flora = compiled._compiled.__wrapped__((catalogue.load_species(name),))
+        flora = _compiled.__wrapped__((catalogue.load_species(name),))
         start = time.process_time()
         _ = flora.clumping
         taken.append(time.process_time() - start)

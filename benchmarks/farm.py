@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A farm of one worker and of two: how much sooner two are done, and that they make the same pictures.
+"""A farm of one worker and of two: how much sooner two are done, and that they make the same images.
 
 ``blender FILE --command tetflora farm OUT`` writes the job, Open Job Description's own runner does the work. Each
 worker is bound to one core and installs the extension first, as on a machine of its own; two workers take turns with
@@ -124,7 +124,7 @@ def _call(command: Sequence[str], environment: dict[str, str]) -> None:
 
 
 def _pixels(path: Path) -> np.ndarray:
-    """Channels of a picture, 0 to 255."""
+    """Channels of an image, 0 to 255."""
     import bpy
 
     image = bpy.data.images.load(str(path))

@@ -8,7 +8,7 @@
     python -m benchmarks.fidelity --keep --heights 200        # beside what earlier runs left, figures of all together
     python -m benchmarks.fidelity --sheet                     # docs/images/fidelity.jpg of the last run
 
-Pictures, ``frames.json`` (written as it goes) and ``figures.json`` are left in ``out/fidelity``. Nothing is denoised.
+Images, ``frames.json`` (written as it goes) and ``figures.json`` are left in ``out/fidelity``. Nothing is denoised.
 Targets are those of the form that the extension takes by itself; figures of all forms stand beside them.
 
 Reduced, since EEVEE on a processor takes seconds for each sample of expanded plants: EEVEE is compared in one light
@@ -28,7 +28,7 @@ from devtools import session
 
 from .report import ROOT, Targets
 
-#: Left by a run: pictures and records.
+#: Left by a run: images and records.
 FOLDER = ROOT / "out" / "fidelity"
 PARTS = ("formulas", "frames", "transitions", "time")
 EEVEE_SAMPLES = 16
@@ -73,7 +73,7 @@ def run(quick: bool) -> dict[str, float]:
 
 
 def series_of(heights: tuple[int, ...], lights: tuple[str, ...], engines: tuple[str, ...]) -> tuple:
-    """Series of pictures of the full bench, of these heights, lights and engines."""
+    """Series of images of the full bench, of these heights, lights and engines."""
     from .fidelity_frames import Series
 
     series = []

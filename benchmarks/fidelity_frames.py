@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stands of plants, refined against fully expanded, picture by picture: what `fidelity` sums up.
+"""Stands of plants, refined against fully expanded, image by image: what `fidelity` sums up.
 
-A frame is one species in one picture. Its pixels are those of its columns in which the expanded plants cover more than
+A frame is one species in one image. Its pixels are those of its columns in which the expanded plants cover more than
 a twentieth. Coverage does not depend on light, so it is measured once for each height, engine and form.
 """
 
@@ -36,12 +36,12 @@ EXPANDED, AGAIN = "EXPANDED", "AGAIN"
 
 @dataclass(frozen=True)
 class Series:
-    """Pictures of one stand in one engine.
+    """Images of one stand in one engine.
 
     Attributes
     ----------
     pixels : int
-        Height of the plants in the picture.
+        Height of the plants in the image.
     each : int
         Plants of each species.
     engine : str
@@ -60,7 +60,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Frame:
-    """One species in one picture, proxies in one form against plants fully expanded.
+    """One species in one image, proxies in one form against plants fully expanded.
 
     Attributes
     ----------
@@ -74,12 +74,12 @@ class Frame:
     colour, brightness : float
         Difference of the mean colours relative to the expanded plants' mean, and of luminance with its sign.
     gap, gap_expanded : float
-        FLIP between this picture and that of the other engine, and between those of the expanded plants; NaN where
+        FLIP between this image and that of the other engine, and between those of the expanded plants; NaN where
         the other engine has none.
     seconds, expanded_seconds : float
-        Rendering of the whole picture, synchronisation included.
+        Rendering of the whole image, synchronisation included.
     memory_mb, expanded_mb : float
-        Megabytes of the meshes of the whole picture (`Statistics.memory_mb`).
+        Megabytes of the meshes of the whole image (`Statistics.memory_mb`).
     """
 
     pixels: int
@@ -108,7 +108,7 @@ def forms() -> tuple[tuple[str, ...], str]:
 
 
 def picture_path(folder: Path, pixels: int, each: int, light: str, engine: str, form: str) -> Path:
-    """Where `frames` leaves a picture."""
+    """Where `frames` leaves an image."""
     return folder / f"{pixels}px-{each}-{light}-{engine}-{form.lower()}.png"
 
 
@@ -129,7 +129,7 @@ def frames(
         Forms of proxies.
     species : tuple of str
     folder : Path
-        Pictures are left here.
+        Images are left here.
     brief : tuple of str
         Forms that are rendered in the `BRIEF_LIGHTS` only, from `BRIEF` pixels on.
     """
@@ -152,7 +152,7 @@ class _Stand:
         self.seconds: dict[tuple[str, str, str], float] = {}
 
     def compare(self, series: list[Series], chosen: tuple[str, ...], brief: tuple[str, ...]) -> Iterator[Frame]:
-        """All frames of the stand; the expanded plants are there only until their pictures are."""
+        """All frames of the stand; the expanded plants are there only until their images are."""
         statistics, _ = timed_refine(self.scene, expand_everything=True)
         self.expanded_mb, self.memory_mb = statistics.memory_mb, {}
         covered = coverage(self.scene, self.folder / "coverage.png", COVERAGE_SAMPLES)

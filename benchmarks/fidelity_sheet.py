@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Contact sheet of the fidelity bench: plants fully expanded beside each form of proxies, by height, light and engine.
 
-``python -m benchmarks.fidelity --sheet`` makes it from the pictures that the last run left.
+``python -m benchmarks.fidelity --sheet`` makes it from the images that the last run left.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-#: Width of a picture on the sheet, pixels; small pictures are enlarged by a whole number without smoothing.
+#: Width of an image on the sheet, pixels; small images are enlarged by a whole number without smoothing.
 WIDTH = 340
 #: Which rows there are, of those that were rendered: height, light and engine.
 ROWS = (
@@ -35,7 +35,7 @@ def make(folder: Path, target: Path) -> None:
     Parameters
     ----------
     folder : Path
-        Of ``frames.json`` and the pictures that it names.
+        Of ``frames.json`` and the images that it names.
     target : Path
 
     Raises
@@ -88,7 +88,7 @@ def make(folder: Path, target: Path) -> None:
 
 
 def _scaled(picture: object) -> object:
-    """A picture of about `WIDTH`: every pixel as a square where it is enlarged, means where it is made smaller."""
+    """An image of about `WIDTH`: every pixel as a square where it is enlarged, means where it is made smaller."""
     from PIL import Image
 
     factor = WIDTH // picture.width

@@ -25,8 +25,8 @@ def sums(frames: Sequence[Frame], default: str) -> dict[str, float]:
     Returns
     -------
     dict of str to float
-        ``engine_gap`` is of the worst picture: FLIP between both engines of proxies less that of the expanded plants,
-        mean over its species. It is missing where no picture was rendered in both.
+        ``engine_gap`` is of the worst image: FLIP between both engines of proxies less that of the expanded plants,
+        mean over its species. It is missing where no image was rendered in both.
     """
     figures = _sums([f for f in frames if f.form == default], "")
     for form, engine in dict.fromkeys((f.form, f.engine) for f in frames):
@@ -54,7 +54,7 @@ def _sums(frames: Sequence[Frame], suffix: str) -> dict[str, float]:
 
 
 def _gaps(frames: Sequence[Frame]) -> list[float]:
-    """By picture that is there in both engines."""
+    """By image that is there in both engines."""
     pictures: dict[tuple[int, int, str], list[float]] = {}
     for f in frames:
         if not isnan(f.gap):

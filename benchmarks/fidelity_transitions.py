@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What changes in the picture when a limit changes by a tenth: a row of plants that recedes.
+"""What changes in the image when a limit changes by a tenth: a row of plants that recedes.
 
 ``transition_flip`` is of the cutoff, ``transition_flip_leaf`` of the leaf limit, which turns real leaves into facets
 wherever they are near it. The heights of a species' plants in the row differ by two fifths; four steps of a tenth take
@@ -30,7 +30,7 @@ _SQUARE = 16
 def run(folder: Path, quick: bool) -> dict[str, float]:
     """FLIP between limits that differ by a tenth, same seed: of the worst step, and of its worst square.
 
-    ``transition_noise`` is what other seeds do to the first picture.
+    ``transition_noise`` is what other seeds do to the first image.
     """
     scene = bpy.context.scene
     stands.receding(scene, *(QUICK_SIZES if quick else SIZES), "side")

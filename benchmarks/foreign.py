@@ -166,7 +166,7 @@ def _material(name: str, colour: tuple[float, float, float]) -> bpy.types.Materi
 
 
 def _area(tree: bpy.types.Object) -> float:
-    """Area of a tree in the world, m², worked out here alone."""
+    """Area of a tree in the world, m², computed here alone."""
     mesh = tree.data
     positions, verts = np.zeros((len(mesh.vertices), 3), np.float32), np.zeros((len(mesh.polygons), 3), np.int32)
     mesh.vertices.foreach_get("co", positions.ravel())

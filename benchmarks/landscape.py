@@ -3,7 +3,7 @@
 """The paper's landscape of 8,636 plants: refined whole, and a tenth of it against its expansion.
 
 Fully expanded it does not fit into the memory of a small machine. Seconds and megabytes of expanding it are those of a
-tenth of the plants, on a tenth of the land, times ten; pictures are compared there.
+tenth of the plants, on a tenth of the land, times ten; images are compared there.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .report import Targets, peak_mb
 from .row80 import timed_refine, timed_render
 
 SAMPLES = 4  # a pixel, as the issue of this benchmark asks for
-COMPARED, QUICK_COMPARED = 64, 16  # samples of the pictures that are compared
+COMPARED, QUICK_COMPARED = 64, 16  # samples of the images that are compared
 SHARE = 10
 
 TARGETS: Targets = {

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What bark costs in Cycles where a trunk fills the picture, over a plain material of the same colour.
+"""What bark costs in Cycles where a trunk fills the image, over a plain material of the same colour.
 
 Times are those of the processor, of all threads, which other programs disturb less than they do the clock. Each bark
 is rendered next to the plain material, and the least time of each counts.
@@ -41,7 +41,7 @@ def run(quick: bool) -> dict[str, float]:
 
 
 def _trunk_scene(scene: bpy.types.Scene) -> bpy.types.Object:
-    """A trunk across the whole picture, under a sun and an even sky."""
+    """A trunk across the whole image, under a sun and an even sky."""
     bpy.ops.mesh.primitive_cylinder_add(vertices=64, radius=RADIUS, depth=LENGTH, end_fill_type='NOTHING')
     trunk = bpy.context.object
     mesh = trunk.data

@@ -13,16 +13,15 @@ import time
 import tracemalloc
 from collections.abc import Callable
 from statistics import median
-from types import ModuleType
 from typing import Any
 
 import bpy
 import numpy as np
 
 from tetflora_addon.blender.results import meshes
-from tetflora_addon.compiled import flora as compiled
-from tetflora_addon.emission import plants as emission
-from tetflora_addon.growth import seeds
+from tetflora_addon.compiled.flora import _compiled
+from tetflora_addon.emission.plants import BLOCK_POLYGONS, expanded_blocks
+from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.species import catalogue
 
 from .report import Targets
@@ -30,7 +29,7 @@ from .report import Targets
 #: Polygons of each species that are made to measure speed.
 POLYGONS, QUICK_POLYGONS = 600_000, 200_000
 REPEATS, QUICK_REPEATS = 5, 2
-#: Nobody plants more of a species in one go; keeps grass and flowers from being all seeds.
+#: Maximum number of plants of a species: keeps grass and flowers from being all seeds.
 MOST_PLANTS = 20_000
 
 TARGETS: Targets = {
@@ -41,12 +40,12 @@ TARGETS: Targets = {
 QUICK_TARGETS: Targets = TARGETS
 
 
-def plants(flora: Any, polygons: float) -> Any:
+def plants_of(flora: Any, polygons: float) -> Any:
     """Upright plants of a flora's only species that have about a number of polygons together, all different."""
     count = int(np.clip(round(polygons / flora.polygons[0]), 1, MOST_PLANTS))
     side = int(np.ceil(np.sqrt(count)))
     index = np.arange(count)
-    return seeds.Seeds(
+    return Seeds(
         (flora.species[0].identifier,),
         np.zeros(count, np.int32),
         index.astype(np.int64),
@@ -56,10 +55,10 @@ def plants(flora: Any, polygons: float) -> Any:
     )
 
 
-def made(emission: ModuleType, meshes: ModuleType, flora: Any, seeds: Any) -> list[Any]:
+def made(flora: Any, seeds: Any) -> list[Any]:
     """Write all plants as meshes, as the job does; returns the buffers, whose meshes are still there."""
     written = []
-    for block in emission.expanded_blocks(flora, seeds):
+    for block in expanded_blocks(flora, seeds):
         meshes.write_mesh("measured", block.buffers)
         written.append(block.buffers)
     return written
@@ -97,15 +96,15 @@ def arrays(buffers: Any) -> list[np.ndarray]:
     return [buffers.positions, *topology, *(values for _, values in buffers.attributes.values())]
 
 
-def peak_over_mesh(emission: ModuleType, meshes: ModuleType, flora: Any) -> float:
+def peak_over_mesh(flora: Any) -> float:
     """Largest memory while about one block is made and written, over the bytes of its meshes."""
-    seeds = plants(flora, emission.BLOCK_POLYGONS)
+    seeds = plants_of(flora, BLOCK_POLYGONS)
     written = peak = 0
     tracemalloc.start()
     try:
         before = tracemalloc.get_traced_memory()[0]
         tracemalloc.reset_peak()
-        for block in emission.expanded_blocks(flora, seeds):
+        for block in expanded_blocks(flora, seeds):
             peak = max(peak, written + tracemalloc.get_traced_memory()[1] - before)
             tracemalloc.reset_peak()
             meshes.write_mesh("measured", block.buffers)
@@ -121,7 +120,7 @@ def peak_over_mesh(emission: ModuleType, meshes: ModuleType, flora: Any) -> floa
 
 def run(quick: bool) -> dict[str, float]:
     """Measure all species; see the table in ``docs/results.md`` for what the figures mean."""
-    compile_species = compiled._compiled.__wrapped__  # never from the cache
+    compile_species = _compiled.__wrapped__  # never from the cache
     repeats = QUICK_REPEATS if quick else REPEATS
     speed, memory, compiling, sampling, copying = {}, {}, {}, {}, {}
     triangles_in_all = bytes_in_all = 0
@@ -130,17 +129,17 @@ def run(quick: bool) -> dict[str, float]:
         flora = compile_species(species)
         compiling[name] = 1e3 * seconds(lambda s=species: compile_species(s), repeats)
         sampling[name] = 1e3 * seconds(lambda s=species: sampled(compile_species(s)), repeats) - compiling[name]
-        seeds = plants(flora, QUICK_POLYGONS if quick else POLYGONS)
-        buffers = made(emission, meshes, flora, seeds)
+        seeds = plants_of(flora, QUICK_POLYGONS if quick else POLYGONS)
+        buffers = made(flora, seeds)
         removed()
         triangles = sum(len(b.corner_verts) - 2 * b.polygons for b in buffers)
         triangles_in_all += triangles
         bytes_in_all += sum(b.nbytes for b in buffers)
         plain = seconds(lambda b=buffers: copied(b), repeats)
         del buffers
-        taken = seconds(lambda f=flora, s=seeds: made(emission, meshes, f, s), repeats, removed)
+        taken = seconds(lambda f=flora, s=seeds: made(f, s), repeats, removed)
         speed[name], copying[name] = triangles / taken / 1e6, taken / plain
-        memory[name] = peak_over_mesh(emission, meshes, flora)
+        memory[name] = peak_over_mesh(flora)
     return {
         "mtri_per_s_median": median(speed.values()),
         "mtri_per_s_min": min(speed.values()),

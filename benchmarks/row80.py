@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The paper's row of eighty trees: refined against fully expanded, in time, memory and picture."""
+"""The paper's row of eighty trees: refined against fully expanded, in time, memory and image."""
 
 from __future__ import annotations
 

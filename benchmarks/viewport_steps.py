@@ -24,7 +24,7 @@ SPECIES = ("birch", "conifer", "bush", "oak")
 def steps(ui):
     """See devtools/window_driver.py."""
     session.start()
-    from tetflora_addon.blender.viewport import state as preview_state
+    from tetflora_addon.blender.viewport import state
 
     wanted = json.loads((ui.out_dir / "wanted.json").read_text(encoding="utf-8"))
     scene = bpy.context.scene
@@ -50,10 +50,10 @@ def steps(ui):
         obj.tetflora.is_plant, obj.tetflora.species, obj.tetflora.seed = True, SPECIES[i % len(SPECIES)], i
     begin = time.perf_counter()
     scene.tetflora.preview.plants = 'LIGHT'
-    yield from ui.until(lambda: preview_state.of(scene).shapes is not None, 120, "plants")
+    yield from ui.until(lambda: state.of(scene).shapes is not None, 120, "plants")
     ui.values["plants_s"] = time.perf_counter() - begin
-    ui.values["plants"] = preview_state.find(scene).shapes.plants
-    ui.values["reading_s"] = preview_state.find(scene).seconds
+    ui.values["plants"] = state.find(scene).shapes.plants
+    ui.values["reading_s"] = state.find(scene).seconds
     yield 1.0
     yield from measure(ui, "both", wanted["redraws"])
     space.show_object_viewport_empty = False
@@ -61,10 +61,10 @@ def steps(ui):
     yield from measure(ui, "plants_alone", wanted["redraws"])
     yield from ui.picture("light")
     scene.tetflora.preview.plants = 'BOUNDS'
-    yield from ui.until(lambda: preview_state.of(scene).shapes.indices.shape[1] == 2, 120, "bounds")
+    yield from ui.until(lambda: state.of(scene).shapes.indices.shape[1] == 2, 120, "bounds")
     yield 1.0
     yield from measure(ui, "bounds", wanted["redraws"])
-    yield from levels(ui, scene, preview_state, wanted["redraws"])
+    yield from levels(ui, scene, state, wanted["redraws"])
     with ui.override():
         bpy.ops.screen.back_to_previous()
     yield 1.0

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes the rendered pictures of the documentation anew: ``python -m examples.docs_images`` (``make docs-images``).
+"""Makes the rendered images of the documentation anew: ``python -m examples.docs_images`` (``make docs-images``).
 
 Pictures of the window come from `devtools.window_pictures`, which needs a full Blender.
 """
@@ -21,12 +21,12 @@ IMAGES = Path(__file__).resolve().parent.parent / "docs" / "images"
 
 
 def store(source: Path, target: Path) -> None:
-    """Store a picture as a JPEG, without what Blender writes into it, such as the path of the file."""
+    """Store an image as a JPEG, without what Blender writes into it, such as the path of the file."""
     save_jpeg(Image.open(source).convert("RGB"), target)
 
 
 def main() -> int:
-    """Render all; exit code 1 if a picture is larger than the repository wants."""
+    """Render all; exit code 1 if an image is larger than the repository wants."""
     session.start()
     from .demo import run
     from .landscape import render_landscape

@@ -29,7 +29,7 @@ _BEGIN, _ASIDE = 60.0, 60.0
 def build(scene: bpy.types.Scene, frames: int = FRAMES, of: str = "row80") -> None:
     """Fill an empty scene with plants, and let its camera walk past them from frame 1 on.
 
-    The first frame of the row is the row's still picture. Every frame has a key, with straight lines between.
+    The first frame of the row is the row's still image. Every frame has a key, with straight lines between.
 
     Parameters
     ----------

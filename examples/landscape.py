@@ -49,7 +49,7 @@ def build(scene: bpy.types.Scene, plants: int = PLANTS, pixels: int = 512) -> No
     plants : int
         Number of plants.
     pixels : int
-        Sides of the picture.
+        Sides of the image.
     """
     heights, spacing = elevation()
     side = _ACROSS * np.sqrt(plants / PLANTS)

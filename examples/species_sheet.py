@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of the catalogue (the paper's figure 4), and of one plant of which order after order is opened."""
+"""Images of the catalogue (the paper's figure 4), and of one plant of which order after order is opened."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tetflora_addon.proxies import microsurfaces
 from tetflora_addon.refinement.statistics import at_once
 from tetflora_addon.species import catalogue
 from tetflora_addon.subplants import leaf_meshes, tubes
-from tetflora_addon.subplants import pieces as expansion
+from tetflora_addon.subplants.pieces import open_subplants
 
 from .studio import render_cells, save_sheet
 
@@ -63,7 +63,7 @@ def opened_cell(identifier: str, orders: int) -> Callable[[], tuple[np.ndarray, 
         closed = growth.trunks(flora.rows, single)
         parts = []
         for _ in range(orders):
-            closed, _, pieces, _ = expansion.open_subplants(flora, closed)
+            closed, _, pieces, _ = open_subplants(flora, closed)
             parts.append(("bark", 0, tubes.tube_buffers(flora, pieces)))
             parts += [("leaf", leaf.form, leaf.buffers) for leaf in leaf_meshes.leaf_meshes(flora, pieces, 0)]
         points = []

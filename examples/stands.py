@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Plants of several species by their height in pixels, under one of four lights: side by side, in rows, as a forest.
 
-Proxies are judged by such pictures. Side by side, each species has its own columns of the picture.
+Proxies are judged by such images. Side by side, each species has its own columns of the image.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 
 from tetflora_addon.blender import compat
-from tetflora_addon.compiled import flora as compiled
+from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.emission import plants
 from tetflora_addon.growth import seeds
 from tetflora_addon.species import catalogue
@@ -39,7 +39,7 @@ class Stand:
     ----------
     scene : bpy.types.Scene
     columns : dict of str to slice
-        Columns of the picture that hold a species.
+        Columns of the image that hold a species.
     """
 
     scene: bpy.types.Scene
@@ -53,7 +53,7 @@ def build(scene: bpy.types.Scene, pixels: int, light: str, each: int, species: t
     ----------
     scene : bpy.types.Scene
     pixels : int
-        Height of every plant in the picture.
+        Height of every plant in the image.
     light : str
         One of `LIGHTS`.
     each : int
@@ -81,7 +81,7 @@ def receding(scene: bpy.types.Scene, largest: int, smallest: int, light: str) ->
     ----------
     scene : bpy.types.Scene
     largest, smallest : int
-        Heights of the first and of the last plant in the picture, pixels.
+        Heights of the first and of the last plant in the image, pixels.
     light : str
         One of `LIGHTS`.
     """
@@ -114,7 +114,7 @@ def forest(scene: bpy.types.Scene, count: int, light: str, columns: int = 512) -
     light : str
         One of `LIGHTS`.
     columns : int
-        Width of the picture, pixels.
+        Width of the image, pixels.
     """
     focal = columns / 2 / tan(_FIELD_OF_VIEW / 2)
     near, far = focal * HEIGHT / 40.0, focal * HEIGHT / 12.0
@@ -145,7 +145,7 @@ def _add_plant(
 
 def _height(identifier: str) -> float:
     """Height of a plant of a species, metres."""
-    flora = compiled.compile_species([catalogue.load_species(identifier)])
+    flora = compile_species([catalogue.load_species(identifier)])
     one = seeds.Seeds(
         (identifier,), np.zeros(1, np.int32), np.zeros(1, np.int64), np.zeros((1, 3)), np.eye(3)[None], np.ones(1)
     )
@@ -187,7 +187,7 @@ def set_light(scene: bpy.types.Scene, light: str) -> None:
 
 
 def _add_camera(scene: bpy.types.Scene, pixels: int, width: float) -> None:
-    """All plants fill the picture's width; the ground before and behind them is seen as well."""
+    """All plants fill the image's width; the ground before and behind them is seen as well."""
     distance, scale = width / 2 / tan(_FIELD_OF_VIEW / 2), pixels / HEIGHT
     _aim(scene, (round(width * scale), round(1.6 * HEIGHT * scale)), _EYE, distance)
     scene.camera.location.y = -distance
@@ -196,7 +196,7 @@ def _add_camera(scene: bpy.types.Scene, pixels: int, width: float) -> None:
 
 
 def _aim(scene: bpy.types.Scene, size: tuple[int, int], height: float, distance: float) -> None:
-    """A level camera over the origin that looks along +y, for a picture of a size in pixels."""
+    """A level camera over the origin that looks along +y, for an image of a size in pixels."""
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.data.angle, camera.data.clip_end = _FIELD_OF_VIEW, 10.0 * distance + 1000.0
     camera.location = (0.0, 0.0, height)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A light studio for pictures of single plants, and contact sheets of such pictures."""
+"""A light studio for images of single plants, and contact sheets of such images."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def add_studio(points: np.ndarray, title: str, aspect: float) -> None:
         Of the plant that stands at the origin, metres.
     title : str
     aspect : float
-        Width of the picture over its height.
+        Width of the image over its height.
     """
     scene = bpy.context.scene
     # A few twigs that reach far out must not make the rest small.
@@ -94,14 +94,14 @@ def add_studio(points: np.ndarray, title: str, aspect: float) -> None:
 def render_cells(
     cells: Sequence[Callable[[], tuple[np.ndarray, str]]], width: int, height: int, samples: int
 ) -> list[np.ndarray]:
-    """Render pictures of single plants.
+    """Render images of single plants.
 
     Parameters
     ----------
     cells : sequence of callable
         Each puts one plant at the origin of an empty scene and returns its points (n, 3) and a title.
     width, height : int
-        Pixels of each picture.
+        Pixels of each image.
     samples : int
 
     Returns
@@ -131,7 +131,7 @@ def render_cells(
 
 
 def save_sheet(pictures: Sequence[np.ndarray], columns: int, path: Path, quality: int = 88) -> None:
-    """Store pictures of one size side by side, in rows from the top, as a JPEG."""
+    """Store images of one size side by side, in rows from the top, as a JPEG."""
     height, width = pictures[0].shape[:2]
     rows = math.ceil(len(pictures) / columns)
     sheet = np.ones((rows * height, columns * width, 4), np.float32) * pictures[0][-1, 0]

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of the catalogue's species for menus: ``python -m examples.thumbnails [IDENTIFIER ...]``.
+"""Images of the catalogue's species for menus: ``python -m examples.thumbnails [IDENTIFIER ...]``.
 
 One plant of each species in daylight, rendered by Cycles in front of a light grey, 128 × 128 pixels, into
-``tetflora_addon/catalogue/thumbnails``. A picture is stored with as many colours as fit into 30 kB.
+``tetflora_addon/catalogue/thumbnails``. An image is stored with as many colours as fit into 30 kB.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def render_thumbnail(identifier: str, path: Path) -> None:
 
 
 def _shrink(source: Path, target: Path) -> None:
-    """Store a picture in front of the backdrop, with fewer steps of colour until it is small enough."""
+    """Store an image in front of the backdrop, with fewer steps of colour until it is small enough."""
     import bpy
     import numpy as np
 
@@ -97,7 +97,7 @@ def _shrink(source: Path, target: Path) -> None:
 
 
 def main(wanted: list[str]) -> int:
-    """Make the pictures that are asked for, or all; exit code 1 if one is too large."""
+    """Make the images that are asked for, or all; exit code 1 if one is too large."""
     session.start()
     from tetflora_addon.species import catalogue
 

@@ -3,8 +3,8 @@
 """Makes the paper's figures and tables: ``python -m examples.paper [FIGURE ...]`` (``make results`` makes all).
 
 Without names it makes what this commit has not made yet, so that it goes on where it was stopped. Each figure is made
-in a process of its own. Pictures go to docs/images, tables into docs/results.md, records, single pictures and the
-frames of the film to out/paper.
+in a process of its own. Images go to docs/images, tables into docs/results.md, records, single images and the
+frames of the animation to out/paper.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def make(name: str) -> None:
 
 
 def is_made(name: str) -> bool:
-    """Whether this commit has made a figure; pictures that it wrote into the repository do not count as a change."""
+    """Whether this commit has made a figure; images that it wrote into the repository do not count as a change."""
     return _record(name).exists() and json.loads(_record(name).read_text())["commit"].rstrip("+") == _commit()
 
 

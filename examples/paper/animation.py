@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The animation (section 8.2): a film of a walk past the row of eighty, and what a frame costs after the first.
+"""The animation (section 8.2): a walk past the row of eighty, and the cost of a frame after the first.
 
-Every fourth frame of a walk of four seconds is filmed, and shown twice as fast. It is rendered as any film is: plants
-are refined before a frame if what those before it left does not serve it as well (*Share Between Frames*). How many
+Every fourth frame of a walk of four seconds is rendered, and shown twice as fast. As in any animation, plants are
+refined before a frame if the results of the frames before it do not serve it as well (*Share Between Frames*). How many
 tetrahedra a frame divides that the frame before did not is counted from each frame of the walk to the next, with space
 divided alike in all of them (*Anchored*).
 """
@@ -26,16 +26,16 @@ from .pictures import save_sheet
 from .scenes import choose_cycles
 
 FRAMES, EVERY, SMALL_FRAMES = 96, 4, 5
-RATE = 12  # of the film
+RATE = 12  # of the animation
 SIZE, SMALL_SIZE = (480, 270), (32, 18)
 #: Frames between which divisions are counted.
 COUNTED, SMALL_COUNTED = 9, 2
-#: Pictures of the contact sheet.
+#: Images of the contact sheet.
 SHOWN = 8
 
 
 def make(out: Path, images: Path, small: bool) -> dict[str, float]:
-    """Make ``paper-film.mp4`` and its contact sheet ``paper-film.jpg``; returns seconds of frames and divisions."""
+    """Make ``paper-animation.mp4`` and its contact sheet, ``.jpg``; returns seconds of frames and divisions."""
     scene = _walk(SMALL_FRAMES if small else FRAMES, small)
     scene.tetflora.refine_at_render = True
     scene.frame_step = EVERY
@@ -132,7 +132,7 @@ def _divided(scene: bpy.types.Scene) -> set[tuple[int, ...]]:
 
 
 def _walk(frames: int, small: bool) -> bpy.types.Scene:
-    """A walk past the row in an empty file, at the size of the film."""
+    """A walk past the row in an empty file, at the size of the animation."""
     session.clean_file()
     scene = bpy.context.scene
     fly_through.build(scene, frames=frames)
@@ -142,7 +142,7 @@ def _walk(frames: int, small: bool) -> bpy.types.Scene:
 
 
 def save_film(pictures: list[Path], rate: int, path: Path) -> None:
-    """Store pictures of one size as an MP4 (H.264), by Blender's sequencer."""
+    """Store images of one size as an MP4 (H.264), by Blender's sequencer."""
     scene = bpy.data.scenes.new("Film")
     first = bpy.data.images.load(str(pictures[0]))
     render = scene.render
@@ -154,7 +154,7 @@ def save_film(pictures: list[Path], rate: int, path: Path) -> None:
     for picture in pictures[1:]:
         strip.elements.append(picture.name)
     scene.frame_start, scene.frame_end = 1, len(pictures)
-    scene.view_settings.view_transform = 'Standard'  # pictures are what they should look like
+    scene.view_settings.view_transform = 'Standard'  # images are what they should look like
     render.fps, render.filepath, render.use_file_extension = rate, str(path), False
     set_format(render.image_settings, 'FFMPEG')
     render.ffmpeg.format, render.ffmpeg.codec = 'MPEG4', 'H264'

@@ -3,8 +3,8 @@
 """Figures 6 and 7: the row of eighty with its polygons stored, and with all polygons deferred to the render.
 
 Stored: Refine makes meshes, which stay in the scene and are lit by the renderer. Deferred: the file holds nothing but
-seeds; polygons are there while the picture is rendered, and the light of what is drawn as an approximation comes from
-the shadow pass over tetrahedra, as in the paper (section 8.3). Two more pictures tell polygons from what stands for the
+seeds; polygons are there while the image is rendered, and the light of what is drawn as an approximation comes from
+the shadow pass over tetrahedra, as in the paper (section 8.3). Two more images tell polygons from what stands for the
 rest, and the sheet shows all four.
 """
 

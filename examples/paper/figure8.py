@@ -18,7 +18,7 @@ from .pictures import save_sheet
 from .scenes import refined, rendered, row
 from .wires import draw_wires
 
-#: Passes after which a picture is made; 0 is the end.
+#: Passes after which an image is made; 0 is the end.
 PASSES, SMALL_PASSES = (2, 3, 4, 5, 6, 7, 8, 0), (4, 0)
 #: A ray goes through many tetrahedra, each of them a surface to the renderer.
 _THROUGH = 128

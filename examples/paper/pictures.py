@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of the documentation: JPEGs of at most half a megabyte, single or side by side with a line of text each."""
+"""Images of the documentation: JPEGs of at most half a megabyte, single or side by side with a line of text each."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _LINE, _TEXT, _PAPER, _GAP = 20, (30, 30, 30), (250, 250, 250), 4
 
 
 def save_jpeg(picture: Image.Image, path: Path) -> None:
-    """Store a picture as well as `LARGEST` bytes allow."""
+    """Store an image as well as `LARGEST` bytes allow."""
     for quality in (92, 88, 84, 78, 70, 60):
         picture.save(path, quality=quality, subsampling=0 if quality > 85 else 2)
         if path.stat().st_size <= LARGEST:
@@ -23,16 +23,16 @@ def save_jpeg(picture: Image.Image, path: Path) -> None:
 
 
 def save_sheet(cells: Sequence[tuple[Path, str]], columns: int, path: Path, width: int | None = None) -> None:
-    """Store pictures of one size side by side, row by row, as a JPEG.
+    """Store images of one size side by side, row by row, as a JPEG.
 
     Parameters
     ----------
     cells : sequence of (Path, str)
-        Pictures, and what stands above each.
+        Images, and what stands above each.
     columns : int
     path : Path
     width : int, optional
-        Pixels that each picture is made as wide as.
+        Pixels that each image is made as wide as.
     """
     pictures = [Image.open(source).convert("RGB") for source, _ in cells]
     if width is not None:

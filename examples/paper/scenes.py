@@ -15,7 +15,7 @@ from tetflora_addon.blender.job import refine
 
 from .. import row80
 
-#: Of the row, its picture, and one of a test.
+#: Of the row, its image, and one of a test.
 SIZE, SMALL_SIZE = (800, 450), (64, 36)
 SMALL_ROW = 8
 
@@ -45,7 +45,7 @@ def choose_cycles(scene: bpy.types.Scene, samples: int) -> None:
 
 
 def rendered(scene: bpy.types.Scene, path: Path, samples: int) -> float:
-    """Render a picture, see `choose_cycles`; returns seconds."""
+    """Render an image, see `choose_cycles`; returns seconds."""
     choose_cycles(scene, samples)
     scene.render.filepath = str(path)
     start = time.perf_counter()
@@ -54,7 +54,7 @@ def rendered(scene: bpy.types.Scene, path: Path, samples: int) -> float:
 
 
 def told_figures(statistics: object) -> dict[str, float]:
-    """What the paper tells about a picture (sections 8.1 and 8.3), from the statistics of its refinement."""
+    """What the paper tells about an image (sections 8.1 and 8.3), from the statistics of its refinement."""
     return {
         "plants": statistics.plants,
         "polygons_full": statistics.polygons_full,

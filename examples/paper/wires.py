@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Edges of tetrahedra over a picture, by what was decided about them, in the colours of the top view."""
+"""Edges of tetrahedra over an image, by what was decided about them, in the colours of the top view."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from tetflora_addon.refinement import decisions
 
 #: Display colours, opacity included; what is rarer comes later, and on top.
 COLOURS = {"HIDDEN": (110, 115, 130, 110), "PROXY": (245, 140, 25, 150), "EXPLICIT": (20, 80, 215, 70)}
-#: Tetrahedra that are smaller, in pixels, would hide the picture under their lines.
+#: Tetrahedra that are smaller, in pixels, would hide the image under their lines.
 LEAST = 10.0
 _EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 _FINER = 3  # times as many pixels while lines are drawn
 
 
 def draw_wires(picture: Path, camera: object, refinement: object) -> None:
-    """Draw the edges of terminal tetrahedra that hold something over a picture of a perspective camera.
+    """Draw the edges of terminal tetrahedra that hold something over an image of a perspective camera.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def draw_wires(picture: Path, camera: object, refinement: object) -> None:
 
 
 def projected_edges(vertices: NDArray[np.float64], camera: object) -> NDArray[np.float64]:
-    """Edges of tetrahedra (n, 4, 3) that are large enough, from the left and from the top in shares of the picture.
+    """Edges of tetrahedra (n, 4, 3) that are large enough, from the left and from the top in shares of the image.
 
     Returns
     -------

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Microspheres stand for facets: one each, in the same place, covering as much of the picture, in the same colours."""
+"""Microspheres stand for facets: one each, in the same place, covering as much of the image, in the same colours."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.engine import support
 from tests.engine.emission.test_emission import scene
 from tetflora_addon.arrays import unit
 from tetflora_addon.camera.camera import Camera
-from tetflora_addon.emission import facets as facet_emission
+from tetflora_addon.emission import facets as subject
 from tetflora_addon.emission.facets import LEAST_COVER, facing, spheres
 from tetflora_addon.emission.forms import Refined, facet_blocks, sphere_blocks
 from tetflora_addon.proxies.microsurfaces import Facets, facet_mesh
@@ -78,8 +78,8 @@ def test_a_refinement_has_a_sphere_for_each_facet(monkeypatch: pytest.MonkeyPatc
     facets = list(facet_blocks(Refined(flora, result, view, 0.33)))
     area = sum(support.face_areas(block).sum() for block in facets)
     whole = sum(block.polygons for block in facets)
-    monkeypatch.setattr(facet_emission, "FACETS_AT_ONCE", 300)
-    monkeypatch.setattr(facet_emission, "BLOCK_POLYGONS", 700)
+    monkeypatch.setattr(subject, "FACETS_AT_ONCE", 300)
+    monkeypatch.setattr(subject, "BLOCK_POLYGONS", 700)
     blocks = list(sphere_blocks(Refined(flora, result, view, 0.33)))
     assert sum(block.polygons for block in blocks) == whole
     begun = [a for a, b in pairwise(blocks) if a.species == b.species]

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tests.engine import support
 from tests.engine.refinement.test_loop import run
 from tetflora_addon.buffers import concatenate_buffers
-from tetflora_addon.emission import facets as facet_emission
+from tetflora_addon.emission import facets as subject
 from tetflora_addon.emission.facets import facet_parts
 from tetflora_addon.emission.plants import BAND, Transition, explicit_blocks
 from tetflora_addon.growth.growth import trunks
@@ -60,7 +60,7 @@ def test_real_leaves_and_facets_together_are_all_leaves(monkeypatch: pytest.Monk
     every = replace(result, decision=np.full_like(result.decision, Decision.EXPLICIT))
     whole = leaf_area(explicit_blocks(flora, every))
     ones = np.ones((len(flora.rows), len(COUNTS)))
-    monkeypatch.setattr(facet_emission, "facet_weights", lambda _: FacetWeights(ones, ones))
+    monkeypatch.setattr(subject, "facet_weights", lambda _: FacetWeights(ones, ones))
     pixels = float(np.median(result.cells.feature))
     fractions = []
     for limit in pixels * np.array([3.0, 0.9, 0.7, 0.5, 0.1]):
@@ -119,7 +119,7 @@ def test_facets_do_not_depend_on_how_space_is_divided() -> None:
 
 def test_few_are_opened_at_a_time_and_it_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     flora, camera, result = scene()
-    transition, opened, inner = Transition(flora, camera, 50.0), [], facet_emission.open_subplants
+    transition, opened, inner = Transition(flora, camera, 50.0), [], subject.open_subplants
 
     def facets() -> np.ndarray:
         parts = [f for block in facet_parts(flora, result, camera, 0.3, transition) for f, _ in block]
@@ -131,7 +131,7 @@ def test_few_are_opened_at_a_time_and_it_changes_nothing(monkeypatch: pytest.Mon
         return inner(flora, subplants)
 
     once = facets()
-    monkeypatch.setattr(facet_emission, "open_subplants", counted)
-    monkeypatch.setattr(facet_emission, "OPENED_AT_ONCE", 40)
+    monkeypatch.setattr(subject, "open_subplants", counted)
+    monkeypatch.setattr(subject, "OPENED_AT_ONCE", 40)
     assert np.array_equal(facets(), once)
     assert max(opened) == 40

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Projected tetrahedra: silhouettes, thickness and pictures against rays; and the levels they are taken from."""
+"""Projected tetrahedra: silhouettes, thickness and images against rays; and the levels they are taken from."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def tetrahedra(seed: int, number: int = 60) -> np.ndarray:
 
 
 def flat(points: np.ndarray, camera: Camera) -> np.ndarray:
-    """Points on the picture plane, at depth 1 for perspective."""
+    """Points on the image plane, at depth 1 for perspective."""
     local = camera.to_camera_space(points)
     return local[..., :2] / local[..., 2:] if camera.kind == "PERSP" else local[..., :2]
 
@@ -108,7 +108,7 @@ def test_the_thick_point_is_where_its_ray_is_longest_within(seed: int, camera: C
 
 
 def picture(projected: Projected, places: np.ndarray, camera: Camera) -> np.ndarray:
-    """Opacity (r, n) that a Gouraud shaded picture has at places (r, 2), by tetrahedron."""
+    """Opacity (r, n) that a Gouraud shaded image has at places (r, 2), by tetrahedron."""
     corners = flat(projected.corners.reshape(-1, 3), camera)[projected.triangles]
     matrix = np.concatenate([corners.transpose(0, 2, 1), np.ones((len(corners), 1, 3))], axis=1)
     weights = np.einsum("tij,rj->rti", np.linalg.inv(matrix), np.c_[places, np.ones(len(places))])

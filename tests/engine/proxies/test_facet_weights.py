@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Facets hold up as many rays as the plants that they stand for, also those that nothing was fitted to."""
+"""Facets block as many rays as the plants that they stand for, also those that nothing was fitted to."""
 
 from dataclasses import replace
 

@@ -135,7 +135,7 @@ def test_a_limit_leaves_what_is_hidden_hidden_and_makes_no_forest_of_leaves() ->
 
 
 def test_leaves_that_are_large_only_at_the_near_end_are_told_from_the_rest() -> None:
-    """All of a small picture's view may be one block: then it is divided in depth, not made explicit as a whole."""
+    """All of a small image's view may be one block: then it is divided in depth, not made explicit as a whole."""
     totals = Totals(*(np.full(1, v) for v in (100.0, 1.0, 1e6, 0.05)))
     one = np.ones(1)
 
@@ -150,7 +150,7 @@ def test_leaves_that_are_large_only_at_the_near_end_are_told_from_the_rest() -> 
 
 
 def test_the_last_few_cells_are_not_worth_a_pass() -> None:
-    """Only if they are few among many, change next to nothing of the picture and hold next to nothing."""
+    """Only if they are few among many, change next to nothing of the image and hold next to nothing."""
     count = 1000
     totals = Totals(*(np.full(count, v) for v in (1.0, 0.1, 1000.0, 0.1)))
     cells = Terminals(

@@ -68,7 +68,7 @@ def test_shadows_that_fall_into_the_picture_are_refined(kind: str, anchored: boo
 
 
 def test_light_from_the_other_side_changes_nothing() -> None:
-    """Shadows that fall away from the picture."""
+    """Shadows that fall away from the image."""
     flora, seeds = support.small_flora(), support.plants(np.arange(3), position=BEHIND)
     result = last(flora, seeds, [Light("SUN", NOWHERE, SLANT * [1, -1, 1])])
     assert not refined(result).any()

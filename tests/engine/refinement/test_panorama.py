@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panoramas against rays cast all around the eye, one for each pixel of the equirectangular picture."""
+"""Panoramas against rays cast all around the eye, one for each pixel of the equirectangular image."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def panorama(window: tuple[float, ...] = SPHERE, width: int = 256, height: int =
 
 
 def rays(camera: Camera) -> NDArray[np.float64]:
-    """Directions through the pixels of the picture, as Cycles has them: columns are longitudes, rows latitudes."""
+    """Directions through the pixels of the image, as Cycles has them: columns are longitudes, rows latitudes."""
     left, right, bottom, top = camera.window
     longitude = left + (np.arange(camera.width) + 0.5) * (right - left) / camera.width
     latitude = bottom + (np.arange(camera.height) + 0.5) * (top - bottom) / camera.height
@@ -91,7 +91,7 @@ def test_a_random_scene_agrees_with_rays(window: tuple[float, ...]) -> None:
 
 @pytest.mark.parametrize("window", [SPHERE, PART])
 def test_pixels_are_those_of_the_picture(window: tuple[float, ...]) -> None:
-    """Six faces fill the sphere once, and what their pixels are worth is all of the picture."""
+    """Six faces fill the sphere once, and what their pixels are worth is all of the image."""
     camera = panorama(window)
     side = 200
     solid, worth = 0.0, 0.0
@@ -111,7 +111,7 @@ def test_clearance_is_positive_beside_the_picture_only() -> None:
     longitude, latitude = camera.longitude_latitude(camera.to_camera_space(points))
     inside = (longitude > -1.3) & (longitude < 0.4) & (latitude > -0.3) & (latitude < 0.8)
     assert np.array_equal(camera.clearance(points) < 0, inside)
-    # Never more than the distance from a point in the picture.
+    # Never more than the distance from a point in the image.
     shown = EYE + rays(camera)[::37] * 6
     beside = points[~inside]
     distance = np.linalg.norm(beside[:, None] - shown, axis=-1).min(axis=1)

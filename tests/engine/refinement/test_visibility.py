@@ -56,7 +56,7 @@ def split_view(camera, cells, seed=0):
 
 
 def cast(vertices, extinction, camera, width, height, occluders=None):
-    """Pixels of the final picture, transmittance and alpha by rays that meet all cells, sorted by distance."""
+    """Pixels of the final image, transmittance and alpha by rays that meet all cells, sorted by distance."""
     origins, directions = pixel_rays(camera, width, height)
     planes = face_planes(vertices)
     count, seen, alpha = np.zeros(len(vertices)), np.zeros(len(vertices)), np.zeros(width * height)
@@ -86,7 +86,7 @@ def cast(vertices, extinction, camera, width, height, occluders=None):
 
 
 def compare(vertices, extinction, rank, camera, resolution, fine=160, triangles=None):
-    """Measured visibility, and rays at the final picture's resolution or coarser."""
+    """Measured visibility, and rays at the final image's resolution or coarser."""
     occluders, hidden = None, None
     size = buffer_size(camera, fine)
     if triangles is not None:
@@ -137,7 +137,7 @@ def test_occluders_hide_what_is_behind_them(kind):
     camera = camera_of(kind)
     vertices, rank = split_view(camera, 300)
     extinction = np.full(len(vertices), 0.02)
-    # A tilted wall over the left half of the picture and far beyond it.
+    # A tilted wall over the left half of the image and far beyond it.
     corners = np.array([[-80.0, 6, -50], [-0.7, 9, -50], [-0.7, 9, 50], [-80, 6, 50]])
     triangles = corners[[[0, 1, 2], [0, 2, 3]]]
     found, (_, seen, alpha) = compare(vertices, extinction, rank, camera, 128, triangles=triangles)
