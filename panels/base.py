@@ -1,12 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What all of TetFlora's panels share: their place in the sidebar and their layout.
+"""What panels share: their place in the sidebar, layout, rows of properties and buttons, and lists of species."""
 
-Lists of species in panels: the mixture to populate with, leaf objects, and kinds of a field.
-"""
-
-from collections.abc import Iterable
 from textwrap import wrap
+from typing import NamedTuple
 
 import bpy
 
@@ -30,7 +27,7 @@ def split_layout(panel: bpy.types.Panel) -> bpy.types.UILayout:
 
 
 def draw_message(context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str = 'ERROR') -> None:
-    """A text over several lines, as Blender breaks none; a letter is some 7 pixels wide at a scale of 1."""
+    """A text over several lines, because Blender does not wrap; a letter is some 7 pixels wide at a scale of 1."""
     letters = context.region.width / (7.0 * context.preferences.system.ui_scale)
     column = layout.column(align=True)
     for n, line in enumerate(wrap(text, max(int(letters) - 4, 16))):
@@ -43,65 +40,97 @@ def picture(identifier: str) -> dict[str, str | int]:
     return {"icon_value": number} if number else {"icon": FALLBACK_ICON}
 
 
-class TETFLORA_UL_mix(bpy.types.UIList):
-    """A species and its share."""
-
-    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, _index, _flag) -> None:
-        row = layout.split(factor=0.7, align=True)
-        row.prop(item, "species_choice", text="", emboss=False)
-        row.prop(item, "weight", text="")
+def draw_properties(layout: bpy.types.UILayout, owner: bpy.types.bpy_struct, *names: str) -> None:
+    """Draw properties of an owner one below the other."""
+    for name in names:
+        layout.prop(owner, name)
 
 
-class TETFLORA_UL_leaf_objects(bpy.types.UIList):
-    """A species and the mesh that replaces its leaf."""
+class Button(NamedTuple):
+    """An operator in a menu or panel, with another text than its label where one is given."""
 
-    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, _index, _flag) -> None:
-        row = layout.row(align=True)
-        row.prop(item, "species_choice", text="", emboss=False)
-        row.prop(item, "leaf", text="")
+    operator: type[bpy.types.Operator]
+    icon: str
+    text: str | None = None
+    values: dict[str, object] = {}
+
+    def draw(self, layout: bpy.types.UILayout, **options: object) -> None:
+        """Draw it, with further options of ``UILayout.operator``."""
+        text = {} if self.text is None else {"text": self.text}
+        made = layout.operator(self.operator.bl_idname, icon=self.icon, **text, **options)
+        for name, value in self.values.items():
+            setattr(made, name, value)
 
 
-class TETFLORA_UL_field_species(bpy.types.UIList):
-    """A number of the attribute species, and the kind of plant that it means."""
+def draw_buttons(layout: bpy.types.UILayout, *buttons: Button | None) -> None:
+    """Draw buttons one below the other; None is a separator."""
+    for button in buttons:
+        if button is None:
+            layout.separator()
+        else:
+            button.draw(layout)
+
+
+class _SpeciesList:
+    """Mix-in for lists of entries with a species, and one more property beside it.
+
+    Attributes
+    ----------
+    which : {'MIX', 'LEAVES', 'FIELD', 'OUTPUT'}
+        The list as the operator that edits it names it.
+    entries : str
+        Name of the owner's collection; that of the active index ends in ``_index``.
+    beside : str
+        Name of the other property.
+    fraction : float
+        Width of the species.
+    """
+
+    which: str
+    entries: str
+    beside = ""
+    fraction = 0.7
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, index, _flag) -> None:
-        row = layout.split(factor=0.12, align=True)
-        row.label(text=str(index))
+        row = layout.split(factor=self.fraction, align=True)
+        if not self.beside:
+            row.label(text=str(index))
         row.prop(item, "species_choice", text="", emboss=False)
+        if self.beside:
+            row.prop(item, self.beside, text="")
+
+    @classmethod
+    def draw_in(cls, layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup) -> None:
+        """Draw the list of an owner, with buttons to add and remove."""
+        row = layout.row()
+        row.template_list(cls.__name__, "", owner, cls.entries, owner, f"{cls.entries}_index", rows=2)
+        column = row.column(align=True)
+        for action in ('ADD', 'REMOVE'):
+            Button(TETFLORA_OT_edit_list, action, "", {"which": cls.which, "action": action}).draw(column)
 
 
-class TETFLORA_UL_output_species(bpy.types.UIList):
+class TETFLORA_UL_mix(_SpeciesList, bpy.types.UIList):
+    """A species and its weight."""
+
+    which, entries, beside = 'MIX', "mix", "weight"
+
+
+class TETFLORA_UL_leaf_objects(_SpeciesList, bpy.types.UIList):
+    """A species and the mesh that replaces its leaf."""
+
+    which, entries, beside, fraction = 'LEAVES', "leaf_objects", "leaf", 0.5
+
+
+class TETFLORA_UL_field_species(_SpeciesList, bpy.types.UIList):
+    """A number of the attribute species, and the species that it means."""
+
+    which, entries, fraction = 'FIELD', "field_species", 0.12
+
+
+class TETFLORA_UL_output_species(_SpeciesList, bpy.types.UIList):
     """A species with output settings of its own."""
 
-    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, _index, _flag) -> None:
-        row = layout.split(factor=0.7, align=True)
-        row.prop(item, "species_choice", text="", emboss=False)
-        row.prop(item, "pass_index", text="")
-
-
-def draw_list(
-    layout: bpy.types.UILayout,
-    cls: type[bpy.types.UIList],
-    owner: bpy.types.PropertyGroup,
-    names: Iterable[str],
-    which: str,
-) -> None:
-    """A list with buttons to add and remove.
-
-    Parameters
-    ----------
-    names : iterable of str
-        The owner's collection and its active index.
-    which : {'MIX', 'LEAVES', 'FIELD', 'OUTPUT'}
-        As in the operator.
-    """
-    entries, index = names
-    row = layout.row()
-    row.template_list(cls.__name__, "", owner, entries, owner, index, rows=2)
-    column = row.column(align=True)
-    for icon, action in (('ADD', 'ADD'), ('REMOVE', 'REMOVE')):
-        button = column.operator(TETFLORA_OT_edit_list.bl_idname, text="", icon=icon)
-        button.which, button.action = which, action
+    which, entries, beside = 'OUTPUT', "species", "pass_index"
 
 
 CLASSES = (

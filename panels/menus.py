@@ -1,13 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Add > TetFlora Plant, > Place Plants by Clicking, with an entry for each species, and > First Forest.
-
-Object > TetFlora: the operators once more, because Blender's search (F3) finds only what stands in a menu.
-
-What is done most, around the mouse: the menu that Alt Shift F opens.
-
-Popup for a render without plants because nothing is refined: the reason and the remedies.
-"""
+"""Entries in the Add and Object menus, the pie menu, and the menu that a render without plants opens."""
 
 import bpy
 
@@ -36,90 +29,111 @@ from ..operators.plants import (
 from ..operators.refine import TETFLORA_OT_clear, TETFLORA_OT_make_plant_mesh, TETFLORA_OT_refine
 from ..tetflora_addon.blender.runtime import open_menu
 from ..tetflora_addon.blender.species.edits import catalogue
-from .base import picture
+from .base import Button, draw_buttons, picture
 from .preferences import PIE
 
 
-class TETFLORA_MT_species(bpy.types.Menu):
-    """Species to give to the selected plants."""
+class _SpeciesMenu:
+    """Mix-in for menus with an entry for each species of the catalog, which calls ``operator`` with it."""
 
-    bl_label = "Change Species"
-
-    def draw(self, _context: bpy.types.Context) -> None:
-        for info in catalogue().values():
-            icon = picture(info.identifier)
-            self.layout.operator(TETFLORA_OT_assign_species.bl_idname, text=info.name, **icon).species = info.identifier
-
-
-class TETFLORA_MT_add_plant(bpy.types.Menu):
-    """Species to add a plant of."""
-
-    bl_label = "TetFlora Plant"
+    operator: type[bpy.types.Operator]
 
     def draw(self, _context: bpy.types.Context) -> None:
+        # Menus execute operators by default; tools need the mouse, and the others have nothing to ask.
+        self.layout.operator_context = 'INVOKE_DEFAULT'
         known = catalogue()
         for info in known.values():
             icon = picture(info.identifier)
-            self.layout.operator(TETFLORA_OT_add_plant.bl_idname, text=info.name, **icon).species = info.identifier
+            self.layout.operator(self.operator.bl_idname, text=info.name, **icon).species = info.identifier
         if not known:
             self.layout.label(text="The catalog has no species", icon='ERROR')
 
 
-class TETFLORA_MT_place_plant(bpy.types.Menu):
-    """Species to set by clicking on the ground."""
+class TETFLORA_MT_species(_SpeciesMenu, bpy.types.Menu):
+    """Species to assign to the selected plants."""
+
+    bl_label = "Change Species"
+    operator = TETFLORA_OT_assign_species
+
+
+class TETFLORA_MT_add_plant(_SpeciesMenu, bpy.types.Menu):
+    """Species to add a plant of."""
+
+    bl_label = "TetFlora Plant"
+    operator = TETFLORA_OT_add_plant
+
+
+class TETFLORA_MT_place_plant(_SpeciesMenu, bpy.types.Menu):
+    """Species to place by clicking on the ground."""
 
     bl_label = "Place Plants by Clicking"
+    operator = TETFLORA_OT_place_plant
 
-    def draw(self, _context: bpy.types.Context) -> None:
-        # Buttons of a menu are executed by default, and this tool needs the mouse.
-        self.layout.operator_context = 'INVOKE_DEFAULT'
-        for info in catalogue().values():
-            icon = picture(info.identifier)
-            self.layout.operator(TETFLORA_OT_place_plant.bl_idname, text=info.name, **icon).species = info.identifier
+
+#: Buttons that panels have as well.
+PLANT_TOOLS = (
+    Button(TETFLORA_OT_reseed, 'FILE_REFRESH'),
+    Button(TETFLORA_OT_select_species, 'RESTRICT_SELECT_OFF', "Select All of This Species"),
+)
+CONVERSIONS = (
+    Button(TETFLORA_OT_make_field, 'POINTCLOUD_DATA'),
+    Button(TETFLORA_OT_split_field, 'OUTLINER_OB_EMPTY'),
+)
+_POPULATE = Button(TETFLORA_OT_populate, 'OUTLINER_OB_POINTCLOUD', "Populate with Plants")
+_PAINT = Button(TETFLORA_OT_paint_plants, 'BRUSH_DATA')
+_DROP = Button(TETFLORA_OT_drop_to_ground, 'TRIA_DOWN_BAR')
+_FIRST_FOREST = Button(TETFLORA_OT_first_forest, 'WORLD')
+
+
+def draw_place_menu(layout: bpy.types.UILayout) -> None:
+    """The menu of plants to place by clicking."""
+    layout.menu(TETFLORA_MT_place_plant.__name__, icon='RESTRICT_SELECT_OFF')
+
+
+def draw_species_menu(layout: bpy.types.UILayout) -> None:
+    """The menu of species to assign to selected plants."""
+    layout.menu(TETFLORA_MT_species.__name__, icon='OUTLINER_OB_EMPTY')
 
 
 def draw_in_add_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     """The entry in Blender's Add menu."""
     menu.layout.separator()
-    menu.layout.operator(TETFLORA_OT_first_forest.bl_idname, icon='WORLD')
-    menu.layout.menu(TETFLORA_MT_place_plant.__name__, icon='RESTRICT_SELECT_OFF')
+    _FIRST_FOREST.draw(menu.layout)
+    draw_place_menu(menu.layout)
     menu.layout.menu(TETFLORA_MT_add_plant.__name__, icon='OUTLINER_OB_FORCE_FIELD')
 
 
 class TETFLORA_MT_object(bpy.types.Menu):
-    """What can be done to plants and ground."""
+    """Operators for plants and ground, also because Blender's search (F3) finds only what a menu lists."""
 
     bl_label = "TetFlora"
 
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
-        layout.operator(TETFLORA_OT_populate.bl_idname, text="Populate with Plants", icon='OUTLINER_OB_POINTCLOUD')
-        layout.operator(TETFLORA_OT_mark_occluder.bl_idname, text="Mark or Unmark as Occluder", icon='MOD_MASK')
-        layout.operator(
-            TETFLORA_OT_mark_explicit.bl_idname, text="Refine or Ignore These Meshes", icon='MESH_ICOSPHERE'
+        draw_buttons(
+            layout,
+            _POPULATE,
+            Button(TETFLORA_OT_mark_occluder, 'MOD_MASK', "Mark or Unmark as Occluder"),
+            Button(TETFLORA_OT_mark_explicit, 'MESH_ICOSPHERE', "Refine or Ignore These Meshes"),
+            Button(TETFLORA_OT_use_as_form, 'CURVE_DATA'),
+            Button(TETFLORA_OT_mark_field, 'POINTCLOUD_DATA', "Use or Stop Using as Field of Plants"),
+            *CONVERSIONS,
+            None,
+            _PAINT,
         )
-        layout.operator(TETFLORA_OT_use_as_form.bl_idname, icon='CURVE_DATA')
-        layout.operator(
-            TETFLORA_OT_mark_field.bl_idname, text="Use or Stop Using as Field of Plants", icon='POINTCLOUD_DATA'
+        draw_place_menu(layout)
+        draw_buttons(layout, _DROP, None)
+        draw_species_menu(layout)
+        draw_buttons(
+            layout,
+            *PLANT_TOOLS,
+            Button(TETFLORA_OT_make_plant_mesh, 'OUTLINER_OB_MESH'),
+            Button(TETFLORA_OT_remove_plants, 'X', "Remove Selected Plants", {"which": 'SELECTED'}),
+            Button(TETFLORA_OT_remove_plants, 'TRASH', "Remove All Plants", {"which": 'ALL'}),
+            None,
+            Button(TETFLORA_OT_refine, 'MOD_DECIM', "Refine Plants"),
+            Button(TETFLORA_OT_clear, 'TRASH', "Clear Refined Plants"),
         )
-        layout.operator(TETFLORA_OT_make_field.bl_idname, icon='POINTCLOUD_DATA')
-        layout.operator(TETFLORA_OT_split_field.bl_idname, icon='OUTLINER_OB_EMPTY')
-        layout.separator()
-        layout.operator(TETFLORA_OT_paint_plants.bl_idname, icon='BRUSH_DATA')
-        layout.menu(TETFLORA_MT_place_plant.__name__, icon='RESTRICT_SELECT_OFF')
-        layout.operator(TETFLORA_OT_drop_to_ground.bl_idname, icon='TRIA_DOWN_BAR')
-        layout.separator()
-        layout.menu(TETFLORA_MT_species.__name__, text="Change Species", icon='OUTLINER_OB_EMPTY')
-        layout.operator(TETFLORA_OT_reseed.bl_idname, icon='FILE_REFRESH')
-        layout.operator(
-            TETFLORA_OT_select_species.bl_idname, text="Select All of This Species", icon='RESTRICT_SELECT_OFF'
-        )
-        layout.operator(TETFLORA_OT_make_plant_mesh.bl_idname, icon='OUTLINER_OB_MESH')
-        layout.operator(TETFLORA_OT_remove_plants.bl_idname, text="Remove Selected Plants", icon='X').which = 'SELECTED'
-        layout.operator(TETFLORA_OT_remove_plants.bl_idname, text="Remove All Plants", icon='TRASH').which = 'ALL'
-        layout.separator()
-        layout.operator(TETFLORA_OT_refine.bl_idname, text="Refine Plants", icon='MOD_DECIM')
-        layout.operator(TETFLORA_OT_clear.bl_idname, text="Clear Refined Plants", icon='TRASH')
 
 
 def draw_in_object_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
@@ -137,14 +151,10 @@ class TETFLORA_MT_pie(bpy.types.Menu):
     def draw(self, _context: bpy.types.Context) -> None:
         pie = self.layout.menu_pie()
         # West, east, south, north, north-west, north-east, south-west, south-east: Blender's own order.
-        pie.operator(TETFLORA_OT_paint_plants.bl_idname, icon='BRUSH_DATA')
-        pie.operator(TETFLORA_OT_refine.bl_idname, icon='MOD_DECIM')
-        pie.operator(TETFLORA_OT_populate.bl_idname, text="Populate with Plants", icon='OUTLINER_OB_POINTCLOUD')
-        pie.menu(TETFLORA_MT_place_plant.__name__, icon='RESTRICT_SELECT_OFF')
-        pie.operator(TETFLORA_OT_drop_to_ground.bl_idname, icon='TRIA_DOWN_BAR')
-        pie.operator(TETFLORA_OT_clear.bl_idname, icon='TRASH')
-        pie.operator(TETFLORA_OT_first_forest.bl_idname, icon='WORLD')
-        pie.menu(TETFLORA_MT_species.__name__, text="Change Species", icon='OUTLINER_OB_EMPTY')
+        draw_buttons(pie, _PAINT, Button(TETFLORA_OT_refine, 'MOD_DECIM'), _POPULATE)
+        draw_place_menu(pie)
+        draw_buttons(pie, _DROP, Button(TETFLORA_OT_clear, 'TRASH'), _FIRST_FOREST)
+        draw_species_menu(pie)
 
 
 class TETFLORA_MT_nothing_refined(bpy.types.Menu):

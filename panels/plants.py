@@ -1,19 +1,19 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tab's first panels: species and seed of the active plant, and what can be done to selected ones."""
+"""Plants: the active plant or field, and operators for the selected ones."""
 
 import bpy
 
 from ..operators.add import TETFLORA_OT_use_as_form
-from ..operators.marks import TETFLORA_OT_make_field, TETFLORA_OT_mark_field, TETFLORA_OT_split_field
-from ..operators.plants import TETFLORA_OT_remove_plants, TETFLORA_OT_reseed, TETFLORA_OT_select_species
+from ..operators.marks import TETFLORA_OT_mark_field
+from ..operators.plants import TETFLORA_OT_remove_plants
 from ..operators.refine import TETFLORA_OT_make_plant_mesh
 from ..tetflora_addon.blender.scene.fields import FIELD_TYPES, stored_size
 from ..tetflora_addon.blender.scene.objects import has_nodes
 from ..tetflora_addon.blender.scene.skeletons import FORM_TYPES
 from ..tetflora_addon.blender.species.edits import catalogue
-from .base import SidebarPanel, TETFLORA_UL_field_species, draw_list, split_layout
-from .menus import TETFLORA_MT_add_plant, TETFLORA_MT_species
+from .base import Button, SidebarPanel, TETFLORA_UL_field_species, draw_buttons, draw_properties, split_layout
+from .menus import CONVERSIONS, PLANT_TOOLS, TETFLORA_MT_add_plant, draw_species_menu
 
 
 class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
@@ -30,9 +30,7 @@ class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
             column.prop(plant, "species_choice")
             if plant.species not in catalogue():
                 column.label(text=f'"{plant.species}" is not in the catalog', icon='ERROR')
-            column.prop(plant, "seed")
-            column.prop(plant, "enabled")
-            column.prop(plant, "form")
+            draw_properties(column, plant, "seed", "enabled", "form")
         elif active is not None and active.tetflora.is_field:
             _draw_field(column, active)
         else:
@@ -46,12 +44,9 @@ class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
             layout.operator(TETFLORA_OT_use_as_form.bl_idname, icon='CURVE_DATA')
         field = active.tetflora.is_field
         if active.type in FIELD_TYPES and (field or not faces or has_nodes(active)):
-            layout.operator(
-                TETFLORA_OT_mark_field.bl_idname,
-                text="Field of Plants" if field else "Use as Field of Plants",
-                icon='CHECKMARK' if field else 'POINTCLOUD_DATA',
-                depress=field,
-            )
+            text = "Field of Plants" if field else "Use as Field of Plants"
+            icon = 'CHECKMARK' if field else 'POINTCLOUD_DATA'
+            Button(TETFLORA_OT_mark_field, icon, text).draw(layout, depress=field)
 
 
 def _draw_field(column: bpy.types.UILayout, obj: bpy.types.Object) -> None:
@@ -59,7 +54,7 @@ def _draw_field(column: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     # What nodes make of the points is not counted: a panel is drawn at every movement of the mouse.
     more = " before modifiers" if has_nodes(obj) else ""
     column.label(text=f"Field of {stored_size(obj):,} points{more}", icon='POINTCLOUD_DATA')
-    draw_list(column, TETFLORA_UL_field_species, field, ("field_species", "field_species_index"), 'FIELD')
+    TETFLORA_UL_field_species.draw_in(column, field)
     if not kinds:
         column.prop(field, "species_choice")
     elif 0 <= field.field_species_index < len(kinds):
@@ -67,12 +62,11 @@ def _draw_field(column: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     for species in {entry.species for entry in kinds} or {field.species}:
         if species not in catalogue():
             column.label(text=f'"{species}" is not in the catalog', icon='ERROR')
-    column.prop(field, "seed")
-    column.prop(field, "enabled")
+    draw_properties(column, field, "seed", "enabled")
 
 
 class TETFLORA_PT_selected_plants(SidebarPanel, bpy.types.Panel):
-    """What can be done to many plants at once; closed at first, so that the panels below stay in sight."""
+    """Operators for many plants at once; closed by default to keep the panels below in sight."""
 
     bl_label = "Selected Plants"
     bl_parent_id = "TETFLORA_PT_plants"
@@ -80,17 +74,14 @@ class TETFLORA_PT_selected_plants(SidebarPanel, bpy.types.Panel):
 
     def draw(self, _context: bpy.types.Context) -> None:
         column = self.layout.column(align=True)
-        column.menu(TETFLORA_MT_species.__name__, text="Change Species", icon='OUTLINER_OB_EMPTY')
-        column.operator(TETFLORA_OT_reseed.bl_idname, icon='FILE_REFRESH')
-        column.operator(
-            TETFLORA_OT_select_species.bl_idname, text="Select All of This Species", icon='RESTRICT_SELECT_OFF'
+        draw_species_menu(column)
+        mesh = Button(TETFLORA_OT_make_plant_mesh, 'OUTLINER_OB_MESH', "Convert to Meshes")
+        draw_buttons(column, *PLANT_TOOLS, mesh, *CONVERSIONS)
+        draw_buttons(
+            self.layout.column(align=True),
+            Button(TETFLORA_OT_remove_plants, 'X', "Remove Selected", {"which": 'SELECTED'}),
+            Button(TETFLORA_OT_remove_plants, 'TRASH', "Remove All Plants", {"which": 'ALL'}),
         )
-        column.operator(TETFLORA_OT_make_plant_mesh.bl_idname, text="Convert to Meshes", icon='OUTLINER_OB_MESH')
-        column.operator(TETFLORA_OT_make_field.bl_idname, icon='POINTCLOUD_DATA')
-        column.operator(TETFLORA_OT_split_field.bl_idname, icon='OUTLINER_OB_EMPTY')
-        column = self.layout.column(align=True)
-        column.operator(TETFLORA_OT_remove_plants.bl_idname, text="Remove Selected", icon='X').which = 'SELECTED'
-        column.operator(TETFLORA_OT_remove_plants.bl_idname, text="Remove All Plants", icon='TRASH').which = 'ALL'
 
 
 CLASSES = (TETFLORA_PT_plants, TETFLORA_PT_selected_plants)

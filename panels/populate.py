@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Populate: populations of plants, the rules for placing them, and occluders.
-
-Paint Plants: the brush's settings, and the buttons that take it up.
-"""
+"""Populate: populations of plants, the rules for placing them, occluders; Paint Plants: the brush."""
 
 import bpy
 
@@ -27,7 +24,15 @@ from ..tetflora_addon.blender.placing.properties import MODES
 from ..tetflora_addon.blender.placing.rules import awaits_update, is_outdated, shown_population
 from ..tetflora_addon.blender.species.edits import catalogue
 from ..tetflora_addon.blender.viewport import points
-from .base import SidebarPanel, TETFLORA_UL_mix, draw_list, draw_message, split_layout
+from .base import (
+    Button,
+    SidebarPanel,
+    TETFLORA_UL_mix,
+    draw_buttons,
+    draw_message,
+    draw_properties,
+    split_layout,
+)
 
 
 class TETFLORA_UL_populations(bpy.types.UIList):
@@ -43,20 +48,20 @@ class TETFLORA_UL_populations(bpy.types.UIList):
 
 
 class TETFLORA_MT_populations(bpy.types.Menu):
-    """Rarer things to do with populations."""
+    """Less common operators for populations."""
 
     bl_label = "Populations"
 
     def draw(self, _context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.operator(TETFLORA_OT_select_population.bl_idname, icon='RESTRICT_SELECT_OFF')
-        layout.operator(
-            TETFLORA_OT_remove_population.bl_idname, text="Remove but Keep Plants", icon='REMOVE'
-        ).keep_plants = True
-        layout.operator(TETFLORA_OT_forget_erased.bl_idname, icon='LOOP_BACK')
-        layout.separator()
-        layout.operator(TETFLORA_OT_import_populations.bl_idname, text="Import...", icon='IMPORT')
-        layout.operator(TETFLORA_OT_export_populations.bl_idname, text="Export...", icon='EXPORT')
+        draw_buttons(
+            self.layout,
+            Button(TETFLORA_OT_select_population, 'RESTRICT_SELECT_OFF'),
+            Button(TETFLORA_OT_remove_population, 'REMOVE', "Remove but Keep Plants", {"keep_plants": True}),
+            Button(TETFLORA_OT_forget_erased, 'LOOP_BACK'),
+            None,
+            Button(TETFLORA_OT_import_populations, 'IMPORT', "Import..."),
+            Button(TETFLORA_OT_export_populations, 'EXPORT', "Export..."),
+        )
 
 
 class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
@@ -70,13 +75,11 @@ class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
         _draw_populations(layout, group)
         if settings.uid:
             row = layout.row(align=True)
-            row.operator(TETFLORA_OT_update_population.bl_idname, text="Update", icon='FILE_REFRESH')
-            row.operator(TETFLORA_OT_reroll_population.bl_idname, text="Re-roll", icon='MOD_NOISE')
-            row.operator(TETFLORA_OT_freeze_population.bl_idname, text="Freeze", icon='FREEZE', depress=settings.frozen)
+            Button(TETFLORA_OT_update_population, 'FILE_REFRESH', "Update").draw(row)
+            Button(TETFLORA_OT_reroll_population, 'MOD_NOISE', "Re-roll").draw(row)
+            Button(TETFLORA_OT_freeze_population, 'FREEZE', "Freeze").draw(row, depress=settings.frozen)
         else:
-            layout.operator(
-                TETFLORA_OT_populate.bl_idname, text="Populate Selected Meshes", icon='OUTLINER_OB_POINTCLOUD'
-            )
+            Button(TETFLORA_OT_populate, 'OUTLINER_OB_POINTCLOUD', "Populate Selected Meshes").draw(layout)
         _draw_status(context, layout, settings)
         column = layout.column()
         column.active = not settings.frozen
@@ -88,16 +91,11 @@ class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
             column.prop(settings, "density", text="Per Hectare")  # the whole name is wider than labels are
         else:
             column.prop(settings, "count")
-        column.prop(settings, "as_field")
-        column.prop(settings, "seed")
+        draw_properties(column, settings, "as_field", "seed")
         active = context.active_object
         marked = active is not None and active.tetflora.is_occluder
-        layout.operator(
-            TETFLORA_OT_mark_occluder.bl_idname,
-            text="Occluder" if marked else "Mark as Occluder",
-            icon='CHECKMARK' if marked else 'MOD_MASK',
-            depress=marked,
-        )
+        text, icon = ("Occluder", 'CHECKMARK') if marked else ("Mark as Occluder", 'MOD_MASK')
+        Button(TETFLORA_OT_mark_occluder, icon, text).draw(layout, depress=marked)
 
 
 class _PartOfPopulate(SidebarPanel):
@@ -114,13 +112,13 @@ class _PartOfPopulate(SidebarPanel):
 
 
 class TETFLORA_PT_populate_species(_PartOfPopulate, bpy.types.Panel):
-    """Which species, and how they stand to each other."""
+    """Which species, and which of them are companions."""
 
     bl_label = "Species"
     bl_options = set()  # open: what to plant is the first question
 
     def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
-        draw_list(layout, TETFLORA_UL_mix, settings, ("mix", "mix_index"), 'MIX')
+        TETFLORA_UL_mix.draw_in(layout, settings)
         if not settings.mix:
             first = next(iter(catalogue().values()), None)
             layout.label(text=f"Default: {first.name}" if first else "The catalog has no species", icon='INFO')
@@ -128,9 +126,7 @@ class TETFLORA_PT_populate_species(_PartOfPopulate, bpy.types.Panel):
             entry = settings.mix[settings.mix_index]
             layout.prop(entry, "companion_choice")
             if entry.companion:
-                column = layout.column(align=True)
-                column.prop(entry, "companion_strength")
-                column.prop(entry, "companion_distance")
+                draw_properties(layout.column(align=True), entry, "companion_strength", "companion_distance")
 
 
 class TETFLORA_PT_populate_where(_PartOfPopulate, bpy.types.Panel):
@@ -167,8 +163,7 @@ class TETFLORA_PT_populate_where(_PartOfPopulate, bpy.types.Panel):
                 layout.prop_search(settings, "uv_layer", ground.data, "uv_layers")
             else:
                 layout.prop(settings, "uv_layer")
-        layout.prop(settings, "areas")
-        layout.prop(settings, "paths")
+        draw_properties(layout, settings, "areas", "paths")
         if settings.paths is not None:
             layout.prop(settings, "path_distance")
 
@@ -179,8 +174,7 @@ class TETFLORA_PT_populate_arrangement(_PartOfPopulate, bpy.types.Panel):
     bl_label = "Spacing"
 
     def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
-        layout.prop(settings, "min_distance")
-        layout.prop(settings, "clumping")
+        draw_properties(layout, settings, "min_distance", "clumping")
         if settings.clumping:
             layout.prop(settings, "clump_size")
 
@@ -191,24 +185,15 @@ class TETFLORA_PT_populate_size(_PartOfPopulate, bpy.types.Panel):
     bl_label = "Size"
 
     def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
-        column = layout.column(align=True)
-        column.prop(settings, "scale_min")
-        column.prop(settings, "scale_max")
-        layout.prop(settings, "scale_at_top")
-        layout.prop(settings, "tilt")
+        draw_properties(layout.column(align=True), settings, "scale_min", "scale_max")
+        draw_properties(layout, settings, "scale_at_top", "tilt")
 
 
 def _draw_populations(layout: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
     row = layout.row()
-    row.template_list(
-        TETFLORA_UL_populations.__name__,
-        "",
-        group,
-        "populations",
-        group,
-        "populations_index",
-        rows=3 if group.populations else 1,
-    )
+    rows = 3 if group.populations else 1
+    name = TETFLORA_UL_populations.__name__
+    row.template_list(name, "", group, "populations", group, "populations_index", rows=rows)
     column = row.column(align=True)
     column.operator(TETFLORA_OT_add_population.bl_idname, text="", icon='ADD')
     if group.populations:
@@ -224,9 +209,7 @@ def _draw_status(context: bpy.types.Context, layout: bpy.types.UILayout, setting
     # In the place of the other text: a line that comes and goes would move the slider away from under the mouse.
     text = points.status(settings)
     row.label(text=f"Update: {text}" if waiting else text, icon='FILE_REFRESH' if waiting else 'INFO')
-    row.operator(
-        TETFLORA_OT_preview_population.bl_idname, text="", icon='HIDE_OFF' if shown else 'HIDE_ON', depress=shown
-    )
+    Button(TETFLORA_OT_preview_population, 'HIDE_OFF' if shown else 'HIDE_ON', "").draw(row, depress=shown)
     for text in points.complaints(settings):
         draw_message(context, layout, text)
 
@@ -255,25 +238,17 @@ class TETFLORA_PT_brush(SidebarPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.scale_y = 1.4
         for mode, name, _, icon, _ in MODES:
-            button = row.operator(
-                TETFLORA_OT_paint_plants.bl_idname, text=name, icon=icon, depress=settings.mode == mode
-            )
-            button.mode = mode
+            Button(TETFLORA_OT_paint_plants, icon, name, {"mode": mode}).draw(row, depress=settings.mode == mode)
         column = layout.column(align=True)
-        column.prop(settings, "radius")
-        column.prop(settings, "density")
+        draw_properties(column, settings, "radius", "density")
         column.prop(settings, "strength", slider=True)
         column.prop(settings, "min_distance")
         column = layout.column()
         column.prop(settings, "source")
         if settings.source == 'ONE':
             column.prop(settings, "species_choice", text=" ")
-        column = layout.column(align=True)
-        column.prop(settings, "scale_min")
-        column.prop(settings, "scale_max")
-        column = layout.column()
-        column.prop(settings, "store")
-        column.prop(settings, "seed")
+        draw_properties(layout.column(align=True), settings, "scale_min", "scale_max")
+        draw_properties(layout.column(), settings, "store", "seed")
 
 
 CLASSES = (

@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The page in Preferences > Add-ons > TetFlora.
-
-Keys: few, free in Blender's own keymaps, changed in Preferences > Keymap or > Add-ons > TetFlora.
-"""
+"""The page in Preferences > Add-ons > TetFlora, and the keys: few, and free in Blender's own keymaps."""
 
 from __future__ import annotations
 
@@ -22,16 +19,7 @@ PIE = "TETFLORA_MT_pie"
 
 @dataclass(frozen=True)
 class Shortcut:
-    """A key of ours.
-
-    Attributes
-    ----------
-    operator : str
-    key : str
-    ctrl, alt, shift : bool
-    menu : str
-        What the operator opens, if it is one that opens menus.
-    """
+    """A key, and the operator that it calls; ``menu`` is what that opens, if it opens menus."""
 
     operator: str
     key: str
@@ -50,7 +38,7 @@ _made: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []
 
 
 def items() -> list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]]:
-    """Our keys as the user has them now, each with its keymap; empty where Blender has no keymaps."""
+    """Our keys as the user has them, each with its keymap; empty where Blender has no keymaps."""
     user = bpy.context.window_manager.keyconfigs.user
     keymap = user.keymaps.get(KEYMAP) if user is not None else None
     if keymap is None:
@@ -119,7 +107,7 @@ def _draw_keys(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
 
 
 def register() -> None:
-    """Draw the page, whose class below the operators only stores the settings, and add the keys."""
+    """Draw the page, whose class only stores the settings, and add the keys."""
     TetFloraPreferences.draw = _draw
     add_keys()
 

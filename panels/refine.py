@@ -1,11 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Refine: the buttons, what the last run made, and the settings that matter most.
-
-Sub-panels of Refine: proxies, visibility, limits, animation and leaf objects.
-
-First Forest: at the top of the tab while the scene has no plants.
-"""
+"""Refine: buttons, state and settings of refinement; and First Forest, while the scene has no plants."""
 
 import bpy
 
@@ -18,12 +13,12 @@ from ..tetflora_addon.blender.results.forms import few_bounces, form_of
 from ..tetflora_addon.blender.results.output import KIND
 from ..tetflora_addon.blender.scene.objects import has_contents
 from ..tetflora_addon.blender.viewport import auto
-from .base import SidebarPanel, TETFLORA_UL_leaf_objects, draw_list, draw_message, split_layout
+from .base import SidebarPanel, TETFLORA_UL_leaf_objects, draw_message, draw_properties, split_layout
 from .results import rows_of
 
 
 class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
-    """Refine: always on top, because the tab is longer than most screens are tall."""
+    """Refine: first, because the tab is longer than most screens are tall."""
 
     bl_label = "Refine"
 
@@ -46,13 +41,12 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
         layout = split_layout(self)
         column = layout.column()
         column.active = not settings.expand_everything
-        for name in ("quality", "cutoff", "shadow_cutoff", "proxy_form", "baked_light", "max_polygons"):
-            column.prop(settings, name)
+        names = ("quality", "cutoff", "shadow_cutoff", "proxy_form", "baked_light", "max_polygons")
+        draw_properties(column, settings, *names)
         active = context.active_object
         if active is not None and (can_be_explicit(active) or active.tetflora.is_explicit):
             layout.prop(active.tetflora, "is_explicit")
-        layout.prop(settings, "refine_at_render")
-        layout.prop(settings, "auto_refine")
+        draw_properties(layout, settings, "refine_at_render", "auto_refine")
 
 
 def hint(scene: bpy.types.Scene) -> str:
@@ -62,7 +56,7 @@ def hint(scene: bpy.types.Scene) -> str:
         return ""
     if settings.refine_at_render:
         return "Click Refine, then press F12 to render" if is_first_forest(scene) and has_contents(scene) else ""
-    # Of results that were kept as meshes, the first of a collection tells: a panel cannot look through all objects.
+    # The first object of a collection shows whether it was kept as meshes: a panel cannot look through all objects.
     first = (next(iter(collection.objects), None) for collection in scene.collection.children_recursive)
     kept = any(obj is not None and KIND in obj for obj in first)
     return "" if kept or not has_contents(scene) else "Nothing is refined, so renders show no plants"
@@ -79,8 +73,7 @@ class _PartOfRefine(SidebarPanel):
         settings = context.scene.tetflora
         column = split_layout(self).column()
         column.active = not settings.expand_everything
-        for name in names:
-            column.prop(settings, name)
+        draw_properties(column, settings, *names)
         return column
 
 
@@ -112,8 +105,7 @@ class TETFLORA_PT_proxy_shading(_PartOfRefine, bpy.types.Panel):
         settings = context.scene.tetflora
         column = split_layout(self).column()
         column.active = not settings.expand_everything and settings.baked_light == 'OFF'
-        for name in form_of(context.scene).sockets.values():
-            column.prop(settings, name)
+        draw_properties(column, settings, *form_of(context.scene).sockets.values())
 
 
 class TETFLORA_PT_visibility(_PartOfRefine, bpy.types.Panel):
@@ -148,9 +140,7 @@ class TETFLORA_PT_films(_PartOfRefine, bpy.types.Panel):
         settings = context.scene.tetflora
         column = layout.column()
         column.active = settings.share_frames and settings.refine_at_render
-        column.prop(settings, "cell_length")
-        column.prop(settings, "cell_turn")
-        column.prop(settings, "kept_memory")
+        draw_properties(column, settings, "cell_length", "cell_turn", "kept_memory")
         column.prop(context.scene.render, "use_persistent_data")  # Cycles then loads what frames share only once
         layout.prop(settings, "anchored")
 
@@ -161,16 +151,10 @@ class TETFLORA_PT_leaf_objects(_PartOfRefine, bpy.types.Panel):
     bl_label = "Leaf Objects"
 
     def draw(self, context: bpy.types.Context) -> None:
-        draw_list(
-            self.layout,
-            TETFLORA_UL_leaf_objects,
-            context.scene.tetflora,
-            ("leaf_objects", "leaf_objects_index"),
-            'LEAVES',
-        )
+        TETFLORA_UL_leaf_objects.draw_in(self.layout, context.scene.tetflora)
 
 
-_FEW = 200  # objects that are looked through at every movement of the mouse; who has more has begun
+_FEW = 200  # objects to look through at every movement of the mouse; a larger scene is not a new one
 
 
 class TETFLORA_PT_first(SidebarPanel, bpy.types.Panel):

@@ -1,13 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Wind: how strong, where to, and how gusty.
-
-Output: where results live, what sees them, and how they are told apart in compositing.
-
-Preview: levels of refinement and plants in the viewport, without making anything.
-
-Statistics of the last refinement, from the figures that it left in the scene.
-"""
+"""Wind, output, previews, and statistics of the last refinement."""
 
 import json
 from functools import lru_cache
@@ -18,7 +11,7 @@ from ..operators.preview import TETFLORA_OT_forget_levels, TETFLORA_OT_look_thro
 from ..operators.refine import TETFLORA_OT_keep_results
 from ..tetflora_addon.blender.placing.plant_objects import plant_collections
 from ..tetflora_addon.blender.viewport import state
-from .base import SidebarPanel, TETFLORA_UL_output_species, draw_list, draw_message, split_layout
+from .base import SidebarPanel, TETFLORA_UL_output_species, draw_message, draw_properties, split_layout
 
 
 class TETFLORA_PT_wind(SidebarPanel, bpy.types.Panel):
@@ -35,8 +28,7 @@ class TETFLORA_PT_wind(SidebarPanel, bpy.types.Panel):
         column = split_layout(self).column()
         column.active = wind.enabled
         column.use_property_decorate = True  # they can be animated
-        for name in ("speed", "direction", "gusts", "loop"):
-            column.prop(wind, name)
+        draw_properties(column, wind, "speed", "direction", "gusts", "loop")
 
 
 class TETFLORA_PT_output(SidebarPanel, bpy.types.Panel):
@@ -68,8 +60,8 @@ class TETFLORA_PT_ray_visibility(SidebarPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         column = split_layout(self).column()
-        for name in ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow"):
-            column.prop(context.scene.tetflora.output, name)
+        names = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
+        draw_properties(column, context.scene.tetflora.output, *names)
 
 
 class TETFLORA_PT_passes(SidebarPanel, bpy.types.Panel):
@@ -84,7 +76,7 @@ class TETFLORA_PT_passes(SidebarPanel, bpy.types.Panel):
         output, layer = context.scene.tetflora.output, context.view_layer
         layout.prop(output, "pass_index")
         layout.prop_search(output, "light_group", layer, "lightgroups")
-        draw_list(layout, TETFLORA_UL_output_species, output, ("species", "species_index"), 'OUTPUT')
+        TETFLORA_UL_output_species.draw_in(layout, output)
         if 0 <= output.species_index < len(output.species):
             entry = output.species[output.species_index]
             layout.prop(entry, "pass_index")

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The species editor: a species, its orders as a list, and a slider for everything that the species file says."""
+"""The species editor: a species, its orders as a list, and a slider for each key of the species file."""
 
 import bpy
 
@@ -21,9 +21,9 @@ from ..tetflora_addon.blender.species.edits import find_edit, problem_of
 from ..tetflora_addon.blender.species.values import NO_LEAF, OBJECT_LEAF, orders_of, present_order, present_species
 from ..tetflora_addon.blender.viewport import species
 from ..tetflora_addon.species.species import LEAF_KINDS
-from .base import SidebarPanel, draw_message, split_layout
+from .base import Button, SidebarPanel, draw_buttons, draw_message, draw_properties, split_layout
 
-# Keys of an order that say how its leaves are; the others are about its branches.
+# Prefixes of an order's keys about leaves; the others are about branches.
 _LEAVES = ("leaf", "leaves")
 
 
@@ -35,13 +35,16 @@ class TETFLORA_MT_species_files(bpy.types.Menu):
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
         layout.operator_context = 'INVOKE_DEFAULT'
-        layout.operator(TETFLORA_OT_save_species.bl_idname, icon='FILE_TICK')
-        layout.operator(TETFLORA_OT_load_species.bl_idname, icon='IMPORT')
-        layout.operator(TETFLORA_OT_export_species.bl_idname, icon='EXPORT')
-        layout.separator()
-        layout.operator(TETFLORA_OT_delete_species.bl_idname, icon='TRASH')
-        layout.separator()
-        layout.operator(TETFLORA_OT_create_asset_library.bl_idname, icon='ASSET_MANAGER')
+        draw_buttons(
+            layout,
+            Button(TETFLORA_OT_save_species, 'FILE_TICK'),
+            Button(TETFLORA_OT_load_species, 'IMPORT'),
+            Button(TETFLORA_OT_export_species, 'EXPORT'),
+            None,
+            Button(TETFLORA_OT_delete_species, 'TRASH'),
+            None,
+            Button(TETFLORA_OT_create_asset_library, 'ASSET_MANAGER'),
+        )
 
 
 class TETFLORA_PT_species(SidebarPanel, bpy.types.Panel):
@@ -65,20 +68,14 @@ class TETFLORA_PT_species(SidebarPanel, bpy.types.Panel):
         if find_edit(scene, identifier) is not None:
             layout.label(text="Edited in this file", icon='GREASEPENCIL')
         else:
-            layout.label(
-                text="Saved in your species folder" if own_file(identifier) else "Built-in species", icon='LOCKED'
-            )
+            text = "Saved in your species folder" if own_file(identifier) else "Built-in species"
+            layout.label(text=text, icon='LOCKED')
         if problem := problem_of(scene, identifier):
             draw_message(context, layout, problem)
         shown = species.shown_in(scene)
         row = layout.row(align=True)
         row.use_property_split = False
-        row.operator(
-            TETFLORA_OT_preview_species.bl_idname,
-            text="Preview",
-            icon='HIDE_OFF' if shown else 'HIDE_ON',
-            depress=shown,
-        )
+        Button(TETFLORA_OT_preview_species, 'HIDE_OFF' if shown else 'HIDE_ON', "Preview").draw(row, depress=shown)
         row.prop(editor, "preview_seed")
         text, failed = species.message()
         if shown and text and text != problem:
@@ -105,8 +102,7 @@ class TETFLORA_PT_species_whole(_SpeciesPart, bpy.types.Panel):
         layout = split_layout(self)
         editor = context.scene.tetflora.species_editor
         column = layout.column()
-        column.prop(editor, "species_name")
-        column.prop(editor, "species_description")
+        draw_properties(column, editor, "species_name", "species_description")
         for kind in LEAF_KINDS:
             form = getattr(editor, f"{kind}_form")
             column.prop(editor, f"{kind}_form")
@@ -114,9 +110,7 @@ class TETFLORA_PT_species_whole(_SpeciesPart, bpy.types.Panel):
                 column.prop_search(editor, f"{kind}_object", bpy.data, "objects")
             if form != NO_LEAF:
                 column.prop(editor, f"{kind}_transmission", text="Translucency")
-        column.prop(editor, "bark")
-        column.prop(editor, "quality")
-        column.prop(editor, "exact")
+        draw_properties(column, editor, "bark", "quality", "exact")
 
 
 class TETFLORA_PT_species_orders(_SpeciesPart, bpy.types.Panel):
@@ -131,7 +125,7 @@ class TETFLORA_PT_species_orders(_SpeciesPart, bpy.types.Panel):
         row.column(align=True).prop(editor, "order", expand=True)
         buttons = row.column(align=True)
         for action, icon in (('ADD', 'ADD'), ('REMOVE', 'REMOVE'), ('SPUR', 'OUTLINER_OB_FORCE_FIELD')):
-            buttons.operator(TETFLORA_OT_edit_orders.bl_idname, text="", icon=icon).action = action
+            Button(TETFLORA_OT_edit_orders, icon, "", {"action": action}).draw(buttons)
         _draw_keys(split_layout(self), editor, leaves=False)
 
 
@@ -157,7 +151,7 @@ def _draw_keys(layout: bpy.types.UILayout, editor: bpy.types.PropertyGroup, leav
         if name.startswith(_LEAVES) != leaves:
             continue
         row = column.row(align=True)
-        # Still there to be changed, but it does nothing as things are.
+        # It can be changed, but has no effect at present.
         row.active = not (bare and leaves and name != "leaves") and not (name == "branches" and last)
         row.prop(editor, name)
         if name + VARIATION in editor.bl_rna.properties:

@@ -4,20 +4,22 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import re
 from pathlib import Path
 from types import SimpleNamespace
-from unittest.mock import MagicMock
 
 import bpy
 import pytest
 
 import operators
+import panels
 from devtools import build
-from panels import menus as add_menu
-from panels import menus as object_menu
-from panels import preferences as keymaps
+from panels.menus import TETFLORA_MT_object, draw_in_add_menu
+from panels.preferences import KEYMAP, KEYS
+from tests.blender.layouts import Layout
+from tests.blender.scenes import add_camera, add_plant
 from tetflora_addon.blender import preferences, properties, translations
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -53,19 +55,18 @@ def _default_keys():
 def test_keys_are_free_in_blenders_own_keymap():
     taken = {tuple(key[1:]) for key in _default_keys() if key[0] in HEARD}
     assert len(taken) > 100
-    keys = keymaps.KEYS
-    assert 1 <= len(keys) <= 4
-    assert not [key for key in keys if (key.key, key.ctrl, key.alt, key.shift) in taken]
+    assert 1 <= len(KEYS) <= 4
+    assert not [key for key in KEYS if (key.key, key.ctrl, key.alt, key.shift) in taken]
 
 
 def test_keys_are_registered_once_and_open_what_is_there():
     config = bpy.context.window_manager.keyconfigs.addon
     ours = [
         (item.idname, getattr(item.properties, "name", ""))
-        for item in config.keymaps[keymaps.KEYMAP].keymap_items
+        for item in config.keymaps[KEYMAP].keymap_items
         if item.idname.startswith("tetflora.") or getattr(item.properties, "name", "").startswith("TETFLORA_")
     ]
-    assert sorted(ours) == sorted((key.operator, key.menu) for key in keymaps.KEYS)
+    assert sorted(ours) == sorted((key.operator, key.menu) for key in KEYS)
     for operator, menu in ours:
         if menu:
             assert operator in {"wm.call_menu", "wm.call_menu_pie"}
@@ -74,16 +75,49 @@ def test_keys_are_registered_once_and_open_what_is_there():
             assert operator in _ids()
 
 
+class _Page(SimpleNamespace):
+    """The preferences as the page draws them: Blender gives an instance a layout only while it draws."""
+
+    bl_rna = preferences.TetFloraPreferences.bl_rna
+
+
 def test_the_page_in_the_preferences_shows_settings_and_the_cache():
-    layout = MagicMock()
-    own = preferences.preferences()
-    preferences.TetFloraPreferences.draw(SimpleNamespace(layout=layout, species_folder="", use_cache=True), bpy.context)
-    assert callable(own.draw)
-    column = layout.column()
-    drawn = {call.args[1] for call in (*layout.prop.call_args_list, *column.prop.call_args_list)}
-    drawn |= {call.args[1] for call in column.row().prop.call_args_list}
-    assert drawn == {p.identifier for p in own.bl_rna.properties if not p.is_readonly} - {"bl_idname", "rna_type"}
-    assert [call.args[0] for call in column.operator.call_args_list] == ["tetflora.clear_cache"]
+    layout = Layout()
+    page = _Page(layout=layout, species_folder="", use_cache=True)
+    preferences.TetFloraPreferences.draw(page, bpy.context)
+    own = preferences.preferences().bl_rna.properties
+    assert set(layout.names("prop", 1)) >= {p.identifier for p in own if not p.is_readonly} - {"bl_idname", "rna_type"}
+    assert "tetflora.clear_cache" in layout.names("operator")
+
+
+DRAWN = [cls for cls in panels.CLASSES if not issubclass(cls, bpy.types.UIList)]
+
+
+@pytest.mark.parametrize("cls", DRAWN, ids=lambda cls: cls.__name__)
+def test_panels_and_menus_draw_only_what_blender_knows(cls):
+    add_camera()
+    bpy.context.view_layer.objects.active = add_plant()
+    layout = Layout()
+    drawing = SimpleNamespace(layout=layout)
+    for name in ("draw_settings", "column"):
+        if hasattr(cls, name):
+            setattr(drawing, name, getattr(cls, name).__get__(drawing))
+    if hasattr(cls, "operator"):
+        drawing.operator = cls.operator
+    cls.draw(drawing, _Context())
+    if hasattr(cls, "draw_header"):
+        cls.draw_header(drawing, _Context())
+    assert layout.drawn
+
+
+class _Context:
+    """The context, with the region and the space of a sidebar, which the background does not have."""
+
+    region = SimpleNamespace(width=300)
+    space_data = SimpleNamespace(bl_rna=bpy.types.SpaceView3D.bl_rna)
+
+    def __getattr__(self, name):
+        return getattr(bpy.context, name)
 
 
 def test_every_operator_is_registered_and_named():
@@ -97,12 +131,11 @@ def test_every_operator_is_registered_and_named():
     assert {name: found for name, found in names.items() if len(found) > 1} == {}
 
 
-def test_new_tools_stand_in_menus_so_that_search_finds_them():
-    layout = MagicMock()
-    for draw in (add_menu.draw_in_add_menu, object_menu.TETFLORA_MT_object.draw):
+def test_new_tools_are_in_menus_so_that_search_finds_them():
+    layout = Layout()
+    for draw in (draw_in_add_menu, TETFLORA_MT_object.draw):
         draw(SimpleNamespace(layout=layout), bpy.context)
-    drawn = {call.args[0] for call in layout.operator.call_args_list}
-    menus = {call.args[0] for call in layout.menu.call_args_list}
+    drawn, menus = set(layout.names("operator")), layout.names("menu")
     assert {f"tetflora.{name}" for name in ("paint_plants", "drop_to_ground", "first_forest")} <= drawn <= _ids()
     assert "TETFLORA_MT_place_plant" in menus
     assert all(hasattr(bpy.types, menu) for menu in menus)
@@ -128,7 +161,7 @@ def _texts():
         group, name = identifier.split(".")
         found.add(getattr(getattr(bpy.ops, group), name).get_rna_type().name)
     for path in (build.ROOT / "panels").glob("*.py"):
-        found |= set(re.findall(r'text="([^"]+)"', path.read_text(encoding="utf-8")))
+        found |= {n.value for n in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(n, ast.Constant)}
     return found
 
 

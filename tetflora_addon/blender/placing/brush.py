@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The brush in a scene: which plants stand where, and strokes that add and remove them.
 
-`planting.strokes` decides, in arrays; here the scene is read before a stroke and changed while it goes on.
+`planting.strokes` decides, in arrays; here the scene is read before a stroke and changed during it.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ _OBJECTS = -1  # where single plants are, in place of the number of a field
 _REACH = 2.0  # radii above and below the brush within which ground counts
 _LEAST_REACH = 10.0  # metres
 _STRONG = 0.5  # strength from which on Erase clears the ground, and not only the plants that it meets
-_SAME = 0.1  # radii within which a dab that removes nothing says no more than the one before
+_SAME = 0.1  # radii within which a dab that removes nothing adds nothing to the one before
 _PLACE = 0.05  # metres around a plant that was removed, where no other stands
 
 
 def brush_of(scene: bpy.types.Scene, pressure: float = 1.0) -> tuple[Brush, tuple[str, ...]]:
-    """The scene's brush as arrays take it, and the species that its shares count through.
+    """The scene's brush as the engine takes it, and the species that its weights refer to.
 
     Raises
     ------
     SceneError
-        No species has a share, or the brush is too wide for its density.
+        No species has a weight above 0, or the brush is too wide for its density.
     """
     settings = scene.tetflora.brush
     mix = [(entry.species, entry.weight) for entry in scene.tetflora.populate.mix if entry.species]
@@ -161,7 +161,7 @@ class Stroke:
     ) -> None:
         settings = scene.tetflora.brush
         self.scene, self.mode = scene, mode
-        brush_of(scene)  # what is wrong with the settings is said before anything is done
+        brush_of(scene)  # reports wrong settings before anything changes
         self.standing = Standing(scene, depsgraph)
         self.ground = Ground(view_layer, depsgraph)
         self.key = strokes.stroke_key(settings.seed, settings.strokes)
@@ -222,7 +222,7 @@ class Stroke:
         self._new, self._gone = [], np.zeros(len(self.standing.places), bool)
 
     def finish(self) -> None:
-        """Change the scene by what is left to do, and let populations remember what was taken from them."""
+        """Flush, and store in populations which plants the stroke removed."""
         self.flush()
         for population in self.scene.tetflora.populations:
             taken = self._taken.get(population.uid)

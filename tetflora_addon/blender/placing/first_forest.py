@@ -1,11 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A small complete scene to begin with: rolling ground, some ninety plants, a camera, the sun and a sky.
+"""The first forest: rolling ground, some ninety plants, a camera, the sun and a sky, with plain node trees.
 
-Nothing of the artist's is removed. A scene that is empty, or holds only what Blender starts with, is used; beside
-anything else a new scene is made.
-
-Ground and sky of the first forest; plain node trees that an artist can read and change.
+An empty scene, or one as Blender starts with, is used and nothing in it is removed. Otherwise the forest gets a new
+scene.
 """
 
 from __future__ import annotations
@@ -26,6 +24,18 @@ from ..compat import shader_tree
 from ..species.catalogue import default_species
 from ..species.edits import catalogue
 from .plant_objects import add_plants
+
+Stops = tuple[tuple[float, tuple[float, float, float]], ...]
+
+NAME = "First forest"
+EYE_HEIGHT = 1.7  # metres
+SAMPLES = 24
+_MARK = "tetflora_first_forest"  # on the collection, so that it may be renamed
+_STARTUP = {"Cube": 'MESH', "Camera": 'CAMERA', "Light": 'LIGHT'}
+_WEST, _EAST, _SOUTH, _NORTH = -48.0, 48.0, -14.0, 112.0  # of the ground, metres; the camera looks north
+_STEP = 2.0  # metres between the ground's vertices
+_CANDIDATES = 4000
+_PATH = 2.2  # metres from the middle of the path to its edge
 
 
 def meadow(name: str) -> bpy.types.Material:
@@ -49,12 +59,12 @@ def meadow(name: str) -> bpy.types.Material:
     ragged.inputs[1].default_value = 1.8
     link(edge.outputs[0], ragged.inputs[0])
     link(aside.outputs["Fac"], ragged.inputs[2])
-    share = new("ShaderNodeMapRange")
-    share.interpolation_type = 'SMOOTHSTEP'
+    weight = new("ShaderNodeMapRange")
+    weight.interpolation_type = 'SMOOTHSTEP'
     for socket, value in (("From Min", 1.3), ("From Max", 2.6), ("To Min", 0.0), ("To Max", 1.0)):
-        share.inputs[socket].default_value = value
-    link(ragged.outputs[0], share.inputs["Value"])
-    colour = _mixed(tree, 'MIX', share.outputs[0], earth, floor)
+        weight.inputs[socket].default_value = value
+    link(ragged.outputs[0], weight.inputs["Value"])
+    colour = _mixed(tree, 'MIX', weight.outputs[0], earth, floor)
     bump = new("ShaderNodeBump")
     bump.inputs["Strength"].default_value, bump.inputs["Distance"].default_value = 0.6, 0.05
     link(grain, bump.inputs["Height"])
@@ -81,9 +91,6 @@ def sky(name: str) -> bpy.types.World:
     link(ramp.outputs["Color"], background.inputs["Color"])
     link(background.outputs[0], output.inputs["Surface"])
     return world
-
-
-Stops = tuple[tuple[float, tuple[float, float, float]], ...]
 
 
 def _set_stops(ramp: bpy.types.ShaderNode, stops: Stops) -> None:
@@ -114,51 +121,26 @@ def _mixed(
     mix.data_type, mix.blend_type = 'RGBA', blend
     # A mix node has sockets of each name for each type of data; those of colours are found by their type.
     colours = [s for s in mix.inputs if s.type == 'RGBA']
-    share = next(s for s in mix.inputs if s.type == 'VALUE' and s.name == "Factor")
+    weight = next(s for s in mix.inputs if s.type == 'VALUE' and s.name == "Factor")
     if isinstance(factor, float):
-        share.default_value = factor
+        weight.default_value = factor
     else:
-        tree.links.new(factor, share)
+        tree.links.new(factor, weight)
     tree.links.new(a, colours[0])
     tree.links.new(b, colours[1])
     return next(s for s in mix.outputs if s.type == 'RGBA')
 
 
-NAME = "First forest"
-EYE_HEIGHT = 1.7  # metres
-SAMPLES = 24
-_MARK = "tetflora_first_forest"  # on the collection, so that it may be renamed
-_STARTUP = {"Cube": 'MESH', "Camera": 'CAMERA', "Light": 'LIGHT'}
-_WEST, _EAST, _SOUTH, _NORTH = -48.0, 48.0, -14.0, 112.0  # of the ground, metres; the camera looks north
-_STEP = 2.0  # metres between the ground's vertices
-_CANDIDATES = 4000
-_PATH = 2.2  # metres from the middle of the path to its edge
-
-
 @dataclass(frozen=True)
 class Layer:
-    """Plants of one species, set after those of the layers before.
-
-    Attributes
-    ----------
-    species : str
-    number : int
-    spacing : float
-        Least distance to plants of this layer and of those before, metres.
-    near, far : float
-        Between which distances from the camera they stand, metres.
-    verge : float
-        Metres that they keep from the edge of the path.
-    smallest, largest : float
-        Scales.
-    """
+    """Plants of one species, placed after the layers before; lengths in metres, ``smallest`` and ``largest`` scale."""
 
     species: str
     number: int
-    spacing: float
-    near: float
+    spacing: float  # minimum distance to plants of this layer and of those before
+    near: float  # distances from the camera
     far: float
-    verge: float
+    verge: float  # distance from the edge of the path
     smallest: float
     largest: float
 
@@ -183,9 +165,9 @@ def build(context: bpy.types.Context, seed: int) -> tuple[bpy.types.Scene, str]:
     Returns
     -------
     scene : bpy.types.Scene
-        Where it is; the window shows it.
-    said : str
-        What happened to what was there, empty if there was nothing.
+        The forest's scene, which the window shows.
+    note : str
+        What happened to earlier objects; empty if there were none.
 
     Raises
     ------
@@ -193,7 +175,7 @@ def build(context: bpy.types.Context, seed: int) -> tuple[bpy.types.Scene, str]:
         The catalogue is empty.
     """
     default_species()
-    scene, said = _scene_for(context)
+    scene, note = _scene_for(context)
     collection = bpy.data.collections.new(NAME)
     collection[_MARK] = True
     scene.collection.children.link(collection)
@@ -204,10 +186,10 @@ def build(context: bpy.types.Context, seed: int) -> tuple[bpy.types.Scene, str]:
     scene.camera = camera
     collection.objects.link(_sun())
     if scene.world is not None:
-        scene.world.use_fake_user = True  # it is still the artist's, and is saved although no scene uses it
+        scene.world.use_fake_user = True  # still the artist's: saved although no scene uses it
     scene.world = sky("First forest sky")
     _settings(scene)
-    return scene, said
+    return scene, note
 
 
 def height(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -321,7 +303,7 @@ def _sun() -> bpy.types.Object:
 
 
 def _settings(scene: bpy.types.Scene) -> None:
-    """What lets Refine and a render give a picture in seconds, and Populate and the brush go on with these species."""
+    """Quick settings for Refine and renders, and the species of the forest for Populate and the brush."""
     scene.tetflora.quality = 'DRAFT'
     mix, known_species = scene.tetflora.populate.mix, catalogue()
     for layer in LAYERS if not mix else ():

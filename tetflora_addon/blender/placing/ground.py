@@ -1,10 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The ground under brush, cursor and plants: rays against visible meshes that are neither plants nor results.
+"""The ground under brush, cursor and plants: rays against visible meshes, and plants dropped onto them.
 
-`Scene.ray_cast` would stop at the leaves of a refined forest, and knows no way to leave objects out.
-
-Plants moved along the vertical onto the ground.
+`Scene.ray_cast` would stop at the leaves of a refined forest, and cannot leave objects out.
 """
 
 from __future__ import annotations
@@ -23,6 +21,7 @@ from .field_edits import own_mesh
 
 _FEW = 8  # objects of which all are asked; of more only those whose boxes the ray meets
 _ABOVE = 1e-3  # metres above a plant's foot from which it falls, so that rounding does not let it through the ground
+_STAYS = 1e-6  # metres: a smaller gap counts as standing on the ground
 
 Hit = tuple[Vector, Vector]
 
@@ -130,12 +129,9 @@ class Ground:
 
 
 def is_ground(obj: bpy.types.Object) -> bool:
-    """Whether plants can stand on an object: seen, and neither a plant, nor made of them, nor refined as one."""
+    """Whether plants can stand on an object: visible, and neither a plant, nor a result, nor refined itself."""
     group = obj.tetflora
     return not (group.is_plant or group.is_field or group.is_explicit or is_ours(obj)) and obj.visible_get()
-
-
-_STAYS = 1e-6  # metres: less is standing on it already
 
 
 def drop_plants(plants: Sequence[bpy.types.Object], ground: Ground) -> tuple[int, int]:

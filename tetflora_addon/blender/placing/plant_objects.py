@@ -29,7 +29,7 @@ _FEW = 1000  # plants that may get their names the way Blender does it
 
 
 def plants_of(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
-    """Those of the objects that are plants, each by itself; fields are told by `fields_of`."""
+    """Those of the objects that are single plants; `fields_of` finds fields."""
     return [o for o in objects if o.tetflora.is_plant]
 
 
@@ -62,7 +62,7 @@ def add_plants(
     ----------
     placement : Placement
     species : sequence of str
-        Identifiers that ``placement.species`` counts through.
+        Identifiers that ``placement.species`` refers to.
     collection : bpy.types.Collection, optional
         Where they go; the scene's collection for plants if not given.
 
@@ -125,7 +125,7 @@ def _set_at_once(objects: Sequence[bpy.types.Object], rows: Sequence[np.ndarray]
 
 
 def _eulers(placement: Placement) -> np.ndarray:
-    """XYZ Euler angles, (n, 3); those of plants that are upright turn about the vertical and nothing else."""
+    """XYZ Euler angles, (n, 3); upright plants turn about the vertical only."""
     angles = np.zeros((len(placement), 3))
     angles[:, 2] = placement.azimuth
     tilted = np.flatnonzero(placement.up[:, 2] < 1.0)
@@ -160,7 +160,7 @@ def add_field(
     ----------
     placement : Placement
     species : sequence of str
-        Identifiers that ``placement.species`` counts through.
+        Identifiers that ``placement.species`` refers to.
     collection : bpy.types.Collection, optional
         Where it goes; the scene's collection for plants if not given.
     """

@@ -3,7 +3,7 @@
 """Populations as JSON files: the rules by which plants are placed, for other scenes and other people.
 
 Keys are the names of the settings in Python. Angles are degrees, lengths metres. Objects, images and collections are
-named; what another file does not have is left empty and said. Everything else that is not understood is refused.
+named; those missing in another file are left empty and reported. Everything unknown is refused.
 """
 
 from __future__ import annotations

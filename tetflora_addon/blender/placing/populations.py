@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Populations of a scene: plants that were placed together, and can be placed anew by the rules that are stored.
+"""Populations of a scene: plants that were placed together, and can be placed again by the stored rules.
 
-A plant or field knows its population by an identity, and its number in it, so neither names nor places in lists matter.
-What an artist copies by hand has the number of its original; of those with one number the oldest belongs to the
-population, and the others are the artist's. Plants of other populations, and those set by hand, keep their room.
+A plant or field stores the identity of its population and its number in it, so names and places in lists do not matter.
+A copy made by hand has the number of its original: the oldest with a number belongs to the population, the others are
+the artist's.
 """
 
 from __future__ import annotations
@@ -36,28 +36,14 @@ NAME = "Population"
 
 @dataclass(frozen=True)
 class Made:
-    """What became of a population.
+    """The plants that placing a population made."""
 
-    Attributes
-    ----------
-    objects : list of bpy.types.Object
-        Its plants in the order of the placement, or its field.
-    number, wanted : int
-        Plants that there are, and that were asked for.
-    reason : str
-        Why there are fewer, empty if there are not.
-    returned : int
-        Plants among them that had been deleted by hand.
-    erased : int
-        Plants that stay away because they would stand where the brush has erased.
-    """
-
-    objects: list[bpy.types.Object]
+    objects: list[bpy.types.Object]  # in the order of the placement, or one field
     number: int
     wanted: int
-    reason: str
-    returned: int
-    erased: int
+    reason: str  # why there are fewer than wanted; empty if there are not
+    returned: int  # plants among them that had been deleted by hand
+    erased: int  # plants omitted where the brush has erased
 
 
 def owner_of(scene: bpy.types.Scene, objects: Iterable[bpy.types.Object]) -> TetFloraPopulation | None:

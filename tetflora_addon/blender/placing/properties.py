@@ -1,11 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a population of plants stores: the rules by which it was placed, so that it can be placed anew.
-
-The same group holds the settings for new populations (``Scene.tetflora.populate``). `populations` acts on it.
-
-Settings of the brush that paints plants: ``Scene.tetflora.brush``.
-"""
+"""Settings of populations, of new ones (``Scene.tetflora.populate``), and of the brush (``Scene.tetflora.brush``)."""
 
 import bpy
 from bpy.props import (
@@ -33,18 +28,20 @@ STORAGE_ITEMS = (
     ('EMPTIES', "Empties", "One object per plant. Each can be moved on its own; many slow Blender down", 1),
     ('FIELD', "Field", "One object whose vertices are the plants. Room for millions", 2),
 )
+#: Painted plants become empties as long as the scene has no more plants than this that are objects.
+MOST_PAINTED_EMPTIES = 2_000
 NOBODY = ("NONE", "None", "No companion", 'NONE', 0)
 
-#: Called after each change of a setting, without arguments; the preview of points listens.
+#: Called without arguments after each change of a setting; the preview of points listens.
 listeners = Listeners()
 _kept_items: dict[int, list] = {}  # Blender keeps no copy of the strings of dynamic items
 
 
-def _tell(_group: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+def _notify(_group: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
     listeners.notify()
 
 
-_LIVE = {"options": set(), "update": _tell}
+_LIVE = {"options": set(), "update": _notify}
 _HIDDEN = {"options": {'HIDDEN'}}
 _RULES = properties_of(Rules, **_LIVE)
 _COMPANION = properties_of(Companion, **_LIVE)
@@ -61,7 +58,7 @@ def _choose_companion(entry: "TetFloraMixEntry", number: int) -> None:
 
 
 class TetFloraMixEntry(bpy.types.PropertyGroup, SpeciesChoice):
-    """One species of a mixture to populate with, and how it stands to another."""
+    """One species of a mixture to populate with, and its companion."""
 
     weight: FloatProperty(
         name="Weight",
@@ -96,22 +93,22 @@ class TetFloraGround(bpy.types.PropertyGroup):
         description="Mesh that the plants grow on, including its modifiers",
         type=bpy.types.Object,
         poll=lambda _group, candidate: candidate.type == 'MESH' and not candidate.tetflora.is_field,
-        update=_tell,
+        update=_notify,
     )
 
 
 class TetFloraPopulation(bpy.types.PropertyGroup):
     """How plants are placed together."""
 
-    # What it is, and what became of it. The plants know it by ``uid``, never by its name or place in the list.
+    # Identity and state. Plants refer to ``uid``, never to the name or the place in the list.
     name: StringProperty(name="Name", description="Name of the population, and of the collection of its plants")
     uid: StringProperty(name="Identity", **_HIDDEN)
     frozen: BoolProperty(name="Frozen", **_HIDDEN)
     collection: PointerProperty(name="Collection", type=bpy.types.Collection, **_HIDDEN)
     made: IntProperty(name="Plants Made", **_HIDDEN)
     message: StringProperty(name="Message", **_HIDDEN)
-    placed_by: StringProperty(name="Placed By", **_HIDDEN)  # `population_rules.fingerprint` of when it was placed
-    erased: StringProperty(name="Erased Places", **_HIDDEN)  # as `erased_places` writes it
+    placed_by: StringProperty(name="Placed By", **_HIDDEN)  # `rules.fingerprint` of when it was placed
+    erased: StringProperty(name="Erased Places", **_HIDDEN)  # as `rules.note_erased` writes it
 
     grounds: CollectionProperty(name="Grounds", description="Meshes that the plants grow on", type=TetFloraGround)
     ground_collection: PointerProperty(
@@ -215,18 +212,10 @@ class TetFloraPopulation(bpy.types.PropertyGroup):
     tilt: _RULES.tilt
 
 
-#: Painted plants become empties as long as the scene has no more plants than this that are objects.
-MOST_PAINTED_EMPTIES = 2_000
 MODES = (
     ('PAINT', "Paint", "Add plants where there are fewer than the density", 'BRUSH_DATA', 0),
     ('ERASE', "Erase", "Remove plants of every species under the brush", 'TRASH', 1),
-    (
-        'THIN',
-        "Thin",
-        "Remove plants above the density, or closer than the minimum distance",
-        'PARTICLES',
-        2,
-    ),
+    ('THIN', "Thin", "Remove plants above the density, or closer than the minimum distance", 'PARTICLES', 2),
 )
 _BRUSH = properties_of(Brush, options=set())
 _SIZES = properties_of(Rules, options=set())
@@ -272,7 +261,7 @@ class TetFloraBrush(bpy.types.PropertyGroup, SpeciesChoice):
                 f"Empties until the scene has {MOST_PAINTED_EMPTIES:,}, then the field of painted plants",
                 0,
             ),
-            ('EMPTIES', "Empties", "One object per plant. Each can be moved on its own; many slow Blender down", 1),
+            STORAGE_ITEMS[1],
             ('FIELD', "Field", 'One object, "Painted plants", whose vertices are the plants. Room for millions', 2),
         ),
         options=set(),

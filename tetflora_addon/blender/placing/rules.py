@@ -1,12 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From what a population stores to the engine's rules, and settings that pass from one population to another.
+"""From the settings of a population to places for its plants: rules for the engine, grounds, and what stands there.
 
-From a population to places for its plants: its ground and masks, what stands there already, and the engine.
-
-Where the brush has taken plants from populations: these places stay bare when a population is placed anew.
-
-Stored in the population as JSON text: a list for each stroke, of a radius and the x and y of the circles' middles.
+Places where the brush has erased plants stay bare. The population stores them as JSON text: a list for each stroke, of
+a radius and the x and y of the centers of its circles.
 """
 
 from __future__ import annotations
@@ -34,29 +31,31 @@ from ..scene.skeletons import species_of
 from ..species.catalogue import default_species
 from ..species.edits import catalogue
 from .plant_objects import plants_of
-from .terrain import read_ground
+from .terrain import MASKS, read_ground
 
-#: Up to this many become empties if nobody says otherwise; beyond, Blender becomes slow.
+#: Up to this many become empties by default; with more, Blender becomes slow.
 EMPTIES_UNASKED = 10_000
 #: Square metres of the area that densities are counted on: foresters count trees by the hectare.
 HECTARE = 10_000.0
-#: What a population is and what became of it; all else are settings, which can be copied and written to files.
+#: Identity and state of a population; all else are settings, which can be copied and written to files.
 IDENTITY = {
     *("rna_type", "name", "uid", "frozen", "collection", "made", "message", "placed_by", "erased"),
     "mix_index",
 }
-_ENTRY = ("species", "weight", "companion", "companion_strength", "companion_distance")
+_COMPANION = ("companion", "companion_strength", "companion_distance")
+_DIGITS = 4  # of erased places: tenths of a millimetre
+_ENTRY = ("species", "weight", *_COMPANION)
 
 
 def settings_of(group: type[bpy.types.PropertyGroup] | bpy.types.PropertyGroup) -> list[bpy.types.Property]:
-    """Properties of a population that say how plants are placed."""
+    """Properties of a population that define how plants are placed."""
     return [p for p in group.bl_rna.properties if p.identifier not in IDENTITY]
 
 
 def fingerprint(population: bpy.types.PropertyGroup) -> str:
-    """A short text that is another one when settings are; what is left at its default does not count.
+    """A short text that changes with the settings; those left at their default do not count.
 
-    So a setting that comes with another version changes nothing of populations that do not use it.
+    A setting that a later version adds changes nothing for populations that do not use it.
     """
     values: list[Any] = [[e.object.name_full for e in population.grounds if e.object is not None]]
     values += [[getattr(entry, name) for name in _ENTRY] for entry in population.mix]
@@ -101,8 +100,8 @@ def copy_settings(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGro
 
 
 def copy_companion(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
-    """Let one species stand to others as another entry says."""
-    for name in ("companion", "companion_strength", "companion_distance"):
+    """Give an entry the companion of another."""
+    for name in _COMPANION:
         setattr(target, name, getattr(source, name))
 
 
@@ -119,20 +118,20 @@ def shown_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup:
 
 
 def rules_from(population: bpy.types.PropertyGroup) -> tuple[Rules, tuple[str, ...]]:
-    """A population's settings as the engine takes them, and the species that its shares count through.
+    """A population's settings as the engine takes them, and the species that its weights refer to.
 
-    Companions that are none of the mixture's species follow it with a share of 0.
+    Companions that are not in the mixture follow it with a weight of 0.
     """
     mix = [(e.species or default_species(), e) for e in population.mix]
-    shares: dict[str, float] = {}
+    weights: dict[str, float] = {}
     for identifier, entry in mix:
-        shares[identifier] = shares.get(identifier, 0.0) + entry.weight
+        weights[identifier] = weights.get(identifier, 0.0) + entry.weight
     if not mix:
-        shares[default_species()] = 1.0
+        weights[default_species()] = 1.0
     for _, entry in mix:
         if entry.companion:
-            shares.setdefault(entry.companion, 0.0)
-    species = tuple(shares)
+            weights.setdefault(entry.companion, 0.0)
+    species = tuple(weights)
     companions = tuple(
         Companion(species.index(identifier), species.index(e.companion), e.companion_strength, e.companion_distance)
         for identifier, e in mix
@@ -146,7 +145,7 @@ def rules_from(population: bpy.types.PropertyGroup) -> tuple[Rules, tuple[str, .
         altitude_min=low,
         altitude_max=high,
         density=population.density / HECTARE,
-        shares=tuple(shares.values()),
+        shares=tuple(weights.values()),
         companions=companions,
     )
     return rules, species
@@ -163,22 +162,19 @@ def unknown_species(population: bpy.types.PropertyGroup) -> list[str]:
     return [e.species for e in population.mix if e.species and e.species not in known]
 
 
-_DIGITS = 4  # tenths of a millimetre
-
-
-def note_erased(population: bpy.types.PropertyGroup, middles: NDArray[np.float64] | Sequence, radius: float) -> None:
-    """Let circles on the map, with middles (n, 2) or more columns, stay bare; metres."""
-    flat = np.round(np.asarray(middles, dtype=np.float64)[:, :2], _DIGITS).ravel().tolist()
+def note_erased(population: bpy.types.PropertyGroup, centers: NDArray[np.float64] | Sequence, radius: float) -> None:
+    """Keep circles on the map bare, with centers (n, 2) or more columns; metres."""
+    flat = np.round(np.asarray(centers, dtype=np.float64)[:, :2], _DIGITS).ravel().tolist()
     strokes = [*_strokes(population), [round(radius, _DIGITS), *flat]]
     population.erased = json.dumps(strokes, separators=(",", ":"))
 
 
 def erased_places(population: bpy.types.PropertyGroup) -> tuple[Path, ...]:
-    """What stays bare, as lines of one point."""
+    """Circles that stay bare, as lines of one point."""
     return tuple(
-        Path(middle[None], stroke[0])
+        Path(center[None], stroke[0])
         for stroke in _strokes(population)
-        for middle in np.array(stroke[1:], dtype=np.float64).reshape(-1, 2)
+        for center in np.array(stroke[1:], dtype=np.float64).reshape(-1, 2)
     )
 
 
@@ -211,11 +207,11 @@ def place_population(
     Parameters
     ----------
     own : set of bpy.types.Object
-        Its present plants, which take no room.
+        Its present plants, which do not count.
     grounds : sequence of bpy.types.Object, optional
-        Grow on these meshes instead of the population's own.
+        Meshes instead of the population's own.
     most : int, optional
-        Plants that are enough, for a preview.
+        Upper limit of plants, for a preview.
 
     Returns
     -------
@@ -226,7 +222,7 @@ def place_population(
     Raises
     ------
     SceneError
-        No ground, a species that the catalogue does not have, or settings that leave no place; says what to do.
+        No ground, a species that the catalogue does not have, or settings that leave no place.
     """
     unknown = unknown_species(population)
     if unknown:
@@ -241,19 +237,8 @@ def place_population(
     rules, species = rules_from(population)
     if most is not None:
         rules = replace(rules, count=min(rules.count, most))
-    ground = read_ground(
-        grounds,
-        depsgraph,
-        vertex_group=population.vertex_group,
-        image=population.image,
-        uv_layer=population.uv_layer,
-        invert_group=population.invert_group,
-        invert_image=population.invert_image,
-        areas=population.areas,
-        paths=population.paths,
-        path_distance=population.path_distance,
-    )
-    found = place(ground, rules, *standing(scene, depsgraph, own, species))
+    masks = {name: getattr(population, name) for name in MASKS}
+    found = place(read_ground(grounds, depsgraph, **masks), rules, *standing(scene, depsgraph, own, species))
     return without(found, erased_places(population)), species
 
 

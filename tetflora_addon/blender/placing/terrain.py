@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Read the ground that plants shall grow on: meshes, vertex groups, an image, and curves for areas and paths.
-
-Curves as lines on the map: borders of areas to plant, and paths to keep free.
-"""
+"""Read terrain to populate: meshes, vertex groups, an image, and curves around areas and along paths."""
 
 from __future__ import annotations
 
@@ -19,6 +16,13 @@ from ...planting.terrain import Path, Terrain
 from ..attributes import image_pixels, members, read, values_of, world_matrix
 from ..scene.objects import objects_within
 
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec. 709
+#: Settings of populations that mask the ground: keyword arguments of `read_ground`.
+MASKS = (
+    *("vertex_group", "image", "uv_layer", "invert_group", "invert_image"),
+    *("areas", "paths", "path_distance"),
+)
+
 
 @dataclass(frozen=True)
 class Line:
@@ -31,7 +35,7 @@ class Line:
     cyclic : bool
         The last point is joined to the first, which is not repeated.
     half_width : float
-        What its bevel adds to either side, metres.
+        Width that its bevel adds to each side, metres.
     """
 
     points: NDArray[np.float64]
@@ -118,9 +122,6 @@ def _from_curves(curves: bpy.types.Curves) -> list[tuple[NDArray[np.float64], bo
     return list(zip(parts, cyclic.tolist(), strict=True))
 
 
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec. 709
-
-
 def read_ground(
     objects: Iterable[bpy.types.Object],
     depsgraph: bpy.types.Depsgraph,
@@ -142,11 +143,10 @@ def read_ground(
         Meshes.
     depsgraph : bpy.types.Depsgraph
     vertex_group : str
-        Group whose weights say how suitable the ground is; every mesh needs it. A float attribute of that name serves
-        as well.
+        Group whose weights define how suitable the ground is; every mesh needs it, or a float attribute of its name.
     image : bpy.types.Image, optional
-        Its luminance says how suitable the ground is, as the values are stored: a picture of 50 % grey halves the
-        number of plants. Alpha does not count.
+        Its luminance, as stored, defines how suitable the ground is: 50 % grey halves the number of plants. Alpha does
+        not count.
     uv_layer : str
         UV map for the image; the one that renders if empty.
     invert_group, invert_image : bool

@@ -1,12 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Species of the catalogue as items of menus and enumerations.
+"""Species of the catalogue in Blender: pictures, items of menus, the property that stores a choice, and species files.
 
-How a species is stored and chosen: as text, with an enumeration over it for panels.
-
-Pictures of species for menus and asset browsers: PNG files beside the species, made by ``examples.thumbnails``.
-
-Species as files: saved for other scenes, taken from others, given away, deleted. Only sound ones get in or out.
+Pictures are PNG files beside the species. Only sound species files are saved or loaded.
 """
 
 import json
@@ -32,6 +28,18 @@ THUMBNAIL_ENDING = ".png"
 #: Where a species has no picture.
 FALLBACK_ICON = 'OUTLINER_OB_EMPTY'
 
+#: Identifier of the only item when there is nothing to choose.
+NO_SPECIES = "NONE"
+FALLBACK_HEIGHT = 5.0  # metres, of the arrow of a plant whose species cannot be read
+#: Ending of species files.
+ENDING = ".json"
+
+Item = tuple[str, str, str, str | int, int]
+
+# Seconds for which a picture is not looked for again: menus and panels ask for all of them at each redraw.
+_TRUSTED = 0.0 if bpy.app.background else 1.0
+_icons: dict[str, tuple[float, int]] = {}
+_kept: dict[tuple, list[Item]] = {}  # items by content: Blender keeps no copy of the strings of dynamic items
 _pictures: previews.ImagePreviewCollection | None = None
 
 
@@ -42,11 +50,6 @@ def thumbnail_file(identifier: str) -> Path | None:
         if identifier and path.is_file():
             return path
     return None
-
-
-# Seconds for which a picture is not looked for again: menus and panels ask for all of them at each redraw.
-_TRUSTED = 0.0 if bpy.app.background else 1.0
-_icons: dict[str, tuple[float, int]] = {}
 
 
 def icon_of(identifier: str) -> int:
@@ -63,7 +66,7 @@ def _icon_of(identifier: str) -> int:
     path = thumbnail_file(identifier)
     if path is None or _pictures is None:
         return 0
-    name = f"{path}|{path.stat().st_mtime_ns}"  # another picture under the same name is another one
+    name = f"{path}|{path.stat().st_mtime_ns}"  # so that a replaced file is loaded again
     found = _pictures.get(name) or _pictures.load(name, str(path), 'IMAGE')
     return found.icon_id
 
@@ -81,16 +84,6 @@ def unregister() -> None:
         previews.remove(_pictures)
     _pictures = None
     _icons.clear()
-
-
-# What an enumeration says when there is nothing to choose.
-NO_SPECIES = "NONE"
-FALLBACK_HEIGHT = 5.0  # metres, of the arrow of a plant whose species cannot be read
-
-Item = tuple[str, str, str, str | int, int]
-
-# Blender keeps no copy of the strings of dynamic items, so somebody has to.
-_kept: dict[tuple, list[Item]] = {}
 
 
 def number_of(identifier: str) -> int:
@@ -180,9 +173,6 @@ def _choose(group: SpeciesChoice, number: int) -> None:
         if item_number == number and number:
             group.species = identifier
             tell_listeners()
-
-
-ENDING = ".json"
 
 
 def own_file(identifier: str) -> Path | None:

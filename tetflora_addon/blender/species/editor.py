@@ -3,7 +3,7 @@
 """Sliders of the species editor, made from the keys of species files: a new key gets its slider by itself.
 
 The properties store nothing. They read the JSON of the chosen species and write it into this file
-(`species_edits`), so there is nothing to keep in step with undo, loading or other scenes.
+(`species.edits`), so there is nothing to keep in step with undo, loading or other scenes.
 """
 
 from collections.abc import Callable

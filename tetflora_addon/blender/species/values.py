@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reading and writing the species that the editor shows, key by key, in its JSON.
-
-Properties of the species editor beside the keys of an order: name, leaves, bark, which order is shown.
-"""
+"""Values of the species editor: keys of the shown species and of the active order, read and written as JSON."""
 
 from math import isnan
 from typing import Any
@@ -19,7 +16,10 @@ from ...species.species import BARKS
 from .catalogue import SpeciesChoice
 from .edits import catalogue, change_species, species_data, species_for, tell_listeners
 
-_SIGNIFICANT = 6  # digits of a slider's float32 that are meant
+#: Items of ``leaf_form`` and ``blossom_form`` that are no built-in model.
+OBJECT_LEAF, OWN_LEAF, NO_LEAF = "OBJECT", "OWN", "NONE"
+_SIGNIFICANT = 6  # digits of a slider's single precision that count
+_kept: dict[tuple[str, ...], list[tuple[str, str, str, int]]] = {}  # Blender keeps no copy of the strings of items
 
 
 def present_species(editor: bpy.types.PropertyGroup) -> str:
@@ -121,7 +121,7 @@ def number_in(value: Any, *path: int) -> float:
 
 
 def rounded(value: float) -> float:
-    """The digits of a slider's single precision that are meant."""
+    """A slider's value without the noise of single precision."""
     return float(f"{value:.{_SIGNIFICANT}g}")
 
 
@@ -141,13 +141,6 @@ def write_range(editor: bpy.types.PropertyGroup, name: str, part: int, value: fl
     """Write the mean (0) or the variation (1) of a range of the shown order."""
     old = value_of(editor, name)
     write(editor, name, [value if i == part else rounded(number_in(old, i)) for i in (0, 1)])
-
-
-#: Items of ``leaf_form`` and ``blossom_form`` that are no built-in model.
-OBJECT_LEAF, OWN_LEAF, NO_LEAF = "OBJECT", "OWN", "NONE"
-
-# Blender keeps no copy of the strings of dynamic items, so somebody has to.
-_kept: dict[tuple[str, ...], list[tuple[str, str, str, int]]] = {}
 
 
 def _order_items(editor: bpy.types.PropertyGroup, _context: Any) -> list[tuple[str, str, str, int]]:

@@ -1,13 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Refine by itself in the window, a moment after the camera, plants or settings changed; in slices between redraws.
+"""Refine Automatically: in the window, shortly after the camera, plants or settings change, in slices between redraws.
 
-A change while it works stops it, and it begins again when nothing has changed for `QUIET` seconds. What a refinement
-depends on is digested first (`scene_digest`): where that is the same as last time, nothing is done. The results of the
-time before stay until there are new ones.
-
-Undo, loading, rendering, and operators that change results stop it too, because it holds on to datablocks that these
-take away.
+A change stops the work, which starts again after `QUIET` seconds without changes. Where the digest of everything that
+refinement depends on is the same as last time, nothing is done. Earlier results stay until there are new ones. Undo,
+loading, rendering, and operators that change results stop the work too, because it holds datablocks that they remove.
 """
 
 from __future__ import annotations
@@ -57,7 +54,7 @@ _done: dict[str, str] = {}  # digest of the results that a scene has, by its nam
 
 
 def message() -> str:
-    """What a panel says of it; empty where there is nothing to say."""
+    """Text for the panel; empty where there is nothing to report."""
     return _state.message
 
 

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Find out what viewports preview: levels of refinement when asked to, plants of few faces whenever they change.
+"""Compute what viewports preview: levels of refinement on request, simple plants whenever plants change.
 
-Without a window nobody looks: then nothing is read unasked, and nothing listens but to the loading of files.
+Without a window, plants are read only on request, and the only handlers are those for loading.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def level_steps(
 def read_shapes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Shapes | None:
     """Make the plants of a scene anew in the form that its settings say; None where they are not to be shown.
 
-    What is wrong with a plant is told by `Preview.message`, for the panel, and the plants of before stay.
+    What is wrong with a plant is reported by `Preview.message`, for the panel, and the earlier plants stay.
     """
     begin, preview, form = time.perf_counter(), of(scene), scene.tetflora.preview.plants
     preview.message, preview.objects = "", len(scene.objects)
@@ -117,7 +117,7 @@ def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
             if (own.is_plant or own.is_field) and (update.is_updated_transform or update.is_updated_geometry):
                 schedule()
                 return
-        # Deleted objects are told only by what they were in.
+        # Deleted objects are reported only as updates of what they were in.
         elif isinstance(datablock, (bpy.types.Scene, bpy.types.Collection)) and (
             preview is None or len(scene.objects) != preview.objects
         ):

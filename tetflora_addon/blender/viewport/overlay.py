@@ -2,12 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Draw previews over 3D viewports: plants, tetrahedra, the frozen camera, figures. Nothing is drawn without a window.
 
-What does not depend on the view is handed to the graphics card once and kept. Translucent tetrahedra are made anew when
-the view changes, as many of them as the last view could be made of in a moment.
-
-From arrays to what the graphics card draws: edges and translucent triangles of tetrahedra, plants, a view's pyramid.
-
-Only called while a viewport is drawn; nothing here decides what is shown.
+Batches that do not depend on the view are made once and kept. Translucent tetrahedra are made again when the view
+changes, as many as the last view could draw in a moment.
 """
 
 from __future__ import annotations
@@ -37,6 +33,12 @@ MOST_WIRES = 60_000
 _WIRE_ALPHA = 0.7
 #: Opacity under which a translucent tetrahedron is left out: less than a screen tells apart.
 _FAINT = 0.004
+#: Seconds that making translucent tetrahedra of a view may take, and how many they are at least and at most.
+_MOMENT = 0.03
+_LEAST, _MOST = 500, 20_000
+_FROZEN = (1.0, 0.75, 0.2, 1.0)
+_TEXT, _COMPLAINT = (0.95, 0.95, 0.95, 1.0), (1.0, 0.7, 0.3, 1.0)
+_handles: list[object] = []
 
 
 def batch(kind: str, positions: NDArray, colours: NDArray, indices: NDArray) -> gpu.types.GPUBatch:
@@ -121,14 +123,6 @@ def _opaque(colours: NDArray[np.float32], alpha: float) -> NDArray[np.float32]:
     return np.concatenate([colours, np.full((len(colours), 1), alpha, np.float32)], axis=1)
 
 
-#: Seconds that making translucent tetrahedra of a view may take, and how many they are at least and at most.
-_MOMENT = 0.03
-_LEAST, _MOST = 500, 20_000
-_FROZEN = (1.0, 0.75, 0.2, 1.0)
-_TEXT, _COMPLAINT = (0.95, 0.95, 0.95, 1.0), (1.0, 0.7, 0.3, 1.0)
-_handles: list[object] = []
-
-
 def view_camera(region: bpy.types.RegionView3D, near: float) -> Camera:
     """A viewport's view as the engine takes it; the size of its picture does not matter here."""
     matrix = np.array(region.view_matrix.inverted(), np.float64)
@@ -177,12 +171,8 @@ def _draw_levels(preview: Preview, settings: TetFloraPreview, space: bpy.types.S
         if made is not None:
             made.draw(shader)
     if settings.wires:
-        made = _kept(
-            preview,
-            "wires",
-            (*shown, settings.colour),
-            lambda: wires(levels, level, settings.colour, forms),
-        )
+        key = (*shown, settings.colour)
+        made = _kept(preview, "wires", key, lambda: wires(levels, level, settings.colour, forms))
         if made is not None:
             made.draw(shader)
     gpu.state.blend_set('NONE')
@@ -272,7 +262,7 @@ def _draw_figures(scene: bpy.types.Scene, preview: Preview, area: bpy.types.Area
 
 
 def _guarded(draw: Callable[[bpy.types.Context, Preview], None]) -> None:
-    """Draw what a viewport shows; an error is told once and not at every redraw."""
+    """Draw what a viewport shows; an error is printed once and not at every redraw."""
     context = bpy.context
     preview = state.find(context.scene)
     if preview is None or not context.space_data.overlay.show_overlays:

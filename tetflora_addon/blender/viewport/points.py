@@ -1,11 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Dots where the plants of the shown population would stand, in the viewport while its settings are edited.
+"""What is drawn on the ground: dots where a population's plants would stand, and the lines of a tool's cursor.
 
-Nothing is made: dots are drawn by the gpu module, belong to the session and are forgotten when a file is loaded. What
-is shown is remembered by names and arrays, for references do not outlive undo.
-
-Lines that a tool draws on the ground while it runs: the brush's circle, the plant that a click would set.
+Dots belong to the session and are forgotten when a file is loaded. The state holds names and arrays, because references
+do not outlive undo.
 """
 
 from __future__ import annotations
@@ -28,9 +26,12 @@ from ..placing.rules import awaits_update, makes_field, place_population, shown_
 from ..runtime import Handlers, call_off, call_soon, redraw
 from ..species import edits
 
+Colour = tuple[float, float, float, float]
+
+WIDTH = 2.0  # of a cursor's lines, pixels times the interface's scale
 #: Dots that are drawn at most, evenly chosen among the plants.
 MOST_DOTS = 20_000
-#: Plants that are placed at most for a preview; of more, it says so.
+#: Plants that are placed at most for a preview.
 MOST_PLACED = 200_000
 #: One after the other for the species of the mixture; linear RGB, told apart by colour-blind eyes as well
 #: (the palette of Okabe and Ito, "Color Universal Design", 2008).
@@ -44,25 +45,13 @@ _SOON = 0.08  # seconds from a change to new dots
 
 @dataclass(frozen=True)
 class Dots:
-    """What a preview shows.
+    """The dots of a population."""
 
-    Attributes
-    ----------
-    position : (n, 3) float32
-        Metres, world space.
-    colour : (n, 4) float32
-    plants : int
-        Plants that would be placed; at least, where ``more``.
-    more : bool
-    message : str
-        Why there are fewer than asked for, empty if there are not.
-    """
-
-    position: NDArray[np.float32]
-    colour: NDArray[np.float32]
-    plants: int
+    position: NDArray[np.float32]  # (n, 3), metres in world space
+    colour: NDArray[np.float32]  # (n, 4)
+    plants: int  # that would be placed; at least, where ``more``
     more: bool
-    message: str
+    message: str  # why there are fewer than asked for; empty if there are not
 
 
 @dataclass
@@ -161,10 +150,10 @@ def status(population: bpy.types.PropertyGroup) -> str:
 def complaints(population: bpy.types.PropertyGroup) -> list[str]:
     """What is wrong with a population, for the panel; reads no geometry."""
     if _state.scene is not None and population.uid == _state.uid:
-        told = _state.error or (_state.dots.message if _state.dots is not None else "")
+        text = _state.error or (_state.dots.message if _state.dots is not None else "")
     else:
-        told = population.message
-    return [told] if told else []
+        text = population.message
+    return [text] if text else []
 
 
 def _on_timer() -> None:
@@ -236,11 +225,6 @@ def unregister() -> None:
     _HANDLERS.unregister()
     edits.listeners.remove(schedule)
     properties.listeners.remove(schedule)
-
-
-Colour = tuple[float, float, float, float]
-
-WIDTH = 2.0  # pixels, times the interface's scale
 
 
 class GroundCursor:

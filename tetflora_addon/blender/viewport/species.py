@@ -48,7 +48,7 @@ def shown_in(scene: bpy.types.Scene) -> bool:
 
 
 def message() -> tuple[str, bool]:
-    """What a panel says of the preview, and whether it is a complaint."""
+    """Text for the panel, and whether it is an error."""
     return _state.message, _state.failed
 
 

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What viewports preview of each scene: levels of refinement, plants of few faces. Of this session, never of a file.
+"""What viewports preview of each scene, levels of refinement and simple plants, and the settings of the preview.
 
-What a preview in the viewport shows: settings of a scene; what is shown itself lives in the session alone.
+The settings are saved in the file; what is shown lives in the session.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ...preview.light_plants import Shapes
 from ..runtime import Listeners, redraw
 from ..scene.camera import read_camera
 
-#: What `camera_reader` reads of a camera, of its depth of field, and of the picture.
+#: What `scene.camera` reads of a camera, of its depth of field, and of the picture.
 _LENS = (
     *("type", "lens", "ortho_scale", "shift_x", "shift_y", "sensor_fit", "sensor_width", "sensor_height"),
     *("clip_start", "clip_end", "panorama_type", "longitude_min", "longitude_max", "latitude_min", "latitude_max"),
@@ -32,7 +32,7 @@ _PICTURE = (
     *("use_multiview", "use_motion_blur", "motion_blur_shutter", "motion_blur_position"),
 )
 
-#: Called when plants are to be shown in another form, without arguments; `preview_job` listens.
+#: Called when plants are to be shown in another form, without arguments; `viewport.levels` listens.
 listeners = Listeners()
 
 
@@ -162,10 +162,6 @@ def plants_wanted(scene: bpy.types.Scene) -> None:
         listeners.notify()
 
 
-#: Reached by the slider; more can be typed.
-_USUAL_LEVELS = 24
-
-
 def _redraw(_group: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
     redraw()
 
@@ -188,7 +184,7 @@ class TetFloraPreview(bpy.types.PropertyGroup):
             "last level, the last one is shown"
         ),
         min=0,
-        soft_max=_USUAL_LEVELS,
+        soft_max=24,
         max=1000,
         options=set(),
         update=_redraw,
@@ -207,7 +203,7 @@ class TetFloraPreview(bpy.types.PropertyGroup):
             (
                 'FORM',
                 "Representation",
-                "Green becomes polygons, orange proxies, blue is hidden, white will be split",
+                "Green becomes polygons, orange proxies; blue is hidden, white is split next",
                 0,
             ),
             ('LEVEL', "Level", "How often space was split: dark is rarely, bright is often", 1),
@@ -215,7 +211,7 @@ class TetFloraPreview(bpy.types.PropertyGroup):
             (
                 'CONTRIBUTION',
                 "Contribution",
-                "Number of pixels it affects in the image: dark is few, bright is many",
+                "Number of pixels that it affects: dark is few, bright is many",
                 3,
             ),
         ),
