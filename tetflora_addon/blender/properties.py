@@ -6,7 +6,7 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
 
 from . import settings
-from .placing import properties as placing_properties
+from .placing import properties
 from .results import output_properties
 from .results.forms import form_property
 from .runtime import Listeners
@@ -173,15 +173,15 @@ class TetFloraScene(RefinementProperties, AnimationProperties, bpy.types.Propert
         ),
     )
 
-    populate: PointerProperty(type=placing_properties.TetFloraPopulation)
+    populate: PointerProperty(type=properties.TetFloraPopulation)
     populations: CollectionProperty(
         name="Populations",
         description="Plants that were placed together, with the rules to place them again",
-        type=placing_properties.TetFloraPopulation,
+        type=properties.TetFloraPopulation,
     )
     populations_index: IntProperty(name="Active Population", options={'HIDDEN', 'SKIP_SAVE'})
     output: PointerProperty(type=output_properties.TetFloraOutput)
-    brush: PointerProperty(type=placing_properties.TetFloraBrush)
+    brush: PointerProperty(type=properties.TetFloraBrush)
     wind: PointerProperty(type=settings.TetFloraWind)
     preview: PointerProperty(type=state.TetFloraPreview)
     leaf_objects: CollectionProperty(
@@ -204,7 +204,7 @@ class TetFloraScene(RefinementProperties, AnimationProperties, bpy.types.Propert
     )
 
 
-_MODULES = (placing_properties, output_properties, state, editor, edits, settings)
+_MODULES = (properties, output_properties, state, editor, edits, settings)
 CLASSES = (
     *(cls for module in _MODULES for cls in module.CLASSES),
     TetFloraFieldEntry,

@@ -3,7 +3,7 @@
 """``blender scene.blend --command tetflora refine|render|stats|farm``: TetFlora for scripts and render farms.
 
 Exit codes: 0 done, 1 the scene or a file cannot be used, 2 wrong arguments. An error is one line on stderr. With
-``--json`` the last line on stdout is one JSON object; Blender's own chatter comes before it.
+``--json`` the last line on stdout is a JSON object, after Blender's own output.
 """
 
 import argparse
@@ -21,24 +21,24 @@ import bpy
 
 from ...errors import SceneError, TetFloraError
 from ..compat import EEVEE_ENGINES, eevee_engine
-from ..job import refine as job
 from ..job.contents import estimate
+from ..job.refine import refine
 from ..properties import TetFloraScene
 from ..runtime import failed_frames
 from ..saved_files import damaged, write_blend
 from ..scene.camera import read_camera
-from . import farm as farm_bundle
-from .farm_template import MOST_FRAME, Run, frame_numbers, frame_runs
+from .farm import write_bundle
+from .farm_template import LAST_FRAME, Run, frame_numbers, frame_runs
 
 NAME = "tetflora"
-#: Most samples that Cycles takes.
-_MOST = 1 << 24
+#: Largest number of samples in Cycles.
+_MAX = 1 << 24
 
 _command: Any = None
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line, as all other errors are said."""
+    """Reports errors in one line, like all others."""
 
     def error(self, message: str) -> None:
         raise SystemExit(_fail(f"{message}; see --help", 2))
@@ -67,7 +67,7 @@ def main(arguments: Sequence[str]) -> int:
     except (TetFloraError, OSError) as error:
         return _fail(str(error), 1)
     except RuntimeError as error:
-        # Blender's operators say "Error: ..." and more, on several lines.
+        # Blender's operators raise "Error: ...", over several lines.
         return _fail(" ".join(str(error).split()).removeprefix("Error: "), 1)
     if figures is None:
         return 1
@@ -76,7 +76,7 @@ def main(arguments: Sequence[str]) -> int:
             print(json.dumps(figures), flush=True)
         else:
             for key, value in figures.items():
-                if key != "steps":  # a line of a dozen figures for each pass: for programs
+                if key != "steps":  # a dozen figures for each pass, for programs
                     print(f"{key.replace('_', ' '):>22}: {_readable(value)}", flush=True)
     except OSError as error:  # into a file on a full disk, or into a program that has ended
         return _fail(f"cannot print the statistics: {error.strerror}", 1)
@@ -90,10 +90,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     commands = parser.add_subparsers(title="commands", required=True, metavar="refine|render|stats|farm")
 
-    refine = commands.add_parser("refine", help="create meshes of the plants for the scene camera")
-    refine.add_argument("--cutoff", type=_positive, metavar="PIXELS", help="override the Cutoff of the scene")
-    refine.add_argument("--save", metavar="PATH", help="save a copy of the file with the results")
-    refine.set_defaults(run=_refine)
+    refining = commands.add_parser("refine", help="create meshes of the plants for the scene camera")
+    refining.add_argument("--cutoff", type=_positive, metavar="PIXELS", help="override the Cutoff of the scene")
+    refining.add_argument("--save", metavar="PATH", help="save a copy of the file with the results")
+    refining.set_defaults(run=_refine)
 
     render = commands.add_parser("render", help="refine and render frames")
     which = render.add_mutually_exclusive_group()
@@ -118,11 +118,11 @@ def _parser() -> argparse.ArgumentParser:
     farm.add_argument("--copy", action="store_true", help="copy the file and its assets into the job")
     farm.set_defaults(run=_farm)
 
-    for command in (refine, render):
+    for command in (refining, render):
         command.add_argument("--form", choices=_choices("proxy_form"), help="override the proxy form of the scene")
         about = "override the Lighting of the scene"
         command.add_argument("--baked-light", choices=_choices("baked_light"), help=about)
-    for command in (refine, render, stats, farm):
+    for command in (refining, render, stats, farm):
         command.add_argument("--json", action="store_true", help="print statistics as a JSON object in the last line")
     return parser
 
@@ -135,15 +135,15 @@ def _refine(options: argparse.Namespace) -> dict:
     target = None if options.save is None else _named(options.save)
     if target is not None:
         _check_target(target)
-    statistics = job.refine(scene, bpy.context.evaluated_depsgraph_get(), view_layer=bpy.context.view_layer)
+    statistics = refine(scene, bpy.context.evaluated_depsgraph_get(), view_layer=bpy.context.view_layer)
     if target is not None:
-        scene.tetflora.output.save_results = True  # that is what was asked for
+        scene.tetflora.output.save_results = True
         write_blend(target, lambda path: bpy.ops.wm.save_as_mainfile(filepath=path, copy=True))
     return asdict(statistics)
 
 
 def _check_target(path: Path) -> None:
-    """Say before the work what would be said after it."""
+    """Refuse a path that cannot be written, before the work."""
     if not path.parent.is_dir():
         raise SceneError(f"The folder {path.parent} does not exist; create it or choose another")
     if path.is_dir():
@@ -185,7 +185,7 @@ def _render(options: argparse.Namespace) -> dict | None:
     for path in damaged(scene, paths):
         raise SceneError(f"{path} is incomplete; check the free disk space")
     if not whole:
-        return None  # said on stderr when it happened
+        return None  # reported on stderr before
     return {"files": list(map(str, paths)), **json.loads(scene.tetflora.statistics or "{}")}
 
 
@@ -195,7 +195,7 @@ def _stats(_options: argparse.Namespace) -> dict:
 
 
 def _farm(options: argparse.Namespace) -> dict:
-    written = farm_bundle.write_bundle(bpy.context.scene, options.folder, options.chunk, options.frames, options.copy)
+    written = write_bundle(bpy.context.scene, options.folder, options.chunk, options.frames, options.copy)
     for path in written["missing"]:
         print(f"tetflora: warning: missing file: {path}", file=sys.stderr, flush=True)
     for path in written["absolute_paths"]:
@@ -205,7 +205,7 @@ def _farm(options: argparse.Namespace) -> dict:
 
 
 def _check_file() -> None:
-    """Refuse to go on where Blender could not open the file: it does, with a cube, whose pictures pass for the film's.
+    """Refuse to go on where Blender could not open the file, and would render its default cube instead.
 
     Raises
     ------
@@ -221,7 +221,7 @@ def _animation(scene: bpy.types.Scene, run: Run) -> tuple[list[str], bool]:
     """Render a run of frames: its files, and whether all of them have their plants."""
     first, last, step = run
     stills = []
-    while first <= min(last, -1):  # no range of Blender's begins below 0
+    while first <= min(last, -1):  # Blender's range of frames cannot begin below 0
         scene.frame_set(first)
         stills.append(_still(scene, scene.render.frame_path(frame=first)))
         first += step
@@ -244,12 +244,12 @@ def _still(scene: bpy.types.Scene, path: str) -> tuple[str, bool]:
 
 
 def _named(text: str) -> Path:
-    """A place as the command line names it; Blender's own // leads from the .blend."""
+    """Absolute path of an argument; // is relative to the .blend."""
     return Path(bpy.path.abspath(text)).absolute()
 
 
 def _place(text: str) -> str:
-    """Where pictures go, as Blender wants it: a folder ends with a slash."""
+    """Output path of a render; Blender needs a slash at the end of a folder."""
     path = _named(text)
     return f"{path}{os.sep}" if text.endswith(("/", os.sep)) or path.is_dir() else str(path)
 
@@ -257,7 +257,7 @@ def _place(text: str) -> str:
 def _still_path(scene: bpy.types.Scene) -> str:
     folder, name = os.path.split(bpy.path.abspath(scene.render.filepath))
     frame = scene.frame_current
-    # In a folder pictures are named by their frames, as in animations.
+    # In a folder, the name of an image is its frame, as in animations.
     return os.path.join(folder, re.sub(r"#+", lambda match: f"{frame:0{len(match.group())}d}", name or "####"))
 
 
@@ -281,15 +281,15 @@ def _positive(text: str) -> float:
 
 def _whole(text: str) -> int:
     value = int(text)
-    if not 1 <= value <= _MOST:
-        raise argparse.ArgumentTypeError(f"{text} is not a number from 1 to {_MOST:,}")
+    if not 1 <= value <= _MAX:
+        raise argparse.ArgumentTypeError(f"{text} is not a number from 1 to {_MAX:,}")
     return value
 
 
 def _frame(text: str) -> int:
     value = int(text)
-    if abs(value) > MOST_FRAME:
-        raise argparse.ArgumentTypeError(f"{text} exceeds the last frame that Blender supports, {MOST_FRAME:,}")
+    if abs(value) > LAST_FRAME:
+        raise argparse.ArgumentTypeError(f"{text} exceeds the last frame that Blender supports, {LAST_FRAME:,}")
     return value
 
 
@@ -316,13 +316,13 @@ def _fail(message: str, code: int) -> int:
 
 
 def register() -> None:
-    """Make ``--command tetflora`` known."""
+    """Register ``--command tetflora``."""
     global _command
     _command = bpy.utils.register_cli_command(NAME, main)
 
 
 def unregister() -> None:
-    """Take the command back; 4.5 hangs at exit if it stays."""
+    """Remove the command; 4.5 hangs at exit otherwise."""
     global _command
     bpy.utils.unregister_cli_command(_command)
     _command = None

@@ -1,11 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``--command tetflora farm``: the open file as a job bundle that any scheduler of Open Job Description can run.
+"""``--command tetflora farm``: the open file as a job bundle for schedulers of Open Job Description.
 
-A bundle is a folder: the three texts of `farm_template`, a folder with the extension's zip, its installer and the
-user's own species, and, if asked for, a copy of the .blend with the files that it uses. Files keep their places
-relative to each other, so that paths that begin with // lead to them unchanged, in linked libraries as well. The open
-file is only read.
+A bundle is a folder with the three files of `farm_template`, a folder with the extension's zip, its installer and the
+user's own species, and optionally a copy of the .blend with its assets. Copies keep their relative places, so that
+paths that begin with // stay valid, in linked libraries as well. The open file is only read.
 """
 
 from __future__ import annotations
@@ -35,9 +34,9 @@ from .farm_template import Run
 #: Root of the extension as it is installed, or of the source tree.
 EXTENSION = Path(__file__).resolve().parents[3]
 MANIFEST = "blender_manifest.toml"
-#: What Blender leaves out of an extension whose manifest does not say.
+#: What Blender excludes from an extension by default.
 _LEFT_OUT = ("__pycache__/", ".*", "/*.zip")
-#: A zip of the same files is the same zip.
+#: Of all files in the zip, so that equal files give equal zips.
 _DATE = (1980, 1, 1, 0, 0, 0)
 
 
@@ -48,12 +47,10 @@ class Assets:
     Attributes
     ----------
     files, folders : tuple of Path
-        Those that are there.
+        Existing ones.
     missing : tuple of Path
-        Those that are not.
     absolute : tuple of str
-        Paths that do not begin with //, as the file has them: they only lead anywhere on machines that see the same
-        drives.
+        Paths in the file that do not begin with //: they are valid only on machines with the same drives.
     """
 
     files: tuple[Path, ...]
@@ -72,13 +69,13 @@ def write_bundle(
     scene : Scene
         The scene that the .blend opens with.
     folder : Path
-        Made if it is not there; it has to be empty.
+        New or empty.
     chunk : int
-        Most frames that one worker renders in one go.
+        Frames that a worker renders per task.
     runs : list of tuple, optional
-        First, last and step of frames; the scene's own if not given.
+        First, last and step of frames; by default the scene's.
     copy : bool
-        Copy the .blend and what it uses into the bundle, instead of naming their places.
+        Copy the .blend and its assets into the bundle instead of referring to them.
 
     Returns
     -------
@@ -88,10 +85,9 @@ def write_bundle(
     Raises
     ------
     SceneError
-        The scene cannot be rendered by a farm, or the folder cannot be used or written; in the latter case what was
-        written is taken away again.
+        A farm cannot render the scene, or the folder cannot be used or written; nothing is left in it then.
     TetFloraError
-        Its plants could not be made.
+        The plants cannot be made.
     """
     blend = _saved_file()
     _check_output(scene)
@@ -137,7 +133,7 @@ def write_bundle(
 
 
 def used_files(blend: Path) -> Assets:
-    """Images, libraries, caches, sounds and fonts on disk that the open file uses, packed ones left out."""
+    """Images, libraries, caches, sounds and fonts on disk that the open file uses, except packed ones."""
     written = bpy.utils.blend_paths(absolute=False, packed=False, local=False)
     paths = bpy.utils.blend_paths(absolute=True, packed=False, local=False)
     files: set[Path] = set()
@@ -162,12 +158,12 @@ def used_files(blend: Path) -> Assets:
 
 
 def write_zip(target: Path, root: Path = EXTENSION) -> None:
-    """Pack an installed extension as Blender's own build does; its manifest says what stays out.
+    """Pack an installed extension as Blender's own build does, with the exclusions of its manifest.
 
     Raises
     ------
     SceneError
-        The folder is no extension.
+        The folder is not an extension.
     """
     names = extension_files(root)
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -191,7 +187,7 @@ def extension_files(root: Path = EXTENSION) -> list[str]:
 
 
 def _left_out(name: str, patterns: tuple[str, ...], folder: bool) -> bool:
-    """Whether a pattern in the manner of .gitignore fits: a slash in front ties to the root, one behind to folders."""
+    """Whether a pattern matches as in .gitignore: a leading slash means the root, a trailing one folders."""
     for pattern in patterns:
         if pattern.endswith("/") and not folder:
             continue
@@ -228,7 +224,7 @@ def _check_output(scene: bpy.types.Scene) -> None:
 
 
 def _plants(scene: bpy.types.Scene) -> int:
-    """How many there are; an unknown species is found now, not by each worker."""
+    """Number of plants; finds unknown species now instead of on each worker."""
     try:
         return estimate(scene, bpy.context.evaluated_depsgraph_get()).plants
     except NoPlantsError:
@@ -236,12 +232,11 @@ def _plants(scene: bpy.types.Scene) -> int:
 
 
 def _empty_folder(folder: Path) -> bool:
-    """Make sure that the folder is there, empty and writable; whether it was made."""
-    made = False
+    """Make sure that the folder exists, is empty and writable; returns whether it was made."""
     try:
-        if not folder.exists():
+        made = not folder.exists()
+        if made:
             folder.mkdir(parents=True)
-            made = True
         if not folder.is_dir():
             raise SceneError(f"{folder} is a file; choose a folder for the job")
         if any(folder.iterdir()):
@@ -255,7 +250,7 @@ def _empty_folder(folder: Path) -> bool:
 
 
 def _reason(error: OSError) -> str:
-    """Why a file could not be written or copied; where many could not, why the first."""
+    """Why a file, or the first of several, could not be written or copied."""
     if isinstance(error, shutil.Error):
         source, _, why = error.args[0][0]
         return f"{source}: {why}"
@@ -284,7 +279,7 @@ def _write_files(folder: Path) -> None:
 
 
 def _places(blend: Path, assets: Assets) -> dict[Path, Path]:
-    """Where each file goes within the bundle: as they lie to each other."""
+    """Place of each file in the bundle, with the same relative paths."""
     everything = (blend, *assets.files, *assets.folders)
     drives = {path.drive: path for path in reversed(everything)}
     if len(drives) > 1:
@@ -313,7 +308,7 @@ def _files_of(path: Path) -> Iterator[Path]:
 
 
 def _sequence(path: Path) -> Iterator[Path]:
-    """All pictures of the sequence that one picture is of: names that differ in the last number."""
+    """All images of a sequence: names that differ from that of one image in the last number."""
     match = re.fullmatch(r"(.*?)(\d+)(\D*)", path.name)
     if match is None or not path.parent.is_dir():
         return

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Installs TetFlora on a worker of a farm; `farm_bundle` copies this file into each job beside the extension's zip.
+"""Installs TetFlora on a worker of a farm; `farm` copies this file into each job, beside the extension's zip.
 
     BLENDER_USER_RESOURCES=/new/folder blender --background --python-exit-code 1 --python install_tetflora.py
 
-Nothing of the extension is imported: it is not installed yet. The folder named by the variable belongs to the job, so
-that a worker's own add-ons and preferences are neither used nor changed.
+It imports nothing of the extension, which is not installed yet. The folder in the variable belongs to the job, so that
+the worker's own add-ons and preferences are neither used nor changed.
 """
 
 import os
@@ -17,12 +17,12 @@ import bpy
 
 REPOSITORY = "user_default"
 PACKAGE = f"bl_ext.{REPOSITORY}.tetflora"
-#: Ways to a graphics card, the fastest first.
+#: Devices of Cycles, the fastest first.
 GRAPHICS = ('OPTIX', 'CUDA', 'HIP', 'ONEAPI', 'METAL')
 
 
 def install(folder: Path) -> None:
-    """Install the zip of a folder, and the species beside it; exits with a message if that is not possible."""
+    """Install the zip of a folder, and the species beside it, or exit with a message."""
     home = os.environ.get("BLENDER_USER_RESOURCES")
     if not home:
         sys.exit("tetflora: error: BLENDER_USER_RESOURCES is not set; set it to a folder of this job and run again")
@@ -44,7 +44,7 @@ def install(folder: Path) -> None:
 
 
 def _choose_graphics_cards() -> None:
-    """Let Cycles use them in scenes that ask for them: in new settings no device is chosen, and it would use none."""
+    """Enable graphics cards in new preferences, so that Cycles uses them in scenes set to GPU Compute."""
     cycles = bpy.context.preferences.addons.get("cycles")
     if cycles is None:
         return

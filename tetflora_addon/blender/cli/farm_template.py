@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The text of a job for a render farm: Open Job Description, jobtemplate-2023-09, and what frames it is about.
+"""The files of a job for a render farm (Open Job Description, jobtemplate-2023-09), and expressions of frames.
 
 Source: Open Job Description, "Template Schemas 2023-09" and its extension TASK_CHUNKING
 (github.com/OpenJobDescription/openjd-specifications). The two files beside the template are those of a job bundle of
-AWS Deadline Cloud. All are JSON, which the specification takes as well as YAML; Blender's Python writes no YAML.
+AWS Deadline Cloud. All are JSON, which the specification allows; Blender's Python cannot write YAML.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from typing import Any
 
 from ...errors import SceneError
 
-#: Folder of the bundle that holds what a worker needs besides Blender and the scene.
+#: Folder of the bundle with everything that a worker needs besides Blender and the scene.
 FILES = "tetflora"
 #: Script in it that installs the extension.
 INSTALLER = "install_tetflora.py"
-#: Folder of the bundle that the scene and what it uses are copied to.
+#: Folder of the bundle with copies of the scene and its assets.
 SCENE_FOLDER = "scene"
 OUTPUT_FOLDER = "output"
 STEP = "Render"
@@ -28,8 +28,8 @@ STEP = "Render"
 #: First, last and step of frames.
 Run = tuple[int, int, int]
 
-#: Last frame that Blender has.
-MOST_FRAME = 1_048_574
+#: Last frame in Blender.
+LAST_FRAME = 1_048_574
 
 _RUN = re.compile(r"(-?\d+)(?:-(-?\d+)(?::(\d+))?)?")
 _LONGEST_NAME = 128
@@ -37,7 +37,7 @@ _LONGEST_NAME = 128
 
 @dataclass(frozen=True)
 class Job:
-    """What a template is filled with.
+    """Values of a job's template.
 
     Attributes
     ----------
@@ -46,9 +46,9 @@ class Job:
     frames : str
         Range expression, see `frame_runs`.
     chunk : int
-        Most frames that one worker renders in one go.
-    picture_name : str
-        File name of the pictures; ``####`` is the frame.
+        Frames that a worker renders per task.
+    image_name : str
+        File name of the images; ``####`` is the frame.
     scene : str or None
         The .blend within the bundle, relative and with slashes; None if it stays where it is.
     """
@@ -56,7 +56,7 @@ class Job:
     name: str
     frames: str
     chunk: int
-    picture_name: str
+    image_name: str
     scene: str | None
 
 
@@ -66,17 +66,17 @@ def frame_runs(text: str) -> list[Run]:
     Parameters
     ----------
     text : str
-        As the specification has it (section 3.4.1.1.1), without negative steps.
+        As in the specification (section 3.4.1.1.1), without negative steps.
 
     Returns
     -------
     list of tuple
-        First, last and step, in the order in which they are written; the last is a frame of its run.
+        First, last and step, in the order of the text; the last is a frame of its run.
 
     Raises
     ------
     ValueError
-        It is no such expression, a range runs backwards, or Blender has no such frame.
+        Another expression, a range that runs backwards, or a frame that Blender does not have.
     """
     runs = []
     for part in text.split(","):
@@ -88,24 +88,24 @@ def frame_runs(text: str) -> list[Run]:
         step = int(match[3] or 1)
         if last < first or step < 1:
             raise ValueError(f"{text} is not a range of frames such as 1-24, 7 or 1-99:2")
-        if max(-first, last) > MOST_FRAME:
-            raise ValueError(f"{text} exceeds the last frame that Blender supports, {MOST_FRAME:,}")
+        if max(-first, last) > LAST_FRAME:
+            raise ValueError(f"{text} exceeds the last frame that Blender supports, {LAST_FRAME:,}")
         runs.append((first, last - (last - first) % step, step))
     return runs
 
 
 def frame_numbers(runs: Sequence[Run]) -> list[int]:
-    """All frames of runs, as often as they are named."""
+    """All frames of runs, repeated ones included."""
     return [frame for first, last, step in runs for frame in range(first, last + 1, step)]
 
 
 def frame_expression(runs: Sequence[Run]) -> str:
-    """The opposite of `frame_runs`: the shortest expression of each run, no frame twice.
+    """The opposite of `frame_runs`: the shortest expression of each run.
 
     Raises
     ------
     SceneError
-        There is no frame, or one is in two runs: OpenJD makes a task of a frame once.
+        There is no frame, or one is in two runs, which OpenJD does not allow.
     """
     numbers = frame_numbers(runs)
     if not numbers:
@@ -121,7 +121,7 @@ def frame_expression(runs: Sequence[Run]) -> str:
 
 
 def job_name(stem: str) -> str:
-    """A name that a template may hold: braces would be read as a variable, control characters are refused."""
+    """A valid name: without double braces, which are variables, and control characters, which are invalid."""
     text = re.sub(r"\{\{|\}\}|[\x00-\x1f\x7f-\x9f]", " ", stem).strip()
     return f"{text or 'scene'} (TetFlora)"[:_LONGEST_NAME]
 
@@ -129,15 +129,15 @@ def job_name(stem: str) -> str:
 def template(job: Job) -> dict[str, Any]:
     """The job template.
 
-    Its one environment gives Blender a folder of resources of its own inside the session and installs the extension
-    there: neither the worker's own add-ons nor its preferences are read or changed. Each task is one Blender. Chunks
-    need the extension TASK_CHUNKING of the specification, so that a job of single frames does without.
+    Its environment gives Blender a folder of resources inside the session and installs the extension there: the
+    worker's own add-ons and preferences are neither read nor changed. Each task is one Blender. Only chunks need the
+    extension TASK_CHUNKING of the specification.
     """
     chunked = job.chunk > 1
     frame: dict[str, Any] = {"name": "Frame", "type": "INT", "range": "{{Param.Frames}}"}
     if chunked:
         frame["type"] = "CHUNK[INT]"
-        # Frames of a step, or left out by hand, would come one by one if chunks had to be without gaps.
+        # Contiguous chunks would be single frames where the range has a step or gaps.
         frame["chunks"] = {"defaultTaskCount": "{{Param.ChunkSize}}", "rangeConstraint": "NONCONTIGUOUS"}
     installer = f"{{{{Param.TetFloraFiles}}}}/{INSTALLER}"
     install = ["--background", "--python-exit-code", "1", "--python", installer]
@@ -170,7 +170,7 @@ def _parameters(job: Job) -> list[dict[str, Any]]:
     scene["description"] = "The .blend file"
     copied = []
     if job.scene is not None:
-        # The default of a path is relative to the bundle; absolute ones are refused.
+        # The default of a path is relative to the bundle; absolute ones are invalid.
         scene["default"] = f"{SCENE_FOLDER}/{job.scene}"
         about = "The scene and the files that it uses; listed so that everything is transferred"
         copied.append(_folder("SceneFolder", SCENE_FOLDER, "IN", about))
@@ -184,7 +184,7 @@ def _parameters(job: Job) -> list[dict[str, Any]]:
         {
             "name": "OutputName",
             "type": "STRING",
-            "default": job.picture_name,
+            "default": job.image_name,
             "description": "File name of the images; #### is the frame",
         },
         {"name": "Blender", "type": "STRING", "default": "blender", "description": "Command that starts Blender"},
@@ -205,11 +205,11 @@ def _folder(name: str, default: str, flow: str, about: str) -> dict[str, Any]:
 
 
 def parameter_values(scene: str | None) -> dict[str, Any]:
-    """Values that the template has no default for: the .blend, if it stays where it is."""
+    """Values without a default in the template: the .blend, if it is not copied."""
     return {"parameterValues": [] if scene is None else [{"name": "SceneFile", "value": scene}]}
 
 
 def asset_references(files: Sequence[str], folders: Sequence[str]) -> dict[str, Any]:
-    """Files and folders outside of the bundle that Deadline Cloud's job attachments bring to the workers."""
+    """Files and folders outside of the bundle that Deadline Cloud transfers to the workers."""
     inputs = {"filenames": list(files), "directories": list(folders)}
     return {"assetReferences": {"inputs": inputs, "outputs": {"directories": []}, "referencedPaths": []}}
