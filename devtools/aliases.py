@@ -5,7 +5,7 @@
     from devtools.aliases import INSTALLED, alias
 
     alias(INSTALLED)
-    from tetflora_addon.blender import job  # is bl_ext.user_default.tetflora.tetflora_addon.blender.job
+    from tetflora_addon.blender.job import refine  # is bl_ext.user_default.tetflora.tetflora_addon.blender.job.refine
 
 Scripts can then import the extension's modules by statements that editors and rename tools understand, and still get
 the modules that Blender uses instead of second copies of them.

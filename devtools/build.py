@@ -3,7 +3,7 @@
 """Build the extension's zip with Blender's own tool: ``python -m devtools.build [FOLDER]`` (default ``dist``).
 
 The manifest is validated against Blender's list of tags first, and the zip that came out is validated once more.
-Neither step starts Blender: its extension tool, which lies in the bpy wheel, is a script that runs by itself.
+Neither step starts Blender: its extension tool, part of the bpy wheel, is a separate script.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def validate(target: Path) -> None:
     Raises
     ------
     RuntimeError
-        It is not valid; the message holds what Blender's tool said.
+        It is not valid; the message is that of Blender's tool.
     """
     tags = _bundled("*/scripts/modules/_bpy_internal/extensions/tags.py")
     _tool("validate", f"--valid-tags={tags}", target)
@@ -62,7 +62,7 @@ def build(folder: Path) -> Path:
     Raises
     ------
     RuntimeError
-        Blender's tool refused something; the message holds what it said.
+        Blender's tool reported an error, which is the message.
     """
     folder.mkdir(parents=True, exist_ok=True)
     about = manifest()

@@ -61,8 +61,8 @@ def make_inside(blender: str, folder: Path) -> None:
     """
     ask = "import sys; print('python is', '%d.%d' % sys.version_info[:2])"
     command = [blender, "-b", "--factory-startup", "--python-expr", ask]
-    said = subprocess.run(command, check=True, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True).stdout
-    version = next(line.split()[-1] for line in said.splitlines() if line.startswith("python is"))
+    output = subprocess.run(command, check=True, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True).stdout
+    version = next(line.split()[-1] for line in output.splitlines() if line.startswith("python is"))
     stamp = folder / ".ready"
     wanted = " ".join([version, *INSIDE])
     if stamp.exists() and stamp.read_text(encoding="utf-8") == wanted:

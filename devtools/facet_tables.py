@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Make the table of facets' shares for the shipped species: ``python -m devtools.facet_tables``."""
+"""Make the table of facet weights of the shipped species: ``python -m devtools.facet_tables``."""
 
 from __future__ import annotations
 

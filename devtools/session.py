@@ -9,8 +9,9 @@
     session.stop()               # disables it; also runs by itself at exit
 
 The modules that Blender uses are ``bl_ext.tetflora_dev.tetflora.*``. From `start` to `stop`, ``tetflora_addon``,
-``operators`` and ``panels`` are other names of the same modules, so ``from tetflora_addon.blender import job`` imports
-what Blender runs. Without a session these names mean the files at the root of the repository; a process uses either.
+``operators`` and ``panels`` are other names of the same modules, so ``from tetflora_addon.blender.job import refine``
+imports what Blender runs. Without a session these names mean the files at the root of the repository; a process uses
+either.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ PANELS = {
     "brush": ("TETFLORA_PT_brush",),
     "refinement": ("TETFLORA_PT_refine", "TETFLORA_PT_proxies", "TETFLORA_PT_visibility", "TETFLORA_PT_limits"),
     "wind": ("TETFLORA_PT_wind",),
-    "films": ("TETFLORA_PT_refine", "TETFLORA_PT_films", "TETFLORA_PT_leaf_objects"),
+    "animation": ("TETFLORA_PT_refine", "TETFLORA_PT_films", "TETFLORA_PT_leaf_objects"),
     "output": ("TETFLORA_PT_output", "TETFLORA_PT_ray_visibility", "TETFLORA_PT_passes"),
     "preview": ("TETFLORA_PT_preview",),
     "statistics": ("TETFLORA_PT_statistics",),
@@ -153,9 +153,9 @@ def _hill(scene: Any) -> None:
     camera.data.clip_end = 1000.0
     settings = scene.tetflora.populate
     settings.count, settings.min_distance = 60, 4.0
-    for species, share in (("broadleaf_tree", 2.0), ("conifer", 1.0), ("bush", 2.0)):
+    for species, weight in (("broadleaf_tree", 2.0), ("conifer", 1.0), ("bush", 2.0)):
         entry = settings.mix.add()
-        entry.species, entry.weight = species, share
+        entry.species, entry.weight = species, weight
 
 
 def _register_open(panels: list[Any]) -> list[Any]:

@@ -3,7 +3,7 @@
 """``blender -b file -a`` over ten frames of a moving camera: each frame is the frame rendered alone.
 
 Frames 1, 5 and 10 are rendered alone, each by a Blender of its own: the first, one in between, and the last. Their
-pixels are those of the film, to the last bit of the file; with persistent data as without, and with motion blur.
+pixels are those of the animation, to the last bit of the file; with persistent data as without, and with motion blur.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ ALONE = (1, 5, 10)
 MOST_DIFFERENCE = 0
 
 
-def film(path: Path, persistent: bool = False, blur: bool = False) -> Path:
+def animation(path: Path, persistent: bool = False, blur: bool = False) -> Path:
     """Save a scene of three plants and a camera that passes them."""
     session.clean_file()
     scene = bpy.context.scene
@@ -73,12 +73,12 @@ def pixels(folder: Path, frame: int) -> np.ndarray:
 @pytest.mark.parametrize(
     ("persistent", "blur"), [(False, False), (True, False), (False, True)], ids=["plain", "persistent data", "blur"]
 )
-def test_each_frame_of_a_film_is_the_frame_alone(
+def test_each_frame_of_a_animation_is_the_frame_alone(
     blender: object, run: Run, tmp_path: Path, persistent: bool, blur: bool
 ) -> None:
-    path = film(tmp_path / "film.blend", persistent, blur)
-    rendered(run, path, tmp_path / "film", "-a")
-    whole = [pixels(tmp_path / "film", n) for n in range(1, FRAMES + 1)]
+    path = animation(tmp_path / "animation.blend", persistent, blur)
+    rendered(run, path, tmp_path / "animation", "-a")
+    whole = [pixels(tmp_path / "animation", n) for n in range(1, FRAMES + 1)]
     for n in ALONE:
         rendered(run, path, tmp_path / "alone", "-f", n)
     differences = {n: int(np.abs(pixels(tmp_path / "alone", n) - whole[n - 1]).max()) for n in ALONE}

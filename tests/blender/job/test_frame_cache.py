@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames of a film share their results, and each of them is the frame alone."""
+"""Frames of an animation share their results, and each of them is the frame alone."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FRAMES = 12
 
 
 @pytest.fixture
-def film(clean_file):
+def animation(clean_file):
     """Two bushes and a camera that walks past them, 12 frames in which it goes through several cells."""
     scene = bpy.context.scene
     scene.render.resolution_x, scene.render.resolution_y = 64, 36
@@ -83,68 +83,68 @@ def alone(scene, frame):
     return found
 
 
-def test_neighbouring_frames_share_and_each_is_the_frame_alone(film, made):
-    sequence = {n: at(film, n) for n in range(1, FRAMES + 1)}
+def test_neighbouring_frames_share_and_each_is_the_frame_alone(animation, made):
+    sequence = {n: at(animation, n) for n in range(1, FRAMES + 1)}
     cells = len({name for name, _ in sequence.values()})
     assert made[0] == 1
     assert 2 <= cells == len(made) <= FRAMES // 2
     order = list(range(1, FRAMES + 1))
     random.Random(5).shuffle(order)
-    again = {n: at(film, n) for n in order}
+    again = {n: at(animation, n) for n in order}
     assert again == sequence
-    assert {n: alone(film, n) for n in order} == sequence
+    assert {n: alone(animation, n) for n in order} == sequence
 
 
-def test_what_is_seen_again_comes_back_without_being_made_again(film, made):
-    first = at(film, 1)
-    at(film, FRAMES)
+def test_what_is_seen_again_comes_back_without_being_made_again(animation, made):
+    first = at(animation, 1)
+    at(animation, FRAMES)
     count = len(made)
-    assert at(film, 1) == first
+    assert at(animation, 1) == first
     assert len(made) == count
 
 
-def test_without_memory_only_the_frame_itself_is_there_and_comes_back_identical(film, made):
-    film.tetflora.kept_memory = 0.0
-    first = at(film, 1)
+def test_without_memory_only_the_frame_itself_is_there_and_comes_back_identical(animation, made):
+    animation.tetflora.kept_memory = 0.0
+    first = at(animation, 1)
     before = {kind: len(names) for kind, names in datablocks().items()}
     for n in (FRAMES, 1, FRAMES):
-        at(film, n)
+        at(animation, n)
     assert {kind: len(names) for kind, names in datablocks().items()}["collections"] == before["collections"]
     assert len(made) == 4
-    assert at(film, 1) == first
+    assert at(animation, 1) == first
 
 
-def test_what_was_not_seen_for_longest_goes_first(film, made):
+def test_what_was_not_seen_for_longest_goes_first(animation, made):
     sizes = []
     for n in (1, FRAMES // 2, FRAMES):
-        at(film, n)
+        at(animation, n)
         sizes.append(sum(entry.megabytes for entry in frame_cache._entries.values()))
-    render.on_render_end(film)
+    render.on_render_end(animation)
     made.clear()
-    film.tetflora.kept_memory = (sizes[-1] - sizes[0] / 2.0) / 1e3  # room for two of three
+    animation.tetflora.kept_memory = (sizes[-1] - sizes[0] / 2.0) / 1e3  # room for two of three
     for n in (1, FRAMES // 2, 1, FRAMES):  # the one in the middle is the oldest now
-        at(film, n)
+        at(animation, n)
     assert made == [1, FRAMES // 2, FRAMES]
-    at(film, 1)
+    at(animation, 1)
     assert made == [1, FRAMES // 2, FRAMES]
-    at(film, FRAMES // 2)
+    at(animation, FRAMES // 2)
     assert made[3:] == [FRAMES // 2]
 
 
-def test_nothing_is_left_when_the_render_ends(film):
+def test_nothing_is_left_when_the_render_ends(animation):
     before = datablocks()
     for n in range(1, FRAMES + 1):
-        at(film, n)
-    render.on_render_end(film)
+        at(animation, n)
+    render.on_render_end(animation)
     assert datablocks() == before
     assert frame_cache._entries == {}
 
 
-def test_nothing_that_is_kept_goes_into_a_file(film, tmp_path):
-    at(film, 1)
-    at(film, FRAMES)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "film.blend"), copy=True)
-    with bpy.data.libraries.load(str(tmp_path / "film.blend")) as (inside, _):
+def test_nothing_that_is_kept_goes_into_a_file(animation, tmp_path):
+    at(animation, 1)
+    at(animation, FRAMES)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "animation.blend"), copy=True)
+    with bpy.data.libraries.load(str(tmp_path / "animation.blend")) as (inside, _):
         assert not [name for name in (*inside.collections, *inside.meshes) if "TetFlora" in name or "leaf" in name]
 
 
@@ -152,123 +152,123 @@ def test_nothing_that_is_kept_goes_into_a_file(film, tmp_path):
     "change",
     ["plant", "seed", "lens", "settings", "terrain", "camera", "species", "form", "material", "pass index", "engine"],
 )
-def test_what_changes_is_noticed(film, made, change):
+def test_what_changes_is_noticed(animation, made, change):
     ground = add_mesh("ground", size=20.0)
     ground.tetflora.is_occluder = True
-    film.tetflora.output.species.add().species = "fern"
+    animation.tetflora.output.species.add().species = "fern"
     depsgraph()
-    at(film, 1)
-    at(film, 1)
+    at(animation, 1)
+    at(animation, 1)
     assert made == [1]
     if change == "plant":
         bpy.data.objects["one"].location.x += 0.01
     elif change == "seed":
         bpy.data.objects["one"].tetflora.seed += 1
     elif change == "lens":
-        film.camera.data.lens *= 1.5
+        animation.camera.data.lens *= 1.5
     elif change == "settings":
-        film.tetflora.facet *= 2.0
+        animation.tetflora.facet *= 2.0
     elif change == "terrain":
         ground.data.vertices[0].co.z += 0.5
         ground.data.update()
     elif change == "camera":  # a cut
-        other = bpy.data.objects.new("other", film.camera.data)
-        film.collection.objects.link(other)
+        other = bpy.data.objects.new("other", animation.camera.data)
+        animation.collection.objects.link(other)
         other.location, other.rotation_euler = (0.0, 12.0, 1.0), (np.pi / 2, 0.0, np.pi)
-        film.camera = other
+        animation.camera = other
     elif change == "species":
         bpy.data.objects["one"].tetflora.species = "fern"
     elif change == "form":
-        film.tetflora.proxy_form = 'MICROSPHERES'
+        animation.tetflora.proxy_form = 'MICROSPHERES'
     elif change == "material":
-        film.tetflora.output.species.add().species = "bush"
-        film.tetflora.output.species[1].leaf = bpy.data.materials.new("mine")
+        animation.tetflora.output.species.add().species = "bush"
+        animation.tetflora.output.species[1].leaf = bpy.data.materials.new("mine")
     elif change == "pass index":
-        film.tetflora.output.species[0].pass_index = 7
+        animation.tetflora.output.species[0].pass_index = 7
     elif change == "engine":  # which draws points in another size
-        film.render.engine = 'CYCLES' if film.render.engine != 'CYCLES' else compat.eevee_engine()
+        animation.render.engine = 'CYCLES' if animation.render.engine != 'CYCLES' else compat.eevee_engine()
     depsgraph()
-    at(film, 1)
+    at(animation, 1)
     assert made == [1, 1]
 
 
-def test_animated_lenses_share_while_they_change_little(film, made):
-    film.camera.animation_data_clear()
-    data = film.camera.data
+def test_animated_lenses_share_while_they_change_little(animation, made):
+    animation.camera.animation_data_clear()
+    data = animation.camera.data
     for frame, lens in ((1, 50.0), (FRAMES, 56.0)):
         data.lens = lens
         data.keyframe_insert("lens", frame=frame)
     for n in range(1, FRAMES + 1):
-        at(film, n)
+        at(animation, n)
     assert 2 <= len(made) <= 4
 
 
-def test_a_camera_that_stands_still_is_refined_for_exactly(film, made):
-    film.camera.animation_data_clear()
-    film.camera.location = (0.0, -8.0, 1.0)
+def test_a_camera_that_stands_still_is_refined_for_exactly(animation, made):
+    animation.camera.animation_data_clear()
+    animation.camera.location = (0.0, -8.0, 1.0)
     depsgraph()
-    exact = read_camera(film, depsgraph(), region_only=True)
-    shared = frame_cache.shared_camera(film, depsgraph())
+    exact = read_camera(animation, depsgraph(), region_only=True)
+    shared = frame_cache.shared_camera(animation, depsgraph())
     assert shared.position.tolist() == exact.position.tolist()
     assert (shared.window, shared.width, shared.setback) == (exact.window, exact.width, 0.0)
     for n in (1, 2, 3):
-        at(film, n)
+        at(animation, n)
     assert made == [1]  # nothing changes, so nothing is made again
 
 
 @pytest.mark.parametrize("mover", ["parent", "constraint", "driver", "parent's parent"])
-def test_whatever_moves_the_camera_counts_as_animation(film, mover):
-    film.camera.animation_data_clear()
+def test_whatever_moves_the_camera_counts_as_animation(animation, mover):
+    animation.camera.animation_data_clear()
     moves = frame_cache.camera_moves
-    assert not moves(film)
+    assert not moves(animation)
     carrier = bpy.data.objects.new("carrier", None)
-    film.collection.objects.link(carrier)
+    animation.collection.objects.link(carrier)
     if mover == "constraint":
-        film.camera.constraints.new('COPY_LOCATION').target = carrier
+        animation.camera.constraints.new('COPY_LOCATION').target = carrier
     elif mover == "driver":
-        film.camera.driver_add("location", 0).driver.expression = "frame * .1"
+        animation.camera.driver_add("location", 0).driver.expression = "frame * .1"
     else:
-        film.camera.parent = carrier
-        assert not moves(film)
+        animation.camera.parent = carrier
+        assert not moves(animation)
         if mover == "parent's parent":
             carrier.parent = carrier = bpy.data.objects.new("outer", None)
-            film.collection.objects.link(carrier)
+            animation.collection.objects.link(carrier)
         carrier.keyframe_insert("location", frame=1)
-    assert moves(film)
+    assert moves(animation)
 
 
-def test_switched_off_each_frame_is_refined_for_its_own_camera(film, made):
-    film.tetflora.share_frames = False
-    names = {at(film, n)[0] for n in (1, 2, 3)}
+def test_switched_off_each_frame_is_refined_for_its_own_camera(animation, made):
+    animation.tetflora.share_frames = False
+    names = {at(animation, n)[0] for n in (1, 2, 3)}
     assert made == [1, 2, 3]
     assert len(names) == 3
 
 
-def test_explicit_objects_are_hidden_for_what_is_shown_and_shown_at_the_end(film, made):
+def test_explicit_objects_are_hidden_for_what_is_shown_and_shown_at_the_end(animation, made):
     bush = add_mesh("foreign", size=0.5, z=0.3)
     bush.tetflora.is_explicit = True
     depsgraph()
     for n in (1, FRAMES, 1, 2):
-        at(film, n)
+        at(animation, n)
         assert bush.hide_render
-    render.on_render_end(film)
+    render.on_render_end(animation)
     assert not bush.hide_render
     assert "tetflora_hidden_for_render" not in bpy.data.objects["foreign"]
 
 
-def test_a_frame_that_fails_leaves_nothing_and_the_next_one_is_right(film, made):
-    good = at(film, 1)
-    camera, film.camera = film.camera, None
-    render.on_render_pre(film)
+def test_a_frame_that_fails_leaves_nothing_and_the_next_one_is_right(animation, made):
+    good = at(animation, 1)
+    camera, animation.camera = animation.camera, None
+    render.on_render_pre(animation)
     assert len(render.render_errors()) == 1
-    assert result_collections(film, 'RENDER') == []
-    film.camera = camera
-    render.on_render_init(film)
-    assert at(film, 1) == good
+    assert result_collections(animation, 'RENDER') == []
+    animation.camera = camera
+    render.on_render_init(animation)
+    assert at(animation, 1) == good
 
 
 @pytest.mark.parametrize("change", ["attribute", "material"])
-def test_what_changes_of_explicit_objects_is_noticed(film, made, change):
+def test_what_changes_of_explicit_objects_is_noticed(animation, made, change):
     count = 400  # corners; numbers print short where there are more than a thousand
     foreign = add_mesh("foreign", size=0.5)
     foreign.data.clear_geometry()
@@ -281,29 +281,29 @@ def test_what_changes_of_explicit_objects_is_noticed(film, made, change):
     foreign.data.materials.append(bpy.data.materials.new("one"))
     foreign.tetflora.is_explicit = True
     depsgraph()
-    at(film, 1)
+    at(animation, 1)
     if change == "attribute":
         tint.data[count // 2].value = 1.0
         foreign.data.update()
     else:
         foreign.data.materials[0] = bpy.data.materials.new("two")
     depsgraph()
-    at(film, 1)
+    at(animation, 1)
     assert made == [1, 1]
 
 
-def test_materials_of_leaf_objects_are_noticed(film, made):
+def test_materials_of_leaf_objects_are_noticed(animation, made):
     leaf = add_mesh("blade", size=0.5)
     leaf.hide_render = True
-    film.tetflora.leaf_limit = 0.05  # real ones in so small a picture
+    animation.tetflora.leaf_limit = 0.05  # real ones in so small a picture
     leaf.data.materials.append(bpy.data.materials.new("one"))
-    entry = film.tetflora.leaf_objects.add()
+    entry = animation.tetflora.leaf_objects.add()
     entry.species, entry.leaf = "bush", leaf
     depsgraph()
-    at(film, 1)
+    at(animation, 1)
     leaf.data.materials[0] = bpy.data.materials.new("two")
     depsgraph()
-    assert "two" in at(film, 1)[1]["materials"]
+    assert "two" in at(animation, 1)[1]["materials"]
     assert made == [1, 1]
 
 
@@ -324,45 +324,45 @@ def test_digests_tell_values_apart(one, other):
     assert digests[0].digest() != digests[1].digest()
 
 
-def test_shells_that_come_back_are_shaded_as_they_were(film, made):
-    film.tetflora.proxy_form = 'SHELLS'
-    first = at(film, 1)
-    film.tetflora.shell_diffuse = 0.5
-    assert at(film, 1)[1]["materials"] != first[1]["materials"]
-    film.tetflora.shell_diffuse = 1.0
-    assert at(film, 1) == first
+def test_shells_that_come_back_are_shaded_as_they_were(animation, made):
+    animation.tetflora.proxy_form = 'SHELLS'
+    first = at(animation, 1)
+    animation.tetflora.shell_diffuse = 0.5
+    assert at(animation, 1)[1]["materials"] != first[1]["materials"]
+    animation.tetflora.shell_diffuse = 1.0
+    assert at(animation, 1) == first
     assert made == [1, 1]
 
 
-def test_materials_put_on_the_artists_results_do_not_change_the_next_frame(film, made):
-    film.tetflora.leaf_limit = 0.05
-    refine.refine(film, depsgraph())
+def test_materials_put_on_the_artists_results_do_not_change_the_next_frame(animation, made):
+    animation.tetflora.leaf_limit = 0.05
+    refine.refine(animation, depsgraph())
     made.clear()
-    (results_of_artist,) = result_collections(film, 'VIEW')
+    (results_of_artist,) = result_collections(animation, 'VIEW')
     leaves = next(o for o in results_of_artist.objects if o.get("tetflora_kind") == "leaf")
     leaves.material_slots[0].material = bpy.data.materials.new("mine")
-    first = at(film, 1)
+    first = at(animation, 1)
     assert "mine" in first[1]["materials"]
-    assert at(film, 1) == first
+    assert at(animation, 1) == first
     assert made == [1]
 
 
-def test_view_layers_go_together_as_if_nothing_were_hidden(film, made):
+def test_view_layers_go_together_as_if_nothing_were_hidden(animation, made):
     foreign = add_mesh("foreign", size=0.5)
     foreign.tetflora.is_explicit = True
     apart = bpy.data.collections.new("apart")
-    film.collection.children.link(apart)
+    animation.collection.children.link(apart)
     apart.objects.link(foreign)
-    film.collection.objects.unlink(foreign)
-    second = film.view_layers.new("second")
+    animation.collection.objects.unlink(foreign)
+    second = animation.view_layers.new("second")
     second.layer_collection.children["apart"].exclude = True
 
     def shown():
-        render.on_render_pre(film)
+        render.on_render_pre(animation)
         assert render.render_errors() == []
         return [
             sorted(c.collection.name for c in layer.layer_collection.children if not c.exclude)
-            for layer in film.view_layers
+            for layer in animation.view_layers
         ]
 
     first = shown()
@@ -371,32 +371,32 @@ def test_view_layers_go_together_as_if_nothing_were_hidden(film, made):
     assert made == [1, 1]
 
 
-def test_scenes_that_are_rendered_within_a_render_leave_its_results_alone(film, made):
-    first = at(film, 1)
+def test_scenes_that_are_rendered_within_a_render_leave_its_results_alone(animation, made):
+    first = at(animation, 1)
     other = bpy.data.scenes.new("other")
-    for obj in film.objects:
+    for obj in animation.objects:
         other.collection.objects.link(obj)
-    other.camera = film.camera
+    other.camera = animation.camera
     for prop in ("leaf_limit", "cutoff", "visibility_resolution", "cell_length"):
-        setattr(other.tetflora, prop, getattr(film.tetflora, prop))
+        setattr(other.tetflora, prop, getattr(animation.tetflora, prop))
     other.render.resolution_x, other.render.resolution_y = 64, 36
-    names = {collection.name for collection in result_collections(film)}
+    names = {collection.name for collection in result_collections(animation)}
     render.on_render_pre(other)
     assert render.render_errors() == []
     theirs = {collection.name for collection in result_collections(other)}
     assert theirs
     assert not theirs & names
     render.on_render_end(other)
-    assert at(film, 1) == first
+    assert at(animation, 1) == first
     assert made == [1, 1]
 
 
-def test_names_that_are_too_long_still_tell_cells_apart(film, made):
+def test_names_that_are_too_long_still_tell_cells_apart(animation, made):
     foreign = add_mesh("x" * 60, size=0.5)
     foreign.tetflora.is_explicit = True
     depsgraph()
-    at(film, 1)
-    _, last = at(film, FRAMES)
+    at(animation, 1)
+    _, last = at(animation, FRAMES)
     assert len(made) == 2
-    assert last == alone(film, FRAMES)[1]
+    assert last == alone(animation, FRAMES)[1]
     assert not [name for kind in ("objects", "meshes") for name in last[kind] if name[-4] == "."]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A film of many frames leaves nothing behind, neither from frame to frame nor at its end; counts, not seconds."""
+"""A long animation leaves nothing behind, neither from frame to frame nor at its end; counts, not seconds."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FRAMES, LEG = 24, 4
 
 
 @pytest.mark.parametrize("gigabytes", [0.0, 4.0], ids=["nothing kept", "results kept"])
-def test_frames_of_a_film_leave_nothing_behind(clean_file, tmp_path, gigabytes):
+def test_frames_of_a_animation_leave_nothing_behind(clean_file, tmp_path, gigabytes):
     """The camera goes to and fro: whatever is kept from frame to frame, a third round needs no more than a second."""
     scene = tiny_render(size=24)
     for n, species in enumerate(("bush", "fern")):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A film whose sequencer shows scenes with plants: each has its own, in all frames, and nothing stays."""
+"""An animation whose sequencer shows scenes with plants: each has its own, in all frames, and nothing stays."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FRAMES = 4
 
 
 @pytest.fixture
-def film(tmp_path):
+def animation(tmp_path):
     """A scene without plants whose sequencer shows one with a plant, past which the camera flies; gives both."""
     wood = tiny_render()
     camera = add_camera(location=(-1.0, 0.0, 12.0), rotation=(0.0, 0.0, 0.0))
@@ -34,17 +34,17 @@ def film(tmp_path):
     wood.world = world
     compat.shader_tree(world).nodes["Background"].inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
     wood.frame_start, wood.frame_end = 1, FRAMES  # which the strip is as long as
-    film = bpy.data.scenes.new("film")
-    film.camera = camera
-    film.frame_start, film.frame_end = 1, FRAMES
-    film.render.resolution_x = film.render.resolution_y = 16
-    film.render.engine, film.cycles.samples = 'CYCLES', 1
-    set_format(film.render.image_settings, "PNG")
-    film.render.filepath = str(tmp_path / "frame_####")
-    strips = film.sequence_editor_create().strips
+    animation = bpy.data.scenes.new("animation")
+    animation.camera = camera
+    animation.frame_start, animation.frame_end = 1, FRAMES
+    animation.render.resolution_x = animation.render.resolution_y = 16
+    animation.render.engine, animation.cycles.samples = 'CYCLES', 1
+    set_format(animation.render.image_settings, "PNG")
+    animation.render.filepath = str(tmp_path / "frame_####")
+    strips = animation.sequence_editor_create().strips
     strips.new_scene("wood", wood, 1, 1)
     depsgraph()
-    return film, wood
+    return animation, wood
 
 
 def picture(folder, frame):
@@ -54,8 +54,8 @@ def picture(folder, frame):
     return values
 
 
-def test_scenes_in_a_sequencer_show_their_plants(film, tmp_path):
-    outer, _ = film
+def test_scenes_in_a_sequencer_show_their_plants(animation, tmp_path):
+    outer, _ = animation
     before = datablocks()
     bpy.ops.render.render(animation=True, scene=outer.name)
     pictures = [picture(tmp_path, n) for n in range(1, FRAMES + 1)]
@@ -68,12 +68,12 @@ def test_scenes_in_a_sequencer_show_their_plants(film, tmp_path):
     assert np.abs(pictures[0] - pictures[-1]).max() > 0.1  # the camera has moved
 
 
-def test_errors_of_a_scene_in_a_sequencer_are_told(film, monkeypatch):
+def test_errors_of_a_scene_in_a_sequencer_are_told(animation, monkeypatch):
     def refuse(*_arguments, **_options):
         raise errors.SpeciesError("no such species")
 
     monkeypatch.setattr(refine, "refine", refuse)
     before = datablocks()
-    bpy.ops.render.render(animation=True, scene=film[0].name)
+    bpy.ops.render.render(animation=True, scene=animation[0].name)
     assert len(render.render_errors()) == FRAMES
     assert datablocks() == before

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Species while a film is rendered: files are looked at once a frame, and whatever changes in them is noticed."""
+"""Species while an animation is rendered: files are looked at once a frame, and whatever changes in them is noticed."""
 
 from __future__ import annotations
 

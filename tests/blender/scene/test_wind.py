@@ -90,9 +90,9 @@ def test_a_frame_is_the_same_whatever_range_is_rendered(scene):
     """Workers of a farm set the scene's range to the frames that they render."""
     scene.frame_set(20)
     wind_of = settings.wind_of
-    film = wind_of(scene)
+    animation = wind_of(scene)
     scene.frame_start, scene.frame_end = 20, 22
-    assert wind_of(scene) == film
+    assert wind_of(scene) == animation
 
 
 def test_results_of_another_frame_are_not_taken_for_this_one(scene):

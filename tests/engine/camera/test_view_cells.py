@@ -202,7 +202,7 @@ def test_a_walk_goes_through_few_cells():
 
 
 def changes(cameras: list[Camera], around: Around | None) -> int:
-    """How often a film comes to another cell."""
+    """How often an animation comes to another cell."""
     cells = [cell_camera(c, CELLS, around) for c in cameras]
     return sum(not same(a, b) for a, b in itertools.pairwise(cells))
 
