@@ -218,6 +218,7 @@ _register, _unregister = bpy.utils.register_classes_factory(CLASSES)
 
 def register() -> None:
     """Register the property groups and add them to Blender's types."""
+    TetFloraScene.__annotations__["proxy_form"] = form_property()  # forms may have come while it was not registered
     _register()
     bpy.types.Object.tetflora = PointerProperty(type=TetFloraObject, override=_OVERRIDES)
     bpy.types.Scene.tetflora = PointerProperty(type=TetFloraScene)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.blender.scenes import add_camera, add_plant, datablocks, depsgraph
+from tetflora_addon.blender import properties
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.materials import materials
 from tetflora_addon.blender.results import forms
@@ -138,6 +139,14 @@ def test_values_that_files_hold_stay_while_forms_come_and_go(scene, tmp_path):
     forms.register_form(row())
     assert scene.tetflora.proxy_form == forms.form_of(scene).identifier == TOY
     forms.unregister_form(TOY)
+
+
+def test_forms_stay_while_the_extension_is_disabled(scene, toy):
+    properties.unregister()
+    properties.register()
+    assert items(scene)[TOY] == NUMBER
+    scene.tetflora.proxy_form = TOY
+    assert forms.form_of(scene).identifier == TOY
 
 
 @pytest.mark.parametrize("changed", [{"identifier": 'SHELLS'}, {"number": 2}])
