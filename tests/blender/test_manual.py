@@ -12,8 +12,7 @@ import pytest
 from devtools import build
 from tetflora_addon.blender import preferences, properties
 from tetflora_addon.blender.cli.command import main
-from tetflora_addon.blender.placing import properties as brush_properties
-from tetflora_addon.blender.placing import properties as population_properties
+from tetflora_addon.blender.placing.properties import TetFloraBrush, TetFloraMixEntry, TetFloraPopulation
 from tetflora_addon.blender.results import output_properties
 from tetflora_addon.blender.settings import TetFloraWind
 from tetflora_addon.blender.viewport import state
@@ -28,12 +27,12 @@ LABELS = {
 GROUPS = (
     properties.TetFloraScene,
     properties.TetFloraLeafObject,
-    population_properties.TetFloraPopulation,
-    population_properties.TetFloraMixEntry,
+    TetFloraPopulation,
+    TetFloraMixEntry,
     output_properties.TetFloraOutput,
     output_properties.TetFloraSpeciesOutput,
     state.TetFloraPreview,
-    brush_properties.TetFloraBrush,
+    TetFloraBrush,
     TetFloraWind,
     preferences.TetFloraPreferences,
 )

@@ -12,8 +12,7 @@ import pytest
 from tests.blender.scenes import add_mesh, add_plant
 from tetflora_addon.blender import preferences, properties, saved_files
 from tetflora_addon.blender.job import contents
-from tetflora_addon.blender.placing import properties as brush_properties
-from tetflora_addon.blender.placing import properties as population_properties
+from tetflora_addon.blender.placing.properties import TetFloraBrush, TetFloraPopulation
 from tetflora_addon.blender.results import leaf_objects
 from tetflora_addon.blender.settings import TetFloraWind
 from tetflora_addon.blender.species import catalogue, edits
@@ -49,8 +48,8 @@ def _without_labels(settings_class):
     ("engine", "group", "engine_only"),
     [
         (settings.RefinementSettings, properties.TetFloraScene, {"hidden_block", "proxy_block", "margin"}),
-        (rules.Rules, population_properties.TetFloraPopulation, {"density", "shares", "companions"}),
-        (strokes.Brush, brush_properties.TetFloraBrush, {"density", "scale_min", "scale_max", "shares"}),
+        (rules.Rules, TetFloraPopulation, {"density", "shares", "companions"}),
+        (strokes.Brush, TetFloraBrush, {"density", "scale_min", "scale_max", "shares"}),
         (wind.Wind, TetFloraWind, {"time", "loop", "moving"}),
     ],
     ids=lambda value: getattr(value, "__name__", ""),
