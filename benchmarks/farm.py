@@ -36,7 +36,7 @@ def run(quick: bool) -> dict[str, float]:
     Raises
     ------
     RuntimeError
-        There is no full Blender, there are not two cores, or a worker failed; with what it said.
+        There is no full Blender, there are not two cores, or a worker failed; with its output.
     """
     cores = sorted(os.sched_getaffinity(0))[:2]
     if not os.environ.get("BLENDER") or len(cores) < 2:
@@ -44,10 +44,10 @@ def run(quick: bool) -> dict[str, float]:
     frames = list(range(1, (QUICK_FRAMES if quick else FRAMES) + 1))
     with tempfile.TemporaryDirectory() as folder:
         bundle = _bundle(Path(folder), len(frames))
-        shares = {"one": [frames], "two": [frames[0::2], frames[1::2]]}
-        one, two = (_timed(bundle, Path(folder) / name, share, cores) for name, share in shares.items())
+        parts = {"one": [frames], "two": [frames[0::2], frames[1::2]]}
+        one, two = (_timed(bundle, Path(folder) / name, part, cores) for name, part in parts.items())
         names = [f"frame_{n:04d}.png" for n in frames]
-        pairs = [[_pixels(Path(folder) / name / picture) for name in shares] for picture in names]
+        pairs = [[_pixels(Path(folder) / name / picture) for name in parts] for picture in names]
         different = sum(int((a != b).sum()) for a, b in pairs)
     return {
         "frames": len(frames),
@@ -91,22 +91,22 @@ def _bundle(folder: Path, frames: int) -> Path:
     return folder / "job"
 
 
-def _timed(bundle: Path, output: Path, shares: Sequence[Sequence[int]], cores: Sequence[int]) -> tuple[float, float]:
-    """Seconds until as many workers as there are shares of the frames are done, each bound to a core.
+def _timed(bundle: Path, output: Path, parts: Sequence[Sequence[int]], cores: Sequence[int]) -> tuple[float, float]:
+    """Seconds until as many workers as there are parts of the frames are done, each bound to a core.
 
     By the clock, and of the processor for the one that had most to do: on a machine that others use as well, only the
     latter is the job's own.
     """
     workers = []
     begun = time.perf_counter()
-    for core, frames in zip(cores, shares, strict=False):
+    for core, frames in zip(cores, parts, strict=False):
         tasks = json.dumps([{"Frame": str(n)} for n in frames])
         command = [sys.executable, "-m", "openjd", "run", str(bundle / "template.json"), "--step", "Render"]
         command += ["-p", f"Blender={os.environ['BLENDER']}", "-p", f"OutputDir={output}", "--tasks", tasks]
         log = output.with_name(f"{output.name}_{core}.log")
-        with log.open("w") as said:
+        with log.open("w") as lines:
             bound = ["taskset", "--cpu-list", str(core), *command]
-            workers.append((subprocess.Popen(bound, stdin=subprocess.DEVNULL, stdout=said, stderr=said), log))
+            workers.append((subprocess.Popen(bound, stdin=subprocess.DEVNULL, stdout=lines, stderr=lines), log))
     processor = 0.0
     for worker, log in workers:
         _, status, used = os.wait4(worker.pid, 0)

@@ -41,7 +41,7 @@ class Cost:
     mesh_mb : float
         Megabytes of what was handed to Blender.
     renderer_mb : float
-        Most that Cycles said it had allocated; its textures, meshes and BVH.
+        Peak allocation that Cycles reported: its textures, meshes and BVH.
     """
 
     refine_s: float

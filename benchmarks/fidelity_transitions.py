@@ -23,7 +23,7 @@ SIZES, QUICK_SIZES = (110, 24), (80, 40)
 STEPS, QUICK_STEPS = 4, 1
 SAMPLES, QUICK_SAMPLES = 512, 64
 FACTOR = 1.1
-#: Side of the squares of which the worst is told, pixels.
+#: Side of the squares of which the worst is reported, pixels.
 _SQUARE = 16
 
 

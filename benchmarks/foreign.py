@@ -54,7 +54,7 @@ def foreign_tree() -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.f
     rng = np.random.default_rng(7)
     base, axis, length, radius = np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]), np.array([9.0]), np.array([0.22])
     parts = []
-    for order, (number, share, segments, sides) in enumerate(ORDERS):
+    for order, (number, ratio, segments, sides) in enumerate(ORDERS):
         if order:
             parent = np.repeat(np.arange(len(base)), number)
             t = rng.uniform(0.3 if order == 1 else 0.15, 1.0, len(parent))
@@ -62,7 +62,7 @@ def foreign_tree() -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.f
             lean = np.radians(rng.uniform(40, 75, len(parent)))[:, None]
             base = base[parent] + (t * length[parent])[:, None] * axis[parent]
             axis = np.cos(lean) * axis[parent] + np.sin(lean) * out
-            length = share * length[parent] * (1.1 - 0.6 * t) * rng.uniform(0.7, 1.2, len(parent))
+            length = ratio * length[parent] * (1.1 - 0.6 * t) * rng.uniform(0.7, 1.2, len(parent))
             radius = radius[parent] * 0.35
         parts.append((*_tubes(base, axis, length, radius, segments, sides), 0))
     parent = np.repeat(np.arange(len(base)), LEAVES)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How time and memory grow: with the number of plants, up to a million, and with the pixels of the image.
 
-Each measurement is a process of its own, whose largest memory is told by the system. The plots go to
+Each measurement is a process of its own, whose largest memory the system reports. The plots go to
 ``docs/images/growth.png`` where ``--plot`` is given: ``python -m benchmarks.growth --plot``.
 """
 

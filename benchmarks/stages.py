@@ -82,8 +82,8 @@ def run(quick: bool) -> dict[str, float]:
     taken, begun = time.process_time() - begun, time.process_time()
     contents = result.contents
     sizes = {"update": held(contents), "visibility": held(result.cells), "refinement": result.tree.nbytes}
-    for stage, share in result.seconds.items():  # told by the clock; together they are what the processor took
-        seconds[stage], left[stage] = share / wall * taken, sizes[stage]
+    for stage, wall_s in result.seconds.items():  # wall clock, scaled to processor time
+        seconds[stage], left[stage] = wall_s / wall * taken, sizes[stage]
     begun = time.process_time()
     for block in explicit_blocks(flora, result):
         lap("polygons", block.buffers.nbytes)

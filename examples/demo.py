@@ -79,10 +79,10 @@ def run(out: Path, width: int) -> dict:
         "blender": bpy.app.version_string,
     }
     (out / "stats.json").write_text(json.dumps(stats, indent=1) + "\n")
-    share = statistics.polygons_meshed / statistics.polygons_full
+    fraction = statistics.polygons_meshed / statistics.polygons_full
     say(
         f"{statistics.plants} plants, {statistics.polygons_full:,} polygons if expanded; "
-        f"{statistics.polygons_meshed:,} were made ({100 * share:.1f} %) "
+        f"{statistics.polygons_meshed:,} were made ({100 * fraction:.1f} %) "
         f"and {statistics.tetrahedra_proxy:,} tetrahedra are drawn as proxies"
     )
     return stats

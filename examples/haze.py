@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Haze over a landscape, after Koschmieder's law.
 
-What is seen at a distance d keeps the share e^(−β d) of its light, and air adds its own light for the rest. A box of a
+Things at a distance d keep the fraction e^(−β d) of their light, and air adds its own light for the rest. A box of a
 volume that absorbs and glows, but scatters nothing, does exactly that, without noise.
 """
 

@@ -18,7 +18,7 @@ from benchmarks.compare import difference, plant_mask
 from tetflora_addon.blender import compat
 
 from .pictures import save_sheet
-from .scenes import refined, rendered, row, told_figures
+from .scenes import paper_figures, refined, rendered, row
 
 #: Linear colours of what is real and of what stands for it, and of everything else.
 REAL, PROXY, REST = (0.02, 0.16, 0.55, 1.0), (0.95, 0.32, 0.02, 1.0), (0.55, 0.55, 0.52, 1.0)
@@ -49,7 +49,7 @@ def make(out: Path, images: Path, small: bool) -> dict[str, float]:
     )
     save_sheet(cells, 2, images / "paper-figures6-7.jpg", width=640)
     return {
-        **told_figures(statistics),
+        **paper_figures(statistics),
         **counts,
         "render_s": render_s,
         "deferred_render_s": deferred_s,

@@ -14,7 +14,7 @@ from devtools import session
 from .. import landscape
 from ..haze import add_haze
 from .pictures import save_jpeg
-from .scenes import refined, rendered, told_figures
+from .scenes import paper_figures, refined, rendered
 
 PIXELS, SMALL_PIXELS = 512, 32
 SMALL_PLANTS = 200
@@ -32,4 +32,4 @@ def make(out: Path, images: Path, small: bool) -> dict[str, float]:
     picture = out / "figure9.png"
     render_s = rendered(scene, picture, 1 if small else 32)
     save_jpeg(Image.open(picture).convert("RGB"), images / "paper-figure9.jpg")
-    return {**told_figures(statistics), "render_s": render_s}
+    return {**paper_figures(statistics), "render_s": render_s}

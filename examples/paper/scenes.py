@@ -53,7 +53,7 @@ def rendered(scene: bpy.types.Scene, path: Path, samples: int) -> float:
     return time.perf_counter() - start
 
 
-def told_figures(statistics: object) -> dict[str, float]:
+def paper_figures(statistics: object) -> dict[str, float]:
     """What the paper tells about an image (sections 8.1 and 8.3), from the statistics of its refinement."""
     return {
         "plants": statistics.plants,

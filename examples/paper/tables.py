@@ -32,7 +32,7 @@ def _megabytes(key: str) -> Callable[[Figures], str]:
     return lambda f: f"{f[key]:,.1f} MB" if f[key] < 10 else f"{f[key]:,.0f} MB"
 
 
-def _share(part: str, whole: str) -> Callable[[Figures], str]:
+def _fraction(part: str, whole: str) -> Callable[[Figures], str]:
     return lambda f: f"{f[part]:,.0f} ({100 * f[part] / f[whole]:.1f} %)"
 
 
@@ -41,7 +41,7 @@ def _scene(paper: dict[str, str]) -> tuple[Row, ...]:
     return (
         ("plants", paper["plants"], _count("plants")),
         ("polygons if expanded", paper["full"], _count("polygons_full")),
-        ("polygons in the image", paper["polygons"], _share("polygons_meshed", "polygons_full")),
+        ("polygons in the image", paper["polygons"], _fraction("polygons_meshed", "polygons_full")),
         ("facets and spheres of approximations", "–", _count("polygons_proxy")),
         ("tetrahedra made", paper["made"], _count("tetrahedra_made")),
         ("tetrahedra drawn as approximations", paper["drawn"], _count("tetrahedra_proxy")),

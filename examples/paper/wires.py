@@ -44,7 +44,7 @@ def draw_wires(picture: Path, camera: object, refinement: object) -> None:
 
 
 def projected_edges(vertices: NDArray[np.float64], camera: object) -> NDArray[np.float64]:
-    """Edges of tetrahedra (n, 4, 3) that are large enough, from the left and from the top in shares of the image.
+    """Edges of tetrahedra (n, 4, 3) that are large enough, from the left and from the top in fractions of the image.
 
     Returns
     -------
@@ -68,5 +68,5 @@ def projected_edges(vertices: NDArray[np.float64], camera: object) -> NDArray[np
 def _cut(point: NDArray[np.float64], other: NDArray[np.float64], near: float) -> NDArray[np.float64]:
     """Points (m, 3), moved towards the other ends of their edges as far as they are nearer than ``near``."""
     missing = np.maximum(near - point[:, 2], 0.0)
-    share = np.divide(missing, other[:, 2] - point[:, 2], out=np.zeros(len(point)), where=missing > 0.0)
-    return point + share[:, None] * (other - point)
+    fraction = np.divide(missing, other[:, 2] - point[:, 2], out=np.zeros(len(point)), where=missing > 0.0)
+    return point + fraction[:, None] * (other - point)

@@ -74,7 +74,7 @@ def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
         outward.append(np.broadcast_to((around + [0.0, 0.0, up]) / np.hypot(1.0, up), (len(seeds), SIDES, 3)))
     crown.append(np.stack([0 * high, 0 * high, high], axis=1)[:, None])
     outward.append(np.broadcast_to([0.0, 0.0, 1.0], (len(seeds), 1, 3)))
-    # The wood's own radius would be less than a pixel from where a forest is looked at.
+    # The wood's own radius would be less than a pixel in the view of a forest.
     radius = np.maximum(trunk.radius / trunk.length, 0.012)[:, None, None]
     foot = radius * around
     middle = (low + 0.5 * (high - low))[:, None, None] * np.array([[0.0, 0.0, 1.0]])

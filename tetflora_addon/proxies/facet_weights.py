@@ -7,7 +7,7 @@ area they would be up to three times as opaque. Rays are cast through grown sub-
 through their facets, at several numbers of facets; with the right weight as many rays are blocked. Weights are for
 facets what `compiled.clumping` is for evenly filled cells.
 
-Sub-plants are looked at together with their next siblings, because facets spill over. Where few facets stand for one,
+Sub-plants are tested together with their next siblings, because facets spill over. Where few facets stand for one,
 all that grow around it take part, because facets then reach across the gaps between neighbours of any parent. Facets
 of pieces are compared in the same way with what branches themselves bear.
 """

@@ -105,7 +105,7 @@ def polygon_totals(polygons: Polygons, width: NDArray[np.float64] | None = None)
 
 
 def _size_factors(flora: Flora, pieces: Pieces) -> NDArray[np.float64] | float:
-    """Mean factor (n,) on the area of leaves of pieces, by how far outside in the crown they sit."""
+    """Mean factor (n,) on the area of leaves of pieces, by their distance from the middle of the crown."""
     if not flora.rows["gradient"].any():
         return 1.0
     low, high = outward_ends(flora, pieces)

@@ -107,7 +107,7 @@ def test_the_thick_point_is_where_its_ray_is_longest_within(seed: int, camera: C
         assert (longest <= projected.thickness + 1e-9).all()
 
 
-def picture(projected: Projected, places: np.ndarray, camera: Camera) -> np.ndarray:
+def image(projected: Projected, places: np.ndarray, camera: Camera) -> np.ndarray:
     """Opacity (r, n) that a Gouraud shaded image has at places (r, 2), by tetrahedron."""
     corners = flat(projected.corners.reshape(-1, 3), camera)[projected.triangles]
     matrix = np.concatenate([corners.transpose(0, 2, 1), np.ones((len(corners), 1, 3))], axis=1)
@@ -121,7 +121,7 @@ def picture(projected: Projected, places: np.ndarray, camera: Camera) -> np.ndar
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_picture_is_that_of_rays(seed: int) -> None:
+def test_an_image_is_that_of_rays(seed: int) -> None:
     """Thickness is linear within each triangle: exact for thin fog, and never darker than rays for thick fog."""
     vertices = tetrahedra(seed, 12)
     rng = np.random.default_rng(seed)
@@ -131,7 +131,7 @@ def test_a_picture_is_that_of_rays(seed: int) -> None:
     assert (lengths > 0).mean() > 0.05
     for kappa in (1e-6, 2.0):
         projected = project(vertices, np.full(len(vertices), kappa), ORTHO)
-        drawn, exact = picture(projected, places, ORTHO), -np.expm1(-kappa * lengths)
+        drawn, exact = image(projected, places, ORTHO), -np.expm1(-kappa * lengths)
         if kappa < 1e-3:
             np.testing.assert_allclose(drawn, exact, atol=1e-6 * kappa * lengths.max() + 1e-15)
         else:

@@ -32,7 +32,7 @@ def triangles(buffers) -> np.ndarray:
     return np.concatenate(fans)
 
 
-def held_up(parts: list[np.ndarray], reach: float, pixels: int = 120) -> float:
+def blocked(parts: list[np.ndarray], reach: float, pixels: int = 120) -> float:
     """Weight of level rays from four sides that meet something within a window around the origin."""
     total = 0.0
     for turn in (0.3, 1.1, 1.9, 2.7):
@@ -70,10 +70,10 @@ def test_opened_plants_of_other_seeds_are_as_opaque(identifier: str) -> None:
         seeds = replace(support.plants(seed), species=np.zeros(1, np.int32))
         real = [triangles(block.buffers) for block in expanded_blocks(flora, seeds)]
         reach = float(max(np.abs(part).max() for part in real)) / 2
-        truth.append(held_up(real, reach))
+        truth.append(blocked(real, reach))
         side = 2 * reach / 40
-        fitted.append(held_up(as_facets(flora, seeds, 1, side, weights), reach))
-        full.append(held_up(as_facets(flora, seeds, 1, side, None), reach))
+        fitted.append(blocked(as_facets(flora, seeds, 1, side, weights), reach))
+        full.append(blocked(as_facets(flora, seeds, 1, side, None), reach))
     error = abs(np.mean(fitted) - np.mean(truth)) / np.mean(truth)
     assert error < 0.08
     assert error < abs(np.mean(full) - np.mean(truth)) / np.mean(truth)

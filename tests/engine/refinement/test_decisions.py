@@ -120,7 +120,7 @@ def test_what_can_never_be(case: dict, cutoff: float) -> None:
 
 
 def test_a_limit_leaves_what_is_hidden_hidden_and_makes_no_forest_of_leaves() -> None:
-    """Nor large space full of leaves of which nobody knows how far away they are."""
+    """Nor large space full of leaves at unknown distances."""
     count = 4
     totals = Totals(*(np.array(v, float) for v in ([1] * 4, [0.1] * 4, [1e6, 1e4, 1e6, 1e6], [1] * 4)))
     pixels, feature = np.array([1e6, 1e6, 900.0, 1e6]), np.array([2.0, 2.0, 2.0, 0.1])
@@ -134,7 +134,7 @@ def test_a_limit_leaves_what_is_hidden_hidden_and_makes_no_forest_of_leaves() ->
     assert (without_splits(kept, cells, np.zeros(count), SETTINGS) == kept).all()
 
 
-def test_leaves_that_are_large_only_at_the_near_end_are_told_from_the_rest() -> None:
+def test_leaves_that_are_large_only_at_the_near_end_are_recognized() -> None:
     """All of a small image's view may be one block: then it is divided in depth, not made explicit as a whole."""
     totals = Totals(*(np.full(1, v) for v in (100.0, 1.0, 1e6, 0.05)))
     one = np.ones(1)

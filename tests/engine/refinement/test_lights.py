@@ -50,7 +50,7 @@ def refined(result: Refinement) -> np.ndarray:
 
 @pytest.mark.parametrize("kind", LIGHTS)
 @pytest.mark.parametrize("anchored", [False, True])
-def test_shadows_that_fall_into_the_picture_are_refined(kind: str, anchored: bool) -> None:
+def test_shadows_that_fall_into_the_image_are_refined(kind: str, anchored: bool) -> None:
     flora, seeds = support.small_flora(), support.plants(np.arange(6), position=BEHIND + ASIDE)
     plain = last(flora, seeds, [LIGHTS[kind]], shadow_cutoff=0.0, anchored=anchored)
     result = last(flora, seeds, [LIGHTS[kind]], anchored=anchored)

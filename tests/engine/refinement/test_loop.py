@@ -161,26 +161,26 @@ def test_tetrahedra_are_limited(limit: int) -> None:
     assert not (result.decision == Decision.SPLIT).any()
 
 
-def test_each_pass_is_told_and_can_be_the_last() -> None:
+def test_each_pass_is_reported_and_can_be_the_last() -> None:
     """Figures of every state on the way; a limit on passes gives the very same states, decided without divisions."""
     flora = support.small_flora()
     camera = support.camera((0, -14, 3), (0, 0, 1.5), pixels=256)
     loop = refine(flora, support.grove(9, 2.0), camera, RefinementSettings(**FAST))
-    told = []
+    steps = []
     while True:
         try:
-            told.append(step_of(next(loop)))
+            steps.append(step_of(next(loop)))
         except StopIteration as stop:
-            told.append(step_of(stop.value))
+            steps.append(step_of(stop.value))
             break
-    assert len(told) > 2
+    assert len(steps) > 2
     for name in ("tetrahedra_made", "levels", "seconds"):
-        values = [getattr(step, name) for step in told]
+        values = [getattr(step, name) for step in steps]
         assert values == sorted(values)
         assert values[-1] > 0
-    assert [step.split > 0 for step in told] == [True] * (len(told) - 1) + [False]
-    assert all(step.memory_mb > 0 for step in told)
-    for passes, step in enumerate(told, start=1):
+    assert [step.split > 0 for step in steps] == [True] * (len(steps) - 1) + [False]
+    assert all(step.memory_mb > 0 for step in steps)
+    for passes, step in enumerate(steps, start=1):
         _, result = run(flora, support.grove(9, 2.0), camera, max_passes=passes)
         check(flora, result)
         last = step_of(result)
@@ -273,7 +273,7 @@ def test_mean_extinction() -> None:
     assert mean_extinction(held, 5.0 * one) == pytest.approx(shadows.mean() / 5.0, rel=0.01)
 
 
-def test_a_loop_that_is_told_to_stop_returns_what_it_has() -> None:
+def test_a_loop_that_is_stopped_returns_what_it_has() -> None:
     """Everything is decided, nothing is left to divide, and all plants are still there."""
     flora = support.small_flora()
     camera = support.camera((0, -30, 6), (0, 0, 1.5), pixels=128, view=0.4)

@@ -90,7 +90,7 @@ def test_a_random_scene_agrees_with_rays(window: tuple[float, ...]) -> None:
 
 
 @pytest.mark.parametrize("window", [SPHERE, PART])
-def test_pixels_are_those_of_the_picture(window: tuple[float, ...]) -> None:
+def test_pixels_are_those_of_the_image(window: tuple[float, ...]) -> None:
     """Six faces fill the sphere once, and what their pixels are worth is all of the image."""
     camera = panorama(window)
     side = 200
@@ -105,7 +105,7 @@ def test_pixels_are_those_of_the_picture(window: tuple[float, ...]) -> None:
     assert worth == pytest.approx(camera.width * camera.height, rel=0.04)
 
 
-def test_clearance_is_positive_beside_the_picture_only() -> None:
+def test_clearance_is_positive_beside_the_image_only() -> None:
     camera = panorama(PART)
     points = EYE + np.random.default_rng(3).normal(size=(2000, 3)) * 5
     longitude, latitude = camera.longitude_latitude(camera.to_camera_space(points))

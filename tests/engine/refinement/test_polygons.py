@@ -174,7 +174,7 @@ def test_a_plane_leaves_each_piece_on_one_side(seed: int) -> None:
 
 
 def test_a_cut_face_of_which_all_is_there_is_mended() -> None:
-    """What nobody needed to cut comes out as it went in: faces, materials, even those without area."""
+    """What need not be cut comes out as it went in: faces, materials, even those without area."""
     one = thicket(1)
     meshes = placed(one, 1)
     polygons = Polygons.everything(meshes)

@@ -117,7 +117,7 @@ def test_cells_of_the_view_fill_every_ray(kind):
     np.testing.assert_allclose(length, (reach - camera.near) / cosine, rtol=1e-9)
 
 
-def test_small_memory_gives_the_same_picture(monkeypatch):
+def test_small_memory_gives_the_same_image(monkeypatch):
     camera, rng = make("PERSP")
     vertices = in_front(camera, rng, 50, 4.0, (0.0, 40.0))
     triangles = in_front(camera, rng, 50, 4.0, (0.0, 40.0))[:, :3]
@@ -172,7 +172,7 @@ def test_a_mesh_has_no_holes_between_its_triangles():
     assert np.isfinite(found).all()
 
 
-def test_buffer_has_the_pictures_shape():
+def test_buffer_has_the_shape_of_the_image():
     camera, _ = make("PERSP")
     assert buffer_size(camera, 256) == (256, 149)
     assert buffer_size(camera, 1) == (1, 1)
