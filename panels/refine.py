@@ -16,9 +16,29 @@ from ..tetflora_addon.blender.viewport import auto
 from .base import SidebarPanel, TETFLORA_UL_leaf_objects, draw_message, draw_properties, split_layout
 from .results import rows_of
 
+_FEW = 200  # objects to look through at every movement of the mouse; a larger scene is not a new one
+
+
+class TETFLORA_PT_first(SidebarPanel, bpy.types.Panel):
+    """First forest: at the top of the tab while the scene has no plants."""
+
+    bl_label = "Get Started"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        scene = context.scene
+        return len(scene.objects) <= _FEW and not has_contents(scene)
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        column = self.layout.column()
+        row = column.row()
+        row.scale_y = 1.6
+        row.operator(TETFLORA_OT_first_forest.bl_idname, icon='WORLD')
+        column.label(text="Then click Refine and press F12")
+
 
 class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
-    """Refine: first, because the tab is longer than most screens are tall."""
+    """Refine: above the others, because the tab is longer than most screens are tall."""
 
     bl_label = "Refine"
 
@@ -114,7 +134,9 @@ class TETFLORA_PT_visibility(_PartOfRefine, bpy.types.Panel):
     bl_label = "Visibility"
 
     def draw(self, context: bpy.types.Context) -> None:
-        self.column(context, "visibility_resolution", "hidden", "block", "few_polygons")
+        column, settings = self.column(context), context.scene.tetflora
+        column.prop(settings, "visibility_resolution", text="Resolution")  # the whole name is wider than labels are
+        draw_properties(column, settings, "hidden", "block", "few_polygons")
 
 
 class TETFLORA_PT_limits(_PartOfRefine, bpy.types.Panel):
@@ -154,28 +176,8 @@ class TETFLORA_PT_leaf_objects(_PartOfRefine, bpy.types.Panel):
         TETFLORA_UL_leaf_objects.draw_in(self.layout, context.scene.tetflora)
 
 
-_FEW = 200  # objects to look through at every movement of the mouse; a larger scene is not a new one
-
-
-class TETFLORA_PT_first(SidebarPanel, bpy.types.Panel):
-    """First forest."""
-
-    bl_label = "Get Started"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        scene = context.scene
-        return len(scene.objects) <= _FEW and not has_contents(scene)
-
-    def draw(self, _context: bpy.types.Context) -> None:
-        column = self.layout.column()
-        row = column.row()
-        row.scale_y = 1.6
-        row.operator(TETFLORA_OT_first_forest.bl_idname, icon='WORLD')
-        column.label(text="Then click Refine and press F12")
-
-
 CLASSES = (
+    TETFLORA_PT_first,
     TETFLORA_PT_refine,
     TETFLORA_PT_proxies,
     TETFLORA_PT_proxy_shading,
@@ -183,5 +185,4 @@ CLASSES = (
     TETFLORA_PT_limits,
     TETFLORA_PT_films,
     TETFLORA_PT_leaf_objects,
-    TETFLORA_PT_first,
 )

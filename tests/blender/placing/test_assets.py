@@ -17,9 +17,9 @@ from tests.blender.scenes import add_camera, add_plant, datablocks, depsgraph, s
 from tetflora_addon.blender import preferences, saved_files
 from tetflora_addon.blender.job import contents
 from tetflora_addon.blender.placing import assets
-from tetflora_addon.blender.species import catalogue as species_items
-from tetflora_addon.blender.species import catalogue as thumbnails
-from tetflora_addon.species import catalogue
+from tetflora_addon.blender.species import catalogue
+from tetflora_addon.blender.species.catalogue import FALLBACK_ICON, icon_of, items_for, thumbnail_file
+from tetflora_addon.species.catalogue import builtin_folder, list_species
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -35,11 +35,11 @@ def own_folder(tmp_path):
 
 
 def _shipped():
-    return catalogue.list_species()
+    return list_species()
 
 
 def test_pictures_are_small_squares_of_known_species():
-    folder = catalogue.builtin_folder() / "thumbnails"
+    folder = builtin_folder() / "thumbnails"
     pictures = sorted(folder.glob("*"))
     assert {p.stem for p in pictures} <= set(_shipped())
     assert len(pictures) >= 3
@@ -58,23 +58,23 @@ def test_pictures_are_small_squares_of_known_species():
 
 def _loaded(identifier):
     """Names of the pictures that Blender has loaded for a species; their icons have numbers only in a window."""
-    thumbnails.icon_of(identifier)
-    return [name for name in thumbnails._pictures if Path(name.partition("|")[0]).stem == identifier]
+    icon_of(identifier)
+    return [name for name in catalogue._pictures if Path(name.partition("|")[0]).stem == identifier]
 
 
 def test_a_species_without_a_picture_gets_an_icon(own_folder):
     shutil.copy(_shipped()["bush"].path, own_folder / "mine.json")
     assert [_loaded(identifier) for identifier in ("mine", "", "gone")] == [[], [], []]
-    mine = next(i for i in species_items.items_for() if i[0] == "mine")
-    assert mine[3] == thumbnails.FALLBACK_ICON
+    mine = next(i for i in items_for() if i[0] == "mine")
+    assert mine[3] == FALLBACK_ICON
 
 
 def test_a_picture_is_loaded_once_and_again_when_it_changes(own_folder):
     picture = own_folder / "thumbnails" / "mine.png"
-    shutil.copy(thumbnails.thumbnail_file("bush"), picture)
-    assert thumbnails.thumbnail_file("mine") == picture
+    shutil.copy(thumbnail_file("bush"), picture)
+    assert thumbnail_file("mine") == picture
     (first,) = _loaded("mine")
-    assert tuple(thumbnails._pictures[first].image_size) == (128, 128)
+    assert tuple(catalogue._pictures[first].image_size) == (128, 128)
     assert _loaded("mine") == [first]
     os.utime(picture, ns=(0, 0))
     assert set(_loaded("mine")) > {first}

@@ -15,9 +15,9 @@ from tests.blender.scenes import add_camera, add_plant, depsgraph, select
 from tetflora_addon import errors
 from tetflora_addon.blender import preferences
 from tetflora_addon.blender.job import contents
-from tetflora_addon.blender.species import catalogue as species_files
-from tetflora_addon.blender.species import editor as species_editor
 from tetflora_addon.blender.species import edits
+from tetflora_addon.blender.species.catalogue import delete_species_file, load_species_file
+from tetflora_addon.blender.species.editor import order_keys
 from tetflora_addon.species import catalogue, schema, skeletons
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -48,7 +48,7 @@ def own_folder(tmp_path):
 def test_every_key_of_an_order_has_its_sliders_with_limits_and_tooltip():
     keys = schema.ORDER_KEYS
     properties = _editor().bl_rna.properties
-    assert set(species_editor.order_keys()) == set(keys)
+    assert set(order_keys()) == set(keys)
     for name, key in keys.items():
         assert name in properties, name
         assert key.meaning[1:] in properties[name].description
@@ -83,7 +83,7 @@ def test_sliders_show_what_the_species_has(identifier):
 
 def test_looking_stores_nothing():
     editor = _editor("conifer", 1)
-    for name in species_editor.order_keys():
+    for name in order_keys():
         getattr(editor, name)
     assert len(bpy.context.scene.tetflora.species_edits) == 0
     assert _edited("conifer") == _shipped("conifer")
@@ -238,7 +238,7 @@ def test_shipped_species_cannot_be_deleted(own_folder):
     _editor("bush")
     assert not bpy.ops.tetflora.delete_species.poll()
     with pytest.raises(errors.SpeciesError, match="built-in"):
-        species_files.delete_species_file("bush")
+        delete_species_file("bush")
 
 
 @pytest.mark.parametrize("text", ["{", '{"format": 1}', '{"format": 1, "name": "x", "orders": [], "leaf": {}}'])
@@ -252,16 +252,16 @@ def test_broken_files_are_refused_with_the_reason(own_folder, tmp_path, text):
 def test_loading_replaces_only_when_told(own_folder, tmp_path):
     _editor("bush")
     bpy.ops.tetflora.export_species(filepath=str(tmp_path / "mine.json"))
-    species_files.load_species_file(tmp_path / "mine.json")
+    load_species_file(tmp_path / "mine.json")
     before = (own_folder / "mine.json").read_bytes()
     _editor("conifer")
     bpy.ops.tetflora.export_species(filepath=str(tmp_path / "mine.json"))
     with pytest.raises(errors.SpeciesError, match="Replace"):
-        species_files.load_species_file(tmp_path / "mine.json")
+        load_species_file(tmp_path / "mine.json")
     assert (own_folder / "mine.json").read_bytes() == before
-    species_files.load_species_file(tmp_path / "mine.json", replace=True)
+    load_species_file(tmp_path / "mine.json", replace=True)
     assert (own_folder / "mine.json").read_bytes() == (tmp_path / "mine.json").read_bytes()
-    assert species_files.load_species_file(own_folder / "mine.json") == "mine"  # the file browser may well stand there
+    assert load_species_file(own_folder / "mine.json") == "mine"  # the file browser may well stand there
 
 
 def test_a_broken_species_is_not_saved(own_folder):

@@ -11,8 +11,8 @@ import pytest
 from tests.blender.scenes import add_camera, add_plant, datablocks, depsgraph
 from tetflora_addon import errors
 from tetflora_addon.blender.job import refine
-from tetflora_addon.blender.viewport import levels as preview_job
 from tetflora_addon.blender.viewport import overlay, state
+from tetflora_addon.blender.viewport.levels import _on_timer, level_steps, read_shapes
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -58,7 +58,7 @@ def test_shells_are_refined_as_refine_does():
 def test_stopped_halfway_nothing_changes():
     scene, _, _ = scene_of_plants()
     kept = compute().levels
-    steps = preview_job.level_steps(scene, depsgraph())
+    steps = level_steps(scene, depsgraph())
     for _ in range(3):
         next(steps)
     steps.close()
@@ -134,9 +134,9 @@ def test_what_is_wrong_is_told():
     scene, _, plants = scene_of_plants()
     plants[0].tetflora.species = "gone"
     with pytest.raises(errors.SceneError, match="gone"):
-        list(preview_job.level_steps(scene, depsgraph()))
+        list(level_steps(scene, depsgraph()))
     scene.tetflora.preview.plants = 'LIGHT'
-    preview_job.read_shapes(scene, depsgraph())
+    read_shapes(scene, depsgraph())
     assert "gone" in state.find(scene).message
 
 
@@ -156,7 +156,7 @@ def test_plants_are_shown_where_they_stand(form, corners):
     plants[0].tetflora.enabled = False
     before = datablocks()
     scene.tetflora.preview.plants = form
-    shapes = preview_job.read_shapes(scene, depsgraph())
+    shapes = read_shapes(scene, depsgraph())
     assert shapes.plants == shapes.of == len(plants) - 1
     assert shapes.indices.shape[1] == corners
     middles = shapes.positions.reshape(shapes.plants, -1, 3).mean(axis=1)
@@ -193,7 +193,7 @@ def test_undo_keeps_levels_and_lets_go_of_what_was_frozen():
     levels = compute().levels
     bpy.ops.ed.undo_push(message="before")
     scene.tetflora.preview.plants = 'LIGHT'
-    preview_job.read_shapes(scene, depsgraph())
+    read_shapes(scene, depsgraph())
     scene.tetflora.preview.freeze = True
     bpy.ops.ed.undo_push(message="frozen")
     bpy.ops.ed.undo()
@@ -231,7 +231,7 @@ def test_nothing_draws_or_waits_in_the_background():
     scene, _, _ = scene_of_plants()
     scene.tetflora.preview.plants = 'LIGHT'
     assert overlay._handles == []
-    assert not bpy.app.timers.is_registered(preview_job._on_timer)
+    assert not bpy.app.timers.is_registered(_on_timer)
 
 
 def test_every_setting_has_a_name_of_its_own():

@@ -11,7 +11,7 @@ import pytest
 from devtools import session
 from tests.blender.scenes import add_camera, add_plant, datablocks, select
 from tetflora_addon.blender.scene import objects
-from tetflora_addon.blender.viewport import species as species_preview
+from tetflora_addon.blender.viewport import species
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -19,10 +19,10 @@ pytestmark = pytest.mark.usefixtures("clean_file")
 @pytest.fixture
 def preview():
     """Timers never fire here, so that the tests do what they would do."""
-    yield species_preview
-    species_preview.show(bpy.context.scene, False)
-    if bpy.app.timers.is_registered(species_preview._on_timer):
-        bpy.app.timers.unregister(species_preview._on_timer)
+    yield species
+    species.show(bpy.context.scene, False)
+    if bpy.app.timers.is_registered(species._on_timer):
+        bpy.app.timers.unregister(species._on_timer)
 
 
 def _switch_on(preview, species="bush"):
