@@ -59,11 +59,11 @@ def test_command_line_helps(run: Run) -> None:
 
 
 def test_translations_reach_the_interface(run: Run) -> None:
-    """Only a full Blender has languages."""
+    """Only a full Blender has languages; a text that Blender has too would be in its words."""
     code = (
         "import bpy; view = bpy.context.preferences.view; view.language = 'de_DE'; "
-        "view.use_translate_interface = True; print('said:', bpy.app.translations.pgettext('Min Distance'))"
+        "view.use_translate_interface = True; print('said:', bpy.app.translations.pgettext('Leaf Limit'))"
     )
     done = run("-b", "--python-exit-code", "1", "--python-expr", code)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert "said: Mindestabstand" in done.stdout
+    assert "said: Kleinste Blattbreite" in done.stdout
