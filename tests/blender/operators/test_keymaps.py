@@ -178,7 +178,7 @@ def test_every_translated_text_is_in_the_interface():
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ('{"*": {"Wind": "Wind",}}', "line 1 column 22"),
+        ('{"*": {"Wind": "Wind" "Loop"}}', "line 1 column 23"),
         ('{"Labels": {}}', '"Operator" and "*"'),
         ('["Wind"]', '"Operator" and "*"'),
         ('{"*": ["Wind"]}', 'must map English texts'),
