@@ -3,12 +3,11 @@
 """Add plants: a single one, one grown on a drawn form, a first forest, or a population on a terrain."""
 
 import bpy
-import numpy as np
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 
 from ..tetflora_addon.blender.attributes import world_matrix
 from ..tetflora_addon.blender.placing.first_forest import build
-from ..tetflora_addon.blender.placing.plant_objects import add_plants, plants_of
+from ..tetflora_addon.blender.placing.plant_objects import add_plant, next_seed
 from ..tetflora_addon.blender.placing.populations import add_population, make_plants, remove_population
 from ..tetflora_addon.blender.placing.properties import MOST_EMPTIES, STORAGE_ITEMS
 from ..tetflora_addon.blender.placing.rules import copy_companion
@@ -18,7 +17,6 @@ from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, default_speci
 from ..tetflora_addon.blender.species.edits import catalogue
 from ..tetflora_addon.blender.species.values import present_species
 from ..tetflora_addon.errors import SceneError, TetFloraError
-from ..tetflora_addon.planting.places import Placement, new_seeds
 from ..tetflora_addon.planting.rules import Rules
 from .base import Reporting, counted, in_object_mode, need, select_only, selected_plants
 from .populations import ground_selected, report_made, selected_grounds
@@ -64,18 +62,10 @@ class TETFLORA_OT_add_plant(Reporting, bpy.types.Operator):
         if not properties.is_property_set("location"):
             self.location = context.scene.cursor.location
         if not properties.is_property_set("seed"):
-            # The n-th plant of a scene: another one each time, but the same when the script runs again.
-            self.seed = int(new_seeds(np.array([len(plants_of(context.scene.objects))]))[0])
+            self.seed = next_seed(context.scene)
         species = default_species() if self.species in {"", NO_SPECIES} else self.species
-        placement = Placement(
-            position=np.array([self.location]),
-            azimuth=np.array([self.azimuth]),
-            scale=np.array([self.scale]),
-            species=np.zeros(1, np.int32),
-            seed=np.array([self.seed]),
-            wanted=1,
-        )
-        select_only(context, add_plants(context.scene, placement, [species]))
+        made = add_plant(context.scene, self.location, self.azimuth, self.scale, self.seed, species)
+        select_only(context, made)
         return {'FINISHED'}
 
 
@@ -101,7 +91,8 @@ class TETFLORA_OT_use_as_form(Reporting, bpy.types.Operator):
         skeleton = read_skeleton(form, depsgraph)  # refuses what cannot be one before anything changes
         plants = selected_plants(context)
         if not plants:
-            plants = add_plants(context.scene, _in_place_of(form, context.scene, depsgraph), [_species(context.scene)])
+            scene, matrix = context.scene, world_matrix(form, depsgraph)
+            plants = add_plant(scene, matrix[:3, 3], upright_turn(matrix), 1.0, next_seed(scene), _species(scene))
         height = float(skeleton.points[:, 2].max())
         for plant in plants:
             plant.tetflora.form = form
@@ -111,18 +102,6 @@ class TETFLORA_OT_use_as_form(Reporting, bpy.types.Operator):
         select_only(context, plants)
         made = f"{counted(len(skeleton.points), 'point')} drawn"
         return self.done(f'"{form.name}" is now the form of {counted(len(plants), "plant")}: {made}')
-
-
-def _in_place_of(form: bpy.types.Object, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Placement:
-    matrix = world_matrix(form, depsgraph)
-    return Placement(
-        position=matrix[None, :3, 3],
-        azimuth=np.array([upright_turn(matrix)]),
-        scale=np.ones(1),
-        species=np.zeros(1, np.int32),
-        seed=new_seeds(np.array([len(plants_of(scene.objects))])),
-        wanted=1,
-    )
 
 
 def _species(scene: bpy.types.Scene) -> str:

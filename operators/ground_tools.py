@@ -12,13 +12,12 @@ from bpy.props import EnumProperty
 from bpy_extras import view3d_utils
 
 from ..tetflora_addon.blender.placing.ground import Ground, Hit
-from ..tetflora_addon.blender.placing.plant_objects import add_plants, plants_of
+from ..tetflora_addon.blender.placing.plant_objects import add_plant, next_seed
 from ..tetflora_addon.blender.runtime import redraw
 from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, default_species, display_height, operator_items
 from ..tetflora_addon.blender.species.edits import catalogue
 from ..tetflora_addon.blender.viewport.points import GroundCursor, circle
 from ..tetflora_addon.errors import TetFloraError
-from ..tetflora_addon.planting.places import Placement, new_seeds
 from .base import NO_VIEWPORT, Tool, in_object_mode, select_only
 
 # Turning and moving the view, which goes on while a tool runs.
@@ -212,17 +211,8 @@ class TETFLORA_OT_place_plant(GroundTool, bpy.types.Operator):
         return True
 
     def _plant(self, context: bpy.types.Context) -> None:
-        # The n-th plant of a scene, as Add > TetFlora Plant has it.
-        seed = new_seeds(np.array([len(plants_of(context.scene.objects))]))
-        placement = Placement(
-            position=np.array([self._hit[0]], dtype=np.float64),
-            azimuth=np.array([self._turn]),
-            scale=np.array([self._scale]),
-            species=np.zeros(1, np.int32),
-            seed=seed,
-            wanted=1,
-        )
-        made = add_plants(context.scene, placement, [self._chosen])
+        scene = context.scene
+        made = add_plant(scene, self._hit[0], self._turn, self._scale, next_seed(scene), self._chosen)
         context.view_layer.update()
         select_only(context, made)
         self._changed = True

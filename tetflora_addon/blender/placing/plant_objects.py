@@ -50,6 +50,26 @@ def plant_collection(scene: bpy.types.Scene) -> bpy.types.Collection:
     return collection
 
 
+def next_seed(scene: bpy.types.Scene) -> int:
+    """Seed of the next plant added to a scene: another one each time, but the same when a script runs again."""
+    return int(new_seeds(np.array([len(plants_of(scene.objects))]))[0])
+
+
+def add_plant(
+    scene: bpy.types.Scene, position: Sequence[float], azimuth: float, scale: float, seed: int, species: str
+) -> list[bpy.types.Object]:
+    """Make the empty of one plant, with its trunk's base at a position in world space; a list of it."""
+    placement = Placement(
+        position=np.array([position], dtype=np.float64),
+        azimuth=np.array([azimuth]),
+        scale=np.array([scale]),
+        species=np.zeros(1, np.int32),
+        seed=np.array([seed]),
+        wanted=1,
+    )
+    return add_plants(scene, placement, [species])
+
+
 def add_plants(
     scene: bpy.types.Scene,
     placement: Placement,
