@@ -75,7 +75,7 @@ def hint(scene: bpy.types.Scene) -> str:
     if settings.statistics:
         return ""
     if settings.refine_at_render:
-        return "Click Refine, then press F12 to render" if is_first_forest(scene) and has_contents(scene) else ""
+        return "Click Refine, then press F12" if is_first_forest(scene) and has_contents(scene) else ""
     # The first object of a collection shows whether it was kept as meshes: a panel cannot look through all objects.
     first = (next(iter(collection.objects), None) for collection in scene.collection.children_recursive)
     kept = any(obj is not None and KIND in obj for obj in first)
