@@ -1,14 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Structures of arrays: many things of one kind, with an array for each of their properties.
+"""Structures of arrays: many things of one kind, with one array for each of their properties.
 
-Arrays of vectors (n, 3) and frames (n, 3, 3) are kept component by component in memory, see `plants.vectors`.
-
-Vectors and frames of many things, laid out so that numpy is fast with them.
-
-Shapes are (n, 3) and (n, 3, 3) everywhere, but memory holds one component of all n after the other. Arithmetic on such
-arrays runs along n without strides, and its results keep the layout; only indexing and stacking have to take care of
-it, which is done here.
+Vectors are (n, 3) and frames (n, 3, 3), but memory holds one component of all n after the other. Arithmetic on such
+arrays runs along n without strides, and its results keep the layout. Only indexing and stacking have to take care of
+it; the functions below do.
 """
 
 from __future__ import annotations

@@ -1,17 +1,11 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A folder that keeps what takes seconds to find out about a species and always comes out the same.
+"""What takes long to compute is kept: in a folder across sessions, in memory within one.
 
-Each result is an array in a file of its own, named after its kind and the content that it follows from; so nothing in
-the folder is ever wrong, only unused. Several processes may share it: files are written whole, and what one deletes the
-others find out anew. Whatever is damaged, foreign or cannot be read counts as absent. The folder never stops anybody:
-what goes wrong with it is said once on stderr.
-
-Files that are written whole or not at all: a full disk or a killed process leaves what was there before.
-
-Results of functions of arrays, kept while the session lasts: asked the same again, they need not work it out again.
-
-What is kept is known by a digest of all that it follows from, so that it is never wrong, only unused.
+The cache folder has one file for each result, named after its kind and a digest of all that it follows from, so a file
+may become unused but never wrong. Processes may share the folder: files are written whole or not at all, even on a full
+disk. Damaged, foreign or unreadable files count as absent. Trouble with the folder is reported once on stderr and stops
+nothing. `keeping` does the same in memory for functions of arrays.
 """
 
 from __future__ import annotations

@@ -1,12 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The camera as the engine sees it: a window at unit depth or on the sphere, projection and its inverse.
+"""The camera as the engine sees it: a window at unit depth or on the sphere, its projection, and its blur.
 
-How much further a picture reaches where its lens is open or its camera moves: depth of field and motion blur.
-
-A lens of radius R that is focused on depth f draws a point at depth z as a disc; at depth 1 its radius is R |1/z − 1/f|
-(M. Potmesil and I. Chakravarty, "A lens and aperture camera model for synthetic image generation", Computer Graphics
-15 (3), 1981). What lies beside the view by less than that is in the picture.
+Blur makes an image reach further. A lens of radius R focused on depth f draws a point at depth z as a disc, whose
+radius at depth 1 is R |1/z − 1/f| (M. Potmesil and I. Chakravarty, "A lens and aperture camera model for synthetic
+image generation", Computer Graphics 15 (3), 1981). What lies beside the view by less than that is in the image.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ plant stands", 1971), here as a function of the cell's size:
 
 with h the cube root of its volume, λ the length of the branch over the usual one of its row (leaves are no smaller on
 shorter branches, so that these are denser). Each order has an offset, each species the other two. They are fitted
-once, by rays through a few plants that are divided into tetrahedra of several sizes (`cells`): as many rays as meet
+once, by rays through a few plants that are divided into tetrahedra of several sizes (`rays`): as many rays as meet
 nothing in truth shall on the mean pass through the tetrahedra. What is fitted is what is seen: whole stacks of cells.
 """
 

@@ -1,13 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Parallel rays: which polygons they meet, and their ways through a lattice of tetrahedra.
+"""Parallel rays: through a lattice of tetrahedra, and against the outlines of leaves and wood.
 
 The lattice is made of unit cubes, each divided into six tetrahedra around its diagonal (Kuhn, "Some combinatorial
-lemmas in topology", 1960): a point is in the one that the order of its coordinates within the cube says.
-
-What is seen of grown plants from far away: where leaves and straight parts of branches are, and their outlines.
-
-Much quicker than their meshes, because only what lies in the way of a ray is worked out to its last corner.
+lemmas in topology", 1960): the order of a point's coordinates within the cube tells which one it is in. Outlines stand
+for the meshes of grown plants and are much faster, because only what lies in the way of a ray gets corners.
 """
 
 from __future__ import annotations

@@ -1,12 +1,11 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Centre lines of branches: straight segments that bend at joints, turn to the sky or the ground, and sway.
+"""Centre lines of branches, and how thick branches are along them.
 
-How thick branches are along their length: taper, flare of the base, and the pipe model.
-
-The radius is that of the base times a profile: linear from 1 to the taper, or by the pipe model, in which r^p is shared
-out among the children (Shinozaki et al., "A quantitative analysis of plant form: the pipe model theory", 1964; p = 2 is
-Leonardo's rule). The flare of Weber and Penn (SIGGRAPH 1995, section 4.4) is added over the first eighth.
+Lines are straight segments that bend at joints, turn to the sky or the ground, and sway. The radius is that of the base
+times a profile: linear from 1 to the taper, or by the pipe model, in which r^p is divided among the children (Shinozaki
+et al., "A quantitative analysis of plant form: the pipe model theory", 1964; p = 2 is Leonardo's rule). The flare of
+Weber and Penn (SIGGRAPH 1995, section 4.4) is added over the first eighth.
 """
 
 from __future__ import annotations
@@ -114,7 +113,7 @@ def _axes(rows: NDArray[np.void], branches: Branches, ahead: float = 0.0) -> Axe
     segments = rows["segments"][branches.row]
     most = int(segments.max(initial=1))
     n = len(branches)
-    # Branches last in memory, see `vectors`. Zeros, not empty: padding must be finite.
+    # Branches last in memory, see `arrays`. Zeros, not empty: padding must be finite.
     knots, frames = _to_front(np.zeros((3, most + 1, n))), _to_front(np.zeros((3, 3, most, n)))
     step = (branches.length / segments)[:, None]
     bend = rows["curvature"][branches.row] / segments[:, None]

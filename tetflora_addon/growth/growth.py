@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Growing branches: trunks from seeds, axes of branches, children of branches, all as arrays (paper, section 5).
+"""Growing branches: trunks from seeds, children of branches, all as arrays (paper, section 5).
 
-A branch is also a *sub-plant*: it and all that grows on it. Every function takes any mix of species and orders.
-
-Whole branches with their axes, which is all that wood and leaves are made from; an axis is worked out only once.
+A branch is also a *sub-plant*: it and all that grows on it. Functions take any mix of species and orders. `Stems` are
+branches with their axes, from which wood and leaves are made; each axis is computed once.
 """
 
 from __future__ import annotations

@@ -3,11 +3,9 @@
 """Random numbers as a pure function of (seed, path of child indices, attribute).
 
 Any part of a plant can therefore be made alone, in any order, and comes out the same. Only unsigned 64-bit integer
-arithmetic is used, which numpy defines exactly, so that no version of numpy or Blender changes a plant.
-
-Random choices that are spread more evenly than chance would spread them, so that few of them give good means.
-
-Stratified and systematic sampling (Cochran, "Sampling Techniques", 1977).
+arithmetic is used, which numpy defines exactly, so no version of numpy or Blender changes a plant. Some choices are
+spread more evenly than by chance, so that few of them give good means: stratified and systematic sampling (Cochran,
+"Sampling Techniques", 1977).
 """
 
 from __future__ import annotations
@@ -135,7 +133,7 @@ _THIN = 201  # a draw of this module, beyond those of growth and samples
 
 
 def evenly(key: NDArray[np.uint64], draw: int) -> NDArray[np.float64]:
-    """Numbers in [0, 1) as from `hashing.uniform`, but for all keys (n,) together one in each n-th of the interval."""
+    """Numbers in [0, 1) as from `uniform`, but for all keys (n,) together one in each n-th of the interval."""
     out = np.empty(len(key))
     out[np.argsort(uniform(key, draw), kind="stable")] = (np.arange(len(key)) + 0.5) / len(key)
     return out

@@ -4,9 +4,8 @@
 
 A row describes one kind of branch: an order of a species, a part of it between forks, or the short shoot. It names the
 rows of its children, of three sorts: laterals of the next order, the stems that continue beyond a fork, short shoots.
-Children follow their parents in the table. Angles are in radians.
-
-Branches that are modelled by hand, as lines of even segments with frames: what rows of the table hold of them.
+Children follow their parents in the table. Each branch drawn by hand has a row too: a line of even segments with
+frames. Angles are in radians.
 """
 
 from __future__ import annotations
@@ -316,7 +315,7 @@ def _local_start(start: Range, low: float, high: float) -> tuple[float, float]:
 
 
 def _radius(order: Order, u: float) -> float:
-    """Radius at a fraction of the branch, in radii of its base (`profiles.profile` without flare)."""
+    """Radius at a fraction of the branch, in radii of its base (`axes.profile` without flare)."""
     if order.pipe <= 0:
         return 1 - (1 - order.taper.mean) * u
     share = float(np.clip((u - order.branch_start.mean) / (1 - order.branch_start.mean), 0, 1))

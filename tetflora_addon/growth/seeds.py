@@ -19,7 +19,7 @@ class Seeds(Arrays):
     Attributes
     ----------
     identifiers : tuple of str
-        Species that ``species`` counts through, as in the catalogue; in a scene, kinds (`blender.plant_kinds`).
+        Species that ``species`` counts through, as in the catalogue; in a scene, kinds of plants.
     species : (n,) int32
         Index into ``identifiers``.
     seed : (n,) int64

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where plants go: on ground that suits them, at a distance from each other, near what they seek.
 
-Arrays only; `blender.plant_objects` makes objects of them. Chance comes from the same hash as in the plants themselves,
-so that a seed means the same arrangement in every version of Blender.
+Arrays only; `blender.placing` makes objects of them. Chance comes from the same hash as in the plants themselves, so
+a seed gives the same arrangement in every version of Blender.
 """
 
 from __future__ import annotations
@@ -18,11 +18,10 @@ from ..errors import SceneError
 from ..growth.hashing import child_key, key_of_seed, uniform
 from .companions import Company
 from .plane import Spacing
-from .rules import Rules, check_rules
+from .rules import MOST_PLANTS, Rules, check_rules
 from .site import REMEDIES, Sample, Site, SiteDraw, lines_of_paths
 from .terrain import Path, Terrain
 
-MOST = 10_000_000  # plants of one population
 _ROUNDS = 24
 _SMALLEST_ROUND = 512
 _LARGEST_ROUND = 2_000_000
@@ -185,10 +184,10 @@ class _Sowing:
         """Place plants of one species, or of all by their shares, and ``part`` of the number asked for."""
         if self.rules.by_density:
             expected = self.rules.density * self.site.area * part
-            if expected > MOST:
+            if expected > MOST_PLANTS:
                 raise SceneError(
                     f"A density of {self.rules.density:.3g} plants per m² makes {expected:,.0f} plants on this ground; "
-                    f"the limit is {MOST:,}. Lower the density"
+                    f"the limit is {MOST_PLANTS:,}. Lower the density"
                 )
             # What is left of a whole plant comes by chance.
             places = int(expected + uniform(key, SiteDraw.SUITABLE))

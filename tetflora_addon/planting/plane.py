@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Areas and lines on the map: which points lie inside of closed curves, and how near they are to lines.
+"""Geometry on the map: areas, nearness to lines, distances between points, and noise for clumps.
 
-Which points lie near others, and how to keep points apart: grids whose cells are as large as the distance.
-
-Clumps: noise on the map from hashes of a lattice, so that a seed means the same clumps everywhere.
+Points are kept apart by grids whose cells are as large as the distance. Noise comes from hashes of a lattice, so that
+a seed gives the same clumps everywhere.
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import spread
 from ..growth.hashing import child_key, uniform
 
 _SLABS = 4096  # at most, into which a polygon is cut
@@ -54,7 +54,7 @@ def _inside(points: NDArray[np.float64], polygon: NDArray[np.float64]) -> NDArra
         return np.clip((y - base) / height, 0, slabs - 1).astype(np.int64)
 
     first = slab(low)
-    edge, offset = _repeated(slab(high) - first + 1)
+    edge, offset = spread(slab(high) - first + 1)
     order = np.argsort(first[edge] + offset, kind="stable")
     begins = np.searchsorted((first[edge] + offset)[order], np.arange(slabs + 1))
     edge = edge[order]
@@ -93,7 +93,7 @@ class Lines:
         first = self._column_row(np.minimum(start, end) - reach[:, None])
         last = self._column_row(np.maximum(start, end) + reach[:, None])
         wide = last - first + 1
-        piece, offset = _repeated(wide.prod(axis=1))
+        piece, offset = spread(wide.prod(axis=1))
         place = first[piece] + np.stack([offset % wide[piece, 0], offset // wide[piece, 0]], axis=1)
         number = place[:, 1] * self.columns + place[:, 0]
         # What is farther from a cell's middle than another's farthest place from it is nowhere in the cell the nearest.
@@ -139,16 +139,10 @@ def _cut(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Pieces of at most the given length in the place of long ones."""
     parts = np.ceil(np.linalg.norm(end - start, axis=1) / longest).astype(np.int64).clip(min=1)
-    piece, offset = _repeated(parts)
+    piece, offset = spread(parts)
     step = ((end - start) / parts[:, None])[piece]
     begin = start[piece] + offset[:, None] * step
     return begin, begin + step, reach[piece]
-
-
-def _repeated(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Each index as often as its count says, and which time it is, from 0."""
-    index = np.repeat(np.arange(len(counts)), counts)
-    return index, np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 NO_DISTANCE = 1e-4  # metres; less is none, and its cells could not be counted

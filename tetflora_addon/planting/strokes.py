@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ..growth.hashing import child_key, key_of_seed, uniform
 from ..setting import LENGTH, setting
 
-#: Cells that one dab looks at; a wider circle, or a higher density, is refused by `cells_of`.
+#: Cells that one dab looks at; a wider circle, or a higher density, is refused by `paint`.
 MOST_CELLS = 200_000
 _TRIES = 6  # places in a cell that are tried before it stays empty
 _TINY = 1e-9

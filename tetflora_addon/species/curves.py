@@ -1,13 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Splines as chains of points with radii: Bezier, Catmull-Rom and NURBS evaluated, and side branches joined.
+"""Splines and graphs from which skeletons are made.
 
-A point has four numbers, its place and its radius, which splines treat alike. *Chains* are points (p, 4) float64, the
-first point of each chain and their number ``first`` (s + 1,) int64, and ``cyclic`` (s,) bool.
-
-Graphs and forests as arrays: points that coincide, connected parts, trees from the root outwards, sums along it.
-
-A forest is an array ``parent`` of indices, -1 for roots. Loops run over the depth of a forest or its logarithm.
+*Chains* are splines evaluated as points with radii (p, 4): Bezier, Catmull-Rom and NURBS, with side branches joined.
+Graphs and forests are arrays: points that coincide, connected parts, trees from the root outwards, sums along it. A
+forest is an array ``parent`` of indices, -1 for roots; loops run over its depth or the logarithm of that.
 """
 
 from __future__ import annotations

@@ -2,9 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a species is: ranges for each branch order and a sample leaf (paper, section 5).
 
-How the length of branches varies from the base of their parent to its tip.
-
-A short text that tells a species from all others, under which results about it are kept.
+`crown_ratio` gives the length of branches along their parent; `fingerprint` identifies a species in the cache folder.
 """
 
 from __future__ import annotations
@@ -100,7 +98,7 @@ class Order:
     spur_start : Range
         Fraction of the branch that stays bare of them.
     crown : str
-        How the length of the children varies along the branch, see `crown_shapes.CROWN_SHAPES`.
+        How the length of the children varies along the branch, see `CROWN_SHAPES`.
     count_by_length : float
         How far the numbers of branches and leaves follow the branch's length: 0 not at all, 1 in proportion.
     leaves : Range

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Leaves as polygons: placed copies of the species' models (paper, section 5).
+"""Leaves as polygons: copies of the species' leaf models, written straight into the arrays of their mesh.
 
-Copies of a leaf model, one for each leaf, written straight into the arrays of their mesh.
+See section 5 of the paper.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pieces of branches: straight parts of an axis with the leaves on them; branches are clipped to them (paper, 6.5).
+"""Pieces of branches, and opening sub-plants into their branches, one order at a time or all the way.
 
-Opening sub-plants into their branches, one order at a time or all the way.
+Pieces are straight parts of an axis with the leaves on them; branches are clipped to them (paper, section 6.5).
 """
 
 from __future__ import annotations

@@ -1,22 +1,16 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Longest-edge bisection: the cut that keeps tetrahedra from becoming slivers (paper, section 4).
+"""Division of tetrahedra without slivers: bisection of the longest edge, and the canonical eight (paper, section 4).
 
-The paper cuts by a plane and picks the division by the aspect ratio of what results. A plane through the midpoint of
-the longest edge and the two vertices opposite it crosses one edge, gives two tetrahedra, and is one node of the binary
-tree. M.-C. Rivara and C. Levin, "A 3-D refinement algorithm suitable for adaptive and multi-grid techniques",
-Communications in Applied Numerical Methods 8 (1992).
+Bisection: the plane through the midpoint of the longest edge and the two vertices opposite it. M.-C. Rivara and C.
+Levin, "A 3-D refinement algorithm suitable for adaptive and multi-grid techniques", Communications in Applied Numerical
+Methods 8 (1992).
 
-The canonical eight: a tetrahedron in eight, as a balanced binary tree of seven planes (paper, section 4, fig. 2).
-
-The midpoints of the six edges cut off four corners, each the whole at half its size; what is left is an octahedron, and
-one of its three diagonals divides it into four. The paper starts from "a plane [that] intersects four edges" and halves
-"the two unintersected edges", which "generates a balanced tree". So it is here. With vertices a, b, c, d and the
-diagonal from the middle of ac to that of bd, the plane through the middles of ac, ad, bc and bd parts a and b from c
-and d; the plane through the diagonal and the middle of ab, which is that of cd as well, parts a from b and c from d;
-the planes of the corners do the rest. Every child is three planes below its parent, as after three bisections.
-
-Faces are divided at the middles of their edges whatever the diagonal, so neighbours that are both divided conform.
+Eight (fig. 2): midpoints of the six edges cut off four corners and leave an octahedron, which one of its diagonals
+divides into four. With vertices a, b, c, d and the diagonal from the middle of ac to that of bd, the plane through the
+middles of ac, ad, bc and bd parts a and b from c and d; the plane through the diagonal and the middles of ab and cd
+parts a from b and c from d; the planes of the corners do the rest. Every child is three planes below its parent, as
+after three bisections. Faces are divided at the middles of their edges whatever the diagonal, so neighbours conform.
 """
 
 from __future__ import annotations

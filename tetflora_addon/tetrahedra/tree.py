@@ -134,7 +134,7 @@ class TetrahedralTree:
         Returns
         -------
         (n, 8) int32
-            Terminals three levels further down, see `eight.divide_by_shape`; they inherit `inside`.
+            Terminals three levels further down, see `subdivision.divide_by_shape`; they inherit `inside`.
 
         Raises
         ------
