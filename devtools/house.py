@@ -16,7 +16,7 @@ from pathlib import Path
 from . import rooms
 
 ROOT = Path(__file__).resolve().parent.parent
-LONGEST = 420  # lines; aim at 400
+LONGEST = 400  # lines
 SOURCES = {".py", ".toml", ".sh", ".yml", ".yaml"}
 SOURCE_NAMES = {"Makefile", "run"}
 HEADER = ("SPDX-FileCopyrightText:", "SPDX-License-Identifier: GPL-3.0-or-later")

@@ -10,6 +10,7 @@ import bpy
 import pytest
 
 from tests.blender.scenes import add_mesh, add_plant
+from tetflora_addon import blender
 from tetflora_addon.blender import preferences, properties, saved_files
 from tetflora_addon.blender.job import contents
 from tetflora_addon.blender.placing.properties import TetFloraBrush, TetFloraPopulation
@@ -186,3 +187,8 @@ def test_files_are_stamped_and_those_of_a_newer_version_left_alone(tmp_path, cap
     assert versions == {"old": saved_files.VERSION, "newer": saved_files.VERSION + 1, "other": 0}
     assert bpy.context.scene.tetflora.version == saved_files.VERSION
     assert "a newer version saved 1 of" in capsys.readouterr().err
+
+
+def test_rooms_are_themselves_and_no_module_of_the_same_name():
+    for room in ("materials", "species", "scene", "results", "placing", "job", "viewport", "cli"):
+        assert getattr(blender, room).__path__

@@ -7,7 +7,8 @@ from .cli import command
 from .job import render
 from .placing import assets
 from .species import catalogue
-from .viewport import auto, levels, overlay, points, species
+from .viewport import auto, levels, overlay, points
+from .viewport import species as species_preview  # or the room of that name could not be read as an attribute
 
 # Handlers and commands read properties, so those come first.
 _PARTS = (
@@ -19,7 +20,7 @@ _PARTS = (
     auto,
     levels,
     overlay,
-    species,
+    species_preview,
     points,
     assets,
     command,
