@@ -40,7 +40,9 @@ def steps(ui):
     ui.values["in_script"] = figures(scene)
     refine.clear(scene)
 
-    # Objects appear early, so there is something to take back.
+    # Objects appear early, so there is something to take back; plants enough that Esc comes before the end.
+    many = [add_plant(f"many {i}", seed=i, location=(i - 20.0, 10.0, 0.0)) for i in range(40)]
+    bare = datablocks()
     scene.tetflora.expand_everything = True
     begin(ui)
     yield from ui.until(lambda: datablocks() != bare, 60, "first objects")
@@ -50,6 +52,7 @@ def steps(ui):
     yield from ui.until(lambda: not running(ui), 30, "end after Esc")
     ui.values["left_by_esc"] = changes(bare)
     scene.tetflora.expand_everything = False
+    bpy.data.batch_remove(many)
 
     scene.tetflora.cutoff, scene.tetflora.leaf_limit = 0.5, 0.1
     messages = listen()
