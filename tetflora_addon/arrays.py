@@ -17,6 +17,9 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+#: Steps of `spiral` that spread directions evenly: the golden section twice, and the golden angle over π.
+GOLDEN_TURN, GOLDEN_ANGLE = 1.0 + np.sqrt(5.0), 3.0 - np.sqrt(5.0)
+
 
 class Arrays:
     """Base of dataclasses whose fields are columns: one row for each of n things.
@@ -151,3 +154,9 @@ def perpendicular(axis: NDArray) -> NDArray:
     """A unit vector (n, 3) across each of unit vectors (n, 3), turned about it as may be."""
     helper = np.where(np.abs(axis[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
     return unit(np.cross(axis, helper))
+
+
+def spiral(z: NDArray, index: NDArray, step: float) -> NDArray:
+    """Unit vectors (n, 3) of a Fibonacci lattice: heights z (n,), turned by ``index`` (n,) × π × ``step``."""
+    turn, level = np.pi * step * index, np.sqrt(1.0 - z * z)
+    return np.stack([level * np.cos(turn), level * np.sin(turn), z], axis=1)

@@ -23,6 +23,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import GOLDEN_TURN, spiral
 from ..growth.branches import Branches
 from ..growth.growth import trunks
 from ..growth.hashing import key_of_seed, mix, uniform
@@ -166,9 +167,7 @@ def _directions(plant: int, plants: int) -> NDArray[np.float64]:
     """Directions (n, 3) on the half sphere from which one of some plants is seen, others for each."""
     number = max(_VIEWS // plants, _LEAST_VIEWS)
     i = plant + np.arange(number) * plants + 0.5
-    turn = np.pi * (1 + np.sqrt(5)) * i
-    z = i / (number * plants)
-    return np.stack([np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z], axis=1)
+    return spiral(i / (number * plants), i, GOLDEN_TURN)
 
 
 def _rays(

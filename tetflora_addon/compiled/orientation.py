@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import columns, cross, perpendicular
+from ..arrays import GOLDEN_ANGLE, columns, cross, perpendicular, spiral
 from ..growth.axes import Axes, axes
 from ..growth.branches import Branches
 from ..growth.foliage import leaf_frames, leaf_keys, leaf_places, outwardness, settled
@@ -240,12 +240,10 @@ def _skies_met(rows: NDArray[np.void], length: NDArray[np.float64]) -> list[NDAr
 
 def _skies_around(n: int, upright: bool, met: NDArray[np.float64]) -> NDArray[np.float64]:
     """Directions (n, 3) of the sky, every other one of those that are met, the rest all around."""
-    cos = 1 - 2 * (np.arange(n) + 0.5) / n  # Fibonacci's sphere
+    cos = 1 - 2 * (np.arange(n) + 0.5) / n
     if upright:  # most plants stand, and few lie
         cos = 1 - 2 * ((1 - cos) / 2) ** 3
-    around = np.pi * (3 - np.sqrt(5)) * np.arange(n)
-    sin = np.sqrt(1 - cos * cos)
-    sky = np.stack([sin * np.cos(around), sin * np.sin(around), cos], axis=1)
+    sky = spiral(cos, np.arange(n), GOLDEN_ANGLE)
     sky[1::2] = met[thinned(len(met), len(sky[1::2]))]
     return sky
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import GOLDEN_TURN, spiral
 from ..buffers import MeshBuffers
 from ..compiled.flora import Flora
 from ..growth.hashing import mix, uniform
@@ -43,9 +44,7 @@ def directional_mean(S: ArrayLike) -> NDArray[np.float64]:
     """
     matrices = np.asarray(S, dtype=np.float64)
     index = np.arange(_DIRECTIONS) + 0.5
-    z = index / _DIRECTIONS
-    turn = np.pi * (1.0 + np.sqrt(5.0)) * index
-    x, y = np.sqrt(1.0 - z * z) * np.cos(turn), np.sqrt(1.0 - z * z) * np.sin(turn)
+    x, y, z = spiral(index / _DIRECTIONS, index, GOLDEN_TURN).T
     basis = np.stack([x * x, y * y, z * z, 2 * x * y, 2 * x * z, 2 * y * z])
     result = np.zeros(len(matrices))
     for start in range(0, len(matrices), _CHUNK):

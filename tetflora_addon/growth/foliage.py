@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import cross, dot, gathered
+from ..arrays import Arrays, cross, dot, gathered
 from .axes import Axes
 from .branches import Branches
 from .growth import level_azimuth
@@ -23,7 +23,7 @@ _PLACE_JITTER = 0.4  # below a half, so that leaves keep their order along the b
 
 
 @dataclass(frozen=True)
-class Leaves:
+class Leaves(Arrays):
     """Leaves as a structure of arrays.
 
     Attributes
@@ -51,9 +51,6 @@ class Leaves:
     size: NDArray[np.float64]
     light: NDArray[np.float64]
     sky: NDArray[np.floating]
-
-    def __len__(self) -> int:
-        return len(self.key)
 
 
 def leaf_keys(branches: Branches, owner: NDArray[np.int64], index: NDArray[np.int64]) -> NDArray[np.uint64]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import GOLDEN_ANGLE, spiral
 from ..camera.camera import Camera
 from ..refinement.lights import Light, image_size, lamp_views, light_views
 from .buffers import LightBuffer
@@ -51,7 +52,7 @@ def _grid_points(span: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArra
 def _disk_points() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Points that stand for equal parts of a disk (Vogel, "A better way to construct the sunflower head", 1979)."""
     index = np.arange(AREA_POINTS**2) + 0.5
-    radius, turn = np.sqrt(index / len(index)), np.pi * (3.0 - np.sqrt(5.0)) * index
+    radius, turn = np.sqrt(index / len(index)), np.pi * GOLDEN_ANGLE * index
     return radius * np.cos(turn), radius * np.sin(turn)
 
 
@@ -106,9 +107,7 @@ class World:
     def of(cls, radiance: Callable[[NDArray[np.float64]], ArrayLike]) -> World:
         """A sky whose radiance (m, 3) in unit directions (m, 3) is known."""
         index = np.arange(SKY_POINTS) + 0.5
-        z, turn = 1.0 - 2.0 * index / SKY_POINTS, np.pi * (3.0 - np.sqrt(5.0)) * index
-        level = np.sqrt(1.0 - z * z)
-        towards = np.stack([level * np.cos(turn), level * np.sin(turn), z], axis=1)
+        towards = spiral(1.0 - 2.0 * index / SKY_POINTS, index, GOLDEN_ANGLE)
         seen = np.broadcast_to(np.asarray(radiance(towards), np.float64), (SKY_POINTS, 3)) * (4.0 * np.pi / SKY_POINTS)
         part, basis = nearest_direction(towards), harmonics(towards)
         parts = np.zeros((len(DIRECTIONS), HARMONICS, 3))

@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import spread
+from ..arrays import GOLDEN_TURN, spiral, spread
 from ..compiled.flora import Flora
 from ..compiled.rays import Things, basis, covered, things_of
 from ..growth.branches import Branches
@@ -303,9 +303,8 @@ class _Sight:
         for family in np.unique(along):
             middle = self.things.middle[:, along == family]
             extent = max(extent, float(np.ptp(middle, axis=1).max()))
-        z = (np.arange(_DIRECTIONS) + 0.5) / _DIRECTIONS
-        turn = np.pi * (1 + np.sqrt(5)) * (np.arange(_DIRECTIONS) + 0.5)
-        directions = np.stack([np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z], axis=1)
+        index = np.arange(_DIRECTIONS) + 0.5
+        directions = spiral(index / _DIRECTIONS, index, GOLDEN_TURN)
         return [_View(*basis(direction), extent / _RAYS) for direction in directions]
 
     def met(self, view: _View) -> int:
