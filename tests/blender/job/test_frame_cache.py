@@ -384,16 +384,14 @@ def test_scenes_that_are_rendered_within_a_render_leave_its_results_alone(animat
     render.on_render_pre(other)
     assert render.render_errors() == []
     theirs = {collection.name for collection in result_collections(other)}
-    assert theirs
-    assert not theirs & names
+    assert theirs and not theirs & names
     render.on_render_end(other)
     assert at(animation, 1) == first
     assert made == [1, 1]
 
 
 def test_names_that_are_too_long_still_tell_cells_apart(animation, made):
-    foreign = add_mesh("x" * 60, size=0.5)
-    foreign.tetflora.is_explicit = True
+    add_mesh("x" * 60, size=0.5).tetflora.is_explicit = True
     depsgraph()
     at(animation, 1)
     _, last = at(animation, FRAMES)
