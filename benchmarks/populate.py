@@ -44,7 +44,7 @@ RULES = Rules(
     clump_size=30.0,
     scale_at_top=0.5,
     tilt=0.3,
-    shares=(3.0, 1.0, 1.0),
+    weights=(3.0, 1.0, 1.0),
     companions=(Companion(1, 0, 1.0, 5.0), Companion(2, 0, -1.0, 2.0)),
 )
 

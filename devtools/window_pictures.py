@@ -31,7 +31,7 @@ PANELS = {
     "brush": ("TETFLORA_PT_brush",),
     "refinement": ("TETFLORA_PT_refine", "TETFLORA_PT_proxies", "TETFLORA_PT_visibility", "TETFLORA_PT_limits"),
     "wind": ("TETFLORA_PT_wind",),
-    "animation": ("TETFLORA_PT_refine", "TETFLORA_PT_films", "TETFLORA_PT_leaf_objects"),
+    "animation": ("TETFLORA_PT_refine", "TETFLORA_PT_animation", "TETFLORA_PT_leaf_objects"),
     "output": ("TETFLORA_PT_output", "TETFLORA_PT_ray_visibility", "TETFLORA_PT_passes"),
     "preview": ("TETFLORA_PT_preview",),
     "statistics": ("TETFLORA_PT_statistics",),

@@ -106,7 +106,7 @@ def plant(scene: bpy.types.Scene, surface: bpy.types.Object, plants: int) -> bpy
         min_distance=0.9,
         scale_min=0.8,
         scale_max=1.35,
-        shares=tuple(SPECIES.values()),
+        weights=tuple(SPECIES.values()),
     )
     ground = terrain.read_ground([surface], depsgraph)
     found = places.place(ground, scattered)

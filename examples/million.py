@@ -76,7 +76,7 @@ def _plant(scene: bpy.types.Scene, surface: bpy.types.Object, land: Terrain, pla
             altitude_max=low + 0.7 * (high - low),
             altitude_falloff=0.25 * (high - low),
             clumping=0.95,
-            shares=tuple(VALLEYS.values()),
+            weights=tuple(VALLEYS.values()),
             **common,
         ),
     )
@@ -89,7 +89,7 @@ def _plant(scene: bpy.types.Scene, surface: bpy.types.Object, land: Terrain, pla
             altitude_falloff=0.25 * (high - low),
             clumping=0.8,
             scale_at_top=0.8,
-            shares=tuple(HEIGHTS.values()),
+            weights=tuple(HEIGHTS.values()),
             **common,
         ),
         valleys.position,

@@ -97,7 +97,7 @@ class TETFLORA_OT_look_through(Reporting, bpy.types.Operator):
 
 
 def look_from(space: bpy.types.SpaceView3D, camera: Camera) -> None:
-    """Turn a viewport to where a camera looks; the picture is as wide as the viewport."""
+    """Turn a viewport to where a camera looks; the image is as wide as the viewport."""
     region = space.region_3d
     region.view_perspective = 'ORTHO' if camera.kind == "ORTHO" else 'PERSP'
     matrix = Matrix(camera.frame.tolist()).to_4x4()

@@ -34,8 +34,8 @@ def draw_message(context: bpy.types.Context, layout: bpy.types.UILayout, text: s
         column.label(text=line, icon='BLANK1' if n else icon)
 
 
-def picture(identifier: str) -> dict[str, str | int]:
-    """Arguments for a layout's element that shows a species' picture, or an icon where it has none."""
+def thumbnail(identifier: str) -> dict[str, str | int]:
+    """Arguments for a layout's element that shows a species' thumbnail, or an icon where it has none."""
     number = icon_of(identifier)
     return {"icon_value": number} if number else {"icon": FALLBACK_ICON}
 

@@ -29,7 +29,7 @@ from ..operators.plants import (
 from ..operators.refine import TETFLORA_OT_clear, TETFLORA_OT_make_plant_mesh, TETFLORA_OT_refine
 from ..tetflora_addon.blender.runtime import open_menu
 from ..tetflora_addon.blender.species.edits import catalogue
-from .base import Button, draw_buttons, picture
+from .base import Button, draw_buttons, thumbnail
 from .preferences import PIE
 
 
@@ -43,7 +43,7 @@ class _SpeciesMenu:
         self.layout.operator_context = 'INVOKE_DEFAULT'
         known = catalogue()
         for info in known.values():
-            icon = picture(info.identifier)
+            icon = thumbnail(info.identifier)
             self.layout.operator(self.operator.bl_idname, text=info.name, **icon).species = info.identifier
         if not known:
             self.layout.label(text="The catalog has no species", icon='ERROR')

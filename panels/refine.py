@@ -149,7 +149,7 @@ class TETFLORA_PT_limits(_PartOfRefine, bpy.types.Panel):
         self.layout.prop(context.scene.tetflora, "expand_everything")
 
 
-class TETFLORA_PT_films(_PartOfRefine, bpy.types.Panel):
+class TETFLORA_PT_animation(_PartOfRefine, bpy.types.Panel):
     """Animation."""
 
     bl_label = "Animation"
@@ -183,6 +183,6 @@ CLASSES = (
     TETFLORA_PT_proxy_shading,
     TETFLORA_PT_visibility,
     TETFLORA_PT_limits,
-    TETFLORA_PT_films,
+    TETFLORA_PT_animation,
     TETFLORA_PT_leaf_objects,
 )

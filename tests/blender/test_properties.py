@@ -49,8 +49,8 @@ def _without_labels(settings_class):
     ("engine", "group", "engine_only"),
     [
         (settings.RefinementSettings, properties.TetFloraScene, {"hidden_block", "proxy_block", "margin"}),
-        (rules.Rules, TetFloraPopulation, {"density", "shares", "companions"}),
-        (strokes.Brush, TetFloraBrush, {"density", "scale_min", "scale_max", "shares"}),
+        (rules.Rules, TetFloraPopulation, {"density", "weights", "companions"}),
+        (strokes.Brush, TetFloraBrush, {"density", "scale_min", "scale_max", "weights"}),
         (wind.Wind, TetFloraWind, {"time", "loop", "moving"}),
     ],
     ids=lambda value: getattr(value, "__name__", ""),

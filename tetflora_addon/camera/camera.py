@@ -37,19 +37,19 @@ class Camera:
     frame : (3, 3) float64
         Rotation; columns are the camera's x, y and z axes in world space.
     window : tuple of float
-        ``(left, right, bottom, top)`` of the picture at depth 1 (``'PERSP'``), at any depth in metres (``'ORTHO'``), or
+        ``(left, right, bottom, top)`` of the image at depth 1 (``'PERSP'``), at any depth in metres (``'ORTHO'``), or
         in radians (``'PANO'``): longitude from the viewing direction to the right, latitude from its plane upwards.
         Lens shift, sensor fit and pixel aspect are in it; it need not be symmetric.
     near, far : float
         Clipping depths, metres, ``0 < near < far``.
     width, height : int
-        Size of the final picture in pixels.
+        Size of the final image in pixels.
     lens_radius : float
         Radius of the lens, metres; 0 where all is sharp.
     focus : float
         Depth that is sharp, metres.
     shutter : tuple of Camera
-        The camera at other times while the shutter is open, and the other eyes of a stereoscopic picture; often empty.
+        The camera at other times while the shutter is open, and the other eyes of a stereoscopic image; often empty.
     setback : float
         How far, in depth, the position lies behind the eye, metres: not 0 where the camera stands for several.
     cell_radius : float
@@ -72,7 +72,7 @@ class Camera:
 
     @property
     def eye(self) -> NDArray[np.float64]:
-        """Where the picture is seen from (3,), metres: before the position where the camera stands for several."""
+        """Where the image is seen from (3,), metres: before the position where the camera stands for several."""
         left, right, bottom, top = self.window
         ahead = np.array([(left + right) / 2.0, (bottom + top) / 2.0, -1.0])
         return self.position + self.setback * (self.frame @ ahead)
@@ -93,7 +93,7 @@ class Camera:
         return ((points - self.position) @ self.frame) * np.array([1.0, 1.0, -1.0])
 
     def clearance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distance of world points (n, 3) from the space that the picture shows, metres; negative within it."""
+        """Distance of world points (n, 3) from the space that the image shows, metres; negative within it."""
         x, y, depth = self.to_camera_space(points).T
         left, right, bottom, top = self.window
         if self.kind == "PANO":
@@ -109,17 +109,17 @@ class Camera:
         return np.max([distance / np.hypot(1.0, slope) for distance, slope in walls], axis=0)
 
     def widened(self, margin: float, margin_up: float | None = None) -> Camera:
-        """The same camera with more around its picture.
+        """The same camera with more around its image.
 
         Parameters
         ----------
         margin : float
-            Share of the picture's width that is added on the left and on the right.
+            Fraction of the image's width that is added on the left and on the right.
         margin_up : float, optional
-            Share of its height that is added below and above; as ``margin`` if it is not given.
+            Fraction of its height that is added below and above; as ``margin`` if it is not given.
         """
         left, right, bottom, top = self.window
-        # Whole pixels, so that the pixels of the picture stay where they are.
+        # Whole pixels, so that the pixels of the image stay where they are.
         across = round(margin * self.width)
         up = round((margin if margin_up is None else margin_up) * self.height)
         step_x, step_y = (right - left) / self.width, (top - bottom) / self.height
@@ -173,7 +173,7 @@ class Camera:
         if self.kind == "PANO":
             local = self.to_camera_space(points)
             distance = np.maximum(np.linalg.norm(local, axis=-1), self.near)
-            # Towards the poles a picture has more pixels for each solid angle.
+            # Towards the poles an image has more pixels for each solid angle.
             cosine = np.hypot(local[..., 0], local[..., 2]) / distance
             return self.pixel_size * self._nearest(distance) * np.sqrt(np.clip(cosine, LEAST_COSINE, 1.0))
         depth = self.to_camera_space(points)[..., 2]
@@ -218,13 +218,13 @@ class Camera:
         return extent
 
 
-#: Margins never exceed this share of the picture on each side. A twig at the lens is blurred over more than all of it,
-#: but so thinly that its leaves cannot be told.
+#: Margins never exceed this fraction of the image on each side. A twig at the lens is blurred over more than all of it,
+#: but so thinly that its leaves cannot be distinguished.
 MOST = 0.5
 
 
 def blur_margins(camera: Camera, centre: NDArray[np.float64], reach: NDArray[np.float64]) -> tuple[float, float]:
-    """Shares of the picture's width and height by which blur reaches beyond it.
+    """Fractions of the image's width and height by which blur reaches beyond it.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def blur_margins(camera: Camera, centre: NDArray[np.float64], reach: NDArray[np.
     Returns
     -------
     across, up : float
-        For each side of the picture, 0 to `MOST`. Where nothing is blurred, 0.
+        For each side of the image, 0 to `MOST`. Where nothing is blurred, 0.
     """
     if not len(centre) or not (camera.lens_radius > 0.0 or camera.shutter):
         return 0.0, 0.0
@@ -271,7 +271,7 @@ def circle_of_confusion(camera: Camera, depth: NDArray[np.float64]) -> NDArray[n
 
 
 def _depths(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Depths (n,) from the eye, metres, or distances where a picture is all around it."""
+    """Depths (n,) from the eye, metres, or distances where an image is all around it."""
     local = camera.to_camera_space(points)
     return np.linalg.norm(local, axis=-1) if camera.kind == "PANO" else local[..., 2] - camera.setback
 
@@ -279,7 +279,7 @@ def _depths(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:
 def _movement(camera: Camera, other: Camera, depths: tuple[float, float]) -> NDArray[np.float64]:
     """How far beyond the window of a camera (2,) the view of another reaches between two depths.
 
-    That view is convex, and so is its picture: the corners are enough.
+    That view is convex, and so is its image: the corners are enough.
     """
     left, right, bottom, top = other.window
     corners = np.array([(x, y, 1.0) for x in (left, right) for y in (bottom, top)])

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Projection to the camera's window: boxes and silhouettes of tetrahedra and triangles, without pixels.
 
-Names: ``local`` is camera space (x right, y up, depth), metres; the *window* is the picture at depth 1
+Names: ``local`` is camera space (x right, y up, depth), metres; the *window* is the image at depth 1
 (``'PERSP'``) or in metres (``'ORTHO'``).
 """
 
@@ -93,7 +93,7 @@ def silhouette_area(
     """Areas ``(n,)`` on the window of tetrahedra beyond the near plane, 0 where not known, and where they are known."""
     left, right, bottom, top = camera.window
     near, far = camera.near, camera.far
-    # A share of the window, so that rounding does not exclude what touches its border, as half of all cells may.
+    # A fraction of the window, so that rounding does not exclude what touches its border, as half of all cells may.
     slack = 1e-9 * np.array([right - left, top - bottom])
     whole = ((low >= np.array([left, bottom]) - slack) & (high <= np.array([right, top]) + slack)).all(axis=1)
     depth = local[..., 2]
@@ -119,8 +119,8 @@ def _clipped_area(triangles: NDArray[np.float64], camera: Camera) -> NDArray[np.
     for i, j in ((0, 1), (1, 2), (2, 0)):
         a, b = triangles[:, i], triangles[:, j]
         crosses = ahead[:, i] != ahead[:, j]
-        share = (camera.near - a[:, 2]) / np.where(crosses, b[:, 2] - a[:, 2], 1.0)
-        cut = a + share[:, None] * (b - a)
+        fraction = (camera.near - a[:, 2]) / np.where(crosses, b[:, 2] - a[:, 2], 1.0)
+        cut = a + fraction[:, None] * (b - a)
         cut = cut[:, :2] if camera.kind == "ORTHO" else cut[:, :2] / camera.near
         start = np.where(ahead[:, i, None], flat[:, i], cut)
         end = np.where(ahead[:, j, None], flat[:, j], cut)
@@ -151,8 +151,8 @@ def window_bounds(
         a, b = local[mixed, first], local[mixed, second]
         crosses = np.flatnonzero(counted[mixed, first] != counted[mixed, second])
         at, a, b = mixed[crosses], a[crosses], b[crosses]
-        share = (near - a[:, 2:]) / (b[:, 2:] - a[:, 2:])
-        cut = a + share * (b - a)
+        fraction = (near - a[:, 2:]) / (b[:, 2:] - a[:, 2:])
+        cut = a + fraction * (b - a)
         point = cut[:, :2] if camera.kind == "ORTHO" else cut[:, :2] / near
         low[at], high[at] = np.minimum(low[at], point), np.maximum(high[at], point)
         total[at] += point

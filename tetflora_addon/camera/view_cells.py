@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""View cells: one refinement for all cameras that are nearly alike, so that the frames of a film share it.
+"""View cells: one refinement for all cameras that are nearly alike, so that the frames of an animation share it.
 
 The space of cameras (place, direction, focal length) is divided into cells. Which cell a camera is in follows from that
-camera alone, never from the frames before it: a frame of a film and the same frame alone are refined alike, on whatever
-machine. What is seen from a cell of space instead of from a point goes back to J. M. Airey, J. H. Rohlf and F. P.
+camera alone, never from the frames before it: a frame of an animation and the same frame alone are refined alike, on
+any machine. What is seen from a cell of space instead of from a point goes back to J. M. Airey, J. H. Rohlf and F. P.
 Brooks, "Towards image realism with interactive update rates in complex virtual building environments" (I3D 1990).
 
 All cameras of a cell are replaced by one that sees whatever any of them sees: it stands further back, its window is
@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from ..setting import setting
 from .camera import Camera
 
-#: How far beyond a cell, as shares of it in place and angle, its camera still sees enough: while the shutter is open,
-#: and for the other eye.
+#: How far beyond a cell, as fractions of it in place and angle, its camera still sees enough: while the shutter is
+#: open, and for the other eye.
 BEYOND, BEYOND_TURN = 0.1, 0.25
 #: Cells of focal length, and of the distance that is sharp, in each doubling.
 ZOOMS, FOCI = 16.0, 2.0
@@ -32,7 +32,7 @@ ACROSS = 2.0
 #: Cells are twice as long, and twice that, where all that is refined is farther from their middle than so many times
 #: the distance to their corners.
 CLEAR = 4.0
-#: Least share of the view's direction that corners of the window must have when the camera has turned: 84 degrees.
+#: Minimum fraction of the view's direction that corners of the window must have when the camera has turned: 84 degrees.
 _AHEAD = 0.1
 #: Where lattices begin, in cells, and a turn that comes before them: what artists type in (0, 90 degrees, whole metres)
 #: then lies on no border, where rounding errors would decide.
@@ -40,7 +40,7 @@ _BEGIN = 0.381966
 _BEFORE = np.array([0.8446, 0.2397, 0.3581, 0.3173])
 _BEFORE /= np.linalg.norm(_BEFORE)
 _BACK = _BEFORE * np.array([1.0, -1.0, -1.0, -1.0])
-#: Fractions of a pixel to which the picture's place on the sensor is rounded, as single precision asks for.
+#: Fractions of a pixel to which the image's place on the sensor is rounded, as single precision asks for.
 _FRACTIONS = 64.0
 
 
@@ -139,7 +139,7 @@ def cell_camera(camera: Camera, cells: ViewCells, around: Around | None = None) 
     narrow = np.minimum(ACROSS * half, 1.0) if camera.kind == "PERSP" else np.ones(2)
     steps = cells.length * np.array([*narrow, 1.0])
     if around is not None and len(around.radii) and camera.kind != "ORTHO":
-        steps = _roomy(camera.position @ frame, frame, steps, around)
+        steps = _enlarged(camera.position @ frame, frame, steps, around)
     eye = frame @ _middle(camera.position @ frame, steps)
     reach = (0.5 + BEYOND) * steps
     for other in others:
@@ -155,7 +155,7 @@ def cell_camera(camera: Camera, cells: ViewCells, around: Around | None = None) 
     return _standing_back(alike, np.array([frame.T @ corner for corner in corners]), reach)
 
 
-def _roomy(
+def _enlarged(
     place: NDArray[np.float64], frame: NDArray[np.float64], steps: NDArray[np.float64], around: Around
 ) -> NDArray[np.float64]:
     """Sides (3,) of the cell in which a place is, doubled as often as nothing is near the cell then.
@@ -214,7 +214,7 @@ def _standing_back(camera: Camera, turned: NDArray[np.float64], reach: NDArray[n
 
 
 def _with_all_windows(camera: Camera) -> Camera:
-    """With whole pixels more around its picture where other eyes look past it: their windows may be shifted."""
+    """With whole pixels more around its image where other eyes look past it: their windows may be shifted."""
     low, high = np.array(camera.window[::2]), np.array(camera.window[1::2])
     step = (high - low) / [camera.width, camera.height]
     windows = np.array([camera.window, *(other.window for other in camera.shutter)])

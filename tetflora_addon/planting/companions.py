@@ -18,14 +18,14 @@ _FOUNDERS = 0.1  # of the plants that seek each other
 class Company:
     """What stands already, by species, and who may join.
 
-    A rule is taken to heart by a share of the plants, chosen by their hashes, which is its strength without the sign.
+    The strength of a rule without its sign is the fraction of plants that follow it, chosen by their hashes.
     Where plants shun others, it does not matter who came first: an oak that shuns birches keeps new birches away too.
     """
 
     def __init__(self, rules: Rules, position: NDArray[np.float64], species: NDArray[np.int32]) -> None:
-        """Begin with older plants: places on the map (m, 2), and indices into the shares or -1 (m,)."""
+        """Begin with older plants: places on the map (m, 2), and indices into the weights or -1 (m,)."""
         self.rules = [(n, r) for n, r in enumerate(rules.companions) if r.strength and r.distance >= NO_DISTANCE]
-        self.place = {s: [position[species == s]] for s in range(len(rules.shares))}
+        self.place = {s: [position[species == s]] for s in range(len(rules.weights))}
 
     def order(self, wanted: list[int]) -> list[int]:
         """Species in the order in which they are placed: those that are sought before those that seek them."""
@@ -43,7 +43,7 @@ class Company:
         for number, rule in self.rules:
             if species not in (rule.species, rule.other):
                 continue
-            asks = fine & _takes_to_heart(keys, number, rule)
+            asks = fine & _follows(keys, number, rule)
             if rule.strength < 0.0 and rule.species == rule.other:
                 asked = np.flatnonzero(asks)
                 fine[asked] = False
@@ -75,7 +75,7 @@ class Company:
         while changed:
             changed = False
             for number, rule in seeking:
-                asked = np.flatnonzero(~gone & (species == rule.species) & _takes_to_heart(keys, number, rule))
+                asked = np.flatnonzero(~gone & (species == rule.species) & _follows(keys, number, rule))
                 there = points[~gone & (species == rule.other)]
                 alone = ~Neighbours(older._standing(rule.other), rule.distance).near(points[asked])
                 # Among their own kind they meet themselves as well.
@@ -103,5 +103,5 @@ class Company:
         return any(self._reaches(s, goal, seen) for s in sorted(ahead))
 
 
-def _takes_to_heart(keys: NDArray[np.uint64], number: int, rule: Companion) -> NDArray[np.bool_]:
+def _follows(keys: NDArray[np.uint64], number: int, rule: Companion) -> NDArray[np.bool_]:
     return uniform(keys, SiteDraw.COMPANION + number) < abs(rule.strength)

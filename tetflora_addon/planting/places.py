@@ -9,16 +9,17 @@ a seed gives the same arrangement in every version of Blender.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Arrays
 from ..errors import SceneError
 from ..growth.hashing import child_key, key_of_seed, uniform
 from .companions import Company
 from .plane import Spacing
-from .rules import MOST_PLANTS, Rules, check_rules
+from .rules import MOST_PLANTS, Rules, check_rules, species_by_weight
 from .site import REMEDIES, Sample, Site, SiteDraw, lines_of_paths
 from .terrain import Path, Terrain
 
@@ -26,14 +27,14 @@ _ROUNDS = 24
 _SMALLEST_ROUND = 512
 _LARGEST_ROUND = 2_000_000
 _MOST_DRAWN = 16_000_000  # and a few dozen for each plant; what is rarer than that takes too long
-_RAREST = 1.0 / 256.0  # share of suitable places that a round counts on at least
+_RAREST = 1.0 / 256.0  # minimum fraction of suitable places that a round expects
 _HOPELESS = 1_000_000  # places without a suitable one
 _FULL = 5_000  # suitable places of which not one can be taken: the ground is full
 _SPECIES = 2**32  # keys of species that are placed one after the other, away from those of plants
 
 
 @dataclass(frozen=True)
-class Placement:
+class Placement(Arrays):
     """Plants to make.
 
     Attributes
@@ -44,7 +45,7 @@ class Placement:
         Rotation about the vertical, radians; comes before the tilt.
     scale : (n,) float64
     species : (n,) int32
-        Index into the shares that were asked for.
+        Index into the weights of the rules.
     seed : (n,) int32
         Zero or positive.
     wanted : int
@@ -72,9 +73,6 @@ class Placement:
         if self.up is None:
             object.__setattr__(self, "up", np.tile([0.0, 0.0, 1.0], (len(self.seed), 1)))
 
-    def __len__(self) -> int:
-        return len(self.seed)
-
     @property
     def rotation(self) -> NDArray[np.float64]:
         """Unit quaternions (n, 4), w first: the turn about the vertical, then the shortest one to ``up``."""
@@ -101,7 +99,7 @@ def place(
     older : (m, 2) or (m, 3) float64, optional
         Places of plants that stand already, meters; new ones keep their distance from them, and may seek or shun them.
     older_species : (m,) int32, optional
-        Their species as index into the shares of the rules; -1 for others, which all are if not given.
+        Their species as index into the weights of the rules; -1 for others, which all are if not given.
 
     Raises
     ------
@@ -114,7 +112,7 @@ def place(
     sampling); those that are kept first come first (dart throwing: R. Cook, "Stochastic sampling in computer graphics",
     1986). By density, as many places are drawn as would stand on wholly suitable ground. By count, more are drawn, in a
     bounded number of rounds, until there are enough. Where species seek or shun each other, they are placed one after
-    the other, each with its share of the count.
+    the other, each with its fraction of the count.
     """
     check_rules(rules)
     older = np.zeros((0, 2)) if older is None else np.asarray(older, dtype=np.float64)[:, :2]
@@ -128,7 +126,7 @@ def place(
     if not company.rules:
         sowing.sow(key, None, 1.0)
     else:
-        weights = np.maximum(rules.shares, 0.0)
+        weights = np.maximum(rules.weights, 0.0)
         for species in company.order(np.flatnonzero(weights > 0.0).tolist()):
             sowing.sow(child_key(key, _SPECIES + species), species, _part(weights, species, rules))
     position, up, keys, species = sowing.result()
@@ -159,9 +157,7 @@ def without(placement: Placement, bare: Sequence[Path]) -> Placement:
     if lines is None or not len(placement):
         return placement
     stay = lines.nearness(placement.position[:, :2]) >= 1.0
-    arrays = {f.name: getattr(placement, f.name) for f in fields(placement)}
-    chosen = {name: values[stay] for name, values in arrays.items() if isinstance(values, np.ndarray)}
-    return replace(placement, **chosen, erased=placement.erased + int((~stay).sum()))
+    return replace(placement.take(stay), erased=placement.erased + int((~stay).sum()))
 
 
 def new_seeds(seeds: NDArray[np.int64], roll: int = 0) -> NDArray[np.int32]:
@@ -181,7 +177,7 @@ class _Sowing:
         self._parts: list[tuple[NDArray, ...]] = []
 
     def sow(self, key: NDArray[np.uint64], species: int | None, part: float) -> None:
-        """Place plants of one species, or of all by their shares, and ``part`` of the number asked for."""
+        """Place plants of one species, or of all by their weights, and ``part`` of the number asked for."""
         if self.rules.by_density:
             expected = self.rules.density * self.site.area * part
             if expected > MOST_PLANTS:
@@ -224,7 +220,7 @@ class _Sowing:
             self.lost[name] += number
         position, up, keys = sample.position, sample.up, sample.key
         if species is None:
-            kinds = _mixed(keys, self.rules.shares)
+            kinds = species_by_weight(self.rules.weights, uniform(keys, SiteDraw.SPECIES))
         else:
             kinds = np.full(len(keys), species, np.int32)
             fine = self.company.admit(species, position[:, :2], keys)
@@ -262,14 +258,14 @@ class _Sowing:
         worst = max(self.lost, key=self.lost.__getitem__)
         if not self.suitable and self.drawn > 10_000:
             raise SceneError(f"No plants could be placed: {REMEDIES[worst]}")
-        shares = {
+        passed = {
             "suitable": self.suitable / self.drawn,
             "companions": 1.0 - self.refused["companions"] / max(self.suitable, 1),
             "distance": 1.0 - self.refused["distance"] / max(self.suitable - self.refused["companions"], 1),
         }
         if rules.by_density and self.suitable:
-            del shares["suitable"]  # these were never wanted
-        least = min(shares, key=shares.__getitem__)
+            del passed["suitable"]  # these were never wanted
+        least = min(passed, key=passed.__getitem__)
         if least == "distance":
             return (
                 f"no room for more plants at a Min Distance of {rules.min_distance:.3g} m; "
@@ -284,24 +280,15 @@ class _Sowing:
 
 
 def _part(weights: NDArray[np.float64], species: int, rules: Rules) -> float:
-    """Share of a species by density; by count its number of plants, the rest going to the largest fractions."""
-    shares = weights / weights.sum()
+    """Fraction of a species by density; by count its number of plants, the rest going to the largest remainders."""
+    fractions = weights / weights.sum()
     if rules.by_density:
-        return float(shares[species])
-    exact = shares * rules.count
+        return float(fractions[species])
+    exact = fractions * rules.count
     whole = np.floor(exact)
     order = np.argsort(-(exact - whole), kind="stable")
     whole[order[: round(rules.count - whole.sum())]] += 1.0
     return float(whole[species])
-
-
-def _mixed(keys: NDArray[np.uint64], shares: tuple[float, ...]) -> NDArray[np.int32]:
-    """Species by chance, as often as their shares ask."""
-    weights = np.maximum(np.asarray(shares, dtype=np.float64), 0.0)
-    limits = np.cumsum(weights) / weights.sum()
-    # Rounding may leave the last limit below a draw that is just under 1.
-    species = np.minimum(np.searchsorted(limits, uniform(keys, SiteDraw.SPECIES), side="right"), len(weights) - 1)
-    return species.astype(np.int32)
 
 
 def _scales(z: NDArray[np.float64], keys: NDArray[np.uint64], site: Site, rules: Rules) -> NDArray[np.float64]:

@@ -129,8 +129,8 @@ class Lines:
         """Distance of each point from its piece, metres."""
         start, along = self.start[piece], self.along[piece]
         length = np.maximum((along * along).sum(axis=1), np.finfo(np.float64).tiny)
-        share = np.clip(((points - start) * along).sum(axis=1) / length, 0.0, 1.0)
-        rest = points - start - share[:, None] * along
+        fraction = np.clip(((points - start) * along).sum(axis=1) / length, 0.0, 1.0)
+        rest = points - start - fraction[:, None] * along
         return np.hypot(rest[:, 0], rest[:, 1])
 
 
@@ -298,5 +298,5 @@ def clumps(points: NDArray[np.float64], size: float, clumping: float, key: NDArr
     value = np.zeros(len(points))
     for octave, (frequency, weight) in enumerate(_OCTAVES):
         value += weight * gradient_noise(points * (frequency / (CELL * size)), child_key(key, octave))
-    share = np.clip((value - _BARE) / (_FULL - _BARE), 0.0, 1.0)
-    return 1.0 - clumping + clumping * share * share * (3.0 - 2.0 * share)
+    fraction = np.clip((value - _BARE) / (_FULL - _BARE), 0.0, 1.0)
+    return 1.0 - clumping + clumping * fraction * fraction * (3.0 - 2.0 * fraction)

@@ -10,6 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import degrees, inf, isfinite, pi, radians
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..errors import SceneError
 from ..setting import LENGTH, setting
 
@@ -27,7 +30,7 @@ class Companion:
     Attributes
     ----------
     species, other : int
-        Indices into the shares. Plants of ``other`` may also be older than the population.
+        Indices into the weights. Plants of ``other`` may also be older than the population.
     strength : float
         -1: none grows within the distance of any of the others; 0: indifferent; 1: they grow only there.
     distance : float
@@ -69,7 +72,7 @@ class Rules:
     altitude_min, altitude_max : float
     aspect : float
         Clockwise from +Y (north) on the map.
-    shares : tuple of float
+    weights : tuple of float
         Relative frequency of each species.
     companions : tuple of Companion
     """
@@ -177,8 +180,16 @@ class Rules:
         "0: upright, as trees grow; 1: perpendicular to the ground, as moss and grass grow",
         **_FACTOR,
     )
-    shares: tuple[float, ...] = (1.0,)
+    weights: tuple[float, ...] = (1.0,)
     companions: tuple[Companion, ...] = ()
+
+
+def species_by_weight(weights: tuple[float, ...], draws: NDArray[np.float64]) -> NDArray[np.int32]:
+    """Species as indices into the weights, which are their relative frequencies, by draws from [0, 1), (n,) each."""
+    weights = np.maximum(np.asarray(weights, dtype=np.float64), 0.0)
+    limits = np.cumsum(weights) / weights.sum()
+    # Rounding may leave the last limit below a draw that is just under 1.
+    return np.minimum(np.searchsorted(limits, draws, side="right"), len(weights) - 1).astype(np.int32)
 
 
 def check_rules(rules: Rules) -> None:
@@ -190,7 +201,7 @@ def check_rules(rules: Rules) -> None:
         The first that cannot be.
     """
     _check_numbers(rules)
-    if not sum(max(share, 0.0) for share in rules.shares) > 0.0:
+    if not sum(max(weight, 0.0) for weight in rules.weights) > 0.0:
         raise SceneError("No species has a weight above 0; raise a weight in the species list")
     if rules.by_density and rules.density == 0.0:
         raise SceneError("Density must be greater than 0; raise it, or turn off By Density")
@@ -215,7 +226,7 @@ def check_rules(rules: Rules) -> None:
             f"Scale must be greater than 0, not {rules.scale_min:g} to {rules.scale_max:g}; raise Min and Max Scale"
         )
     for rule in rules.companions:
-        _check_companion(rule, len(rules.shares))
+        _check_companion(rule, len(rules.weights))
 
 
 def _check_numbers(rules: Rules) -> None:

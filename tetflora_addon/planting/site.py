@@ -154,28 +154,28 @@ class Site:
         corners = np.take(self.triangles.reshape(-1, 9), index, axis=0)
         root = np.sqrt(uniform(keys, SiteDraw.SIDE))
         along = uniform(keys, SiteDraw.ALONG)
-        shares = np.stack([1.0 - root, root * (1.0 - along), root * along], axis=1)
-        points = _mean(corners, shares)
+        barycentric = np.stack([1.0 - root, root * (1.0 - along), root * along], axis=1)
+        points = _mean(corners, barycentric)
         left = np.arange(len(keys))
         wanted = uniform(keys, SiteDraw.SUITABLE) * self.most[index]
         suitable = np.ones(len(keys))
-        for name, factor in self._factors(index, shares, points):
+        for name, factor in self._factors(index, barycentric, points):
             suitable[left] *= factor(left)
             stay = wanted[left] < suitable[left]
             lost[name] += len(left) - int(stay.sum())
             left = left[stay]
         return points[left], self.normal[index[left]], keys[left]
 
-    def _factors(self, index: NDArray[np.int64], shares: NDArray, points: NDArray) -> Iterator[tuple[str, object]]:
+    def _factors(self, index: NDArray[np.int64], barycentric: NDArray, points: NDArray) -> Iterator[tuple[str, object]]:
         """Rules by name, each a function from indices of places to how suitable they are; cheap ones first."""
         rules, ground = self.rules, self.ground
         if self.weight is not None:
-            yield "weight", lambda i: np.einsum("ij,ij->i", np.take(self.weight, index[i], axis=0), shares[i])
+            yield "weight", lambda i: np.einsum("ij,ij->i", np.take(self.weight, index[i], axis=0), barycentric[i])
         limits = rules.altitude_min, rules.altitude_max
         if np.isfinite(limits).any():
             yield "altitude", lambda i: _between(points[i, 2], *limits, rules.altitude_falloff)
         if self.uv is not None:
-            yield "image", lambda i: self._pictured(index[i], shares[i])
+            yield "image", lambda i: self._image_value(index[i], barycentric[i])
         if ground.areas:
             yield "areas", lambda i: inside_any(points[i, :2], ground.areas)
         if self.paths is not None:
@@ -185,8 +185,8 @@ class Site:
         if rules.clumping > 0.0:
             yield "clumping", lambda i: clumps(points[i, :2], rules.clump_size, rules.clumping, self._key)
 
-    def _pictured(self, index: NDArray[np.int64], shares: NDArray[np.float64]) -> NDArray[np.float64]:
-        uv = _mean(np.take(self.uv.reshape(-1, 6), index, axis=0), shares)
+    def _image_value(self, index: NDArray[np.int64], barycentric: NDArray[np.float64]) -> NDArray[np.float64]:
+        uv = _mean(np.take(self.uv.reshape(-1, 6), index, axis=0), barycentric)
         return np.clip(np.nan_to_num(sampled(self.ground.image, uv)), 0.0, 1.0)
 
 
@@ -201,10 +201,10 @@ def lines_of_paths(paths: Sequence[Path]) -> Lines | None:
     return Lines(np.concatenate([e[:-1] for e in ends]), np.concatenate([e[1:] for e in ends]), reach)
 
 
-def _mean(corners: NDArray[np.float64], shares: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values between three corners, (n, 3 k) one after the other, by the shares of each, (n, 3): (n, k)."""
+def _mean(corners: NDArray[np.float64], barycentric: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values between three corners, (n, 3 k) one after the other, at barycentric coordinates (n, 3): (n, k)."""
     a, b, c = np.split(corners, 3, axis=1)
-    return shares[:, :1] * a + shares[:, 1:2] * b + shares[:, 2:] * c
+    return barycentric[:, :1] * a + barycentric[:, 1:2] * b + barycentric[:, 2:] * c
 
 
 def _between(z: NDArray[np.float64], low: float, high: float, falloff: float) -> NDArray[np.float64]:

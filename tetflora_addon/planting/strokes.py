@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ..growth.hashing import child_key, key_of_seed, uniform
 from ..setting import LENGTH, setting
+from .rules import species_by_weight
 
 #: Cells that one dab looks at; a wider circle, or a higher density, is refused by `paint`.
 MOST_CELLS = 200_000
@@ -47,7 +48,7 @@ class Brush:
     density : float
         Plants for each square meter of the map.
     scale_min, scale_max : float
-    shares : tuple of float
+    weights : tuple of float
         Relative frequency of each species.
     """
 
@@ -81,7 +82,7 @@ class Brush:
     )
     scale_min: float = 1.0
     scale_max: float = 1.0
-    shares: tuple[float, ...] = (1.0,)
+    weights: tuple[float, ...] = (1.0,)
 
 
 def stroke_key(seed: int, stroke: int) -> NDArray[np.uint64]:
@@ -175,7 +176,7 @@ def paint(
 def erase(
     brush: Brush, centre: Sequence[float], standing: NDArray[np.float64], key: NDArray[np.uint64], dab: int
 ) -> NDArray[np.int64]:
-    """Which plants, as numbers of places (m, 2) or (m, 3), one dab removes: a share of all in the circle."""
+    """Which plants, as numbers of places (m, 2) or (m, 3), one dab removes: a fraction of all in the circle."""
     inside = np.flatnonzero(within(standing, centre, brush.radius))
     return inside[_drawn(brush, inside, key, dab)]
 
@@ -185,8 +186,8 @@ def thin(
 ) -> NDArray[np.int64]:
     """Which plants one dab removes where they are denser than the brush, as numbers of places (m, 2) or (m, 3).
 
-    Of each cell one plant stays, and of two that are closer than the least distance one. Which, is a matter of chance
-    that the place itself decides: so plants outside of the circle can win too, and doing it again changes nothing.
+    Of each cell one plant stays, and of two that are closer than the minimum distance one. Which one depends on a hash
+    of its place: so plants outside of the circle can stay too, and doing it again changes nothing.
     """
     near = np.flatnonzero(within(standing, centre, reach_of(brush)))
     near = near[np.argsort(_ranks(standing[near, :2]), kind="stable")]
@@ -206,16 +207,12 @@ def _ranks(places: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def individuals(brush: Brush, keys: NDArray[np.uint64]) -> dict[str, NDArray]:
-    """Azimuth (radians), scale, species (index of the shares) and seed (from 0 on) of plants with keys, (n,) each."""
-    weights = np.maximum(np.asarray(brush.shares, dtype=np.float64), 0.0)
-    limits = np.cumsum(weights) / weights.sum()
+    """Azimuth (radians), scale, species (index of a weight) and seed (0 or more) of plants with keys, (n,) each."""
     low, high = sorted((brush.scale_min, brush.scale_max))
-    # Rounding may leave the last limit below a draw that is just under 1.
-    species = np.minimum(np.searchsorted(limits, uniform(keys, _Draw.SPECIES), side="right"), len(weights) - 1)
     return {
         "azimuth": 2.0 * np.pi * uniform(keys, _Draw.AZIMUTH),
         "scale": low + (high - low) * uniform(keys, _Draw.SCALE),
-        "species": species.astype(np.int32),
+        "species": species_by_weight(brush.weights, uniform(keys, _Draw.SPECIES)),
         "seed": (uniform(keys, _Draw.SEED) * 2**31).astype(np.int32),
     }
 

@@ -81,7 +81,7 @@ def load_species(
     folders : sequence of Path
         As of `list_species`.
     known : mapping, optional
-        What `list_species` said a moment ago.
+        What `list_species` returned a moment ago.
 
     Raises
     ------

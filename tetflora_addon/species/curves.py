@@ -196,7 +196,7 @@ def joined_edges(chains: Chains) -> tuple[NDArray[np.float64], NDArray[np.int64]
     margin = np.maximum(points[edges, 3].max(axis=1), near)[:, None]
     low = points[edges, :3].min(axis=1) - margin
     high = points[edges, :3].max(axis=1) + margin
-    found: list[tuple[int, float]] = []  # edge, share of it
+    found: list[tuple[int, float]] = []  # edge, fraction along it
     joints: list[NDArray[np.float64]] = []
     for chain in np.flatnonzero(~chains.cyclic):
         for end in (chains.first[chain], chains.first[chain + 1] - 1):
@@ -204,21 +204,21 @@ def joined_edges(chains: Chains) -> tuple[NDArray[np.float64], NDArray[np.int64]
             close = np.flatnonzero(((low <= here) & (here <= high)).all(axis=1) & (line != chain))
             a, b = points[edges[close, 0]], points[edges[close, 1]]
             along = b[:, :3] - a[:, :3]
-            share = ((here - a[:, :3]) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-300)
-            share = np.clip(share, 0, 1)[:, None]
-            on_line = a + share * (b - a)
+            fraction = ((here - a[:, :3]) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-300)
+            fraction = np.clip(fraction, 0, 1)[:, None]
+            on_line = a + fraction * (b - a)
             gap = np.linalg.norm(here - on_line[:, :3], axis=1) / np.maximum(on_line[:, 3], near)
             if len(gap) and gap.min() <= 1:
                 best = int(gap.argmin())
                 points[end, :3] = on_line[best, :3]
-                found.append((int(close[best]), float(share[best, 0])))
+                found.append((int(close[best]), float(fraction[best, 0])))
                 joints.append(on_line[best])
                 break
     if not found:
         return points, edges, line
     # Each edge that bears joints becomes a chain through them.
-    bearer, share = np.array([e for e, _ in found]), np.array([s for _, s in found])
-    order = np.lexsort((share, bearer))
+    bearer, fraction = np.array([e for e, _ in found]), np.array([s for _, s in found])
+    order = np.lexsort((fraction, bearer))
     bearer, new = bearer[order], len(points) + np.arange(len(found))
     points = np.concatenate([points, np.array(joints)[order]])
     first = np.diff(bearer, prepend=-1) != 0

@@ -101,7 +101,7 @@ class LeafModel:
 
     @cached_property
     def width(self) -> float:
-        """Extent across the midrib, in units of the leaf's size; what its size on the picture is judged by."""
+        """Extent across the midrib, in units of the leaf's size, which decides on its size in the image."""
         return float(np.ptp(self.positions[:, [0, 2]], axis=0).max())
 
 

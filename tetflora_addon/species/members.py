@@ -15,7 +15,7 @@ import numpy as np
 from .leaf_models import LeafModel
 from .species import CROWN_SHAPES, LEAF_KINDS, Order, Range, Species, crown_ratio, fork_cuts
 
-_SHARES = (np.arange(256) + 0.5) / 256
+_FRACTIONS = (np.arange(256) + 0.5) / 256
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,8 @@ def expected_members(species: Species) -> Members:
         spurs += full * order.spurs.mean * _fold(cuts, fold, order.spur_start)
         if i + 1 < len(species.orders):
             start = order.branch_start.mean
-            stems_there = fold[np.searchsorted(cuts[1:-1], start + (1 - start) * _SHARES, side="right")]
-            vigour = crown_ratio(np.full(_SHARES.shape, CROWN_SHAPES.index(order.crown)), 1 - _SHARES)
+            stems_there = fold[np.searchsorted(cuts[1:-1], start + (1 - start) * _FRACTIONS, side="right")]
+            vigour = crown_ratio(np.full(_FRACTIONS.shape, CROWN_SHAPES.index(order.crown)), 1 - _FRACTIONS)
             follow = 1 - species.orders[i + 1].count_by_length * (1 - vigour)
             number = full * order.branches.mean * float(stems_there.mean())
             full = full * order.branches.mean * float((stems_there * follow).mean())
@@ -68,7 +68,7 @@ def expected_members(species: Species) -> Members:
 
 def expected_forks(forks: Range, power: float = 1.0) -> float:
     """Mean of n^power, for the n stems into which a branch divides (`growth.branch_counts`)."""
-    wanted = forks.mean + forks.variation * (2 * _SHARES - 1)
+    wanted = forks.mean + forks.variation * (2 * _FRACTIONS - 1)
     below = np.floor(wanted)
     more = wanted - below  # how likely one more is
     return float(((1 - more) * np.maximum(below, 1) ** power + more * np.maximum(below + 1, 1) ** power).mean())

@@ -32,7 +32,7 @@ _ROUNDER = 10.0  # factor on sides and on segments for one unit of detail above 
 _TURN = 40.0  # degrees that one segment may stand for before a bent branch is a different one
 _SLOWER = 0.25  # how much slower they grow from `_ROUND` on: nobody sees more sides
 _ROUND = 0.6
-_LEAF_SHARE = 0.02, 0.06  # of the plant's reach: leaves that are too short, or long enough, to make its outline
+_LEAF_FRACTION = 0.02, 0.06  # of the plant's reach: leaves that are too short, or long enough, to make its outline
 _SHORTEST = 0.5  # of the length of boughs
 _SWAY_HIGH = 1.25  # highest factor on the random bend of joints: the bound of a plant grows with it
 _DETAIL_HIGH = 16.0
@@ -218,7 +218,7 @@ def _kept(described: Species, changed: Species) -> Species:
         # figure is its perimeter by pi). The radius makes up for both, as far as branches stay thinner than parents.
         wanted = fewer[i] * _perimeter(old.sides) / _perimeter(new.sides)
         if i > 0 and not spur and tiers[i - 1].pipe > 0:
-            thick = 1.0  # the pipe model shares out the parent's radius among fewer by itself
+            thick = 1.0  # the pipe model divides the parent's radius among fewer by itself
             thicker *= (fewer[i] / fewer[i - 1]) ** (1 / tiers[i - 1].pipe)
         else:
             length = shorter if i > 0 and not spur else 1.0
@@ -266,8 +266,8 @@ def _widening(species: Species, form: LeafModel, larger: float) -> float:
     keep it, and take or give their area in width. Few large leaves become at most half as wide as they are long.
     """
     longest = max(o.leaf_size.mean for o in _tiers(species) if o.leaves.mean > 0)
-    share = longest / (longest + sum(_lengths(species)))
-    outline = min(max((share - _LEAF_SHARE[0]) / (_LEAF_SHARE[1] - _LEAF_SHARE[0]), 0.0), 1.0)
+    fraction = longest / (longest + sum(_lengths(species)))
+    outline = min(max((fraction - _LEAF_FRACTION[0]) / (_LEAF_FRACTION[1] - _LEAF_FRACTION[0]), 0.0), 1.0)
     if larger < 1:
         return larger ** (2 * outline)
     return min(max(larger ** (2 * outline), math.sqrt(larger)), max(0.5 / form.width, 1.0))
@@ -319,8 +319,8 @@ def _bent_alike(old: Order, new: Order) -> Order:
         return replace(new, angle=Range(mean, min(variation, mean, high - mean)), angle_tip=tip)
     high = ORDER_KEYS["curvature"].high
     inner_left, outer_left = _sways(t)
-    share = inner / inner_left if inner > 0 and inner_left > 0 else (inner + outer) / (inner_left + outer_left)
-    mean = min(max(old.curvature.mean * share, -high), high)
+    factor = inner / inner_left if inner > 0 and inner_left > 0 else (inner + outer) / (inner_left + outer_left)
+    mean = min(max(old.curvature.mean * factor, -high), high)
     tip = min(max((moved - inner_left * mean) / outer_left, -high), high)
     variation = old.curvature.variation * min(sway / _random_sway(t), _SWAY_HIGH)
     pull = _within(old.attraction, (inner + outer) / (inner_left + outer_left), "attraction")

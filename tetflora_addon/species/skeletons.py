@@ -207,8 +207,8 @@ def drawn_branches(skeleton: Skeleton) -> DrawnBranches:
     """Split a skeleton into branches.
 
     At each fork the child on the same line goes on; of equals, the one with the largest radius; of these, the one with
-    the longest way to a tip. A side branch takes its radius at the fork from its own points, as far as these let it be
-    told, not from its parent.
+    the longest way to a tip. A side branch takes its radius at the fork from its own points, as far as these
+    determine it, not from its parent.
     """
     points, radius, parent = skeleton.points, skeleton.radius, skeleton.parent.astype(np.int64)
     n = len(points)

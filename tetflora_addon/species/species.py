@@ -184,7 +184,7 @@ class Species:
         Forms of the sample leaf, and of blossoms or fruit, where there are any; each leaf has one of them by chance. A
         string is the name of a Blender mesh object, which the bridge to Blender replaces by a model.
     leaf_transmission, blossom_transmission : float
-        Share of the light scattered by a leaf or blossom that goes through it, 0 to 1.
+        Fraction of the light scattered by a leaf or blossom that goes through it, 0 to 1.
     spur : Order or None
         A short shoot; its length is in metres and its thickness a fraction of that, as for a trunk.
     bark : str

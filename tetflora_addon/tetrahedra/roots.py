@@ -24,13 +24,13 @@ from numpy.typing import ArrayLike, NDArray
 from .geometry import plane_through, quality, signed_volume
 from .tree import TetrahedralTree
 
-#: Room between the scene or the view and the walls of the box, as a share of their size, so that nothing lies on a wall
-#: and no piece beside the view is thinner than this.
+#: Margin between the scene or the view and the walls of the box, as a fraction of their size, so that nothing lies on a
+#: wall and no piece beside the view is thinner than this.
 MARGIN = 0.05
 
 
 class ViewingCamera(Protocol):
-    """What a root needs of `tetflora_addon.camera.camera.Camera`, which this room must not import."""
+    """What a root needs of `tetflora_addon.camera.camera.Camera`, which this package must not import."""
 
     kind: str
     position: NDArray[np.float64]
@@ -116,8 +116,8 @@ def _box(camera: ViewingCamera, bounds: NDArray[np.float64]) -> tuple[NDArray[np
     view = np.array([(left, bottom, 0.0), (left, top, 0.0), (right, bottom, far), (right, top, far), (0.0, 0.0, 0.0)])
     points = np.concatenate([corners, view])
     low, high = points.min(axis=0), points.max(axis=0)
-    room = MARGIN * (high - low)
-    low, high = low - room, high + room
+    margin = MARGIN * (high - low)
+    low, high = low - margin, high + margin
     high[2] = deepest
     return low, high, far
 
@@ -248,7 +248,7 @@ def _centre(piece: _Piece) -> NDArray[np.float64]:
     return piece.mean(axis=0)
 
 
-#: Smallest cube, metres: room for a plant that is no larger than a flower.
+#: Smallest cube, metres: space for a plant that is no larger than a flower.
 SMALLEST = 1.0
 
 
@@ -278,8 +278,8 @@ def world_cubes(bounds: ArrayLike) -> tuple[float, NDArray[np.int64], NDArray[np
     if not np.isfinite(bounds).all():
         raise ValueError("the bounds of the scene must be finite")
     longest = max(float(np.ptp(bounds, axis=0).max()), SMALLEST)
-    share, power = np.frexp(longest)  # a logarithm would round, and a third cube be needed
-    side = float(np.ldexp(1.0, power if share > 0.5 else power - 1))
+    mantissa, power = np.frexp(longest)  # a logarithm would round, and a third cube be needed
+    side = float(np.ldexp(1.0, power if mantissa > 0.5 else power - 1))
     low = np.floor(bounds[0] / side).astype(np.int64)
     return side, low, np.maximum(np.ceil(bounds[1] / side).astype(np.int64) - low, 1)
 

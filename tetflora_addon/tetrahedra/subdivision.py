@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from .geometry import EDGES, plane_through, quality, signed_volume, squared_edges
 
-#: Squared lengths that differ by less than this share count as equal, so that the choice of the edge does not hang on
-#: the last bit, which differs between processors and versions of numpy.
+#: Squared lengths that differ by less than this fraction count as equal, so that the choice of the edge does not depend
+#: on the last bit, which differs between processors and versions of numpy.
 TIE = 1e-9
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of species in menus, and the catalogue as an asset library."""
+"""Thumbnails of species in menus, and the catalogue as an asset library."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ def _shipped():
     return list_species()
 
 
-def test_pictures_are_small_squares_of_known_species():
+def test_thumbnails_are_small_squares_of_known_species():
     folder = builtin_folder() / "thumbnails"
-    pictures = sorted(folder.glob("*"))
-    assert {p.stem for p in pictures} <= set(_shipped())
-    assert len(pictures) >= 3
-    for path in pictures:
+    thumbnails = sorted(folder.glob("*"))
+    assert {p.stem for p in thumbnails} <= set(_shipped())
+    assert len(thumbnails) >= 3
+    for path in thumbnails:
         assert path.suffix == ".png"
         assert path.stat().st_size <= 30_000
         image = bpy.data.images.load(str(path))
@@ -57,9 +57,9 @@ def test_pictures_are_small_squares_of_known_species():
 
 
 def _loaded(identifier):
-    """Names of the pictures that Blender has loaded for a species; their icons have numbers only in a window."""
+    """Names of the thumbnails that Blender has loaded for a species; their icons have numbers only in a window."""
     icon_of(identifier)
-    return [name for name in catalogue._pictures if Path(name.partition("|")[0]).stem == identifier]
+    return [name for name in catalogue._thumbnails if Path(name.partition("|")[0]).stem == identifier]
 
 
 def test_a_species_without_a_picture_gets_an_icon(own_folder):
@@ -70,13 +70,13 @@ def test_a_species_without_a_picture_gets_an_icon(own_folder):
 
 
 def test_a_picture_is_loaded_once_and_again_when_it_changes(own_folder):
-    picture = own_folder / "thumbnails" / "mine.png"
-    shutil.copy(thumbnail_file("bush"), picture)
-    assert thumbnail_file("mine") == picture
+    thumbnail = own_folder / "thumbnails" / "mine.png"
+    shutil.copy(thumbnail_file("bush"), thumbnail)
+    assert thumbnail_file("mine") == thumbnail
     (first,) = _loaded("mine")
-    assert tuple(catalogue._pictures[first].image_size) == (128, 128)
+    assert tuple(catalogue._thumbnails[first].image_size) == (128, 128)
     assert _loaded("mine") == [first]
-    os.utime(picture, ns=(0, 0))
+    os.utime(thumbnail, ns=(0, 0))
     assert set(_loaded("mine")) > {first}
     assert _loaded("bush")
 

@@ -89,8 +89,8 @@ def test_the_mixture_is_that_of_populate():
         entry.species, entry.weight = species, weight
     _brush(source='MIX', density=60.0)
     _stroke()
-    share = np.mean([o.tetflora.species == "bush" for o in _plants()])
-    assert 0.6 < share < 0.9
+    fraction = np.mean([o.tetflora.species == "bush" for o in _plants()])
+    assert 0.6 < fraction < 0.9
 
 
 def test_many_plants_go_to_one_field_with_all_that_says_how_they_grow():

@@ -52,8 +52,8 @@ def test_plants_fall_and_rise_to_the_nearest_ground(capfd):
     assert [round(p.location.z, 5) for p in plants] == [0.0, 0.0, 5.0, 0.0, 3.0]
     assert [tuple(p.location)[:2] for p in plants[:2]] == [(10.0, 0.0), (10.0, 3.0)]
     assert other.location.z == 9.0
-    said = capfd.readouterr()
-    assert "3 plants moved to the ground; 1 plant had no ground below or above" in said.out + said.err
+    reported = capfd.readouterr()
+    assert "3 plants moved to the ground; 1 plant had no ground below or above" in reported.out + reported.err
 
 
 def test_children_and_their_parents_both_arrive():

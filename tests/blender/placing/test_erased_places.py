@@ -71,9 +71,9 @@ def test_an_update_brings_nothing_back_and_changes_nothing_else(as_field, capfd)
     assert _population().made == len(left)
     assert np.allclose(_update(), left, atol=1e-5)
     assert _population().made == len(left)
-    told = capfd.readouterr().out
-    assert f"{gone} omitted where you erased" in told
-    assert "restored" not in told
+    reported = capfd.readouterr().out
+    assert f"{gone} omitted where you erased" in reported
+    assert "restored" not in reported
 
 
 def test_the_ground_stays_bare_in_other_arrangements_too():

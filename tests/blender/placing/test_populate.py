@@ -98,10 +98,10 @@ def test_plants_are_spread_evenly_over_the_map():
 
 
 def test_shares_of_species_hold():
-    placed = _place(count=6000, shares=(3.0, 0.0, 1.0))
-    share = np.bincount(placed.species, minlength=3) / 6000
-    assert share[1] == 0.0
-    assert share[0] == pytest.approx(0.75, abs=0.03)
+    placed = _place(count=6000, weights=(3.0, 0.0, 1.0))
+    fraction = np.bincount(placed.species, minlength=3) / 6000
+    assert fraction[1] == 0.0
+    assert fraction[0] == pytest.approx(0.75, abs=0.03)
 
 
 def test_a_full_terrain_takes_no_more_and_says_why():
@@ -132,7 +132,7 @@ def test_no_ground_is_an_error():
     with pytest.raises(errors.SceneError, match="flatter than Max Slope"):
         _place(wall)
     with pytest.raises(errors.SceneError, match="weight above 0"):
-        _place(shares=(0.0,))
+        _place(weights=(0.0,))
 
 
 def test_the_operator_makes_upright_empties_of_the_chosen_species():

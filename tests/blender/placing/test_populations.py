@@ -101,7 +101,7 @@ def test_an_edit_replaces_the_plants_and_nothing_else():
     assert hand not in own
     assert hand.tetflora.seed == 1
     gaps = np.linalg.norm(_places(own)[:, :2], axis=1)
-    assert gaps.min() >= 2.0 - 1e-4  # its own former plants took no room, the one by hand did
+    assert gaps.min() >= 2.0 - 1e-4  # its own former plants took no space, the one by hand did
 
 
 def test_other_populations_keep_their_room_and_their_plants():

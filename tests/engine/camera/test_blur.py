@@ -35,7 +35,7 @@ def test_circles_are_those_of_rays_through_the_lens(
     camera = replace(CAMERA, kind=kind, lens_radius=radius, focus=focus)
     angle = np.random.default_rng(seed).uniform(0, 2 * np.pi)
     rim = radius * np.array([np.cos(angle), np.sin(angle)])
-    # The middle of the picture's ray starts at the rim and crosses the axis at the depth that is sharp.
+    # The middle of the image's ray starts at the rim and crosses the axis at the depth that is sharp.
     at_depth = rim * (1 - depth / focus)
     shift = np.linalg.norm(at_depth) / (1.0 if kind == "ORTHO" else depth)
     assert circle_of_confusion(camera, np.array([depth]))[0] == pytest.approx(shift, rel=1e-9, abs=1e-12)
@@ -50,7 +50,7 @@ def test_what_the_open_lens_sees_is_in_the_wider_view(seed: int, focus: float) -
     reach = rng.uniform(0.1, 2.0, 30)
     wide = camera.widened(*blur_margins(camera, centre, reach))
     points = centre + reach[:, None] * rng.normal(size=(30, 3)) / 4
-    # A point is blurred over a disc of the window; where that meets the picture, the point must be in the wider one.
+    # A point is blurred over a disc of the window; where that meets the image, the point must be in the wider one.
     x, y, depth = camera.to_camera_space(points).T
     left, right, bottom, top = camera.window
     disc = circle_of_confusion(camera, depth)

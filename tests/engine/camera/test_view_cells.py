@@ -41,7 +41,7 @@ def drawn(rng: np.random.Generator, kind: str = "PERSP") -> Camera:
     return Camera(kind, place, frame, tuple(window), 0.1, 200.0, 640, height)
 
 
-def picture(rng: np.random.Generator, camera: Camera, count: int = 400) -> np.ndarray:
+def points_in_image(rng: np.random.Generator, camera: Camera, count: int = 400) -> np.ndarray:
     """Points (n, 3) that a camera sees, near ones as often as far ones."""
     left, right, bottom, top = camera.window
     x, y = rng.uniform(left, right, count), rng.uniform(bottom, top, count)
@@ -52,7 +52,7 @@ def picture(rng: np.random.Generator, camera: Camera, count: int = 400) -> np.nd
 
 def far_points(rng: np.random.Generator, camera: Camera, cell: Camera) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 3) that a camera sees far from the eyes of its cell, and their distances (n,)."""
-    points = picture(rng, camera)
+    points = points_in_image(rng, camera)
     away = np.linalg.norm(points - camera.position, axis=1)
     return points[away > 8.0 * cell.cell_radius], away[away > 8.0 * cell.cell_radius]
 
@@ -79,7 +79,7 @@ def test_the_cells_camera_sees_all_that_any_of_its_cameras_sees(rng, kind):
     if cell is None:
         assert max(np.abs(camera.window)) > 1.0  # wider than 90 degrees
         return
-    points = picture(rng, camera)
+    points = points_in_image(rng, camera)
     assert (cell.clearance(points) <= 1e-9).all()
     depth = cell.to_camera_space(points)[:, 2]
     assert (depth >= cell.near - 1e-9).all()
@@ -97,14 +97,14 @@ def test_it_sees_what_the_other_eye_sees_through_a_shifted_window(rng):
     if cell is None:
         assert max(np.abs((*camera.window, *other.window))) > 1.0
         return
-    assert (cell.clearance(picture(rng, camera)) <= 1e-9).all()
-    assert (cell.clearance(picture(rng, other)) <= 0.01).all()  # a 64th of a pixel at most
+    assert (cell.clearance(points_in_image(rng, camera)) <= 1e-9).all()
+    assert (cell.clearance(points_in_image(rng, other)) <= 0.01).all()  # a 64th of a pixel at most
 
 
 @given(RANDOM)
 def test_blur_reaches_as_far_into_its_picture_as_into_that_of_any_of_its_cameras(rng):
     camera = drawn(rng)
-    centre, reach = picture(rng, camera, 1), np.full(1, 0.01)
+    centre, reach = points_in_image(rng, camera, 1), np.full(1, 0.01)
     away = np.linalg.norm(centre - camera.position)
     # Nearer than a third of the way to what is sharp: nearly sharp, it is a matter of how wide cells of focus are.
     camera = replace(camera, lens_radius=rng.uniform(0.005, 0.05), focus=rng.uniform(3.0, 30.0) * away)
@@ -124,9 +124,9 @@ def test_it_takes_nothing_to_be_farther_away_than_any_of_its_cameras(rng):
     camera = drawn(rng)
     cell = cell_camera(camera, CELLS)
     assume(cell is not None)
-    points = picture(rng, camera)
+    points = points_in_image(rng, camera)
     points = points[np.linalg.norm(points - camera.position, axis=1) > 4.0 * cell.cell_radius]
-    # Towards the border of a wide picture depth changes with the direction as well.
+    # Towards the border of a wide image depth changes with the direction as well.
     border = 1.0 + np.tan(CELLS.turn) * 2.0 * np.abs(camera.window).max()
     assert (cell.extent_around(points) <= camera.extent_around(points) * border).all()
     assert (cell.pixel_extent(points) <= camera.pixel_extent(points) * border).all()
@@ -270,7 +270,7 @@ def test_only_what_is_far_enough_hides_others_from_all_cameras_of_a_cell(opaque)
     far = 100.0 * ahead + 2.0 * corners
 
     def seen(distance: float, viewer: Camera) -> float:
-        """Transmittance of what is far behind a screen at a distance, both in the middle of the picture."""
+        """Transmittance of what is far behind a screen at a distance, both in the middle of the image."""
         screen = distance * (ahead + np.array([[-1.5, 0.0, -1.5], [1.5, 0.0, -1.5], [0.0, 0.0, 2.0]]))
         solid = np.concatenate([screen, (screen.mean(axis=0) + 0.2 * distance * ahead)[None]])
         if opaque == "polygon":

@@ -33,8 +33,8 @@ def test_lines_are_as_near_as_by_brute_force(seed, longest):
     end, reach = start + rng.uniform(-longest, longest, (30, 2)), rng.uniform(0.1, 5.0, 30)
     points = rng.uniform(-10.0, 30.0, (200, 2))
     along = end - start
-    share = np.clip(((points[:, None] - start) * along).sum(-1) / (along**2).sum(-1), 0.0, 1.0)
-    gap = np.linalg.norm(points[:, None] - start - share[..., None] * along, axis=-1)
+    fraction = np.clip(((points[:, None] - start) * along).sum(-1) / (along**2).sum(-1), 0.0, 1.0)
+    gap = np.linalg.norm(points[:, None] - start - fraction[..., None] * along, axis=-1)
     expected = np.minimum((gap / reach).min(axis=1), 1.0)
     assert np.allclose(plane.Lines(start, end, reach).nearness(points), expected, atol=1e-9)
 

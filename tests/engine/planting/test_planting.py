@@ -103,7 +103,7 @@ RULES = st.builds(
     scale_max=st.floats(1.0, 2.0),
     scale_at_top=st.floats(0.3, 2.0),
     tilt=st.floats(0.0, 1.0),
-    shares=st.just((2.0, 1.0, 1.0)),
+    weights=st.just((2.0, 1.0, 1.0)),
     companions=COMPANIONS.map(tuple),
 )
 
@@ -180,7 +180,7 @@ RICH = Rules(
     clump_size=6.0,
     edge_falloff=2.0,
     tilt=0.5,
-    shares=(2.0, 1.0),
+    weights=(2.0, 1.0),
     companions=(Companion(1, 0, 1.0, 1.0),),
 )
 
@@ -294,7 +294,7 @@ def test_rotation_turns_about_the_vertical_and_then_tilts():
 
 
 def test_companions_in_part_thin_and_shares_hold():
-    rules = Rules(count=3000, shares=(1.0, 1.0), companions=(Companion(1, 0, -0.5, 0.1),))
+    rules = Rules(count=3000, weights=(1.0, 1.0), companions=(Companion(1, 0, -0.5, 0.1),))
     placed = place(Terrain(SQUARE), rules)
     assert np.bincount(placed.species).tolist() == [1500, 1500]
     hosts, others = placed.position[placed.species == 0], placed.position[placed.species == 1]
@@ -305,7 +305,7 @@ def test_companions_in_part_thin_and_shares_hold():
 
 def test_species_that_seek_each_other_find_each_other():
     circle = (Companion(0, 1, 1.0, 0.5), Companion(1, 0, 1.0, 0.5), Companion(2, 2, 1.0, 0.5))
-    placed = place(Terrain(SQUARE), Rules(count=600, shares=(1.0, 1.0, 1.0), companions=circle))
+    placed = place(Terrain(SQUARE), Rules(count=600, weights=(1.0, 1.0, 1.0), companions=circle))
     assert (np.bincount(placed.species, minlength=3) > 100).all()
 
 
@@ -323,7 +323,7 @@ def test_small_areas_on_large_ground_are_filled():
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
-        (dict(shares=(0.0, -1.0)), "weight above 0"),
+        (dict(weights=(0.0, -1.0)), "weight above 0"),
         (dict(slope_min=0.8, slope_max=0.2), "Min Slope .* is greater"),
         (dict(altitude_min=3.0, altitude_max=1.0), "Min Altitude .3 m. is greater"),
         (dict(altitude_min=30.0), "altitudes 30 and inf m; the ground extends from"),
@@ -367,8 +367,8 @@ def test_ground_that_cannot_be_is_refused_by_name():
         (dict(count=1000, min_distance=1.0), "at a Min Distance of 1 m"),
         (dict(by_density=True, density=20.0, min_distance=1.0), "at a Min Distance of 1 m"),
         (dict(by_density=True, density=1e-4), "less than one"),
-        (dict(count=5000, shares=(1.0, 1.0), companions=(Companion(0, 0, -1.0, 1.0),)), "companion rules leave"),
-        (dict(shares=(1.0, 0.0), companions=(Companion(0, 1, 1.0, 1.0),)), "companion rules leave"),
+        (dict(count=5000, weights=(1.0, 1.0), companions=(Companion(0, 0, -1.0, 1.0),)), "companion rules leave"),
+        (dict(weights=(1.0, 0.0), companions=(Companion(0, 1, 1.0, 1.0),)), "companion rules leave"),
     ],
 )
 def test_fewer_plants_come_with_a_reason(changes, says):

@@ -148,12 +148,12 @@ def test_thinned_places_have_the_density_that_was_asked_for_whatever_the_brush(r
 
 
 def test_species_come_in_their_shares_and_sizes_in_their_range():
-    brush = Brush(radius=60.0, density=0.5, shares=(3.0, 0.0, 1.0), scale_min=0.5, scale_max=2.0)
+    brush = Brush(radius=60.0, density=0.5, weights=(3.0, 0.0, 1.0), scale_min=0.5, scale_max=2.0)
     _, keys = strokes.paint(brush, (0.0, 0.0), NONE, strokes.stroke_key(4, 0), 0)
     made = strokes.individuals(brush, keys)
-    share = np.bincount(made["species"], minlength=3) / len(keys)
-    assert share[1] == 0.0
-    assert share[0] == pytest.approx(0.75, abs=0.03)
+    fraction = np.bincount(made["species"], minlength=3) / len(keys)
+    assert fraction[1] == 0.0
+    assert fraction[0] == pytest.approx(0.75, abs=0.03)
     assert 0.5 <= made["scale"].min() < 0.6 < 1.9 < made["scale"].max() <= 2.0
     assert len(set(made["seed"].tolist())) == len(keys)
     assert (made["seed"] >= 0).all()

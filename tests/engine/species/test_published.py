@@ -55,14 +55,14 @@ def table_of(name: str) -> dict[str, float]:
 
 def children(table: dict[str, float], level: int) -> tuple[NDArray, NDArray, NDArray]:
     """Length and radius in those of the parent, and the factor on the own numbers, of evenly spread branches."""
-    share = (np.arange(4096) + 0.5) / 4096
+    fraction = (np.arange(4096) + 0.5) / 4096
     if level == 1:
-        offset = table["BaseSize"] + (1 - table["BaseSize"]) * share
-        ratio = SHAPE_RATIO[int(table["Shape"])](1 - share)
+        offset = table["BaseSize"] + (1 - table["BaseSize"]) * fraction
+        ratio = SHAPE_RATIO[int(table["Shape"])](1 - fraction)
         length, full = table["1Length"] * ratio, 0.2 + 0.8 * ratio
     else:
-        offset = share
-        length, full = table[f"{level}Length"] * (1 - 0.6 * share), 1 - 0.5 * share
+        offset = fraction
+        length, full = table[f"{level}Length"] * (1 - 0.6 * fraction), 1 - 0.5 * fraction
     there = 1 - min(table[f"{level - 1}Taper"], 1.0) * offset
     return length, np.minimum(length ** table["RatioPower"], there), full
 
@@ -148,8 +148,8 @@ def test_plants_have_the_counts_and_proportions_of_the_table(name: str) -> None:
         (branches.length, trunk.length, wanted.lengths),
         (branches.radius, trunk.radius, wanted.radii),
     ):
-        shares = np.bincount(order, grown / own[branches.plant]) / np.bincount(order)
-        np.testing.assert_allclose(shares, np.array(means) / means[0], rtol=0.03)
+        fractions = np.bincount(order, grown / own[branches.plant]) / np.bincount(order)
+        np.testing.assert_allclose(fractions, np.array(means) / means[0], rtol=0.03)
 
 
 def test_the_willow_has_the_leaf_area_of_its_table_on_fewer_leaves() -> None:

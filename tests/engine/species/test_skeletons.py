@@ -50,10 +50,10 @@ def _sorted_rows(array: np.ndarray) -> np.ndarray:
     return rows[np.lexsort(rows.T)]
 
 
-def _point_at(chain: np.ndarray, share: float) -> np.ndarray:
-    """Where a share of a chain's length is behind."""
+def _point_at(chain: np.ndarray, fraction: float) -> np.ndarray:
+    """Where a fraction of a chain's length is behind."""
     arc = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(chain, axis=0), axis=1))])
-    return np.array([np.interp(share * arc[-1], arc, column) for column in chain.T])
+    return np.array([np.interp(fraction * arc[-1], arc, column) for column in chain.T])
 
 
 def _check_structure(drawn: DrawnBranches) -> None:
@@ -264,7 +264,7 @@ def test_even_lines_keep_the_shape_of_a_fine_curve() -> None:
     radius = np.linspace(0.2, 0.1, 400)
     fine = drawn_branches(skeleton_from_edges(spiral, radius, np.stack([np.arange(399), np.arange(1, 400)], 1), "form"))
     coarse = drawn_lines(fine)
-    where = np.array([_point_at(coarse.knots[0], share) for share in np.linspace(0, 1, 400)])
+    where = np.array([_point_at(coarse.knots[0], fraction) for fraction in np.linspace(0, 1, 400)])
     # An arc of 1/24 of 4 rad bulges by 1 - cos(1/12) = .0035.
     assert np.linalg.norm(where - fine.knots, axis=1).max() < 0.006
     assert abs(coarse.length[0] / fine.length[0] - 1) < 0.002

@@ -36,10 +36,10 @@ def view(kind, window, seed, far=1000.0):
     return camera, bounds, rng
 
 
-def split_at_random(tree, rng, rounds, share=0.4):
+def split_at_random(tree, rng, rounds, fraction=0.4):
     for _ in range(rounds):
         nodes = tree.terminals()
-        tree.split(nodes[rng.random(len(nodes)) < share])
+        tree.split(nodes[rng.random(len(nodes)) < fraction])
 
 
 CASES = given(

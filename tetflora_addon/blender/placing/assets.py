@@ -102,13 +102,13 @@ def _make_asset(obj: bpy.types.Object, info: SpeciesInfo, height: float) -> None
     about.description, about.author, about.catalog_id = info.description, "TetFlora", _CATALOG
     for tag in ("plant", "TetFlora", info.identifier):
         about.tags.new(tag, skip_if_exists=True)
-    picture = thumbnail_file(info.identifier)
-    if picture is not None:
-        _set_preview(obj, picture)
+    thumbnail = thumbnail_file(info.identifier)
+    if thumbnail is not None:
+        _set_preview(obj, thumbnail)
 
 
-def _set_preview(obj: bpy.types.Object, picture: Path) -> None:
-    image = bpy.data.images.load(str(picture))
+def _set_preview(obj: bpy.types.Object, thumbnail: Path) -> None:
+    image = bpy.data.images.load(str(thumbnail))
     try:
         pixels = np.zeros(len(image.pixels), np.float32)
         image.pixels.foreach_get(pixels)

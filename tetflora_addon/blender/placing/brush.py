@@ -58,7 +58,7 @@ def brush_of(scene: bpy.types.Scene, pressure: float = 1.0) -> tuple[Brush, tupl
         min_distance=settings.min_distance,
         scale_min=settings.scale_min,
         scale_max=settings.scale_max,
-        shares=tuple(weight for _, weight in mix),
+        weights=tuple(weight for _, weight in mix),
     )
     if strokes.too_many(brush):
         raise SceneError(

@@ -137,7 +137,7 @@ def rules_from(population: bpy.types.PropertyGroup) -> tuple[Rules, tuple[str, .
         for identifier, e in mix
         if e.companion and e.companion_strength
     )
-    free = ("altitude_min", "altitude_max", "density", "shares", "companions")
+    free = ("altitude_min", "altitude_max", "density", "weights", "companions")
     given = {name: getattr(population, name) for name in Rules.__dataclass_fields__ if name not in free}
     low, high = (population.altitude_min, population.altitude_max) if population.use_altitude else (-inf, inf)
     rules = Rules(
@@ -145,7 +145,7 @@ def rules_from(population: bpy.types.PropertyGroup) -> tuple[Rules, tuple[str, .
         altitude_min=low,
         altitude_max=high,
         density=population.density / HECTARE,
-        shares=tuple(weights.values()),
+        weights=tuple(weights.values()),
         companions=companions,
     )
     return rules, species

@@ -139,7 +139,7 @@ class _OneByOne(Exception):
 def copies_of(objects: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> list[Copies]:
     """Places of all plants and fields that some objects instance, the objects themselves not included.
 
-    Individuals are told apart by the instancer's name and by the ``id`` of the instance, which is its number where
+    Individuals are distinguished by the instancer's name and by the ``id`` of the instance, which is its number where
     nodes set none, so that they stay the same while an animation goes on.
 
     Parameters

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Species of the catalogue in Blender: pictures, items of menus, the property that stores a choice, and species files.
+"""Species of the catalogue in Blender: thumbnails, items of menus, the property that stores a choice, and files.
 
-Pictures are PNG files beside the species. Only sound species files are saved or loaded.
+Thumbnails are PNG files beside the species. Only sound species files are saved or loaded.
 """
 
 import json
@@ -25,7 +25,7 @@ from .edits import catalogue, species_data, species_for, tell_listeners
 
 FOLDER = "thumbnails"
 THUMBNAIL_ENDING = ".png"
-#: Where a species has no picture.
+#: Where a species has no thumbnail.
 FALLBACK_ICON = 'OUTLINER_OB_EMPTY'
 
 #: Identifier of the only item when there is nothing to choose.
@@ -36,15 +36,15 @@ ENDING = ".json"
 
 Item = tuple[str, str, str, str | int, int]
 
-# Seconds for which a picture is not looked for again: menus and panels ask for all of them at each redraw.
+# Seconds for which a thumbnail is not looked for again: menus and panels ask for all of them at each redraw.
 _TRUSTED = 0.0 if bpy.app.background else 1.0
 _icons: dict[str, tuple[float, int]] = {}
 _kept: dict[tuple, list[Item]] = {}  # items by content: Blender keeps no copy of the strings of dynamic items
-_pictures: previews.ImagePreviewCollection | None = None
+_thumbnails: previews.ImagePreviewCollection | None = None
 
 
 def thumbnail_file(identifier: str) -> Path | None:
-    """The picture of a species: ``thumbnails/identifier.png`` in the user's folder or among the shipped ones."""
+    """The thumbnail of a species: ``thumbnails/identifier.png`` in the user's folder or among the shipped ones."""
     for folder in (*species_folders(), builtin_folder()):
         path = folder / FOLDER / (identifier + THUMBNAIL_ENDING)
         if identifier and path.is_file():
@@ -53,7 +53,7 @@ def thumbnail_file(identifier: str) -> Path | None:
 
 
 def icon_of(identifier: str) -> int:
-    """Number of a species' picture for items and layouts, loaded at first use; 0 where it has none."""
+    """Number of a species' thumbnail for items and layouts, loaded at first use; 0 where it has none."""
     now = time.monotonic()
     seen, icon = _icons.get(identifier, (-_TRUSTED, 0))
     if now - seen >= _TRUSTED:
@@ -64,25 +64,25 @@ def icon_of(identifier: str) -> int:
 
 def _icon_of(identifier: str) -> int:
     path = thumbnail_file(identifier)
-    if path is None or _pictures is None:
+    if path is None or _thumbnails is None:
         return 0
     name = f"{path}|{path.stat().st_mtime_ns}"  # so that a replaced file is loaded again
-    found = _pictures.get(name) or _pictures.load(name, str(path), 'IMAGE')
+    found = _thumbnails.get(name) or _thumbnails.load(name, str(path), 'IMAGE')
     return found.icon_id
 
 
 def register() -> None:
-    """Open an empty collection of pictures."""
-    global _pictures
-    _pictures = previews.new()
+    """Open an empty collection of thumbnails."""
+    global _thumbnails
+    _thumbnails = previews.new()
 
 
 def unregister() -> None:
-    """Free the pictures."""
-    global _pictures
-    if _pictures is not None:
-        previews.remove(_pictures)
-    _pictures = None
+    """Free the thumbnails."""
+    global _thumbnails
+    if _thumbnails is not None:
+        previews.remove(_thumbnails)
+    _thumbnails = None
     _icons.clear()
 
 

@@ -33,7 +33,7 @@ listeners = Listeners()
 _TRUSTED = 0.0 if bpy.app.background else 0.3
 _seen: dict[str, SpeciesInfo] | None = None
 _seen_at = 0.0
-_looking = True  # or what was seen is trusted until told otherwise
+_looking = True  # False within `looked_at_once`
 _read: dict[str, dict[str, Any]] = {}  # decoded files, as long as what was seen is trusted
 
 

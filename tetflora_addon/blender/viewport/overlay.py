@@ -124,7 +124,7 @@ def _opaque(colours: NDArray[np.float32], alpha: float) -> NDArray[np.float32]:
 
 
 def view_camera(region: bpy.types.RegionView3D, near: float) -> Camera:
-    """A viewport's view as the engine takes it; the size of its picture does not matter here."""
+    """A viewport's view as the engine takes it; the size of its image does not matter here."""
     matrix = np.array(region.view_matrix.inverted(), np.float64)
     kind = "PERSP" if region.is_perspective else "ORTHO"
     # From an orthographic view everything is in front: its eye is as far back as one likes.

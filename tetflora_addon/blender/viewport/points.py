@@ -33,7 +33,7 @@ WIDTH = 2.0  # of a cursor's lines, pixels times the interface's scale
 MOST_DOTS = 20_000
 #: Plants that are placed at most for a preview.
 MOST_PLACED = 200_000
-#: One after the other for the species of the mixture; linear RGB, told apart by colour-blind eyes as well
+#: One after the other for the species of the mixture; linear RGB, distinguishable by colour-blind eyes as well
 #: (the palette of Okabe and Ito, "Color Universal Design", 2008).
 PALETTE = np.array(
     [[0.0, 0.62, 0.45], [0.9, 0.62, 0.0], [0.34, 0.71, 0.91], [0.94, 0.89, 0.26], [0.84, 0.37, 0.0], [0.8, 0.47, 0.65]]

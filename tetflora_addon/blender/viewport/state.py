@@ -20,7 +20,7 @@ from ...preview.light_plants import Shapes
 from ..runtime import Listeners, redraw
 from ..scene.camera import read_camera
 
-#: What `scene.camera` reads of a camera, of its depth of field, and of the picture.
+#: What `scene.camera` reads of a camera, of its depth of field, and of the image.
 _LENS = (
     *("type", "lens", "ortho_scale", "shift_x", "shift_y", "sensor_fit", "sensor_width", "sensor_height"),
     *("clip_start", "clip_end", "panorama_type", "longitude_min", "longitude_max", "latitude_min", "latitude_max"),
@@ -57,9 +57,9 @@ class Preview:
     seconds : float
         What reading them took.
     made : int
-        Counts changes of levels and shapes, so that what was handed to the graphics card can be told from what is new.
+        Counts changes of levels and shapes, to know what the graphics card already has.
     cache : dict
-        Room for the overlay.
+        What the overlay keeps.
     """
 
     levels: Levels | None = None
@@ -106,9 +106,9 @@ def forget(scene: bpy.types.Scene) -> None:
 
 
 def camera_now(scene: bpy.types.Scene) -> tuple:
-    """What of the scene's camera and picture decides on levels; cheap, to see whether it has changed.
+    """What of the scene's camera and image decides on levels; cheap, to see whether it has changed.
 
-    Not where an object in focus is, and how far apart the eyes of a stereoscopic picture are.
+    Not where an object in focus is, and how far apart the eyes of a stereoscopic image are.
     """
     camera, render = scene.camera, scene.render
     if camera is None or camera.type != 'CAMERA':
