@@ -72,10 +72,10 @@ def run(quick: bool) -> dict[str, float]:
 
 def grown(flora: Any, branches: Any) -> NDArray[np.float64]:
     """All vertices (v, 3) of sub-plants of one species."""
-    stems = list(pieces.expand(flora, branches))
-    bark = tubes.tube_buffers(flora, pieces.Pieces.empty(), stems)
+    whole = list(pieces.expand(flora, branches))
+    bark = tubes.tube_buffers(flora, pieces.Pieces.empty(), whole)
     out = [] if bark is None else [bark.positions]
-    for own, leaves in placed_leaves(flora, stems):
+    for own, leaves in placed_leaves(flora, whole):
         row = own.row[:1]
         frame = foliage.settled(flora.rows, row, leaves.frame, leaves.light, np.array([0.0, 0.0, 1.0]))
         forms = flora.forms[0][flora.rows["leaf_kind"][row[0]]]
@@ -87,10 +87,10 @@ def grown(flora: Any, branches: Any) -> NDArray[np.float64]:
     return np.concatenate(out).astype(np.float64)
 
 
-def placed_leaves(flora: Any, stems: list[Any]) -> Iterator[tuple[Any, Any]]:
+def placed_leaves(flora: Any, whole: list[Any]) -> Iterator[tuple[Any, Any]]:
     """Branches and all leaves on their own axes, row by row."""
     rows = flora.rows
-    for some in stems:
+    for some in whole:
         for row in np.unique(some.branches.row):
             if rows["leaves"][row].sum() > 0:
                 own = some.take(some.branches.row == row)
@@ -111,20 +111,20 @@ def vertices_outside(flora: Any, seeds: int) -> int:
     wide = np.maximum(1 + flora.rows["flare"], bounds.ring_stretch(flora.rows))
     out = 0
     for chunk in pieces.chunks(flora.polygons[trunks.row], AT_ONCE):
-        whole = trunks.take(chunk)
-        bodies, first = bodies_of(flora, whole), whole.plant[0]
-        stems = list(pieces.expand(flora, whole))
-        doubtful = np.zeros(len(whole), bool)
-        for some in stems:
+        plants = trunks.take(chunk)
+        bodies, first = bodies_of(flora, plants), plants.plant[0]
+        whole = list(pieces.expand(flora, plants))
+        doubtful = np.zeros(len(plants), bool)
+        for some in whole:
             owner, _, position = some.knots(flora.rows)
             plant = some.branches.plant[owner] - first
             radius = (some.branches.radius * wide[some.branches.row])[owner]
             doubtful[plant[excess(bodies, plant, position) + radius > 0]] = True
-        for own, leaves in placed_leaves(flora, stems):
+        for own, leaves in placed_leaves(flora, whole):
             at, reach = own.plant[leaves.branch] - first, flora.leaf.reach[own.row[0]] * leaves.size
             doubtful[at[excess(bodies, at, leaves.position) + reach > 0]] = True
         for i in np.flatnonzero(doubtful):
-            points = grown(flora, whole.take(np.array([i])))
+            points = grown(flora, plants.take(np.array([i])))
             allowed = _FLOAT32 * (np.abs(points).max() + bodies[6:, i].sum())
             out += int((excess(bodies, np.full(len(points), i), points) > allowed).sum())
     return out

@@ -170,8 +170,8 @@ def camera(
 
 def expanded(one: Flora, subplants: Branches) -> Pieces:
     """All branches of sub-plants, to the last twig, as pieces."""
-    stems = [whole_pieces(one.rows, some)[0] for some in expand(one, subplants)]
-    return Pieces.concatenate([Pieces.empty(), *stems])
+    parts = [whole_pieces(one.rows, some)[0] for some in expand(one, subplants)]
+    return Pieces.concatenate([Pieces.empty(), *parts])
 
 
 def grown(one: Flora, seeds: Seeds) -> tuple[Branches, Pieces]:

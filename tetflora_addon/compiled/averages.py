@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Expected amounts of sub-plants in closed form, from the highest order down to the trunk (paper, section 5).
+"""Expected totals of sub-plants in closed form, from the highest order down to the trunk (paper, section 5).
 
-Every amount is kept by the row that contributes it, so that colours and shares follow by a product. What depends on how
-far outside in the crown a sub-plant sits is known at three places, `NODES`, and quadratic between them.
+Every total is kept by the row that contributes it, so that colours and fractions follow by a product. What depends on
+how far outside in the crown a sub-plant sits is known at three places, `NODES`, and quadratic between them.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ..species.members import expected_forks
 from ..species.species import Range, crown_ratio
 
 NODES = np.array([0.0, 0.5, 1.0])
-_SHARES = (np.arange(256) + 0.5) / 256
+_FRACTIONS = (np.arange(256) + 0.5) / 256
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class RowLeaves:
 
 @dataclass(frozen=True)
 class Averages:
-    """Expected amounts of the sub-plant of each row, by contributing row.
+    """Expected totals of the sub-plant of each row, by contributing row.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ def own_leaf_integrals(
 
 
 def average(rows: NDArray[np.void], leaf: RowLeaves) -> Averages:
-    """Expected amounts of every row.
+    """Expected totals of every row.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ class _Sums:
 
     ``number`` of them; ``full``, the sum of the factors on their own numbers (`growth.fullness`); ``wood`` and
     ``full_wood``, the sums of length × radius relative to the parent's (of short shoots in m²), without and with that
-    factor; ``nodes`` (3, 3), what their amounts at `NODES` add to the parent's; ``length`` and ``radius``, typical ones
+    factor; ``nodes`` (3, 3), what their totals at `NODES` add to the parent's; ``length`` and ``radius``, typical ones
     relative to the parent's.
     """
 
@@ -221,18 +221,18 @@ def _sums(rows: NDArray[np.void], i: int, sort: int) -> _Sums:
     number, thickness = float(row["count"][sort, 0]), child["thickness"][0]
     if sort == FORK:
         return _fork_sums(rows, i)
-    start, (low, high) = row["start"][sort, 0], row["share"][sort]
-    t = start + (1 - start) * _SHARES
+    start, (low, high) = row["start"][sort, 0], row["fraction"][sort]
+    t = start + (1 - start) * _FRACTIONS
     vigour = np.ones_like(t)
     if sort == LATERAL:
-        vigour = crown_ratio(np.full(t.shape, row["crown"]), 1 - (low + (high - low) * _SHARES))
+        vigour = crown_ratio(np.full(t.shape, row["crown"]), 1 - (low + (high - low) * _FRACTIONS))
     full = 1 - child["count_by_length"] * (1 - vigour)
     if sort == SPUR:
         mean, variation = child["length"]
         size, radius = np.full(t.shape, (mean**2 + variation**2 / 3) * thickness), thickness
     else:
         here = np.full(t.shape, i)
-        thick = row["pipe_share"] * vigour if row["pipe"] > 0 else profile(rows, here, np.zeros(len(t), np.uint64), t)
+        thick = row["pipe_radius"] * vigour if row["pipe"] > 0 else profile(rows, here, np.zeros(len(t), np.uint64), t)
         size, radius = vigour * row["nominal"] * child["length"][0] * thick * thickness, float(thick.mean() * thickness)
     nodes = number * full.mean() * np.eye(3)
     if row["order"] == 1:

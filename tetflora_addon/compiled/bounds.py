@@ -179,16 +179,16 @@ def _unit_bound(rows: NDArray[np.void], index: int, bounds: NDArray[np.float64])
         if row["next"][sort] < 0:
             continue
         child = rows[row["next"][sort]]
-        share = np.linspace(0, 1, _SLABS + 1)
+        fraction = np.linspace(0, 1, _SLABS + 1)
         start = max(row["start"][sort, 0] - row["start"][sort, 1], 0.0)
-        t = start + (1 - start) * share
-        share = row["share"][sort, 0] + np.ptp(row["share"][sort]) * share
+        t = start + (1 - start) * fraction
+        fraction = row["fraction"][sort, 0] + np.ptp(row["fraction"][sort]) * fraction
         r, lo, hi = (np.interp(t, knot_t, v) for v in (radius, low, high))
         first = np.minimum((t[:-1] * row["segments"]).astype(int), len(turn) - 1)
         last = np.minimum((t[1:] * row["segments"]).astype(int), len(turn) - 1)
         dev = np.maximum(turn[first], turn[last])
         base, variation = child["angle"]
-        lean = base + (child["angle_tip"] - base) * share
+        lean = base + (child["angle_tip"] - base) * fraction
         most = np.clip(np.maximum(lean[:-1], lean[1:]) + variation + dev, 0, np.pi)
         least = np.clip(np.minimum(lean[:-1], lean[1:]) - variation - dev, 0, np.pi)
         longest = np.full(_SLABS, child["length"].sum() * row["nominal"])
@@ -196,9 +196,9 @@ def _unit_bound(rows: NDArray[np.void], index: int, bounds: NDArray[np.float64])
             longest[:] = child["length"].sum()
             least[:] = 0.0  # a single stem goes straight on
         elif row["start"][sort, 1] > 0:
-            longest *= _crown_most(row, np.zeros(1), np.ones(1))[0]  # the places of shares are not known
+            longest *= _crown_most(row, np.zeros(1), np.ones(1))[0]  # where children sit is not known
         else:
-            longest *= _crown_most(row, share[:-1], share[1:])
+            longest *= _crown_most(row, fraction[:-1], fraction[1:])
         angle = np.linspace(least, most, _ANGLES, axis=1)
         far, bottom, top = _tilted(bounds[row["next"][sort]], angle, longest)
         # Between a slab's ends nothing sticks out: radius and height grow along the axis, the lowest height is concave.
@@ -209,7 +209,7 @@ def _unit_bound(rows: NDArray[np.void], index: int, bounds: NDArray[np.float64])
 
 
 def _crown_most(row: NDArray[np.void], low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Greatest length ratio of children between two shares (n,)."""
+    """Greatest length ratio of children between two fractions (n,) of them."""
     inner = np.linspace(low, high, 5, axis=1)
     ratio = crown_ratio(np.full(inner.shape, row["crown"]), 1 - inner).max(axis=1)
     return np.minimum(ratio + _CROWN_SLOPE * (high - low) / 8, 1)

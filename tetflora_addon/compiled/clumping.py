@@ -38,11 +38,11 @@ _METHOD = 1
 #: Polygons that are grown of each species, if two plants have no more than a number, and plants at most; of plants that
 #: are still larger than the last number some sub-plants are taken.
 _POLYGONS, _PAIR, _PLANTS, _LARGEST = 200_000, 500_000, 6, 400_000
-_VIEWS = 4  # directions that plants are seen from, shared out among them, but at least
+_VIEWS = 4  # directions that plants are seen from, distributed among them, but at least
 _LEAST_VIEWS = 2  # for each
 _RAYS = 28  # to a side of what is looked at
 _SIZES = 4  # of cells,
-_FINEST, _COARSEST = 2.0, 0.2  # from so many widths of a leaf to this share of the plant
+_FINEST, _COARSEST = 2.0, 0.2  # from so many widths of a leaf to this fraction of the plant
 _SEGMENTS = 50_000  # of rays, for each size: fewer rays through finer cells
 #: Root (in widths of a leaf), density, offset, and difference of an order's from that where nothing is known; and the
 #: weights that these have against what is seen.
@@ -247,7 +247,7 @@ def _solved(
 ) -> NDArray[np.float64]:
     """Coefficients (k,) with which depths (n, k) let through as many rays as meet nothing, by Newton's method.
 
-    Equations are weighted by the share that each coefficient has in a ray's depth: one for each. The first coefficient
+    Equations are weighted by the contribution of each coefficient to a ray's depth: one for each. The first coefficient
     is one of 1 / √h, with h in units whose square root is given.
     """
     depth = depth * np.where(np.arange(depth.shape[1]) == 0, unit, 1.0)

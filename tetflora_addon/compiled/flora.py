@@ -34,8 +34,8 @@ from .samples import Samples, draw_samples
 class Flora:
     """The compiled species of a scene; arrays have one entry for each row (species and order).
 
-    Amounts are those of a sub-plant where the crown's branches are longest (vigour 1); of what follows the length, a
-    shorter one has the share that `growth.fullness` says.
+    Totals are those of a sub-plant where the crown's branches are longest (vigour 1); of what follows the length, a
+    shorter one has the fraction that `growth.fullness` gives.
 
     Attributes
     ----------
@@ -71,9 +71,9 @@ class Flora:
     wood_colour : (r, 3) float64
         Area-weighted mean.
     transmission : (r,) float64
-        Share of scattered light that goes through the leaves of the sub-plant.
+        Fraction of scattered light that goes through the leaves of the sub-plant.
     averages : Averages
-        All expected amounts by the row that contributes them.
+        All expected totals by the row that contributes them.
     area_nodes : (r, 3) float64
         Expected one-sided area of leaves at `averages.NODES`, m² at plant scale 1.
     colour_nodes : (r, 3, 3) float64
@@ -125,8 +125,8 @@ class Flora:
         """Points on the leaves and wood of sub-plants; drawn when first asked for, as only proxies need them."""
         if self.calm is not None:
             return self.calm.samples
-        amounts = self.averages
-        return draw_samples(self.rows, amounts.leaf_area[:, 1], _wood_shares(amounts), amounts.length)
+        totals = self.averages
+        return draw_samples(self.rows, totals.leaf_area[:, 1], _wood_totals(totals), totals.length)
 
     @cached_property
     def sampled_bound(self) -> NDArray[np.float64]:
@@ -141,18 +141,18 @@ class Flora:
         """How the surfaces of sub-plants are turned; likewise."""
         if self.calm is not None:
             return self.calm.orientation
-        amounts = self.averages
-        return orientation_of(self.rows, self.forms, amounts.leaf_area[:, 1], _wood_shares(amounts), amounts.length)
+        totals = self.averages
+        return orientation_of(self.rows, self.forms, totals.leaf_area[:, 1], _wood_totals(totals), totals.length)
 
     @cached_property
     def clumping(self) -> Clumping:
         """How much lighter sub-plants are than even fogs of their area; fitted when first asked for, as above."""
         if self.calm is not None:
             return self.calm.clumping
-        amounts = self.averages
-        wood = _wood_shares(amounts) * (amounts.length * amounts.radius)[:, None]
-        area = amounts.leaf_area[:, 1] + wood / 2
-        return fit_clumping(self.rows, self.forms, area, self.polygons, self.leaf_width, amounts.length)
+        totals = self.averages
+        wood = _wood_totals(totals) * (totals.length * totals.radius)[:, None]
+        area = totals.leaf_area[:, 1] + wood / 2
+        return fit_clumping(self.rows, self.forms, area, self.polygons, self.leaf_width, totals.length)
 
     def species_of(self, row: NDArray[np.integer]) -> NDArray[np.integer]:
         """Index (n,) of the species that rows (n,) belong to."""
@@ -215,13 +215,13 @@ def _compiled(species: tuple[Species, ...]) -> Flora:
     rows = build_rows(species)
     forms = tuple(tuple(one.forms(kind) for kind in range(len(LEAF_KINDS))) for one in species)
     leaf = row_leaves(rows, forms, np.array([[one.leaf_transmission, one.blossom_transmission] for one in species]))
-    amounts = average(rows, leaf)
+    totals = average(rows, leaf)
     bound = _with_drawn(rows, unit_bounds(rows))
-    leaves, area = amounts.leaves, amounts.leaf_area[:, 1]
-    wood = _wood_shares(amounts)
+    leaves, area = totals.leaves, totals.leaf_area[:, 1]
+    wood = _wood_totals(totals)
     leaf_count, leaf_area = leaves.sum(axis=1), area.sum(axis=1)
     size = rows["leaf_size"][:, 0] * (1 + rows["leaf_size_tip"]) / 2
-    fixed, full = amounts.fixed_faces.sum(axis=1), amounts.full_faces.sum(axis=1)
+    fixed, full = totals.fixed_faces.sum(axis=1), totals.full_faces.sum(axis=1)
     polygons = fixed + full + leaves @ leaf.polygons
     return Flora(
         species=tuple(species),
@@ -235,25 +235,25 @@ def _compiled(species: tuple[Species, ...]) -> Flora:
         leaf_box=leaf_boxes(rows, forms),
         leaf_width=leaves @ (size * leaf.width) / np.maximum(leaf_count, 1e-300),
         leaf_count=leaf_count,
-        fixed_wood=amounts.fixed_wood.sum(axis=1),
-        full_wood=amounts.full_wood.sum(axis=1),
-        spur_wood=amounts.spur_wood.sum(axis=1),
+        fixed_wood=totals.fixed_wood.sum(axis=1),
+        full_wood=totals.full_wood.sum(axis=1),
+        spur_wood=totals.spur_wood.sum(axis=1),
         polygons=polygons,
         leaf_faces=leaves @ leaf.polygons,
         fixed_faces=fixed,
         wood_colour=wood @ rows["branch_colour"][:, 0] / wood.sum(axis=1, keepdims=True),
         transmission=area @ leaf.transmission / np.maximum(leaf_area, 1e-300),
-        averages=amounts,
-        area_nodes=amounts.leaf_area.sum(axis=2),
-        colour_nodes=amounts.leaf_colour,
+        averages=totals,
+        area_nodes=totals.leaf_area.sum(axis=2),
+        colour_nodes=totals.leaf_colour,
     )
 
 
 @lru_cache(maxsize=8)
 def _windy(flora: Flora, wind: Wind) -> Flora:
     """A flora at rest in a wind at one time."""
-    amounts = flora.averages
-    rows = windy_rows(flora.rows, amounts.length, amounts.radius, wind)
+    totals = flora.averages
+    rows = windy_rows(flora.rows, totals.length, totals.radius, wind)
     bound = _with_drawn(rows, unit_bounds(rows))
     return replace(
         flora,
@@ -282,7 +282,7 @@ def _with_drawn(rows: NDArray[np.void], bound: NDArray[np.float64]) -> NDArray[n
     return bound
 
 
-def _wood_shares(amounts: Averages) -> NDArray[np.float64]:
+def _wood_totals(totals: Averages) -> NDArray[np.float64]:
     """Expected surface (r, r) of branches of typical size by contributing row, over length × radius of the own one."""
-    size = np.maximum(amounts.length * amounts.radius, 1e-300)
-    return amounts.fixed_wood + amounts.full_wood + amounts.spur_wood / size[:, None]
+    size = np.maximum(totals.length * totals.radius, 1e-300)
+    return totals.fixed_wood + totals.full_wood + totals.spur_wood / size[:, None]

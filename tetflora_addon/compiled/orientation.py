@@ -135,7 +135,7 @@ def _frames_along(axis: NDArray[np.float64]) -> NDArray[np.float64]:
 def orientation_of(
     rows: NDArray[np.void],
     forms: Sequence[Sequence[Sequence[LeafModel]]],
-    leaf_share: NDArray[np.float64],
+    leaf: NDArray[np.float64],
     wood: NDArray[np.float64],
     length: NDArray[np.float64],
 ) -> Orientation:
@@ -146,7 +146,7 @@ def orientation_of(
     rows : (r,) parameter table
     forms : by species and kind
         Models of leaves.
-    leaf_share : (r, r) float64
+    leaf : (r, r) float64
         Expected area of leaves in a sub-plant by the row that bears them.
     wood : (r, r) float64
         Expected surface of branches by row, over length × radius of the sub-plant's own branch.
@@ -155,7 +155,7 @@ def orientation_of(
     """
     out = Orientation(*np.zeros((3, len(rows), _TERMS, 6)))
     turn = _model_moments(rows, forms)
-    leaf_area, wood_area = leaf_share.sum(axis=1), wood.sum(axis=1)
+    leaf_area, wood_area = leaf.sum(axis=1), wood.sum(axis=1)
     skies = _skies_met(rows, length)
     for i in range(len(rows) - 1, -1, -1):
         branches = _looked_at(i, float(length[i]), _skies_around(_BRANCHES, bool(rows["order"][i] == 0), skies[i]))
@@ -163,12 +163,12 @@ def orientation_of(
         children, owner, stands = _some_children(rows, branches, lines)
         row, scale = children.row, branches.scale[0]
         basis = _basis(branches.frame[:, 2, :])
-        # What grows on the children is turned as they say; own leaves and the own branch are looked at one by one.
+        # What grows on the children is turned as they are; own leaves and the own branch are looked at one by one.
         if leaf_area[i] > 0:
             weight = stands * fullness(rows, children) * leaf_area[row] * scale**2
             leaves = _Sums.of(len(branches), owner, _evaluated(out.leaves, row, children.frame), weight)
-            if leaf_share[i, i] > 0:
-                leaves = _own_leaves(rows, branches, lines, turn[i]).mixed(leaves, leaf_share[i, i] / leaf_area[i])
+            if leaf[i, i] > 0:
+                leaves = _own_leaves(rows, branches, lines, turn[i]).mixed(leaves, leaf[i, i] / leaf_area[i])
                 straight = _own_leaves(rows, branches, _straight(branches), turn[i])
                 out.own_leaves[i] = straight.fitted(branches, basis)
             out.leaves[i] = leaves.fitted(branches, basis)
@@ -194,11 +194,11 @@ class _Sums:
         sums = np.stack([np.bincount(owner, one, n) for one in values], axis=1)
         return cls(sums.reshape(n, 3, 3), np.bincount(owner, weight, n))
 
-    def mixed(self, other: _Sums, share: float) -> _Sums:
-        """Both together; this one has a known share of all."""
+    def mixed(self, other: _Sums, fraction: float) -> _Sums:
+        """Both together; this one has a known fraction of all."""
         if other.weight.sum() <= 0:
             return self
-        a, b = (part / max(p.weight.sum(), 1e-300) for p, part in ((self, share), (other, 1 - share)))
+        a, b = (part / max(p.weight.sum(), 1e-300) for p, part in ((self, fraction), (other, 1 - fraction)))
         return _Sums(self.moment * a + other.moment * b, self.weight * a + other.weight * b)
 
     def fitted(self, branches: Branches, basis: NDArray[np.float64]) -> NDArray[np.float64]:

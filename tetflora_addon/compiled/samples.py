@@ -34,7 +34,7 @@ _OF_CLASS = 64  # samples of each class of tilt and roll
 _OF_UPRIGHT = 512  # of upright ones, as trunks are
 _CLASS_PATHS = 48  # paths for each class
 _DRAWN = 4  # more rows drawn by hand than this share the paths and samples of so many,
-_LEAST_DRAWN = 1 / 16  # but each has this share of another row's
+_LEAST_DRAWN = 1 / 16  # but each has this fraction of another row's
 _BANDS = 8  # in which samples are spread evenly
 _LEAVES = 2  # of each branch that a path comes to
 _PICK, _ALONG, _TILT, _ROLL, _CHILD = range(101, 106)  # draws of this module, beyond those of growth
@@ -84,8 +84,8 @@ class Samples:
 
 def draw_samples(
     rows: NDArray[np.void],
-    leaf_share: NDArray[np.float64],
-    wood_share: NDArray[np.float64],
+    leaf_area: NDArray[np.float64],
+    wood_area: NDArray[np.float64],
     length: NDArray[np.float64],
 ) -> Samples:
     """Sample every row.
@@ -93,7 +93,7 @@ def draw_samples(
     Parameters
     ----------
     rows : (r,) parameter table
-    leaf_share, wood_share : (r, r) float64
+    leaf_area, wood_area : (r, r) float64
         Expected area in a sub-plant by the row that contributes it.
     length : (r,) float64
         Typical length of a branch, metres.
@@ -101,11 +101,11 @@ def draw_samples(
     leaves, wood = _Collector(len(rows)), _Collector(len(rows))
     trunk = np.flatnonzero(np.diff(rows["species"], prepend=-1))
     for first, end in zip(trunk, [*trunk[1:], len(rows)], strict=True):
-        walk = _Walk(rows, int(first), int(end), leaf_share, length)
+        walk = _Walk(rows, int(first), int(end), leaf_area, length)
         for row in range(first, end):
-            for points, share, out in ((walk.leaves, leaf_share, leaves), (walk.wood, wood_share, wood)):
-                if share[row].sum() > 0:
-                    out.add(row, *walk.sampled(points, row, share[row]))
+            for points, area, out in ((walk.leaves, leaf_area, leaves), (walk.wood, wood_area, wood)):
+                if area[row].sum() > 0:
+                    out.add(row, *walk.sampled(points, row, area[row]))
     return Samples(leaves.points(), wood.points())
 
 
@@ -132,8 +132,8 @@ def _at_least_some(counts: NDArray[np.int64]) -> NDArray[np.int64]:
 class _Points(Arrays):
     """Sample points on branches of one row or several; shapes as in `Points`.
 
-    ``line`` (n, slots) says on which branches the point is, see `_Walk`; ``offset`` (n, 3) is the part of the position
-    that does not follow the length of the branches that lead there: the way along a short shoot.
+    ``line`` (n, slots) gives the branches that the point is on, see `_Walk`; ``offset`` (n, 3) is the part of the
+    position that does not follow the length of the branches that lead there: the way along a short shoot.
     """
 
     line: NDArray[np.int32]
@@ -161,7 +161,7 @@ class _Points(Arrays):
 class _Arrived:
     """Branches of one row that paths have come to.
 
-    ``weight`` (n,) says how many branches each stands for, ``line`` (slots, n) on which branches it grows, see `_Walk`.
+    ``weight`` (n,) is how many branches each stands for, ``line`` (slots, n) gives those it grows on, see `_Walk`.
     """
 
     branches: Branches
@@ -184,13 +184,13 @@ class _Walk:
     """
 
     def __init__(
-        self, rows: NDArray[np.void], first: int, end: int, leaf_share: NDArray[np.float64], length: NDArray[np.float64]
+        self, rows: NDArray[np.void], first: int, end: int, leaf_area: NDArray[np.float64], length: NDArray[np.float64]
     ) -> None:
         self.rows, self.first = rows, first
         self.length = np.where(length[first:end] > 0, length[first:end], 1.0) / max(length[first], 1e-9)
         self.scale = 1 / max(length[first], 1e-9)
         drawn = rows["drawn"][first:end]
-        self.share = np.where(drawn, np.clip(_DRAWN / max(drawn.sum(), 1), _LEAST_DRAWN, 1), 1)
+        self.fraction = np.where(drawn, np.clip(_DRAWN / max(drawn.sum(), 1), _LEAST_DRAWN, 1), 1)
         self.slot = np.cumsum(~drawn | (np.diff(drawn, prepend=False) & drawn)) - 1
         self.start = np.where(drawn, self._number(int(drawn.argmax()) + first) * (np.cumsum(drawn) - 1), 0)
         arrived: list[list[_Arrived]] = [[] for _ in range(first, end)]
@@ -202,7 +202,7 @@ class _Walk:
             self.branches.append(one.branches)
             lines = axes(rows, one.branches)
             wood.append(_wood_points(rows, one, lines))
-            if leaf_share[row, row] > 0:
+            if leaf_area[row, row] > 0:
                 leaves.append(_leaf_points(rows, one, lines))
             for sort in (LATERAL, FORK, SPUR):
                 child = int(rows["next"][row, sort])
@@ -214,7 +214,7 @@ class _Walk:
         self.leaves = _Points.concatenate(leaves) if leaves else None
 
     def _number(self, row: int) -> int:
-        return int((_CLASSES * _CLASS_PATHS if self.rows["worldly"][row] else _PATHS) * self.share[row - self.first])
+        return int((_CLASSES * _CLASS_PATHS if self.rows["tropic"][row] else _PATHS) * self.fraction[row - self.first])
 
     def _gathered(self, row: int, arrived: list[_Arrived]) -> _Arrived:
         """Branches of a row: as many from each row that bears them, and always the same number."""
@@ -239,7 +239,7 @@ class _Walk:
         # Keys from fixed seeds, so that what is compiled never depends on what was compiled before.
         key = mix(key_of_seed(np.arange(n)) ^ np.uint64(0x7E7F10A5))
         frame = np.broadcast_to(np.eye(3), (n, 3, 3))
-        if self.rows["worldly"][row]:
+        if self.rows["tropic"][row]:
             # Half of them upright, as most are.
             half_n = np.arange(n) // 2
             stand = np.where(np.arange(n) % 2, _CLASSES - _ROLLS + half_n % _ROLLS, half_n % _CLASSES)
@@ -253,7 +253,7 @@ class _Walk:
         return _Arrived(branches, one, np.full((self.slot[-1] + 1, n), -1, np.int32))
 
     def sampled(
-        self, points: _Points | None, row: int, share: NDArray[np.float64]
+        self, points: _Points | None, row: int, expected: NDArray[np.float64]
     ) -> tuple[_Points, NDArray[np.int64], NDArray[np.int64]]:
         """Samples of what grows on branches of a row, drawn by area, in their axes.
 
@@ -262,7 +262,7 @@ class _Walk:
         points : _Points
             Where from: leaves, or wood.
         row : int
-        share : (r,) float64
+        expected : (r,) float64
             Expected area in a sub-plant by the row that contributes it.
 
         Returns
@@ -272,20 +272,20 @@ class _Walk:
         i = row - self.first
         number = np.zeros(0) if points is None else points.line[:, self.slot[i]] - self.start[i]
         own = np.flatnonzero((number >= 0) & (number < len(self.branches[i])))
-        if len(own) == 0 or share[points.row[own]].sum() == 0:
+        if len(own) == 0 or expected[points.row[own]].sum() == 0:
             # So rare that no path has met any: they are taken to be where the branches of the row itself are.
-            points = replace(self.wood, row=np.full_like(self.wood.row, share.argmax()))
+            points = replace(self.wood, row=np.full_like(self.wood.row, expected.argmax()))
             own = np.flatnonzero(self.wood.row == row)
-        # Areas are scaled so that each row has its expected share; paths only say how it is spread.
-        met = np.bincount(points.row[own], points.area[own], len(share))
-        area = points.area[own] * (share / np.where(met > 0, met, 1))[points.row[own]]
+        # Areas are scaled so that each row has its expected area; paths only give its distribution.
+        met = np.bincount(points.row[own], points.area[own], len(expected))
+        area = points.area[own] * (expected / np.where(met > 0, met, 1))[points.row[own]]
         base, under = self.branches[i], points.line[own, self.slot[i]] - self.start[i]
         place = _in_bands(points, own, base, under)
-        group, numbers = np.zeros(len(own), np.int64), np.full(_CLASSES, int(SAMPLES * self.share[i]))
+        group, numbers = np.zeros(len(own), np.int64), np.full(_CLASSES, int(SAMPLES * self.fraction[i]))
         first = np.zeros(_CLASSES, np.int64)
-        if self.rows["worldly"][row]:
+        if self.rows["tropic"][row]:
             group = _GROUPS[_stand_classes(base.frame[:, 2, :])][under]
-            numbers = (np.where(_UPRIGHT, _OF_UPRIGHT, _OF_CLASS) * self.share[i]).astype(np.int64)
+            numbers = (np.where(_UPRIGHT, _OF_UPRIGHT, _OF_CLASS) * self.fraction[i]).astype(np.int64)
             distinct = np.where(np.arange(_CLASSES) == _GROUPS, numbers, 0)
             first = (np.cumsum(distinct) - distinct)[_GROUPS]
             pick = systematic(area, group, place, distinct)

@@ -23,7 +23,7 @@ from ..buffers import BLOCK_POLYGONS, MeshBuffers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.branches import Branches
-from ..growth.growth import Stems, trunks
+from ..growth.growth import WholeBranches, trunks
 from ..growth.hashing import Draw, uniform
 from ..growth.seeds import Seeds
 from ..refinement.contents import Contents
@@ -156,21 +156,21 @@ def expanded_blocks(flora: Flora, seeds: Seeds) -> Iterator[Block]:
 def _block(
     flora: Flora,
     pieces: Pieces,
-    stems: list[Stems],
+    branches: list[WholeBranches],
     number: int,
     fraction: float,
     bare: Pieces | None = None,
     transition: Transition | None = None,
 ) -> Iterator[Block]:
-    """Meshes of pieces and stems of any species, and of the wood alone of ``bare`` pieces."""
+    """Meshes of pieces and branches of any species, and of the wood alone of ``bare`` pieces."""
     bare = Pieces.empty() if bare is None else bare
     of_pieces, of_bare = flora.species_of(pieces.branches.row), flora.species_of(bare.branches.row)
-    of_stems = [flora.species_of(some.branches.row) for some in stems]
+    of_branches = [flora.species_of(some.branches.row) for some in branches]
     fraction_of = None if transition is None else transition.of_branches
     made: list[tuple[str, int, int, MeshBuffers | None]] = []
-    for s in np.unique(np.concatenate([of_pieces, of_bare, *of_stems])):
+    for s in np.unique(np.concatenate([of_pieces, of_bare, *of_branches])):
         cut = pieces.take(of_pieces == s)
-        whole = [some.take(species == s) for some, species in zip(stems, of_stems, strict=True)]
+        whole = [some.take(species == s) for some, species in zip(branches, of_branches, strict=True)]
         leaves = leaf_meshes(flora, cut, int(s), whole, fraction_of)
         made += [(LEAF_KINDS[m.kind], m.form, int(s), m.buffers) for m in leaves]
         if transition is not None:
@@ -180,7 +180,7 @@ def _block(
         made.append(("bark", 0, int(s), tube_buffers(flora, cut, whole)))
         del cut, whole
     # The caller copies each block into Blender; meanwhile its sources and the blocks already taken are not kept.
-    del pieces, stems, bare
+    del pieces, branches, bare
     while made:
         kind, form, s, buffers = made.pop(0)
         if buffers is not None:

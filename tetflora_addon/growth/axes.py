@@ -101,7 +101,7 @@ def _to_front(array: NDArray) -> NDArray:
 
 
 def axes(rows: NDArray[np.void], branches: Branches) -> Axes:
-    """Centre lines; each joint bends by its share of the order's curvature, and turns to the sky or the ground."""
+    """Centre lines; each joint bends by its part of the order's curvature, and turns to the sky or the ground."""
     lines = _axes(rows, branches)
     if branches.later is None:
         return lines
@@ -228,8 +228,8 @@ def profile(rows: NDArray[np.void], row: NDArray, key: NDArray[np.uint64], t: ND
     piped = np.flatnonzero(rows["pipe"][row] > 0)
     if len(piped):
         power, start, tip = _pipe(rows, row[piped], taper[piped])
-        share = np.clip((t[piped] - start) / (1 - start), 0, 1)
-        out[piped] = (tip + (1 - tip) * (1 - share)) ** (1 / power)
+        fraction = np.clip((t[piped] - start) / (1 - start), 0, 1)
+        out[piped] = (tip + (1 - tip) * (1 - fraction)) ** (1 / power)
     flared = np.flatnonzero(rows["flare"][row] > 0)
     if len(flared):
         out[flared] += rows["flare"][row[flared]] * np.maximum(np.exp(-_FALL * t[flared]) - 0.01, 0)
@@ -246,9 +246,9 @@ def profile_integral(rows: NDArray[np.void], row: NDArray, key: NDArray[np.uint6
     piped = np.flatnonzero(rows["pipe"][row] > 0)
     if len(piped):
         power, start, tip = _pipe(rows, row[piped], taper[piped])
-        share = np.clip((t[piped] - start) / (1 - start), 0, 1)
+        fraction = np.clip((t[piped] - start) / (1 - start), 0, 1)
         q = 1 + 1 / power
-        fallen = 1 - (tip + (1 - tip) * (1 - share)) ** q
+        fallen = 1 - (tip + (1 - tip) * (1 - fraction)) ** q
         out[piped] = np.minimum(t[piped], start) + (1 - start) * fallen / (q * np.maximum(1 - tip, 1e-12))
     flared = np.flatnonzero(rows["flare"][row] > 0)
     if len(flared):
@@ -259,7 +259,7 @@ def profile_integral(rows: NDArray[np.void], row: NDArray, key: NDArray[np.uint6
 
 def _pipe(rows: NDArray[np.void], row: NDArray, taper: NDArray) -> tuple[NDArray, NDArray, NDArray]:
     power = rows["pipe"][row]
-    # A tip as thick as the base has nothing to share out; the limit keeps divisions finite.
+    # A tip as thick as the base has nothing to distribute; the limit keeps divisions finite.
     return power, rows["start"][row, 0, 0], np.minimum(taper, 1 - 1e-6) ** power
 
 

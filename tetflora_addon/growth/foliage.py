@@ -70,10 +70,10 @@ def leaf_places(
         node = index // whorl
         key = np.where(index % whorl > 0, leaf_keys(branches, owner, node * whorl), key)
         number = number // whorl
-    share = (node + 0.5 + _PLACE_JITTER * signed(key, Draw.PLACE)) / number
+    fraction = (node + 0.5 + _PLACE_JITTER * signed(key, Draw.PLACE)) / number
     start = leaf_start(rows, branches)
     start = start[:1] if len(row) == 1 and (start == start[:1]).all() else np.take(start, owner)
-    return start + (1 - start) * share
+    return start + (1 - start) * fraction
 
 
 def leaf_start(rows: NDArray[np.void], branches: Branches) -> NDArray[np.float64]:
@@ -123,9 +123,9 @@ def leaf_range(
         some = branches.take(near)
         start, whorl = leaf_start(rows, some), rows["leaf_whorl"][some.row]
         number = counts[near] // whorl
-        share = (t[near] - start) / (1 - start)
+        fraction = (t[near] - start) / (1 - start)
         # Each whorl keeps to its own part of the branch, one of `number`.
-        node = np.clip(np.floor(share * number), 0, number - 1).astype(np.int64)
+        node = np.clip(np.floor(fraction * number), 0, number - 1).astype(np.int64)
         place = leaf_places(rows, branches, near, node * whorl, counts, leaf_keys(branches, near, node * whorl))
         out[near] = (node + (place < t[near])) * whorl
         return out
@@ -238,7 +238,7 @@ def _leaf_frames(
 
 
 def face_light(frame: NDArray[np.floating], light: NDArray[np.float64], sky: NDArray[np.float64]) -> NDArray:
-    """Turn leaves to the sky by the shares that their orders ask for.
+    """Turn leaves to the sky, as far as their orders ask for.
 
     Parameters
     ----------
@@ -313,7 +313,7 @@ def in_wind(
 
 
 def hanging(frame: NDArray[np.floating], droop: NDArray[np.float64], sky: NDArray[np.float64]) -> NDArray:
-    """Let leaves hang: the midrib turns down by the share ``droop`` (n,) or (1,), the blade follows it."""
+    """Let leaves hang: the midrib turns down as far as ``droop`` (n,) or (1,), the blade follows it."""
     kind = frame.dtype
     droop, sky = droop.astype(kind), sky.astype(kind).T
     along, up = frame[:, :, 1].T, frame[:, :, 2].T

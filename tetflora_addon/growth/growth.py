@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Growing branches: trunks from seeds, children of branches, all as arrays (paper, section 5).
 
-A branch is also a *sub-plant*: it and all that grows on it. Functions take any mix of species and orders. `Stems` are
-branches with their axes, from which wood and leaves are made; each axis is computed once.
+A branch is also a *sub-plant*: it and all that grows on it. Functions take any mix of species and orders.
+`WholeBranches` have their axes with them, from which wood and leaves are made; each axis is computed once.
 """
 
 from __future__ import annotations
@@ -114,8 +114,8 @@ def chosen_drawn(
 
 def fullness(rows: NDArray[np.void], branches: Branches) -> NDArray[np.float64]:
     """Factor (n,) on the numbers of branches and leaves: 1 for the longest branches of a crown, less for others."""
-    share = rows["count_by_length"][branches.row]
-    return 1 - share + share * branches.vigour
+    weight = rows["count_by_length"][branches.row]
+    return 1 - weight + weight * branches.vigour
 
 
 def branch_counts(rows: NDArray[np.void], branches: Branches, sort: int = LATERAL) -> NDArray[np.int64]:
@@ -177,22 +177,22 @@ def chosen_children(
     key = child_key(parent.key, index + path)
     row = rows["next"][parent.row, sort]
     if sort == FORK:
-        whorl, node, within, share = counts[owner], np.zeros_like(index), index, np.ones(len(index))
+        whorl, node, within, fraction = counts[owner], np.zeros_like(index), index, np.ones(len(index))
         t = np.ones(len(index))
     else:
         # Branches of a whorl share their place: that of the first of them.
         whorl = rows["whorl"][row]
         node, within = index // whorl, index % whorl
         place = signed(np.where(within > 0, child_key(parent.key, node * whorl + path), key), Draw.PLACE)
-        share = (node + 0.5 + _PLACE_JITTER * place) / np.maximum(counts[owner] // whorl, 1)
+        fraction = (node + 0.5 + _PLACE_JITTER * place) / np.maximum(counts[owner] // whorl, 1)
         start = varied(rows["start"][parent.row, sort], parent.key, _START[sort])
-        t = start + (1 - start) * share
-        low, high = rows["share"][parent.row, sort].T
-        share = low + (high - low) * share
+        t = start + (1 - start) * fraction
+        low, high = rows["fraction"][parent.row, sort].T
+        fraction = low + (high - low) * fraction
     position, frame = lines.at(owner, t)
     sky = lines.sky_at(owner, t)
     angle_base, angle_spread = rows["angle"][row].T
-    angle = angle_base + (rows["angle_tip"][row] - angle_base) * share + angle_spread * signed(key, Draw.ANGLE)
+    angle = angle_base + (rows["angle_tip"][row] - angle_base) * fraction + angle_spread * signed(key, Draw.ANGLE)
     step, jitter = rows["azimuth"][row].T
     turn = uniform(parent.key, Draw.AZIMUTH)
     azimuth = 2 * np.pi * (turn + within / whorl) + node * step + jitter * signed(key, Draw.AZIMUTH)
@@ -208,9 +208,11 @@ def chosen_children(
         around = np.where(limb, first + (last - first) * t, around)
     radius = radius_at(rows, parent, t)
     if sort == LATERAL:
-        vigour = crown_ratio(rows["crown"][parent.row], 1 - share)
+        vigour = crown_ratio(rows["crown"][parent.row], 1 - fraction)
         measure = parent.length * rows["nominal"][parent.row] * vigour
-        radius = np.where(rows["pipe"][parent.row] > 0, parent.radius * rows["pipe_share"][parent.row] * vigour, radius)
+        radius = np.where(
+            rows["pipe"][parent.row] > 0, parent.radius * rows["pipe_radius"][parent.row] * vigour, radius
+        )
     elif sort == FORK:
         vigour, measure = parent.vigour, parent.length  # which follows the crown already
         radius = radius * np.maximum(whorl, 1) ** (-1 / rows["fork_power"][parent.row])
@@ -248,7 +250,7 @@ def children(
 
 
 @dataclass(frozen=True)
-class Stems(Arrays):
+class WholeBranches(Arrays):
     """Whole branches and their axes.
 
     Attributes

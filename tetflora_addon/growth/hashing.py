@@ -113,7 +113,7 @@ def stepped(key: NDArray[np.uint64], index: NDArray[np.integer]) -> NDArray[np.f
     """Numbers in [0, 1) that are spread evenly along consecutive indices (n,), beginning where each key (n,) says.
 
     Steps by the golden section (H. Weyl, "Über die Gleichverteilung von Zahlen mod. Eins", 1916): of any run of them,
-    the share that falls into an interval is its length, to within one or two.
+    the fraction inside an interval is its length, to within one or two.
     """
     turned = key + np.asarray(index).astype(np.uint64) * _GOLDEN
     return (turned >> np.uint64(11)).astype(np.float64) * _TO_UNIT
@@ -173,6 +173,6 @@ def systematic(
     low, high = np.where(high > low, [low, high], [[0.0], [edges[-1]]])
     of = np.repeat(np.arange(len(numbers)), numbers)
     place = {number: np.argsort(np.argsort(np.arange(number) * _STEP % 1.0)) for number in set(numbers.tolist())}
-    share = (np.concatenate([place[number] for number in numbers.tolist()]) + 0.5) / numbers[of]
-    at = low[of] + (high - low)[of] * share
+    fraction = (np.concatenate([place[number] for number in numbers.tolist()]) + 0.5) / numbers[of]
+    at = low[of] + (high - low)[of] * fraction
     return order[np.minimum(np.searchsorted(edges[1:], at, side="right"), len(order) - 1)]

@@ -107,7 +107,7 @@ def _frames(knots: NDArray[np.float64], segments: NDArray[np.int64]) -> NDArray[
 
 
 LATERAL, FORK, SPUR = range(3)
-"""Sorts of children, the axis of ``next``, ``count``, ``start`` and ``share``."""
+"""Sorts of children, the axis of ``next``, ``count``, ``start`` and ``fraction``."""
 
 SPUR_ORDER = 100
 _RANGES = (
@@ -133,9 +133,9 @@ ROW_DTYPE = np.dtype(
     + [(name, np.int64) for name in _INTEGERS]
     + [(name, np.int64) for name in ("crown", "leaf_kind", "species", "order", "rings")]
     + [("next", np.int32, (3,)), ("count", np.float64, (3, 2)), ("start", np.float64, (3, 2))]
-    + [("share", np.float64, (3, 2)), ("part", np.float64, (2,))]
-    + [("nominal", np.float64), ("pipe_share", np.float64), ("fork_power", np.float64)]
-    + [("continues", np.bool_), ("outward", np.bool_), ("worldly", np.bool_), ("gradient", np.bool_)]
+    + [("fraction", np.float64, (3, 2)), ("part", np.float64, (2,))]
+    + [("nominal", np.float64), ("pipe_radius", np.float64), ("fork_power", np.float64)]
+    + [("continues", np.bool_), ("outward", np.bool_), ("tropic", np.bool_), ("gradient", np.bool_)]
     + [("exact", np.bool_), ("phantom", np.bool_), ("drawn", np.bool_), ("drawn_rows", np.int32, (2,))]
     + [("knots", np.float64, (MAX_SEGMENTS + 1, 3)), ("radii", np.float64, (MAX_SEGMENTS + 1,))]
     + [("frames", np.float64, (MAX_SEGMENTS, 3, 3)), ("size", np.float64, (4,))]
@@ -144,11 +144,11 @@ ROW_DTYPE = np.dtype(
 
 Ranges are (mean, variation), colours ((r, g, b), variation of each). Beyond the keys of an order: ``rings`` are those
 that a flared base gets besides its joints; ``next`` the rows of children, -1 for none, ``count`` how many, ``start``
-the part that stays bare, ``share`` which part of all children of the order's branch these are; ``part`` the ends of
-this row on the order's branch and ``nominal`` the length of that in lengths of this; ``pipe_share`` the radius of a
-lateral by the pipe model in radii of this; ``continues`` marks stems beyond a fork; ``outward`` branches whose own axis
-leads from the inside of the crown to the outside; ``worldly`` sub-plants whose shape depends on how they stand to the
-sky; ``gradient`` leaves that differ between inside and outside; ``exact`` plants that are all the same.
+the part that stays bare, ``fraction`` where these begin and end among all children of the order's branch; ``part`` the
+ends of this row on the order's branch and ``nominal`` the length of that in lengths of this; ``pipe_radius`` the radius
+of a lateral by the pipe model in radii of this; ``continues`` marks stems beyond a fork; ``outward`` branches whose own
+axis leads from the inside of the crown to the outside; ``tropic`` sub-plants whose shape depends on how they stand to
+the sky; ``gradient`` leaves that differ between inside and outside; ``exact`` plants that are all the same.
 
 A plant whose form is drawn by hand begins with a ``phantom`` row: a branch without wood, whose children are the
 ``drawn`` rows from the first to before the last of ``drawn_rows``. Each of these is one branch with ``knots`` (metres,
@@ -173,7 +173,7 @@ def build_rows(species: Sequence[Species]) -> NDArray[np.void]:
         row = rows[i]
         here = row["attraction"].any() or row["spray"] > 0 or row["leaf_spray"] > 0
         children = np.concatenate([row["next"][row["next"] >= 0], np.arange(*row["drawn_rows"])])
-        row["worldly"] = here or rows["worldly"][children].any()
+        row["tropic"] = here or rows["tropic"][children].any()
     return rows
 
 
@@ -204,7 +204,7 @@ def _rows_of_species(one: Species, number: int, first: int) -> list[np.void]:
                 row["next"][SPUR] = spur
             out.append(_part(row, order, low, high, cuts[o][p - 1] if p else 0.0))
             if row["next"][LATERAL] >= 0 and row["pipe"] > 0:
-                row["pipe_share"] = _pipe_share(row, one.orders[o + 1].thickness.high)
+                row["pipe_radius"] = _pipe_radius(row, one.orders[o + 1].thickness.high)
     if any(order.spurs.high > 0 for order in one.orders) and one.spur is not None:
         row = _row(one.spur, number, SPUR_ORDER)
         row["next"] = -1
@@ -259,7 +259,7 @@ def _row(order: Order, species: int, number: int) -> np.void:
     row["species"], row["order"], row["outward"] = species, number, number <= 1
     row["count"] = order.branches, (0, 0), order.spurs
     row["start"] = order.branch_start, (0, 0), order.spur_start
-    row["share"], row["part"], row["nominal"] = (0, 1), (0, 1), 1
+    row["fraction"], row["part"], row["nominal"] = (0, 1), (0, 1), 1
     if order.pipe > 0:
         row["pipe"] = max(order.pipe, 1.0)
     row["fork_power"] = row["pipe"] or _FORK_POWER
@@ -284,12 +284,12 @@ def _part(row: np.void, order: Order, low: float, high: float, before: float) ->
     row["curvature"][1] *= length
     row["attraction"] *= length
     for sort, start in ((LATERAL, order.branch_start), (SPUR, order.spur_start)):
-        share = np.clip((np.array([low, high]) - start.mean) / (1 - start.mean), 0, 1)
-        row["share"][sort] = share
-        row["count"][sort] *= share[1] - share[0]
+        fraction = np.clip((np.array([low, high]) - start.mean) / (1 - start.mean), 0, 1)
+        row["fraction"][sort] = fraction
+        row["count"][sort] *= fraction[1] - fraction[0]
         row["start"][sort] = _local_start(start, low, high)
-    leaf_share = np.clip((np.array([low, high]) - order.leaf_start.mean) / (1 - order.leaf_start.mean), 0, 1)
-    row["leaves"] *= leaf_share[1] - leaf_share[0]
+    leaf_fraction = np.clip((np.array([low, high]) - order.leaf_start.mean) / (1 - order.leaf_start.mean), 0, 1)
+    row["leaves"] *= leaf_fraction[1] - leaf_fraction[0]
     row["leaf_start"] = _local_start(order.leaf_start, low, high)
     if low > 0:
         relative = order.length.variation / order.length.mean
@@ -318,10 +318,10 @@ def _radius(order: Order, u: float) -> float:
     """Radius at a fraction of the branch, in radii of its base (`axes.profile` without flare)."""
     if order.pipe <= 0:
         return 1 - (1 - order.taper.mean) * u
-    share = float(np.clip((u - order.branch_start.mean) / (1 - order.branch_start.mean), 0, 1))
+    fraction = float(np.clip((u - order.branch_start.mean) / (1 - order.branch_start.mean), 0, 1))
     power = max(order.pipe, 1.0)
     tip = order.taper.mean**power
-    return (tip + (1 - tip) * (1 - share)) ** (1 / power)
+    return (tip + (1 - tip) * (1 - fraction)) ** (1 / power)
 
 
 def _flare_rings(row: np.void) -> int:
@@ -333,9 +333,9 @@ def flare_rings(number: int) -> NDArray[np.float64]:
     return np.array(_FLARE_RINGS[:number])
 
 
-def _pipe_share(row: np.void, thickest: float) -> float:
+def _pipe_radius(row: np.void, thickest: float) -> float:
     """Radius of a lateral of vigour 1 such that all together have what the taper takes away, in r^p."""
-    low, high = row["share"][LATERAL]
+    low, high = row["fraction"][LATERAL]
     at = low + (high - low) * (np.arange(256) + 0.5) / 256
     vigour = crown_ratio(np.full(at.shape, row["crown"]), 1 - at)
     lost = 1 - row["taper"][0] ** row["pipe"]

@@ -6,7 +6,7 @@ A branch turns by equal parts at its base and at each joint, towards where the w
 long as it is, and carries what grows on it along. It leans by a mean, more so in gusts, which travel over the land with
 the wind, and sways about that at its natural frequency. Each order adds its own movement, slow at the trunk and quick
 at the twigs, as in "Physically Guided Animation of Trees" (Habel, Kusternig and Wimmer, 2009); that branches which
-move by themselves are what keeps real trees from swaying like poles is said in "Mechanical stability of trees under
+move by themselves keep real trees from swaying like poles is shown in "Mechanical stability of trees under
 dynamic loads" (James, Haritos and Ades, 2006).
 
 Rows of a flora in the wind have the columns of `WIND_COLUMNS` besides; others have not, and nothing here costs them
@@ -42,9 +42,9 @@ _SPEED_OF_BENDING, _LOADED, _RATES = 834.0, 0.4, (0.1, 2.5)
 _SWAY = np.array([0.5, 0.5, 0.25])
 _SWAY_RATES = np.array([1.0, 1.13, 1.29])  # over the natural frequency, or all would move on ellipses
 _SWAY_DRAWS = (Draw.SWAY_ALONG, Draw.SWAY_ACROSS, Draw.SWAY_UP)
-#: Frequencies of gusts in hertz, shares of their strength, and cycles a metre across the wind.
+#: Frequencies of gusts in hertz, weights, and cycles a metre across the wind.
 _GUST_RATES = np.array([0.06, 0.17, 0.43])
-_GUST_SHARES = np.array([0.5, 0.3, 0.2])
+_GUST_WEIGHTS = np.array([0.5, 0.3, 0.2])
 _GUST_ACROSS = np.array([0.004, -0.013, 0.031])
 #: Sine of the angle by which leaves flutter at `_STRONG`, and the rate in hertz of a leaf of so many metres.
 _FLUTTER, _FLUTTER_MOST, _FLUTTER_RATE, _FLUTTER_SIZE = 0.22, 0.45, 3.0, 0.06
@@ -58,7 +58,7 @@ AIR_DTYPE = np.dtype(
     [(name, np.float64) for name in ("time", "loop", "moment", "speed", "gusts")] + [("axes", np.float64, (3, 3))]
 )
 """The wind: seconds, period after which all repeats (0: never), seconds between the two looks that tell how fast
-things move (0: nobody asks), metres a second, share by which gusts are stronger or
+things move (0: not needed), metres a second, fraction by which gusts are stronger or
 weaker, and as rows where it blows to, across that, and up."""
 
 WIND_COLUMNS = [("lean", np.float64), ("pace", np.float64), ("flutter", np.float64), ("flutter_rate", np.float64)] + [
@@ -211,8 +211,8 @@ def sway(rows: NDArray[np.void], branches: Branches, ahead: float = 0.0) -> NDAr
     if drawn.any():
         key, place = np.where(drawn, np.uint64(0), key), np.where(drawn, branches.position @ _APART, 0.0)
     force = np.zeros((3, len(row)))
-    for axis, (share, quicker, draw) in enumerate(zip(_SWAY, _SWAY_RATES, _SWAY_DRAWS, strict=True)):
-        force[axis] = share * np.sin(2 * np.pi * _cycles(air, rate * quicker, ahead, uniform(key, draw) + place))
+    for axis, (amplitude, quicker, draw) in enumerate(zip(_SWAY, _SWAY_RATES, _SWAY_DRAWS, strict=True)):
+        force[axis] = amplitude * np.sin(2 * np.pi * _cycles(air, rate * quicker, ahead, uniform(key, draw) + place))
     force[0] += 1.0
     force *= rows["lean"][row] * gusts(rows, branches.position, ahead)
     # Towards the force by an angle that is largest where it comes from the side.
@@ -220,14 +220,14 @@ def sway(rows: NDArray[np.void], branches: Branches, ahead: float = 0.0) -> NDAr
 
 
 def gusts(rows: NDArray[np.void], position: NDArray[np.float64], ahead: float = 0.0) -> NDArray[np.float64]:
-    """Strength (n,) of the wind at places (n, 3) over its mean: within 1 ∓ the share of gusts."""
+    """Strength (n,) of the wind at places (n, 3) over its mean: within 1 ∓ Gusts."""
     air = rows["air"][0]
     along, across = position @ air["axes"][0], position @ air["axes"][1]
     out = np.ones(len(position))
-    for rate, share, sideways in zip(_GUST_RATES, _GUST_SHARES, _GUST_ACROSS, strict=True):
+    for rate, weight, sideways in zip(_GUST_RATES, _GUST_WEIGHTS, _GUST_ACROSS, strict=True):
         whole = _whole(air, rate)
         phase = sideways * across - whole / air["speed"] * along
-        out += air["gusts"] * share * np.sin(2 * np.pi * _cycles(air, whole, ahead, phase))
+        out += air["gusts"] * weight * np.sin(2 * np.pi * _cycles(air, whole, ahead, phase))
     return out
 
 
@@ -298,9 +298,8 @@ def leant(points: NDArray[np.float64], up: NDArray[np.float64], turn: NDArray[np
         for v, w in ((np.sin(angle) / steep, above), ((1 - np.cos(angle)) / steep, above * angle / 2))
     )
     level = points - above[:, :, None] * up[:, None]
-    cos, sin = np.cos(angle)[..., None], np.sin(angle)[..., None]
-    k = axis[:, None]
-    level = cos * level + sin * np.cross(k, level) + (1 - cos) * (level * k).sum(-1, keepdims=True) * k
+    around = np.repeat(axis, level.shape[1], axis=0)
+    level = turned_vectors(level.reshape(-1, 3), around, angle.ravel()).reshape(level.shape)
     return along[..., None] * up[:, None] + beside[..., None] * aside[:, None] + level
 
 

@@ -30,7 +30,7 @@ from ..growth.foliage import (
     place_leaves,
     settled,
 )
-from ..growth.growth import Stems, leaf_counts
+from ..growth.growth import WholeBranches, leaf_counts
 from ..growth.hashing import Draw, uniform
 from ..growth.wind import moment
 from ..species.leaf_models import LeafModel
@@ -48,7 +48,7 @@ class LeafCopies:
     number : int
         Of copies in the end.
     transmission : float
-        Share of the light scattered through the leaf, the same for all.
+        Fraction of the light scattered through the leaf, the same for all.
     moving : bool
         Whether they have velocities.
     """
@@ -174,8 +174,8 @@ def leaf_meshes(
     flora: Flora,
     pieces: Pieces,
     species: int,
-    stems: Sequence[Stems] = (),
-    share_of: Callable[[Branches], NDArray[np.float64]] | None = None,
+    whole: Sequence[WholeBranches] = (),
+    fraction_of: Callable[[Branches], NDArray[np.float64]] | None = None,
 ) -> Iterator[LeafMesh]:
     """Copies of the leaf models for the leaves on branches of one species, form by form.
 
@@ -186,15 +186,15 @@ def leaf_meshes(
         Parts of branches; a leaf belongs to the piece that holds its base, at the branch's tip to the last one.
     species : int
         Index into the flora's species.
-    stems : sequence of Stems
+    whole : sequence of WholeBranches
         Whole branches.
-    share_of : callable, optional
-        Share (n,) of the leaves of branches that are wanted; numbers of the leaves' own say which.
+    fraction_of : callable, optional
+        Fraction (n,) of the leaves of branches that are wanted; the leaves' own random numbers decide which.
     """
-    groups = [*_of_pieces(flora, pieces), *(group for some in stems for group in _of_stems(flora, some))]
-    if share_of is not None:
+    groups = [*_of_pieces(flora, pieces), *(group for some in whole for group in _of_whole(flora, some))]
+    if fraction_of is not None:
         for group in groups:
-            group.share = share_of(group.stems.branches)
+            group.fraction = fraction_of(group.whole.branches)
     for kind in sorted({group.kind for group in groups}):
         own = [group for group in groups if group.kind == kind]
         forms = flora.forms[species][kind]
@@ -218,14 +218,14 @@ def _of_pieces(flora: Flora, pieces: Pieces) -> Iterator[_Bearers]:
     low, high = leaf_range(flora.rows, branches, counts, pieces.t0[first], pieces.t1[last])
     for row, own in _by_row(branches.row):
         lines = axes(flora.rows, branches.take(own))
-        yield _Bearers(flora, row, Stems(branches.take(own), lines), counts[own], low[own], (high - low)[own])
+        yield _Bearers(flora, row, WholeBranches(branches.take(own), lines), counts[own], low[own], (high - low)[own])
 
 
-def _of_stems(flora: Flora, stems: Stems) -> Iterator[_Bearers]:
-    order = np.argsort(stems.branches.row, kind="stable")
-    order = order[_bears(flora, stems.branches.row[order])]
-    for row, own in _by_row(stems.branches.row[order]):
-        some = stems.take(order[own])
+def _of_whole(flora: Flora, whole: WholeBranches) -> Iterator[_Bearers]:
+    order = np.argsort(whole.branches.row, kind="stable")
+    order = order[_bears(flora, whole.branches.row[order])]
+    for row, own in _by_row(whole.branches.row[order]):
+        some = whole.take(order[own])
         counts = leaf_counts(flora.rows, some.branches)
         yield _Bearers(flora, row, some, counts, np.zeros_like(counts), counts)
 
@@ -249,22 +249,22 @@ class _Bearers:
     ----------
     flora : Flora
     row : int
-    stems : Stems of n
+    whole : WholeBranches of n
     counts, low, number : (n,) int64
         Leaves of each whole branch, the first one wanted and how many.
     """
 
     def __init__(
-        self, flora: Flora, row: int, stems: Stems, counts: NDArray, low: NDArray, number: NDArray[np.int64]
+        self, flora: Flora, row: int, whole: WholeBranches, counts: NDArray, low: NDArray, number: NDArray[np.int64]
     ) -> None:
-        self.flora, self.stems, self.counts, self.low, self.number = flora, stems, counts, low, number
-        self.share: NDArray[np.float64] | None = None
+        self.flora, self.whole, self.counts, self.low, self.number = flora, whole, counts, low, number
+        self.fraction: NDArray[np.float64] | None = None
         self.row = np.array([row])
         self.kind = int(flora.rows["leaf_kind"][row])
 
     def numbers(self, forms: int) -> NDArray[np.int64]:
         """How many leaves there are of each form."""
-        if forms == 1 and self.share is None:
+        if forms == 1 and self.fraction is None:
             return np.array([self.number.sum()])
         out = np.zeros(forms, np.int64)
         for part in self._chunks(1):
@@ -276,7 +276,7 @@ class _Bearers:
         """Place all leaves of one of the forms."""
         rows = self.flora.rows
         for part in self._chunks(len(copies.model.positions)):
-            bearers = self.stems.take(part)
+            bearers = self.whole.take(part)
             owner, index, key = self._leaves(part)
             if forms > 1:
                 chosen = np.flatnonzero(leaf_forms(forms, key) == form)
@@ -307,8 +307,8 @@ class _Bearers:
         """Branch within the run, number on it, and key of each wanted leaf."""
         owner, index = spread(self.number[part])
         index += np.take(self.low[part], owner)
-        key = leaf_keys(self.stems.branches.take(part), owner, index)
-        if self.share is None or (self.share[part] >= 1.0).all():
+        key = leaf_keys(self.whole.branches.take(part), owner, index)
+        if self.fraction is None or (self.fraction[part] >= 1.0).all():
             return owner, index, key
-        kept = np.flatnonzero(uniform(key, Draw.TRANSITION) < np.take(self.share[part], owner))
+        kept = np.flatnonzero(uniform(key, Draw.TRANSITION) < np.take(self.fraction[part], owner))
         return owner[kept], index[kept], key[kept]

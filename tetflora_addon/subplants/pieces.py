@@ -19,7 +19,7 @@ from ..compiled.flora import Flora
 from ..growth.axes import axes, profile_integral
 from ..growth.branches import Branches
 from ..growth.foliage import leaf_start, outwardness
-from ..growth.growth import Stems, children, drawn_children
+from ..growth.growth import WholeBranches, children, drawn_children
 
 
 @dataclass(frozen=True)
@@ -69,13 +69,13 @@ def along_branches(pieces: Pieces) -> Pieces:
     return pieces.take(np.concatenate([np.flatnonzero(~of_part), rest]))
 
 
-def whole_pieces(rows: NDArray[np.void], stems: Stems) -> tuple[Pieces, NDArray[np.int64]]:
+def whole_pieces(rows: NDArray[np.void], whole: WholeBranches) -> tuple[Pieces, NDArray[np.int64]]:
     """All segments of branches as pieces, and the index of the branch of each."""
-    owner, t, position = stems.knots(rows)
+    owner, t, position = whole.knots(rows)
     low = np.flatnonzero(owner[1:] == owner[:-1])
     ends = gathered(position, low), gathered(position, low + 1)
     owner = np.take(owner, low)
-    return Pieces(stems.branches.take(owner), t[low], t[low + 1], *ends), owner
+    return Pieces(whole.branches.take(owner), t[low], t[low + 1], *ends), owner
 
 
 def clipped(
@@ -94,9 +94,9 @@ def clipped(
     tuple of Pieces
         The halves at the start and at the end, n each.
     """
-    share = distance_start / (distance_start - distance_end)
-    t = pieces.t0 + share * (pieces.t1 - pieces.t0)
-    middle = pieces.start + share[:, None] * (pieces.end - pieces.start)
+    fraction = distance_start / (distance_start - distance_end)
+    t = pieces.t0 + fraction * (pieces.t1 - pieces.t0)
+    middle = pieces.start + fraction[:, None] * (pieces.end - pieces.start)
     return (
         Pieces(pieces.branches, pieces.t0, t, pieces.start, middle),
         Pieces(pieces.branches, t, pieces.t1, middle, pieces.end),
@@ -104,7 +104,7 @@ def clipped(
 
 
 def leaf_fraction(flora: Flora, pieces: Pieces) -> NDArray[np.float64]:
-    """Expected share (n,) of a branch's own leaves that sit on each piece."""
+    """Expected fraction (n,) of a branch's own leaves that sit on each piece."""
     start = leaf_start(flora.rows, pieces.branches)
     return np.clip(np.maximum(pieces.t1, start) - np.maximum(pieces.t0, start), 0, None) / (1 - start)
 
@@ -143,12 +143,12 @@ def open_subplants(flora: Flora, subplants: Branches) -> tuple[Branches, NDArray
     Branches, (m,) int64, Pieces, (k,) int64
         Children with the index of the sub-plant that each comes from, and pieces with theirs.
     """
-    stems, body, grown, owner = _opened(flora, subplants)
-    pieces, piece_owner = whole_pieces(flora.rows, stems)
+    whole, body, grown, owner = _opened(flora, subplants)
+    pieces, piece_owner = whole_pieces(flora.rows, whole)
     return grown, body[owner], pieces, body[piece_owner]
 
 
-def expand(flora: Flora, subplants: Branches) -> Iterator[Stems]:
+def expand(flora: Flora, subplants: Branches) -> Iterator[WholeBranches]:
     """All branches of sub-plants, to the last twig, order by order.
 
     Notes
@@ -156,11 +156,11 @@ def expand(flora: Flora, subplants: Branches) -> Iterator[Stems]:
     Memory grows with the number of branches; split the sub-plants with `chunks` where there are many.
     """
     while len(subplants):
-        stems, _, subplants, _ = _opened(flora, subplants)
-        yield stems
+        whole, _, subplants, _ = _opened(flora, subplants)
+        yield whole
 
 
-def _opened(flora: Flora, subplants: Branches) -> tuple[Stems, NDArray[np.int64], Branches, NDArray[np.int64]]:
+def _opened(flora: Flora, subplants: Branches) -> tuple[WholeBranches, NDArray[np.int64], Branches, NDArray[np.int64]]:
     """Branches of sub-plants with the index of the sub-plant of each, and their children with that of their parent."""
     rows = flora.rows
     phantom = rows["phantom"][subplants.row]
@@ -171,7 +171,7 @@ def _opened(flora: Flora, subplants: Branches) -> tuple[Stems, NDArray[np.int64]
     else:
         bodies, body = subplants, np.arange(len(subplants))
     lines = axes(rows, bodies)
-    return Stems(bodies, lines), body, *children(rows, bodies, lines)
+    return WholeBranches(bodies, lines), body, *children(rows, bodies, lines)
 
 
 def chunks(polygons: NDArray[np.float64], limit: float) -> Iterator[slice]:

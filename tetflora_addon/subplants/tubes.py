@@ -16,7 +16,7 @@ from ..compiled.flora import Flora
 from ..growth.axes import Axes, axes
 from ..growth.branches import Branches
 from ..growth.foliage import branch_colours
-from ..growth.growth import Stems, radius_at
+from ..growth.growth import WholeBranches, radius_at
 from ..growth.wind import moment
 from .pieces import Pieces, along_branches, chunks
 
@@ -25,7 +25,7 @@ _AT_JOINT = 1e-6  # fractions of a segment closer to a joint than this are at it
 _RINGS_AT_ONCE = 48_000
 
 
-def tube_buffers(flora: Flora, pieces: Pieces, stems: Sequence[Stems] = ()) -> MeshBuffers | None:
+def tube_buffers(flora: Flora, pieces: Pieces, whole: Sequence[WholeBranches] = ()) -> MeshBuffers | None:
     """Tubes of branches; pieces that touch share a ring.
 
     Parameters
@@ -33,7 +33,7 @@ def tube_buffers(flora: Flora, pieces: Pieces, stems: Sequence[Stems] = ()) -> M
     flora : Flora
     pieces : Pieces of n
         Parts of branches of any rows; no two may overlap. Those without length are passed over.
-    stems : sequence of Stems
+    whole : sequence of WholeBranches
         Whole branches.
 
     Returns
@@ -44,10 +44,10 @@ def tube_buffers(flora: Flora, pieces: Pieces, stems: Sequence[Stems] = ()) -> M
     pieces = along_branches(pieces.take(pieces.t1 > pieces.t0))
     first, last = pieces.runs()
     rows = flora.rows
-    cut_sides, whole_sides = rows["sides"][pieces.branches.row[first]], [rows["sides"][s.branches.row] for s in stems]
+    cut_sides, whole_sides = rows["sides"][pieces.branches.row[first]], [rows["sides"][s.branches.row] for s in whole]
     # One ring at the start of each piece, and one more at the end of each run of pieces.
     cut_rings = last - first + 2
-    whole_rings = [s.lines.segments + rows["rings"][s.branches.row] + 1 for s in stems]
+    whole_rings = [s.lines.segments + rows["rings"][s.branches.row] + 1 for s in whole]
     sides, rings = (np.concatenate(a) for a in ([cut_sides, *whole_sides], [cut_rings, *whole_rings]))
     if len(sides) == 0:
         return None
@@ -56,10 +56,10 @@ def tube_buffers(flora: Flora, pieces: Pieces, stems: Sequence[Stems] = ()) -> M
         own = np.flatnonzero(cut_sides == k)
         for some in _chunks(cut_rings[own]):
             tubes.add(flora, _rings_of_pieces(flora, pieces, first[own[some]], last[own[some]]), int(k))
-        for group, group_sides, group_rings in zip(stems, whole_sides, whole_rings, strict=True):
+        for group, group_sides, group_rings in zip(whole, whole_sides, whole_rings, strict=True):
             own = np.flatnonzero(group_sides == k)
             for some in _chunks(group_rings[own]):
-                tubes.add(flora, _rings_of_stems(flora, group.take(own[some])), int(k))
+                tubes.add(flora, _rings_of_whole(flora, group.take(own[some])), int(k))
     return tubes.buffers()
 
 
@@ -94,14 +94,14 @@ class _Rings:
     later: NDArray[np.float64] | None = None
 
 
-def _rings_of_stems(flora: Flora, stems: Stems) -> _Rings:
-    owner, t, centre = stems.knots(flora.rows)
+def _rings_of_whole(flora: Flora, whole: WholeBranches) -> _Rings:
+    owner, t, centre = whole.knots(flora.rows)
     goes_on = np.zeros(len(owner), bool)
     goes_on[:-1] = owner[1:] == owner[:-1]
     later = None
-    if stems.lines.later is not None:
-        later = Stems(stems.branches, stems.lines.later).knots(flora.rows)[2]
-    return _Rings(stems.branches, stems.lines, owner, t, centre, goes_on, later)
+    if whole.lines.later is not None:
+        later = WholeBranches(whole.branches, whole.lines.later).knots(flora.rows)[2]
+    return _Rings(whole.branches, whole.lines, owner, t, centre, goes_on, later)
 
 
 def _rings_of_pieces(flora: Flora, pieces: Pieces, first: NDArray[np.int64], last: NDArray[np.int64]) -> _Rings:

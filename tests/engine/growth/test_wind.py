@@ -22,7 +22,7 @@ from tetflora_addon.emission.facets import spheres
 from tetflora_addon.errors import TetFloraError
 from tetflora_addon.growth.axes import axes
 from tetflora_addon.growth.foliage import leaf_keys, leaf_places, place_leaves, settled
-from tetflora_addon.growth.growth import Stems, leaf_counts
+from tetflora_addon.growth.growth import WholeBranches, leaf_counts
 from tetflora_addon.growth.rows import ROW_DTYPE
 from tetflora_addon.growth.wind import Wind, gusts, leant, sway, widest_sway
 from tetflora_addon.proxies.facet_weights import facet_weights
@@ -49,7 +49,7 @@ def vertices(flora: Flora, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
     return tuple(np.concatenate([m.positions for m in some]).astype(np.float64) for some in (tubes, leaves))
 
 
-def stems_of(flora: Flora, seed: int = 1) -> list[Stems]:
+def whole_branches_of(flora: Flora, seed: int = 1) -> list[WholeBranches]:
     return list(expand(flora, support.trunks(flora.rows, support.plants(seed))))
 
 
@@ -102,7 +102,7 @@ def test_a_plant_drawn_by_hand_holds_together_within_its_bound(wind: Wind, seed:
 def test_branches_keep_their_lengths_and_leaves_their_areas(data: dict) -> None:
     flora = support.compiled(data)
     windy = flora.in_wind(Wind(15.0, 0.3, 0.5, 12.0))
-    for still, moved in zip(stems_of(flora), stems_of(windy), strict=True):
+    for still, moved in zip(whole_branches_of(flora), whole_branches_of(windy), strict=True):
         one, other = (np.linalg.norm(np.diff(s.lines.knots, axis=1), axis=2) for s in (still, moved))
         np.testing.assert_allclose(one, other, atol=1e-12)
     areas = [
@@ -117,7 +117,7 @@ def test_branches_keep_their_lengths_and_leaves_their_areas(data: dict) -> None:
 def test_what_grows_on_a_branch_stays_on_it(data: dict) -> None:
     """Where children begin lies on the axis of some branch of the level before."""
     flora = support.compiled(data).in_wind(Wind(20.0, 2.0, 1.0, 5.0))
-    levels = stems_of(flora)
+    levels = whole_branches_of(flora)
     for parents, grown in pairwise(levels):
         some = grown.branches.position[:: max(1, len(grown) // 40)]
         start, step = parents.lines.knots[:, :-1].reshape(-1, 3), np.diff(parents.lines.knots, axis=1).reshape(-1, 3)
@@ -157,9 +157,9 @@ def test_nothing_jumps(species: str) -> None:
     """Leaves that turn to the light and boughs that lie level turn with their branch, not over in an instant."""
     number = support.SPECIES.index(species)
     flora = support.flora().in_wind(Wind(8.0, 0.3, 0.5, 4.3, 0.0, moving=True))
-    stems = list(expand(flora, support.trunks(flora.rows, support.plants(3, number))))
+    whole = list(expand(flora, support.trunks(flora.rows, support.plants(3, number))))
     none = Pieces.empty()
-    found = [tube_buffers(flora, none, stems), *(leaf.buffers for leaf in leaf_meshes(flora, none, number, stems))]
+    found = [tube_buffers(flora, none, whole), *(leaf.buffers for leaf in leaf_meshes(flora, none, number, whole))]
     for mesh in found:
         assert np.linalg.norm(mesh.attributes["velocity"][1], axis=1).max() < 10.0
 
@@ -171,7 +171,7 @@ def test_wind_turns_and_changes_nothing_else(data: dict) -> None:
     """Branches and leaves stand to where up has gone with them as they stand to the sky at rest."""
     flora = support.compiled(data)
     windy = flora.in_wind(Wind(20.0, 2.0, 1.0, 5.0))
-    for still, moved in zip(stems_of(flora), stems_of(windy), strict=True):
+    for still, moved in zip(whole_branches_of(flora), whole_branches_of(windy), strict=True):
         stands = np.einsum("nij,ni->nj", moved.branches.frame, moved.branches.sky)
         np.testing.assert_allclose(stands, still.branches.frame[:, 2], atol=1e-9)
         along = np.einsum("nsij,nsi->nsj", moved.lines.frames, moved.lines.skies)
@@ -266,8 +266,8 @@ def meshes_at(flora: Flora, time: float, moving: bool = False, whole: bool = Tru
     trunk = support.trunks(one.rows, support.plants(3, position=(12, -5, 1)))
     if not whole:
         return [m for some in support.meshes(one, support.expanded(one, trunk)) for m in some]
-    stems, none = list(expand(one, trunk)), Pieces.empty()
-    return [tube_buffers(one, none, stems), *(leaf.buffers for leaf in leaf_meshes(one, none, 0, stems))]
+    whole, none = list(expand(one, trunk)), Pieces.empty()
+    return [tube_buffers(one, none, whole), *(leaf.buffers for leaf in leaf_meshes(one, none, 0, whole))]
 
 
 @pytest.mark.parametrize("whole", [True, False], ids=("branches", "pieces"))

@@ -254,10 +254,10 @@ def test_whole_branches_are_the_same_as_all_their_pieces() -> None:
     flora = support.flora()
     for species in range(len(support.SPECIES)):
         whole, pieces = support.grown(flora, support.plants([1, 2], species))
-        stems = list(expand(flora, whole))
+        branches = list(expand(flora, whole))
         meshes = [
             [tube_buffers(flora, *some), *(leaf.buffers for leaf in leaf_meshes(flora, some[0], species, some[1]))]
-            for some in ((pieces, ()), (Pieces.empty(), stems))
+            for some in ((pieces, ()), (Pieces.empty(), branches))
         ]
         for cut, made in zip(*meshes, strict=True):
             assert cut.polygons == made.polygons
