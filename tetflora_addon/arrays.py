@@ -38,7 +38,10 @@ class Arrays:
         return sum(c.nbytes for c in columns if isinstance(c, np.ndarray | Arrays))
 
     def take(self, index: NDArray | slice) -> Self:
-        """Selection by indices, mask or slice; by a mask that leaves nothing out, the same object."""
+        """Rows by indices (k,), mask (n,) or slice.
+
+        A mask that is all true returns the object itself: never write into what this returns.
+        """
         if not isinstance(index, slice) and index.dtype == bool:
             if index.all():
                 return self
@@ -77,7 +80,7 @@ def nested(kind: type[Arrays]) -> dict[str, Callable]:
 
 
 def gathered(array: NDArray, index: NDArray | slice) -> NDArray:
-    """``array[index]`` along the first axis, component by component; ``index`` may be integers, a mask or a slice."""
+    """``array[index]`` of an array (n, ...), by component; ``index`` is integers (k,), a mask (n,) or a slice."""
     if isinstance(index, slice):
         return array[index]
     if index.dtype == bool:

@@ -90,7 +90,7 @@ def trouble() -> str:
 def remembered(
     kind: str, content: str, shape: tuple[int, ...], find_out: Callable[[], NDArray[np.float64]]
 ) -> NDArray[np.float64]:
-    """What was found out before, or is found out now and kept.
+    """A result from the cache folder, or computed now and stored there.
 
     Parameters
     ----------

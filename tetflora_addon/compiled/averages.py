@@ -85,7 +85,7 @@ def quadratic(outward: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def tube_perimeter(sides: NDArray[np.integer]) -> NDArray[np.float64]:
-    """Perimeter of a branch's cross-section, a regular polygon, divided by its radius."""
+    """Perimeter (n,) of branches' cross-sections, regular polygons of ``sides`` (n,), divided by their radius."""
     return 2 * sides * np.sin(np.pi / sides)
 
 

@@ -137,7 +137,7 @@ WIDEST = 1.5
 
 
 def opened(rows: NDArray[np.void], subplants: Branches) -> tuple[Branches, Axes, Branches]:
-    """Branches of sub-plants, their axes, and the sub-plants on them."""
+    """Branches (m,) of sub-plants (n,), their axes, and the sub-plants on them; forms drawn by hand have several."""
     phantom = rows["phantom"][subplants.row]
     if phantom.any():
         drawn, _ = drawn_children(rows, subplants.take(np.flatnonzero(phantom)))
@@ -218,7 +218,7 @@ class WoodOutlines:
         return self.radii.sum(axis=1) * np.linalg.norm(across, axis=1)
 
     def outlines(self, near: NDArray[np.intp], u: NDArray, v: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-        """As of leaves; one quad each."""
+        """Corners (4 n, 2), first corners and numbers (n,), as `LeafOutlines.outlines`; one quad each."""
         flat = self.ends[near] @ np.stack([u, v], axis=1)
         along = flat[:, 1] - flat[:, 0]
         aside = np.stack([-along[:, 1], along[:, 0]], axis=1)

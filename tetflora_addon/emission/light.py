@@ -140,7 +140,7 @@ class SheetList:
     def add_faces(
         self, positions: NDArray[np.floating], corner_verts: NDArray[np.integer], offsets: NDArray[np.integer]
     ) -> None:
-        """Faces of a mesh, in the layout of `buffers.MeshBuffers`."""
+        """Add faces of a mesh: positions (v, 3) in metres, ``corner_verts`` (c,), first corners (f + 1,)."""
         self._parts.append(positions[corner_verts[_four_corners(offsets)]].astype(np.float32))
 
     def corners(self) -> NDArray[np.float32]:

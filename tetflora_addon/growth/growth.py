@@ -80,7 +80,7 @@ def trunks(rows: NDArray[np.void], seeds: Seeds) -> Branches:
 
 
 def drawn_children(rows: NDArray[np.void], plants: Branches) -> tuple[Branches, NDArray[np.int64]]:
-    """Branches that are drawn by hand, of plants whose form is, and the index of each one's plant."""
+    """Branches (m,) drawn by hand of plants (n,) that have such a form, and the plant (m,) of each."""
     first, last = rows["drawn_rows"][plants.row].T
     owner, index = spread((last - first).astype(np.int64))
     return chosen_drawn(rows, plants, owner, index), owner
@@ -119,7 +119,7 @@ def fullness(rows: NDArray[np.void], branches: Branches) -> NDArray[np.float64]:
 
 
 def branch_counts(rows: NDArray[np.void], branches: Branches, sort: int = LATERAL) -> NDArray[np.int64]:
-    """Number of children of one sort of each branch, in whole whorls; its expectation is exactly the range's mean."""
+    """Number (n,) of children of one sort, in whole whorls; its expectation is exactly the range's mean."""
     row, key = branches.row, branches.key
     wanted = varied(rows["count"][row, sort], key, _COUNT[sort])
     child = rows["next"][row, sort]
@@ -132,7 +132,7 @@ def branch_counts(rows: NDArray[np.void], branches: Branches, sort: int = LATERA
 
 
 def leaf_counts(rows: NDArray[np.void], branches: Branches) -> NDArray[np.int64]:
-    """Number of leaves on each branch's own axis, in whole whorls; its expectation is exactly the range's mean."""
+    """Number (n,) of leaves on branches' own axes, in whole whorls; its expectation is exactly the range's mean."""
     wanted = ranged(rows, "leaves", branches.row, branches.key, Draw.LEAVES) * fullness(rows, branches)
     whorl = rows["leaf_whorl"][branches.row]
     return np.floor(wanted / whorl + uniform(branches.key, Draw.LEAVES_ROUND)).astype(np.int64) * whorl
@@ -238,7 +238,7 @@ def sorts_of(rows: NDArray[np.void], parents: Branches) -> list[int]:
 def children(
     rows: NDArray[np.void], parents: Branches, lines: Axes | None = None
 ) -> tuple[Branches, NDArray[np.int64]]:
-    """All children of branches, and the index of each one's parent."""
+    """All children (m,) of branches (n,), and the parent (m,) of each; ``lines`` are the branches' axes if known."""
     lines = axes(rows, parents) if lines is None else lines
     grown, owners = [Branches.empty()], [np.zeros(0, np.int64)]
     for sort in sorts_of(rows, parents):

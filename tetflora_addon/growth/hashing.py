@@ -120,7 +120,7 @@ def stepped(key: NDArray[np.uint64], index: NDArray[np.integer]) -> NDArray[np.f
 
 
 def signed(key: NDArray[np.uint64], draw: int) -> NDArray[np.float64]:
-    """Numbers in [-1, 1), one for each key."""
+    """Numbers (n,) in [-1, 1), one for each key (n,)."""
     out = uniform(key, draw)
     out *= 2.0
     out -= 1.0

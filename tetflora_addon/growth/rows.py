@@ -329,7 +329,7 @@ def _flare_rings(row: np.void) -> int:
 
 
 def flare_rings(number: int) -> NDArray[np.float64]:
-    """Fractions of the length at which a flared base has rings of its own."""
+    """Fractions (number,) of the length at which a flared base has rings of its own."""
     return np.array(_FLARE_RINGS[:number])
 
 

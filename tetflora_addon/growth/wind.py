@@ -179,7 +179,7 @@ def is_windy(rows: NDArray[np.void]) -> bool:
 
 
 def moment(rows: NDArray[np.void]) -> float:
-    """Seconds until the second look at where things are, 0 where velocities are not asked for."""
+    """Seconds to the second moment for which positions are computed; 0 without velocities."""
     return float(rows["air"]["moment"][0]) if is_windy(rows) else 0.0
 
 

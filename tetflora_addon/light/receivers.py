@@ -169,7 +169,10 @@ class Sheets:
 
     @classmethod
     def of(cls, corners: NDArray[np.float64], cell: NDArray[np.integer], count: int) -> Sheets:
-        """Sheets in place of all tetrahedra that have some; those with a negative ``cell`` belong to the first."""
+        """Sheets with corners (m, 4, 3) in metres, by tetrahedron (m,) out of ``count``.
+
+        They replace the clouds of tetrahedra that have some. Those with a negative ``cell`` belong to the first.
+        """
         replaced = np.bincount(cell[cell >= 0], minlength=count) > 0
         return cls(corners, np.maximum(cell, 0).astype(np.int64), replaced)
 

@@ -72,7 +72,7 @@ class Terminals(Arrays):
     def seen(
         cls, tree: TetrahedralTree, nodes: NDArray[np.intp], totals: Totals, camera: Camera, buffer: AlphaBuffer
     ) -> Terminals:
-        """Draw tetrahedra into the alpha buffer and keep what it finds for each."""
+        """Draw tetrahedra ``nodes`` (n,) of the tree into the alpha buffer and keep what it finds for each."""
         vertices = tree.vertices(nodes)
         outline = buffer.add(nodes, vertices, mean_extinction(totals, volume(vertices)))
         span = np.sqrt(squared_edges(vertices).max(axis=1)) / camera.extent_around(vertices.mean(axis=1))
@@ -151,7 +151,10 @@ def contributions(cells: Terminals, transmittance: NDArray[np.float64]) -> NDArr
 def gains_nothing(
     splitting: NDArray[np.bool_], cells: Terminals, transmittance: NDArray[np.float64], camera: Camera
 ) -> bool:
-    """Whether dividing the last few cells would change almost no pixels, and they hold few polygons."""
+    """Whether dividing the last few cells, a mask (n,), would change almost no pixels, and they hold few polygons.
+
+    ``transmittance`` (n,) is the fraction of each that nothing in front blocks.
+    """
     if splitting.sum() > FEW * len(cells):
         return False
     gain = contributions(cells, transmittance)[splitting].sum() / (camera.width * camera.height)

@@ -265,7 +265,7 @@ class Polygons(Arrays):
         return cls(meshes, *numbers, weights, centre, reach)
 
     def take(self, index: NDArray | slice) -> Polygons:
-        """Selection by indices, mask or slice."""
+        """Rows by indices (k,), mask (n,) or slice; fragments go with the faces that refer to them."""
         part = self.part[index]
         cut = np.flatnonzero(part >= 0)
         rows = part[cut]

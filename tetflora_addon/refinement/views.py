@@ -90,7 +90,7 @@ class PanoramaBuffer:
         self._weight = np.zeros((len(self.faces), 0))
 
     def add(self, cells: NDArray[np.integer], vertices: NDArray[np.float64], extinction: ArrayLike) -> Outline:
-        """Draw tetrahedra; as `AlphaBuffer.add`."""
+        """Draw tetrahedra (n, 4, 3); parameters and result as for `AlphaBuffer.add`."""
         count, extinction = len(vertices), np.asarray(extinction, np.float64)
         pixels, opacity = np.zeros((2, count))
         if count:
@@ -106,12 +106,12 @@ class PanoramaBuffer:
         return Outline(pixels, opacity / np.where(pixels > 0.0, pixels, 1.0), whole)
 
     def remove(self, chosen: NDArray[np.bool_]) -> None:
-        """Take away tetrahedra; ``chosen`` is a mask by their numbers."""
+        """Remove tetrahedra; ``chosen`` is a mask (m,) by their numbers."""
         for face in self.faces:
             face.remove(chosen)
 
     def transmittance(self, rank: NDArray[np.integer]) -> NDArray[np.float64]:
-        """Fraction of each tetrahedron's light that nothing in front blocks; as `AlphaBuffer.transmittance`."""
+        """Fraction (m,) of each tetrahedron's light that nothing in front blocks, as `AlphaBuffer.transmittance`."""
         self._grow(len(rank))
         weight = self._weight[:, : len(rank)]
         seen = sum(w * face.transmittance(rank) for w, face in zip(weight, self.faces, strict=True))

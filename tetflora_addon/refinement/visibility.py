@@ -149,7 +149,7 @@ class AlphaBuffer:
         return Outline(pixels, opacity, whole)
 
     def remove(self, chosen: NDArray[np.bool_]) -> None:
-        """Take away tetrahedra; ``chosen`` is a mask by their numbers."""
+        """Remove tetrahedra; ``chosen`` is a mask (m,) by their numbers."""
         go = chosen[self._cell]
         if go.any():
             self._changed[self._pixel[go]] = True

@@ -44,7 +44,7 @@ class Chains:
         return cls(points, np.cumsum(counts), np.concatenate([np.zeros(0, bool), *(p.cyclic for p in parts)]))
 
     def without(self, splines: NDArray[np.int64]) -> Chains:
-        """All but some of the splines."""
+        """The chains without some splines, given by number (k,)."""
         counts = np.diff(self.first)
         stays = np.ones(len(counts), dtype=bool)
         stays[splines] = False
@@ -278,7 +278,7 @@ def summed_from_root(parent: NDArray[np.int64], values: NDArray) -> NDArray[np.i
 
 
 def levels(parent: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Points that have a parent, by their number of steps from the root, the farthest first."""
+    """Points that have a parent, grouped by steps from the root, farthest first; ``parent`` is (n,), -1 at roots."""
     depth = summed_from_root(parent, parent >= 0)
     order = np.argsort(depth, kind="stable")
     cuts = np.searchsorted(depth[order], np.arange(1, depth.max(initial=0) + 2))

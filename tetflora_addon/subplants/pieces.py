@@ -70,7 +70,7 @@ def along_branches(pieces: Pieces) -> Pieces:
 
 
 def whole_pieces(rows: NDArray[np.void], whole: WholeBranches) -> tuple[Pieces, NDArray[np.int64]]:
-    """All segments of branches as pieces, and the index of the branch of each."""
+    """All segments (m,) of whole branches as pieces, and the branch (m,) of each."""
     owner, t, position = whole.knots(rows)
     low = np.flatnonzero(owner[1:] == owner[:-1])
     ends = gathered(position, low), gathered(position, low + 1)
