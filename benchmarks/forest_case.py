@@ -1,0 +1,109 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One case of the benchmark `forest`, measured in the process that it is called in."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import bpy
+import numpy as np
+
+from tetflora_addon.blender.job import refine
+from tetflora_addon.refinement.decisions import Decision
+
+from .report import peak_mb
+from .row80 import timed_render
+
+#: Steps of the job that are named, longest first.
+_NAMED = 5
+#: Seconds that Blender may stand still.
+STILL = 0.2
+#: Samples of the whole image to which seconds are extrapolated.
+SAMPLES = 64
+
+
+def refined(scene: bpy.types.Scene) -> dict:
+    """Refine as the operator does, step by step; figures of the job and of what the loop left."""
+    kept = SimpleNamespace(refinement=None)
+    afford = refine.afford
+
+    def watched(flora: object, refinement: object, *rest: object) -> object:
+        kept.refinement = refinement
+        return afford(flora, refinement, *rest)
+
+    refine.afford = watched
+    try:
+        start = time.perf_counter()
+        steps = refine.refine_steps(scene, bpy.context.evaluated_depsgraph_get())
+        statistics, taken, before = None, [], "begin"
+        while statistics is None:
+            begun, message = time.perf_counter(), "end"
+            try:
+                message = next(steps).message
+            except StopIteration as stop:
+                statistics = stop.value
+            taken.append((time.perf_counter() - begun, f"{before} > {message}"))
+            before = message
+        seconds = time.perf_counter() - start
+    finally:
+        refine.afford = afford
+    peak = peak_mb()
+    longest = sorted(taken, reverse=True)[:_NAMED]
+    return {
+        "plants": statistics.plants,
+        "refine_emit_s": seconds,
+        "peak_mb": peak,
+        "longest_step_s": longest[0][0],
+        "steps": len(taken),
+        "steps_too_long": sum(one > STILL for one, _ in taken),
+        "polygons_meshed": statistics.polygons_meshed,
+        "polygons_proxy": statistics.polygons_proxy,
+        "polygons": statistics.polygons_meshed + statistics.polygons_proxy,
+        "polygons_full": statistics.polygons_full,
+        "facet_pixels": statistics.facet_pixels,
+        "passes": statistics.passes,
+        "tetrahedra_made": statistics.tetrahedra_made,
+        "complete": statistics.complete,
+        "mesh_mb": statistics.memory_mb,
+        **({} if kept.refinement is None else left_open(kept.refinement)),
+        "seconds": {stage: round(value, 3) for stage, value in statistics.seconds.items()},
+        "longest_steps": [f"{one:.2f} s  {what}" for one, what in longest],
+    }
+
+
+def left_open(refinement: object) -> dict[str, float]:
+    """How many sub-plants and pieces of branches are open, by what was decided on the cells that hold them."""
+    nodes = np.zeros(len(refinement.tree), np.int8)
+    nodes[refinement.nodes] = refinement.decision
+    contents = refinement.contents
+    found = sum(
+        np.bincount(nodes[kind.cell], minlength=len(Decision)) for kind in (contents.subplants, contents.pieces)
+    )
+    cells = np.bincount(refinement.decision, minlength=len(Decision))
+    seen = int(found[Decision.EXPLICIT] + found[Decision.PROXY])
+    return {
+        "open_hidden": int(found[Decision.HIDDEN]),
+        "open_seen": seen,
+        "hidden_open": float(found[Decision.HIDDEN] / max(seen, 1)),
+        **{
+            f"cells_{one.name.lower()}": int(cells[one]) for one in (Decision.HIDDEN, Decision.EXPLICIT, Decision.PROXY)
+        },
+    }
+
+
+def rendered(scene: bpy.types.Scene, folder: Path, samples: int, fewer: int = 1) -> dict[str, float]:
+    """Render twice; seconds before the first sample (sync and BVH), of each, and of an image with `SAMPLES`."""
+    few_s = timed_render(scene, folder / "few.png", fewer)
+    many_s = timed_render(scene, folder / "many.png", samples)
+    each = max(many_s - few_s, 0.0) / (samples - fewer)
+    setup = max(few_s - fewer * each, 0.0)
+    return {
+        "render_s": many_s,
+        "render_setup_s": setup,
+        "render_sample_s": each,
+        f"render_{SAMPLES}_s": setup + SAMPLES * each,
+        "peak_render_mb": peak_mb(),
+    }
