@@ -54,7 +54,7 @@ _TABLE = {
     "blender/scene": ". species growth camera refinement planting light emission "
     "blender blender/materials blender/species",
     "blender/results": f". species refinement emission {_LOW}",
-    "blender/placing": f". species growth planting {_LOW}",
+    "blender/placing": f". species growth compiled planting {_LOW}",
     "blender/job": f". species growth compiled camera refinement proxies emission {_LOW} blender/results",
     "blender/viewport": f". species growth compiled tetrahedra camera refinement preview {_LOW} {_HIGH}",
     "blender/cli": ". blender blender/scene blender/job",

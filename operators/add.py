@@ -6,6 +6,7 @@ import bpy
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 
 from ..tetflora_addon.blender.attributes import world_matrix
+from ..tetflora_addon.blender.placing.distances import distance_of, follows_species
 from ..tetflora_addon.blender.placing.first_forest import build
 from ..tetflora_addon.blender.placing.plant_objects import add_plant, next_seed
 from ..tetflora_addon.blender.placing.populations import add_population, make_plants, remove_population
@@ -181,6 +182,12 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
         description="Comma-separated identifiers of species with optional weights: broadleaf_tree:3, bush:1",
         options={'SKIP_SAVE'},
     )
+    suited: FloatProperty(
+        name="Suited Distance",
+        description="Min Distance that followed from the species; another one was given",
+        default=-1.0,
+        options={'SKIP_SAVE', 'HIDDEN'},
+    )
 
     def run(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
@@ -208,23 +215,31 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
     ) -> bpy.types.PropertyGroup:
         """A new population with the settings for new ones, and over them what was given."""
         population = add_population(scene, grounds)
+        settings = scene.tetflora.populate
+        if not self.properties.is_property_set("min_distance"):
+            follows, self.min_distance = follows_species(settings), settings.min_distance
+        else:
+            follows = self.min_distance == self.suited
         for name in _SHARED:
             setattr(population, "slope_max" if name == "slope_limit" else name, getattr(self, name))
         population.by_density = False
         population.mix.clear()
-        given = {entry.species: entry for entry in scene.tetflora.populate.mix}
+        known = {entry.species: entry for entry in settings.mix}
         for identifier, weight in weights.items():
             entry = population.mix.add()
             entry.species, entry.weight = identifier, weight
-            if identifier in given:
-                copy_companion(given[identifier], entry)
+            if identifier in known:
+                copy_companion(known[identifier], entry)
+        population.distance_by_species = follows
+        if follows:  # the redo panel shows it, and tells by it whether the artist has changed it
+            self.min_distance = self.suited = distance_of(population)
         return population
 
     def _complete_from(self, scene: bpy.types.Scene) -> None:
         """Take what was not given from the panel; the redo panel then shows what was really used."""
         settings = scene.tetflora.populate
         for name in _SHARED:
-            if not self.properties.is_property_set(name):
+            if not self.properties.is_property_set(name) and name != "min_distance":
                 setattr(self, name, getattr(settings, "slope_max" if name == "slope_limit" else name))
         if not self.species:
             mix = [(entry.species, entry.weight) for entry in settings.mix if entry.species]

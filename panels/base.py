@@ -6,6 +6,7 @@ from textwrap import wrap
 from typing import NamedTuple
 
 import bpy
+from bpy.utils import units
 
 from ..operators.marks import TETFLORA_OT_edit_list
 from ..tetflora_addon.blender.species.catalogue import FALLBACK_ICON, icon_of
@@ -38,6 +39,12 @@ def thumbnail(identifier: str) -> dict[str, str | int]:
     """Arguments for a layout's element that shows a species' thumbnail, or an icon where it has none."""
     number = icon_of(identifier)
     return {"icon_value": number} if number else {"icon": FALLBACK_ICON}
+
+
+def shown_length(metres: float) -> str:
+    """A length in the scene's units, as its fields show it."""
+    unit = bpy.context.scene.unit_settings
+    return units.to_string(unit.system, 'LENGTH', metres * unit.scale_length, precision=2)
 
 
 def draw_properties(layout: bpy.types.UILayout, owner: bpy.types.bpy_struct, *names: str) -> None:

@@ -20,6 +20,7 @@ from ..operators.populations import (
     TETFLORA_OT_set_population_ground,
     TETFLORA_OT_update_population,
 )
+from ..tetflora_addon.blender.placing.distances import distance_of, empty_means, follows_species
 from ..tetflora_addon.blender.placing.properties import MODES
 from ..tetflora_addon.blender.placing.rules import awaits_update, is_outdated, shown_population
 from ..tetflora_addon.blender.species.edits import catalogue
@@ -31,6 +32,7 @@ from .base import (
     draw_buttons,
     draw_message,
     draw_properties,
+    shown_length,
     split_layout,
 )
 
@@ -120,8 +122,9 @@ class TETFLORA_PT_populate_species(_PartOfPopulate, bpy.types.Panel):
     def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
         TETFLORA_UL_mix.draw_in(layout, settings)
         if not settings.mix:
-            first = next(iter(catalogue().values()), None)
-            layout.label(text=f"Default: {first.name}" if first else "The catalog has no species", icon='INFO')
+            known = catalogue()
+            text = f"Default: {known[empty_means(settings)].name}" if known else "The catalog has no species"
+            layout.label(text=text, icon='INFO')
         elif 0 <= settings.mix_index < len(settings.mix):
             entry = settings.mix[settings.mix_index]
             layout.prop(entry, "companion_choice")
@@ -174,7 +177,8 @@ class TETFLORA_PT_populate_arrangement(_PartOfPopulate, bpy.types.Panel):
     bl_label = "Spacing"
 
     def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
-        draw_properties(layout, settings, "min_distance", "clumping")
+        _draw_distance(layout, settings)
+        layout.prop(settings, "clumping")
         if settings.clumping:
             layout.prop(settings, "clump_size")
 
@@ -187,6 +191,18 @@ class TETFLORA_PT_populate_size(_PartOfPopulate, bpy.types.Panel):
     def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
         draw_properties(layout.column(align=True), settings, "scale_min", "scale_max")
         draw_properties(layout, settings, "scale_at_top", "tilt")
+
+
+def _draw_distance(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    """The switch between the distance that suits the species and the artist's own, and the one that counts."""
+    row = layout.row(heading="Min Distance")
+    row.prop(settings, "distance_by_species")
+    if follows_species(settings):
+        right = row.row()
+        right.alignment = 'RIGHT'
+        right.label(text=shown_length(distance_of(settings)))
+    else:
+        layout.prop(settings, "min_distance", text=" ")
 
 
 def _draw_populations(layout: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
@@ -242,7 +258,7 @@ class TETFLORA_PT_brush(SidebarPanel, bpy.types.Panel):
         column = layout.column(align=True)
         draw_properties(column, settings, "radius", "density")
         column.prop(settings, "strength", slider=True)
-        column.prop(settings, "min_distance")
+        _draw_distance(column, settings)
         column = layout.column()
         column.prop(settings, "source")
         if settings.source == 'ONE':

@@ -14,6 +14,9 @@ from ..errors import SpeciesError
 from .schema import MAX_FILE_BYTES, read_species
 from .species import Species
 
+#: What lists begin with, and new plants are where nothing is chosen: a tree of which anybody expects a forest.
+FIRST = "beech"
+
 
 @dataclass(frozen=True)
 class SpeciesInfo:
@@ -52,8 +55,13 @@ def _stamp(path: Path) -> tuple[int, int]:
     return status.st_mtime_ns, status.st_size
 
 
+def in_order(found: Mapping[str, SpeciesInfo]) -> dict[str, SpeciesInfo]:
+    """Species in the order in which they are offered: `FIRST`, then the others by name."""
+    return dict(sorted(found.items(), key=lambda item: (item[0] != FIRST, item[1].name.lower())))
+
+
 def list_species(folders: Sequence[Path] = ()) -> dict[str, SpeciesInfo]:
-    """All species by identifier, sorted by name.
+    """All species by identifier, as `in_order` sorts them.
 
     Parameters
     ----------
@@ -67,7 +75,7 @@ def list_species(folders: Sequence[Path] = ()) -> dict[str, SpeciesInfo]:
             for path in sorted(folder.glob("*.json")):
                 if path.is_file():  # neither a folder nor a link that leads nowhere
                     found[path.stem] = _info(path, _stamp(path))
-    return dict(sorted(found.items(), key=lambda item: item[1].name.lower()))
+    return in_order(found)
 
 
 def load_species(

@@ -150,12 +150,12 @@ def _texts():
         if name.startswith(("TETFLORA_", "TetFlora")) and rna is not None:
             found |= {getattr(cls, "bl_label", ""), rna.name}
             for prop in rna.properties:
-                found.add(prop.name)
+                found |= {prop.name, prop.description}
                 if prop.type == 'ENUM':
                     found |= {item.name for item in prop.enum_items}
     for cls in (*properties.CLASSES, preferences.TetFloraPreferences):
         settings = cls.bl_rna.properties
-        found |= {p.name for p in settings}
+        found |= {text for p in settings for text in (p.name, p.description)}
         found |= {item.name for p in settings if p.type == 'ENUM' for item in p.enum_items}
     for identifier in _ids():
         group, name = identifier.split(".")

@@ -19,7 +19,7 @@ from ...planting.places import Placement
 from ...planting.strokes import Brush
 from ..attributes import world_matrix
 from ..scene.fields import fields_of, read_field
-from ..species.catalogue import default_species
+from .distances import SQUARE, choose, distance_of, follows_species, painted_weights
 from .field_edits import add_points, editable, positions, take_points
 from .ground import Ground
 from .plant_objects import add_field, add_plants, plants_of
@@ -46,26 +46,24 @@ def brush_of(scene: bpy.types.Scene, pressure: float = 1.0) -> tuple[Brush, tupl
         No species has a weight above 0, or the brush is too wide for its density.
     """
     settings = scene.tetflora.brush
-    mix = [(entry.species, entry.weight) for entry in scene.tetflora.populate.mix if entry.species]
-    if settings.source == 'ONE' or not mix:
-        mix = [(settings.species if settings.source == 'ONE' and settings.species else default_species(), 1.0)]
-    if not sum(weight for _, weight in mix) > 0.0:
+    mix = painted_weights(scene)
+    if not sum(mix.values()) > 0.0:
         raise SceneError("No species has a weight above 0; raise a weight in the Populate panel")
     brush = Brush(
         radius=settings.radius,
-        density=settings.density / 100.0,
+        density=settings.density / SQUARE,
         strength=max(0.01, settings.strength * pressure),
-        min_distance=settings.min_distance,
+        min_distance=distance_of(settings),
         scale_min=settings.scale_min,
         scale_max=settings.scale_max,
-        weights=tuple(weight for _, weight in mix),
+        weights=tuple(mix.values()),
     )
     if strokes.too_many(brush):
         raise SceneError(
             f"A brush with a radius of {settings.radius:g} m and {settings.density:g} plants per 100 m² is too large; "
             "lower Radius or Density, or use Populate"
         )
-    return brush, tuple(identifier for identifier, _ in mix)
+    return brush, tuple(mix)
 
 
 class Standing:
@@ -165,6 +163,7 @@ class Stroke:
         self.standing = Standing(scene, depsgraph)
         self.ground = Ground(view_layer, depsgraph)
         self.key = strokes.stroke_key(settings.seed, settings.strokes)
+        choose(settings, follows_species(settings))  # noted before the first stroke: old files have strokes and no note
         settings.strokes += 1
         self.dabs = self.added = self.removed = 0
         self._new: list[tuple[NDArray[np.float64], NDArray[np.uint64]]] = []

@@ -18,7 +18,9 @@ from ...planting.strokes import Brush
 from ...setting import LENGTH
 from ..runtime import Listeners
 from ..settings import properties_of
-from ..species.catalogue import SpeciesChoice, items_for, number_of
+from ..species.catalogue import NO_SPECIES, SpeciesChoice, items_for, number_of
+from ..species.edits import catalogue
+from .distances import SOURCES, choose, empty_means, follows_species
 from .rules import EMPTIES_UNASKED
 
 #: Most plants that Populate creates as objects.
@@ -41,10 +43,32 @@ def _notify(_group: bpy.types.PropertyGroup, _context: bpy.types.Context) -> Non
     listeners.notify()
 
 
+def _on_distance(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    settings.distance_from = 'OWN'
+    listeners.notify()
+
+
+def _choose_distance(settings: bpy.types.PropertyGroup, by_species: bool) -> None:
+    choose(settings, by_species)
+    listeners.notify()
+
+
 _LIVE = {"options": set(), "update": _notify}
 _HIDDEN = {"options": {'HIDDEN'}}
 _RULES = properties_of(Rules, **_LIVE)
 _COMPANION = properties_of(Companion, **_LIVE)
+_DISTANCE = {"options": set(), "update": _on_distance}
+_BY_SPECIES = {
+    "name": "By Species",
+    "description": (
+        "Keep plants as far apart as the crowns of their species need, or closer where the density asks for it. Turn "
+        "off to set the distance yourself"
+    ),
+    "get": follows_species,
+    "set": _choose_distance,
+    "options": {'SKIP_SAVE'},
+}
+_SOURCE = {"name": "Distance From", "items": SOURCES, "default": 'UNSET', "options": {'HIDDEN'}}
 
 
 def _companion_items(entry: "TetFloraMixEntry", _context: bpy.types.Context | None) -> list:
@@ -147,7 +171,7 @@ class TetFloraPopulation(bpy.types.PropertyGroup):
     )
     mix_index: IntProperty(name="Active Species", options={'HIDDEN', 'SKIP_SAVE'})
 
-    min_distance: _RULES.min_distance
+    min_distance: properties_of(Rules, **_DISTANCE).min_distance
     clumping: _RULES.clumping
     clump_size: _RULES.clump_size
 
@@ -211,6 +235,9 @@ class TetFloraPopulation(bpy.types.PropertyGroup):
     scale_at_top: _RULES.scale_at_top
     tilt: _RULES.tilt
 
+    distance_from: EnumProperty(**_SOURCE)
+    distance_by_species: BoolProperty(**_BY_SPECIES)
+
 
 MODES = (
     ('PAINT', "Paint", "Add plants where there are fewer than the density", 'BRUSH_DATA', 0),
@@ -239,7 +266,9 @@ class TetFloraBrush(bpy.types.PropertyGroup, SpeciesChoice):
         options=set(),
     )
     strength: _BRUSH.strength
-    min_distance: _BRUSH.min_distance
+    min_distance: properties_of(Brush, **_DISTANCE).min_distance
+    distance_from: EnumProperty(**_SOURCE)
+    distance_by_species: BoolProperty(**_BY_SPECIES)
     source: EnumProperty(
         name="Species",
         description="What to paint",
@@ -275,6 +304,10 @@ class TetFloraBrush(bpy.types.PropertyGroup, SpeciesChoice):
         min=0,
         options={'HIDDEN'},
     )
+
+    def species_if_empty(self) -> str:
+        """What the brush paints then, in older files as well."""
+        return empty_means(self) if catalogue() else NO_SPECIES
 
 
 CLASSES = (

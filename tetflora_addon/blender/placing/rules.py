@@ -28,19 +28,17 @@ from ..attributes import world_matrix
 from ..scene.fields import fields_of, read_field
 from ..scene.objects import objects_within
 from ..scene.skeletons import species_of
-from ..species.catalogue import default_species
 from ..species.edits import catalogue
+from .distances import HECTARE, distance_of, empty_means, weights_of
 from .plant_objects import plants_of
 from .terrain import MASKS, read_ground
 
 #: Up to this many become empties by default; with more, Blender becomes slow.
 EMPTIES_UNASKED = 10_000
-#: Square metres of the area that densities are counted on: foresters count trees by the hectare.
-HECTARE = 10_000.0
 #: Identity and state of a population; all else are settings, which can be copied and written to files.
 IDENTITY = {
     *("rna_type", "name", "uid", "frozen", "collection", "made", "message", "placed_by", "erased"),
-    "mix_index",
+    *("mix_index", "distance_from"),
 }
 _COMPANION = ("companion", "companion_strength", "companion_distance")
 _DIGITS = 4  # of erased places: tenths of a millimetre
@@ -60,7 +58,7 @@ def fingerprint(population: bpy.types.PropertyGroup) -> str:
     values: list[Any] = [[e.object.name_full for e in population.grounds if e.object is not None]]
     values += [[getattr(entry, name) for name in _ENTRY] for entry in population.mix]
     for name, default in _defaults(type(population)):
-        value = getattr(population, name)
+        value = distance_of(population) if name == "min_distance" else getattr(population, name)
         if isinstance(value, bpy.types.ID):
             value = value.name_full
         if value != default:
@@ -70,8 +68,11 @@ def fingerprint(population: bpy.types.PropertyGroup) -> str:
 
 @lru_cache(maxsize=1)
 def _defaults(kind: type[bpy.types.PropertyGroup]) -> tuple[tuple[str, Any], ...]:
-    """Names and defaults of settings that are single values; kept, because panels ask at every redraw."""
-    simple = [p for p in settings_of(kind) if p.type != 'COLLECTION']
+    """Names and defaults of settings that are single values; kept, because panels ask at every redraw.
+
+    Of the distance counts what it is, and not where it comes from.
+    """
+    simple = [p for p in settings_of(kind) if p.type != 'COLLECTION' and p.identifier != "distance_by_species"]
     return tuple((p.identifier, None if p.type == 'POINTER' else p.default) for p in simple)
 
 
@@ -122,12 +123,8 @@ def rules_from(population: bpy.types.PropertyGroup) -> tuple[Rules, tuple[str, .
 
     Companions that are not in the mixture follow it with a weight of 0.
     """
-    mix = [(e.species or default_species(), e) for e in population.mix]
-    weights: dict[str, float] = {}
-    for identifier, entry in mix:
-        weights[identifier] = weights.get(identifier, 0.0) + entry.weight
-    if not mix:
-        weights[default_species()] = 1.0
+    mix = [(e.species or empty_means(population), e) for e in population.mix]
+    weights = weights_of(population)
     for _, entry in mix:
         if entry.companion:
             weights.setdefault(entry.companion, 0.0)
@@ -137,11 +134,12 @@ def rules_from(population: bpy.types.PropertyGroup) -> tuple[Rules, tuple[str, .
         for identifier, e in mix
         if e.companion and e.companion_strength
     )
-    free = ("altitude_min", "altitude_max", "density", "weights", "companions")
+    free = ("min_distance", "altitude_min", "altitude_max", "density", "weights", "companions")
     given = {name: getattr(population, name) for name in Rules.__dataclass_fields__ if name not in free}
     low, high = (population.altitude_min, population.altitude_max) if population.use_altitude else (-inf, inf)
     rules = Rules(
         **given,
+        min_distance=distance_of(population),
         altitude_min=low,
         altitude_max=high,
         density=population.density / HECTARE,

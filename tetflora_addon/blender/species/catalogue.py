@@ -7,7 +7,7 @@ Thumbnails are PNG files beside the species. Only sound species files are saved 
 
 import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 from zlib import crc32
@@ -132,18 +132,23 @@ def display_height(identifier: str) -> float:
         return FALLBACK_HEIGHT
 
 
-def default_species() -> str:
-    """First species of the catalogue.
+def default_species(by_name: bool = False) -> str:
+    """The species that the catalogue offers first.
+
+    Parameters
+    ----------
+    by_name : bool
+        The first by name instead: what an empty choice meant in files that were saved before there was another order.
 
     Raises
     ------
     SpeciesError
         There is none.
     """
-    known: Sequence[str] = tuple(catalogue())
+    known = catalogue()
     if not known:
         raise SpeciesError("The catalog has no species; reinstall TetFlora, or set a Species Folder in the preferences")
-    return known[0]
+    return min(known, key=lambda identifier: known[identifier].name.lower()) if by_name else next(iter(known))
 
 
 class SpeciesChoice:
@@ -162,10 +167,19 @@ class SpeciesChoice:
         name="Species",
         description="Species from the catalog",
         items=lambda self, _context: items_for(self.species),
-        get=lambda self: number_of(self.species) if self.species else items_for()[0][4],
+        get=lambda self: _chosen(self),
         set=lambda self, number: _choose(self, number),
         options={'SKIP_SAVE'},
     )
+
+    def species_if_empty(self) -> str:
+        """What counts where no species is stored; a group may know better."""
+        return items_for()[0][0]
+
+
+def _chosen(group: SpeciesChoice) -> int:
+    identifier = group.species or group.species_if_empty()
+    return 0 if identifier == NO_SPECIES else number_of(identifier)
 
 
 def _choose(group: SpeciesChoice, number: int) -> None:

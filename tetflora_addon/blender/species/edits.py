@@ -20,7 +20,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ...errors import SpeciesError
-from ...species.catalogue import SpeciesInfo, list_species, load_species
+from ...species.catalogue import SpeciesInfo, in_order, list_species, load_species
 from ...species.schema import species_from_dict
 from ...species.species import Species
 from ..preferences import species_folders
@@ -252,10 +252,10 @@ def new_identifier(name: str, taken: Callable[[str], bool]) -> str:
 
 
 def catalogue() -> dict[str, SpeciesInfo]:
-    """All species that this user or this file has, by identifier, sorted by name."""
+    """All species that this user or this file has, by identifier, in the order in which they are offered."""
     known = listed()
     edited = edited_infos()
-    return dict(sorted((known | edited).items(), key=lambda item: item[1].name.lower())) if edited else known
+    return in_order(known | edited) if edited else known
 
 
 def edited_infos() -> dict[str, SpeciesInfo]:

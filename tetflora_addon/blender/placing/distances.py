@@ -1,0 +1,139 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How far apart plants of a population or of the brush stand: as their species need, until the artist says otherwise.
+
+``min_distance`` is the artist's own. ``distance_from`` says whether it counts; where that is not set, nobody has chosen
+anything yet, or the file is older than this choice and keeps what it meant.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...compiled.crowns import crown_of
+from ...errors import SpeciesError
+from ...planting.distances import suggested_distance
+from ..species.catalogue import default_species, display_height
+from ..species.edits import species_for
+
+#: Square metres of the area that densities are counted on: foresters count trees by the hectare.
+HECTARE = 10_000.0
+#: Square metres of the area that densities of the brush are counted on.
+SQUARE = 100.0
+#: Whence the distance comes, as stored.
+SOURCES = (
+    ('UNSET', "Unset", "Not chosen yet", 0),
+    ('SPECIES', "Species", "From the crowns of the species", 1),
+    ('OWN', "Own", "Set by the artist", 2),
+)
+_SLENDER = 0.2  # crown radius of a plant over its height, where its species cannot be compiled
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """Species with their relative frequencies, the mean scale of plants, and plants per square metre if asked for."""
+
+    weights: dict[str, float]
+    scale: float
+    density: float | None = None
+
+
+def empty_means(settings: bpy.types.PropertyGroup) -> str:
+    """The species of a population or brush that names none: what the catalogue offers first.
+
+    In older files it is the first by name, which was offered then.
+
+    Raises
+    ------
+    SpeciesError
+        The catalogue is empty.
+    """
+    return default_species(by_name=settings.distance_from == 'UNSET' and not follows_species(settings))
+
+
+def weights_of(population: bpy.types.PropertyGroup) -> dict[str, float]:
+    """Relative frequency of each species of a population, at least one.
+
+    Raises
+    ------
+    SpeciesError
+        The catalogue is empty.
+    """
+    weights: dict[str, float] = {}
+    for entry in population.mix:
+        identifier = entry.species or empty_means(population)
+        weights[identifier] = weights.get(identifier, 0.0) + entry.weight
+    return weights or {empty_means(population): 1.0}
+
+
+def painted_weights(scene: bpy.types.Scene) -> dict[str, float]:
+    """Relative frequency of each species that the brush of a scene paints, at least one.
+
+    Raises
+    ------
+    SpeciesError
+        The catalogue is empty.
+    """
+    brush = scene.tetflora.brush
+    if brush.source == 'ONE' and brush.species:
+        return {brush.species: 1.0}
+    weights: dict[str, float] = {}
+    for entry in scene.tetflora.populate.mix if brush.source == 'MIX' else ():
+        if entry.species:
+            weights[entry.species] = weights.get(entry.species, 0.0) + entry.weight
+    return weights or {empty_means(brush): 1.0}
+
+
+def follows_species(settings: bpy.types.PropertyGroup) -> bool:
+    """Whether a population or brush takes its distance from its species; cheap."""
+    if settings.distance_from != 'UNSET':
+        return settings.distance_from == 'SPECIES'
+    used = settings.strokes if _is_brush(settings) else settings.uid
+    return not used and not settings.is_property_set("min_distance")
+
+
+def distance_of(settings: bpy.types.PropertyGroup) -> float:
+    """Distance in metres that counts for a population or brush: its own, or the one that suits its species."""
+    return suggestion(settings) if follows_species(settings) else settings.min_distance
+
+
+def suggestion(settings: bpy.types.PropertyGroup) -> float:
+    """Distance in metres that suits the species of a population or brush.
+
+    Species are compiled at the first time, some hundredths of a second each; panels may ask for it.
+    """
+    try:
+        mixture = _mixture_of(settings)
+    except SpeciesError:  # an empty catalogue, of which Populate and the brush complain
+        return settings.min_distance
+    radii = [_radius(settings.id_data, identifier) for identifier in mixture.weights]
+    suited = suggested_distance(radii, list(mixture.weights.values()), mixture.scale, mixture.density)
+    return float(np.float32(suited))  # as Blender stores it, so that it is the same when the artist takes it over
+
+
+def _is_brush(settings: bpy.types.PropertyGroup) -> bool:
+    return "strokes" in settings.bl_rna.properties
+
+
+def _mixture_of(settings: bpy.types.PropertyGroup) -> Mixture:
+    scale = (settings.scale_min + settings.scale_max) / 2.0
+    if _is_brush(settings):
+        return Mixture(painted_weights(settings.id_data), scale, settings.density / SQUARE)
+    return Mixture(weights_of(settings), scale, settings.density / HECTARE if settings.by_density else None)
+
+
+def _radius(scene: bpy.types.Scene, identifier: str) -> float:
+    try:
+        return crown_of(species_for(scene, identifier)).radius
+    except SpeciesError:  # missing, broken, or with an object for a leaf
+        return _SLENDER * display_height(identifier)
+
+
+def choose(settings: bpy.types.PropertyGroup, by_species: bool) -> None:
+    """Let a population or brush follow its species from now on, or keep the distance that it has."""
+    if not by_species and follows_species(settings):
+        settings.min_distance = suggestion(settings)  # what the artist sees is what there is to change
+    settings.distance_from = 'SPECIES' if by_species else 'OWN'
