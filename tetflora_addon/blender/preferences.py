@@ -51,8 +51,8 @@ class TetFloraPreferences(bpy.types.AddonPreferences):
     new_memory: FloatProperty(
         name="Max Memory of New Scenes",
         description=(
-            "Max Memory of new scenes: gigabytes that refined plants may take in Blender and the renderer together. "
-            "Plants that would not fit become coarser; 0 for no limit"
+            "Max Memory of new scenes, in gigabytes: what Blender may take to refine plants and render them. Plants "
+            "that would not fit become coarser. 0 is automatic: half of the machine's memory"
         ),
         default=0.0,
         min=0.0,

@@ -127,7 +127,8 @@ class RefinementSettings:
     max_memory: float = setting(
         0.0,
         "Max Memory",
-        "Approximate maximum memory of the result in gigabytes, in Blender and the renderer together; 0 for no limit",
+        "Maximum memory of Blender in gigabytes, for refinement, its result and rendering together. 0 is automatic: "
+        "half of the machine's memory. Plants that would not fit become coarser",
         min=0.0,
         soft_max=256.0,
         precision=1,

@@ -1,0 +1,87 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How much memory the machine and this process have, and what that leaves for results."""
+
+from __future__ import annotations
+
+import math
+import sys
+
+import numpy as np
+import pytest
+
+from tetflora_addon import memory
+
+
+def test_the_memory_of_this_machine_is_known():
+    assert 2**28 < memory.total() < 2**50
+    assert 1e6 < memory.resident() < memory.total()
+
+
+def test_what_this_process_takes_is_seen():
+    before = memory.resident()
+    held = np.ones(200_000_000, np.uint8)
+    grown = memory.resident() - before
+    assert 0.8 * held.nbytes < grown < 1.3 * held.nbytes
+
+
+def test_the_limit_is_that_of_the_artist_or_half_of_the_machine(monkeypatch):
+    monkeypatch.setattr(memory, "total", lambda: 16_000_000_000)
+    assert memory.limit(3.0) == 3e9
+    assert memory.limit(0.0) == 8e9
+    assert memory.limit(40.0) == 40e9  # nobody forbids to swap
+    monkeypatch.setattr(memory, "total", lambda: None)
+    assert memory.limit(0.0) == math.inf
+
+
+def test_what_is_left_is_the_limit_less_all_that_others_take(monkeypatch):
+    monkeypatch.setattr(memory, "total", lambda: 16_000_000_000)
+    monkeypatch.setattr(memory, "resident", lambda: 1_500_000_000)
+    assert memory.allowance(4.0) == 2.5e9
+    assert memory.allowance(0.0) == 6.5e9
+    assert memory.allowance(4.0, 1_000_000) == 2.5e9 - 1e6 * memory.BYTES_PER_PIXEL
+    assert memory.allowance(1.0) == memory.LEAST
+    monkeypatch.setattr(memory, "resident", lambda: None)
+    assert memory.allowance(4.0) == 4e9
+    monkeypatch.setattr(memory, "total", lambda: None)
+    assert memory.allowance(0.0, 10**9) == math.inf
+
+
+@pytest.mark.parametrize("failure", [OSError, ValueError, AttributeError])
+def test_a_system_that_does_not_tell_is_not_guessed(monkeypatch, failure):
+    def fail():
+        raise failure
+
+    asked = {"win32": "_windows", "darwin": "_mac"}.get(sys.platform, "_unix")
+    for name in ("total", "resident"):
+        monkeypatch.setattr(memory, f"{asked}_{name}", fail)
+    memory.total.cache_clear()
+    try:
+        assert memory.total() is None
+        assert memory.resident() is None
+    finally:
+        memory.total.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("text", "files", "expected"),
+    [
+        ("0::/job/one", {"job/memory.max": "4000000000", "job/one/memory.max": "max"}, [4_000_000_000]),
+        ("0::/job/one", {"job/memory.max": "5", "job/one/memory.max": "3"}, [3, 5]),
+        ("0::/", {"memory.max": "7"}, [7]),
+        ("4:cpu,memory:/job", {"memory/job/memory.limit_in_bytes": "9"}, [9]),
+        ("4:cpuset:/job", {"memory/job/memory.limit_in_bytes": "9", "job/memory.max": "9"}, []),
+        ("nonsense", {"memory.max": "7"}, []),
+    ],
+)
+def test_containers_have_limits_of_their_own(monkeypatch, tmp_path, text, files, expected):
+    groups = tmp_path / "groups"
+    for name, content in files.items():
+        (groups / name).parent.mkdir(parents=True, exist_ok=True)
+        (groups / name).write_text(content + "\n", encoding="utf-8")
+    (tmp_path / "own").write_text(text + "\n", encoding="utf-8")
+    monkeypatch.setattr(memory, "_CGROUPS", groups)
+    monkeypatch.setattr(memory, "_OWN_GROUPS", tmp_path / "own")
+    assert memory._container_limits() == expected
+    monkeypatch.setattr(memory, "_OWN_GROUPS", tmp_path / "missing")
+    assert memory._container_limits() == []
