@@ -29,7 +29,7 @@ def split_layout(panel: bpy.types.Panel) -> bpy.types.UILayout:
 
 def draw_message(context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str = 'ERROR') -> None:
     """A text over several lines, because Blender does not wrap; a letter is some 7 pixels wide at a scale of 1."""
-    letters = context.region.width / (7.0 * context.preferences.system.ui_scale)
+    letters = context.region.width / (7.0 * (context.preferences.system.ui_scale or 1.0))  # 0 without a window
     column = layout.column(align=True)
     for n, line in enumerate(wrap(text, max(int(letters) - 4, 16))):
         column.label(text=line, icon='BLANK1' if n else icon)

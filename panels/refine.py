@@ -7,6 +7,7 @@ import bpy
 from ..operators.add import TETFLORA_OT_first_forest
 from ..operators.marks import can_be_explicit
 from ..operators.refine import TETFLORA_OT_clear, TETFLORA_OT_refine
+from ..tetflora_addon.blender.job.forecast import forecast_text, memory_text
 from ..tetflora_addon.blender.job.render import render_errors
 from ..tetflora_addon.blender.placing.first_forest import is_first_forest
 from ..tetflora_addon.blender.results.forms import few_bounces, form_of
@@ -58,15 +59,28 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
             draw_message(context, layout, text, 'INFO')
         elif rows := dict(rows_of(settings.statistics)):
             draw_message(context, layout, f"{rows['Polygons']} polygons made in {rows['Seconds']} s", 'INFO')
+        if text := forecast_text(context.scene, context.view_layer):
+            draw_message(context, layout, text, 'TIME')
         layout = split_layout(self)
         column = layout.column()
         column.active = not settings.expand_everything
         names = ("quality", "cutoff", "shadow_cutoff", "proxy_form", "baked_light", "max_polygons")
         draw_properties(column, settings, *names)
+        _draw_memory(column, context.scene)
         active = context.active_object
         if active is not None and (can_be_explicit(active) or active.tetflora.is_explicit):
             layout.prop(active.tetflora, "is_explicit")
         draw_properties(layout, settings, "refine_at_render", "auto_refine")
+
+
+def _draw_memory(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    """The limit of memory, and what it is where the artist sets none."""
+    column = layout.column(align=True)
+    column.prop(scene.tetflora, "max_memory", text="Max Memory (GB)")
+    if text := memory_text(scene):
+        row = column.split(factor=0.4)  # as labels and values are split
+        row.label()
+        row.label(text=text)
 
 
 def hint(scene: bpy.types.Scene) -> str:
@@ -145,7 +159,7 @@ class TETFLORA_PT_limits(_PartOfRefine, bpy.types.Panel):
     bl_label = "Limits"
 
     def draw(self, context: bpy.types.Context) -> None:
-        self.column(context, "max_memory", "max_tetrahedra", "max_levels", "max_passes")
+        self.column(context, "max_tetrahedra", "max_levels", "max_passes")
         self.layout.prop(context.scene.tetflora, "expand_everything")
 
 

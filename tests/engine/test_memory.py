@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
 import sys
 
@@ -39,12 +40,18 @@ def test_what_is_left_is_the_limit_less_all_that_others_take(monkeypatch):
     monkeypatch.setattr(memory, "resident", lambda: 1_500_000_000)
     assert memory.allowance(4.0) == 2.5e9
     assert memory.allowance(0.0) == 6.5e9
-    assert memory.allowance(4.0, 1_000_000) == 2.5e9 - 1e6 * memory.BYTES_PER_PIXEL
+    assert memory.allowance(4.0, memory.picture_bytes(1_000_000)) == 2.5e9 - 1e6 * memory.BYTES_PER_PIXEL
+    assert memory.picture_bytes(2_000_000, denoised=True) > 5 * memory.picture_bytes(2_000_000)
     assert memory.allowance(1.0) == memory.LEAST
     monkeypatch.setattr(memory, "resident", lambda: None)
     assert memory.allowance(4.0) == 4e9
     monkeypatch.setattr(memory, "total", lambda: None)
-    assert memory.allowance(0.0, 10**9) == math.inf
+    assert memory.allowance(0.0, 1e12) == math.inf
+
+
+def test_structures_of_other_systems_have_their_sizes():
+    sizes = {memory._Task: 48, memory._Status: 64, memory._Counters: 8 + 8 * ctypes.sizeof(ctypes.c_size_t)}
+    assert {kind: ctypes.sizeof(kind) for kind in sizes} == sizes
 
 
 @pytest.mark.parametrize("failure", [OSError, ValueError, AttributeError])

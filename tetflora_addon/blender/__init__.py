@@ -4,7 +4,7 @@
 
 from . import preferences, properties, saved_files, translations
 from .cli import command
-from .job import render
+from .job import forecast, render
 from .placing import assets
 from .species import catalogue
 from .viewport import auto, levels, overlay, points
@@ -16,6 +16,7 @@ _PARTS = (
     catalogue,
     properties,
     render,
+    forecast,
     saved_files,
     auto,
     levels,

@@ -9,6 +9,8 @@ from dataclasses import dataclass, fields, replace
 import bpy
 import numpy as np
 
+from ... import memory
+from ...camera.camera import Camera
 from ...compiled.flora import Flora, compile_species
 from ...emission.light import Sources
 from ...growth.growth import trunks
@@ -123,6 +125,17 @@ def settings_from(scene: bpy.types.Scene) -> RefinementSettings:
     # A field without a property keeps the engine's value.
     names = [f.name for f in fields(RefinementSettings) if f.name in group.bl_rna.properties]
     return RefinementSettings(**{name: getattr(group, name) for name in names})
+
+
+def picture_bytes(scene: bpy.types.Scene, camera: Camera) -> int:
+    """Bytes that the renderer will need for the picture of a camera, whatever is in it."""
+    cycles = scene.render.engine == 'CYCLES' and getattr(scene, "cycles", None)
+    return memory.picture_bytes(camera.width * camera.height, bool(cycles and cycles.use_denoising))
+
+
+def memory_left(scene: bpy.types.Scene, camera: Camera) -> float:
+    """Bytes that the scene's limit of memory leaves for results now; infinite without a limit."""
+    return memory.allowance(scene.tetflora.max_memory, picture_bytes(scene, camera))
 
 
 def refinement_settings(scene: bpy.types.Scene) -> RefinementSettings:

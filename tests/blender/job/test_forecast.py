@@ -1,0 +1,181 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The line about what refining will take: plants of all kinds of storage count, and changes show."""
+
+from __future__ import annotations
+
+import re
+
+import bpy
+import pytest
+
+from tests.blender.scenes import add_camera, add_mesh, add_plant, select
+from tetflora_addon import memory
+from tetflora_addon.blender.job import contents, forecast
+from tetflora_addon.blender.scene.camera import read_camera
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+
+@pytest.fixture(autouse=True)
+def _afresh():
+    forecast._on_load()
+
+
+def _forecast():
+    bpy.context.view_layer.update()
+    bpy.context.evaluated_depsgraph_get()
+    forecast._counted.took = 0.0  # as if counting took no time
+    return forecast.forecast(bpy.context.scene, bpy.context.view_layer)
+
+
+def _wood(count, **options):
+    ground = add_mesh("ground", size=60.0)
+    select(ground)
+    bpy.ops.tetflora.populate(count=count, **{"min_distance": 0.0, "species": "birch", **options})
+
+
+def test_without_camera_or_plants_there_is_nothing_to_tell():
+    assert _forecast() is None
+    add_camera()
+    assert _forecast() is None
+    assert forecast.forecast_text(bpy.context.scene, bpy.context.view_layer) == ""
+    add_plant(species="birch")
+    assert _forecast().plants == 1
+    bpy.context.scene.camera = None
+    assert _forecast() is None
+
+
+@pytest.mark.parametrize("as_field", ["EMPTIES", "FIELD"])
+def test_plants_of_both_kinds_count_alike(as_field):
+    add_camera()
+    _wood(300, as_field=as_field, species="birch:3, bush:1")
+    found = _forecast()
+    assert found.plants == 300
+    empties = {'EMPTIES': found}.get(as_field)
+    if empties is None:
+        bpy.ops.tetflora.split_field()
+        empties = _forecast()
+    assert found.primitives == pytest.approx(empties.primitives, rel=0.01)
+    assert found.primitives > 10_000
+
+
+def test_large_fields_are_known_by_a_sample():
+    add_camera()
+    _wood(30_000, as_field='FIELD')
+    found = _forecast()
+    assert found.plants == 30_000
+    assert len(forecast._counted.stand.foot) == forecast._LOOKED_AT
+    add_plant(species="oak")
+    assert _forecast().plants == 30_001
+
+
+def test_instances_of_collections_count():
+    add_camera()
+    plant = add_plant(species="birch")
+    trees = bpy.data.collections.new("trees")
+    trees.objects.link(plant)
+    bpy.context.scene.collection.objects.unlink(plant)
+    for number in range(3):
+        copy = bpy.data.objects.new(f"copy {number}", None)
+        copy.instance_type, copy.instance_collection = 'COLLECTION', trees
+        bpy.context.scene.collection.objects.link(copy)
+    assert _forecast().plants == 3
+
+
+def test_what_does_not_render_does_not_count():
+    add_camera()
+    plants = [add_plant(f"p{i}", species="birch") for i in range(4)]
+    plants[0].hide_render = True
+    plants[1].tetflora.enabled = False
+    assert _forecast().plants == 2
+    add_plant("missing", species="gone")
+    assert _forecast().plants == 3
+
+
+def test_settings_and_camera_show_at_once():
+    camera = add_camera()
+    _wood(500)
+    scene = bpy.context.scene
+    before = _forecast()
+    scene.render.resolution_percentage *= 2
+    assert _forecast().primitives > 2.0 * before.primitives
+    scene.render.resolution_percentage //= 2
+    scene.tetflora.quality = 'DRAFT'
+    assert _forecast().primitives < 0.3 * before.primitives
+    scene.tetflora.quality = 'FINAL'
+    scene.tetflora.max_polygons = 1000
+    assert _forecast().primitives == 1000
+    scene.tetflora.max_polygons = 0
+    scene.tetflora.expand_everything = True
+    assert _forecast().primitives > 20_000_000
+    scene.tetflora.expand_everything = False
+    camera.rotation_euler = (3.14159, 0.0, 0.0)
+    assert _forecast().primitives < before.primitives
+
+
+def test_the_text_says_that_it_is_an_estimate(monkeypatch):
+    add_camera()
+    _wood(500)
+    scene, layer = bpy.context.scene, bpy.context.view_layer
+    _forecast()
+    text = forecast.forecast_text(scene, layer)
+    assert re.fullmatch(r"About \d+ (s|min), [\d.,]+( M)? polygons, \d+\.\d GB", text)
+    scene.tetflora.max_polygons = 1000
+    assert forecast.forecast_text(scene, layer).endswith(", as Max Polygons allows")
+    scene.tetflora.max_polygons, scene.tetflora.max_memory = 0, 0.01
+    monkeypatch.setattr(memory, "LEAST", 1e5)
+    assert forecast.forecast_text(scene, layer).endswith(", as Max Memory allows")
+
+
+@pytest.mark.parametrize(
+    ("seconds", "shown"),
+    [(0.2, "1 s"), (7.4, "7 s"), (33.0, "35 s"), (100.0, "2 min"), (3000.0, "50 min"), (9000.0, "2.5 h")],
+)
+def test_times_are_rounded(seconds, shown):
+    assert forecast._seconds(seconds) == shown
+
+
+@pytest.mark.parametrize(
+    ("number", "shown"), [(0.0, "0"), (987.0, "990"), (123_456.0, "120,000"), (4_120_000.0, "4.1 M"), (3.66e7, "37 M")]
+)
+def test_polygons_are_rounded(number, shown):
+    assert forecast._polygons(number) == f"{shown} polygons"
+
+
+def test_the_automatic_limit_is_told(monkeypatch):
+    scene = bpy.context.scene
+    monkeypatch.setattr(memory, "total", lambda: 23_400_000_000)
+    assert forecast.memory_text(scene) == "Automatic: 11.7 GB"
+    scene.tetflora.max_memory = 4.0
+    assert forecast.memory_text(scene) == ""
+    scene.tetflora.max_memory = 0.0
+    monkeypatch.setattr(memory, "total", lambda: None)
+    assert forecast.memory_text(scene) == "Automatic: no limit"
+
+
+def test_many_plants_are_not_counted_at_every_redraw():
+    add_camera()
+    add_plant(species="birch")
+    assert _forecast().plants == 1
+    forecast._counted.took = 100.0  # as if there were millions
+    add_plant("other", species="birch")
+    bpy.context.view_layer.update()
+    assert forecast.forecast(bpy.context.scene, bpy.context.view_layer).plants == 1
+    assert _forecast().plants == 2
+
+
+def test_denoising_needs_memory_that_results_cannot_have(monkeypatch):
+    add_camera()
+    scene = bpy.context.scene
+    monkeypatch.setattr(memory, "resident", lambda: 1_000_000_000)
+    scene.render.engine, scene.tetflora.max_memory = 'CYCLES', 4.0
+    bpy.context.view_layer.update()
+    seen = read_camera(scene, bpy.context.evaluated_depsgraph_get())
+    scene.cycles.use_denoising = False
+    plain = contents.memory_left(scene, seen)
+    scene.cycles.use_denoising = True
+    denoised = contents.memory_left(scene, seen)
+    pixels = seen.width * seen.height
+    assert plain == 3e9 - pixels * memory.BYTES_PER_PIXEL
+    assert plain - denoised == pixels * memory.BYTES_PER_DENOISED_PIXEL
