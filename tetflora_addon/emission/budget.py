@@ -2,40 +2,72 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A budget of polygons: the best image that fits (beyond the paper, whose only limit is the cutoff).
 
-If the result of refinement does not fit, real leaves go to the tetrahedra that gain most by them for each polygon, best
-first, until the budget is spent. All others become proxies, whose facets grow until they fit as well.
+A picture shows no more than about one facet for each pixel and layer of what is seen. If the result of refinement has
+more, the widths below which leaves become facets and the facets themselves grow by one factor until it fits. What is
+hidden or beside the view only casts shadows and sends light back: its facets get a part of the budget of their own,
+and never more than what is seen. Shells have one size; there, real leaves go to the tetrahedra that gain most by them
+for each polygon.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
-from ..proxies.facet_sizes import coarseness, piece_facet_sizes, polygon_facet_sizes, subplant_facet_sizes
+from ..proxies.facet_sizes import FacetPixels, polygon_facet_sizes
 from ..refinement.decisions import Decision, contributions
 from ..refinement.loop import Refinement
 from ..refinement.settings import RefinementSettings
+from .facets import sizes_of
+from .plants import Transition
+from .portions import Sight
 
 #: Approximate bytes of a polygon in Blender (110) and in a renderer (500) together.
 BYTES_PER_POLYGON = 610
 #: The same for a microsphere in a point cloud.
 BYTES_PER_SPHERE = 210
-#: Reserved fraction of the budget, since expected numbers are means.
+#: Polygons and facets for each pixel of the image that are enough, and the number that is never too many.
+ENOUGH_A_PIXEL, NEVER_TOO_MANY = 1.7, 1_500_000.0
+#: Fraction of them that may be hidden, and how many hidden ones are never too many.
+_HIDDEN, _FEW_HIDDEN = 0.25, 300_000.0
+#: Reserved fraction of a budget that somebody has set, since expected numbers are means.
 _RESERVE = 0.06
-#: Fraction of the budget that facets may use before real leaves get theirs.
-_FACETS_FIRST = 0.5
-_STEPS = 12  # of bisection on the logarithm of the facets' side, between 1 and:
-_LARGEST = 64.0
+_STEPS = 12  # of bisection on the logarithm of factors, between 1 and:
+_LARGEST = 256.0
+
+
+@dataclass(frozen=True)
+class Detail:
+    """How finely a refined scene is drawn.
+
+    Attributes
+    ----------
+    refinement : Refinement
+        Decisions that fit into the budget.
+    pixels : FacetPixels
+        Sides of facets.
+    leaf_limit : float
+        Width in pixels up to which leaves are facets.
+    """
+
+    refinement: Refinement
+    pixels: FacetPixels
+    leaf_limit: float
 
 
 def polygons_allowed(settings: RefinementSettings) -> float:
     """Polygons that the settings allow, infinite where they set no limit."""
     return min(settings.max_polygons or np.inf, settings.max_memory * 1e9 / BYTES_PER_POLYGON or np.inf)
+
+
+def enough(camera: Camera) -> float:
+    """Polygons and facets that an image can show."""
+    return max(ENOUGH_A_PIXEL * camera.width * camera.height, NEVER_TOO_MANY)
 
 
 def afford(
@@ -45,8 +77,8 @@ def afford(
     settings: RefinementSettings,
     faces: float | None = None,
     primitive_bytes: float = BYTES_PER_POLYGON,
-) -> tuple[Refinement, float]:
-    """Decisions that fit into the budget of the settings.
+) -> Detail:
+    """Detail that fits into the budget of the settings.
 
     Parameters
     ----------
@@ -59,87 +91,89 @@ def afford(
         Faces of each proxy tetrahedron; by default proxies are facets or spheres, whose number follows their size.
     primitive_bytes : float
         Memory of one facet or sphere.
-
-    Returns
-    -------
-    Refinement
-        With other decisions, or the same object.
-    float
-        Side of a facet in pixels.
     """
-    side = settings.facet
+    detail = Detail(result, FacetPixels(settings.facet), settings.leaf_limit)
+    memory = settings.max_memory * 1e9 / BYTES_PER_POLYGON or np.inf
+    most = settings.max_polygons or np.inf
+    if faces is not None:
+        allowed = (1 - _RESERVE) * min(memory, most)
+        return replace(detail, refinement=_fitted_shells(result, allowed, faces)) if np.isfinite(allowed) else detail
+    count = _Facets(flora, result, camera)
     # A sphere is a whole polygon for the limit on polygons, but only a part of one for memory: a budget for each.
-    memory = replace(settings, max_polygons=0), primitive_bytes / BYTES_PER_POLYGON
-    for limits, weight in ((replace(settings, max_memory=0.0), 1.0), memory):
-        allowed = (1 - _RESERVE) * polygons_allowed(limits)
-        if np.isfinite(allowed):
-            result, side = _fitted(flora, result, camera, allowed, side, weight, faces)
-    return result, side
+    limits = [(enough(camera), 1.0), ((1 - _RESERVE) * most, 1.0)]
+    limits += [((1 - _RESERVE) * memory, primitive_bytes / BYTES_PER_POLYGON)]
+    factor = hidden = 1.0
+    for allowed, weight in limits:
+        if not np.isfinite(allowed):
+            continue
+
+        def seen(by: float, weight: float = weight) -> float:
+            return count.seen(by * settings.facet, by * settings.leaf_limit, weight)
+
+        def unseen(by: float, weight: float = weight, at: float = factor) -> float:
+            return weight * count.unseen(FacetPixels(settings.facet, by))
+
+        for_hidden = min(unseen(hidden), max(_HIDDEN * allowed, min(_FEW_HIDDEN, allowed / 2)))
+        factor = max(factor, _smallest(lambda f, seen=seen, left=allowed - for_hidden: seen(f) <= left))
+        for_hidden = min(for_hidden, max(seen(factor), min(_FEW_HIDDEN, allowed / 2)))
+        hidden = max(hidden, _smallest(lambda f, unseen=unseen, left=for_hidden: unseen(f) <= left))
+    return Detail(result, FacetPixels(factor * settings.facet, hidden), factor * settings.leaf_limit)
 
 
-def _fitted(
-    flora: Flora,
-    result: Refinement,
-    camera: Camera,
-    allowed: float,
-    side: float,
-    weight: float,
-    faces: float | None,
-) -> tuple[Refinement, float]:
-    """Decisions and a side of facets, at least ``side``; a facet counts as ``weight`` polygons."""
+def _fitted_shells(result: Refinement, allowed: float, faces: float) -> Refinement:
+    """Decisions that fit where each proxy has so many faces."""
     explicit = result.decision == Decision.EXPLICIT
-    polygons = np.where(explicit, result.totals.polygons, 0.0)
-    count = _Facets(flora, result, camera) if faces is None else None
-    fixed = None if faces is None else faces + _large(result)
-
-    def proxies(factor: float) -> NDArray[np.float64]:
-        """Faces (cells,) of all cells as proxies, with facets larger by a factor."""
-        return count.by_cell(factor * side, weight) if count else fixed
-
-    as_asked = proxies(1.0)
-    if polygons.sum() + as_asked[~explicit].sum() <= allowed:
-        return result, side
-    factor = _smallest(lambda f: proxies(f).sum() <= _FACETS_FIRST * allowed) if count else 1.0
-    cost = polygons - proxies(factor)
+    polygons, fixed = np.where(explicit, result.totals.polygons, 0.0), faces + _large(result)
+    if polygons.sum() + fixed[~explicit].sum() <= allowed:
+        return result
+    cost = polygons - fixed
     gain = contributions(result.cells, result.transmittance) / np.maximum(cost, 1.0)
     order = np.argsort(np.where(explicit, -gain, np.inf), kind="stable")[: explicit.sum()]
-    spent = np.cumsum(np.maximum(cost[order], 0.0)) + proxies(factor).sum()
+    spent = np.cumsum(np.maximum(cost[order], 0.0)) + fixed.sum()
     kept = np.zeros(len(explicit), bool)
     kept[order[spent <= allowed]] = True
-    if count:  # what real leaves leave over makes facets finer again
-        left = allowed - polygons[kept].sum()
-        factor = _smallest(lambda f: proxies(f)[~kept].sum() <= left)
     decision = np.where(explicit & ~kept, Decision.PROXY, result.decision).astype(np.int8)
-    return replace(result, decision=decision), factor * side
+    return replace(result, decision=decision)
 
 
 def _large(result: Refinement) -> NDArray[np.float64]:
     """Polygons (cells,) that stay polygons although their cell is a proxy."""
-    contents = result.contents
-    large = np.isinf(contents.polygons.totals.width)
-    return np.bincount(contents.polygons.cell[large], minlength=len(result.tree))[result.nodes].astype(np.float64)
+    held = result.holdings.contents.polygons
+    large = np.isinf(held.totals.width)
+    return np.bincount(held.cell[large], minlength=len(result.tree))[result.nodes].astype(np.float64)
 
 
 class _Facets:
-    """Expected facets of the cells of a refinement as proxies."""
+    """Expected polygons and facets of a refinement."""
 
     def __init__(self, flora: Flora, result: Refinement, camera: Camera) -> None:
-        contents, coarse = result.contents, coarseness(result)
-        index = np.zeros(len(result.tree), np.int64)
-        index[result.nodes] = np.arange(len(result.nodes))
-        self.number = len(result.nodes)
-        self.plants = [
-            (subplant_facet_sizes(flora, contents, camera, coarse), index[contents.subplants.cell]),
-            (piece_facet_sizes(flora, contents, camera, coarse), index[contents.pieces.cell]),
-        ]
-        self.polygons = polygon_facet_sizes(contents, camera, result.chosen(Decision.HIDDEN))
-        self.polygon_cell = index[contents.polygons.cell]
+        portions = Sight(flora, result, camera).portions()
+        some = portions.visibility > 0
+        self.flora, self.camera, self.portions = flora, camera, portions.take(np.flatnonzero(some))
+        self.sizes = sizes_of(flora, self.portions, camera)
+        self.unseen_sizes = sizes_of(flora, portions.take(np.flatnonzero(~some)), camera)
+        held = result.holdings.contents.polygons
+        hidden = result.chosen(Decision.HIDDEN)
+        self.hidden = hidden[held.cell] | ~result.in_view[held.cell]
+        self.explicit = result.chosen(Decision.EXPLICIT)[held.cell]
+        self.polygons = polygon_facet_sizes(result.holdings.contents, camera, hidden)
 
-    def by_cell(self, pixels: float, weight: float = 1.0) -> NDArray[np.float64]:
-        """Facets (cells,), each counted with a weight, where those that are seen have so many pixels."""
-        made = sum(np.bincount(cell, sizes.counts(pixels), self.number) for sizes, cell in self.plants)
-        kept, counts = self.polygons.kept(pixels), self.polygons.counts(pixels)
-        return weight * made + np.bincount(self.polygon_cell, np.where(kept, 1.0, weight) * counts, self.number)
+    def seen(self, pixels: float, limit: float, weight: float) -> float:
+        """Polygons, and facets counted with a weight, of all that is seen."""
+        transition = Transition(self.flora, self.camera, limit)
+        branches, totals = self.portions.parts.branches, self.portions.parts.totals
+        real = np.where(self.portions.real, transition.of_branches(branches, self.portions.visibility), 0.0)
+        facets = weight * self.sizes.counts(FacetPixels(pixels))
+        return float((real * totals.polygons + (1.0 - real) * facets).sum()) + self._polygons(pixels, weight, False)
+
+    def unseen(self, pixels: FacetPixels) -> float:
+        """Facets of all that is not seen."""
+        return float(self.unseen_sizes.counts(pixels).sum()) + self._polygons(pixels.seen, 1.0, True)
+
+    def _polygons(self, pixels: float, weight: float, hidden: bool) -> float:
+        kept = self.explicit | self.polygons.kept(pixels)
+        counts = np.where(kept, 1.0, weight * self.polygons.counts(pixels))
+        return float(counts[self.hidden == hidden].sum())
 
 
 def _smallest(fits: Callable[[float], bool]) -> float:

@@ -15,26 +15,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays
 from ..buffers import BLOCK_POLYGONS, PointBuffers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
+from ..growth.axes import axes
 from ..growth.branches import Branches
-from ..proxies.facet_sizes import HIDDEN_LEAVES, coarseness, piece_facet_sizes, subplant_facet_sizes
-from ..proxies.facet_weights import facet_weights
+from ..growth.growth import WholeBranches
+from ..proxies.facet_sizes import HIDDEN_LEAVES, FacetPixels, FacetSizes, piece_facet_sizes, subplant_facet_sizes
+from ..proxies.facet_weights import FacetWeights, facet_weights
 from ..proxies.microsurfaces import Facets, concatenate_facets, kept_out_of_view, piece_facets, subplant_facets
-from ..refinement.contents import Contents
+from ..refinement.contents import piece_totals
 from ..refinement.decisions import Decision
-from ..refinement.descent import OPENED_AT_ONCE
-from ..refinement.loop import SLACK, Refinement
-from ..subplants.pieces import Pieces, chunks, open_subplants
+from ..refinement.loop import Refinement
+from ..subplants.pieces import whole_pieces
 from .plants import Transition
 from .polygons import polygon_facets
+from .portions import MIXED, Portions, Sight, in_chunks
 
 #: Approximate number of facets that are made at a time; thick wood close to the eye is cut into very many.
 FACETS_AT_ONCE = 200_000
-#: Pixels down to which visible sub-plants are opened; the loop does not open smaller ones either.
-DETAIL = SLACK
+#: Pixels, and facets, down to which visible sub-plants are opened for the places of their facets.
+DETAIL, FEW = 4.0, 8.0
 #: Minimum fraction of a facet's area that its sphere covers, where the facet is seen from its edge.
 LEAST_COVER = 0.1
 #: Mean of |cos| over all directions.
@@ -56,7 +57,7 @@ class Parts:
 
 
 def facet_parts(
-    flora: Flora, result: Refinement, camera: Camera, facet_pixels: float, transition: Transition | None = None
+    flora: Flora, result: Refinement, camera: Camera, pixels: FacetPixels, transition: Transition | None = None
 ) -> Iterator[Parts]:
     """Facets of all that is not explicit and of no polygon that is kept as it is; no block is empty.
 
@@ -68,15 +69,15 @@ def facet_parts(
     flora : Flora
     result : Refinement
     camera : Camera
-    facet_pixels : float
-        Side of a facet that is seen, in pixels; see `proxies.facet_sizes` for the others.
+    pixels : FacetPixels
+        Sides of facets, see `proxies.facet_sizes`.
     transition : Transition, optional
         With it, what is too small in explicit tetrahedra gets facets too, and thick wood elsewhere gets none;
         `plants.explicit_blocks` with the same transition makes the rest.
     """
     parts: list[Part] = []
     current = None
-    for species, *made in _facets(flora, result, camera, facet_pixels, transition):
+    for species, *made in _facets(flora, result, camera, pixels, transition):
         full = sum(len(facets) for facets, _ in parts) >= BLOCK_POLYGONS
         if parts and (full or species != current):
             yield Parts(current, tuple(parts))
@@ -89,134 +90,105 @@ def facet_parts(
 
 
 def _facets(
-    flora: Flora, result: Refinement, camera: Camera, facet_pixels: float, transition: Transition | None
+    flora: Flora, result: Refinement, camera: Camera, pixels: FacetPixels, transition: Transition | None
 ) -> Iterator[tuple[int | None, Facets, bool]]:
     """Facets in runs of about `FACETS_AT_ONCE`, species by species."""
-    hidden = result.chosen(Decision.HIDDEN)
-    explicit = result.chosen(Decision.EXPLICIT) if transition else np.zeros(len(result.tree), bool)
-    contents = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN) | explicit)
-    if transition is not None:
-        contents = _in_detail(contents, explicit, result.in_view & ~hidden, transition)
-    weights, coarse = facet_weights(flora), coarseness(result)
-    every = []
-    for held, row, sizes_of, weight_of, make in (
-        (
-            contents.subplants,
-            contents.subplants.items.row,
-            subplant_facet_sizes,
-            weights.of_subplants,
-            _of_subplants,
-        ),
-        (contents.pieces, contents.pieces.items.branches.row, piece_facet_sizes, weights.of_pieces, _of_pieces),
-    ):
-        things, sizes = held.items, sizes_of(flora, contents, camera, coarse)
-        inside, side = result.in_view[held.cell], sizes.sides(facet_pixels)
-        weight = weight_of(row, sizes.whole_optical / np.maximum(side[0], 1e-12) ** 2)
-        wanted = _Wanted(*side, weight, explicit[held.cell], inside & ~sizes.hidden)
-        of_species = flora.rows["species"][row]
-        order = np.argsort(of_species, kind="stable")
-        first = np.searchsorted(of_species[order], np.arange(len(flora.species) + 1))
-        every.append((things, wanted, inside, sizes.counts(facet_pixels) + 1, order, first, make))
+    sight = Sight(flora, result, camera)
+    maker = _Maker(sight, facet_weights(flora), pixels, transition)
+    portions = sight.portions()
+    of_species = flora.rows["species"][portions.parts.branches.row]
     for species in range(len(flora.species)):
-        for things, wanted, inside, expected, order, first, make in every:
-            own = order[first[species] : first[species + 1]]
-            for seen in (True, False):
-                for i in _runs(expected, own[inside[own] & (wanted.seen[own] == seen)]):
-                    yield species, make(flora, transition, things.take(i), wanted.take(i)), seen
-            # Facets beside the view must not reach into the image.
-            for i in _runs(expected, own[~inside[own]]):
-                made = make(flora, transition, things.take(i), wanted.take(i))
-                yield species, kept_out_of_view(made, camera.clearance, HIDDEN_LEAVES**-0.5), False
-    proxies = contents.within(~explicit)
+        own = portions.take(np.flatnonzero(of_species == species))
+        expected = sizes_of(flora, own, camera).counts(pixels) + 1
+        for run in in_chunks(expected, FACETS_AT_ONCE):
+            for facets, seen in maker.facets(own.take(run)):
+                yield species, facets, seen
+    explicit = result.chosen(Decision.EXPLICIT) if transition else np.zeros(len(result.tree), bool)
+    held = result.holdings.contents
+    proxies = held.within(result.chosen(Decision.PROXY, Decision.HIDDEN) & ~explicit)
     if len(proxies.polygons):
-        for facets, seen in polygon_facets(proxies, result, camera, facet_pixels, FACETS_AT_ONCE):
+        for facets, seen in polygon_facets(proxies, result, camera, pixels.seen, FACETS_AT_ONCE):
             yield None, facets, seen
 
 
-def _in_detail(
-    contents: Contents, explicit: NDArray[np.bool_], seen: NDArray[np.bool_], transition: Transition
-) -> Contents:
-    """Contents without what is entirely real, with sub-plants opened where they are seen.
-
-    How far they are opened depends on their own size, not on the tetrahedra that they are in: facets stay the same
-    while the division of space changes. Explicit tetrahedra are not divided as far as others anyway.
-    """
-    flora, camera = transition.flora, transition.camera
-    some, cell = contents.subplants.items, contents.subplants.cell
-    pieces, piece_cell = [contents.pieces.items], [contents.pieces.cell]
-    placed, placed_cell = [], []
-    while len(some):
-        inside = explicit[cell]
-        left = np.flatnonzero(~inside | (transition.of_branches(some) < 1.0))
-        some, cell = some.take(left), cell[left]
-        bound = flora.sampled_bound[some.row]
-        extent = np.maximum(2.0 * bound[:, 0], bound[:, 2] - bound[:, 1]) * some.length
-        large = seen[cell] & (extent > DETAIL * camera.extent_around(some.position))
-        placed.append(some.take(~large))
-        placed_cell.append(cell[~large])
-        below, below_cell, large = [Branches.empty()], [cell[:0]], np.flatnonzero(large)
-        for start in range(0, len(large), OPENED_AT_ONCE):
-            opened = large[start : start + OPENED_AT_ONCE]
-            grown, owner, own, own_owner = open_subplants(flora, some.take(opened))
-            pieces.append(own)
-            piece_cell.append(cell[opened[own_owner]])
-            below.append(grown)
-            below_cell.append(cell[opened[owner]])
-        some, cell = Branches.concatenate(below), np.concatenate(below_cell)
-    made = Contents.of(
-        flora,
-        Branches.concatenate(placed or [Branches.empty()]),
-        np.concatenate(placed_cell or [contents.subplants.cell]),
-        Pieces.concatenate(pieces),
-        np.concatenate(piece_cell),
-    )
-    return replace(made, polygons=contents.polygons)
+def sizes_of(flora: Flora, portions: Portions, camera: Camera) -> FacetSizes:
+    """Sizes of the facets of portions (n,), were they drawn as they are."""
+    parts = portions.parts
+    given = parts.totals, camera, portions.visibility, portions.coarse
+    # A branch alone is placed by its middle; how long its pieces are decides nothing here.
+    sizes = subplant_facet_sizes(flora, parts.branches, *given)
+    sides = flora.rows["sides"][parts.branches.row] * flora.rows["segments"][parts.branches.row]
+    alone = np.sqrt(parts.totals.wood_area / 2 / np.maximum(sides, 1))
+    return replace(sizes, least_wood=np.where(parts.alone, alone, sizes.least_wood))
 
 
 @dataclass(frozen=True)
-class _Wanted(Arrays):
-    """Properties that the facets of sub-plants or pieces (n,) are to have.
+class _Maker:
+    """Makes the facets of parts of plants."""
 
-    ``leaf`` and ``wood`` are the sides of facets, metres; ``weight`` is the fraction of their area that they get.
-    ``explicit`` marks what is in tetrahedra of which polygons are made, and ``seen`` what the camera sees.
-    """
+    sight: Sight
+    weights: FacetWeights
+    pixels: FacetPixels
+    transition: Transition | None
 
-    leaf: NDArray[np.float64]
-    wood: NDArray[np.float64]
-    weight: NDArray[np.float64]
-    explicit: NDArray[np.bool_]
-    seen: NDArray[np.bool_]
+    def facets(self, portions: Portions) -> Iterator[Part]:
+        """Facets of portions, which are opened as far as their places show."""
+        flora, sight, transition = self.sight.flora, self.sight, self.transition
+        bodies = [Portions.empty()]
+        while len(portions):
+            parts, seen = portions.parts, portions.visibility > 0
+            sizes = sizes_of(flora, portions, sight.camera)
+            extent = sight.pixels(portions)
+            mixed = seen & portions.mixed & (extent > MIXED)
+            detail = seen & (extent > DETAIL) & (sizes.counts(self.pixels) > FEW)
+            real, thick = np.zeros((2, len(parts)))
+            if transition is not None:
+                real = np.where(portions.real & seen, transition.of_branches(parts.branches, portions.visibility), 0.0)
+                thick = np.where(seen, transition.of_thickness(parts.branches, portions.visibility), 0.0)
+            open_here = parts.can_open(flora) & (mixed | ((detail | (thick > 0)) & (real < 1.0)))
+            bodies.append(portions.take(np.flatnonzero(parts.alone)))
+            for group in (seen, ~seen & ~portions.beside, portions.beside & ~seen):
+                some = np.flatnonzero(group & ~open_here & ~parts.alone & (real < 1.0))
+                if len(some):
+                    made = self._of_subplants(parts.branches.take(some), sizes.take(some), real[some])
+                    yield self._beside(made, bool(portions.beside[some[0]] and not seen[some[0]])), bool(seen[some[0]])
+            # What is opened for its detail alone keeps one visibility, as its real leaves do.
+            portions = replace(portions, mixed=mixed).take(np.flatnonzero(open_here))
+            portions = sight.opened(portions) if len(portions) else portions
+        every = Portions.concatenate(bodies)
+        seen = every.visibility > 0
+        for group in (seen, ~seen & ~every.beside, every.beside & ~seen):
+            some = every.take(np.flatnonzero(group))
+            if len(some):
+                made = self._of_bodies(some)
+                beside = bool(some.beside[0] and some.visibility[0] <= 0)
+                yield self._beside(made, beside), bool(some.visibility[0] > 0)
 
-    @property
-    def sizes(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Sides of facets of leaves and of wood, and the weight."""
-        return self.leaf, self.wood, self.weight
+    def _beside(self, facets: Facets, beside: bool) -> Facets:
+        """Facets beside the view must not reach into the image."""
+        return kept_out_of_view(facets, self.sight.camera.clearance, HIDDEN_LEAVES**-0.5) if beside else facets
 
+    def _of_subplants(self, subplants: Branches, sizes: FacetSizes, real: NDArray[np.float64]) -> Facets:
+        leaf, wood = sizes.sides(self.pixels)
+        weight = self.weights.of_subplants(subplants.row, sizes.whole_optical / np.maximum(leaf, 1e-12) ** 2)
+        return subplant_facets(self.sight.flora, subplants, leaf, wood, weight, real)
 
-def _of_subplants(flora: Flora, transition: Transition | None, subplants: Branches, wanted: _Wanted) -> Facets:
-    """Facets of sub-plants; of those in explicit tetrahedra, what is too small to be real."""
-    if not wanted.explicit.any():
-        return subplant_facets(flora, subplants, *wanted.sizes)
-    real = np.where(wanted.explicit, transition.of_branches(subplants), 0.0)
-    some = np.flatnonzero(real < 1.0)
-    return subplant_facets(flora, subplants.take(some), *wanted.take(some).sizes, real[some])
-
-
-def _of_pieces(flora: Flora, transition: Transition | None, pieces: Pieces, wanted: _Wanted) -> Facets:
-    """Facets of pieces; without thick wood, which is real wherever it is seen."""
-    if transition is None:
-        return piece_facets(flora, pieces, *wanted.sizes)
-    real = np.where(wanted.explicit, transition.of_branches(pieces.branches), 0.0)
-    bare = wanted.seen & transition.of_wood(pieces, among_leaves=False)
-    tubes = np.where(wanted.explicit, transition.of_wood(pieces), bare)
-    some = np.flatnonzero(~tubes | (real < 1.0))
-    return piece_facets(flora, pieces.take(some), *wanted.take(some).sizes, real[some], tubes[some])
-
-
-def _runs(expected: NDArray[np.float64], chosen: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
-    """Chosen things (m,) in runs of about `FACETS_AT_ONCE` expected facets."""
-    for run in chunks(expected[chosen], FACETS_AT_ONCE):
-        yield chosen[run]
+    def _of_bodies(self, portions: Portions) -> Facets:
+        """Facets of branches alone, without wood that is real."""
+        flora, branches, transition = self.sight.flora, portions.parts.branches, self.transition
+        pieces, owner = whole_pieces(flora.rows, WholeBranches(branches, axes(flora.rows, branches)))
+        visibility, coarse = portions.visibility[owner], portions.coarse[owner]
+        sizes = piece_facet_sizes(flora, pieces, piece_totals(flora, pieces), self.sight.camera, visibility, coarse)
+        leaf, wood = sizes.sides(self.pixels)
+        weight = self.weights.of_pieces(pieces.branches.row, sizes.whole_optical / np.maximum(leaf, 1e-12) ** 2)
+        real = tubes = None
+        if transition is not None:
+            seen = portions.visibility > 0
+            real = np.where(portions.real & seen, transition.of_branches(branches, portions.visibility), 0.0)
+            among, bare = (transition.of_wood(branches, portions.visibility, leaves) for leaves in (True, False))
+            tubes = (seen & np.where(real > 0, among, bare))[owner]
+            real = real[owner]
+        return piece_facets(flora, pieces, leaf, wood, weight, real, tubes)
 
 
 def spheres(parts: Sequence[tuple[Facets, bool]], camera: Camera, disc: float = np.pi) -> PointBuffers:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..buffers import MeshBuffers, PointBuffers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
+from ..proxies.facet_sizes import FacetPixels
 from ..proxies.microsurfaces import Facets, concatenate_facets, facet_mesh
 from ..refinement.loop import Refinement
 from .budget import BYTES_PER_POLYGON, BYTES_PER_SPHERE
@@ -34,8 +35,8 @@ class Refined:
     flora : Flora
     refinement : Refinement
     camera : Camera
-    facet_pixels : float or None
-        Side of facets and spheres, pixels; None in forms that have none.
+    pixels : FacetPixels or None
+        Sides of facets and spheres; None in forms that have none.
     transition : Transition or None
         As for `plants.explicit_blocks`; None in forms without facets.
     disc : float
@@ -45,13 +46,18 @@ class Refined:
     flora: Flora
     refinement: Refinement
     camera: Camera
-    facet_pixels: float | None = None
+    pixels: FacetPixels | None = None
     transition: Transition | None = None
     disc: float = np.pi
 
+    @property
+    def facet_pixels(self) -> float | None:
+        """Side in pixels of facets that are seen; None in forms that have none."""
+        return None if self.pixels is None else self.pixels.seen
+
     def facet_parts(self) -> Iterator[Parts]:
         """Facets of the proxies, block by block."""
-        return facet_parts(self.flora, self.refinement, self.camera, self.facet_pixels, self.transition)
+        return facet_parts(self.flora, self.refinement, self.camera, self.pixels, self.transition)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ Wood goes by its own width or that of its leaves, whichever is larger: a trunk i
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,20 +22,22 @@ from numpy.typing import NDArray
 from ..buffers import BLOCK_POLYGONS, MeshBuffers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
+from ..growth.axes import axes
 from ..growth.branches import Branches
 from ..growth.growth import WholeBranches, trunks
 from ..growth.hashing import Draw, uniform
 from ..growth.seeds import Seeds
-from ..refinement.contents import Contents
-from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 from ..species.species import LEAF_KINDS
 from ..subplants.leaf_meshes import leaf_meshes
 from ..subplants.pieces import Pieces, chunks, expand
 from ..subplants.tubes import tube_buffers
+from .portions import MIXED, Portions, Sight, in_chunks
 
 #: Width from which on all leaves are real over the width up to which none is.
 BAND = 2.5
+#: Power of the visibility by which the width of things counts as smaller.
+FADING = 0.5
 
 
 @dataclass(frozen=True)
@@ -47,36 +49,40 @@ class Transition:
     flora : Flora
     camera : Camera
     limit : float
-        Width in pixels up to which leaves are facets.
+        Width in pixels up to which leaves are facets, where nothing hides them. What is hidden in part counts as
+        smaller: the roots of its visibility.
     """
 
     flora: Flora
     camera: Camera
     limit: float
 
-    def fraction(self, width: NDArray[np.float64], position: NDArray[np.float64]) -> NDArray[np.float64]:
+    def fraction(
+        self, width: NDArray[np.float64], position: NDArray[np.float64], visibility: NDArray[np.float64] | float = 1.0
+    ) -> NDArray[np.float64]:
         """Real fraction (n,) of things of a width (n,) in metres at places (n, 3): a smooth step in the logarithm."""
-        pixels = width / np.maximum(self.camera.extent_around(position), 1e-300)
+        pixels = width / np.maximum(self.camera.extent_around(position), 1e-300) * visibility**FADING
         place = np.log(np.maximum(pixels, 1e-300) / self.limit) / np.log(BAND)
         place = np.clip(place, 0.0, 1.0)
         return place * place * (3.0 - 2.0 * place)
 
-    def of_branches(self, branches: Branches) -> NDArray[np.float64]:
+    def of_branches(self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0) -> NDArray[np.float64]:
         """Real fraction (n,) of the leaves and the wood of sub-plants; of leafless ones by the base of their branch."""
-        return self.fraction(self._width(branches), branches.position)
+        return self.fraction(self._width(branches), branches.position, visibility)
 
-    def of_wood(self, pieces: Pieces, among_leaves: bool = True) -> NDArray[np.bool_]:
-        """Pieces (n,) whose wood is real, by its own width or also by that of the leaves on the branch."""
-        return self._kept(pieces.branches, (pieces.start + pieces.end) / 2.0, among_leaves)
+    def of_wood(
+        self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0, among_leaves: bool = True
+    ) -> NDArray[np.bool_]:
+        """Branches (n,) whose wood is real, by its own width or also by that of the leaves on the branch."""
+        return uniform(branches.key, Draw.TRANSITION) < self.of_thickness(branches, visibility, among_leaves)
 
-    def of_twigs(self, branches: Branches) -> NDArray[np.bool_]:
-        """Whole branches (n,) whose wood is real."""
-        return self._kept(branches, branches.position, among_leaves=True)
-
-    def _kept(self, branches: Branches, position: NDArray[np.float64], among_leaves: bool) -> NDArray[np.bool_]:
+    def of_thickness(
+        self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0, among_leaves: bool = False
+    ) -> NDArray[np.float64]:
+        """Fraction (n,) of branches like these whose wood is real."""
         own = 2.0 * branches.radius
         width = np.maximum(own, self._width(branches)) if among_leaves else own
-        return uniform(branches.key, Draw.TRANSITION) < self.fraction(width, position)
+        return self.fraction(width, branches.position, visibility)
 
     def _width(self, branches: Branches) -> NDArray[np.float64]:
         row = branches.row
@@ -110,38 +116,72 @@ class Block:
     fraction: float
 
 
-def explicit_blocks(flora: Flora, result: Refinement, transition: Transition | None = None) -> Iterator[Block]:
-    """Polygons of all explicit tetrahedra, and thick wood of those that are drawn as proxies.
+def explicit_blocks(
+    flora: Flora, result: Refinement, camera: Camera, transition: Transition | None = None
+) -> Iterator[Block]:
+    """Polygons of explicit tetrahedra, and thick wood of all that is seen, in blocks from front to back.
 
-    With a transition, small leaves are left to facets, by a random number of each leaf.
+    With a transition, small leaves are left to facets, by a random number of each leaf. Without, everything that lies
+    in explicit tetrahedra for the most part is polygons.
     """
-    explicit = result.decision == Decision.EXPLICIT
-    nodes, rank, polygons = result.nodes, result.rank, np.where(explicit, result.totals.polygons, 0.0)
-    wood = Contents() if transition is None else _thick_wood(result, transition)
-    number_of = np.full(len(result.tree), -1, dtype=np.int64)
-    number_of[nodes] = np.arange(len(nodes))
-    tubes = np.bincount(number_of[wood.pieces.cell], flora.rows["sides"][wood.pieces.items.branches.row], len(nodes))
-    polygons = polygons + tubes
-    order = np.argsort(rank, kind="stable")
-    order = order[explicit[order] | (tubes[order] > 0)]
-    block_of_node = np.full(len(result.tree), -1, dtype=np.int64)
-    runs = list(chunks(polygons[order], BLOCK_POLYGONS))
-    for number, run in enumerate(runs):
-        block_of_node[nodes[order[run]]] = number
-    contents = result.contents.within(result.chosen(Decision.EXPLICIT))
-    of_subplant, of_piece = block_of_node[contents.subplants.cell], block_of_node[contents.pieces.cell]
-    of_wood = block_of_node[wood.pieces.cell]
-    for number in range(len(runs)):
-        cut = contents.pieces.items.take(of_piece == number)
-        whole = contents.subplants.items.take(of_subplant == number)
-        bare = wood.pieces.items.take(of_wood == number)
-        yield from _block(flora, cut, list(expand(flora, whole)), number, (number + 1) / len(runs), bare, transition)
+    sight = Sight(flora, result, camera, facets=transition is not None)
+    portions = sight.portions()
+    portions = portions.take(np.flatnonzero(_may_be_real(portions, transition)))
+    expected = portions.parts.totals.polygons
+    done, whole = np.cumsum(expected), max(float(expected.sum()), 1.0)
+    for number, run in enumerate(in_chunks(expected, BLOCK_POLYGONS)):
+        fraction = float(done[run[-1]]) / whole if len(run) else 1.0
+        yield from _block(flora, *_real_parts(sight, portions.take(run), transition), number, fraction, transition)
 
 
-def _thick_wood(result: Refinement, transition: Transition) -> Contents:
-    """Pieces of branches that are wide enough to be seen where all else is drawn as proxies."""
-    contents = result.contents.within(result.chosen(Decision.PROXY) & result.in_view)
-    return Contents(pieces=contents.pieces.take(transition.of_wood(contents.pieces.items, among_leaves=False)))
+def _may_be_real(portions: Portions, transition: Transition | None) -> NDArray[np.bool_]:
+    """Portions (n,) of which leaves or wood may be polygons."""
+    if transition is None:
+        return portions.real
+    branches, seen = portions.parts.branches, portions.visibility > 0
+    # What is seen here and there is seen better in places.
+    best = np.where(portions.mixed, 1.0, portions.visibility)
+    leaves = portions.real & (transition.of_branches(branches, best) > 0)
+    return seen & (leaves | (transition.of_thickness(branches, best) > 0))
+
+
+def _real_parts(
+    sight: Sight, portions: Portions, transition: Transition | None
+) -> tuple[list[WholeBranches], WholeBranches | None, NDArray[np.float64]]:
+    """Branches with all that is to be real of them, branches of which only the wood is, and visibilities.
+
+    The ``plant`` of branches is their place among the visibilities.
+    """
+    flora = sight.flora
+    full, bodies, bare, visibility, count = [], [], [], [np.zeros(0)], 0
+    while len(portions):
+        parts = portions.parts
+        open_here = parts.can_open(flora) & portions.mixed & (sight.pixels(portions) > MIXED)
+        if transition is None:
+            real, wood = portions.real & (portions.visibility >= 0.5), np.zeros(len(parts), bool)
+        else:
+            real = portions.real & (transition.of_branches(parts.branches, portions.visibility) > 0)
+            wood = ~real & (transition.of_thickness(parts.branches, portions.visibility) > 0)
+        # A sub-plant with small leaves may grow on a thick branch.
+        open_here |= wood & parts.can_open(flora)
+        ready = ~open_here & (real | wood)
+        at = np.flatnonzero(ready)
+        own = parts.branches.take(at)
+        own = replace(own, plant=np.arange(count, count + len(at), dtype=np.int32))
+        visibility.append(portions.visibility[at])
+        count += len(at)
+        alone, only_wood = parts.alone[at], wood[at]
+        full.append(own.take(np.flatnonzero(~alone & ~only_wood)))
+        bodies.append(own.take(np.flatnonzero(alone & ~only_wood)))
+        bare.append(own.take(np.flatnonzero(alone & only_wood)))
+        portions = sight.opened(portions.take(np.flatnonzero(open_here)))
+        portions = portions.take(np.flatnonzero(_may_be_real(portions, transition)))
+    made = list(expand(flora, Branches.concatenate(full)))
+    bodies, bare = (Branches.concatenate(some) for some in (bodies, bare))
+    if len(bodies):
+        made.append(WholeBranches(bodies, axes(flora.rows, bodies)))
+    thin = WholeBranches(bare, axes(flora.rows, bare)) if len(bare) else None
+    return made, thin, np.concatenate(visibility)
 
 
 def expanded_blocks(flora: Flora, seeds: Seeds) -> Iterator[Block]:
@@ -150,37 +190,41 @@ def expanded_blocks(flora: Flora, seeds: Seeds) -> Iterator[Block]:
     runs = list(chunks(flora.polygons[plants.row], BLOCK_POLYGONS))
     for number, run in enumerate(runs):
         whole = list(expand(flora, plants.take(run)))
-        yield from _block(flora, Pieces.empty(), whole, number, (number + 1) / len(runs))
+        yield from _block(flora, whole, None, np.zeros(0), number, (number + 1) / len(runs))
 
 
 def _block(
     flora: Flora,
-    pieces: Pieces,
     branches: list[WholeBranches],
+    bare: WholeBranches | None,
+    visibility: NDArray[np.float64],
     number: int,
     fraction: float,
-    bare: Pieces | None = None,
     transition: Transition | None = None,
 ) -> Iterator[Block]:
-    """Meshes of pieces and branches of any species, and of the wood alone of ``bare`` pieces."""
-    bare = Pieces.empty() if bare is None else bare
-    of_pieces, of_bare = flora.species_of(pieces.branches.row), flora.species_of(bare.branches.row)
+    """Meshes of branches of any species, and of the wood alone of ``bare`` ones."""
     of_branches = [flora.species_of(some.branches.row) for some in branches]
-    fraction_of = None if transition is None else transition.of_branches
+    of_bare = np.zeros(0, int) if bare is None else flora.species_of(bare.branches.row)
+
+    def fraction_of(some: Branches) -> NDArray[np.float64]:
+        return transition.of_branches(some, visibility[some.plant])
+
     made: list[tuple[str, int, int, MeshBuffers | None]] = []
-    for s in np.unique(np.concatenate([of_pieces, of_bare, *of_branches])):
-        cut = pieces.take(of_pieces == s)
-        whole = [some.take(species == s) for some, species in zip(branches, of_branches, strict=True)]
-        leaves = leaf_meshes(flora, cut, int(s), whole, fraction_of)
+    for s in np.unique(np.concatenate([np.zeros(0, int), of_bare, *of_branches])):
+        whole = [some.take(np.flatnonzero(kind == s)) for some, kind in zip(branches, of_branches, strict=True)]
+        leaves = leaf_meshes(flora, Pieces.empty(), int(s), whole, None if transition is None else fraction_of)
         made += [(LEAF_KINDS[m.kind], m.form, int(s), m.buffers) for m in leaves]
         if transition is not None:
-            cut = cut.take(transition.of_wood(cut))
-            whole = [some.take(transition.of_twigs(some.branches)) for some in whole]
-        cut = Pieces.concatenate([cut, bare.take(of_bare == s)])
-        made.append(("bark", 0, int(s), tube_buffers(flora, cut, whole)))
-        del cut, whole
+            kept = (transition.of_wood(some.branches, visibility[some.branches.plant]) for some in whole)
+            whole = [some.take(np.flatnonzero(wood)) for some, wood in zip(whole, kept, strict=True)]
+        if bare is not None:
+            own = bare.take(np.flatnonzero(of_bare == s))
+            keep = transition.of_wood(own.branches, visibility[own.branches.plant], among_leaves=False)
+            whole.append(own.take(np.flatnonzero(keep)))
+        made.append(("bark", 0, int(s), tube_buffers(flora, Pieces.empty(), whole)))
+        del whole
     # The caller copies each block into Blender; meanwhile its sources and the blocks already taken are not kept.
-    del pieces, branches, bare
+    del branches, bare
     while made:
         kind, form, s, buffers = made.pop(0)
         if buffers is not None:

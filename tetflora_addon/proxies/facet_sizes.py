@@ -14,17 +14,22 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Arrays
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
-from ..refinement.contents import Contents, Held, Totals, bounding_cylinders
+from ..growth.branches import Branches
+from ..refinement.contents import Contents, Totals, bounding_cylinders
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
+from ..subplants.pieces import Pieces
 
 #: How much larger facets of hidden tetrahedra are: where the optical depth in front just hides them, and at most, in
 #: proportion to the depth. For the depth alone they are never wider than so many pixels: some of what is deeply hidden
 #: shows between crowns after all, and would be blots where a budget makes facets large.
 COARSE, COARSEST = 3.0, 9.0
 _WIDEST = 3.0
+#: Power of the visibility by which facets are larger where they are seen in part, and the visibility that counts least.
+FADING, LEAST_VISIBILITY = 0.5, 0.05
 _HIDING_DEPTH = 4.0  # e^−4 = .02 is left
 #: Side of facets per metre from the view: the sun is .0093 radians wide, so their shadows are half as soft as large.
 _SOFT = 0.02
@@ -37,8 +42,16 @@ HIDDEN_FACES = 4
 
 
 @dataclass(frozen=True)
-class FacetSizes:
-    """What determines sizes and numbers of facets of sub-plants or pieces.
+class FacetPixels:
+    """Sides of facets: in pixels where they are seen, and what multiplies those of hidden ones."""
+
+    seen: float
+    hidden: float = 1.0
+
+
+@dataclass(frozen=True)
+class FacetSizes(Arrays):
+    """What determines sizes and numbers of facets of parts of plants.
 
     Attributes
     ----------
@@ -48,8 +61,10 @@ class FacetSizes:
         Area of a leaf, m².
     least_wood : (n,) float64
         Side of facets that are as many as the faces of the wood, metres.
+    visibility : (n,) float64
+        Fraction of light that nothing in front blocks; 0 where nothing is seen.
     coarse : (n,) float64
-        How much larger than seen ones facets are; 1 where they are seen.
+        How much larger than seen ones facets are where nothing is seen.
     clearance : (n,) float64
         Metres from the space that the image shows; negative within.
     totals : Totals of n
@@ -60,6 +75,7 @@ class FacetSizes:
     extent: NDArray[np.float64]
     one_leaf: NDArray[np.float64]
     least_wood: NDArray[np.float64]
+    visibility: NDArray[np.float64]
     coarse: NDArray[np.float64]
     clearance: NDArray[np.float64]
     totals: Totals
@@ -68,25 +84,27 @@ class FacetSizes:
     @property
     def hidden(self) -> NDArray[np.bool_]:
         """Things (n,) that are not seen."""
-        return self.coarse > 1.0
+        return self.visibility <= 0.0
 
     @property
     def whole_optical(self) -> NDArray[np.float64]:
         """Optical area (n,) of the whole of which each is a part, m²."""
         return self.totals.optical_area / np.maximum(self.part, 1e-12)
 
-    def sides(self, pixels: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Sides (n,), (n,) of facets of leaves and of wood, metres, where those that are seen have so many pixels."""
-        side = np.minimum(self.coarse * pixels, max(COARSE * pixels, _WIDEST)) * self.extent
+    def sides(self, pixels: FacetPixels) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Sides (n,), (n,) of facets of leaves and of wood, metres."""
+        fading = np.maximum(self.visibility, LEAST_VISIBILITY) ** -FADING
+        side = fading * pixels.seen * self.extent
+        coarse = np.minimum(self.coarse * pixels.seen, max(COARSE * pixels.seen, _WIDEST)) * self.extent
         blurred = np.minimum(_SOFT * np.maximum(self.clearance, 0.0), np.sqrt(self.totals.optical_area / _FEWEST))
-        unseen = np.maximum(blurred, np.sqrt(HIDDEN_LEAVES * self.one_leaf))
-        side = np.where(self.hidden, np.maximum(side, unseen), side)
+        unseen = np.maximum(np.maximum(coarse, blurred), np.sqrt(HIDDEN_LEAVES * self.one_leaf))
+        side = np.where(self.hidden, pixels.hidden * unseen, side)
         # Hidden wood is cut into no more facets than it has faces. Elsewhere it is cut as fine as the side requires, or
         # thin twigs would become blots.
         wood = np.where(self.hidden, np.maximum(side, self.least_wood), side)
         return np.maximum(side, np.sqrt(self.one_leaf)), wood
 
-    def counts(self, pixels: float) -> NDArray[np.float64]:
+    def counts(self, pixels: FacetPixels) -> NDArray[np.float64]:
         """Expected number (n,) of facets."""
         leaf, wood = self.sides(pixels)
         # Branches are closed: half of their surface is never seen.
@@ -162,23 +180,34 @@ def polygon_facet_sizes(contents: Contents, camera: Camera, hidden: NDArray[np.b
     )
 
 
-def subplant_facet_sizes(flora: Flora, contents: Contents, camera: Camera, coarse: NDArray[np.float64]) -> FacetSizes:
-    """Facets of the sub-plants of contents; ``coarse`` (nodes,) as `coarseness` gives it."""
-    held, own = contents.subplants, contents.subplants.items
+def subplant_facet_sizes(
+    flora: Flora, own: Branches, totals: Totals, camera: Camera, visibility: NDArray, coarse: NDArray
+) -> FacetSizes:
+    """Facets of sub-plants (n,) of given totals (n,), visibility (n,) and coarseness (n,) where that is 0."""
     place, faces = bounding_cylinders(flora, own)[0], flora.branch_faces(own)
-    return _facet_sizes(held, place, flora.one_leaf_area(own), faces, np.ones(len(own)), camera, coarse)
+    one = np.ones(len(own))
+    return _facet_sizes(totals, place, flora.one_leaf_area(own), faces, one, camera, visibility, coarse)
 
 
-def piece_facet_sizes(flora: Flora, contents: Contents, camera: Camera, coarse: NDArray[np.float64]) -> FacetSizes:
-    """Facets of the pieces of contents; parameters as for `subplant_facet_sizes`."""
-    held, own = contents.pieces, contents.pieces.items
+def piece_facet_sizes(
+    flora: Flora, own: Pieces, totals: Totals, camera: Camera, visibility: NDArray, coarse: NDArray
+) -> FacetSizes:
+    """Facets of pieces (n,); parameters as for `subplant_facet_sizes`."""
     place, faces = (own.start + own.end) / 2, flora.rows["sides"][own.branches.row]
-    return _facet_sizes(held, place, flora.one_leaf_area(own.branches), faces, own.t1 - own.t0, camera, coarse)
+    part = own.t1 - own.t0
+    return _facet_sizes(totals, place, flora.one_leaf_area(own.branches), faces, part, camera, visibility, coarse)
 
 
 def _facet_sizes(
-    held: Held, place: NDArray, one_leaf: NDArray, faces: NDArray, part: NDArray, camera: Camera, coarse: NDArray
+    totals: Totals,
+    place: NDArray,
+    one_leaf: NDArray,
+    faces: NDArray,
+    part: NDArray,
+    camera: Camera,
+    visibility: NDArray,
+    coarse: NDArray,
 ) -> FacetSizes:
-    least = np.sqrt(held.totals.wood_area / 2 / np.maximum(faces, 1))
+    least = np.sqrt(totals.wood_area / 2 / np.maximum(faces, 1))
     extent, away = camera.extent_around(place), camera.clearance(place)
-    return FacetSizes(extent, one_leaf, least, coarse[held.cell], away, held.totals, part)
+    return FacetSizes(extent, one_leaf, least, visibility, coarse, away, totals, part)

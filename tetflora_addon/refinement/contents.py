@@ -240,6 +240,12 @@ class Holdings:
         """Bytes of all arrays, including what was taken out but is not yet dropped."""
         return sum(part.nbytes for part in self._parts)
 
+    def totals(self, chosen: NDArray[np.bool_]) -> list[tuple[Totals, NDArray[np.int32]]]:
+        """Totals of polygons in chosen nodes, a mask (nodes,), and their nodes; one pair for each part."""
+        held = [part.polygons for part in self._parts]
+        some = [kind.take(chosen[np.maximum(kind.cell, 0)] & (kind.cell >= 0)) for kind in held]
+        return [(kind.totals, kind.cell) for kind in some]
+
     def put(self, contents: Contents) -> None:
         """Add contents."""
         self._parts.append(contents)

@@ -9,17 +9,12 @@ the alpha buffer shows in the image: what reaches beyond a plane by less than su
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import gathered
-from ..compiled.flora import Flora
-from ..growth.branches import Branches
-from ..subplants.pieces import Pieces, clipped, open_subplants
-from ..subplants.sides import body_distances, bounding_bodies, crossing, sampled_bodies
 from ..tetrahedra.tree import TetrahedralTree
 from .contents import Contents, Held, polygon_totals
 from .polygons import Polygons, area_fractions
@@ -84,118 +79,12 @@ def cut(
     return np.concatenate([owner[stays], owner[from_]]), np.concatenate([larger, side]), parts
 
 
-def push_down(flora: Flora, tree: TetrahedralTree, contents: Contents, slack: Slack | None = None) -> Contents:
-    """Hand contents of divided nodes on until all lie in terminal ones.
+def push_down(tree: TetrahedralTree, contents: Contents, slack: Slack | None = None) -> Contents:
+    """Hand polygons of divided nodes on until all lie in terminal ones.
 
-    What reaches no further than ``slack`` beyond a plane stays whole; without it everything is exact to the last leaf.
-    Nothing is lost or held twice.
+    What reaches no further than ``slack`` beyond a plane stays whole. Nothing is lost or held twice.
     """
-    placed, placed_cells = [Branches.empty()], [np.zeros(0, np.int32)]
-    loose, loose_cells = [contents.pieces.items], [contents.pieces.cell]
-    subplants, cells = contents.subplants.items, contents.subplants.cell
-    while len(subplants):
-        cells, opened = _lowered(flora, tree, subplants, cells, slack)
-        placed.append(subplants.take(~opened))
-        placed_cells.append(cells[~opened])
-        parts, part_cells = [Branches.empty()], [np.zeros(0, np.int32)]
-        for chosen in _alike(flora, subplants, np.flatnonzero(opened)):
-            grown, owner, pieces, piece_owner = open_subplants(flora, subplants.take(chosen))
-            parts.append(grown)
-            part_cells.append(cells[chosen[owner]])
-            loose.append(pieces)
-            loose_cells.append(cells[chosen[piece_owner]])
-        subplants, cells = Branches.concatenate(parts), np.concatenate(part_cells)
-    pieces, piece_cells = _push_down_pieces(tree, Pieces.concatenate(loose), np.concatenate(loose_cells), slack)
-    plants = Contents.of(flora, Branches.concatenate(placed), np.concatenate(placed_cells), pieces, piece_cells)
-    return replace(plants, polygons=_push_down_polygons(tree, contents.polygons, slack))
-
-
-def _lowered(
-    flora: Flora, tree: TetrahedralTree, subplants: Branches, cells: NDArray, slack: Slack | None
-) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-    """Nodes (n,) that sub-plants come down to whole, and whether they cross the planes of these."""
-    cells, crosses = cells.copy(), np.zeros(len(subplants), bool)
-    order = np.argsort(subplants.row, kind="stable")  # tests run row by row
-    for start in range(0, len(order), LOWERED_AT_ONCE):
-        some = order[start : start + LOWERED_AT_ONCE]
-        cells[some], crosses[some] = _lowered_together(flora, tree, subplants.take(some), cells[some], slack)
-    return cells, crosses
-
-
-def _lowered_together(
-    flora: Flora, tree: TetrahedralTree, subplants: Branches, cells: NDArray, slack: Slack | None
-) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-    crosses = np.zeros(len(subplants), bool)
-    bodies = bounding_bodies(flora, subplants)
-    loose = np.zeros(len(subplants)) if slack is None else slack(bodies[:3].T)
-    sampled = None if slack is None else sampled_bodies(flora, subplants)
-    moving = np.arange(len(subplants))
-    while True:
-        moving = moving[tree.children[cells[moving], 0] >= 0]
-        if len(moving) == 0:
-            return cells, crosses
-        planes = tree.planes(cells[moving])
-        distance, reach = body_distances(np.take(bodies, moving, axis=1), planes)
-        side = (distance > 0).astype(np.int64)
-        whole = np.abs(distance) > reach - loose[moving]
-        unclear = np.flatnonzero(~whole)
-        if sampled is not None and len(unclear):
-            some = moving[unclear]
-            middle, near = body_distances(np.take(sampled, some, axis=1), planes[unclear])
-            small = reach[unclear] <= _SMALL * loose[some]
-            within = small & (np.abs(middle) > near - loose[some])
-            whole[unclear[within]] = True
-            side[unclear[within]] = middle[within] > 0
-            unclear = unclear[~small & (np.abs(middle) > _DEEP * near)]
-        found, base = crossing(flora, subplants.take(moving[unclear]), planes[unclear], loose[moving[unclear]])
-        whole[unclear[~found]] = True
-        side[unclear] = base
-        crosses[moving[~whole]] = True
-        moving, side = moving[whole], side[whole]
-        cells[moving] = tree.children[cells[moving], side]
-
-
-def _alike(flora: Flora, subplants: Branches, chosen: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
-    """Runs of sub-plants whose branches have as many segments: bending takes as long for all as for the most."""
-    segments = flora.rows["segments"][subplants.row[chosen]]
-    for number in np.unique(segments):
-        some = chosen[segments == number]
-        yield from np.split(some, np.arange(OPENED_AT_ONCE, len(some), OPENED_AT_ONCE))
-
-
-def _push_down_pieces(
-    tree: TetrahedralTree, pieces: Pieces, cells: NDArray, slack: Slack | None
-) -> tuple[Pieces, NDArray[np.int32]]:
-    placed, placed_cells = [Pieces.empty()], [np.zeros(0, np.int32)]
-    while len(pieces):
-        cells, cut = cells.copy(), np.zeros(len(pieces), bool)
-        loose = np.zeros(len(pieces)) if slack is None else slack(pieces.start)
-        from_start, from_end = np.zeros((2, len(pieces)))
-        moving = np.arange(len(pieces))
-        while True:
-            moving = moving[tree.children[cells[moving], 0] >= 0]
-            if len(moving) == 0:
-                break
-            plane = tree.planes(cells[moving])
-            start, end = (
-                np.einsum("ni,ni->n", plane[:, :3], gathered(p, moving)) + plane[:, 3]
-                for p in (pieces.start, pieces.end)
-            )
-            whole = (start < 0) == (end < 0)
-            whole |= np.minimum(np.abs(start), np.abs(end)) < loose[moving]
-            crossing_ones = moving[~whole]
-            cut[crossing_ones] = True
-            from_start[crossing_ones], from_end[crossing_ones] = start[~whole], end[~whole]
-            moving, side = moving[whole], (start[whole] + end[whole] >= 0).astype(np.int64)
-            cells[moving] = tree.children[cells[moving], side]
-        placed.append(pieces.take(~cut))
-        placed_cells.append(cells[~cut])
-        children = tree.children[cells[cut]]
-        lower, upper = clipped(pieces.take(cut), from_start[cut], from_end[cut])
-        first, every = (from_start[cut] >= 0).astype(np.int64), np.arange(len(children))
-        pieces = Pieces.concatenate([lower, upper])
-        cells = np.concatenate([children[every, first], children[every, 1 - first]])
-    return Pieces.concatenate(placed), np.concatenate(placed_cells)
+    return replace(contents, polygons=_push_down_polygons(tree, contents.polygons, slack))
 
 
 def _push_down_polygons(tree: TetrahedralTree, held: Held[Polygons], slack: Slack | None) -> Held[Polygons]:

@@ -17,13 +17,15 @@ from ..camera.camera import Camera
 from ..camera.silhouette import expected_pixels
 from ..compiled.flora import Flora
 from ..growth.seeds import Seeds
+from ..tetrahedra.geometry import squared_edges
 from ..tetrahedra.tree import TetrahedralTree
-from .contents import Contents, Holdings, Totals, large_polygons
+from .contents import Contents, Holdings, Totals, bounding_box, large_polygons, sums
 from .decisions import Decision, Terminals, decide, gains_nothing, without_splits
 from .descent import Slack, push_down
 from .lights import Light, decide_by_shadows, seen_ground, shadows_of
 from .polygons import Polygons
 from .settings import RefinementSettings
+from .shares import SharedPlants
 from .statistics import Step, Stopwatch
 from .views import buffers_for, is_anchored, pixels_of_buffer, root_for, widened_for
 from .visibility import AlphaBuffer, Buffers
@@ -45,8 +47,10 @@ class Refinement:
     Attributes
     ----------
     tree : TetrahedralTree
+    plants : SharedPlants
+        All plants, shared among terminal nodes.
     holdings : Holdings
-        All plants and polygons, in terminal nodes.
+        All polygons, in terminal nodes.
     cells : Terminals of t
         Terminal nodes that hold something.
     transmittance : (t,) float64
@@ -64,6 +68,7 @@ class Refinement:
     """
 
     tree: TetrahedralTree
+    plants: SharedPlants
     holdings: Holdings
     cells: Terminals
     transmittance: NDArray[np.float64]
@@ -85,8 +90,9 @@ class Refinement:
 
     @property
     def contents(self) -> Contents:
-        """All plants, in terminal nodes."""
-        return self.holdings.contents
+        """All plants and polygons, in terminal nodes: a copy, with a sub-plant for each node that it is shared by."""
+        subplants, bodies = self.plants.held(len(self.tree))
+        return Contents(subplants, bodies, self.holdings.contents.polygons)
 
     @property
     def in_view(self) -> NDArray[np.bool_]:
@@ -134,21 +140,21 @@ def refine(
         Whose shadows of what is hidden are refined if ``settings.shadow_cutoff`` is above 0.
     """
     clock = Stopwatch()
-    contents = Contents.of_plants(flora, seeds)
-    camera = widened_for(camera, settings.margin, flora, contents.subplants.items, polygons)
+    plants = SharedPlants(flora, seeds, camera)
+    camera = widened_for(camera, settings.margin, flora, plants.parts.branches, polygons)
     slack = _slack(camera, settings.visibility_resolution)
-    if polygons is not None:
-        contents = Contents.joined([contents, Contents.of_polygons(polygons, large_polygons(polygons, camera))])
-    tree = root_for(camera, settings, contents.bounding_box(flora))
-    new = push_down(flora, tree, contents, slack)
-    holdings = Holdings(new)
+    own = Contents() if polygons is None else Contents.of_polygons(polygons, large_polygons(polygons, camera))
+    tree = root_for(camera, settings, _bounds(flora, plants, polygons))
+    holdings = Holdings(push_down(tree, own, slack))
+    divided = np.arange(len(tree)) == 0
+    plants.update(tree, divided, np.where(divided, np.inf, 0.0))
     clock.lap("update")
     lights = lights if settings.shadow_cutoff > 0.0 else ()
     ground = seen_ground(camera, occluders, _height(seeds, polygons)) if lights else None
     buffers = buffers_for(camera, settings.visibility_resolution, occluders)
     # Generations count from the root's own pieces. Passes do not count: a late one may divide what is still coarse.
     deepest = tree.levels - 1 + settings.max_levels
-    cells, buffer = _drawn(tree, buffers, None, None, *_filled(tree, new))
+    cells, buffer = _drawn(tree, buffers, None, None, *_filled(tree, plants, holdings, np.ones(len(tree), bool)))
     clock.lap("visibility")
     passes = 0
     while True:
@@ -177,22 +183,27 @@ def refine(
             splitting &= ~barred
         clock.lap("refinement")
         ranks, seconds = rank[cells.nodes], dict(clock.seconds)
-        state = Refinement(tree, holdings, cells, transmittance, decision, ranks, passes, not limited, seconds)
+        state = Refinement(tree, plants, holdings, cells, transmittance, decision, ranks, passes, not limited, seconds)
         if not splitting.any():
             return state
         if (yield state):
             as_it_is = np.where(splitting, instead, decision).astype(np.int8)
             return replace(state, decision=as_it_is, complete=False)
-        dividing = np.zeros(len(tree), bool)
-        dividing[cells.nodes[splitting]] = True
+        parents = cells.nodes[splitting]
         fractions = np.where(by_shadow, ALWAYS, transmittance * cells.opacity)[splitting]
-        _split(tree, cells.nodes[splitting], fractions, camera, settings, deepest)
+        _split(tree, parents, fractions, camera, settings, deepest)
         clock.lap("refinement")
-        new = push_down(flora, tree, holdings.take_out(dividing), slack)
+        dividing, edge = np.zeros(len(tree), bool), np.zeros(len(tree))
+        dividing[parents] = True
+        edge[parents] = np.sqrt(squared_edges(tree.vertices(parents)).max(axis=1))
+        new = push_down(tree, holdings.take_out(dividing), slack)
         holdings.put(new)
+        changed = plants.update(tree, dividing, edge)
+        changed[_nodes_of(new)] = True
         clock.lap("update")
-        buffer.remove(dividing)
-        cells, buffer = _drawn(tree, buffers, buffer, cells.take(~splitting), *_filled(tree, new))
+        buffer.remove(changed)
+        kept = cells.take(np.flatnonzero(~changed[cells.nodes]))
+        cells, buffer = _drawn(tree, buffers, buffer, kept, *_filled(tree, plants, holdings, changed))
         clock.lap("visibility")
 
 
@@ -202,9 +213,23 @@ def _height(seeds: Seeds, polygons: Polygons | None) -> float:
     return float(np.median(np.concatenate(heights)))
 
 
-def _filled(tree: TetrahedralTree, new: Contents) -> tuple[NDArray[np.intp], Totals]:
-    """Nodes (n,) that received something, and their totals."""
-    every = new.sums(len(tree))
+def _bounds(flora: Flora, plants: SharedPlants, polygons: Polygons | None) -> NDArray[np.float64]:
+    """Axis-aligned box (2, 3) of all that is there, metres."""
+    boxes = [bounding_box(flora, plants.parts.branches)] if len(plants.parts) else []
+    boxes += [] if polygons is None else [polygons.bounding_box()]
+    return np.stack([np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)])
+
+
+def _nodes_of(contents: Contents) -> NDArray[np.int32]:
+    return contents.polygons.cell
+
+
+def _filled(
+    tree: TetrahedralTree, plants: SharedPlants, holdings: Holdings, changed: NDArray[np.bool_]
+) -> tuple[NDArray[np.intp], Totals]:
+    """Nodes (n,) whose contents have changed and that hold something, and their totals."""
+    found = [plants.totals(changed), *holdings.totals(changed)]
+    every = sums(Totals.concatenate([t for t, _ in found]), np.concatenate([c for _, c in found]), len(tree))
     nodes = np.flatnonzero(every.area > 0)
     return nodes, every.take(nodes)
 
@@ -268,7 +293,7 @@ def step_of(state: Refinement) -> Step:
     """Figures of a state, valid only before the loop goes on."""
     numbers = np.bincount(state.decision, minlength=len(Decision))
     explicit = state.decision == Decision.EXPLICIT
-    subplants, pieces, polygons = state.holdings.sizes
+    alone = state.plants.parts.alone
     return Step(
         tetrahedra_made=int(state.tree.tetrahedra_made),
         levels=int(state.tree.levels),
@@ -276,10 +301,10 @@ def step_of(state: Refinement) -> Step:
         proxy=int(numbers[Decision.PROXY]),
         hidden=int(numbers[Decision.HIDDEN]),
         explicit=int(numbers[Decision.EXPLICIT]),
-        subplants=subplants,
-        pieces=pieces,
-        foreign=polygons,
+        subplants=int((~alone).sum()),
+        pieces=int(alone.sum()),
+        foreign=state.holdings.sizes[2],
         polygons=round(float(state.totals.polygons[explicit].sum())),
         seconds=sum(state.seconds.values()),
-        memory_mb=(state.tree.nbytes + state.holdings.nbytes) / 1e6,
+        memory_mb=(state.tree.nbytes + state.plants.nbytes + state.holdings.nbytes) / 1e6,
     )

@@ -143,7 +143,7 @@ def open_subplants(flora: Flora, subplants: Branches) -> tuple[Branches, NDArray
     Branches, (m,) int64, Pieces, (k,) int64
         Children with the index of the sub-plant that each comes from, and pieces with theirs.
     """
-    whole, body, grown, owner = _opened(flora, subplants)
+    whole, body, grown, owner = open_branches(flora, subplants)
     pieces, piece_owner = whole_pieces(flora.rows, whole)
     return grown, body[owner], pieces, body[piece_owner]
 
@@ -156,11 +156,13 @@ def expand(flora: Flora, subplants: Branches) -> Iterator[WholeBranches]:
     Memory grows with the number of branches; split the sub-plants with `chunks` where there are many.
     """
     while len(subplants):
-        whole, _, subplants, _ = _opened(flora, subplants)
+        whole, _, subplants, _ = open_branches(flora, subplants)
         yield whole
 
 
-def _opened(flora: Flora, subplants: Branches) -> tuple[WholeBranches, NDArray[np.int64], Branches, NDArray[np.int64]]:
+def open_branches(
+    flora: Flora, subplants: Branches
+) -> tuple[WholeBranches, NDArray[np.int64], Branches, NDArray[np.int64]]:
     """Branches of sub-plants with the index of the sub-plant of each, and their children with that of their parent."""
     rows = flora.rows
     phantom = rows["phantom"][subplants.row]

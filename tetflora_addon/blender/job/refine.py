@@ -180,20 +180,21 @@ def _write_refined(
     scene, form, settings = results.scene, form_of(results.scene), refinement_settings(results.scene)
     refinement = yield from _run_loop(flora, given, camera, settings, statistics)
     own = form.emission
-    refinement, facet_pixels = afford(flora, refinement, camera, settings, own.faces, own.primitive_bytes)
+    detail = afford(flora, refinement, camera, settings, own.faces, own.primitive_bytes)
+    refinement = detail.refinement
     clock.lap("refine")
     _count(statistics, refinement)
     refined = Refined(flora, refinement, camera)
     if own.facets:
         yield Progress(_LOOP_FRACTION, "Analyzing leaf clustering")
         facet_weights(flora)
-        transition = Transition(flora, camera, settings.leaf_limit)
-        refined = Refined(flora, refinement, camera, facet_pixels, transition, drawn_disc(scene.render.engine))
+        transition = Transition(flora, camera, detail.leaf_limit)
+        refined = Refined(flora, refinement, camera, detail.pixels, transition, drawn_disc(scene.render.engine))
     results.open()
     baking = None
     if given.sources is not None:
         baking = Baking(given.sources, leaves=scene.tetflora.baked_light == 'ALL')
-    blocks = explicit_blocks(flora, refinement, refined.transition)
+    blocks = explicit_blocks(flora, refinement, camera, refined.transition)
     yield from _write_blocks(results, flora, blocks, statistics, _LOOP_FRACTION, baking)
     if given.explicit is not None:
         blocks = polygon_blocks(refinement, camera, refined.facet_pixels)

@@ -1,0 +1,161 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is seen of each part of a plant, and how far parts are opened before they are drawn.
+
+The loop leaves parts that are shared by several tetrahedra. What lies in hidden ones and beside the view only casts
+shadows and sends light back: few facets stand for it. A part that is seen in some of its tetrahedra and hidden in
+others is opened until its own parts are on one side, or too small to matter. The *visibility* of a part is the
+fraction of its light that reaches the eye; leaves that hardly show become facets earlier, and facets larger, so that
+each draws about as much of the image.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Arrays, column, nested
+from ..camera.camera import Camera
+from ..compiled.flora import Flora
+from ..proxies.facet_sizes import coarseness
+from ..refinement.decisions import Decision
+from ..refinement.loop import Refinement
+from ..refinement.shares import PlantParts, SharePoints, lowered, opened, share_points
+
+#: Pixels from which on a part that is seen only here and there is opened.
+MIXED = 24.0
+#: Points on the leaves of such a part, at most, that tell where it is seen.
+POINTS = 12
+#: Fraction of its area from which on a part counts as seen here and there.
+SOME = 0.05
+
+
+@dataclass(frozen=True)
+class Portions(Arrays):
+    """Parts of plants (n), and what is seen of them.
+
+    Attributes
+    ----------
+    parts : PlantParts of n
+    visibility : (n,) float64
+        Mean fraction of light that nothing in front blocks, 0 where all of it is hidden or beside the view.
+    real : (n,) bool
+        Whether some of it may be drawn as it is: it reaches into an explicit tetrahedron.
+    mixed : (n,) bool
+        Seen in part only.
+    beside : (n,) bool
+        All of it is out of view.
+    coarse : (n,) float64
+        How much larger its facets are where it is hidden, see `facet_sizes.coarseness`.
+    rank : (n,) int32
+        Front-to-back order of the tetrahedra that they begin in.
+    """
+
+    parts: PlantParts = field(metadata=nested(PlantParts))
+    visibility: NDArray[np.float64]
+    real: NDArray[np.bool_] = field(metadata=column(dtype=bool))
+    mixed: NDArray[np.bool_] = field(metadata=column(dtype=bool))
+    beside: NDArray[np.bool_] = field(metadata=column(dtype=bool))
+    coarse: NDArray[np.float64]
+    rank: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
+
+
+class Sight:
+    """What the loop has found for all nodes of the tree, and what that means for parts of plants.
+
+    Parameters
+    ----------
+    flora : Flora
+    result : Refinement
+    camera : Camera
+    facets : bool
+        Whether proxies are facets or spheres. If not, only what is explicit counts as seen: the rest are shells.
+    """
+
+    def __init__(self, flora: Flora, result: Refinement, camera: Camera, facets: bool = True) -> None:
+        self.flora, self.camera, self.tree, self.plants = flora, camera, result.tree, result.plants
+        nodes, explicit = result.nodes, result.decision == Decision.EXPLICIT
+        seen = np.isin(result.decision, (Decision.EXPLICIT, Decision.PROXY)) if facets else explicit
+        size = len(result.tree)
+        self._visibility, self._rank = np.zeros(size), np.zeros(size, np.int32)
+        # What is explicit although it is hidden is so for its shadow.
+        shown = np.where(explicit & (result.transmittance <= 0.0), 1.0, result.transmittance)
+        self._visibility[nodes] = np.where(seen, np.maximum(shown, 1e-3), 0.0)
+        self._rank[nodes] = result.rank
+        self._explicit = result.chosen(Decision.EXPLICIT)
+        self._inside = result.in_view | self._explicit
+        self._coarse = coarseness(result)
+
+    def portions(self) -> Portions:
+        """All parts, front to back."""
+        made = self._portions(self.plants.parts, self.plants.points)
+        branches = made.parts.branches
+        # Ties are broken by the plants themselves, so that their order in the scene does not matter.
+        return made.take(np.lexsort([branches.position[:, 1], branches.position[:, 0], branches.key, made.rank]))
+
+    def _portions(self, parts: PlantParts, points: SharePoints) -> Portions:
+        count, cell = len(parts), points.cell
+        area = points.optical_area.astype(np.float64)
+        total = np.bincount(points.part, area, count)
+        total = np.where(total > 0, total, 1.0)
+
+        def mean(values: NDArray) -> NDArray[np.float64]:
+            return np.bincount(points.part, area * values, count) / total
+
+        visibility = self._visibility[cell]
+        seen = mean(visibility > 0)
+        unseen = np.maximum(1.0 - seen, 1e-12)
+        first = np.full(count, -1, np.int64)
+        first[points.part[::-1]] = np.arange(len(points))[::-1]
+        return Portions(
+            parts,
+            np.where(seen > SOME, mean(visibility), 0.0),
+            mean(self._explicit[cell]) > 0,
+            (seen > SOME) & (seen < 1.0 - SOME),
+            mean(self._inside[cell]) <= 0.0,
+            np.where(seen < 1.0, mean(self._coarse[cell] * (visibility <= 0)) / unseen, 1.0),
+            np.where(first >= 0, self._rank[cell[first]], 0).astype(np.int32),
+        )
+
+    def opened(self, portions: Portions) -> Portions:
+        """Open sub-plants (n,); where their visibility differs from place to place, that of the new parts is found."""
+        parts, points, parent, count = [PlantParts.empty()], [SharePoints.empty()], [np.zeros(0, np.int64)], 0
+        for new, owner, lines in opened(self.flora, portions.parts):
+            unclear = np.flatnonzero(portions.mixed[owner])
+            if len(unclear):
+                some = new.take(unclear)
+                own = share_points(
+                    self.flora, some, self.plants.pixels(some), None if lines is None else lines.take(unclear), POINTS
+                )
+                points.append(SharePoints(unclear[own.part].astype(np.int32) + np.int32(count), *_rest(own)))
+            parts.append(new)
+            parent.append(owner)
+            count += len(new)
+        every, owner, found = PlantParts.concatenate(parts), np.concatenate(parent), SharePoints.concatenate(points)
+        made = Portions(every, *(getattr(portions, name)[owner] for name in _INHERITED))
+        if not len(found):
+            return made
+        known = self._portions(every, SharePoints(found.part, lowered(self.tree, found), *_rest(found)[1:]))
+        mixed = portions.mixed[owner]
+        return Portions(every, *(np.where(mixed, getattr(known, name), getattr(made, name)) for name in _INHERITED))
+
+    def pixels(self, portions: Portions) -> NDArray[np.float64]:
+        """Extent (n,) of parts in the image."""
+        return self.plants.pixels(portions.parts)
+
+
+_INHERITED = ("visibility", "real", "mixed", "beside", "coarse", "rank")
+
+
+def _rest(points: SharePoints) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    return points.cell, points.position, points.leaf, points.wood
+
+
+def in_chunks(expected: NDArray[np.float64], limit: float) -> Iterator[NDArray[np.int64]]:
+    """Things (n,) in runs of about so many expected polygons, opened parts included."""
+    block = (np.cumsum(expected) / limit).astype(np.int64)
+    edges = np.flatnonzero(np.diff(block)) + 1
+    yield from np.split(np.arange(len(expected)), edges)

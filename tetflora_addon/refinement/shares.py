@@ -1,0 +1,306 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Plants as the loop holds them: parts of plants, shared among tetrahedra by points on their leaves and wood.
+
+The paper opens a sub-plant as soon as a plane crosses it (section 6.5). Most of what is so opened is never seen: a
+plane of the first tetrahedra runs through the crowns of a whole forest. Here a sub-plant that crosses planes stays
+whole. Points on it, which stand for equal fractions of its area, go down the tree, and each tetrahedron holds the
+fraction whose points it holds. Only where a tetrahedron is divided that is not much larger than a sub-plant is the
+sub-plant opened: into the branch itself and the sub-plants of the next order, with points of their own. The number of
+points follows the size in the image, so that the work is bounded by what the image shows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Arrays, column, nested, spread
+from ..camera.camera import Camera
+from ..compiled.flora import Flora
+from ..compiled.samples import Points
+from ..growth.axes import Axes
+from ..growth.branches import Branches
+from ..growth.foliage import leaf_start
+from ..growth.growth import radius_at, trunks
+from ..growth.hashing import uniform
+from ..growth.seeds import Seeds
+from ..subplants.pieces import Pieces, open_branches
+from ..tetrahedra.tree import TetrahedralTree
+from .contents import Held, Totals, piece_totals, subplant_totals, sums
+
+#: Sub-plants larger than this many times the longest edge of a tetrahedron that is divided are opened.
+LARGE = 1.0
+#: Pixels along a part for each of its points on leaves; fewest and most of these; points on wood for each of them.
+PIXELS_A_POINT, FEWEST, MOST, WOOD = 6.0, 4, 64, 0.25
+#: Sub-plants that are opened, and points that are lowered, at a time; bounds what that takes to some hundred megabytes.
+OPENED_AT_ONCE, LOWERED_AT_ONCE = 40_000, 1_000_000
+#: Draw of this module: where a part's run of samples starts.
+_START = 221
+
+
+@dataclass(frozen=True)
+class PlantParts(Arrays):
+    """PlantParts of plants (n): sub-plants, and branches without what grows on them.
+
+    Attributes
+    ----------
+    branches : Branches of n
+    alone : (n,) bool
+        Only the branch itself, with the leaves that it bears.
+    totals : Totals of n
+    extent : (n,) float64
+        Longest side, metres.
+    """
+
+    branches: Branches = field(metadata=nested(Branches))
+    alone: NDArray[np.bool_] = field(metadata=column(dtype=bool))
+    totals: Totals = field(metadata=nested(Totals))
+    extent: NDArray[np.float64]
+
+    @classmethod
+    def of_subplants(cls, flora: Flora, branches: Branches) -> PlantParts:
+        """Whole sub-plants (n,)."""
+        bound = flora.sampled_bound[branches.row]
+        extent = np.maximum(2.0 * bound[:, 0], bound[:, 2] - bound[:, 1]) * branches.length
+        return cls(branches, np.zeros(len(branches), bool), subplant_totals(flora, branches), extent)
+
+    @classmethod
+    def of_bodies(cls, flora: Flora, branches: Branches) -> PlantParts:
+        """Branches (n,) without what grows on them."""
+        return cls(branches, np.ones(len(branches), bool), piece_totals(flora, as_pieces(branches)), branches.length)
+
+    def can_open(self, flora: Flora) -> NDArray[np.bool_]:
+        """PlantParts (n,) on which something else grows."""
+        row = self.branches.row
+        return ~self.alone & ((flora.rows["next"][row] >= 0).any(axis=1) | flora.rows["phantom"][row])
+
+
+def as_pieces(branches: Branches) -> Pieces:
+    """Branches (n,) as one piece each, from base to tip as if they were straight."""
+    none = np.zeros(len(branches))
+    tip = branches.position + branches.length[:, None] * branches.frame[:, :, 2]
+    return Pieces(branches, none, none + 1.0, branches.position, tip)
+
+
+@dataclass(frozen=True)
+class SharePoints(Arrays):
+    """Points (m) on parts of plants; each stands for a fraction of its part's area.
+
+    Attributes
+    ----------
+    part : (m,) int32
+    cell : (m,) int32
+        Node of the tree that the point is in.
+    position : (m, 3) float32
+        Metres, world space.
+    leaf, wood : (m,) float32
+        Area that it stands for, m²; one of the two is 0.
+    """
+
+    part: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
+    cell: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
+    position: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
+    leaf: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
+    wood: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
+
+    @property
+    def optical_area(self) -> NDArray[np.float32]:
+        """Area (m,) that can block light, m²."""
+        return self.leaf + self.wood / 2
+
+
+def share_points(
+    flora: Flora, parts: PlantParts, pixels: NDArray[np.float64], lines: Axes | None = None, most: int = MOST
+) -> SharePoints:
+    """Points on parts of plants, all in the root.
+
+    Parameters
+    ----------
+    flora : Flora
+    parts : PlantParts of n
+        Sub-plants, or if ``lines`` are given branches alone.
+    pixels : (n,) float64
+        Extent of the parts in the image.
+    lines : Axes of n, optional
+    most : int
+        Points on the leaves of a part at most.
+    """
+    number = np.ceil(np.clip(pixels / PIXELS_A_POINT, FEWEST, most)).astype(np.int64)
+    made = []
+    for leafy in (True, False):
+        area = parts.totals.leaf_area if leafy else parts.totals.wood_area
+        count = np.where(area > 0, number if leafy else np.ceil(WOOD * number).astype(np.int64), 0)
+        owner, index = spread(count)
+        even = (area / np.maximum(count, 1))[owner]
+        if lines is not None:
+            t = (index + 0.5) / count[owner]
+            if leafy:
+                start = leaf_start(flora.rows, parts.branches)[owner]
+                t = start + (1.0 - start) * t
+            else:  # thicker parts have more of the wood
+                thick = radius_at(flora.rows, parts.branches.take(owner), t)
+                mean = np.bincount(owner, thick, len(parts)) / np.maximum(count, 1)
+                even = even * thick / np.maximum(mean, 1e-300)[owner]
+            position = lines.at(owner, t)[0]
+        else:
+            position = _sampled(flora.samples.leaves if leafy else flora.samples.wood, parts.branches, owner, index)
+        none = np.zeros(len(owner), np.float32)
+        areas = (even.astype(np.float32), none) if leafy else (none, even.astype(np.float32))
+        made.append(SharePoints(owner.astype(np.int32), none.astype(np.int32), position.astype(np.float32), *areas))
+    return SharePoints.concatenate(made)
+
+
+def _sampled(
+    points: Points, branches: Branches, owner: NDArray[np.int64], index: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Places (m, 3) of samples of sub-plants; runs of samples are spread over them."""
+    first, number = points.runs(branches)
+    start = (uniform(branches.key, _START) * number).astype(np.int64)
+    pick = first[owner] + (start[owner] + index) % np.maximum(number[owner], 1)
+    local = points.position[pick] * branches.length[owner, None].astype(np.float32)
+    frame = branches.frame.astype(np.float32)
+    out = np.take(branches.position, owner, axis=0)
+    for axis in range(3):
+        for column_ in range(3):
+            out[:, axis] += np.take(frame[:, axis, column_], owner) * local[:, column_]
+    return out
+
+
+def opened(flora: Flora, parts: PlantParts) -> Iterator[tuple[PlantParts, NDArray[np.int64], Axes | None]]:
+    """Open sub-plants into branches alone and the sub-plants of the next order.
+
+    Yields
+    ------
+    PlantParts of m, (m,) int64, Axes or None
+        Some of the new parts, of one of the two kinds, the part that each comes from, and the axes of branches alone.
+    """
+    segments = flora.rows["segments"][parts.branches.row]
+    for number in np.unique(segments):  # bending takes as long for all as for the most
+        some = np.flatnonzero(segments == number)
+        for chosen in np.split(some, np.arange(OPENED_AT_ONCE, len(some), OPENED_AT_ONCE)):
+            whole, body, grown, parent = open_branches(flora, parts.branches.take(chosen))
+            yield PlantParts.of_bodies(flora, whole.branches), chosen[body], whole.lines
+            if len(grown):
+                yield PlantParts.of_subplants(flora, grown), chosen[body[parent]], None
+
+
+def lowered(tree: TetrahedralTree, points: SharePoints) -> NDArray[np.int32]:
+    """Terminal nodes (m,) that points are in, below those that they are known to be in."""
+    cell = points.cell.copy()
+    every = np.flatnonzero(tree.children[cell, 0] >= 0)
+    for start in range(0, len(every), LOWERED_AT_ONCE):
+        moving = every[start : start + LOWERED_AT_ONCE]
+        place = np.take(points.position, moving, axis=0)
+        while len(moving):
+            at = np.take(cell, moving)
+            plane = tree.planes(at)
+            side = plane[:, 3] + np.einsum("ni,ni->n", plane[:, :3], place) >= 0.0
+            at = tree.children[at, side.astype(np.intp)]
+            cell[moving] = at
+            left = np.flatnonzero(tree.children[at, 0] >= 0)
+            if len(left) < len(moving):
+                moving, place = moving[left], np.take(place, left, axis=0)
+    return cell
+
+
+class SharedPlants:
+    """All plants of a refinement, as parts and the points on them; changes as the tree is divided.
+
+    Parameters
+    ----------
+    flora : Flora
+    seeds : Seeds
+    camera : Camera
+
+    Attributes
+    ----------
+    parts : PlantParts
+    points : SharePoints
+    """
+
+    def __init__(self, flora: Flora, seeds: Seeds, camera: Camera) -> None:
+        self.flora, self.camera = flora, camera
+        self.parts = PlantParts.of_subplants(flora, trunks(flora.rows, seeds)) if len(seeds) else PlantParts.empty()
+        self.points = self._points(self.parts, None) if len(seeds) else SharePoints.empty()
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays."""
+        return self.parts.nbytes + self.points.nbytes
+
+    def pixels(self, parts: PlantParts) -> NDArray[np.float64]:
+        """Extent (n,) of parts in the image."""
+        return parts.extent / self.camera.extent_around(parts.branches.position)
+
+    def update(self, tree: TetrahedralTree, dividing: NDArray[np.bool_], edge: NDArray[np.float64]) -> NDArray:
+        """Hand points in divided nodes on, and open what is large there.
+
+        Parameters
+        ----------
+        tree : TetrahedralTree
+        dividing : (nodes,) bool
+            Nodes that have been divided.
+        edge : (nodes,) float64
+            Their longest edge, metres.
+
+        Returns
+        -------
+        (nodes,) bool
+            Nodes whose contents have changed.
+        """
+        points = self.points
+        changed = dividing.copy()
+        inside = np.flatnonzero(dividing[points.cell])
+        part = points.part[inside]
+        large = self.parts.extent[part] > LARGE * edge[points.cell[inside]]
+        opening = np.zeros(len(self.parts), bool)
+        opening[part[large]] = True
+        opening &= self.parts.can_open(self.flora)
+        if opening.any():
+            gone = opening[points.part]
+            changed[points.cell[gone]] = True
+            self._open(opening, points.take(np.flatnonzero(~gone)))
+        cell = lowered(tree, self.points)
+        changed[cell[cell != self.points.cell]] = True
+        self.points = replace(self.points, cell=cell)
+        return changed
+
+    def _open(self, opening: NDArray[np.bool_], kept_points: SharePoints) -> None:
+        number = np.cumsum(~opening) - 1
+        kept = self.parts.take(np.flatnonzero(~opening))
+        parts, points = [kept], [replace(kept_points, part=number[kept_points.part].astype(np.int32))]
+        count = len(kept)
+        for new, _, lines in opened(self.flora, self.parts.take(np.flatnonzero(opening))):
+            made = self._points(new, lines)
+            points.append(replace(made, part=made.part + np.int32(count)))
+            parts.append(new)
+            count += len(new)
+        self.parts, self.points = PlantParts.concatenate(parts), SharePoints.concatenate(points)
+
+    def _points(self, parts: PlantParts, lines: Axes | None) -> SharePoints:
+        return share_points(self.flora, parts, self.pixels(parts), lines)
+
+    def totals(self, chosen: NDArray[np.bool_]) -> tuple[Totals, NDArray[np.int32]]:
+        """Totals (k,) of points in chosen nodes, a mask (nodes,), and their nodes (k,)."""
+        points = self.points if chosen.all() else self.points.take(np.flatnonzero(chosen[self.points.cell]))
+        whole, part = self.parts.totals, points.part
+        fraction = (points.leaf + points.wood) / np.maximum(whole.area, 1e-300)[part]
+        return Totals(points.leaf, points.wood, whole.polygons[part] * fraction, whole.width[part]), points.cell
+
+    def held(self, nodes: int) -> tuple[Held[Branches], Held[Pieces]]:
+        """Sub-plants and branches alone, once for each node that holds some of them, with the totals of that."""
+        points = self.points
+        pair, row = np.unique(points.part.astype(np.int64) * nodes + points.cell, return_inverse=True)
+        totals, _ = self.totals(np.ones(nodes, bool))
+        found = sums(totals, row, len(pair))
+        part, cell = pair // nodes, (pair % nodes).astype(np.int32)
+        alone = self.parts.alone[part]
+        made = []
+        for chosen in (np.flatnonzero(~alone), np.flatnonzero(alone)):
+            made.append((self.parts.branches.take(part[chosen]), cell[chosen], found.take(chosen)))
+        subplants, bodies = made
+        return Held(*subplants), Held(as_pieces(bodies[0]), *bodies[1:])
