@@ -22,6 +22,7 @@ from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.foliage import leaf_keys, leaf_places, place_leaves
 from tetflora_addon.growth.growth import leaf_counts, trunks
 from tetflora_addon.growth.seeds import Seeds
+from tetflora_addon.proxies.facet_sizes import FacetPixels
 from tetflora_addon.refinement.loop import Refinement
 from tetflora_addon.species.catalogue import builtin_folder, load_species
 from tetflora_addon.species.members import expected_polygons
@@ -238,9 +239,12 @@ def moment(*meshes: MeshBuffers) -> NDArray[np.float64]:
     return scaled.T @ scaled / areas.sum()
 
 
-def facet_buffers(flora: Flora, result: Refinement, camera: Camera, facet_pixels: float = 0.33) -> MeshBuffers | None:
-    """All facets of proxies in one mesh; None where there are none."""
-    return concatenate_buffers(list(facet_blocks(Refined(flora, result, camera, facet_pixels))))
+def facet_buffers(
+    flora: Flora, result: Refinement, camera: Camera, pixels: FacetPixels | float = 0.33
+) -> MeshBuffers | None:
+    """All facets of proxies in one mesh, of given sides in pixels; None where there are none."""
+    sides = pixels if isinstance(pixels, FacetPixels) else FacetPixels(pixels)
+    return concatenate_buffers(list(facet_blocks(Refined(flora, result, camera, sides))))
 
 
 def face_planes(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
