@@ -27,6 +27,7 @@ NAMES = (
     "growth",
     "budget",
     "stages",
+    "forest",
     "foreign",
     "closed_form",
     "fidelity",

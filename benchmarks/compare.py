@@ -12,9 +12,11 @@ import flip_evaluator
 import numpy as np
 from numpy.typing import NDArray
 
+from devtools.formats import set_format
+
 
 def read_picture(path: Path) -> NDArray[np.float32]:
-    """RGBA (height, width, 4) of an 8-bit image as it is stored (sRGB), top row first."""
+    """RGBA (height, width, 4) of an image as it is stored (sRGB if it has 8 bits), top row first."""
     image = bpy.data.images.load(str(path), check_existing=False)
     try:
         image.colorspace_settings.name = "Non-Color"
@@ -71,13 +73,15 @@ def colour_error(reference: NDArray[np.floating], test: NDArray[np.floating], ma
     return float(np.abs(b - a).mean() / a.mean())
 
 
-def render(scene: bpy.types.Scene, path: Path, samples: int, seed: int = 0, engine: str = 'CYCLES') -> None:
-    """Render a frame of a scene without denoising, as an 8-bit PNG; EEVEE knows no seeds."""
+def render(
+    scene: bpy.types.Scene, path: Path, samples: int, seed: int = 0, engine: str = 'CYCLES', form: str = 'PNG'
+) -> None:
+    """Render a frame of a scene without denoising, as an 8-bit PNG or in another format; EEVEE knows no seeds."""
     scene.render.engine = engine
     scene.cycles.samples, scene.cycles.seed = samples, seed
     scene.eevee.taa_render_samples = samples
     scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
-    scene.render.image_settings.file_format = 'PNG'
+    set_format(scene.render.image_settings, form)
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
 

@@ -5,43 +5,138 @@
     python -m benchmarks forest [--quick]          # everything, with targets
     python -m benchmarks.forest birch --no-render  # one case, as a line of JSON
     python -m benchmarks.forest mix --size 480x270 --side 50 --samples 2
+    python -m benchmarks.forest eye --what part    # against expansion, where it can be expanded
+    python -m benchmarks.forest missing            # everything that an earlier run has not left in out/forest
 
-A case is a species, ``mix`` (five species, 5 m apart) or ``eye`` (inside a wood of five species). Each is measured in a
-process of its own, so that the largest memory is its own.
+A case is a species, ``mix`` (five species, 5 m apart), ``eye`` (inside a wood of five species), ``million`` (that of
+the README) or ``light``. Each is measured in a process of its own, so that the largest memory is its own.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import subprocess
 import sys
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 
 from devtools import session
 
+ROOT = Path(__file__).resolve().parent.parent
+#: Left by a run: what each process has measured.
+FOLDER = ROOT / "out" / "forest"
+QUICK_FOLDER = ROOT / "out" / "forest-quick"
+WHATS = ("refine", "instances", "part")
+QUICK = ("birch", "mix")
+#: Samples of timed images, of images that are compared, and where light is measured.
+SAMPLES, COMPARED, LIT = 4, 64, 64
+#: Gigabytes that the process may have.
+LIMITS = (2, 4, 8)
+_LONGEST = 3600  # seconds of one process
+
+TARGETS: dict[str, dict[str, float]] = {
+    "refine_emit_s_max": {"max": 20.0},
+    "peak_mb_max": {"max": 3000.0},
+    "polygons_max": {"max": 6e6},
+    "mix_s": {"max": 15.0},
+    "eye_s": {"max": 15.0},
+    "longest_step_s": {"max": 0.2},
+    "render_ratio_max": {"max": 1.1},
+    "total_ratio_max": {"max": 1.05},
+    "memory_ratio_max": {"max": 2.0},
+    "hidden_open_ratio_max": {"max": 1.0},
+    "flip_mean": {"max": 0.05},
+    "flip_max": {"max": 0.08},
+    "limit_ratio_max": {"max": 1.0},
+    "light_error_max": {"max": 0.02},
+    "million_s": {"max": 60.0},
+    "million_mb": {"max": 6000.0},
+}
+QUICK_TARGETS = {key: TARGETS[key] for key in ("longest_step_s", "hidden_open_ratio_max", "flip_max")}
+
+
+def run(quick: bool) -> dict[str, float]:
+    """Measure; quick: a smaller wood in a smaller image, of birches and of five species."""
+    for path in _folder(quick).glob("*.json"):
+        path.unlink()
+    return measure(quick)
+
+
+def measure(quick: bool) -> dict[str, float]:
+    """Figures of all cases; what an earlier run has left is not measured again."""
+    from .forest_scene import trees
+    from .forest_sums import sums
+
+    cases = QUICK if quick else (*trees(), "mix", "eye")
+    small = ("--size", "480x270", "--side", "60") if quick else ()
+    records = {}
+    for case in cases:
+        for what in WHATS:
+            samples = SAMPLES if what != "part" else COMPARED // (4 if quick else 1)
+            words = ("--what", what, "--samples", str(samples), *small)
+            records[case, what] = _measured(quick, case, *words)
+    if not quick:
+        records["light", "light"] = _measured(quick, "light", "--samples", str(LIT))
+        records["million", "refine"] = _measured(quick, "million", "--no-render")
+        for limit in LIMITS:
+            records["birch", f"limit_{limit}"] = _measured(
+                quick, "birch", "--set", f"max_memory={limit}", "--samples", "1"
+            )
+    return sums(records)
+
+
+def _folder(quick: bool) -> Path:
+    return QUICK_FOLDER if quick else FOLDER
+
+
+def _measured(quick: bool, *words: str) -> dict:
+    """What a process of its own measures, or has measured in an earlier run."""
+    path = _folder(quick) / ("-".join(words).replace("--", "").replace("=", "-") + ".json")
+    if path.exists():
+        return json.loads(path.read_text())
+    command = [sys.executable, "-m", "benchmarks.forest", *words, *(["--quick"] if quick else [])]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=_LONGEST, check=False)
+    if done.returncode:
+        raise RuntimeError(f"{' '.join(words)} failed with {done.returncode}:\n{done.stderr[-2000:]}")
+    line = next(line for line in reversed(done.stdout.splitlines()) if line.startswith("{"))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(line + "\n")
+    print(line, flush=True)
+    return json.loads(line)
+
 
 def one(arguments: argparse.Namespace) -> dict:
     """Measure one case in this process."""
-    import tempfile
-
     import bpy
 
-    from . import forest_case, forest_scene
+    from . import forest_case, forest_instances, forest_light, forest_part, forest_scene
 
-    case = forest_scene.case_of(arguments.case)
-    changes = {"asked": arguments.plants, "side": arguments.side}
-    case = replace(case, **{name: value for name, value in changes.items() if value})
     scene = bpy.context.scene
-    figures = {"case": arguments.case, "planted": forest_scene.build(scene, case, arguments.size)}
-    for name, value in arguments.set:
-        kind = type(getattr(scene.tetflora, name))
-        setattr(scene.tetflora, name, value == "True" if kind is bool else kind(value))
-    figures |= forest_case.refined(scene)
-    if not arguments.no_render:
-        with tempfile.TemporaryDirectory() as folder:
-            figures |= forest_case.rendered(scene, Path(folder), arguments.samples)
-    return figures
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = arguments.keep or Path(temporary)
+        folder.mkdir(parents=True, exist_ok=True)
+        if arguments.case == "light":
+            return forest_light.run(folder, arguments.samples)
+        if arguments.case == "million":
+            planted = forest_scene.build_million(scene, arguments.plants)
+        else:
+            case = forest_scene.case_of(arguments.case)
+            changes = {"asked": arguments.plants, "side": arguments.side, "distance": arguments.distance}
+            case = replace(case, **{name: value for name, value in changes.items() if value})
+            planted = forest_scene.build(scene, case, arguments.size)
+        for name, value in arguments.set:
+            kind = type(getattr(scene.tetflora, name))
+            setattr(scene.tetflora, name, value == "True" if kind is bool else kind(value))
+        figures = {"case": arguments.case, "what": arguments.what, "planted": planted}
+        if arguments.what == "part":
+            return figures | forest_part.measure(scene, folder, arguments.samples, noise=not arguments.quick)
+        figures |= forest_case.refined(scene) if arguments.what == "refine" else forest_instances.build(scene)
+        if not arguments.no_render:
+            figures |= forest_case.rendered(scene, folder, arguments.samples)
+            figures["peak_render_mb"] = max(figures["peak_mb"], figures["peak_render_mb"])
+        return figures
 
 
 def _size(text: str) -> tuple[int, int]:
@@ -55,26 +150,31 @@ def _setting(text: str) -> tuple[str, str]:
 
 
 def main() -> int:
-    """Measure one case and print a line of JSON."""
+    """Measure one case and print a line of JSON, or finish a run that was interrupted."""
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.forest", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("case", help="a species, mix or eye")
-    parser.add_argument("--plants", type=int, help="plants that Populate is asked for, by default 100,000")
-    parser.add_argument(
-        "--side", type=float, help="of the ground, by default 300 m: a smaller wood of the same density"
+    add = parser.add_argument
+    add("case", help="a species, mix, eye, million, light, or missing")
+    add("--what", choices=WHATS, default="refine", help="refine, variants as instances, or a part against expansion")
+    add("--plants", type=int, help="plants that Populate is asked for, by default 100,000")
+    add("--side", type=float, help="of the ground, by default 300 m: a smaller wood of the same density")
+    add("--distance", type=float, help="minimum distance between plants, metres")
+    add("--size", type=_size, default=(1920, 1080), metavar="WxH")
+    add("--set", type=_setting, nargs="+", default=[], metavar="NAME=VALUE", help="settings of the scene")
+    add("--no-render", action="store_true")
+    add(
+        "--samples", type=int, default=SAMPLES, help="of images that are timed (beside one with one sample) or compared"
     )
-    parser.add_argument("--size", type=_size, default=(1920, 1080), metavar="WxH")
-    parser.add_argument(
-        "--set", type=_setting, nargs="+", default=[], metavar="NAME=VALUE", help="settings of the scene"
-    )
-    parser.add_argument("--no-render", action="store_true")
-    parser.add_argument("--samples", type=int, default=4, help="of the image that is timed, beside one with one sample")
+    add("--keep", type=Path, metavar="FOLDER", help="leave images there")
+    add("--quick", action="store_true")
     arguments = parser.parse_args()
     session.start()
     session.clean_file()
-    figures = one(arguments)
-    print(json.dumps(figures), flush=True)
+    if arguments.case == "missing":
+        print(json.dumps(measure(arguments.quick), indent=1))
+    else:
+        print(json.dumps(one(arguments)), flush=True)
     return 0
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from tetflora_addon.blender.job import refine
 from tetflora_addon.refinement.decisions import Decision
 
-from .report import peak_mb
+from .report import forget_peak, peak_mb
 from .row80 import timed_render
 
 #: Steps of the job that are named, longest first.
@@ -51,6 +51,9 @@ def refined(scene: bpy.types.Scene) -> dict:
     finally:
         refine.afford = afford
     peak = peak_mb()
+    found = {} if kept.refinement is None else left_open(kept.refinement)
+    kept.refinement = None
+    forget_peak()  # counting made copies
     longest = sorted(taken, reverse=True)[:_NAMED]
     return {
         "plants": statistics.plants,
@@ -68,7 +71,7 @@ def refined(scene: bpy.types.Scene) -> dict:
         "tetrahedra_made": statistics.tetrahedra_made,
         "complete": statistics.complete,
         "mesh_mb": statistics.memory_mb,
-        **({} if kept.refinement is None else left_open(kept.refinement)),
+        **found,
         "seconds": {stage: round(value, 3) for stage, value in statistics.seconds.items()},
         "longest_steps": [f"{one:.2f} s  {what}" for one, what in longest],
     }
@@ -94,16 +97,21 @@ def left_open(refinement: object) -> dict[str, float]:
     }
 
 
-def rendered(scene: bpy.types.Scene, folder: Path, samples: int, fewer: int = 1) -> dict[str, float]:
-    """Render twice; seconds before the first sample (sync and BVH), of each, and of an image with `SAMPLES`."""
-    few_s = timed_render(scene, folder / "few.png", fewer)
-    many_s = timed_render(scene, folder / "many.png", samples)
-    each = max(many_s - few_s, 0.0) / (samples - fewer)
-    setup = max(few_s - fewer * each, 0.0)
-    return {
-        "render_s": many_s,
-        "render_setup_s": setup,
-        "render_sample_s": each,
-        f"render_{SAMPLES}_s": setup + SAMPLES * each,
-        "peak_render_mb": peak_mb(),
-    }
+def rendered(scene: bpy.types.Scene, folder: Path, samples: int) -> dict[str, float]:
+    """Render twice; seconds before the first sample (sync and BVH), of each, and of an image with `SAMPLES`.
+
+    With a single sample: render once, for the memory.
+    """
+    few_s = timed_render(scene, folder / "few.png", 1)
+    figures = {"render_s": few_s}
+    if samples > 1:
+        many_s = timed_render(scene, folder / "many.png", samples)
+        each = max(many_s - few_s, 0.0) / (samples - 1)
+        setup = max(few_s - each, 0.0)
+        figures = {
+            "render_s": many_s,
+            "render_setup_s": setup,
+            "render_sample_s": each,
+            f"render_{SAMPLES}_s": setup + SAMPLES * each,
+        }
+    return figures | {"peak_render_mb": peak_mb()}

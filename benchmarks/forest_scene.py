@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
+from examples import million
 from tetflora_addon.blender.job.plant_mesh import single_seed
 from tetflora_addon.blender.placing.first_forest import sky
 from tetflora_addon.compiled.flora import compile_species
@@ -29,6 +30,7 @@ WIDTH, HEIGHT = 1920, 1080
 MIX = ("birch", "spruce", "oak", "beech", "scots_pine")
 #: The catalogue does not say what a tree is: all that grow at least so high, metres.
 TREE = 4.0
+MILLION_GB = 6.0
 #: The eye looks at this height above the middle of the ground, metres.
 _CROWNS = 7.0
 
@@ -117,3 +119,12 @@ def add_light(scene: bpy.types.Scene) -> None:
     sun.rotation_euler = np.radians(52.0), 0.0, np.radians(-68.0)
     scene.collection.objects.link(sun)
     scene.world = sky("Sky")
+    scene.view_settings.exposure = 0.9
+
+
+def build_million(scene: bpy.types.Scene, plants: int | None = None) -> int:
+    """The forest of a million plants of the README, within the gigabytes of its image; how many plants there are."""
+    plants = plants or million.PLANTS
+    million.build(scene, plants)
+    scene.tetflora.refine_at_render, scene.tetflora.max_memory = False, MILLION_GB
+    return plants
