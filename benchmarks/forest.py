@@ -74,9 +74,9 @@ def measure(quick: bool) -> dict[str, float]:
     records = {}
     for case in cases:
         for what in WHATS:
-            samples = SAMPLES if what != "part" else COMPARED // (4 if quick else 1)
-            words = ("--what", what, "--samples", str(samples), *small)
-            records[case, what] = _measured(quick, case, *words)
+            # A part of a small wood would be a tree or two.
+            samples, of = (COMPARED // (4 if quick else 1), ()) if what == "part" else (SAMPLES, small)
+            records[case, what] = _measured(quick, case, "--what", what, "--samples", str(samples), *of)
     if not quick:
         records["light", "light"] = _measured(quick, "light", "--samples", str(LIT))
         records["million", "refine"] = _measured(quick, "million", "--no-render")

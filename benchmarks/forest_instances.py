@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The same wood as artists make it without the extension: a few variants of each species, instanced at its places."""
+"""The same wood as artists make it without the extension: a few variants, instanced at its places."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tetflora_addon.growth.seeds import Seeds
 
 from .report import peak_mb
 
-#: Different plants of each species.
+#: Different plants in all; species have equal parts of them, rounded up.
 VARIANTS = 8
 _NAME = "Variants"
 
@@ -26,16 +26,16 @@ def build(scene: bpy.types.Scene) -> dict[str, float]:
     depsgraph = bpy.context.evaluated_depsgraph_get()
     seeds = read_scene(scene, depsgraph, depsgraph.view_layer).seeds
     variants = bpy.data.collections.new(_NAME)  # of no scene: only the instances are rendered
-    polygons = 0
+    polygons, each = 0, -(-VARIANTS // len(seeds.identifiers))
     for number, kind in enumerate(seeds.identifiers):
         flora = compile_for((kind,), scene, depsgraph)
-        for one in range(VARIANTS):
+        for one in range(each):
             # Geometry nodes sort the members of a collection by their names.
             name = f"{_NAME} {number:03d} {one:03d}"
             mesh = plant_mesh(scene, name, flora.species[0], plant_parts(flora, single_seed(kind, one)))
             variants.objects.link(bpy.data.objects.new(name, mesh))
             polygons += len(mesh.polygons)
-    wood = bpy.data.objects.new("Wood", _points(seeds))
+    wood = bpy.data.objects.new("Wood", _points(seeds, each))
     scene.collection.objects.link(wood)
     wood.modifiers.new("Instances", 'NODES').node_group = _nodes(variants)
     bpy.context.view_layer.update()
@@ -43,8 +43,8 @@ def build(scene: bpy.types.Scene) -> dict[str, float]:
     return {"instances": len(seeds), "build_s": seconds, "variant_polygons": polygons, "peak_mb": peak_mb()}
 
 
-def _points(seeds: Seeds) -> bpy.types.Mesh:
-    """A vertex for each plant, with its rotation, scale and variant."""
+def _points(seeds: Seeds, each: int) -> bpy.types.Mesh:
+    """A vertex for each plant, with its rotation, scale and variant, out of so many of its species."""
     mesh = bpy.data.meshes.new("Wood")
     mesh.vertices.add(len(seeds))
     frame = seeds.frame
@@ -56,7 +56,7 @@ def _points(seeds: Seeds) -> bpy.types.Mesh:
         ],
         axis=1,
     )
-    variant = seeds.species * VARIANTS + np.random.default_rng(1).integers(0, VARIANTS, len(seeds))
+    variant = seeds.species * each + np.random.default_rng(1).integers(0, each, len(seeds))
     mesh.attributes["position"].data.foreach_set("vector", seeds.position.astype(np.float32).ravel())
     for name, kind, key, values in (
         ("turned", 'FLOAT_VECTOR', "vector", angles.astype(np.float32)),
