@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from ..growth.rows import FORK, LATERAL, SPUR
 from ..growth.wind import widest_sway
-from ..species.leaf_models import LeafModel
 from ..species.species import crown_ratio
 from .samples import Points
 
@@ -73,29 +72,6 @@ def widest_radii(rows: NDArray[np.void]) -> NDArray[np.float64]:
             out[index] *= max(rows["radii"][index].max(), 1.0)
         if rows["phantom"][index]:  # as thick as the thickest that is drawn
             out[index] = out[slice(*rows["drawn_rows"][index])].max()
-    return out
-
-
-def leaf_boxes(rows: NDArray[np.void], forms: Sequence[Sequence[Sequence[LeafModel]]]) -> NDArray[np.float64]:
-    """Boxes around all forms of the leaf that each row bears, of size 1 and in its own axes.
-
-    Parameters
-    ----------
-    rows : (r,) table
-    forms : by species and kind of leaf
-
-    Returns
-    -------
-    (r, 2, 3) float64
-        Middle and half of the extent; zero without leaves.
-    """
-    out = np.zeros((len(rows), 2, 3))
-    for index, row in enumerate(rows):
-        models = forms[row["species"]][row["leaf_kind"]]
-        if models and row["leaves"].sum() > 0:
-            points = np.concatenate([model.positions for model in models])
-            low, high = points.min(axis=0), points.max(axis=0)
-            out[index] = (low + high) / 2, (high - low) / 2
     return out
 
 

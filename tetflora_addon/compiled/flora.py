@@ -24,7 +24,7 @@ from ..species.leaf_models import LeafModel
 from ..species.quality import with_quality
 from ..species.species import LEAF_KINDS, Species
 from .averages import Averages, RowLeaves, average, quadratic, row_leaves
-from .bounds import leaf_boxes, leaf_reaches, sampled_bounds, unit_bounds, widest_radii
+from .bounds import leaf_reaches, sampled_bounds, unit_bounds, widest_radii
 from .clumping import Clumping, fit_clumping
 from .orientation import Orientation, orientation_of
 from .samples import Samples, draw_samples
@@ -54,8 +54,6 @@ class Flora:
         Greatest distance of the sub-plant's wood from its axes, in radii of its base, see `bounds.widest_radii`.
     leaf_reach : (r,) float64
         How far leaves and short shoots of the sub-plant stick out beyond its axes at plant scale 1, metres.
-    leaf_box : (r, 2, 3) float64
-        Middle and half of the extent of the leaf that the row's own branch bears, of size 1.
     leaf_width : (r,) float64
         Mean width of its leaves at plant scale 1, metres; 0 without leaves.
     leaf_count : (r,) float64
@@ -90,7 +88,6 @@ class Flora:
     bound: NDArray[np.float64]
     widest: NDArray[np.float64]
     leaf_reach: NDArray[np.float64]
-    leaf_box: NDArray[np.float64]
     leaf_width: NDArray[np.float64]
     leaf_count: NDArray[np.float64]
     fixed_wood: NDArray[np.float64]
@@ -232,7 +229,6 @@ def _compiled(species: tuple[Species, ...]) -> Flora:
         bound=bound,
         widest=widest_radii(rows),
         leaf_reach=leaf_reaches(rows, bound, leaf.reach),
-        leaf_box=leaf_boxes(rows, forms),
         leaf_width=leaves @ (size * leaf.width) / np.maximum(leaf_count, 1e-300),
         leaf_count=leaf_count,
         fixed_wood=totals.fixed_wood.sum(axis=1),

@@ -23,8 +23,8 @@ from ..compiled.flora import Flora
 from ..growth.branches import Branches
 from ..growth.growth import fullness, trunks
 from ..growth.seeds import Seeds
+from ..subplants.bodies import bounding_bodies
 from ..subplants.pieces import Pieces, leaf_fraction, outward_ends, wood_areas
-from ..subplants.sides import bounding_bodies
 from .polygons import Polygons
 
 #: Side in pixels from which on a polygon is large: more than facets have, hidden ones included.

@@ -15,8 +15,8 @@ from tests.engine import support
 from tetflora_addon.compiled.bounds import ring_stretch, unit_bounds, widest_radii
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.branches import Branches
+from tetflora_addon.subplants.bodies import bounding_bodies
 from tetflora_addon.subplants.pieces import open_subplants
-from tetflora_addon.subplants.sides import body_distances, bounding_bodies, crossing
 
 _FLOAT32 = 1e-6  # relative rounding of vertices
 
@@ -41,40 +41,6 @@ def outside(flora: Flora, subplants: Branches) -> float:
     return worst
 
 
-def check_sides(flora: Flora, subplants: Branches, seed: int, directions: int = 6) -> None:
-    """What `crossing` promises, at planes that just touch the vertices and at such that keep off them.
-
-    A plane that cuts off a vertex is crossed, whatever the vertex belongs to. One that keeps off by no more than what
-    the box of a leaf or the sphere around a ring has room for is not. Either way round, the side is that of the base.
-    """
-    rng = np.random.default_rng(seed)
-    rows = flora.rows
-    boxes = np.linalg.norm(flora.leaf_box[:, 1], axis=1)
-    leaf = (rows["leaf_size"].sum(axis=1) * np.maximum(rows["leaf_size_tip"], 1) * boxes).max()
-    for i in range(len(subplants)):
-        one = subplants.take(np.full(directions, i))
-        points = vertices(flora, one.take(np.s_[:1]))
-        size = np.abs(points).max()
-        normal = rng.normal(size=(directions, 3))
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        support_of = (points @ normal.T).max(axis=0)
-        room = leaf * one.scale[0] + 2 * one.radius[0] * flora.widest[one.row[0]] + _FLOAT32 * size
-        turn = rng.choice([-1.0, 1.0], directions)
-
-        def planes(offset: np.ndarray, normal: np.ndarray = normal, turn: np.ndarray = turn) -> np.ndarray:
-            return turn[:, None] * np.column_stack([normal, -offset])
-
-        base = np.einsum("ni,ni->n", normal, one.position)
-        cutting = support_of - 10 * _FLOAT32 * size
-        crosses, side = crossing(flora, one, planes(cutting))
-        told = cutting > base + _FLOAT32 * size  # else the base itself is what is cut off, and the rest lies on a side
-        assert crosses[told].all()
-        np.testing.assert_array_equal(side[told], (turn < 0)[told])
-        crosses, side = crossing(flora, one, planes(support_of + room))
-        assert not crosses.any()
-        np.testing.assert_array_equal(side, turn < 0)
-
-
 @pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
 def test_every_vertex_of_many_plants_is_inside_the_bound(species: int) -> None:
     """As many as a quarter of a million polygons make, at most 100; `benchmarks bounds` takes a thousand of each."""
@@ -86,15 +52,13 @@ def test_every_vertex_of_many_plants_is_inside_the_bound(species: int) -> None:
 
 @pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
 def test_subplants_of_all_orders(species: int) -> None:
-    """Every vertex is inside their bounds, and what they cross is what their vertices cross."""
+    """Every vertex is inside their bounds."""
     flora = support.flora()
     level = support.trunks(flora.rows, support.plants([1, 2], species))
-    check_sides(flora, level.take(np.s_[:1]), species, 12)
     while len(level):
         level, *_ = open_subplants(flora, level.take(np.s_[:: max(1, len(level) // 12)]))
         some = level.take(np.s_[:: max(1, len(level) // 8)])
         assert outside(flora, some) < _FLOAT32
-        check_sides(flora, some, species)
 
 
 def ranges(low: float, high: float, most: float) -> st.SearchStrategy[list[float]]:
@@ -162,7 +126,7 @@ def any_species(first: dict, second: dict, leans: list[dict]) -> Flora:
 
 @given(SHAPES, SHAPES, st.lists(LEANS, min_size=2, max_size=2), st.integers(0, 10**6))
 @settings(deadline=None, max_examples=20)
-def test_bounds_and_sides_hold_for_any_species(first: dict, second: dict, leans: list[dict], seed: int) -> None:
+def test_bounds_hold_for_any_species(first: dict, second: dict, leans: list[dict], seed: int) -> None:
     """Attraction, forks, short shoots, flares, the pipe model, leaves that hang; trunks, limbs and twigs."""
     flora = any_species(first, second, leans)
     trunk = support.trunks(flora.rows, support.plants(seed, scale=1.7, position=(1, 2, 3)))
@@ -170,11 +134,10 @@ def test_bounds_and_sides_hold_for_any_species(first: dict, second: dict, leans:
     twigs, *_ = open_subplants(flora, limbs.take(np.s_[:4]))
     for some in (trunk, limbs.take(np.s_[:: max(1, len(limbs) // 3)]), twigs.take(np.s_[:3])):
         assert outside(flora, some) < _FLOAT32
-        check_sides(flora, some, seed, 4)
 
 
 @pytest.mark.parametrize("whorl", [2, 3])
-def test_whorls_are_told_to_the_last_leaf(whorl: int) -> None:
+def test_whorls_are_inside_the_bound(whorl: int) -> None:
     """Branches and leaves that share their places."""
     change = {"whorl": whorl, "leaf_whorl": whorl, "branches": [6, 0], "leaves": [6, 0]}
     flora = support.compiled(
@@ -182,8 +145,8 @@ def test_whorls_are_told_to_the_last_leaf(whorl: int) -> None:
     )
     trunk = support.trunks(flora.rows, support.plants(np.arange(3)))
     limbs, *_ = open_subplants(flora, trunk)
-    for some in (trunk, limbs.take(np.s_[:6])):
-        check_sides(flora, some, whorl)
+    assert outside(flora, trunk) < _FLOAT32
+    assert outside(flora, limbs.take(np.s_[:6])) < _FLOAT32
 
 
 @given(ranges(-360, 360, 180), st.floats(-360, 360), st.integers(1, 6), st.integers(0, 10**6))
@@ -225,15 +188,25 @@ def test_what_is_longer_has_the_larger_bound() -> None:
     assert long[0] > 1.5 * short[0]
 
 
-def test_bodies_and_planes() -> None:
-    """A body reaches to the sides of planes as far as a cylinder with rounded edges does."""
-    body = np.array([[1.0, 2.0, 3.0, 0.0, 0.0, 1.0, 0.5, 2.0, 0.25]]).T
-    for normal, reach in (((0, 0, 1), 2.25), ((1, 0, 0), 0.75), ((0, 0.6, 0.8), 0.3 + 1.6 + 0.25)):
-        distance, found = body_distances(body, np.array([[*normal, -1.0]]))
-        assert distance[0] == pytest.approx(np.dot(normal, [1, 2, 3]) - 1)
-        assert found[0] == pytest.approx(reach)
-
-
-def test_no_subplants_cross_nothing() -> None:
-    crosses, side = crossing(support.small_flora(), Branches.empty(), np.zeros((0, 4)))
-    assert crosses.shape == side.shape == (0,)
+@pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
+def test_samples_are_inside_the_bound(species: int) -> None:
+    """And inside the tighter bound that says how large sub-plants look: points on sub-plants of all orders."""
+    flora = support.flora()
+    level = support.trunks(flora.rows, support.plants([1, 2, 3], species))
+    while len(level):
+        some = level.take(np.s_[:: max(1, len(level) // 40)])
+        tight, body = flora.sampled_bound[some.row], bounding_bodies(flora, some)
+        for points in (flora.samples.leaves, flora.samples.wood):
+            first, number = points.runs(some)
+            for i in np.flatnonzero(number):
+                local = points.position[first[i] : first[i] + number[i]].astype(float)
+                radius, low, high = tight[i] * (1 + np.sign([1, -1, 1]) * 1e-6) + np.array([1, -1, 1]) * 1e-6
+                assert np.hypot(local[:, 0], local[:, 1]).max() <= radius
+                assert local[:, 2].min() >= low
+                assert local[:, 2].max() <= high
+                offset = some.position[i] + some.length[i] * local @ some.frame[i].T - body[:3, i]
+                along = offset @ body[3:6, i]
+                across = np.linalg.norm(offset - along[:, None] * body[3:6, i], axis=1)
+                beyond = np.hypot(np.maximum(np.abs(along) - body[7, i], 0), np.maximum(across - body[6, i], 0))
+                assert beyond.max() <= body[8, i] * (1 + 1e-5)
+        level, *_ = open_subplants(flora, level.take(np.s_[:: max(1, len(level) // 12)]))
