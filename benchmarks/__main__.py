@@ -28,6 +28,7 @@ NAMES = (
     "budget",
     "stages",
     "forest",
+    "curves",
     "foreign",
     "closed_form",
     "fidelity",
@@ -38,6 +39,8 @@ NAMES = (
     "endurance",
     "farm",
 )
+#: Modules that are not called as their benchmark.
+MODULES = {"curves": "forest_curves"}
 
 
 def main() -> int:
@@ -52,7 +55,7 @@ def main() -> int:
     session.start()
     from .report import missed, report, table  # after the session has prepared Blender
 
-    module = importlib.import_module(f"{__package__}.{arguments.name}")
+    module = importlib.import_module(f"{__package__}.{MODULES.get(arguments.name, arguments.name)}")
     session.clean_file()
     targets = module.QUICK_TARGETS if arguments.quick else module.TARGETS
     record = report(arguments.name, module.run(arguments.quick), targets)

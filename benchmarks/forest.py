@@ -71,19 +71,19 @@ def measure(quick: bool) -> dict[str, float]:
 
     cases = QUICK if quick else (*trees(), "mix", "eye")
     small = ("--size", "480x270", "--side", "60") if quick else ()
+    brief = ("--quick",) if quick else ()
     records = {}
     for case in cases:
         for what in WHATS:
             # A part of a small wood would be a tree or two.
             samples, of = (COMPARED // (4 if quick else 1), ()) if what == "part" else (SAMPLES, small)
-            records[case, what] = _measured(quick, case, "--what", what, "--samples", str(samples), *of)
+            records[case, what] = measured(_folder(quick), case, "--what", what, "--samples", str(samples), *of, *brief)
     if not quick:
-        records["light", "light"] = _measured(quick, "light", "--samples", str(LIT))
-        records["million", "refine"] = _measured(quick, "million", "--no-render")
+        records["light", "light"] = measured(_folder(quick), "light", "--samples", str(LIT))
+        records["million", "refine"] = measured(_folder(quick), "million", "--no-render")
         for limit in LIMITS:
-            records["birch", f"limit_{limit}"] = _measured(
-                quick, "birch", "--set", f"max_memory={limit}", "--samples", "1"
-            )
+            limited = ("--set", f"max_memory={limit}", "--samples", "1")
+            records["birch", f"limit_{limit}"] = measured(_folder(quick), "birch", *limited)
     return sums(records)
 
 
@@ -91,12 +91,12 @@ def _folder(quick: bool) -> Path:
     return QUICK_FOLDER if quick else FOLDER
 
 
-def _measured(quick: bool, *words: str) -> dict:
-    """What a process of its own measures, or has measured in an earlier run."""
-    path = _folder(quick) / ("-".join(words).replace("--", "").replace("=", "-") + ".json")
+def measured(folder: Path, *words: str) -> dict:
+    """What a process of its own measures, or has left in a folder in an earlier run; ``words`` as of `main`."""
+    path = folder / ("-".join(words).replace("--", "").replace("=", "-") + ".json")
     if path.exists():
         return json.loads(path.read_text())
-    command = [sys.executable, "-m", "benchmarks.forest", *words, *(["--quick"] if quick else [])]
+    command = [sys.executable, "-m", "benchmarks.forest", *words]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=_LONGEST, check=False)
     if done.returncode:
         raise RuntimeError(f"{' '.join(words)} failed with {done.returncode}:\n{done.stderr[-2000:]}")
@@ -120,10 +120,10 @@ def one(arguments: argparse.Namespace) -> dict:
         if arguments.case == "light":
             return forest_light.run(folder, arguments.samples)
         if arguments.case == "million":
-            planted = forest_scene.build_million(scene, arguments.plants)
+            planted = forest_scene.build_million(scene, arguments.asked)
         else:
             case = forest_scene.case_of(arguments.case)
-            changes = {"asked": arguments.plants, "side": arguments.side, "distance": arguments.distance}
+            changes = {name: getattr(arguments, name) for name in ("asked", "side", "distance", "eye", "away")}
             case = replace(case, **{name: value for name, value in changes.items() if value})
             planted = forest_scene.build(scene, case, arguments.size)
         for name, value in arguments.set:
@@ -157,9 +157,11 @@ def main() -> int:
     add = parser.add_argument
     add("case", help="a species, mix, eye, million, light, or missing")
     add("--what", choices=WHATS, default="refine", help="refine, variants as instances, or a part against expansion")
-    add("--plants", type=int, help="plants that Populate is asked for, by default 100,000")
+    add("--asked", "--plants", type=int, help="plants that Populate is asked for, by default 100,000")
     add("--side", type=float, help="of the ground, by default 300 m: a smaller wood of the same density")
     add("--distance", type=float, help="minimum distance between plants, metres")
+    add("--eye", type=float, help="height of the camera, metres")
+    add("--away", type=float, help="least distance of the camera from the middle, metres; it looks so far")
     add("--size", type=_size, default=(1920, 1080), metavar="WxH")
     add("--set", type=_setting, nargs="+", default=[], metavar="NAME=VALUE", help="settings of the scene")
     add("--no-render", action="store_true")

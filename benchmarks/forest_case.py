@@ -35,6 +35,7 @@ def refined(scene: bpy.types.Scene) -> dict:
         return afford(flora, refinement, *rest)
 
     refine.afford = watched
+    forget_peak()  # of what planted the wood
     try:
         start = time.perf_counter()
         steps = refine.refine_steps(scene, bpy.context.evaluated_depsgraph_get())

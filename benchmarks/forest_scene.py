@@ -8,8 +8,7 @@ camera stands at the edge, 30 m up. Everything else is as in a new file, with th
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -24,8 +23,6 @@ from tetflora_addon.species import catalogue
 
 #: Ground: metres along each side, and faces. With these 14,891 plants have room, 2,446 at 5 m.
 SIDE, SUBDIVISIONS = 300.0, 120
-#: Plants of a hectare of that wood.
-DENSITY = 14_891 / (SIDE / 100.0) ** 2
 WIDTH, HEIGHT = 1920, 1080
 MIX = ("birch", "spruce", "oak", "beech", "scots_pine")
 #: The catalogue does not say what a tree is: all that grow at least so high, metres.
@@ -53,6 +50,9 @@ class Case:
         The camera stands in the middle of the wood and looks ahead, not at the edge.
     side : float
         Of the ground, metres.
+    away : float
+        Least distance of the camera from the middle of the ground, metres, and how far ahead it then looks. 0: to the
+        middle.
     """
 
     species: tuple[str, ...]
@@ -61,6 +61,7 @@ class Case:
     eye: float = 30.0
     inside: bool = False
     side: float = SIDE
+    away: float = 0.0
 
 
 def case_of(name: str) -> Case:
@@ -83,11 +84,6 @@ def trees() -> tuple[str, ...]:
     return tuple(name for name in catalogue.list_species() if height_of(name) >= TREE)
 
 
-def grown(case: Case, plants: float) -> Case:
-    """A wood as dense as the full one on so much land that about so many plants have room."""
-    return replace(case, side=100.0 * math.sqrt(plants / DENSITY))
-
-
 def build(scene: bpy.types.Scene, case: Case, size: tuple[int, int] = (WIDTH, HEIGHT)) -> int:
     """Fill an empty scene with ground, plants, camera, sun and sky; how many plants there are."""
     bpy.ops.mesh.primitive_grid_add(size=case.side, x_subdivisions=SUBDIVISIONS, y_subdivisions=SUBDIVISIONS)
@@ -103,8 +99,8 @@ def build(scene: bpy.types.Scene, case: Case, size: tuple[int, int] = (WIDTH, HE
 
 def add_camera(scene: bpy.types.Scene, case: Case) -> None:
     """The camera that Blender adds, where the case has it; its range reaches to the end of the wood."""
-    eye = Vector((0.0, 0.0 if case.inside else -case.side / 2, case.eye))
-    ahead = Vector((0.0, 1.0, 0.0)) if case.inside else Vector((0.0, 0.0, min(_CROWNS, case.eye))) - eye
+    eye = Vector((0.0, 0.0 if case.inside else -max(case.side / 2, case.away), case.eye))
+    ahead = Vector((0.0, case.away or case.side / 2, 0.0 if case.inside else min(_CROWNS, case.eye) - case.eye))
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.location, camera.rotation_euler = eye, ahead.to_track_quat('-Z', 'Y').to_euler()
     camera.data.clip_end = max(1000.0, 2.0 * case.side)
