@@ -9,8 +9,9 @@ from typing import Any
 import bpy
 
 from ..tetflora_addon.blender.placing.plant_objects import plants_of
+from ..tetflora_addon.blender.worker import at_once
 from ..tetflora_addon.errors import TetFloraError
-from ..tetflora_addon.refinement.statistics import Progress, at_once
+from ..tetflora_addon.refinement.statistics import Progress
 
 LINKED = (
     "The plants are linked from another file; use Object > Relations > Make Local, or Object > Library Override > Make"
@@ -179,7 +180,7 @@ class ModalJob(Reporting):
         end = time.monotonic() + _SLICE
         try:
             progress = self._next()
-            while time.monotonic() < end:
+            while time.monotonic() < end and not progress.waiting:
                 progress = self._next()
         except StopIteration as stop:
             self._leave(context)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Generator
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import TypeVar
 
 _Result = TypeVar("_Result")
@@ -103,10 +103,18 @@ class Progress:
         0 to 1, an estimate.
     message : str
         For the status bar.
+    waiting : bool
+        Whether nothing is new: the next step waits as well.
     """
 
     fraction: float
     message: str
+    waiting: bool = False
+
+    @property
+    def again(self) -> Progress:
+        """The same, while nothing is new."""
+        return replace(self, waiting=True)
 
 
 def at_once(steps: Generator[object, object, _Result]) -> _Result:

@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import json
+import threading
+from collections import deque
 
 import bpy
 import numpy as np
@@ -13,7 +15,8 @@ import pytest
 from tests.blender.renders import picture
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks
 from tetflora_addon import errors
-from tetflora_addon.blender import compat
+from tetflora_addon.blender import compat, worker
+from tetflora_addon.blender.attributes import read
 from tetflora_addon.blender.job import contents, refine
 from tetflora_addon.blender.results.collection import has_results
 
@@ -143,6 +146,43 @@ def test_closing_the_job_leaves_the_scene_as_it_was(steps):
     assert datablocks() == before
 
 
+def test_closing_the_job_in_the_middle_of_a_pass_does_not_wait_for_it(monkeypatch):
+    """As Esc does: the pass goes on in its thread until it notices, and the scene is as it was at once."""
+    scene = _forest()
+    before = datablocks()
+    begun, go = threading.Event(), threading.Event()
+
+    original = refine.loop.refine
+
+    def slow(*given):
+        begun.set()
+        assert go.wait(60.0)
+        return (yield from original(*given))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(refine.loop, "refine", slow)
+        running = refine.refine_steps(scene, bpy.context.evaluated_depsgraph_get())
+        while not begun.is_set():
+            progress = next(running)
+        while not progress.waiting:
+            progress = next(running)
+        running.close()
+        assert datablocks() == before
+        go.set()
+    assert _refine(scene).polygons_meshed > 0
+
+
+def test_steps_give_what_is_made_at_once():
+    """To the last bit, although one has a thread and the other has none."""
+    scene = _forest()
+    digests = []
+    for run in (lambda steps: deque(steps, maxlen=0), worker.at_once):
+        run(refine.refine_steps(scene, bpy.context.evaluated_depsgraph_get()))
+        made = sorted(_made(scene), key=lambda o: o.name.split(".")[0])
+        digests.append([(o.name.split(".")[0], read(o.data, "position").tobytes()) for o in made])
+    assert digests[0] == digests[1]
+
+
 def test_an_error_while_writing_leaves_nothing(monkeypatch):
     """As a full memory would."""
     scene = _forest()
@@ -236,12 +276,12 @@ def test_a_job_that_is_told_to_stop_refining_makes_what_it_has():
     scene = _forest()
     scene.tetflora.cutoff = 0.5
     steps = refine.refine_steps(scene, bpy.context.evaluated_depsgraph_get())
-    while not (progress := next(steps)).message.startswith("Refining"):
+    while (progress := next(steps)).waiting or not progress.message.startswith("Refining"):
         pass
     with pytest.raises(StopIteration) as stop:
         progress = steps.send(True)
         while True:
-            assert not progress.message.startswith("Refining")
+            assert progress.waiting or not progress.message.startswith("Refining")
             progress = next(steps)
     statistics = stop.value.value
     assert not statistics.complete

@@ -20,6 +20,7 @@ from ...refinement.polygons import Polygons
 from ...refinement.settings import RefinementSettings
 from ...refinement.statistics import Statistics
 from ...species.catalogue import list_species, load_species
+from ...species.species import Species
 from ..results.forms import form_of
 from ..results.hiding import originals_shown
 from ..results.leaf_objects import resolved_species
@@ -95,9 +96,14 @@ def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph:
     SpeciesError
         Unknown or broken species, or a leaf object that is missing or not a mesh with faces.
     """
+    return compile_species(load_for(identifiers, scene, depsgraph))
+
+
+def load_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Species]:
+    """The species that `compile_for` compiles; it alone needs the scene."""
     if not identifiers:
-        return compile_species([load_species(min(list_species()))])
-    return compile_species([resolved_species(scene, identifier, depsgraph) for identifier in identifiers])
+        return [load_species(min(list_species()))]
+    return [resolved_species(scene, identifier, depsgraph) for identifier in identifiers]
 
 
 def in_wind(scene: bpy.types.Scene, flora: Flora) -> Flora:

@@ -23,6 +23,7 @@ from ..attributes import frames_of, world_matrix, write
 from ..results.leaf_objects import materials_of
 from ..results.meshes import write_mesh
 from ..scene.skeletons import kind_of
+from ..worker import call_in_thread
 from .contents import compile_for, expected_polygons
 
 #: Most polygons of one conversion; more would fill the memory of most computers.
@@ -135,9 +136,11 @@ def make_plant_mesh_steps(
     whole = False
     try:
         for number, (plant, seed) in enumerate(zip(plants, seeds, strict=True)):
-            yield Progress(number / len(plants), f"mesh {number + 1:,} of {len(plants):,}")
+            progress = Progress(number / len(plants), f"mesh {number + 1:,} of {len(plants):,}")
+            yield progress
             flora = floras[kind_of(plant)]
-            mesh = plant_mesh(scene, f"{plant.name} mesh", flora.species[0], plant_parts(flora, seed))
+            parts = yield from call_in_thread(progress, plant_parts, flora, seed)
+            mesh = plant_mesh(scene, f"{plant.name} mesh", flora.species[0], parts)
             made.append(_placed(mesh, plant, frame[number] * scale[number], world[number, :3, 3]))
             if plant.tetflora.enabled:
                 plant.tetflora.enabled = False

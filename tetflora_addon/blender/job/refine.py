@@ -1,28 +1,33 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From a scene of plants and meshes to results, in steps that can be shown, stopped and undone."""
+"""From a scene of plants and meshes to results, in steps that can be shown, stopped and undone.
+
+The engine works in a thread beside Blender's (`worker`); only reading and writing datablocks happens here.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import closing
+from typing import TypeVar
 
 import bpy
 import numpy as np
 
 from ...buffers import MeshBuffers
 from ...camera.camera import Camera
-from ...compiled.flora import Flora
+from ...compiled.flora import Flora, compile_species
 from ...emission.budget import afford
-from ...emission.forms import Refined
-from ...emission.plants import Transition, expanded_blocks, explicit_blocks
-from ...emission.polygons import polygon_blocks
+from ...emission.forms import EmissionForm, Refined
+from ...emission.plants import Block, Transition, expanded_blocks, explicit_blocks
+from ...emission.polygons import PolygonBlock, polygon_blocks
 from ...proxies.facet_weights import facet_weights
 from ...refinement import loop
 from ...refinement.decisions import Decision
 from ...refinement.loop import Refinement, step_of
 from ...refinement.settings import RefinementSettings
-from ...refinement.statistics import Progress, Statistics, Stopwatch, at_once
+from ...refinement.statistics import Progress, Statistics, Stopwatch
 from ..compat import drawn_disc
 from ..materials.materials import baked_material
 from ..results.collection import Results
@@ -33,10 +38,13 @@ from ..results.output import adopt_materials, release_materials, result_collecti
 from ..results.proxies import Baking, write_proxies
 from ..scene.camera import read_camera
 from ..scene.explicit import Explicit
-from .contents import Given, compile_for, in_wind, read_scene, refinement_settings
+from ..worker import at_once, call_in_thread, in_thread, steps_in_thread
+from .contents import Given, compile_for, in_wind, load_for, read_scene, refinement_settings
 
 #: Fraction of the progress bar that the loop takes; the rest is for writing meshes.
 _LOOP_FRACTION = 0.6
+
+_Block = TypeVar("_Block")
 
 
 def refine_steps(
@@ -85,10 +93,12 @@ def refine_steps(
     if given is None:
         given = read_scene(scene, depsgraph, view_layer or depsgraph.view_layer)
     clock.lap("read")
-    yield Progress(0.02, "Compiling species")
-    flora = in_wind(scene, compile_for(given.species, scene, depsgraph))
+    progress = Progress(0.02, "Compiling species")
+    yield progress
+    flora = yield from call_in_thread(progress, compile_species, load_for(given.species, scene, depsgraph))
+    flora = in_wind(scene, flora)
     clock.lap("compile")
-    full = given.polygons_full(flora)
+    full = yield from call_in_thread(progress, given.polygons_full, flora)
     statistics = Statistics(plants=len(given.seeds), polygons_full=full, seconds=clock.seconds)
     originals = []
     results = Results(scene, 'RENDER' if for_render else 'VIEW', mark)
@@ -173,39 +183,57 @@ def _run_loop(
         )
 
 
+def _refined(
+    flora: Flora,
+    given: Given,
+    camera: Camera,
+    settings: RefinementSettings,
+    form: EmissionForm,
+    disc: float,
+    statistics: Statistics,
+    clock: Stopwatch,
+) -> Generator[Progress, bool | None, Refined]:
+    """Refine, and find out what the proxies depend on."""
+    refinement = yield from _run_loop(flora, given, camera, settings, statistics)
+    yield Progress(_LOOP_FRACTION, "Choosing polygons and proxies")
+    detail = afford(flora, refinement, camera, settings, form.faces, form.primitive_bytes)
+    refinement = detail.refinement
+    clock.lap("refine")
+    _count(statistics, refinement)
+    if not form.facets:
+        return Refined(flora, refinement, camera)
+    yield Progress(_LOOP_FRACTION, "Analyzing leaf clustering")
+    facet_weights(flora)
+    return Refined(flora, refinement, camera, detail.pixels, Transition(flora, camera, detail.leaf_limit), disc)
+
+
 def _write_refined(
     results: Results, flora: Flora, given: Given, camera: Camera, statistics: Statistics, clock: Stopwatch
 ) -> Generator[Progress, bool | None, None]:
     """Refine, and make meshes and proxies."""
     scene, form, settings = results.scene, form_of(results.scene), refinement_settings(results.scene)
-    refinement = yield from _run_loop(flora, given, camera, settings, statistics)
-    own = form.emission
-    detail = afford(flora, refinement, camera, settings, own.faces, own.primitive_bytes)
-    refinement = detail.refinement
-    clock.lap("refine")
-    _count(statistics, refinement)
-    refined = Refined(flora, refinement, camera)
-    if own.facets:
-        yield Progress(_LOOP_FRACTION, "Analyzing leaf clustering")
-        facet_weights(flora)
-        transition = Transition(flora, camera, detail.leaf_limit)
-        refined = Refined(flora, refinement, camera, detail.pixels, transition, drawn_disc(scene.render.engine))
+    disc = drawn_disc(scene.render.engine)
+    work = _refined(flora, given, camera, settings, form.emission, disc, statistics, clock)
+    refined = yield from steps_in_thread(work, Progress(0.05, "Refining, pass 1"))
     results.open()
     baking = None
     if given.sources is not None:
         baking = Baking(given.sources, leaves=scene.tetflora.baked_light == 'ALL')
-    blocks = explicit_blocks(flora, refinement, camera, refined.transition)
+    blocks = explicit_blocks(flora, refined.refinement, camera, refined.transition)
     yield from _write_blocks(results, flora, blocks, statistics, _LOOP_FRACTION, baking)
     if given.explicit is not None:
-        blocks = polygon_blocks(refinement, camera, refined.facet_pixels)
+        blocks = polygon_blocks(refined.refinement, camera, refined.facet_pixels)
         yield from _write_polygons(results, given.explicit, blocks, statistics, baking)
     if baking is not None:
         clock.lap("emit")
         yield from _bake(baking, refined)
         clock.lap("light")
-    yield Progress(0.95, "Making proxies")
+    progress = Progress(0.95, "Making proxies")
+    yield progress
     for done in write_proxies(results, form, refined, statistics, baking):
-        yield Progress(0.95 + 0.05 * done, f"Making proxies: {statistics.polygons_proxy:,}")
+        if done is not None:
+            progress = Progress(0.95 + 0.05 * done, f"Making proxies: {statistics.polygons_proxy:,}")
+        yield progress.again if done is None else progress
 
 
 def _count(statistics: Statistics, refinement: Refinement) -> None:
@@ -217,10 +245,16 @@ def _count(statistics: Statistics, refinement: Refinement) -> None:
 
 
 def _write_blocks(
-    results: Results, flora: Flora, blocks: object, statistics: Statistics, start: float, baking: Baking | None = None
+    results: Results,
+    flora: Flora,
+    blocks: Iterator[Block],
+    statistics: Statistics,
+    start: float,
+    baking: Baking | None = None,
 ) -> Generator[Progress, None, None]:
     materials: dict[tuple[int, str, int], list[bpy.types.Material]] = {}
-    for block in blocks:
+
+    def write(block: Block) -> Progress:
         species, what = flora.species[block.species], (block.species, block.kind, block.form)
         if what not in materials:
             baked = baking is not None and baking.leaves
@@ -229,18 +263,37 @@ def _write_blocks(
         name = f"{species.name} {block.kind} {block.number:03d}"
         obj = results.add(name, block.kind, block.buffers, materials[what], species)
         _made(obj, block.buffers, statistics, baking, lit=True)
-        yield Progress(start + (0.95 - start) * block.fraction, f"Making polygons: {statistics.polygons_meshed:,}")
+        return Progress(start + (0.95 - start) * block.fraction, f"Making polygons: {statistics.polygons_meshed:,}")
+
+    yield from _written(blocks, write, Progress(start, "Making polygons"))
 
 
 def _write_polygons(
-    results: Results, explicit: Explicit, blocks: object, statistics: Statistics, baking: Baking | None = None
+    results: Results,
+    explicit: Explicit,
+    blocks: Iterator[PolygonBlock],
+    statistics: Statistics,
+    baking: Baking | None = None,
 ) -> Generator[Progress, None, None]:
-    for block in blocks:
+    def write(block: PolygonBlock) -> Progress:
         name = explicit.meshes.surfaces[block.surface].name
         materials = explicit.materials[block.surface]
         obj = results.add(f"{name} {block.number:03d}", "explicit", block.buffers, materials)
         _made(obj, block.buffers, statistics, baking, lit=False)
-        yield Progress(0.95, f"Keeping polygons: {statistics.polygons_meshed:,}")
+        return Progress(0.95, f"Keeping polygons: {statistics.polygons_meshed:,}")
+
+    yield from _written(blocks, write, Progress(0.95, "Keeping polygons"))
+
+
+def _written(
+    blocks: Iterator[_Block], write: Callable[[_Block], Progress], progress: Progress
+) -> Generator[Progress, None, None]:
+    """Write blocks one by one, while the next is computed."""
+    with closing(in_thread(blocks, ahead=1)) as made:
+        for block in made:
+            if block is not None:
+                progress = write(block)
+            yield progress.again if block is None else progress
 
 
 def _made(
@@ -255,9 +308,12 @@ def _made(
 def _bake(baking: Baking, refined: Refined) -> Generator[Progress, None, None]:
     """Compute the light of everything, and write that of meshes."""
     if refined.facet_pixels is not None:
-        for count in baking.add_facets(refined):
-            yield Progress(0.9, f"Baking light: {count:,} facets")
-    for done in baking.look(refined):
-        yield Progress(0.9 + 0.03 * done, f"Baking light: {done:.0%} of the shadows")
+        facets = (Progress(0.9, f"Baking light: {count:,} facets") for count in baking.add_facets(refined))
+        yield from steps_in_thread(facets, Progress(0.9, "Baking light"))
+    shadows = (Progress(0.9 + 0.03 * done, f"Baking light: {done:.0%} of the shadows") for done in baking.look(refined))
+    yield from steps_in_thread(shadows, Progress(0.9, "Baking light"))
+    progress = Progress(0.93, "Baking light")
     for done in baking.light_meshes():
-        yield Progress(0.93 + 0.02 * done, f"Baking light: {done:.0%} of the leaves")
+        if done is not None:
+            progress = Progress(0.93 + 0.02 * done, f"Baking light: {done:.0%} of the leaves")
+        yield progress.again if done is None else progress

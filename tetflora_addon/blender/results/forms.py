@@ -39,7 +39,7 @@ class ProxyForm:
     number : int
         Value of the item in saved files: never change or reuse it.
     emission : EmissionForm
-        How buffers are made.
+        How buffers are made: in a thread, so without bpy.
     material : callable
         Returns the material of meshes, made if needed.
     point_material, baked_material : callable

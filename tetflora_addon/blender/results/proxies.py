@@ -5,16 +5,20 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Mapping
+from contextlib import closing
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...buffers import MeshBuffers, PointBuffers
-from ...emission.forms import Refined
+from ...emission.forms import Buffers, Refined
 from ...emission.light import AT_ONCE, BakedLight, SheetList, Sources, at_vertices, baked_attributes, baked_light
 from ...refinement.statistics import Statistics
+from ...species.species import Species
 from ..attributes import face_offsets, read, write
 from ..materials.nodes import find_socket, is_ours
+from ..worker import calling, in_thread
 from .collection import Results
 from .forms import ProxyForm, form_of
 from .output import KIND
@@ -62,35 +66,45 @@ class Baking:
         facets = refined.facet_pixels is not None
         self.light = yield from baked_light(*scene, self.sources, self.sheets, facets)
 
-    def light_meshes(self) -> Iterator[float]:
-        """Write the light of meshes; yields the fraction that is done."""
+    def light_meshes(self) -> Generator[float | None, None, None]:
+        """Write the light of meshes; yields the fraction that is done, and None while a thread computes."""
         for number, (made, first) in enumerate(self._meshes):
-            for part in _light_mesh(made.data, self.light, first, rounded=made[KIND] == "bark"):
-                yield (number + part) / len(self._meshes)
+            mesh = made.data
+            stored = [read(mesh, name) for name in ("position", ".corner_vert", "tf_colour", "tf_transmission")]
+            given = self.light, first, made[KIND] == "bark", face_offsets(mesh), *stored
+            found = yield from in_thread(calling(_light_of_mesh, *given))
+            for name, (domain, values) in found.items():
+                write(mesh, name, values, domain)
+            yield (number + 1) / len(self._meshes)
 
 
-def _light_mesh(mesh: bpy.types.Mesh, light: BakedLight, first: int, rounded: bool) -> Iterator[float]:
-    """Write the light of a mesh whose faces are the sheets from ``first`` on; at vertices where it is round."""
-    faces = len(mesh.polygons)
-    positions, corner_verts, offsets = read(mesh, "position"), read(mesh, ".corner_vert"), face_offsets(mesh)
-    colour, transmission = read(mesh, "tf_colour"), read(mesh, "tf_transmission")
+def _light_of_mesh(
+    light: BakedLight,
+    first: int,
+    rounded: bool,
+    offsets: NDArray[np.int32],
+    positions: NDArray[np.float32],
+    corner_verts: NDArray[np.int32],
+    colour: NDArray[np.float32],
+    transmission: NDArray[np.float32],
+) -> Mapping[str, tuple[str, NDArray[np.float32]]]:
+    """Attributes of a mesh whose faces are the sheets from ``first`` on: its light, at vertices where it is round."""
+    faces = len(offsets) - 1
     front, back = np.zeros((2, faces, 3), np.float32)
     for start in range(0, faces, AT_ONCE):
         part = slice(start, min(start + AT_ONCE, faces))
         sheets = np.arange(first + part.start, first + part.stop)
         given = offsets[part.start : part.stop + 1], colour[part], transmission[part]
         front[part], back[part] = light.of_faces(positions, corner_verts, *given, sheets)
-        yield part.stop / faces
     if rounded:
         front, back = (at_vertices(side, corner_verts, offsets, len(positions)) for side in (front, back))
-    for name, (domain, values) in baked_attributes('POINT' if rounded else 'FACE', front, back).items():
-        write(mesh, name, values, domain)
+    return baked_attributes('POINT' if rounded else 'FACE', front, back)
 
 
 def write_proxies(
     results: Results, form: ProxyForm, refined: Refined, statistics: Statistics, baking: Baking | None = None
-) -> Generator[float, None, None]:
-    """Make the proxies of a refined scene.
+) -> Generator[float | None, None, None]:
+    """Make the proxies of a refined scene; a thread makes the next block while one is written.
 
     Parameters
     ----------
@@ -104,26 +118,37 @@ def write_proxies(
 
     Yields
     ------
-    float
-        Estimated fraction that is done.
+    float or None
+        Estimated fraction that is done; None while there is nothing to write.
     """
-    scene, emission = results.scene, form.emission
+    emission = form.emission
     baked = baking is not None and emission.baked_blocks is not None
     blocks = emission.baked_blocks(refined, baking.light, baking.first_facet) if baked else emission.blocks(refined)
     statistics.facet_pixels = refined.facet_pixels or 0.0
-    for number, buffers in enumerate(blocks):
-        points = isinstance(buffers, PointBuffers)
-        material = form.baked_material if baked else form.point_material if points else form.material
-        made = material()
-        if not baked:
-            set_sockets(made, scene, form.sockets)
-        species = None if buffers.species is None else refined.flora.species[buffers.species]
-        name = f"{'TetFlora' if species is None else species.name} proxies {number:03d}"
-        add = results.add_points if points else results.add
-        add(name, "proxy", buffers, [made], species)
-        statistics.polygons_proxy += buffers.polygons
-        statistics.memory_mb += buffers.nbytes / 1e6
-        yield 1 - 0.9**number
+    with closing(in_thread((buffers for buffers in blocks), ahead=1)) as made:
+        number = 0
+        for buffers in made:
+            if buffers is None:
+                yield None
+                continue
+            species = None if buffers.species is None else refined.flora.species[buffers.species]
+            _add(results, form, buffers, number, baked, species)
+            statistics.polygons_proxy += buffers.polygons
+            statistics.memory_mb += buffers.nbytes / 1e6
+            yield 1 - 0.9**number
+            number += 1
+
+
+def _add(
+    results: Results, form: ProxyForm, buffers: Buffers, number: int, baked: bool, species: Species | None
+) -> None:
+    points = isinstance(buffers, PointBuffers)
+    material = (form.baked_material if baked else form.point_material if points else form.material)()
+    if not baked:
+        set_sockets(material, results.scene, form.sockets)
+    name = f"{'TetFlora' if species is None else species.name} proxies {number:03d}"
+    add = results.add_points if points else results.add
+    add(name, "proxy", buffers, [material], species)
 
 
 def set_sockets(material: bpy.types.Material, scene: bpy.types.Scene, sockets: Mapping[str, str]) -> None:

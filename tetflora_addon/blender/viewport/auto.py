@@ -45,6 +45,7 @@ class _State:
     due: float = 0.0
     message: str = ""
     working: bool = False  # in here right now: what changes is our own doing
+    waiting: bool = False  # for a thread that computes
     again: bool = False  # look once more when the job is done
     paused: int = 0  # others that refine
 
@@ -126,7 +127,9 @@ def tick() -> float | None:
             raise
     finally:
         _state.working = False
-    return 0.001 if more else None
+    if not more:
+        return None
+    return SLICE if _state.waiting else 0.001
 
 
 def _begin(scene: bpy.types.Scene) -> bool:
@@ -138,7 +141,7 @@ def _begin(scene: bpy.types.Scene) -> bool:
         _state.message = ""
         redraw()
         return False
-    _state.digest, _state.again = digest, False
+    _state.digest, _state.again, _state.waiting = digest, False, False
     _state.steps = refine.refine_steps(scene, layer.depsgraph, view_layer=layer)
     return True
 
@@ -147,7 +150,7 @@ def _slice(scene: bpy.types.Scene) -> bool:
     end = time.monotonic() + SLICE
     try:
         progress = next(_state.steps)
-        while time.monotonic() < end:
+        while time.monotonic() < end and not progress.waiting:
             progress = next(_state.steps)
     except StopIteration:
         _state.steps, _state.message = None, ""
@@ -156,6 +159,7 @@ def _slice(scene: bpy.types.Scene) -> bool:
         redraw()
         _state.due = time.monotonic() + QUIET
         return _state.again
+    _state.waiting = progress.waiting
     text = f"{progress.fraction:.0%}  {progress.message}"
     if text != _state.message:  # a redraw of the viewport may take longer than the slice
         _state.message = text

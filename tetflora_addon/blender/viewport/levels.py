@@ -12,16 +12,18 @@ from collections.abc import Generator
 
 import bpy
 
+from ...compiled.flora import compile_species
 from ...errors import TetFloraError
-from ...preview.levels import Levels, gather
+from ...preview.levels import Level, Levels, gather
 from ...preview.light_plants import Shapes, bounds_of_plants, light_plants
 from ...refinement.loop import refine as refine_loop
 from ...refinement.statistics import Progress
-from ..job.contents import compile_for, read_scene, refinement_settings
+from ..job.contents import compile_for, load_for, read_scene, refinement_settings
 from ..runtime import Handlers, call_off, call_soon, redraw
 from ..scene.camera import read_camera
 from ..scene.plants import NoPlantsError, read_plants
 from ..species import edits
+from ..worker import call_in_thread, steps_in_thread
 from . import state
 from .state import camera_now, find, of
 
@@ -43,20 +45,12 @@ def level_steps(
     before = find(scene)
     camera = before.frozen if before is not None and before.frozen is not None else read_camera(scene, depsgraph)
     given = read_scene(scene, depsgraph, view_layer or depsgraph.view_layer)
-    yield Progress(0.02, "Compiling species")
-    flora = compile_for(given.species, scene, depsgraph)
+    progress = Progress(0.02, "Compiling species")
+    yield progress
+    flora = yield from call_in_thread(progress, compile_species, load_for(given.species, scene, depsgraph))
     settings = refinement_settings(scene)
     states = refine_loop(flora, given.seeds, camera, settings, given.occluders, given.polygons, given.lights)
-    loop = gather(states, flora, camera)
-    fraction = 0.05
-    while True:
-        try:
-            level = next(loop)
-        except StopIteration as stop:
-            levels = stop.value
-            break
-        fraction += 0.15 * (1.0 - fraction)  # nobody knows how many passes will follow
-        yield Progress(fraction, f"Level {level.number}: {len(level):,} tetrahedra")
+    levels = yield from steps_in_thread(_shown(gather(states, flora, camera)), Progress(0.05, "Level 0"))
     preview = of(scene)
     preview.levels, preview.looked = levels, looked
     preview.made += 1
@@ -64,6 +58,18 @@ def level_steps(
         preview.frozen = camera
     redraw()
     return levels
+
+
+def _shown(levels: Generator[Level, None, Levels]) -> Generator[Progress, object, Levels]:
+    """Levels as progress."""
+    fraction = 0.05
+    while True:
+        try:
+            level = next(levels)
+        except StopIteration as stop:
+            return stop.value
+        fraction += 0.15 * (1.0 - fraction)  # nobody knows how many passes will follow
+        yield Progress(fraction, f"Level {level.number}: {len(level):,} tetrahedra")
 
 
 def read_shapes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Shapes | None:
