@@ -152,7 +152,7 @@ def _hill(scene: Any) -> None:
     camera.rotation_euler = (Vector((0.0, 0.0, 4.0)) - camera.location).to_track_quat('-Z', 'Y').to_euler()
     camera.data.clip_end = 1000.0
     settings = scene.tetflora.populate
-    settings.count, settings.min_distance = 60, 4.0
+    settings.count = 60
     for species, weight in (("broadleaf_tree", 2.0), ("conifer", 1.0), ("bush", 2.0)):
         entry = settings.mix.add()
         entry.species, entry.weight = species, weight

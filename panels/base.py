@@ -41,6 +41,13 @@ def thumbnail(identifier: str) -> dict[str, str | int]:
     return {"icon_value": number} if number else {"icon": FALLBACK_ICON}
 
 
+def draw_below(layout: bpy.types.UILayout, text: str) -> None:
+    """A note under a property, where its value is."""
+    row = layout.split(factor=0.4)
+    row.label()
+    row.label(text=text)
+
+
 def shown_length(metres: float) -> str:
     """A length in the scene's units, as its fields show it."""
     unit = bpy.context.scene.unit_settings

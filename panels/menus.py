@@ -29,6 +29,7 @@ from ..operators.plants import (
 from ..operators.refine import TETFLORA_OT_clear, TETFLORA_OT_make_plant_mesh, TETFLORA_OT_refine
 from ..tetflora_addon.blender.runtime import open_menu
 from ..tetflora_addon.blender.species.edits import catalogue
+from ..tetflora_addon.species.catalogue import FIRST
 from .base import Button, draw_buttons, thumbnail
 from .preferences import PIE
 
@@ -45,6 +46,8 @@ class _SpeciesMenu:
         for info in known.values():
             icon = thumbnail(info.identifier)
             self.layout.operator(self.operator.bl_idname, text=info.name, **icon).species = info.identifier
+            if info.identifier == FIRST:  # the others follow by name
+                self.layout.separator()
         if not known:
             self.layout.label(text="The catalog has no species", icon='ERROR')
 

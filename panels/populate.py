@@ -29,6 +29,7 @@ from .base import (
     Button,
     SidebarPanel,
     TETFLORA_UL_mix,
+    draw_below,
     draw_buttons,
     draw_message,
     draw_properties,
@@ -93,6 +94,7 @@ class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
             column.prop(settings, "density", text="Per Hectare")  # the whole name is wider than labels are
         else:
             column.prop(settings, "count")
+        draw_below(column, f"At least {shown_length(distance_of(settings))} apart")
         draw_properties(column, settings, "as_field", "seed")
         active = context.active_object
         marked = active is not None and active.tetflora.is_occluder

@@ -14,8 +14,15 @@ from ..tetflora_addon.blender.results.forms import few_bounces, form_of
 from ..tetflora_addon.blender.results.output import KIND
 from ..tetflora_addon.blender.scene.objects import has_contents
 from ..tetflora_addon.blender.viewport import auto
-from .base import SidebarPanel, TETFLORA_UL_leaf_objects, draw_message, draw_properties, split_layout
-from .results import rows_of
+from .base import (
+    SidebarPanel,
+    TETFLORA_UL_leaf_objects,
+    draw_below,
+    draw_message,
+    draw_properties,
+    split_layout,
+)
+from .results import made_of
 
 _FEW = 200  # objects to look through at every movement of the mouse; a larger scene is not a new one
 
@@ -55,12 +62,10 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
             draw_message(context, layout, error)
         if context.scene.camera is None:
             draw_message(context, layout, "The scene has no camera; add one, and make it active with Ctrl Numpad 0")
-        elif text := hint(context.scene):
+        elif text := hint(context.scene) or made_of(settings.statistics):
             draw_message(context, layout, text, 'INFO')
-        elif rows := dict(rows_of(settings.statistics)):
-            draw_message(context, layout, f"{rows['Polygons']} polygons made in {rows['Seconds']} s", 'INFO')
-        if text := forecast_text(context.scene, context.view_layer):
-            draw_message(context, layout, text, 'TIME')
+        for number, text in enumerate(forecast_text(context.scene, context.view_layer).splitlines()):
+            draw_message(context, layout, text, 'BLANK1' if number else 'TIME')
         layout = split_layout(self)
         column = layout.column()
         column.active = not settings.expand_everything
@@ -75,12 +80,13 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
 
 def _draw_memory(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     """The limit of memory, and what it is where the artist sets none."""
-    column = layout.column(align=True)
-    column.prop(scene.tetflora, "max_memory", text="Max Memory (GB)")
+    row = layout.row(align=True)
+    row.prop(scene.tetflora, "max_memory")
+    unit = row.row()
+    unit.ui_units_x = 1.4
+    unit.label(text="GB")  # Blender has no unit for memory
     if text := memory_text(scene):
-        row = column.split(factor=0.4)  # as labels and values are split
-        row.label()
-        row.label(text=text)
+        draw_below(layout, text)
 
 
 def hint(scene: bpy.types.Scene) -> str:

@@ -9,6 +9,7 @@ import bpy
 
 from ..operators.preview import TETFLORA_OT_forget_levels, TETFLORA_OT_look_through, TETFLORA_OT_preview_levels
 from ..operators.refine import TETFLORA_OT_keep_results
+from ..tetflora_addon.blender.job.forecast import polygons_text, seconds_text
 from ..tetflora_addon.blender.placing.plant_objects import plant_collections
 from ..tetflora_addon.blender.viewport import state
 from .base import SidebarPanel, TETFLORA_UL_output_species, draw_message, draw_properties, split_layout
@@ -149,6 +150,15 @@ def rows_of(text: str) -> tuple[tuple[str, str], ...]:
         )
     except (ValueError, KeyError, TypeError, AttributeError):
         return ()
+
+
+def made_of(text: str) -> str:
+    """The stored figures in one line, counted as an estimate and Max Polygons count; empty if there are none."""
+    if not rows_of(text):
+        return ""
+    figures = json.loads(text)
+    polygons = figures["polygons_meshed"] + figures["polygons_proxy"]
+    return f"{polygons_text(polygons)} made in {seconds_text(sum(figures['seconds'].values()))}"
 
 
 class TETFLORA_PT_statistics(SidebarPanel, bpy.types.Panel):

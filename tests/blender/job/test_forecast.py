@@ -122,10 +122,10 @@ def test_the_text_says_that_it_is_an_estimate(monkeypatch):
     text = forecast.forecast_text(scene, layer)
     assert re.fullmatch(r"About \d+ (s|min), [\d.,]+( M)? polygons, \d+\.\d GB", text)
     scene.tetflora.max_polygons = 1000
-    assert forecast.forecast_text(scene, layer).endswith(", as Max Polygons allows")
+    assert forecast.forecast_text(scene, layer).endswith("\nLimited by Max Polygons")
     scene.tetflora.max_polygons, scene.tetflora.max_memory = 0, 0.01
     monkeypatch.setattr(memory, "LEAST", 1e5)
-    assert forecast.forecast_text(scene, layer).endswith(", as Max Memory allows")
+    assert forecast.forecast_text(scene, layer).endswith("\nLimited by Max Memory")
 
 
 @pytest.mark.parametrize(
@@ -133,14 +133,14 @@ def test_the_text_says_that_it_is_an_estimate(monkeypatch):
     [(0.2, "1 s"), (7.4, "7 s"), (33.0, "35 s"), (100.0, "2 min"), (3000.0, "50 min"), (9000.0, "2.5 h")],
 )
 def test_times_are_rounded(seconds, shown):
-    assert forecast._seconds(seconds) == shown
+    assert forecast.seconds_text(seconds) == shown
 
 
 @pytest.mark.parametrize(
     ("number", "shown"), [(0.0, "0"), (987.0, "990"), (123_456.0, "120,000"), (4_120_000.0, "4.1 M"), (3.66e7, "37 M")]
 )
 def test_polygons_are_rounded(number, shown):
-    assert forecast._polygons(number) == f"{shown} polygons"
+    assert forecast.polygons_text(number) == f"{shown} polygons"
 
 
 def test_the_automatic_limit_is_told(monkeypatch):

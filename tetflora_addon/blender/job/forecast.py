@@ -68,15 +68,15 @@ def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimat
 
 
 def forecast_text(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> str:
-    """``About 12 s, 4.1 M polygons, 2.5 GB``; empty where nothing can be told."""
+    """``About 12 s, 4.1 M polygons, 2.5 GB``, and in a second line which limit holds; empty where nothing is known."""
     found = forecast(scene, view_layer)
     if found is None:
         return ""
-    text = f"About {_seconds(found.seconds)}, {_polygons(found.primitives)}, {found.memory / _GIGA:.1f} GB"
+    text = f"About {seconds_text(found.seconds)}, {polygons_text(found.primitives)}, {found.memory / _GIGA:.1f} GB"
     if not found.limited:
         return text
     most = scene.tetflora.max_polygons
-    return f"{text}, as {'Max Polygons' if most and found.primitives >= most else 'Max Memory'} allows"
+    return f"{text}\nLimited by {'Max Polygons' if most and found.primitives >= most else 'Max Memory'}"
 
 
 def memory_text(scene: bpy.types.Scene) -> str:
@@ -87,13 +87,15 @@ def memory_text(scene: bpy.types.Scene) -> str:
     return f"Automatic: {most / _GIGA:.1f} GB" if np.isfinite(most) else "Automatic: no limit"
 
 
-def _seconds(seconds: float) -> str:
+def seconds_text(seconds: float) -> str:
+    """A time as long as one would say it: ``12 s``, ``35 s``, ``4 min``."""
     if seconds < 90.0:
         return f"{max(round(seconds), 1) if seconds < 20.0 else 5 * round(seconds / 5.0)} s"
     return f"{round(seconds / 60.0)} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
 
 
-def _polygons(number: float) -> str:
+def polygons_text(number: float) -> str:
+    """A number of polygons in two digits."""
     if number >= _MEGA:
         return f"{number / _MEGA:.2g} M polygons" if number < 10.0 * _MEGA else f"{number / _MEGA:,.0f} M polygons"
     return f"{float(f'{number:.2g}'):,.0f} polygons"
