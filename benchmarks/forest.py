@@ -9,7 +9,8 @@
     python -m benchmarks.forest missing            # everything that an earlier run has not left in out/forest
 
 A case is a species, ``mix`` (five species, 5 m apart), ``eye`` (inside a wood of five species), ``million`` (that of
-the README) or ``light``. Each is measured in a process of its own, so that the largest memory is its own.
+the README) or ``light`` (``light-ground``, ``light-shadow``, ``light-pond``). Each is measured
+in a process of its own, so that the largest memory is its own.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ QUICK_FOLDER = ROOT / "out" / "forest-quick"
 WHATS = ("refine", "instances", "part")
 QUICK = ("birch", "mix")
 #: Samples of timed images, of images that are compared, and where light is measured.
-SAMPLES, COMPARED, LIT = 4, 64, 64
+SAMPLES, COMPARED, LIT = 4, 64, 16
 #: Gigabytes that the process may have.
 LIMITS = (2, 4, 8)
 _LONGEST = 3600  # seconds of one process
@@ -117,8 +118,9 @@ def one(arguments: argparse.Namespace) -> dict:
     with tempfile.TemporaryDirectory() as temporary:
         folder = arguments.keep or Path(temporary)
         folder.mkdir(parents=True, exist_ok=True)
-        if arguments.case == "light":
-            return forest_light.run(folder, arguments.samples)
+        if arguments.case.startswith("light"):
+            names = tuple(arguments.case.split("-")[1:]) or tuple(forest_light.SCENES)
+            return forest_light.run(folder, arguments.samples, names, again=not arguments.quick)
         if arguments.case == "million":
             planted = forest_scene.build_million(scene, arguments.asked)
         else:
