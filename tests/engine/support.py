@@ -17,6 +17,7 @@ from tetflora_addon.buffers import MeshBuffers, concatenate_buffers
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.emission.forms import Refined, facet_blocks
+from tetflora_addon.emission.plants import Transition
 from tetflora_addon.growth.axes import axes
 from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.foliage import leaf_keys, leaf_places, place_leaves
@@ -240,11 +241,15 @@ def moment(*meshes: MeshBuffers) -> NDArray[np.float64]:
 
 
 def facet_buffers(
-    flora: Flora, result: Refinement, camera: Camera, pixels: FacetPixels | float = 0.33
+    flora: Flora,
+    result: Refinement,
+    camera: Camera,
+    pixels: FacetPixels | float = 0.33,
+    transition: Transition | None = None,
 ) -> MeshBuffers | None:
-    """All facets of proxies in one mesh, of given sides in pixels; None where there are none."""
+    """All facets in one mesh, of given sides in pixels; without a transition, those of all plants; None if none."""
     sides = pixels if isinstance(pixels, FacetPixels) else FacetPixels(pixels)
-    return concatenate_buffers(list(facet_blocks(Refined(flora, result, camera, sides))))
+    return concatenate_buffers(list(facet_blocks(Refined(flora, result, camera, sides, transition))))
 
 
 def face_planes(vertices: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -59,7 +59,7 @@ class Parts:
 def facet_parts(
     flora: Flora, result: Refinement, camera: Camera, pixels: FacetPixels, transition: Transition | None = None
 ) -> Iterator[Parts]:
-    """Facets of all that is not explicit and of no polygon that is kept as it is; no block is empty.
+    """Facets of all that is not drawn as it is; no block is empty.
 
     Blocks have about `BLOCK_POLYGONS` facets each, so that only one of them is in memory beside Blender's own data.
     Each is of one species, or of other meshes.
@@ -72,8 +72,8 @@ def facet_parts(
     pixels : FacetPixels
         Sides of facets, see `proxies.facet_sizes`.
     transition : Transition, optional
-        With it, what is too small in explicit tetrahedra gets facets too, and thick wood elsewhere gets none;
-        `plants.explicit_blocks` with the same transition makes the rest.
+        `plants.explicit_blocks` with the same transition makes the rest: wide leaves of explicit tetrahedra, and thick
+        wood of all that is seen. Without, all of every plant gets facets.
     """
     parts: list[Part] = []
     current = None

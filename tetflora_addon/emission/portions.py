@@ -81,8 +81,8 @@ class Sight:
         seen = np.isin(result.decision, (Decision.EXPLICIT, Decision.PROXY)) if facets else explicit
         size = len(result.tree)
         self._visibility, self._rank = np.zeros(size), np.zeros(size, np.int32)
-        # What is explicit although it is hidden is so for its shadow.
-        shown = np.where(explicit & (result.transmittance <= 0.0), 1.0, result.transmittance)
+        # What is explicit although it is hidden is so for its shadow; without facets all that is explicit is drawn.
+        shown = np.where(explicit & ((result.transmittance <= 0.0) | (not facets)), 1.0, result.transmittance)
         self._visibility[nodes] = np.where(seen, np.maximum(shown, 1e-3), 0.0)
         self._rank[nodes] = result.rank
         self._explicit = result.chosen(Decision.EXPLICIT)
@@ -94,7 +94,7 @@ class Sight:
         made = self._portions(self.plants.parts, self.plants.points)
         branches = made.parts.branches
         # Ties are broken by the plants themselves, so that their order in the scene does not matter.
-        return made.take(np.lexsort([branches.position[:, 1], branches.position[:, 0], branches.key, made.rank]))
+        return made.take(np.lexsort([*branches.position.T, branches.key, made.rank]))
 
     def _portions(self, parts: PlantParts, points: SharePoints) -> Portions:
         count, cell = len(parts), points.cell
