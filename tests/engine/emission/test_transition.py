@@ -2,21 +2,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Between real leaves and facets nothing pops: fractions grow smoothly, what is real stays real, and areas add up."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.engine import support
+from tests.engine.emission.test_emission import unweighted, with_decision
 from tests.engine.refinement.test_loop import run
 from tetflora_addon.buffers import concatenate_buffers
-from tetflora_addon.emission import facets as subject
 from tetflora_addon.emission.facets import facet_parts
-from tetflora_addon.emission.plants import BAND, Transition, explicit_blocks
+from tetflora_addon.emission.plants import BAND, FADING, Transition, explicit_blocks
 from tetflora_addon.growth.growth import trunks
-from tetflora_addon.proxies.facet_weights import COUNTS, FacetWeights
+from tetflora_addon.proxies.facet_sizes import FacetPixels
+from tetflora_addon.proxies.microsurfaces import Facets, concatenate_facets
+from tetflora_addon.refinement import shares
 from tetflora_addon.refinement.decisions import Decision
 
 
@@ -44,66 +44,126 @@ def test_fractions_grow_with_the_width(a: float, b: float, limit: float) -> None
     assert (fraction[0] - fraction[1]) * (a - b) >= 0
 
 
+def leaf_meshes(blocks) -> list:
+    return [b.buffers for b in blocks if b.kind == "leaf"]
+
+
 def leaf_area(blocks) -> float:
-    made = concatenate_buffers([b.buffers for b in blocks if b.kind == "leaf"])
-    return 0.0 if made is None else float(support.face_areas(made).sum())
+    return float(sum(support.face_areas(mesh).sum() for mesh in leaf_meshes(blocks)))
+
+
+def all_facets(flora, result, camera, transition, pixels: float = 0.3) -> Facets:
+    return concatenate_facets(
+        [f for block in facet_parts(flora, result, camera, FacetPixels(pixels), transition) for f, _ in block]
+    )
 
 
 def facets_of_leaves(flora, result, camera, transition) -> float:
-    parts = [f for block in facet_parts(flora, result, camera, 0.3, transition) for f, _ in block]
-    return float(sum((f.side**2)[f.transmission > 0].sum() for f in parts))
+    made = all_facets(flora, result, camera, transition)
+    return float((made.side**2)[made.transmission > 0].sum())
 
 
-def test_real_leaves_and_facets_together_are_all_leaves(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever the limit, but for what leaves of a cluster hide of each other."""
+EXPLICIT, PROXY, HIDDEN = Decision.EXPLICIT, Decision.PROXY, Decision.HIDDEN
+
+
+@pytest.mark.parametrize(
+    ("decisions", "visibility"),
+    [
+        ((EXPLICIT,), 1.0),
+        ((EXPLICIT,), 0.3),
+        ((EXPLICIT,), 0.03),
+        ((EXPLICIT,), None),
+        ((PROXY,), None),
+        ((HIDDEN,), None),
+        ((EXPLICIT, HIDDEN), None),
+        ((EXPLICIT, PROXY, HIDDEN), None),
+    ],
+)
+def test_real_leaves_and_facets_together_are_all_leaves(
+    monkeypatch: pytest.MonkeyPatch, decisions: tuple[Decision, ...], visibility: float | None
+) -> None:
+    """Whatever the limit, the decisions and what is seen of each cell, but for what leaves of a cluster hide."""
     flora, camera, result = scene()
-    every = replace(result, decision=np.full_like(result.decision, Decision.EXPLICIT))
-    whole = leaf_area(explicit_blocks(flora, every))
-    ones = np.ones((len(flora.rows), len(COUNTS)))
-    monkeypatch.setattr(subject, "facet_weights", lambda _: FacetWeights(ones, ones))
+    rng = np.random.default_rng(2)
+    seen = rng.random(len(result.nodes)) if visibility is None else visibility
+    every = with_decision(result, rng.choice(np.array(decisions), len(result.nodes)), seen)
+    whole = leaf_area(explicit_blocks(flora, with_decision(result, EXPLICIT), camera))
+    unweighted(monkeypatch, flora)
     pixels = float(np.median(result.cells.feature))
     fractions = []
-    for limit in pixels * np.array([3.0, 0.9, 0.7, 0.5, 0.1]):
+    for limit in pixels * np.array([3.0, 0.9, 0.7, 0.5, 0.01]):
         transition = Transition(flora, camera, float(limit))
-        real = leaf_area(explicit_blocks(flora, every, transition))
+        real = leaf_area(explicit_blocks(flora, every, camera, transition))
         fractions.append(real / whole)
         assert real + facets_of_leaves(flora, every, camera, transition) == pytest.approx(whole, rel=0.08)
     assert fractions == sorted(fractions)
     assert fractions[0] == 0.0
-    assert 0.02 < fractions[2] < 0.98
-    assert fractions[-1] == pytest.approx(1.0)
+    if decisions == (EXPLICIT,):
+        assert fractions[-1] == pytest.approx(1.0)
+        assert visibility != 1.0 or 0.02 < fractions[2] < 0.98
+    elif EXPLICIT in decisions:
+        assert 0.1 < fractions[-1] < 1.0
+    else:
+        assert fractions[-1] == 0.0
 
 
-def test_what_is_real_stays_real_as_the_limit_falls() -> None:
+@pytest.mark.parametrize("visibility", [1.0, 0.5])
+def test_each_leaf_is_real_or_a_facet_in_the_right_fraction(monkeypatch: pytest.MonkeyPatch, visibility: float) -> None:
+    """Plant by plant: as many leaves are real as widths say, and facets have what is left of its area."""
     flora, camera, result = scene()
-    every = replace(result, decision=np.full_like(result.decision, Decision.EXPLICIT))
+    seeds = support.grove(6, 3.0)
+    every = with_decision(result, EXPLICIT, visibility)
+    unweighted(monkeypatch, flora)
+    limit = 0.7 * float(np.median(result.cells.feature)) * visibility**FADING
+    transition = Transition(flora, camera, limit)
+    real = concatenate_buffers(leaf_meshes(explicit_blocks(flora, every, camera, transition)))
+    made = all_facets(flora, every, camera, transition, 0.05)
+    made = made.take(np.flatnonzero(made.transmission > 0))
+
+    def owner(places: np.ndarray) -> np.ndarray:
+        away = np.linalg.norm(places[:, None, :2] - seeds.position[None, :, :2], axis=2)
+        return away.argmin(axis=1)
+
+    areas = np.bincount(owner(support.face_centres(real)), support.face_areas(real), len(seeds))
+    rest = np.bincount(owner(made.centre), made.side**2, len(seeds))
+    for plant in range(len(seeds)):
+        _, pieces = support.grown(flora, seeds.take(np.array([plant])))
+        branches = pieces.branches.take(np.flatnonzero(pieces.t0 == 0))
+        fraction = transition.of_branches(branches, visibility)
+        leaf, _, size = support.leaves_of(flora, branches)
+        shape = float(size @ size)
+        expected = float(size**2 @ fraction[leaf]) / shape
+        assert 0.1 < expected < 0.9
+        whole = areas[plant] + rest[plant]
+        assert areas[plant] / whole == pytest.approx(expected, abs=4 * 0.5 / np.sqrt(len(size)) + 0.02)
+
+
+def test_what_is_real_stays_real_as_the_limit_falls_and_as_more_is_seen() -> None:
+    flora, camera, result = scene()
     pixels = float(np.median(result.cells.feature))
     leaves = []
-    for limit in pixels * np.array([0.8, 0.7]):
-        made = [b.buffers for b in explicit_blocks(flora, every, Transition(flora, camera, limit)) if b.kind == "leaf"]
+    for limit, visibility in ((0.8, 0.8), (0.8, 1.0), (0.7, 1.0)):
+        every = with_decision(result, Decision.EXPLICIT, visibility)
+        made = leaf_meshes(explicit_blocks(flora, every, camera, Transition(flora, camera, limit * pixels)))
         leaves.append({tuple(p) for m in made for p in m.positions.round(4)})
-    assert leaves[0] < leaves[1]
+    assert set() < leaves[0] < leaves[1] < leaves[2]
 
 
 def test_thick_wood_is_real_among_proxies() -> None:
     """A trunk of many pixels is a tube, and has no facets, although all around it is drawn as proxies."""
     flora, camera, result = scene()
-    proxies = replace(result, decision=np.full_like(result.decision, Decision.PROXY))
+    proxies = with_decision(result, Decision.PROXY)
     trunk = trunks(flora.rows, support.grove(6, 3.0))
     wide = 2 * trunk.radius.max() / camera.extent_around(trunk.position).min()
     near = Transition(flora, camera, wide / 10)
-    blocks = list(explicit_blocks(flora, proxies, near))
+    blocks = list(explicit_blocks(flora, proxies, camera, near))
     assert {b.kind for b in blocks} == {"bark"}
-    wood = [
-        sum(
-            float((f.side**2)[f.transmission == 0].sum())
-            for b in facet_parts(flora, proxies, camera, 0.3, t)
-            for f, _ in b
-        )
-        for t in (None, near)
-    ]
+    wood = []
+    for transition in (None, near):
+        made = all_facets(flora, proxies, camera, transition)
+        wood.append(float((made.side**2)[made.transmission == 0].sum()))
     assert wood[1] < wood[0]
-    assert list(explicit_blocks(flora, proxies, Transition(flora, camera, 100 * wide))) == []
+    assert list(explicit_blocks(flora, proxies, camera, Transition(flora, camera, 100 * wide))) == []
 
 
 def test_facets_do_not_depend_on_how_space_is_divided() -> None:
@@ -111,19 +171,19 @@ def test_facets_do_not_depend_on_how_space_is_divided() -> None:
     made = []
     for cutoff in (2.0, 2.6):
         flora, camera, result = scene(cutoff=cutoff, hidden=-1.0)
-        seen = replace(result, decision=np.full_like(result.decision, Decision.PROXY))
-        parts = [f for b in facet_parts(flora, seen, camera, 0.3, Transition(flora, camera, 50.0)) for f, s in b if s]
-        made.append({tuple(c) for f in parts for c in f.centre.round(5)})
+        seen = with_decision(result, Decision.PROXY, 1.0)
+        centres = all_facets(flora, seen, camera, Transition(flora, camera, 50.0)).centre
+        made.append({tuple(c) for c in centres.round(5)})
     assert len(made[0] & made[1]) > 0.8 * len(made[0] | made[1])
 
 
 def test_few_are_opened_at_a_time_and_it_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     flora, camera, result = scene()
-    transition, opened, inner = Transition(flora, camera, 50.0), [], subject.open_subplants
+    transition, opened, inner = Transition(flora, camera, 50.0), [], shares.open_branches
 
     def facets() -> np.ndarray:
-        parts = [f for block in facet_parts(flora, result, camera, 0.3, transition) for f, _ in block]
-        every = np.concatenate([np.column_stack([f.centre, f.along, f.side]) for f in parts])
+        made = all_facets(flora, result, camera, transition)
+        every = np.column_stack([made.centre, made.along, made.side])
         return every[np.lexsort(every.T)]
 
     def counted(flora, subplants):
@@ -131,7 +191,7 @@ def test_few_are_opened_at_a_time_and_it_changes_nothing(monkeypatch: pytest.Mon
         return inner(flora, subplants)
 
     once = facets()
-    monkeypatch.setattr(subject, "open_subplants", counted)
-    monkeypatch.setattr(subject, "OPENED_AT_ONCE", 40)
+    monkeypatch.setattr(shares, "open_branches", counted)
+    monkeypatch.setattr(shares, "OPENED_AT_ONCE", 3)
     assert np.array_equal(facets(), once)
-    assert max(opened) == 40
+    assert max(opened) == 3
