@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..proxies.facet_sizes import FacetPixels, polygon_facet_sizes
+from ..refinement.contents import LARGE
 from ..refinement.decisions import Decision, contributions
 from ..refinement.loop import Refinement
 from ..refinement.settings import RefinementSettings
@@ -100,24 +101,35 @@ def afford(
         return replace(detail, refinement=_fitted_shells(result, allowed, faces)) if np.isfinite(allowed) else detail
     count = _Facets(flora, result, camera)
     # A sphere is a whole polygon for the limit on polygons, but only a part of one for memory: a budget for each.
-    limits = [(enough(camera), 1.0), ((1 - _RESERVE) * most, 1.0)]
-    limits += [((1 - _RESERVE) * memory, primitive_bytes / BYTES_PER_POLYGON)]
+    # What other meshes have out of sight takes from what somebody allows, not from what the image shows.
+    limits = [(enough(camera), 1.0, False), ((1 - _RESERVE) * most, 1.0, True)]
+    limits += [((1 - _RESERVE) * memory, primitive_bytes / BYTES_PER_POLYGON, True)]
     factor = hidden = 1.0
-    for allowed, weight in limits:
+    for allowed, weight, every in limits:
         if not np.isfinite(allowed):
             continue
 
-        def seen(by: float, weight: float = weight) -> float:
-            return count.seen(by * settings.facet, by * settings.leaf_limit, weight)
+        def seen(by: float, weight: float = weight, every: bool = every) -> float:
+            pixels, limit = by * settings.facet, _limit(by, settings)
+            return count.seen(pixels, limit, weight) + count.polygons(pixels, limit, weight, every)
 
-        def unseen(by: float, weight: float = weight, at: float = factor) -> float:
+        def unseen(by: float, weight: float = weight) -> float:
             return weight * count.unseen(FacetPixels(settings.facet, by))
 
         for_hidden = min(unseen(hidden), max(_HIDDEN * allowed, min(_FEW_HIDDEN, allowed / 2)))
         factor = max(factor, _smallest(lambda f, seen=seen, left=allowed - for_hidden: seen(f) <= left))
         for_hidden = min(for_hidden, max(seen(factor), min(_FEW_HIDDEN, allowed / 2)))
         hidden = max(hidden, _smallest(lambda f, unseen=unseen, left=for_hidden: unseen(f) <= left))
-    return Detail(result, FacetPixels(factor * settings.facet, hidden), factor * settings.leaf_limit)
+    limit = _limit(factor, settings)
+    small = count.too_small(limit) if factor > 1.0 else np.zeros(0, bool)
+    if small.any():
+        result = replace(result, decision=np.where(small, Decision.PROXY, result.decision).astype(np.int8))
+    return Detail(result, FacetPixels(factor * settings.facet, hidden), limit)
+
+
+def _limit(factor: float, settings: RefinementSettings) -> float:
+    """Width in pixels up to which leaves are facets."""
+    return factor * settings.leaf_limit
 
 
 def _fitted_shells(result: Refinement, allowed: float, faces: float) -> Refinement:
@@ -138,7 +150,7 @@ def _fitted_shells(result: Refinement, allowed: float, faces: float) -> Refineme
 
 def _large(result: Refinement) -> NDArray[np.float64]:
     """Polygons (cells,) that stay polygons although their cell is a proxy."""
-    held = result.holdings.contents.polygons
+    held = result.holdings.polygons
     large = np.isinf(held.totals.width)
     return np.bincount(held.cell[large], minlength=len(result.tree))[result.nodes].astype(np.float64)
 
@@ -152,28 +164,38 @@ class _Facets:
         self.flora, self.camera, self.portions = flora, camera, portions.take(np.flatnonzero(some))
         self.sizes = sizes_of(flora, self.portions, camera)
         self.unseen_sizes = sizes_of(flora, portions.take(np.flatnonzero(~some)), camera)
-        held = result.holdings.contents.polygons
-        hidden = result.chosen(Decision.HIDDEN)
+        self.result, held, hidden = result, result.holdings.polygons, result.chosen(Decision.HIDDEN)
+        self.cell = held.cell
         self.hidden = hidden[held.cell] | ~result.in_view[held.cell]
-        self.explicit = result.chosen(Decision.EXPLICIT)[held.cell]
-        self.polygons = polygon_facet_sizes(result.holdings.contents, camera, hidden)
+        self.faces = polygon_facet_sizes(held, camera, hidden)
 
     def seen(self, pixels: float, limit: float, weight: float) -> float:
-        """Polygons, and facets counted with a weight, of all that is seen."""
+        """Polygons, and facets counted with a weight, of all plants that are seen."""
         transition = Transition(self.flora, self.camera, limit)
         branches, totals = self.portions.parts.branches, self.portions.parts.totals
         real = np.where(self.portions.real, transition.of_branches(branches, self.portions.visibility), 0.0)
         facets = weight * self.sizes.counts(FacetPixels(pixels))
-        return float((real * totals.polygons + (1.0 - real) * facets).sum()) + self._polygons(pixels, weight, False)
+        return float((real * totals.polygons + (1.0 - real) * facets).sum())
 
     def unseen(self, pixels: FacetPixels) -> float:
-        """Facets of all that is not seen."""
-        return float(self.unseen_sizes.counts(pixels).sum()) + self._polygons(pixels.seen, 1.0, True)
+        """Facets of all plants that are not seen."""
+        return float(self.unseen_sizes.counts(pixels).sum())
 
-    def _polygons(self, pixels: float, weight: float, hidden: bool) -> float:
-        kept = self.explicit | self.polygons.kept(pixels)
-        counts = np.where(kept, 1.0, weight * self.polygons.counts(pixels))
-        return float(counts[self.hidden == hidden].sum())
+    def polygons(self, pixels: float, limit: float, weight: float, every: bool) -> float:
+        """Polygons of other meshes, and facets in their place; of what is seen, or of all."""
+        explicit = np.zeros(len(self.result.tree), bool)
+        explicit[self.result.nodes] = (self.result.decision == Decision.EXPLICIT) & ~self.too_small(limit)
+        kept = explicit[self.cell] | self.faces.kept(pixels)
+        counts = np.where(kept, 1.0, weight * self.faces.counts(pixels))
+        return float(counts[every | ~self.hidden].sum())
+
+    def too_small(self, limit: float) -> NDArray[np.bool_]:
+        """Explicit tetrahedra (cells,) with polygons of other meshes that are proxies under a larger limit."""
+        cells, held = self.result.cells, np.zeros(len(self.result.tree), bool)
+        held[self.cell] = True
+        # What is large there stays as it is as long as facets are smaller.
+        feature = np.where(np.isinf(cells.feature), LARGE, cells.feature)
+        return held[cells.nodes] & (self.result.decision == Decision.EXPLICIT) & (feature < limit)
 
 
 def _smallest(fits: Callable[[float], bool]) -> float:

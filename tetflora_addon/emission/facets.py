@@ -104,9 +104,9 @@ def _facets(
             for facets, seen in maker.facets(own.take(run)):
                 yield species, facets, seen
     explicit = result.chosen(Decision.EXPLICIT) if transition else np.zeros(len(result.tree), bool)
-    held = result.holdings.contents
-    proxies = held.within(result.chosen(Decision.PROXY, Decision.HIDDEN) & ~explicit)
-    if len(proxies.polygons):
+    held = result.holdings.polygons
+    proxies = held.take((result.chosen(Decision.PROXY, Decision.HIDDEN) & ~explicit)[held.cell])
+    if len(proxies):
         for facets, seen in polygon_facets(proxies, result, camera, pixels.seen, FACETS_AT_ONCE):
             yield None, facets, seen
 

@@ -25,7 +25,7 @@ from ..camera.camera import Camera
 from ..growth.hashing import child_key, key_of_seed, mix, stepped, uniform
 from ..proxies.facet_sizes import HIDDEN_FACES, polygon_facet_sizes
 from ..proxies.microsurfaces import Facets, kept_out_of_view
-from ..refinement.contents import Contents
+from ..refinement.contents import Held
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 from ..refinement.polygons import Polygons, area_fractions
@@ -71,19 +71,19 @@ def polygon_blocks(result: Refinement, camera: Camera, facet_pixels: float | Non
     facet_pixels : float or None
         Side of a facet that is seen, in pixels; None where proxies are shells, which stand for all but large polygons.
     """
-    contents = result.contents
-    if not len(contents.polygons):
+    held = result.holdings.polygons
+    if not len(held):
         return
-    cell = contents.polygons.cell
+    cell = held.cell
     kept = ~result.chosen(Decision.PROXY, Decision.HIDDEN)[cell]
     if facet_pixels is None:
-        kept |= ~np.isfinite(contents.polygons.totals.width)
+        kept |= ~np.isfinite(held.totals.width)
     else:
-        sizes = polygon_facet_sizes(contents, camera, result.chosen(Decision.HIDDEN))
+        sizes = polygon_facet_sizes(held, camera, result.chosen(Decision.HIDDEN))
         kept |= sizes.kept(facet_pixels)
     rank = np.zeros(len(result.tree), np.int64)
     rank[result.nodes] = result.rank
-    polygons, rank = contents.polygons.items.take(kept), rank[cell[kept]]
+    polygons, rank = held.items.take(kept), rank[cell[kept]]
     order = np.argsort(rank, kind="stable")
     polygons = mended(polygons.take(order))
     runs = list(chunks(np.ones(len(polygons)), BLOCK_POLYGONS))
@@ -202,14 +202,14 @@ def _at_corners(
 
 
 def polygon_facets(
-    contents: Contents, result: Refinement, camera: Camera, facet_pixels: float, at_once: float = np.inf
+    held: Held[Polygons], result: Refinement, camera: Camera, facet_pixels: float, at_once: float = np.inf
 ) -> Iterator[tuple[Facets, bool]]:
-    """Facets of the polygons of proxies (``contents``) that are not kept, about ``at_once`` at a time.
+    """Facets of the polygons of proxies (``held``) that are not kept, about ``at_once`` at a time.
 
     Yields facets and whether they are seen: neither hidden nor beside the view.
     """
-    sizes = polygon_facet_sizes(contents, camera, result.chosen(Decision.HIDDEN))
-    side, inside = sizes.sides(facet_pixels), result.in_view[contents.polygons.cell]
+    sizes = polygon_facet_sizes(held, camera, result.chosen(Decision.HIDDEN))
+    side, inside = sizes.sides(facet_pixels), result.in_view[held.cell]
     left, expected = ~sizes.kept(facet_pixels), sizes.counts(facet_pixels) + 1  # polygons take memory too
     for alike, seen, beside in (
         (inside & ~sizes.hidden, True, False),
@@ -219,7 +219,7 @@ def polygon_facets(
         chosen = np.flatnonzero(left & alike)
         for run in chunks(expected[chosen], at_once):
             some = chosen[run]
-            made = chosen_facets(contents.polygons.items.take(some), sizes.optical[some], side[some])
+            made = chosen_facets(held.items.take(some), sizes.optical[some], side[some])
             yield kept_out_of_view(made, camera.clearance, HIDDEN_FACES**-0.5) if beside else made, seen
 
 

@@ -18,9 +18,10 @@ from ..arrays import Arrays
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.branches import Branches
-from ..refinement.contents import Contents, Totals, bounding_cylinders
+from ..refinement.contents import Held, Totals, bounding_cylinders
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
+from ..refinement.polygons import Polygons
 from ..subplants.pieces import Pieces
 
 #: How much larger facets of hidden tetrahedra are: where the optical depth in front just hides them, and at most, in
@@ -166,15 +167,15 @@ def coarseness(result: Refinement) -> NDArray[np.float64]:
     return np.where(result.chosen(Decision.HIDDEN), coarse, 1.0)
 
 
-def polygon_facet_sizes(contents: Contents, camera: Camera, hidden: NDArray[np.bool_]) -> PolygonFacetSizes:
-    """Facets of the polygons of contents; ``hidden`` (nodes,) marks nodes that are not seen."""
-    own, totals = contents.polygons.items, contents.polygons.totals
+def polygon_facet_sizes(held: Held[Polygons], camera: Camera, hidden: NDArray[np.bool_]) -> PolygonFacetSizes:
+    """Facets of polygons (n,); ``hidden`` (nodes,) marks nodes that are not seen."""
+    own, totals = held.items, held.totals
     meshes = own.meshes
     return PolygonFacetSizes(
         camera.extent_around(own.centre),
         meshes.face_areas(own.face, own.instance),
         meshes.leaf[own.face],
-        hidden[contents.polygons.cell],
+        hidden[held.cell],
         totals.optical_area,
         meshes.solid[own.face],
     )

@@ -1,15 +1,13 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contents of tetrahedra: sub-plants, pieces of branches and explicit polygons, with their totals (paper, 6.5).
+"""Contents of tetrahedra: sub-plants, branches and explicit polygons, with their totals (paper, section 6.5).
 
-A plant is held as a sub-plant while it lies on one side of every plane. Where it crosses one it is opened into the
-sub-plants of the next order and the pieces of its own branch, see `descent`. Polygons come from meshes that were
-modelled elsewhere. Totals are what decisions need: areas, numbers of polygons, and the width of features.
+Plants are shared among tetrahedra, see `shares`. Polygons come from meshes that were modelled elsewhere; each is in one
+tetrahedron, see `descent`. Totals are what decisions need: areas, numbers of polygons, and the width of features.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Generic, TypeVar
 
@@ -21,8 +19,7 @@ from ..camera.camera import Camera
 from ..compiled.averages import own_leaf_integrals
 from ..compiled.flora import Flora
 from ..growth.branches import Branches
-from ..growth.growth import fullness, trunks
-from ..growth.seeds import Seeds
+from ..growth.growth import fullness
 from ..subplants.bodies import bounding_bodies
 from ..subplants.pieces import Pieces, leaf_fraction, outward_ends, wood_areas
 from .polygons import Polygons
@@ -151,89 +148,38 @@ class Held(Arrays, Generic[Kind]):
 
 @dataclass(frozen=True)
 class Contents:
-    """Sub-plants, pieces of branches and explicit polygons, each in one terminal tetrahedron."""
+    """Sub-plants, branches as one piece each, and explicit polygons, in terminal tetrahedra.
+
+    A part of a plant that is shared by several tetrahedra is there once for each, with what that one holds of it.
+    """
 
     subplants: Held[Branches] = field(default_factory=lambda: Held.none(Branches))
     pieces: Held[Pieces] = field(default_factory=lambda: Held.none(Pieces))
     polygons: Held[Polygons] = field(default_factory=lambda: Held.none(Polygons))
 
-    @classmethod
-    def of(
-        cls, flora: Flora, subplants: Branches, subplant_cell: NDArray, pieces: Pieces, piece_cell: NDArray
-    ) -> Contents:
-        """Parts of plants in cells."""
-        return cls(
-            Held(subplants, subplant_cell, subplant_totals(flora, subplants)),
-            Held(pieces, piece_cell, piece_totals(flora, pieces)),
-        )
 
-    @classmethod
-    def of_plants(cls, flora: Flora, seeds: Seeds) -> Contents:
-        """Whole plants, all in the root."""
-        return cls.of(flora, trunks(flora.rows, seeds), np.zeros(len(seeds), np.int32), Pieces.empty(), _NONE)
-
-    @classmethod
-    def of_polygons(cls, polygons: Polygons, large: NDArray[np.bool_] | None = None) -> Contents:
-        """Polygons, all in the root; ``large`` ones (k,) stay polygons whatever is decided about their cells."""
-        totals = polygon_totals(polygons)
-        if large is not None:
-            totals = replace(totals, width=np.where(large, np.inf, totals.width))
-        return cls(polygons=Held(polygons, np.zeros(len(polygons), np.int32), totals))
-
-    @property
-    def kinds(self) -> tuple[Held[Branches], Held[Pieces], Held[Polygons]]:
-        """Sub-plants, pieces and polygons."""
-        return self.subplants, self.pieces, self.polygons
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of all arrays."""
-        return sum(kind.nbytes for kind in self.kinds)
-
-    def within(self, chosen: NDArray[np.bool_]) -> Contents:
-        """The part that lies in chosen nodes; ``chosen`` is (nodes,) bool."""
-        return self.take(*(chosen[kind.cell] for kind in self.kinds))
-
-    def take(self, subplants: NDArray[np.bool_], pieces: NDArray[np.bool_], polygons: NDArray[np.bool_]) -> Contents:
-        """Selection by masks (n,), (m,) and (k,)."""
-        return Contents(*(kind.take(m) for kind, m in zip(self.kinds, (subplants, pieces, polygons), strict=True)))
-
-    @classmethod
-    def joined(cls, parts: Sequence[Contents]) -> Contents:
-        """All of several together."""
-        if len(parts) < 2:
-            return parts[0] if parts else cls()
-        return cls(*(Held.concatenate(kinds) for kinds in zip(*(p.kinds for p in parts), strict=True)))
-
-    def sums(self, nodes: int) -> Totals:
-        """Totals of each of a number of nodes."""
-        totals = Totals.concatenate([kind.totals for kind in self.kinds])
-        return sums(totals, np.concatenate([kind.cell for kind in self.kinds]), nodes)
-
-    def bounding_box(self, flora: Flora) -> NDArray[np.float64]:
-        """Axis-aligned box (2, 3) of all that is there, metres."""
-        boxes = [bounding_box(flora, self.subplants.items)] if len(self.subplants) else []
-        boxes += [self.polygons.items.bounding_box()] if len(self.polygons) else []
-        return np.stack([np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)])
+def in_the_root(polygons: Polygons, large: NDArray[np.bool_] | None = None) -> Held[Polygons]:
+    """Polygons (n,), all in the root; ``large`` ones (n,) stay polygons whatever is decided about their cells."""
+    totals = polygon_totals(polygons)
+    if large is not None:
+        totals = replace(totals, width=np.where(large, np.inf, totals.width))
+    return Held(polygons, np.zeros(len(polygons), np.int32), totals)
 
 
 class Holdings:
-    """Contents of terminal nodes while a tree is divided: only what lies in divided nodes is taken out and copied."""
+    """Polygons in terminal nodes while a tree is divided: only what lies in divided nodes is taken out and copied."""
 
-    def __init__(self, contents: Contents) -> None:
-        self._parts = [contents]
+    def __init__(self, polygons: Held[Polygons]) -> None:
+        self._parts = [polygons]
+
+    def __len__(self) -> int:
+        return int(sum((part.cell >= 0).sum() for part in self._parts))
 
     @property
-    def contents(self) -> Contents:
+    def polygons(self) -> Held[Polygons]:
         """All together; copies them into one, which is then kept until something changes."""
-        self._parts = [Contents.joined([_living(p) for p in self._parts])]
+        self._parts = [_joined([_living(part) for part in self._parts])]
         return self._parts[0]
-
-    @property
-    def sizes(self) -> tuple[int, ...]:
-        """Numbers of sub-plants, pieces and polygons."""
-        every = zip(*(part.kinds for part in self._parts), strict=True)
-        return tuple(int(sum((kind.cell >= 0).sum() for kind in kinds)) for kinds in every)
 
     @property
     def nbytes(self) -> int:
@@ -242,36 +188,42 @@ class Holdings:
 
     def totals(self, chosen: NDArray[np.bool_]) -> list[tuple[Totals, NDArray[np.int32]]]:
         """Totals of polygons in chosen nodes, a mask (nodes,), and their nodes; one pair for each part."""
-        held = [part.polygons for part in self._parts]
-        some = [kind.take(chosen[np.maximum(kind.cell, 0)] & (kind.cell >= 0)) for kind in held]
-        return [(kind.totals, kind.cell) for kind in some]
+        some = [part.take(_within(part, chosen)) for part in self._parts]
+        return [(part.totals, part.cell) for part in some]
 
-    def put(self, contents: Contents) -> None:
-        """Add contents."""
-        self._parts.append(contents)
+    def put(self, polygons: Held[Polygons]) -> None:
+        """Add polygons."""
+        self._parts.append(polygons)
 
-    def take_out(self, chosen: NDArray[np.bool_]) -> Contents:
+    def take_out(self, chosen: NDArray[np.bool_]) -> Held[Polygons]:
         """Remove and return what lies in chosen nodes; ``chosen`` is (nodes,) bool."""
         out, kept = [], []
         for part in self._parts:
-            masks = [chosen[np.maximum(kind.cell, 0)] & (kind.cell >= 0) for kind in part.kinds]
-            if not any(m.any() for m in masks):
-                kept.append(part)
-                continue
-            out.append(part.take(*masks))
-            # What is taken is only marked; copying what stays would cost more than all else that moves.
-            kinds = zip(masks, part.kinds, strict=True)
-            part = Contents(*(replace(kind, cell=np.where(m, np.int32(-1), kind.cell)) for m, kind in kinds))
-            if 2 * sum((kind.cell < 0).sum() for kind in part.kinds) > sum(map(len, part.kinds)):
-                part = _living(part)
+            taken = _within(part, chosen)
+            if taken.any():
+                out.append(part.take(taken))
+                # What is taken is only marked; copying what stays would cost more than all else that moves.
+                part = replace(part, cell=np.where(taken, np.int32(-1), part.cell))
+                if 2 * (part.cell < 0).sum() > len(part):
+                    part = _living(part)
             kept.append(part)
         self._parts = kept
-        return Contents.joined(out)
+        return _joined(out)
 
 
-def _living(part: Contents) -> Contents:
+def _within(part: Held[Polygons], chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    return chosen[np.maximum(part.cell, 0)] & (part.cell >= 0)
+
+
+def _living(part: Held[Polygons]) -> Held[Polygons]:
     """Without what has been taken out."""
-    return part.take(*(kind.cell >= 0 for kind in part.kinds))
+    return part.take(part.cell >= 0)
+
+
+def _joined(parts: list[Held[Polygons]]) -> Held[Polygons]:
+    if len(parts) < 2:
+        return parts[0] if parts else Held.none(Polygons)
+    return Held.concatenate(parts)
 
 
 def large_polygons(polygons: Polygons, camera: Camera) -> NDArray[np.bool_]:

@@ -1,9 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The update step: handing contents of divided tetrahedra on to their children (paper, section 6.5).
+"""The update step of polygons: those of divided tetrahedra are handed on to the children (paper, section 6.5).
 
-What lies on one side of a plane goes there whole. Sub-plants that cross it are opened into the sub-plants of the next
-order and the pieces of their own branch; pieces and polygons that cross are clipped. Nothing smaller than a pixel of
+What lies on one side of a plane goes there whole, polygons that cross it are clipped. Nothing smaller than a pixel of
 the alpha buffer shows in the image: what reaches beyond a plane by less than such a *slack* does not cross it.
 """
 
@@ -16,19 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..tetrahedra.tree import TetrahedralTree
-from .contents import Contents, Held, polygon_totals
+from .contents import Held, polygon_totals
 from .polygons import Polygons, area_fractions
 
 #: Metres (n,) at points (n, 3) that make no difference in the image.
 Slack = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
-#: Sub-plants that are opened, and that are lowered, at a time; bounds what that takes to some hundred megabytes.
-OPENED_AT_ONCE = 40_000
+#: Polygons that are lowered at a time; bounds what that takes to some hundred megabytes.
 LOWERED_AT_ONCE = 200_000
-#: A sub-plant that reaches no further than this many slacks is known well enough by its samples.
-_SMALL = 16.0
-#: One whose middle is closer to a plane than this fraction of its reach crosses it, whatever its seed.
-_DEEP = 0.3
 
 
 def cut(
@@ -79,21 +73,17 @@ def cut(
     return np.concatenate([owner[stays], owner[from_]]), np.concatenate([larger, side]), parts
 
 
-def push_down(tree: TetrahedralTree, contents: Contents, slack: Slack | None = None) -> Contents:
+def push_down(tree: TetrahedralTree, held: Held[Polygons], slack: Slack | None = None) -> Held[Polygons]:
     """Hand polygons of divided nodes on until all lie in terminal ones.
 
     What reaches no further than ``slack`` beyond a plane stays whole. Nothing is lost or held twice.
     """
-    return replace(contents, polygons=_push_down_polygons(tree, contents.polygons, slack))
-
-
-def _push_down_polygons(tree: TetrahedralTree, held: Held[Polygons], slack: Slack | None) -> Held[Polygons]:
     placed = [Held.none(Polygons)]
     while len(held):
         polygons, cells, crosses = held.items, held.cell.copy(), np.zeros(len(held), bool)
         for start in range(0, len(polygons), LOWERED_AT_ONCE):
             some = slice(start, start + LOWERED_AT_ONCE)
-            cells[some], crosses[some] = _lowered_polygons(tree, polygons.take(some), cells[some], slack)
+            cells[some], crosses[some] = _lowered(tree, polygons.take(some), cells[some], slack)
         placed.append(replace(held, cell=cells).take(~crosses))
         polygons, cells, width = polygons.take(crosses), cells[crosses], held.totals.width[crosses]
         loose = 0.0 if slack is None else slack(polygons.centre)
@@ -102,7 +92,7 @@ def _push_down_polygons(tree: TetrahedralTree, held: Held[Polygons], slack: Slac
     return Held.concatenate(placed)
 
 
-def _lowered_polygons(
+def _lowered(
     tree: TetrahedralTree, polygons: Polygons, cells: NDArray, slack: Slack | None
 ) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
     """Nodes (n,) that polygons come down to whole, and whether they cross the planes of these."""

@@ -19,7 +19,7 @@ from ..compiled.flora import Flora
 from ..growth.seeds import Seeds
 from ..tetrahedra.geometry import squared_edges
 from ..tetrahedra.tree import TetrahedralTree
-from .contents import Contents, Holdings, Totals, bounding_box, large_polygons, sums
+from .contents import Contents, Held, Holdings, Totals, bounding_box, in_the_root, large_polygons, sums
 from .decisions import Decision, Terminals, decide, gains_nothing, without_splits
 from .descent import Slack, push_down
 from .lights import Light, decide_by_shadows, seen_ground, shadows_of
@@ -92,7 +92,7 @@ class Refinement:
     def contents(self) -> Contents:
         """All plants and polygons, in terminal nodes: a copy, with a sub-plant for each node that it is shared by."""
         subplants, bodies = self.plants.held(len(self.tree))
-        return Contents(subplants, bodies, self.holdings.contents.polygons)
+        return Contents(subplants, bodies, self.holdings.polygons)
 
     @property
     def in_view(self) -> NDArray[np.bool_]:
@@ -143,7 +143,7 @@ def refine(
     plants = SharedPlants(flora, seeds, camera)
     camera = widened_for(camera, settings.margin, flora, plants.parts.branches, polygons)
     slack = _slack(camera, settings.visibility_resolution)
-    own = Contents() if polygons is None else Contents.of_polygons(polygons, large_polygons(polygons, camera))
+    own = Held.none(Polygons) if polygons is None else in_the_root(polygons, large_polygons(polygons, camera))
     tree = root_for(camera, settings, _bounds(flora, plants, polygons))
     holdings = Holdings(push_down(tree, own, slack))
     divided = np.arange(len(tree)) == 0
@@ -199,7 +199,7 @@ def refine(
         new = push_down(tree, holdings.take_out(dividing), slack)
         holdings.put(new)
         changed = plants.update(tree, dividing, edge)
-        changed[_nodes_of(new)] = True
+        changed[new.cell] = True
         clock.lap("update")
         buffer.remove(changed)
         kept = cells.take(np.flatnonzero(~changed[cells.nodes]))
@@ -218,10 +218,6 @@ def _bounds(flora: Flora, plants: SharedPlants, polygons: Polygons | None) -> ND
     boxes = [bounding_box(flora, plants.parts.branches)] if len(plants.parts) else []
     boxes += [] if polygons is None else [polygons.bounding_box()]
     return np.stack([np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)])
-
-
-def _nodes_of(contents: Contents) -> NDArray[np.int32]:
-    return contents.polygons.cell
 
 
 def _filled(
@@ -303,7 +299,7 @@ def step_of(state: Refinement) -> Step:
         explicit=int(numbers[Decision.EXPLICIT]),
         subplants=int((~alone).sum()),
         pieces=int(alone.sum()),
-        foreign=state.holdings.sizes[2],
+        foreign=len(state.holdings),
         polygons=round(float(state.totals.polygons[explicit].sum())),
         seconds=sum(state.seconds.values()),
         memory_mb=(state.tree.nbytes + state.plants.nbytes + state.holdings.nbytes) / 1e6,

@@ -15,10 +15,13 @@ from tests.engine import support
 from tests.engine.subplants.test_leaf_meshes import check_topology
 from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.emission.budget import afford
+from tetflora_addon.emission.forms import Refined, facet_blocks
 from tetflora_addon.emission.polygons import mended, polygon_blocks, polygon_buffers, polygon_facets
 from tetflora_addon.emission.shells import proxy_shells
+from tetflora_addon.growth.branches import Branches
 from tetflora_addon.proxies.summaries import summarise
-from tetflora_addon.refinement.contents import Contents
+from tetflora_addon.refinement.contents import Contents, Held, Holdings, in_the_root
+from tetflora_addon.refinement.contents import sums as sums_by_node
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.descent import cut, push_down
 from tetflora_addon.refinement.loop import Refinement, refine
@@ -27,6 +30,7 @@ from tetflora_addon.refinement.polygons import Meshes, Polygons, Surface, area_f
 from tetflora_addon.refinement.settings import RefinementSettings
 from tetflora_addon.refinement.views import widened_for
 from tetflora_addon.tetrahedra.roots import view_root
+from tetflora_addon.tetrahedra.tree import TetrahedralTree
 
 #: u, v and a number at a place in the mesh's own space: affine, so that they must be so after any cut.
 AFFINE = np.array([[0.3, -0.2, 0.9], [0.5, 0.1, 0.2], [-1.0, 0.4, 0.3]])
@@ -88,26 +92,24 @@ def placed(one: Surface, seed: int, number: int = 3) -> Meshes:
 def sums(polygons: Polygons) -> np.ndarray:
     """Area, colour, transmission, orientation moment, all as sums."""
     nothing = np.zeros(1, np.int64)
-    summary = summarise(support.small_flora(), Contents.of_polygons(polygons), nothing, 1)
+    summary = summarise(support.small_flora(), Contents(polygons=in_the_root(polygons)), nothing, 1)
     return np.concatenate([[1], summary.colour[0], summary.transmission, summary.moment.ravel()]) * summary.optical_area
 
 
-def divided(polygons: Polygons, seed: int, slack: float | None, rounds: int = 4) -> tuple[object, Contents]:
-    """Contents of a tree that a camera roots and random choices divide."""
+def divided(polygons: Polygons, seed: int, slack: float | None, rounds: int = 4) -> tuple[TetrahedralTree, Held]:
+    """Polygons in a tree that a camera roots and random choices divide."""
     rng = np.random.default_rng(seed)
-    flora = support.small_flora()
-    contents = Contents.of_polygons(polygons)
     camera = support.camera(rng.uniform(-9, 9, 3), rng.uniform(-3, 3, 3))
-    tree = view_root(camera, contents.bounding_box(flora))
+    tree = view_root(camera, polygons.bounding_box())
     loose = None if slack is None else lambda points: np.full(len(points), slack)
-    contents = push_down(flora, tree, contents, loose)
+    held = push_down(tree, in_the_root(polygons), loose)
     for _ in range(rounds):
-        nodes = np.unique(contents.polygons.cell)
+        nodes = np.unique(held.cell)
         nodes = nodes[rng.random(len(nodes)) < 0.7]
         for _ in range(2):
             nodes = tree.split(nodes).ravel()
-        contents = push_down(flora, tree, contents, loose)
-    return tree, contents
+        held = push_down(tree, held, loose)
+    return tree, held
 
 
 @given(SEEDS, st.sampled_from([None, 0.02, 0.5]))
@@ -115,13 +117,13 @@ def divided(polygons: Polygons, seed: int, slack: float | None, rounds: int = 4)
 def test_area_colour_and_moment_are_exact_under_any_cuts(seed: int, slack: float | None) -> None:
     """To 1e-6, as sums over all tetrahedra; totals are those of the fragments, and all is in terminal nodes."""
     polygons = Polygons.everything(placed(thicket(seed), seed))
-    tree, contents = divided(polygons, seed, slack)
-    parts = contents.polygons.items
-    assert (tree.children[contents.polygons.cell, 0] < 0).all()
+    tree, held = divided(polygons, seed, slack)
+    parts = held.items
+    assert (tree.children[held.cell, 0] < 0).all()
     assert len(parts) > len(polygons)
     assert parts.areas().sum() == pytest.approx(polygons.areas().sum(), rel=1e-9)
     assert sums(parts) == pytest.approx(sums(polygons), rel=1e-6, abs=1e-9)
-    totals = contents.sums(len(tree))
+    totals = sums_by_node(held.totals, held.cell, len(tree))
     assert totals.area.sum() == pytest.approx(polygons.areas().sum(), rel=1e-9)
     assert totals.polygons.sum() == len(parts)
 
@@ -131,8 +133,8 @@ def test_area_colour_and_moment_are_exact_under_any_cuts(seed: int, slack: float
 def test_everything_is_on_the_right_side(seed: int) -> None:
     """Every corner of every polygon lies within its tetrahedron's planes, up to the root; within the slack if any."""
     for slack in (None, 0.1):
-        tree, contents = divided(Polygons.everything(placed(thicket(seed, 30), seed)), seed, slack)
-        polygons, node = contents.polygons.items, contents.polygons.cell.astype(np.intp)
+        tree, held = divided(Polygons.everything(placed(thicket(seed, 30), seed)), seed, slack)
+        polygons, node = held.items, held.cell.astype(np.intp)
         assert (tree.parent[node] >= 0).any()
         while (tree.parent[node] >= 0).any():
             parent = np.maximum(tree.parent[node], 0)
@@ -148,8 +150,8 @@ def test_texture_coordinates_and_attributes_are_interpolated(seed: int) -> None:
     """What was an affine function of the place before is the same function after cuts."""
     one = thicket(seed, 30, fans=False)
     meshes = Meshes([one], np.zeros(1, int), np.eye(4)[None])
-    _, contents = divided(Polygons.everything(meshes), seed, None)
-    mesh = polygon_buffers(contents.polygons.items)
+    _, held = divided(Polygons.everything(meshes), seed, None)
+    mesh = polygon_buffers(held.items)
     sound(mesh)
     expected = mesh.positions[mesh.corner_verts].astype(np.float64) @ AFFINE.T
     assert mesh.attributes["UVMap"][0] == "CORNER"
@@ -177,13 +179,13 @@ def test_a_cut_face_of_which_all_is_there_is_mended() -> None:
     one = thicket(1)
     meshes = placed(one, 1)
     polygons = Polygons.everything(meshes)
-    _, contents = divided(polygons, 1, None)
-    assert len(contents.polygons) > 2 * len(polygons)
-    whole = mended(contents.polygons.items)
+    _, held = divided(polygons, 1, None)
+    assert len(held) > 2 * len(polygons)
+    whole = mended(held.items)
     assert (whole.part == -1).all()
     key = np.sort(whole.instance.astype(np.int64) * 1000 + whole.face)
     assert (key == np.sort(polygons.instance.astype(np.int64) * 1000 + polygons.face)).all()
-    some = contents.polygons.items.take(np.random.default_rng(0).random(len(contents.polygons)) < 0.8)
+    some = held.items.take(np.random.default_rng(0).random(len(held)) < 0.8)
     assert mended(some).areas().sum() == pytest.approx(some.areas().sum(), rel=1e-9)
 
 
@@ -245,25 +247,31 @@ def refined(meshes: Meshes, camera: object, **options: float) -> Refinement:
             return stop.value
 
 
+def proxies_of(result: Refinement) -> Held:
+    """Polygons of proxies."""
+    held = result.holdings.polygons
+    return held.take(result.chosen(Decision.PROXY, Decision.HIDDEN)[held.cell])
+
+
 @pytest.mark.parametrize("anchored", [False, True])
 def test_near_polygons_stay_and_far_ones_become_facets_of_the_same_area(anchored: bool) -> None:
     """No plant is needed. Leaves near the eye are there as they were, all others are there as area, but for chance."""
     meshes, camera = grove()
     result = refined(meshes, camera, anchored=anchored)
     whole = Polygons.everything(meshes)
-    assert result.contents.polygons.items.areas().sum() == pytest.approx(whole.areas().sum(), rel=1e-9)
+    assert result.holdings.polygons.items.areas().sum() == pytest.approx(whole.areas().sum(), rel=1e-9)
     assert {Decision.PROXY, Decision.EXPLICIT} <= set(result.decision.tolist())
     blocks = [b.buffers for b in polygon_blocks(result, camera, 0.4)]
     kept = sum(support.face_areas(b).sum() for b in blocks)
-    proxies = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN))
-    beside = ~result.in_view[proxies.polygons.cell]
+    proxies = proxies_of(result)
+    beside = ~result.in_view[proxies.cell]
     facets = np.concatenate([f.side**2 for f, _ in polygon_facets(proxies, result, camera, 0.4)])
     drawn = facets.sum()
     chance = 2 * np.sqrt((facets**2).sum())  # facets are there or not; of a mesh, not independently
     assert chance < 0.1 * drawn
     assert 0.1 < kept / (kept + drawn) < 0.95
     # Facets beside the view may have been made smaller, so that they do not reach into it.
-    loss = 0.5 * proxies.polygons.totals.area[beside].sum()
+    loss = 0.5 * proxies.totals.area[beside].sum()
     assert whole.areas().sum() - loss - chance <= kept + drawn <= whole.areas().sum() + chance
     assert sum(b.polygons for b in blocks) + len(facets) < 0.7 * len(whole)
     near = whole.take(np.linalg.norm(whole.centre - camera.position, axis=1) < 7)
@@ -276,7 +284,7 @@ def test_near_polygons_stay_and_far_ones_become_facets_of_the_same_area(anchored
 def test_facets_of_polygons_come_in_runs_that_are_bounded_and_the_same() -> None:
     meshes, camera = grove()
     result = refined(meshes, camera, anchored=True)
-    proxies = result.contents.within(result.chosen(Decision.PROXY, Decision.HIDDEN))
+    proxies = proxies_of(result)
     made = []
     for at_once in (np.inf, 100.0):
         parts = list(polygon_facets(proxies, result, camera, 0.2, at_once))
@@ -292,7 +300,7 @@ def test_facets_of_polygons_come_in_runs_that_are_bounded_and_the_same() -> None
 def test_explicit_everywhere_is_the_original() -> None:
     meshes, camera = grove(6)
     result = refined(meshes, camera, leaf_limit=1e-6, hidden=-1.0, cutoff=1e-3, few_polygons=100)
-    seen = result.tree.inside[result.contents.polygons.cell]
+    seen = result.tree.inside[result.holdings.polygons.cell]
     assert np.isin(result.decision, [Decision.EXPLICIT, Decision.HIDDEN]).all()
     blocks = list(polygon_blocks(result, camera, 1e-4))
     assert sum(b.buffers.polygons for b in blocks) == len(Polygons.everything(meshes))
@@ -305,7 +313,7 @@ def test_explicit_everywhere_is_the_original() -> None:
 def test_lens_and_shutter_widen_the_view_for_polygons_alone() -> None:
     meshes, camera = grove(6)
     flora, polygons = support.small_flora(), Polygons.everything(meshes)
-    nobody = Contents().subplants.items
+    nobody = Branches.empty()
     sharp = widened_for(camera, 0.04, flora, nobody, polygons)
     assert sharp.window == camera.widened(0.04).window
     blurred = widened_for(replace(camera, lens_radius=0.2, focus=20.0), 0.04, flora, nobody, polygons)
@@ -351,10 +359,36 @@ def test_a_budget_counts_polygons() -> None:
     result, flora = refined(meshes, camera), support.small_flora()
     sizes = []
     for most in (0, 3_000, 1_000):
-        options = RefinementSettings(max_polygons=most)
-        fitted, side = afford(flora, result, camera, options)
-        made = [b.buffers for b in polygon_blocks(fitted, camera, side)]
-        facets = support.facet_buffers(flora, fitted, camera, side)
-        sizes.append(sum(b.polygons for b in made) + (facets.polygons if facets else 0))
+        detail = afford(flora, result, camera, RefinementSettings(max_polygons=most))
+        made = [b.buffers for b in polygon_blocks(detail.refinement, camera, detail.pixels.seen)]
+        scene = Refined(flora, detail.refinement, camera, pixels=detail.pixels)
+        facets = sum(block.polygons for block in facet_blocks(scene))
+        sizes.append(sum(b.polygons for b in made) + facets)
         assert sizes[-1] <= (most or np.inf)
     assert sizes[0] > sizes[1] > sizes[2] > 500
+
+
+@given(SEEDS)
+@settings(deadline=None, max_examples=20)
+def test_holdings_give_and_take(seed: int) -> None:
+    """Whatever is taken out and put back, in whatever order, everything is there once, with its own totals."""
+    tree, held = divided(Polygons.everything(placed(thicket(1), 1)), 1, None)
+    rng = np.random.default_rng(seed)
+    holdings = Holdings(held)
+    for _ in range(5):
+        chosen = rng.random(len(tree)) < rng.choice([0.05, 0.5, 0.95])
+        out = holdings.take_out(chosen)
+        assert len(out) + len(holdings) == len(held)
+        assert chosen[out.cell].all()
+        for totals, cell in holdings.totals(np.ones(len(tree), bool)):
+            assert len(totals) == len(cell)
+            assert not chosen[cell].any()
+        assert not chosen[holdings.polygons.cell].any()
+        holdings.put(out)
+
+    def rows(some: Held) -> np.ndarray:
+        columns = (some.items.instance, some.items.face, some.cell, some.totals.area, some.totals.width)
+        table = np.stack(columns, axis=1)
+        return table[np.lexsort(table.T)]
+
+    np.testing.assert_array_equal(rows(holdings.polygons), rows(held))
