@@ -17,6 +17,7 @@ from tetflora_addon.camera.camera import Camera
 from tetflora_addon.emission import facets as subject
 from tetflora_addon.emission.facets import LEAST_COVER, facing, spheres
 from tetflora_addon.emission.forms import Refined, facet_blocks, sphere_blocks
+from tetflora_addon.proxies.facet_sizes import FacetPixels
 from tetflora_addon.proxies.microsurfaces import Facets, facet_mesh
 
 EYE = np.array([2.0, -30.0, 4.0])
@@ -73,19 +74,20 @@ def test_places_and_looks_are_those_of_the_facets() -> None:
 
 
 def test_a_refinement_has_a_sphere_for_each_facet(monkeypatch: pytest.MonkeyPatch) -> None:
-    """In blocks of bounded size; leaves that lie flat cover less than half of their area for a level view."""
+    """In the same blocks, of bounded size; leaves that lie flat cover less than half of their area for a level view."""
     flora, _, view, result = scene()
-    facets = list(facet_blocks(Refined(flora, result, view, 0.33)))
-    area = sum(support.face_areas(block).sum() for block in facets)
-    whole = sum(block.polygons for block in facets)
+    refined = Refined(flora, result, view, FacetPixels(1.0))
+    whole = sum(block.polygons for block in facet_blocks(refined))
     monkeypatch.setattr(subject, "FACETS_AT_ONCE", 300)
     monkeypatch.setattr(subject, "BLOCK_POLYGONS", 700)
-    blocks = list(sphere_blocks(Refined(flora, result, view, 0.33)))
+    facets, blocks = list(facet_blocks(refined)), list(sphere_blocks(refined))
+    assert [block.polygons for block in blocks] == [block.polygons for block in facets]
+    assert [block.species for block in blocks] == [block.species for block in facets]
     assert sum(block.polygons for block in blocks) == whole
     begun = [a for a, b in pairwise(blocks) if a.species == b.species]
     assert min(block.polygons for block in begun) >= 700
-    assert max(block.polygons for block in blocks) < 2 * 700
+    area = sum(support.face_areas(block).sum() for block in facets)
     cover = sum(discs(block.radius).sum() for block in blocks)
     assert 0.2 * area < cover < 0.5 * area
-    again = list(sphere_blocks(Refined(flora, replace(result), view, 0.33)))
+    again = list(sphere_blocks(replace(refined, refinement=replace(result))))
     assert all((a.radius == b.radius).all() for a, b in zip(blocks, again, strict=True))
