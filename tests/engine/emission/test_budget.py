@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Budgets: what is made fits, the best goes first, and a budget that suffices changes nothing."""
+"""Budgets: what is made fits, the best goes first, what is hidden takes the least, and enough changes nothing."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -12,68 +12,145 @@ from hypothesis import given
 from hypothesis import settings as examples
 from hypothesis import strategies as st
 
-from tests.engine import support
 from tests.engine.emission.test_emission import scene, with_decision
-from tetflora_addon.emission.budget import BYTES_PER_POLYGON, BYTES_PER_SPHERE, afford, polygons_allowed
-from tetflora_addon.emission.forms import Refined, sphere_blocks
-from tetflora_addon.emission.plants import explicit_blocks
+from tetflora_addon.emission import budget
+from tetflora_addon.emission.budget import (
+    BYTES_PER_POLYGON,
+    BYTES_PER_SPHERE,
+    Detail,
+    afford,
+    enough,
+    polygons_allowed,
+)
+from tetflora_addon.emission.facets import facet_parts
+from tetflora_addon.emission.plants import Transition, explicit_blocks
+from tetflora_addon.proxies.facet_sizes import FacetPixels
 from tetflora_addon.refinement.decisions import Decision, contributions
+from tetflora_addon.refinement.loop import Refinement
 from tetflora_addon.refinement.settings import RefinementSettings
 
 SETTINGS = RefinementSettings()
 
 
-def made(limit: int, faces: float | None = None) -> tuple[int, int, float, object]:
-    """Polygons of plants and of proxies that come of a budget, the facets' side, and the decisions."""
-    flora, _, camera, result = scene()
-    fitted, side = afford(flora, result, camera, replace(SETTINGS, max_polygons=limit), faces)
-    leaves = sum(b.buffers.polygons for b in explicit_blocks(flora, fitted))
-    proxies = support.facet_buffers(flora, fitted, camera, side)
-    return leaves, proxies.polygons if proxies else 0, side, fitted
+@dataclass(frozen=True)
+class Made:
+    """Polygons, and facets of what is seen and of what is not, that come of a budget."""
+
+    detail: Detail
+    polygons: int
+    seen: int
+    hidden: int
+
+    @property
+    def facets(self) -> int:
+        return self.seen + self.hidden
+
+    @property
+    def whole(self) -> int:
+        return self.polygons + self.facets
+
+    def memory(self, primitive_bytes: float) -> float:
+        return self.polygons * BYTES_PER_POLYGON + self.facets * primitive_bytes
+
+
+def made(limits: RefinementSettings = SETTINGS, result: Refinement | None = None, **options: float) -> Made:
+    """What comes of limits."""
+    flora, _, camera, own = scene()
+    detail = afford(flora, own if result is None else result, camera, limits, **options)
+    transition = Transition(flora, camera, detail.leaf_limit)
+    polygons = sum(b.buffers.polygons for b in explicit_blocks(flora, detail.refinement, camera, transition))
+    numbers = [0, 0]
+    for parts in facet_parts(flora, detail.refinement, camera, detail.pixels, transition):
+        for facets, seen in parts:
+            numbers[seen] += len(facets)
+    return Made(detail, polygons, numbers[1], numbers[0])
+
+
+def at_most(polygons: float) -> RefinementSettings:
+    return replace(SETTINGS, max_polygons=int(polygons))
 
 
 def test_a_budget_that_suffices_changes_nothing() -> None:
     flora, _, camera, result = scene()
-    for unlimited in (SETTINGS, replace(SETTINGS, max_polygons=10**9), replace(SETTINGS, max_memory=1e6)):
-        assert afford(flora, result, camera, unlimited) == (result, SETTINGS.facet)
-        assert afford(flora, result, camera, unlimited)[0] is result
+    for unlimited in (SETTINGS, at_most(10**9), replace(SETTINGS, max_memory=1e6)):
+        detail = afford(flora, result, camera, unlimited)
+        assert detail.refinement is result
+        assert (detail.pixels, detail.leaf_limit) == (FacetPixels(SETTINGS.facet), SETTINGS.leaf_limit)
 
 
 @given(st.floats(0.03, 1.2))
 @examples(deadline=None, max_examples=8)
 def test_what_is_made_fits(fraction: float) -> None:
     """Polygons and facets together, whatever the budget; and most of it is used where there is use for it."""
-    whole = sum(made(0)[:2])
-    limit = int(fraction * whole)
-    leaves, proxies, side, fitted = made(limit)
-    assert leaves + proxies <= limit
+    limit = int(fraction * made().whole)
+    fitted = made(at_most(limit))
+    assert fitted.whole <= limit
     if fraction < 0.9:
-        assert leaves + proxies > 0.6 * limit
-    assert side >= SETTINGS.facet
-    assert not (fitted.decision == Decision.SPLIT).any()
+        assert fitted.whole > 0.7 * limit
+    assert not (fitted.detail.refinement.decision == Decision.SPLIT).any()
+
+
+def test_one_factor_for_leaves_and_facets() -> None:
+    """Leaves become facets as early as facets are large, so that neither is finer than the other."""
+    whole = made().whole
+    for fraction in (0.05, 0.3, 0.7):
+        detail = made(at_most(fraction * whole)).detail
+        factor = detail.pixels.seen / SETTINGS.facet
+        assert factor > 1
+        assert detail.leaf_limit == pytest.approx(factor * SETTINGS.leaf_limit)
 
 
 def test_more_is_better() -> None:
-    """Real leaves become more with the budget, facets finer, and what is kept gains more than what is not."""
-    whole = sum(made(0)[:2])
-    results = [made(int(fraction * whole)) for fraction in (0.1, 0.3, 0.6, 0.9)]
-    assert [r[0] for r in results] == sorted(r[0] for r in results)
-    *_, first = scene()
-    wanted = first.decision == Decision.EXPLICIT
-    gain = contributions(first.cells, first.transmittance) / first.totals.polygons
-    for *_, fitted in results:
-        kept = fitted.decision == Decision.EXPLICIT
-        assert not (kept & ~wanted).any()
-        if kept.any() and (wanted & ~kept).any():
-            assert np.median(gain[kept]) > np.median(gain[wanted & ~kept])
+    """Real leaves become more with the budget, and facets finer."""
+    whole = made().whole
+    results = [made(at_most(fraction * whole)) for fraction in (0.1, 0.3, 0.6, 0.9)]
+    assert np.all(np.diff([r.polygons for r in results]) > 0)
+    assert np.all(np.diff([r.detail.pixels.seen for r in results]) < 0)
 
 
-def test_shells_are_not_made_larger() -> None:
+def mostly_hidden() -> Refinement:
+    """All plants near the eye, which would have the most facets, are hidden, those far off are seen."""
+    *_, result = scene()
+    hidden = result.tree.vertices(result.nodes)[:, :, 1].mean(axis=1) < 130
+    return with_decision(result, np.where(hidden, Decision.HIDDEN, Decision.PROXY), np.where(hidden, 0.01, 0.3))
+
+
+@pytest.mark.parametrize("allowed", [2_000.0, 10_000.0])
+def test_what_is_hidden_never_has_more_than_what_is_seen(monkeypatch: pytest.MonkeyPatch, allowed: float) -> None:
+    """By default, wherever a picture shows fewer facets than a scene would have."""
+    *_, camera, _ = scene()
+    before = made(replace(SETTINGS, facet=0.1), mostly_hidden())
+    assert before.hidden > before.seen
+    monkeypatch.setattr(budget, "NEVER_TOO_MANY", allowed)
+    monkeypatch.setattr(budget, "ENOUGH_A_PIXEL", 0.0)
+    monkeypatch.setattr(budget, "_FEW_HIDDEN", 0.0)
+    assert enough(camera) == allowed
+    after = made(replace(SETTINGS, facet=0.1), mostly_hidden())
+    assert after.hidden <= 1.15 * (after.seen + after.polygons)
+    assert after.whole <= 1.15 * allowed
+    assert after.detail.pixels.hidden > 1
+
+
+def test_enough_follows_the_pixels_of_the_image() -> None:
+    *_, camera, _ = scene()
+    small, large, huge = (enough(replace(camera, width=side, height=side)) for side in (64, 4_000, 8_000))
+    assert small == enough(camera)
+    assert huge == 4 * large > 4 * small
+
+
+@pytest.mark.parametrize("limit", [5_000, 20_000])
+def test_shells_are_not_made_larger(limit: int) -> None:
+    """They make room for real leaves where these gain the most for each polygon."""
     flora, _, camera, result = scene()
-    fitted, side = afford(flora, result, camera, replace(SETTINGS, max_polygons=20_000), faces=4.0)
-    assert side == SETTINGS.facet
-    kept = fitted.decision == Decision.EXPLICIT
-    assert fitted.totals.polygons[kept].sum() + 4 * (~kept).sum() <= 20_000
+    detail = afford(flora, result, camera, at_most(limit), faces=4.0)
+    assert (detail.pixels, detail.leaf_limit) == (FacetPixels(SETTINGS.facet), SETTINGS.leaf_limit)
+    wanted, kept = (r.decision == Decision.EXPLICIT for r in (result, detail.refinement))
+    assert result.totals.polygons[kept].sum() + 4 * (~kept).sum() <= limit
+    assert not (kept & ~wanted).any()
+    gain = contributions(result.cells, result.transmittance) / result.totals.polygons
+    assert kept.any()
+    assert np.median(gain[kept]) > np.median(gain[wanted & ~kept])
+    assert afford(flora, result, camera, SETTINGS, faces=4.0).refinement is result
 
 
 def test_memory_and_polygons_limit_each_other() -> None:
@@ -84,19 +161,19 @@ def test_memory_and_polygons_limit_each_other() -> None:
 
 
 def test_spheres_take_less_of_a_budget_of_memory_and_as_much_of_one_of_polygons() -> None:
-    flora, _, camera, result = scene()
+    *_, result = scene()
     everything = with_decision(result, Decision.PROXY)
 
-    def spheres(**limits: float) -> int:
-        settings = replace(SETTINGS, **limits)
-        fitted, side = afford(flora, everything, camera, settings, primitive_bytes=BYTES_PER_SPHERE)
-        return sum(block.polygons for block in sphere_blocks(Refined(flora, fitted, camera, side)))
+    def spheres(primitive_bytes: float = BYTES_PER_SPHERE, **limits: float) -> Made:
+        return made(replace(SETTINGS, **limits), everything, primitive_bytes=primitive_bytes)
 
     whole = spheres()
-    memory = 0.3 * whole * BYTES_PER_SPHERE / 1e9
-    assert 0.6 * 0.3 * whole < spheres(max_memory=memory) <= 0.3 * whole
-    assert 0.6 * 0.2 * whole < spheres(max_memory=memory, max_polygons=whole // 5) <= 0.2 * whole
-    assert spheres(max_memory=memory, max_polygons=whole) == spheres(max_memory=memory)
-    tight = replace(SETTINGS, max_memory=memory)
-    sides = [afford(flora, everything, camera, tight, None, size)[1] for size in (BYTES_PER_POLYGON, BYTES_PER_SPHERE)]
-    assert sides[0] > sides[1]
+    memory = 0.3 * whole.memory(BYTES_PER_SPHERE)
+    tight = spheres(max_memory=memory / 1e9)
+    assert 0.7 * memory < tight.memory(BYTES_PER_SPHERE) <= memory
+    both = spheres(max_memory=memory / 1e9, max_polygons=tight.whole // 2)
+    assert 0.7 * tight.whole / 2 < both.whole <= tight.whole / 2
+    assert spheres(max_memory=memory / 1e9, max_polygons=whole.whole).detail == tight.detail
+    facets = spheres(BYTES_PER_POLYGON, max_memory=memory / 1e9)
+    assert facets.memory(BYTES_PER_POLYGON) <= memory
+    assert facets.detail.pixels.seen > tight.detail.pixels.seen
