@@ -4,6 +4,7 @@
 
 import json
 import sys
+import threading
 from pathlib import Path
 
 import bpy
@@ -62,6 +63,21 @@ def steps(ui):
     yield from ui.until(lambda: not running(ui), 60, "end after Return")
     ui.values["stopped"] = [has_results(scene), json.loads(scene.tetflora.statistics)["complete"]]
     refine.clear(scene)
+
+    # A pass that does not end by itself: Esc must not wait for it.
+    bare = datablocks()
+    begun, go = threading.Event(), threading.Event()
+    original = refine.loop.refine
+    refine.loop.refine = lambda *given: held(begun, go, original, *given)
+    begin(ui)
+    yield from ui.until(begun.is_set, 60, "beginning of the pass")
+    yield 0.5
+    ui.values["running_in_pass"] = running(ui)
+    ui.press('ESC')
+    yield from ui.until(lambda: not running(ui), 10, "end after Esc in a pass")
+    ui.values["left_by_esc_in_pass"] = changes(bare)
+    refine.loop.refine = original
+    go.set()
 
     odd = add_plant("odd", "quercus")
     bare = datablocks()
@@ -123,6 +139,13 @@ def listen():
 
     refine.refine_steps = noted
     return messages
+
+
+def held(begun, go, original, *given):
+    """The loop, which begins when it may."""
+    begun.set()
+    go.wait(120.0)
+    return (yield from original(*given))
 
 
 def broken(*_arguments, **_options):

@@ -31,6 +31,11 @@ def test_escape_in_the_middle_leaves_the_scene_as_it_was(seen: dict) -> None:
     assert seen["left_by_esc"] == []
 
 
+def test_escape_does_not_wait_for_a_pass(seen: dict) -> None:
+    assert seen["running_in_pass"]
+    assert seen["left_by_esc_in_pass"] == []
+
+
 def test_return_stops_refining_and_makes_what_there_is(seen: dict) -> None:
     assert seen["stopped"] == [True, False]
     assert "Stopped early" in seen["reports"]

@@ -18,7 +18,7 @@ from ..attributes import frames_of, world_matrix
 from ..species.edits import catalogue
 from .fields import read_field
 from .objects import Copies, copies_of, may_instance, renderable_objects
-from .skeletons import kind_of, species_of
+from .skeletons import kind_of, kind_of_choice, species_of
 
 _NAMED = 3  # objects that a message names before it only counts
 
@@ -45,8 +45,10 @@ def read_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_lay
         the objects.
     """
     objects = sorted(renderable_objects(view_layer), key=lambda o: o.name_full)
-    own = [o for o in objects if o.tetflora.is_plant or o.tetflora.is_field]
-    single = [o for o in own if o.tetflora.is_plant and o.tetflora.enabled]
+    grouped = [(o, o.tetflora) for o in objects]  # asking an object for its group is half of the time
+    grouped = [(o, group) for o, group in grouped if group.is_plant or group.is_field]
+    own = [o for o, _ in grouped]
+    single = [o for o, group in grouped if group.is_plant and group.enabled]
     read = [(single[0].name if single else "", single_plants(single, depsgraph))]
     copies = copies_of([o for o in objects if may_instance(o)], depsgraph)
     enabled = [c for c in copies if c.owner.tetflora.enabled]
@@ -91,11 +93,12 @@ def single_plants(plants: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph
     SceneError
         As `read_plants`.
     """
-    names, own = [obj.name for obj in plants], [kind_of(obj) for obj in plants]
+    groups = [obj.tetflora for obj in plants]
+    names, own = [obj.name for obj in plants], [kind_of_choice(group) for group in groups]
     _check_species(list(zip(names, own, strict=True)))
     number = {kind: i for i, kind in enumerate(sorted(set(own)))}
     species = np.array([number[kind] for kind in own], dtype=np.int32)
-    seeds = np.array([obj.tetflora.seed for obj in plants], dtype=np.int64)
+    seeds = np.array([group.seed for group in groups], dtype=np.int64)
     # Some versions of Blender give single precision.
     matrices = np.array([world_matrix(obj, depsgraph) for obj in plants], dtype=np.float64).reshape(-1, 4, 4)
     return _placed(names, tuple(number), species, seeds, matrices)
