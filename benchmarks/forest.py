@@ -81,7 +81,7 @@ def measure(quick: bool) -> dict[str, float]:
             records[case, what] = measured(_folder(quick), case, "--what", what, "--samples", str(samples), *of, *brief)
     if not quick:
         records["light", "light"] = measured(_folder(quick), "light", "--samples", str(LIT))
-        records["million", "refine"] = measured(_folder(quick), "million", "--no-render")
+        records["million", "refine"] = measured(_folder(quick), "million", "--no-render", "--at-once")
         for limit in LIMITS:
             limited = ("--set", f"max_memory={limit}", "--samples", "1")
             records["birch", f"limit_{limit}"] = measured(_folder(quick), "birch", *limited)
@@ -134,7 +134,10 @@ def one(arguments: argparse.Namespace) -> dict:
         figures = {"case": arguments.case, "what": arguments.what, "planted": planted}
         if arguments.what == "part":
             return figures | forest_part.measure(scene, folder, arguments.samples, noise=not arguments.quick)
-        figures |= forest_case.refined(scene) if arguments.what == "refine" else forest_instances.build(scene)
+        if arguments.what == "instances":
+            figures |= forest_instances.build(scene)
+        else:
+            figures |= forest_case.refined(scene, arguments.at_once)
         if not arguments.no_render:
             figures |= forest_case.rendered(scene, folder, arguments.samples)
             figures["peak_render_mb"] = max(figures["peak_mb"], figures["peak_render_mb"])
@@ -166,6 +169,7 @@ def main() -> int:
     add("--away", type=float, help="least distance of the camera from the middle, metres; it looks so far")
     add("--size", type=_size, default=(1920, 1080), metavar="WxH")
     add("--set", type=_setting, nargs="+", default=[], metavar="NAME=VALUE", help="settings of the scene")
+    add("--at-once", action="store_true", help="as scripts and renders refine, not in steps as the window does")
     add("--no-render", action="store_true")
     add(
         "--samples", type=int, default=SAMPLES, help="of images that are timed (beside one with one sample) or compared"

@@ -5,14 +5,17 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
 import bpy
 import numpy as np
 
+from tetflora_addon.blender import worker
 from tetflora_addon.blender.job import refine
 from tetflora_addon.refinement.decisions import Decision
+from tetflora_addon.refinement.statistics import Progress, Statistics
 
 from .report import forget_peak, peak_mb
 from .row80 import timed_render
@@ -25,8 +28,11 @@ STILL = 0.2
 SAMPLES = 64
 
 
-def refined(scene: bpy.types.Scene) -> dict:
-    """Refine as the operator does, step by step; figures of the job and of what the loop left."""
+def refined(scene: bpy.types.Scene, at_once: bool = False) -> dict:
+    """Refine as the operator does; figures of the job and of what the loop left.
+
+    at_once: as scripts and renders do, without a thread; steps are then those of the engine, which nobody waits for.
+    """
     kept = SimpleNamespace(refinement=None)
     afford = refine.afford
 
@@ -36,18 +42,11 @@ def refined(scene: bpy.types.Scene) -> dict:
 
     refine.afford = watched
     forget_peak()  # of what planted the wood
+    taken: list[tuple[float, str]] = []
     try:
         start = time.perf_counter()
-        steps = refine.refine_steps(scene, bpy.context.evaluated_depsgraph_get())
-        statistics, taken, before = None, [], "begin"
-        while statistics is None:
-            begun, message = time.perf_counter(), "end"
-            try:
-                message = next(steps).message
-            except StopIteration as stop:
-                statistics = stop.value
-            taken.append((time.perf_counter() - begun, f"{before} > {message}"))
-            before = message
+        steps = _timed(refine.refine_steps(scene, bpy.context.evaluated_depsgraph_get()), taken)
+        statistics = worker.at_once(steps) if at_once else worker.run(steps)
         seconds = time.perf_counter() - start
     finally:
         refine.afford = afford
@@ -76,6 +75,21 @@ def refined(scene: bpy.types.Scene) -> dict:
         "seconds": {stage: round(value, 3) for stage, value in statistics.seconds.items()},
         "longest_steps": [f"{one:.2f} s  {what}" for one, what in longest],
     }
+
+
+def _timed(steps: Iterator[Progress], taken: list[tuple[float, str]]) -> Generator[Progress, None, Statistics]:
+    """A job that notes the seconds of each step, between which messages."""
+    before = "begin"
+    while True:
+        begun = time.perf_counter()
+        try:
+            progress = next(steps)
+        except StopIteration as stop:
+            taken.append((time.perf_counter() - begun, f"{before} > end"))
+            return stop.value
+        taken.append((time.perf_counter() - begun, f"{before} > {progress.message}"))
+        before = progress.message
+        yield progress
 
 
 def left_open(refinement: object) -> dict[str, float]:

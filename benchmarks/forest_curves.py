@@ -85,7 +85,7 @@ def words(curve: str, value: float, quick: bool = False) -> tuple[str, ...]:
         more = ("--eye", f"{value:g}")
     width = round(math.sqrt(size * 16 / 9))
     wood = ("--plants", f"{asked:.0f}", "--side", f"{side:g}", "--distance", f"{distance:.2f}", *more)
-    return (SPECIES, "--no-render", "--size", f"{width}x{round(size / width)}", *wood)
+    return (SPECIES, "--no-render", "--at-once", "--size", f"{width}x{round(size / width)}", *wood)
 
 
 def slope(values: Iterable[float], cost: Iterable[float]) -> float:
