@@ -15,34 +15,72 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tests.engine.emission.test_emission import scene
-from tetflora_addon.proxies.facet_sizes import COARSE, COARSEST, FacetSizes, coarseness, subplant_facet_sizes
+from tetflora_addon.growth.branches import Branches
+from tetflora_addon.growth.growth import trunks
+from tetflora_addon.proxies.facet_sizes import (
+    COARSE,
+    COARSEST,
+    FacetPixels,
+    FacetSizes,
+    coarseness,
+    subplant_facet_sizes,
+)
 from tetflora_addon.proxies.microsurfaces import facet_mesh, subplant_facets
-from tetflora_addon.refinement.contents import Contents
+from tetflora_addon.refinement.contents import subplant_totals
 from tetflora_addon.refinement.decisions import Decision
 
-PIXELS = 0.33
+PIXELS = FacetPixels(0.33)
 PLANTS = 200
 
 
-def sizes(clearance: float, coarse: float, extent: float = 0.01) -> tuple[FacetSizes, Contents]:
+def sizes(
+    clearance: float, coarse: float, extent: float = 0.01, visibility: float = 0.0
+) -> tuple[FacetSizes, Branches]:
     """Of plants so many metres beside a view whose pixels span so many metres there."""
     flora = support.small_flora()
-    contents = Contents.of_plants(flora, support.plants(np.arange(PLANTS)))
+    own = trunks(flora.rows, support.plants(np.arange(PLANTS)))
     camera = SimpleNamespace(
         extent_around=lambda points: np.full(len(points), extent),
         clearance=lambda points: np.full(len(points), clearance),
     )
-    return subplant_facet_sizes(flora, contents, camera, np.array([coarse])), contents
+    totals = subplant_totals(flora, own)
+    return subplant_facet_sizes(flora, own, totals, camera, np.full(PLANTS, visibility), np.full(PLANTS, coarse)), own
 
 
 @given(st.floats(-100.0, 1e5), st.floats(1e-4, 10.0))
 @examples(deadline=None, max_examples=20)
 def test_what_is_seen_is_as_fine_as_asked_for(clearance: float, extent: float) -> None:
-    seen, _ = sizes(clearance, 1.0, extent)
-    leaf, wood = seen.sides(PIXELS)
-    assert not seen.hidden.any()
-    assert np.allclose(wood, PIXELS * extent)
-    assert np.allclose(leaf, np.maximum(PIXELS * extent, np.sqrt(seen.one_leaf)))
+    """Nothing else matters for it: not what hides others, nor how coarse these may be."""
+    seen, _ = sizes(clearance, COARSEST, extent, visibility=1.0)
+    for hidden in (1.0, 20.0):
+        leaf, wood = seen.sides(FacetPixels(PIXELS.seen, hidden))
+        assert not seen.hidden.any()
+        assert np.allclose(wood, PIXELS.seen * extent)
+        assert np.allclose(leaf, np.maximum(PIXELS.seen * extent, np.sqrt(seen.one_leaf)))
+
+
+@given(st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+@examples(deadline=None, max_examples=20)
+def test_the_less_is_seen_of_a_plant_the_larger_its_facets(one: float, other: float) -> None:
+    """So that each draws about as much of the image; but a plant that is hardly seen is still drawn."""
+    low, high = sorted([max(one, 1e-3), max(other, 1e-3)])
+    dim, bright = (sizes(0.0, COARSE, visibility=v)[0].sides(PIXELS)[1] for v in (low, high))
+    assert (bright >= PIXELS.seen * 0.01 * (1 - 1e-12)).all()
+    assert (dim >= bright * (1 - 1e-12)).all()
+    least = sizes(0.0, COARSE, visibility=1e-9)[0].sides(PIXELS)[1]
+    assert (least <= 10 * PIXELS.seen * 0.01).all()
+
+
+@given(st.floats(1.0, 50.0), st.floats(0.0, 100.0))
+@examples(deadline=None, max_examples=20)
+def test_a_factor_on_hidden_facets_is_one(factor: float, clearance: float) -> None:
+    """Their sides are larger by it, and they are fewer; wood that has few faces anyway stays as it is."""
+    hidden, _ = sizes(clearance, COARSE)
+    larger = FacetPixels(PIXELS.seen, factor)
+    assert (hidden.counts(larger) <= hidden.counts(PIXELS)).all()
+    leaf, wood = (b / a for a, b in zip(hidden.sides(PIXELS), hidden.sides(larger), strict=True))
+    assert np.allclose(leaf, factor)
+    assert ((wood > 1 - 1e-9) & (wood < factor * (1 + 1e-9))).all()
 
 
 @given(st.floats(0.0, 1e5), st.floats(1.0, 4.0), st.floats(COARSE, COARSEST), st.floats(1e-4, 10.0))
@@ -57,7 +95,7 @@ def test_facets_grow_with_the_way_to_the_view_and_with_what_hides_them(
 
 def test_no_budget_makes_blots_of_what_is_deeply_hidden() -> None:
     """Where facets are large already, depth makes them no larger; nothing is smaller than behind one crown."""
-    for pixels in (0.1, 0.33, 0.9, 1.1, 4.0, 20.0):
+    for pixels in map(FacetPixels, (0.1, 0.33, 0.9, 1.1, 4.0, 20.0)):
         one, deep = (sizes(0.0, coarse, extent=1.0)[0].sides(pixels)[0] for coarse in (COARSE, COARSEST))
         assert (deep <= np.maximum(one, 3.0) * (1 + 1e-12)).all()
         assert (deep >= one).all()
@@ -67,10 +105,9 @@ def test_no_budget_makes_blots_of_what_is_deeply_hidden() -> None:
 def test_shadows_from_beside_the_view_keep_their_area(clearance: float) -> None:
     """However far a plant is, some facets of it are left, and they cover what it covers."""
     flora = support.small_flora()
-    beside, contents = sizes(clearance, COARSE)
-    mesh = facet_mesh(subplant_facets(flora, contents.subplants.items, *beside.sides(PIXELS)))
-    totals = contents.subplants.totals
-    optical = (totals.leaf_area + totals.wood_area / 2).sum()
+    beside, plants = sizes(clearance, COARSE)
+    mesh = facet_mesh(subplant_facets(flora, plants, *beside.sides(PIXELS)))
+    optical = subplant_totals(flora, plants).optical_area.sum()
     assert support.face_areas(mesh).sum() == pytest.approx(optical, rel=0.05)
     assert mesh.polygons == pytest.approx(beside.counts(PIXELS).sum(), rel=0.05)
     assert mesh.polygons >= 4 * PLANTS

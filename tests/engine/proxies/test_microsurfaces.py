@@ -17,9 +17,9 @@ from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.growth import trunks
-from tetflora_addon.proxies.facet_sizes import COARSE, piece_facet_sizes, subplant_facet_sizes
+from tetflora_addon.proxies.facet_sizes import COARSE, FacetPixels, piece_facet_sizes, subplant_facet_sizes
 from tetflora_addon.proxies.microsurfaces import facet_mesh, piece_facets, subplant_facets
-from tetflora_addon.refinement.contents import Contents, bounding_cylinders, subplant_totals
+from tetflora_addon.refinement.contents import bounding_cylinders, piece_totals, subplant_totals
 
 
 def facets(flora: Flora, subplants: Branches, side: float) -> MeshBuffers:
@@ -118,7 +118,6 @@ def test_hidden_wood_gets_no_more_facets_than_it_has_faces() -> None:
     """Plants beside the eye, where a pixel is a millimetre: the area stays, the number is that of their polygons."""
     flora = support.small_flora()
     plants, pieces = support.grown(flora, support.plants(np.arange(100)))
-    contents = Contents.of(flora, plants, np.zeros(100, int), pieces, np.zeros(len(pieces), int))
     camera = SimpleNamespace(
         extent_around=lambda points: np.full(len(points), 1e-3), clearance=lambda points: np.zeros(len(points))
     )
@@ -128,25 +127,26 @@ def test_hidden_wood_gets_no_more_facets_than_it_has_faces() -> None:
             subplant_facets,
             plants,
             100 * (flora.polygons[0] - flora.leaf_count[0] * flora.leaf.polygons[0]),
-            contents.subplants.totals,
+            subplant_totals(flora, plants),
         ),
         (
             piece_facet_sizes,
             piece_facets,
             pieces,
             flora.rows["sides"][pieces.branches.row].sum(),
-            contents.pieces.totals,
+            piece_totals(flora, pieces),
         ),
     ):
-        sizes = sizes_of(flora, contents, camera, np.array([COARSE]))
-        made = facet_mesh(make(flora, things, *sizes.sides(1.0)))
-        assert made.polygons == pytest.approx(sizes.counts(1.0).sum(), rel=0.02)
+        none, coarse = np.zeros(len(things)), np.full(len(things), COARSE)
+        sizes = sizes_of(flora, things, totals, camera, none, coarse)
+        made = facet_mesh(make(flora, things, *sizes.sides(FacetPixels(1.0))))
+        assert made.polygons == pytest.approx(sizes.counts(FacetPixels(1.0)).sum(), rel=0.02)
         wood = part(made, False)
         assert wood.sum() <= faces * 1.01
         assert support.face_areas(made)[wood].sum() == pytest.approx(totals.wood_area.sum() / 2, rel=0.1)
-        seen = sizes_of(flora, contents, camera, np.ones(1))
-        assert part(facet_mesh(make(flora, things, *seen.sides(12.0))), False).sum() > faces * 5
-        assert (seen.sides(3.0)[0] >= np.sqrt(seen.one_leaf)).all()
+        seen = sizes_of(flora, things, totals, camera, none + 1, coarse)
+        assert part(facet_mesh(make(flora, things, *seen.sides(FacetPixels(12.0)))), False).sum() > faces * 5
+        assert (seen.sides(FacetPixels(3.0))[0] >= np.sqrt(seen.one_leaf)).all()
 
 
 def test_facets_are_equilateral_and_share_the_area_of_their_plant() -> None:
