@@ -258,7 +258,7 @@ def test_shells_hold_what_explicit_does_not() -> None:
         one = with_decision(result, np.where(near, Decision.EXPLICIT, Decision.HIDDEN), rng.random(len(near)))
         real = sum(by_kind(list(explicit_blocks(flora, one, camera)), "leaf", species) for species in (0, 1))
         index = np.where(one.chosen(Decision.HIDDEN), 0, -1)
-        held = one.contents.within(index >= 0).sums(len(one.tree)).leaf_area.sum()
+        held = one.totals.leaf_area[one.decision == Decision.HIDDEN].sum()
         shell = summarise(flora, one.contents, index, 1).optical_area[0]
         assert 0 < held <= shell
         assert 0.05 * whole < real < whole
