@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tetflora_addon.camera.camera import MOST, blur_margins, circle_of_confusion
-from tetflora_addon.refinement.contents import Contents
 from tetflora_addon.refinement.views import widened_for
 
 CAMERA = support.camera((0, 0, 0), (0, 10, 0), pixels=1000, view=1.0, near=0.05)
@@ -92,7 +91,7 @@ def test_a_camera_that_turns_fast_gets_no_more_than_the_most() -> None:
 def test_the_view_is_widened_by_the_lens() -> None:
     flora, seeds = support.small_flora(), support.grove(9, 2.0)
     camera = support.camera((0, -14, 3), (0, 0, 1.5), pixels=256)
-    plants = Contents.of_plants(flora, seeds).subplants.items
+    plants = support.trunks(flora.rows, seeds)
     sharp = widened_for(camera, 0.04, flora, plants)
     assert sharp.window == camera.widened(0.04).window
     blurred = widened_for(replace(camera, lens_radius=0.2, focus=4.0), 0.04, flora, plants)

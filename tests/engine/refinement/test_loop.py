@@ -12,11 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.engine import support
-from tests.engine.refinement.test_contents import expanded, measures
+from tests.engine.refinement.test_shares import check_points, check_whole
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.compiled.flora import Flora
+from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.refinement.contents import Contents, Totals, bounding_box
+from tetflora_addon.refinement.contents import Totals, bounding_box
 from tetflora_addon.refinement.decisions import Decision, feature_pixels, mean_extinction
 from tetflora_addon.refinement.loop import Refinement, refine, step_of
 from tetflora_addon.refinement.settings import RefinementSettings
@@ -39,14 +40,19 @@ def run(
             return states, stop.value
 
 
-def check(flora: Flora, result: Refinement) -> None:
-    """What holds for every result."""
+def check(flora: Flora, seeds: Seeds, result: Refinement) -> None:
+    """What holds for every result; nothing is lost."""
+    check_whole(flora, seeds, result.plants)
+    check_points(result.tree, result.plants)
     tree = result.tree
     assert (tree.children[result.nodes, 0] < 0).all()
     assert np.isin(result.decision, [Decision.PROXY, Decision.HIDDEN, Decision.EXPLICIT]).all()
     assert len(np.unique(result.rank)) == len(result.rank)
-    held = np.concatenate([result.contents.subplants.cell, result.contents.pieces.cell])
-    assert np.isin(held, result.nodes).all()
+    assert np.isin(result.plants.points.cell, result.nodes).all()
+    assert np.isin(result.nodes, result.plants.points.cell).all()
+    for name in ("leaf_area", "wood_area", "polygons"):
+        whole = getattr(result.plants.parts.totals, name).sum()
+        assert getattr(result.totals, name).sum() == pytest.approx(whole, rel=1e-6)
     assert volume(tree.vertices(tree.terminals())).min() > 0
     for array in (result.cells.pixels, result.transmittance, result.totals.leaf_area, result.totals.width):
         assert len(array) == len(result.nodes)
@@ -75,13 +81,10 @@ def test_cameras(place: str, number: int, anchored: bool) -> None:
     eye, target, kind, view = CAMERAS[place]
     seeds = support.grove(number, 2.0)
     _, result = run(flora, seeds, support.camera(eye, target, kind=kind, view=view), anchored=anchored)
-    check(flora, result)
+    check(flora, seeds, result)
     assert result.complete
     seen = (result.decision == Decision.PROXY) | (result.decision == Decision.EXPLICIT)
     assert result.in_view[result.nodes[seen]].all()
-    parts = measures(flora, expanded(flora, result.contents))
-    whole = measures(flora, support.grown(flora, seeds)[1])
-    assert parts == pytest.approx(whole, rel=1e-6)
     if "turned away" in place and anchored:
         # A piece of space that reaches into the view may keep a few polygons rather than be divided.
         assert (result.totals.polygons[result.decision != Decision.HIDDEN] <= RefinementSettings().few_polygons).all()
@@ -106,10 +109,8 @@ def test_an_eye_in_the_crown(sort: str, eye: tuple[float, ...]) -> None:
         sphere = (-np.pi, np.pi, -np.pi / 2, np.pi / 2)
         camera = replace(camera, kind="PANO", window=sphere, width=512, height=256)
     _, result = run(flora, seeds, camera, anchored=sort == "anchored")
-    check(flora, result)
+    check(flora, seeds, result)
     assert result.complete
-    parts = measures(flora, expanded(flora, result.contents))
-    assert parts == pytest.approx(measures(flora, support.grown(flora, seeds)[1]), rel=1e-6)
     large = feature_pixels(result.tree.vertices(result.nodes), result.totals.width, camera)[0] >= 0.5
     seen = result.transmittance > RefinementSettings().hidden
     assert not (large & seen & (result.decision == Decision.PROXY)).any()
@@ -128,14 +129,12 @@ def test_random_views(seed: int, cutoff: float) -> None:
     seeds = support.grove(6, 2.5, rng.integers(0, 2, 6))
     camera = support.camera(rng.uniform(-12, 12, 3) + [0, 0, 13], rng.uniform(-2, 2, 3), pixels=200)
     states, result = run(flora, seeds, camera, cutoff=cutoff)
-    check(flora, result)
+    check(flora, seeds, result)
     assert [s.passes for s in [*states, result]] == list(range(1, len(states) + 2))
     large = feature_pixels(result.tree.vertices(result.nodes), result.totals.width, camera)[0] >= 0.5
     seen = result.transmittance > RefinementSettings().hidden
     assert not (large & seen & (result.decision == Decision.PROXY)).any()
     assert not (seen & (result.decision == Decision.HIDDEN)).any()
-    parts = measures(flora, expanded(flora, result.contents))
-    assert parts == pytest.approx(measures(flora, support.grown(flora, seeds)[1]), rel=1e-6)
 
 
 def test_states_on_the_way_are_ever_finer() -> None:
@@ -154,8 +153,9 @@ def test_tetrahedra_are_limited(limit: int) -> None:
     """The limit holds from the second level on; what would have been split is decided all the same."""
     flora = support.small_flora()
     camera = support.camera((0, -14, 3), (0, 0, 1.5), pixels=600)
-    _, result = run(flora, support.grove(9, 2.0), camera, max_tetrahedra=limit, cutoff=0.5, few_polygons=0, block=4)
-    check(flora, result)
+    seeds = support.grove(9, 2.0)
+    _, result = run(flora, seeds, camera, max_tetrahedra=limit, cutoff=0.5, few_polygons=0, block=4)
+    check(flora, seeds, result)
     assert result.tree.tetrahedra_made <= limit
     assert not result.complete
     assert not (result.decision == Decision.SPLIT).any()
@@ -164,8 +164,8 @@ def test_tetrahedra_are_limited(limit: int) -> None:
 def test_each_pass_is_reported_and_can_be_the_last() -> None:
     """Figures of every state on the way; a limit on passes gives the very same states, decided without divisions."""
     flora = support.small_flora()
-    camera = support.camera((0, -14, 3), (0, 0, 1.5), pixels=256)
-    loop = refine(flora, support.grove(9, 2.0), camera, RefinementSettings(**FAST))
+    camera, seeds = support.camera((0, -14, 3), (0, 0, 1.5), pixels=256), support.grove(9, 2.0)
+    loop = refine(flora, seeds, camera, RefinementSettings(**FAST))
     steps = []
     while True:
         try:
@@ -181,8 +181,8 @@ def test_each_pass_is_reported_and_can_be_the_last() -> None:
     assert [step.split > 0 for step in steps] == [True] * (len(steps) - 1) + [False]
     assert all(step.memory_mb > 0 for step in steps)
     for passes, step in enumerate(steps, start=1):
-        _, result = run(flora, support.grove(9, 2.0), camera, max_passes=passes)
-        check(flora, result)
+        _, result = run(flora, seeds, camera, max_passes=passes)
+        check(flora, seeds, result)
         last = step_of(result)
         assert result.passes == passes
         assert result.complete == (step.split == 0)
@@ -198,9 +198,9 @@ def test_generations_are_limited(limit: int) -> None:
     flora = support.small_flora()
     seeds = support.grove(9, 2.0)
     camera = support.camera((0, -14, 3), (0, 0, 1.5), pixels=600)
-    root = view_root(camera, bounding_box(flora, Contents.of_plants(flora, seeds).subplants.items))
+    root = view_root(camera, bounding_box(flora, trunks(flora.rows, seeds)))
     _, result = run(flora, seeds, camera, max_levels=limit, cutoff=0.5, few_polygons=0, block=4)
-    check(flora, result)
+    check(flora, seeds, result)
     assert not result.complete
     if limit == 0:
         assert result.tree.levels == root.levels
@@ -259,7 +259,7 @@ def test_the_same_scene_twice_is_the_same_result() -> None:
     assert (a.decision == b.decision).all()
     assert (a.nodes == b.nodes).all()
     assert (a.rank == b.rank).all()
-    assert (a.contents.pieces.items.end == b.contents.pieces.items.end).all()
+    assert (a.plants.points.position == b.plants.points.position).all()
 
 
 def test_mean_extinction() -> None:
@@ -288,7 +288,38 @@ def test_a_loop_that_is_stopped_returns_what_it_has() -> None:
     assert not result.complete
     assert not (result.decision == Decision.SPLIT).any()
     assert result.passes == state.passes
-    held = np.flatnonzero(result.contents.sums(len(result.tree)).area > 0)
-    assert set(held) == set(result.nodes)
-    whole = Contents.of_plants(flora, seeds).sums(1)
-    assert result.contents.sums(len(result.tree)).leaf_area.sum() == pytest.approx(whole.leaf_area.sum(), rel=0.1)
+    check(flora, seeds, result)
+
+
+@given(st.integers(0, 2**31))
+@settings(deadline=None, max_examples=6)
+def test_the_order_of_plants_does_not_matter(seed: int) -> None:
+    """The same parts, and the same totals and decisions of the same tetrahedra."""
+    flora = support.compiled(support.SMALL, support.shipped("bush"))
+    rng = np.random.default_rng(seed)
+    seeds = support.grove(8, 2.2, rng.integers(0, 2, 8))
+    order = rng.permutation(8)
+    camera = support.camera(rng.uniform(-12, 12, 3) + [0, 0, 13], rng.uniform(-2, 2, 3), pixels=200)
+    one, other = (run(flora, some, camera)[1] for some in (seeds, seeds.take(order)))
+    np.testing.assert_array_equal(one.nodes, other.nodes)
+    np.testing.assert_array_equal(one.decision, other.decision)
+    for name in ("leaf_area", "wood_area", "polygons", "width"):
+        np.testing.assert_allclose(getattr(one.totals, name), getattr(other.totals, name), rtol=1e-6)
+    branches = [r.plants.parts.branches.take(np.argsort(r.plants.parts.branches.key)) for r in (one, other)]
+    np.testing.assert_array_equal(branches[0].key, branches[1].key)
+    np.testing.assert_array_equal(branches[0].position, branches[1].position)
+    np.testing.assert_array_equal(branches[0].plant, order[branches[1].plant])
+
+
+@pytest.mark.parametrize("species", ["birch", "conifer", "bush"])
+@pytest.mark.parametrize("view", [((0, -22, 2), (0, 0, 4)), ((1, 1, 1.7), (9, 9, 4))], ids=("edge", "within"))
+def test_what_is_hidden_is_not_opened_more_than_what_is_seen(species: str, view: tuple) -> None:
+    """In a small wood, hidden tetrahedra hold no more of the parts that plants have been opened into than seen ones."""
+    flora, which = support.flora(), support.SPECIES.index(species)
+    _, result = run(flora, support.grove(49, 4.0, which), support.camera(*view, pixels=480, view=1.0))
+    subplants, bodies = result.plants.held(len(result.tree))
+    of_opened = subplants.cell[subplants.items.row != flora.first_row[which]]
+    cell = np.concatenate([of_opened, bodies.cell])
+    hidden = result.chosen(Decision.HIDDEN)[cell]
+    assert (~hidden).sum() > 500
+    assert hidden.sum() <= (~hidden).sum()
