@@ -20,7 +20,7 @@ from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.growth.wind import Wind
-from tetflora_addon.refinement.contents import Contents, Totals, bounding_box, subplant_totals, sums
+from tetflora_addon.refinement.contents import Totals, bounding_box, subplant_totals, sums
 from tetflora_addon.refinement.shares import LARGE, PlantParts, SharedPlants, opened, share_points
 from tetflora_addon.subplants.pieces import expand
 from tetflora_addon.tetrahedra.geometry import squared_edges, volume
@@ -78,14 +78,6 @@ def shared(
         nodes = np.unique(plants.points.cell)
         divide(tree, plants, nodes[rng.random(len(nodes)) < 0.7])
     return tree, plants
-
-
-def divided(
-    flora: Flora, seeds: Seeds, seed: int, kind: str = "PERSP", rounds: int = 2
-) -> tuple[TetrahedralTree, Contents]:
-    """The same, as contents of tetrahedra."""
-    tree, plants = shared(flora, seeds, seed, kind, rounds)
-    return tree, Contents(*plants.held(len(tree)))
 
 
 def names(*some: Branches) -> NDArray[np.uint64]:
