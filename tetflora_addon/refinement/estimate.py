@@ -7,8 +7,8 @@ plant covers the picture with the ellipse of its crown, plants cover it together
 gets more polygons than it has. What is out of view and casts shadows adds a fraction. Time is linear in plants and in
 what is made.
 
-The constants are least squares over the cases of ``python -m benchmarks forest`` on two cores; a case is off by a
-factor of 2 at most, other machines by their speed.
+The constants are meant for woods at 1920 × 1080 on two cores, the cases of ``python -m benchmarks forest``, to whose
+seconds and numbers they are fitted whenever refinement changes; other machines differ by their speed.
 """
 
 from __future__ import annotations
