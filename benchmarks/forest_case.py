@@ -5,16 +5,20 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
+from contextlib import AbstractContextManager, closing, contextmanager
+from dataclasses import replace
+from itertools import takewhile
 from pathlib import Path
-from types import SimpleNamespace
 
 import bpy
 import numpy as np
 
 from tetflora_addon.blender import worker
 from tetflora_addon.blender.job import refine
+from tetflora_addon.emission.budget import Detail
 from tetflora_addon.refinement.decisions import Decision
+from tetflora_addon.refinement.loop import Refinement
 from tetflora_addon.refinement.statistics import Progress, Statistics
 
 from .report import forget_peak, peak_mb
@@ -28,36 +32,61 @@ STILL = 0.2
 SAMPLES = 64
 
 
+@contextmanager
+def watching(look: Callable[[Refinement, Detail], Detail | None]) -> Iterator[None]:
+    """While it lasts, jobs show what the loop left and the detail they can afford, and take what it returns."""
+    afford = refine.afford
+
+    def watched(flora: object, refinement: Refinement, *rest: object) -> Detail:
+        detail = afford(flora, refinement, *rest)
+        return look(refinement, detail) or detail
+
+    refine.afford = watched
+    try:
+        yield
+    finally:
+        refine.afford = afford
+
+
+def detail_of(scene: bpy.types.Scene) -> Detail:
+    """How finely a scene would be drawn; nothing is made."""
+    kept: list[Detail] = []
+
+    def begun() -> Generator[Progress, None, None]:
+        with closing(refine.refine_steps(scene, bpy.context.evaluated_depsgraph_get())) as steps:
+            yield from takewhile(lambda _: not kept, steps)
+
+    with watching(lambda _, detail: kept.append(replace(detail, refinement=None))):
+        worker.at_once(begun())
+    return kept[0]
+
+
+def as_fine_as(detail: Detail) -> AbstractContextManager:
+    """While it lasts, everything is drawn as finely as something else, whatever could be afforded."""
+    return watching(lambda _, own: replace(detail, refinement=own.refinement))
+
+
 def refined(scene: bpy.types.Scene, at_once: bool = False) -> dict:
     """Refine as the operator does; figures of the job and of what the loop left.
 
     at_once: as scripts and renders do, without a thread; steps are then those of the engine, which nobody waits for.
     """
-    kept = SimpleNamespace(refinement=None)
-    afford = refine.afford
-
-    def watched(flora: object, refinement: object, *rest: object) -> object:
-        kept.refinement = refinement
-        return afford(flora, refinement, *rest)
-
-    refine.afford = watched
-    forget_peak()  # of what planted the wood
+    kept: list[Refinement] = []
     taken: list[tuple[float, str]] = []
-    try:
-        start = time.perf_counter()
+    forget_peak()  # of what planted the wood
+    with watching(lambda refinement, _: kept.append(refinement)):
+        start, processor = time.perf_counter(), time.process_time()
         steps = _timed(refine.refine_steps(scene, bpy.context.evaluated_depsgraph_get()), taken)
         statistics = worker.at_once(steps) if at_once else worker.run(steps)
-        seconds = time.perf_counter() - start
-    finally:
-        refine.afford = afford
+        seconds, processor = time.perf_counter() - start, time.process_time() - processor
     peak = peak_mb()
-    found = {} if kept.refinement is None else left_open(kept.refinement)
-    kept.refinement = None
+    found = left_open(kept.pop()) if kept else {}
     forget_peak()  # counting made copies
     longest = sorted(taken, reverse=True)[:_NAMED]
     return {
         "plants": statistics.plants,
         "refine_emit_s": seconds,
+        "refine_emit_cpu_s": processor,
         "peak_mb": peak,
         "longest_step_s": longest[0][0],
         "steps": len(taken),
@@ -92,7 +121,7 @@ def _timed(steps: Iterator[Progress], taken: list[tuple[float, str]]) -> Generat
         yield progress
 
 
-def left_open(refinement: object) -> dict[str, float]:
+def left_open(refinement: Refinement) -> dict[str, float]:
     """How many sub-plants and pieces of branches are open, by what was decided on the cells that hold them."""
     nodes = np.zeros(len(refinement.tree), np.int8)
     nodes[refinement.nodes] = refinement.decision

@@ -3,7 +3,8 @@
 """Light that comes from plants which nobody sees: on the ground under a wood, in shadows, and in a pond.
 
 Three small scenes. Of each the mean luminance of what receives the light, where no plant stands before it, is compared
-between refined and expanded plants. Images are of light, not of colours as a film shows them.
+between refined and expanded plants. Facets are as large, seen and hidden ones, as in the wood of `forest`, since
+these scenes would not exhaust what an image can afford. Images are of light, not of colours as a film shows them.
 """
 
 from __future__ import annotations
@@ -20,14 +21,21 @@ from devtools import session
 from tetflora_addon.blender.compat import shader_tree
 from tetflora_addon.blender.placing.first_forest import sky
 from tetflora_addon.blender.placing.plant_objects import add_field
+from tetflora_addon.emission.budget import Detail
 from tetflora_addon.planting.places import Placement
 
 from .compare import coverage, read_picture, render
+from .forest_case import as_fine_as, detail_of
+from .forest_scene import build as build_wood
+from .forest_scene import case_of
 from .row80 import timed_refine
 
-WIDTH, HEIGHT = 480, 270
+#: Of the image, of which refinement takes every pixel for as many as this on each side.
+WIDTH, HEIGHT, FINER = 480, 270, 4
 #: Pixels that plants cover by more than this are not those of the receiver.
 _BARE = 0.005
+#: The wood.
+WOOD = "birch"
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 Box = tuple[float, float, float, float]
 
@@ -67,15 +75,18 @@ _SPECIES = ("broadleaf_tree", "aspen", "conifer")
 
 def run(folder: Path, samples: int, names: tuple[str, ...] = tuple(SCENES), again: bool = True) -> dict[str, float]:
     """Compare all scenes; again: and expanded plants with themselves, of another seed of the renderer."""
-    figures: dict[str, float] = {}
+    build_wood(bpy.context.scene, case_of(WOOD))
+    detail = detail_of(bpy.context.scene)
+    figures = {"light_facet_pixels": detail.pixels.seen, "light_hidden_factor": detail.pixels.hidden}
     for name in names:
         session.clean_file()
-        figures |= {f"{key}_{name}": value for key, value in _compared(SCENES[name], folder, samples, again).items()}
+        found = _compared(SCENES[name], detail, folder, samples, again)
+        figures |= {f"{key}_{name}": value for key, value in found.items()}
     figures["light_error_max"] = max(abs(figures[f"light_error_{name}"]) for name in names)
     return figures
 
 
-def _compared(given: Scene, folder: Path, samples: int, again: bool) -> dict[str, float]:
+def _compared(given: Scene, detail: Detail, folder: Path, samples: int, again: bool) -> dict[str, float]:
     scene = bpy.context.scene
     plants = build(scene, given)
     receiver = _within(scene, given.receiver)
@@ -84,7 +95,10 @@ def _compared(given: Scene, folder: Path, samples: int, again: bool) -> dict[str
         return _luminance(scene, folder / "light.exr", samples, seed)
 
     bare = light()
-    refined, _ = timed_refine(scene, expand_everything=False)
+    scene.render.resolution_percentage = 100 * FINER
+    with as_fine_as(detail):
+        refined, _ = timed_refine(scene, expand_everything=False)
+    scene.render.resolution_percentage = 100
     seen, covered = light(), coverage(scene, folder / "covered.png", 16)
     timed_refine(scene, expand_everything=True)
     expanded, covered = light(), np.maximum(covered, coverage(scene, folder / "covered.png", 16))

@@ -3,6 +3,8 @@
 """A part of the wood that can be expanded: the plants behind a window in the middle of the image, refined and expanded.
 
 The camera is that of the whole image, and so are the pixels that refinement counts; only the window is rendered.
+Facets are as large, and leaves become facets at the same width, as in the whole wood, which has to share out what it
+can afford.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.planting.places import Placement
 
 from .compare import difference, plant_mask
+from .forest_case import as_fine_as, detail_of
 from .row80 import timed_refine, timed_render
 
 #: Of the width and the height of the image: 480 × 270 of 1920 × 1080 pixels.
@@ -45,13 +48,15 @@ def measure(scene: bpy.types.Scene, folder: Path, samples: int, noise: bool = Tr
     noise : bool
         Render the expanded plants with another seed as well.
     """
+    detail = detail_of(scene)
     plants = keep(scene)
     render = scene.render
     low, high = (1.0 - WINDOW) / 2.0, (1.0 + WINDOW) / 2.0
     render.use_border = render.use_crop_to_border = True
     render.border_min_x = render.border_min_y = low
     render.border_max_x = render.border_max_y = high
-    refined, _ = timed_refine(scene, expand_everything=False)
+    with as_fine_as(detail):
+        refined, _ = timed_refine(scene, expand_everything=False)
     timed_render(scene, folder / "refined.png", samples)
     expanded, _ = timed_refine(scene, expand_everything=True)
     timed_render(scene, folder / "expanded.png", samples)
@@ -61,6 +66,8 @@ def measure(scene: bpy.types.Scene, folder: Path, samples: int, noise: bool = Tr
         "part_plants": plants,
         "part_polygons": refined.polygons_meshed + refined.polygons_proxy,
         "part_polygons_full": expanded.polygons_meshed,
+        "part_facet_pixels": refined.facet_pixels,
+        "part_leaf_limit": detail.leaf_limit,
         "part_covered": float(mask.mean()),
         "flip": found.flip,
         "colour_error": found.colour,
