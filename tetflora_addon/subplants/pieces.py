@@ -78,31 +78,6 @@ def whole_pieces(rows: NDArray[np.void], whole: WholeBranches) -> tuple[Pieces, 
     return Pieces(whole.branches.take(owner), t[low], t[low + 1], *ends), owner
 
 
-def clipped(
-    pieces: Pieces, distance_start: NDArray[np.float64], distance_end: NDArray[np.float64]
-) -> tuple[Pieces, Pieces]:
-    """Cut pieces that cross a plane.
-
-    Parameters
-    ----------
-    pieces : Pieces of n
-    distance_start, distance_end : (n,) float64
-        Signed distances of the ends from the plane, of opposite sign.
-
-    Returns
-    -------
-    tuple of Pieces
-        The halves at the start and at the end, n each.
-    """
-    fraction = distance_start / (distance_start - distance_end)
-    t = pieces.t0 + fraction * (pieces.t1 - pieces.t0)
-    middle = pieces.start + fraction[:, None] * (pieces.end - pieces.start)
-    return (
-        Pieces(pieces.branches, pieces.t0, t, pieces.start, middle),
-        Pieces(pieces.branches, t, pieces.t1, middle, pieces.end),
-    )
-
-
 def leaf_fraction(flora: Flora, pieces: Pieces) -> NDArray[np.float64]:
     """Expected fraction (n,) of a branch's own leaves that sit on each piece."""
     start = leaf_start(flora.rows, pieces.branches)
