@@ -33,11 +33,15 @@ BYTES_PER_POLYGON = 610
 #: The same for a microsphere in a point cloud.
 BYTES_PER_SPHERE = 210
 #: Polygons and facets for each pixel of the image that are enough, and the number that is never too many.
-ENOUGH_A_PIXEL, NEVER_TOO_MANY = 1.7, 1_500_000.0
+ENOUGH_A_PIXEL, NEVER_TOO_MANY = 2.5, 1_500_000.0
 #: Fraction of them that may be hidden, and how many hidden ones are never too many.
-_HIDDEN, _FEW_HIDDEN = 0.25, 300_000.0
+_HIDDEN, _FEW_HIDDEN = 0.12, 300_000.0
+#: Facets grow to so many times their size before real leaves become fewer.
+FACETS_FIRST = 4.0
 #: Reserved fraction of a budget that somebody has set, since expected numbers are means.
 _RESERVE = 0.06
+#: Fraction of the faces of twigs that are made where leaves are real.
+_TWIGS = 0.15
 _STEPS = 12  # of bisection on the logarithm of factors, between 1 and:
 _LARGEST = 256.0
 
@@ -110,7 +114,7 @@ def afford(
             continue
 
         def seen(by: float, weight: float = weight, every: bool = every) -> float:
-            pixels, limit = by * settings.facet, _limit(by, settings)
+            pixels, limit = _side(by, settings), _limit(by, settings)
             return count.seen(pixels, limit, weight) + count.polygons(pixels, limit, weight, every)
 
         def unseen(by: float, weight: float = weight) -> float:
@@ -124,7 +128,15 @@ def afford(
     small = count.too_small(limit) if factor > 1.0 else np.zeros(0, bool)
     if small.any():
         result = replace(result, decision=np.where(small, Decision.PROXY, result.decision).astype(np.int8))
-    return Detail(result, FacetPixels(factor * settings.facet, hidden), limit)
+    return Detail(result, FacetPixels(_side(factor, settings), hidden), limit)
+
+
+def _side(factor: float, settings: RefinementSettings) -> float:
+    """Side of facets in pixels, where leaves become facets at a width larger by a factor.
+
+    Real leaves are where the plants have them, facets are not: facets give way first.
+    """
+    return max(min(factor**4, FACETS_FIRST), factor) * settings.facet
 
 
 def _limit(factor: float, settings: RefinementSettings) -> float:
@@ -163,6 +175,13 @@ class _Facets:
         some = portions.visibility > 0
         self.flora, self.camera, self.portions = flora, camera, portions.take(np.flatnonzero(some))
         self.sizes = sizes_of(flora, self.portions, camera)
+        # Among real leaves, hardly any twig is wide enough to be real.
+        parts = self.portions.parts
+        leaves = flora.face_counts(parts.branches) - flora.branch_faces(parts.branches)
+        leafy = flora.leaf_count[parts.branches.row] > 0
+        self.faces_real = np.where(
+            leafy & ~parts.alone, leaves + _TWIGS * (parts.totals.polygons - leaves), parts.totals.polygons
+        )
         self.unseen_sizes = sizes_of(flora, portions.take(np.flatnonzero(~some)), camera)
         self.result, held, hidden = result, result.holdings.polygons, result.chosen(Decision.HIDDEN)
         self.cell = held.cell
@@ -172,10 +191,10 @@ class _Facets:
     def seen(self, pixels: float, limit: float, weight: float) -> float:
         """Polygons, and facets counted with a weight, of all plants that are seen."""
         transition = Transition(self.flora, self.camera, limit)
-        branches, totals = self.portions.parts.branches, self.portions.parts.totals
+        branches = self.portions.parts.branches
         real = np.where(self.portions.real, transition.of_branches(branches, self.portions.visibility), 0.0)
         facets = weight * self.sizes.counts(FacetPixels(pixels))
-        return float((real * totals.polygons + (1.0 - real) * facets).sum())
+        return float((real * self.faces_real + (1.0 - real) * facets).sum())
 
     def unseen(self, pixels: FacetPixels) -> float:
         """Facets of all plants that are not seen."""

@@ -37,7 +37,9 @@ from .portions import MIXED, Portions, Sight, in_chunks
 #: Width from which on all leaves are real over the width up to which none is.
 BAND = 2.5
 #: Power of the visibility by which the width of things counts as smaller.
-FADING = 0.5
+FADING = 0.25
+#: Among real leaves, wood counts as so many times as wide.
+TWIGS = 4.0
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,7 @@ class Transition:
     ) -> NDArray[np.float64]:
         """Fraction (n,) of branches like these whose wood is real."""
         own = 2.0 * branches.radius
-        width = np.maximum(own, self._width(branches)) if among_leaves else own
+        width = np.minimum(TWIGS * own, np.maximum(own, self._width(branches))) if among_leaves else own
         return self.fraction(width, branches.position, visibility)
 
     def _width(self, branches: Branches) -> NDArray[np.float64]:
