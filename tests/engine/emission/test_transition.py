@@ -52,15 +52,15 @@ def leaf_area(blocks) -> float:
     return float(sum(support.face_areas(mesh).sum() for mesh in leaf_meshes(blocks)))
 
 
+def wood_area(blocks) -> float:
+    """That facets would stand for: closed branches show half."""
+    return float(sum(support.face_areas(b.buffers).sum() for b in blocks if b.kind == "bark")) / 2
+
+
 def all_facets(flora, result, camera, transition, pixels: float = 0.3) -> Facets:
     return concatenate_facets(
         [f for block in facet_parts(flora, result, camera, FacetPixels(pixels), transition) for f, _ in block]
     )
-
-
-def facets_of_leaves(flora, result, camera, transition) -> float:
-    made = all_facets(flora, result, camera, transition)
-    return float((made.side**2)[made.transmission > 0].sum())
 
 
 EXPLICIT, PROXY, HIDDEN = Decision.EXPLICIT, Decision.PROXY, Decision.HIDDEN
@@ -82,20 +82,24 @@ EXPLICIT, PROXY, HIDDEN = Decision.EXPLICIT, Decision.PROXY, Decision.HIDDEN
 def test_real_leaves_and_facets_together_are_all_leaves(
     monkeypatch: pytest.MonkeyPatch, decisions: tuple[Decision, ...], visibility: float | None
 ) -> None:
-    """Whatever the limit, the decisions and what is seen of each cell, but for what leaves of a cluster hide."""
+    """And wood; whatever the limit, the decisions and what is seen of each cell, but for what a cluster hides."""
     flora, camera, result = scene()
     rng = np.random.default_rng(2)
     seen = rng.random(len(result.nodes)) if visibility is None else visibility
     every = with_decision(result, rng.choice(np.array(decisions), len(result.nodes)), seen)
-    whole = leaf_area(explicit_blocks(flora, with_decision(result, EXPLICIT), camera))
+    blocks = list(explicit_blocks(flora, with_decision(result, EXPLICIT), camera))
+    whole, whole_wood = leaf_area(blocks), wood_area(blocks)
     unweighted(monkeypatch, flora)
     pixels = float(np.median(result.cells.feature))
     fractions = []
     for limit in pixels * np.array([3.0, 0.9, 0.7, 0.5, 0.01]):
         transition = Transition(flora, camera, float(limit))
-        real = leaf_area(explicit_blocks(flora, every, camera, transition))
+        blocks = list(explicit_blocks(flora, every, camera, transition))
+        made = all_facets(flora, every, camera, transition)
+        leafy, real = made.transmission > 0, leaf_area(blocks)
         fractions.append(real / whole)
-        assert real + facets_of_leaves(flora, every, camera, transition) == pytest.approx(whole, rel=0.08)
+        assert real + (made.side**2)[leafy].sum() == pytest.approx(whole, rel=0.08)
+        assert wood_area(blocks) + (made.side**2)[~leafy].sum() == pytest.approx(whole_wood, rel=0.08)
     assert fractions == sorted(fractions)
     assert fractions[0] == 0.0
     if decisions == (EXPLICIT,):
