@@ -21,7 +21,7 @@ from tetflora_addon.emission.plants import Transition
 from tetflora_addon.growth.axes import axes
 from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.foliage import leaf_keys, leaf_places, place_leaves
-from tetflora_addon.growth.growth import leaf_counts, trunks
+from tetflora_addon.growth.growth import WholeBranches, leaf_counts, trunks
 from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.proxies.facet_sizes import FacetPixels
 from tetflora_addon.refinement.loop import Refinement
@@ -29,7 +29,7 @@ from tetflora_addon.species.catalogue import builtin_folder, load_species
 from tetflora_addon.species.members import expected_polygons
 from tetflora_addon.species.quality import with_quality
 from tetflora_addon.species.schema import species_from_dict
-from tetflora_addon.subplants.leaf_meshes import leaf_meshes
+from tetflora_addon.subplants.leaf_meshes import LeafMesh, leaf_meshes
 from tetflora_addon.subplants.pieces import Pieces, expand, whole_pieces
 from tetflora_addon.subplants.tubes import tube_buffers
 from tetflora_addon.tetrahedra.geometry import FACES, barycentric, face_area_vectors
@@ -192,20 +192,36 @@ def leaves_of(one: Flora, branches: Branches) -> tuple[NDArray[np.int64], NDArra
     return owner, leaves.position, leaves.size
 
 
+def whole_of(one: Flora, pieces: Pieces) -> WholeBranches:
+    """Branches of which all pieces are there, with their axes."""
+    branches = pieces.branches.take(np.flatnonzero(pieces.t0 == 0))
+    return WholeBranches(branches, axes(one.rows, branches))
+
+
+def tube_mesh(one: Flora, pieces: Pieces) -> MeshBuffers | None:
+    """Tubes of branches of which all pieces are there; None without any."""
+    return tube_buffers(one, Pieces.empty(), [whole_of(one, pieces)])
+
+
+def leaf_forms_of(one: Flora, pieces: Pieces, species: int = 0) -> list[LeafMesh]:
+    """Leaves of branches of a species of which all pieces are there, by their forms."""
+    return list(leaf_meshes(one, Pieces.empty(), species, [whole_of(one, pieces)]))
+
+
 def meshes(one: Flora, pieces: Pieces) -> tuple[list[MeshBuffers], list[MeshBuffers]]:
-    """Tubes and leaves of pieces, a mesh for each species that has any, and for each form of its leaves."""
+    """Tubes and leaves of branches, a mesh for each species that has any, and for each form of its leaves."""
     tubes, leaves = [], []
     kinds = one.species_of(pieces.branches.row)
     for species in np.unique(kinds):
         own = pieces.take(kinds == species)
-        tubes += [b for b in [tube_buffers(one, own)] if b is not None]
-        leaves += [leaf.buffers for leaf in leaf_meshes(one, own, int(species))]
+        tubes += [b for b in [tube_mesh(one, own)] if b is not None]
+        leaves += [leaf.buffers for leaf in leaf_forms_of(one, own, int(species))]
     return tubes, leaves
 
 
 def leaf_mesh(one: Flora, pieces: Pieces, species: int = 0) -> MeshBuffers | None:
-    """Leaves of a species that has only one form of them; None where pieces bear none."""
-    found = [leaf.buffers for leaf in leaf_meshes(one, pieces, species)]
+    """Leaves of a species that has only one form of them; None where branches bear none."""
+    found = [leaf.buffers for leaf in leaf_forms_of(one, pieces, species)]
     assert len(found) < 2
     return found[0] if found else None
 

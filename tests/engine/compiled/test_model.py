@@ -5,6 +5,7 @@ whorled and hanging leaves, blossoms, several forms, gradients from the inside o
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,8 +25,7 @@ from tetflora_addon.growth.growth import branch_counts, children, leaf_counts, r
 from tetflora_addon.growth.rows import FORK, LATERAL, SPUR, without_variation
 from tetflora_addon.refinement.contents import piece_totals, subplant_totals
 from tetflora_addon.species.members import expected_members, expected_polygons
-from tetflora_addon.subplants.leaf_meshes import leaf_meshes
-from tetflora_addon.subplants.pieces import Pieces, clipped, open_subplants, wood_areas
+from tetflora_addon.subplants.pieces import Pieces, open_subplants, wood_areas
 
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -86,9 +86,8 @@ def test_totals_of_pieces_add_up_exactly(seed: int, cuts: list[float]) -> None:
     _, pieces = support.grown(flora, support.plants(seed))
     parts = pieces
     for cut in cuts:
-        n = len(parts)
-        lower, upper = clipped(parts, np.full(n, -cut), np.full(n, 1 - cut))
-        parts = Pieces.concatenate([lower, upper])
+        middle = parts.t0 + cut * (parts.t1 - parts.t0)
+        parts = Pieces.concatenate([replace(parts, t1=middle), replace(parts, t0=middle)])
     for name in ("leaf_area", "wood_area"):
         before, after = (getattr(piece_totals(flora, p), name).sum() for p in (pieces, parts))
         assert after == pytest.approx(before, rel=1e-9), name
@@ -272,7 +271,7 @@ def test_spurs_and_blossoms_are_as_many_as_described() -> None:
     trunk = support.trunks(flora.rows, support.plants(np.arange(300)))
     pieces = support.expanded(flora, trunk)
     forms: dict[tuple[int, int], int] = {}
-    for leaf in leaf_meshes(flora, pieces, 0):
+    for leaf in support.leaf_forms_of(flora, pieces):
         forms[leaf.kind, leaf.form] = leaf.buffers.polygons // flora.forms[0][leaf.kind][leaf.form].polygons
     assert {kind for kind, _ in forms} == {0, 1}
     members = expected_members(flora.species[0])

@@ -27,9 +27,7 @@ from tetflora_addon.growth.rows import ROW_DTYPE
 from tetflora_addon.growth.wind import Wind, gusts, leant, sway, widest_sway
 from tetflora_addon.proxies.facet_weights import facet_weights
 from tetflora_addon.proxies.microsurfaces import Facets, concatenate_facets, facet_mesh, piece_facets, subplant_facets
-from tetflora_addon.subplants.leaf_meshes import leaf_meshes
-from tetflora_addon.subplants.pieces import Pieces, expand, open_subplants
-from tetflora_addon.subplants.tubes import tube_buffers
+from tetflora_addon.subplants.pieces import expand, open_subplants
 
 _FLOAT32 = 1e-6
 WINDS = st.builds(
@@ -156,10 +154,8 @@ def test_nothing_jumps(species: str) -> None:
     """Leaves that turn to the light and boughs that lie level turn with their branch, not over in an instant."""
     number = support.SPECIES.index(species)
     flora = support.flora().in_wind(Wind(8.0, 0.3, 0.5, 4.3, 0.0, moving=True))
-    whole = list(expand(flora, support.trunks(flora.rows, support.plants(3, number))))
-    none = Pieces.empty()
-    found = [tube_buffers(flora, none, whole), *(leaf.buffers for leaf in leaf_meshes(flora, none, number, whole))]
-    for mesh in found:
+    tubes, leaves = support.meshes(flora, support.grown(flora, support.plants(3, number))[1])
+    for mesh in (*tubes, *leaves):
         assert np.linalg.norm(mesh.attributes["velocity"][1], axis=1).max() < 10.0
 
 
@@ -259,19 +255,15 @@ def test_one_compile_serves_all_times_and_proxies_keep_their_mean() -> None:
     assert first.rows["air"]["time"][0] != second.rows["air"]["time"][0]
 
 
-def meshes_at(flora: Flora, time: float, moving: bool = False, whole: bool = True) -> list[MeshBuffers]:
-    """Wood and leaves of a plant that stands off the origin, of whole branches or of their pieces."""
+def meshes_at(flora: Flora, time: float, moving: bool = False) -> list[MeshBuffers]:
+    """Wood and leaves of a plant that stands off the origin."""
     one = flora.in_wind(Wind(9.0, 0.4, 0.5, time, 0.0, moving))
-    trunk = support.trunks(one.rows, support.plants(3, position=(12, -5, 1)))
-    if not whole:
-        return [m for some in support.meshes(one, support.expanded(one, trunk)) for m in some]
-    whole, none = list(expand(one, trunk)), Pieces.empty()
-    return [tube_buffers(one, none, whole), *(leaf.buffers for leaf in leaf_meshes(one, none, 0, whole))]
+    _, pieces = support.grown(one, support.plants(3, position=(12, -5, 1)))
+    return [m for some in support.meshes(one, pieces) for m in some]
 
 
-@pytest.mark.parametrize("whole", [True, False], ids=("branches", "pieces"))
 @pytest.mark.parametrize("kind", ["rich", "birch", "drawn"])
-def test_velocities_are_those_of_the_vertices(kind: str, whole: bool) -> None:
+def test_velocities_are_those_of_the_vertices(kind: str) -> None:
     """The way from a little before to a little after, of wood and leaves; the ways themselves are none else."""
     flora = {
         "rich": lambda: support.compiled(support.RICH),
@@ -280,9 +272,9 @@ def test_velocities_are_those_of_the_vertices(kind: str, whole: bool) -> None:
     }[kind]()
     step = 4e-3
     moving, before, after = (
-        meshes_at(flora, time, asked, whole) for time, asked in ((5.0, True), (5.0 - step, False), (5.0 + step, False))
+        meshes_at(flora, time, asked) for time, asked in ((5.0, True), (5.0 - step, False), (5.0 + step, False))
     )
-    for now, still, low, high in zip(moving, meshes_at(flora, 5.0, False, whole), before, after, strict=True):
+    for now, still, low, high in zip(moving, meshes_at(flora, 5.0), before, after, strict=True):
         np.testing.assert_array_equal(now.positions, still.positions)
         assert "velocity" not in still.attributes
         domain, velocity = now.attributes["velocity"]

@@ -6,15 +6,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from tests.engine import support
 from tetflora_addon.buffers import MeshBuffers, concatenate_buffers
 from tetflora_addon.growth.growth import radius_at
-from tetflora_addon.subplants.leaf_meshes import leaf_meshes
-from tetflora_addon.subplants.pieces import Pieces, clipped, expand, leaf_fraction, wood_areas
-from tetflora_addon.subplants.tubes import tube_buffers
+from tetflora_addon.subplants.pieces import Pieces, wood_areas
 
 
 def check_topology(mesh: MeshBuffers) -> None:
@@ -72,7 +68,7 @@ def test_tubes_are_open_pipes_that_face_outwards() -> None:
     """Euler number 0 for each; every edge between rings has two faces, rims have one; normals lead from the axis."""
     flora = support.small_flora()
     _, pieces = support.grown(flora, support.plants([1, 2, 3]))
-    tubes = tube_buffers(flora, pieces)
+    tubes = support.tube_mesh(flora, pieces)
     branches = int((pieces.t0 == 0).sum())
     assert len(tubes.positions) - len(tubes.edge_verts) + tubes.polygons == 0
     uses = np.bincount(tubes.corner_edges)
@@ -83,7 +79,7 @@ def test_tubes_are_open_pipes_that_face_outwards() -> None:
     assert tubes.polygons == flora.rows["sides"][pieces.branches.row].sum()
     for key in pieces.branches.key[pieces.t0 == 0][::3]:
         own = pieces.take(pieces.branches.key == key)
-        mesh = tube_buffers(flora, own)
+        mesh = support.tube_mesh(flora, own)
         centre, normal = support.face_centres(mesh), support.face_vectors(mesh)
         axis = own.end - own.start
         along = np.clip(np.einsum("fni,ni->fn", centre[:, None] - own.start, axis) / (axis**2).sum(1), 0, 1)
@@ -96,7 +92,7 @@ def test_a_straight_tube_is_a_frustum() -> None:
     """Positive volume, the radii of its ends, the area of its trapezoids."""
     flora = support.compiled({**support.small(order0={"curvature": [0, 0], "angle": [0, 0], "branches": [0, 0]})})
     trunk, pieces = support.grown(flora, support.plants(5))
-    mesh = tube_buffers(flora, pieces)
+    mesh = support.tube_mesh(flora, pieces)
     sides, taper = int(flora.rows["sides"][0]), float(flora.rows["taper"][0, 0])
     rings = mesh.positions.reshape(-1, sides, 3)
     radii = np.linalg.norm(rings[..., :2], axis=2)
@@ -116,7 +112,7 @@ def test_area_of_tubes_is_the_area_of_the_wood() -> None:
     flora = support.flora()
     for species in range(len(support.SPECIES)):
         _, pieces = support.grown(flora, support.plants([1, 2], species))
-        area = support.face_areas(tube_buffers(flora, pieces)).sum()
+        area = support.face_areas(support.tube_mesh(flora, pieces)).sum()
         assert area == pytest.approx(wood_areas(flora, pieces).sum(), rel=0.03)
 
 
@@ -127,7 +123,7 @@ def test_area_of_leaves_is_that_of_the_model_times_size_squared() -> None:
         tips = pieces.take(pieces.t1 == 1)
         owner, _, size = support.leaves_of(flora, tips.branches)
         number, area, single = 0, 0.0, True
-        for leaf in leaf_meshes(flora, pieces, species):
+        for leaf in support.leaf_forms_of(flora, pieces, species):
             model = flora.forms[species][leaf.kind][leaf.form]
             copies = leaf.buffers.polygons // model.polygons
             assert len(leaf.buffers.positions) == copies * len(model.positions)
@@ -141,7 +137,7 @@ def test_area_of_leaves_is_that_of_the_model_times_size_squared() -> None:
 def test_uv_of_leaves_and_bark() -> None:
     flora = support.small_flora()
     _, pieces = support.grown(flora, support.plants(1))
-    leaves, tubes = support.leaf_mesh(flora, pieces, 0), tube_buffers(flora, pieces)
+    leaves, tubes = support.leaf_mesh(flora, pieces, 0), support.tube_mesh(flora, pieces)
     number = leaves.polygons // flora.forms[0][0][0].polygons
     assert (leaves.attributes["UVMap"][1] == np.tile(flora.forms[0][0][0].uv, (number, 1))).all()
     quads = tubes.attributes["UVMap"][1].reshape(-1, 4, 2)
@@ -154,49 +150,12 @@ def test_one_colour_a_branch_and_a_leaf() -> None:
     flora = support.small_flora()
     _, pieces = support.grown(flora, support.plants(1))
     own = pieces.take(pieces.branches.row == 0)
-    colours = tube_buffers(flora, own).attributes["tf_colour"][1]
+    colours = support.tube_mesh(flora, own).attributes["tf_colour"][1]
     assert len(np.unique(colours, axis=0)) == 1
     leaves = support.leaf_mesh(flora, pieces, 0).attributes["tf_colour"][1]
     assert len(np.unique(leaves, axis=0)) > 0.9 * len(leaves) / flora.forms[0][0][0].polygons
     low, high = (flora.rows["leaf_colour"][1, 0] + s * flora.rows["leaf_colour"][1, 1] for s in (-1, 1))
     assert ((leaves >= low - 1e-6) & (leaves <= high + 1e-6)).all()
-
-
-def cut(pieces: Pieces, plane: np.ndarray) -> Pieces:
-    """Pieces with those that cross a plane cut in two."""
-    start, end = (p @ plane[:3] + plane[3] for p in (pieces.start, pieces.end))
-    crossing = (start < 0) != (end < 0)
-    return Pieces.concatenate([pieces.take(~crossing), *clipped(pieces.take(crossing), start[crossing], end[crossing])])
-
-
-@given(st.integers(0, 2**31), st.integers(1, 4))
-@settings(deadline=None, max_examples=25)
-def test_cutting_changes_nothing_but_the_number_of_rings(seed: int, cuts: int) -> None:
-    """Leaves are the same to the bit, the tube's surface stays, and no seam opens where pieces touch."""
-    flora = support.small_flora()
-    rng = np.random.default_rng(seed)
-    _, pieces = support.grown(flora, support.plants(seed))
-    parts = pieces
-    for _ in range(cuts):
-        normal = rng.normal(size=3)
-        normal /= np.linalg.norm(normal)
-        parts = cut(parts, np.append(normal, -normal @ (rng.normal(size=3) * 0.5 + [0, 0, 1.5])))
-    parts = parts.take(rng.permutation(len(parts)))
-    assert wood_areas(flora, parts).sum() == pytest.approx(wood_areas(flora, pieces).sum(), rel=1e-12)
-    assert (leaf_fraction(flora, parts)).sum() == pytest.approx(leaf_fraction(flora, pieces).sum(), rel=1e-12)
-    for row in range(3):
-        of = [support.leaf_mesh(flora, p.take(p.branches.row == row), 0) for p in (pieces, parts)]
-        if of[0] is None:
-            assert of[1] is None
-            continue
-        ordered = [np.unique(m.positions.reshape(-1, 12), axis=0) for m in of]
-        assert (ordered[0] == ordered[1]).all()
-    whole, mesh = tube_buffers(flora, pieces), tube_buffers(flora, parts)
-    check_topology(mesh)
-    added = flora.rows["sides"][parts.branches.row].sum() - flora.rows["sides"][pieces.branches.row].sum()
-    assert mesh.polygons == whole.polygons + added
-    assert len(mesh.positions) == len(whole.positions) + added  # one ring, not two, at each cut
-    assert support.face_areas(mesh).sum() == pytest.approx(support.face_areas(whole).sum(), rel=1e-3)
 
 
 def test_copies_of_a_seed_are_plants_of_their_own() -> None:
@@ -218,8 +177,8 @@ def test_copies_of_a_seed_are_plants_of_their_own() -> None:
 def test_species_of_one_seed_are_plants_of_their_own() -> None:
     flora = support.compiled(support.SMALL, support.shipped("bush"))
     pieces = support.grown(flora, support.plants([9, 9], [0, 1]))[1]
-    together = tube_buffers(flora, pieces).polygons
-    apart = [tube_buffers(flora, pieces.take(flora.species_of(pieces.branches.row) == s)).polygons for s in (0, 1)]
+    together = support.tube_mesh(flora, pieces).polygons
+    apart = [support.tube_mesh(flora, pieces.take(flora.species_of(pieces.branches.row) == s)).polygons for s in (0, 1)]
     assert together == sum(apart)
 
 
@@ -227,7 +186,7 @@ def test_concatenation() -> None:
     """Parts keep their shape, numbers are offset by what stands before; nothing is made of nothing."""
     flora = support.small_flora()
     _, pieces = support.grown(flora, support.plants(2))
-    parts = [tube_buffers(flora, pieces.take(pieces.branches.row == row)) for row in range(3)]
+    parts = [support.tube_mesh(flora, pieces.take(pieces.branches.row == row)) for row in range(3)]
     mesh = concatenate_buffers(parts)
     check_topology(mesh)
     assert mesh.smooth
@@ -241,28 +200,8 @@ def test_concatenation() -> None:
 def test_no_mesh_without_contents() -> None:
     flora = support.small_flora()
     _, pieces = support.grown(flora, support.plants(2))
-    assert tube_buffers(flora, Pieces.empty()) is None
+    assert support.tube_mesh(flora, Pieces.empty()) is None
     assert support.leaf_mesh(flora, Pieces.empty(), 0) is None
     assert support.leaf_mesh(flora, pieces.take(pieces.branches.row == 0), 0) is None
-    bare = pieces.take((pieces.branches.row == 1) & (pieces.t1 <= 0.5))
-    assert len(bare)
-    assert support.leaf_mesh(flora, bare, 0) is None
-
-
-def test_whole_branches_are_the_same_as_all_their_pieces() -> None:
-    """Down to the last digit, whichever way they came; in the emission whole branches pass by without being pieces."""
-    flora = support.flora()
-    for species in range(len(support.SPECIES)):
-        whole, pieces = support.grown(flora, support.plants([1, 2], species))
-        branches = list(expand(flora, whole))
-        meshes = [
-            [tube_buffers(flora, *some), *(leaf.buffers for leaf in leaf_meshes(flora, some[0], species, some[1]))]
-            for some in ((pieces, ()), (Pieces.empty(), branches))
-        ]
-        for cut, made in zip(*meshes, strict=True):
-            assert cut.polygons == made.polygons
-            check_topology(made)
-            faces = [support.face_vectors(m).round(9) + support.face_centres(m).round(6) for m in (cut, made)]
-            assert np.array_equal(*(f[np.lexsort(f.T)] for f in faces))
-            for name, (_, values) in cut.attributes.items():
-                assert values.sum() == pytest.approx(made.attributes[name][1].sum(), rel=1e-5)
+    tubes, leaves = support.meshes(flora, Pieces.empty())
+    assert tubes == leaves == []
