@@ -158,7 +158,8 @@ def _real_parts(
     full, bodies, bare, visibility, count = [], [], [], [np.zeros(0)], 0
     while len(portions):
         parts = portions.parts
-        open_here = parts.can_open(flora) & portions.mixed & (sight.pixels(portions) > MIXED)
+        mixed = portions.mixed & (sight.pixels(portions) > MIXED)
+        open_here = parts.can_open(flora) & mixed
         if transition is None:
             real, wood = portions.real & (portions.visibility >= 0.5), np.zeros(len(parts), bool)
         else:
@@ -176,7 +177,8 @@ def _real_parts(
         full.append(own.take(np.flatnonzero(~alone & ~only_wood)))
         bodies.append(own.take(np.flatnonzero(alone & ~only_wood)))
         bare.append(own.take(np.flatnonzero(alone & only_wood)))
-        portions = sight.opened(portions.take(np.flatnonzero(open_here)))
+        # What is opened for its thick wood alone keeps one visibility, as its facets do.
+        portions = sight.opened(replace(portions, mixed=mixed).take(np.flatnonzero(open_here)))
         portions = portions.take(np.flatnonzero(_may_be_real(portions, transition)))
     made = list(expand(flora, Branches.concatenate(full)))
     bodies, bare = (Branches.concatenate(some) for some in (bodies, bare))
