@@ -66,7 +66,7 @@ def run(quick: bool) -> dict[str, float]:
 def grown(flora: Any, branches: Any) -> NDArray[np.float64]:
     """All vertices (v, 3) of sub-plants of one species."""
     whole = list(pieces.expand(flora, branches))
-    bark = tubes.tube_buffers(flora, pieces.Pieces.empty(), whole)
+    bark = tubes.tube_buffers(flora, whole)
     out = [] if bark is None else [bark.positions]
     for own, leaves in placed_leaves(flora, whole):
         row = own.row[:1]

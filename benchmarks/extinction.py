@@ -98,16 +98,15 @@ def grown(flora: Any, seed: int) -> tuple[list[tuple], np.ndarray, np.ndarray, n
     """
     plant = seeds.Seeds(("",), np.zeros(1, np.int32), np.array([seed]), np.zeros((1, 3)), np.eye(3)[None], np.ones(1))
     surfaces, places, weights, coefficients = [], [], [], []
-    none = pieces.Pieces.empty()
     for whole in pieces.expand(flora, growth.trunks(flora.rows, plant)):
         own, _ = pieces.whole_pieces(flora.rows, whole)
         held = contents.piece_totals(flora, own)
         places.append((own.start + own.end) / 2)
         weights.append(held.leaf_area + held.wood_area / 2)
         coefficients.append(flora.clumping.coefficients(own.branches, flora.clumping.own))
-        leaves = leaf_meshes.leaf_meshes(flora, none, 0, [whole])
+        leaves = leaf_meshes.leaf_meshes(flora, 0, [whole])
         surfaces += [polygons(leaf.buffers, 1.0) for leaf in leaves]
-        surfaces.append(polygons(tubes.tube_buffers(flora, none, [whole]), 0.5))
+        surfaces.append(polygons(tubes.tube_buffers(flora, [whole]), 0.5))
     return surfaces, np.concatenate(places), np.concatenate(weights), np.concatenate(coefficients)
 
 

@@ -18,7 +18,7 @@ from tetflora_addon.proxies import microsurfaces
 from tetflora_addon.refinement.statistics import at_once
 from tetflora_addon.species import catalogue
 from tetflora_addon.subplants import leaf_meshes, tubes
-from tetflora_addon.subplants.pieces import open_subplants
+from tetflora_addon.subplants.pieces import open_branches
 
 from .studio import render_cells, save_sheet
 
@@ -63,9 +63,9 @@ def opened_cell(identifier: str, orders: int) -> Callable[[], tuple[np.ndarray, 
         closed = growth.trunks(flora.rows, single)
         parts = []
         for _ in range(orders):
-            closed, _, pieces, _ = open_subplants(flora, closed)
-            parts.append(("bark", 0, tubes.tube_buffers(flora, pieces)))
-            parts += [("leaf", leaf.form, leaf.buffers) for leaf in leaf_meshes.leaf_meshes(flora, pieces, 0)]
+            whole, _, closed, _ = open_branches(flora, closed)
+            parts.append(("bark", 0, tubes.tube_buffers(flora, [whole])))
+            parts += [("leaf", leaf.form, leaf.buffers) for leaf in leaf_meshes.leaf_meshes(flora, 0, [whole])]
         points = []
         if len(closed):
             facets = microsurfaces.subplant_facets(flora, closed, np.full(len(closed), FACET))

@@ -200,12 +200,12 @@ def whole_of(one: Flora, pieces: Pieces) -> WholeBranches:
 
 def tube_mesh(one: Flora, pieces: Pieces) -> MeshBuffers | None:
     """Tubes of branches of which all pieces are there; None without any."""
-    return tube_buffers(one, Pieces.empty(), [whole_of(one, pieces)])
+    return tube_buffers(one, [whole_of(one, pieces)])
 
 
 def leaf_forms_of(one: Flora, pieces: Pieces, species: int = 0) -> list[LeafMesh]:
     """Leaves of branches of a species of which all pieces are there, by their forms."""
-    return list(leaf_meshes(one, Pieces.empty(), species, [whole_of(one, pieces)]))
+    return list(leaf_meshes(one, species, [whole_of(one, pieces)]))
 
 
 def meshes(one: Flora, pieces: Pieces) -> tuple[list[MeshBuffers], list[MeshBuffers]]:

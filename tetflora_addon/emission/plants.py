@@ -30,7 +30,7 @@ from ..growth.seeds import Seeds
 from ..refinement.loop import Refinement
 from ..species.species import LEAF_KINDS
 from ..subplants.leaf_meshes import leaf_meshes
-from ..subplants.pieces import Pieces, chunks, expand
+from ..subplants.pieces import chunks, expand
 from ..subplants.tubes import tube_buffers
 from .portions import MIXED, Portions, Sight, in_chunks
 
@@ -216,7 +216,7 @@ def _block(
     made: list[tuple[str, int, int, MeshBuffers | None]] = []
     for s in np.unique(np.concatenate([np.zeros(0, int), of_bare, *of_branches])):
         whole = [some.take(np.flatnonzero(kind == s)) for some, kind in zip(branches, of_branches, strict=True)]
-        leaves = leaf_meshes(flora, Pieces.empty(), int(s), whole, None if transition is None else fraction_of)
+        leaves = leaf_meshes(flora, int(s), whole, None if transition is None else fraction_of)
         made += [(LEAF_KINDS[m.kind], m.form, int(s), m.buffers) for m in leaves]
         if transition is not None:
             kept = (transition.of_wood(some.branches, visibility[some.branches.plant]) for some in whole)
@@ -225,7 +225,7 @@ def _block(
             own = bare.take(np.flatnonzero(of_bare == s))
             keep = transition.of_wood(own.branches, visibility[own.branches.plant], among_leaves=False)
             whole.append(own.take(np.flatnonzero(keep)))
-        made.append(("bark", 0, int(s), tube_buffers(flora, Pieces.empty(), whole)))
+        made.append(("bark", 0, int(s), tube_buffers(flora, whole)))
         del whole
     # The caller copies each block into Blender; meanwhile its sources and the blocks already taken are not kept.
     del branches, bare

@@ -90,49 +90,6 @@ def outwardness(
     return np.where(rows["outward"][row], first + (last - first) * t, np.take(branches.outward, owner))
 
 
-def leaf_range(
-    rows: NDArray[np.void],
-    branches: Branches,
-    counts: NDArray[np.int64],
-    t0: NDArray[np.float64],
-    t1: NDArray[np.float64],
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Which leaves sit on a part of each branch: those with t0 ≤ t < t1, and at the tip with t = 1 as well.
-
-    Leaves are numbered from base to tip, so that they are a range of numbers, and only one leaf at each end of the
-    part has to be looked at.
-
-    Parameters
-    ----------
-    rows : parameter table
-    branches : Branches of n
-    counts : (n,) int
-        Number of leaves of each whole branch.
-    t0, t1 : (n,) float64
-        Ends of the parts as fractions of the branches' axes.
-
-    Returns
-    -------
-    low, high : (n,) int64
-        Number of the first leaf, and of the first one beyond.
-    """
-
-    def below(t: NDArray[np.float64]) -> NDArray[np.int64]:
-        out = np.where(t >= 1, counts, 0)
-        near = np.flatnonzero((t > 0) & (t < 1) & (counts > 0))
-        some = branches.take(near)
-        start, whorl = leaf_start(rows, some), rows["leaf_whorl"][some.row]
-        number = counts[near] // whorl
-        fraction = (t[near] - start) / (1 - start)
-        # Each whorl keeps to its own part of the branch, one of `number`.
-        node = np.clip(np.floor(fraction * number), 0, number - 1).astype(np.int64)
-        place = leaf_places(rows, branches, near, node * whorl, counts, leaf_keys(branches, near, node * whorl))
-        out[near] = (node + (place < t[near])) * whorl
-        return out
-
-    return below(t0), below(t1)
-
-
 def _rows_of(branches: Branches, owner: NDArray[np.int64]) -> NDArray[np.int32]:
     """Row (m,) of each branch's parameters, or the only one (1,), which is as good and need not be gathered."""
     row = branches.row

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from ..arrays import spread
 from ..buffers import MeshBuffers
 from ..compiled.flora import Flora
-from ..growth.axes import axes
 from ..growth.branches import Branches
 from ..growth.foliage import (
     in_wind,
@@ -25,7 +24,6 @@ from ..growth.foliage import (
     leaf_forms,
     leaf_keys,
     leaf_places,
-    leaf_range,
     outwardness,
     place_leaves,
     settled,
@@ -34,7 +32,7 @@ from ..growth.growth import WholeBranches, leaf_counts
 from ..growth.hashing import Draw, uniform
 from ..growth.wind import moment
 from ..species.leaf_models import LeafModel
-from .pieces import Pieces, chunks
+from .pieces import chunks
 
 _ROWS_AT_ONCE = 4096
 
@@ -172,9 +170,8 @@ class LeafMesh:
 
 def leaf_meshes(
     flora: Flora,
-    pieces: Pieces,
     species: int,
-    whole: Sequence[WholeBranches] = (),
+    whole: Sequence[WholeBranches],
     fraction_of: Callable[[Branches], NDArray[np.float64]] | None = None,
 ) -> Iterator[LeafMesh]:
     """Copies of the leaf models for the leaves on branches of one species, form by form.
@@ -182,16 +179,13 @@ def leaf_meshes(
     Parameters
     ----------
     flora : Flora
-    pieces : Pieces
-        Parts of branches; a leaf belongs to the piece that holds its base, at the branch's tip to the last one.
     species : int
         Index into the flora's species.
     whole : sequence of WholeBranches
-        Whole branches.
     fraction_of : callable, optional
         Fraction (n,) of the leaves of branches that are wanted; the leaves' own random numbers decide which.
     """
-    groups = [*_of_pieces(flora, pieces), *(group for some in whole for group in _of_whole(flora, some))]
+    groups = [group for some in whole for group in _bearers(flora, some)]
     if fraction_of is not None:
         for group in groups:
             group.fraction = fraction_of(group.whole.branches)
@@ -207,31 +201,12 @@ def leaf_meshes(
             yield LeafMesh(kind, int(form), copies.buffers())
 
 
-def _of_pieces(flora: Flora, pieces: Pieces) -> Iterator[_Bearers]:
-    first, last = pieces.runs()
-    row = np.take(pieces.branches.row, first)
-    order = np.argsort(row, kind="stable")
-    order = order[_bears(flora, row[order])]
-    first, last = first[order], last[order]
-    branches = pieces.branches.take(first)
-    counts = leaf_counts(flora.rows, branches)
-    low, high = leaf_range(flora.rows, branches, counts, pieces.t0[first], pieces.t1[last])
-    for row, own in _by_row(branches.row):
-        lines = axes(flora.rows, branches.take(own))
-        yield _Bearers(flora, row, WholeBranches(branches.take(own), lines), counts[own], low[own], (high - low)[own])
-
-
-def _of_whole(flora: Flora, whole: WholeBranches) -> Iterator[_Bearers]:
+def _bearers(flora: Flora, whole: WholeBranches) -> Iterator[_Bearers]:
+    """Those of branches that bear leaves, row by row."""
     order = np.argsort(whole.branches.row, kind="stable")
-    order = order[_bears(flora, whole.branches.row[order])]
+    order = order[flora.rows["leaves"][whole.branches.row[order]].sum(axis=1) > 0]
     for row, own in _by_row(whole.branches.row[order]):
-        some = whole.take(order[own])
-        counts = leaf_counts(flora.rows, some.branches)
-        yield _Bearers(flora, row, some, counts, np.zeros_like(counts), counts)
-
-
-def _bears(flora: Flora, row: NDArray[np.integer]) -> NDArray[np.bool_]:
-    return flora.rows["leaves"][row].sum(axis=1) > 0
+        yield _Bearers(flora, row, whole.take(order[own]))
 
 
 def _by_row(rows: NDArray[np.integer]) -> Iterator[tuple[int, slice]]:
@@ -250,14 +225,10 @@ class _Bearers:
     flora : Flora
     row : int
     whole : WholeBranches of n
-    counts, low, number : (n,) int64
-        Leaves of each whole branch, the first one wanted and how many.
     """
 
-    def __init__(
-        self, flora: Flora, row: int, whole: WholeBranches, counts: NDArray, low: NDArray, number: NDArray[np.int64]
-    ) -> None:
-        self.flora, self.whole, self.counts, self.low, self.number = flora, whole, counts, low, number
+    def __init__(self, flora: Flora, row: int, whole: WholeBranches) -> None:
+        self.flora, self.whole, self.counts = flora, whole, leaf_counts(flora.rows, whole.branches)
         self.fraction: NDArray[np.float64] | None = None
         self.row = np.array([row])
         self.kind = int(flora.rows["leaf_kind"][row])
@@ -265,7 +236,7 @@ class _Bearers:
     def numbers(self, forms: int) -> NDArray[np.int64]:
         """How many leaves there are of each form."""
         if forms == 1 and self.fraction is None:
-            return np.array([self.number.sum()])
+            return np.array([self.counts.sum()])
         out = np.zeros(forms, np.int64)
         for part in self._chunks(1):
             key = self._leaves(part)[2]
@@ -299,14 +270,13 @@ class _Bearers:
 
     def _chunks(self, vertices: int) -> Iterator[slice]:
         """Runs of branches, for leaves of a number of vertices."""
-        for run in chunks(self.number * vertices, _VERTICES_AT_ONCE):
-            if self.number[run].any():
+        for run in chunks(self.counts * vertices, _VERTICES_AT_ONCE):
+            if self.counts[run].any():
                 yield run
 
     def _leaves(self, part: slice) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.uint64]]:
         """Branch within the run, number on it, and key of each wanted leaf."""
-        owner, index = spread(self.number[part])
-        index += np.take(self.low[part], owner)
+        owner, index = spread(self.counts[part])
         key = leaf_keys(self.whole.branches.take(part), owner, index)
         if self.fraction is None or (self.fraction[part] >= 1.0).all():
             return owner, index, key

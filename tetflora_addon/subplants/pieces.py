@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pieces of branches, and opening sub-plants into their branches, one order at a time or all the way.
+"""Pieces of branches, and opening sub-plants into their branches, one order at a time or all the way (paper, 6.5).
 
-Pieces are straight parts of an axis with the leaves on them; branches are clipped to them (paper, section 6.5).
+Pieces are straight parts of an axis with the leaves on them.
 """
 
 from __future__ import annotations
@@ -41,32 +41,6 @@ class Pieces(Arrays):
     t1: NDArray[np.float64]
     start: NDArray[np.float64] = field(metadata=column(3))
     end: NDArray[np.float64] = field(metadata=column(3))
-
-    def runs(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """First and last piece (k,), (k,) of each longest row of pieces that follow one another on a branch."""
-        key, plant = self.branches.key, self.branches.plant
-        apart = (key[1:] != key[:-1]) | (plant[1:] != plant[:-1]) | (self.t0[1:] != self.t1[:-1])
-        inner = np.flatnonzero(apart)
-        edge = np.zeros(min(len(self), 1), np.int64)
-        return np.concatenate([edge, inner + 1]), np.concatenate([inner, edge + len(self) - 1])
-
-
-def along_branches(pieces: Pieces) -> Pieces:
-    """The same pieces, those of each branch together and from base to tip; whole branches keep their place.
-
-    No two may overlap. What comes from `whole_pieces` is in order already and costs nothing.
-    """
-    first, last = pieces.runs()
-    # A branch that is whole in one run has no pieces elsewhere.
-    parts = (pieces.t0[first] > 0) | (pieces.t1[last] < 1)
-    if not parts.any():
-        return pieces
-    of_part = np.repeat(parts, last - first + 1)
-    rest = np.flatnonzero(of_part)
-    # The plant belongs to the order: plants of one seed (copies in the scene) have the same keys at different places.
-    key, plant = (np.take(a, rest) for a in (pieces.branches.key, pieces.branches.plant))
-    rest = rest[np.lexsort([np.take(pieces.t0, rest), key, plant])]
-    return pieces.take(np.concatenate([np.flatnonzero(~of_part), rest]))
 
 
 def whole_pieces(rows: NDArray[np.void], whole: WholeBranches) -> tuple[Pieces, NDArray[np.int64]]:

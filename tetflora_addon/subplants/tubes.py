@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tubes around branches and parts of branches: rings of vertices, joined by quads (paper, section 5)."""
+"""Tubes around branches: rings of vertices, joined by quads (paper, section 5)."""
 
 from __future__ import annotations
 
@@ -10,56 +10,40 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import gathered, spread, unit
+from ..arrays import unit
 from ..buffers import MeshBuffers
 from ..compiled.flora import Flora
-from ..growth.axes import Axes, axes
+from ..growth.axes import Axes
 from ..growth.branches import Branches
 from ..growth.foliage import branch_colours
 from ..growth.growth import WholeBranches, radius_at
 from ..growth.wind import moment
-from .pieces import Pieces, along_branches, chunks
+from .pieces import chunks
 
 _AT_JOINT = 1e-6  # fractions of a segment closer to a joint than this are at it
 #: Rings that are worked on at a time: some ten megabytes.
 _RINGS_AT_ONCE = 48_000
 
 
-def tube_buffers(flora: Flora, pieces: Pieces, whole: Sequence[WholeBranches] = ()) -> MeshBuffers | None:
-    """Tubes of branches; pieces that touch share a ring.
-
-    Parameters
-    ----------
-    flora : Flora
-    pieces : Pieces of n
-        Parts of branches of any rows; no two may overlap. Those without length are passed over.
-    whole : sequence of WholeBranches
-        Whole branches.
+def tube_buffers(flora: Flora, whole: Sequence[WholeBranches]) -> MeshBuffers | None:
+    """Tubes of whole branches of any rows.
 
     Returns
     -------
     MeshBuffers or None
         Quads with ``UVMap``, ``tf_colour`` and ``tf_transmission``; None without branches.
     """
-    pieces = along_branches(pieces.take(pieces.t1 > pieces.t0))
-    first, last = pieces.runs()
-    rows = flora.rows
-    cut_sides, whole_sides = rows["sides"][pieces.branches.row[first]], [rows["sides"][s.branches.row] for s in whole]
-    # One ring at the start of each piece, and one more at the end of each run of pieces.
-    cut_rings = last - first + 2
-    whole_rings = [s.lines.segments + rows["rings"][s.branches.row] + 1 for s in whole]
-    sides, rings = (np.concatenate(a) for a in ([cut_sides, *whole_sides], [cut_rings, *whole_rings]))
+    sides_of = [flora.rows["sides"][some.branches.row] for some in whole]
+    rings_of = [some.lines.segments + flora.rows["rings"][some.branches.row] + 1 for some in whole]
+    sides, rings = (np.concatenate([np.zeros(0, np.int64), *each]) for each in (sides_of, rings_of))
     if len(sides) == 0:
         return None
-    tubes = _Tubes(int((sides * rings).sum()), int((sides * (rings - 1)).sum()), moment(rows) > 0)
+    tubes = _Tubes(int((sides * rings).sum()), int((sides * (rings - 1)).sum()), moment(flora.rows) > 0)
     for k in np.unique(sides):
-        own = np.flatnonzero(cut_sides == k)
-        for some in _chunks(cut_rings[own]):
-            tubes.add(flora, _rings_of_pieces(flora, pieces, first[own[some]], last[own[some]]), int(k))
-        for group, group_sides, group_rings in zip(whole, whole_sides, whole_rings, strict=True):
+        for group, group_sides, group_rings in zip(whole, sides_of, rings_of, strict=True):
             own = np.flatnonzero(group_sides == k)
             for some in _chunks(group_rings[own]):
-                tubes.add(flora, _rings_of_whole(flora, group.take(own[some])), int(k))
+                tubes.add(flora, _rings_of(flora, group.take(own[some])), int(k))
     return tubes.buffers()
 
 
@@ -94,7 +78,7 @@ class _Rings:
     later: NDArray[np.float64] | None = None
 
 
-def _rings_of_whole(flora: Flora, whole: WholeBranches) -> _Rings:
+def _rings_of(flora: Flora, whole: WholeBranches) -> _Rings:
     owner, t, centre = whole.knots(flora.rows)
     goes_on = np.zeros(len(owner), bool)
     goes_on[:-1] = owner[1:] == owner[:-1]
@@ -102,28 +86,6 @@ def _rings_of_whole(flora: Flora, whole: WholeBranches) -> _Rings:
     if whole.lines.later is not None:
         later = WholeBranches(whole.branches, whole.lines.later).knots(flora.rows)[2]
     return _Rings(whole.branches, whole.lines, owner, t, centre, goes_on, later)
-
-
-def _rings_of_pieces(flora: Flora, pieces: Pieces, first: NDArray[np.int64], last: NDArray[np.int64]) -> _Rings:
-    """Rings of runs of pieces, from their first to their last."""
-    number = last - first + 1
-    owner, step = spread(number)
-    piece = np.take(first, owner) + step
-    branches = pieces.branches.take(first)
-    # Those of the pieces' starts, and between them those that close each run.
-    base = np.arange(len(piece)) + owner
-    closing = np.cumsum(number + 1) - 1
-    t, branch, of_piece = (np.zeros(len(piece) + len(first), kind) for kind in (float, int, int))
-    t[base], t[closing] = np.take(pieces.t0, piece), np.take(pieces.t1, last)
-    branch[base], branch[closing] = owner, np.arange(len(first))
-    of_piece[base], of_piece[closing] = piece, last
-    centre = gathered(pieces.start, of_piece)
-    centre[closing] = gathered(pieces.end, last)
-    goes_on = np.ones(len(t), bool)
-    goes_on[closing] = False
-    lines = axes(flora.rows, branches)
-    later = None if lines.later is None else lines.later.at(branch, t)[0]
-    return _Rings(branches, lines, branch, t, centre, goes_on, later)
 
 
 class _Tubes:
