@@ -14,13 +14,14 @@ from hypothesis import strategies as st
 from tests.engine import support
 from tests.engine.subplants.test_leaf_meshes import check_topology
 from tetflora_addon.buffers import MeshBuffers
+from tetflora_addon.emission import budget
 from tetflora_addon.emission.budget import afford
 from tetflora_addon.emission.forms import Refined, facet_blocks
 from tetflora_addon.emission.polygons import mended, polygon_blocks, polygon_buffers, polygon_facets
 from tetflora_addon.emission.shells import proxy_shells
 from tetflora_addon.growth.branches import Branches
 from tetflora_addon.proxies.summaries import summarise
-from tetflora_addon.refinement.contents import Contents, Held, Holdings, in_the_root
+from tetflora_addon.refinement.contents import Contents, Held, in_the_root
 from tetflora_addon.refinement.contents import sums as sums_by_node
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.descent import cut, push_down
@@ -368,27 +369,14 @@ def test_a_budget_counts_polygons() -> None:
     assert sizes[0] > sizes[1] > sizes[2] > 500
 
 
-@given(SEEDS)
-@settings(deadline=None, max_examples=20)
-def test_holdings_give_and_take(seed: int) -> None:
-    """Whatever is taken out and put back, in whatever order, everything is there once, with its own totals."""
-    tree, held = divided(Polygons.everything(placed(thicket(1), 1)), 1, None)
-    rng = np.random.default_rng(seed)
-    holdings = Holdings(held)
-    for _ in range(5):
-        chosen = rng.random(len(tree)) < rng.choice([0.05, 0.5, 0.95])
-        out = holdings.take_out(chosen)
-        assert len(out) + len(holdings) == len(held)
-        assert chosen[out.cell].all()
-        for totals, cell in holdings.totals(np.ones(len(tree), bool)):
-            assert len(totals) == len(cell)
-            assert not chosen[cell].any()
-        assert not chosen[holdings.polygons.cell].any()
-        holdings.put(out)
-
-    def rows(some: Held) -> np.ndarray:
-        columns = (some.items.instance, some.items.face, some.cell, some.totals.area, some.totals.width)
-        table = np.stack(columns, axis=1)
-        return table[np.lexsort(table.T)]
-
-    np.testing.assert_array_equal(rows(holdings.polygons), rows(held))
+def test_polygons_out_of_sight_take_nothing_from_what_the_image_shows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only from a limit that somebody has set."""
+    meshes, camera = grove()
+    behind = replace(camera, frame=camera.frame @ np.diag([-1.0, 1.0, -1.0]))
+    result, flora, options = refined(meshes, behind), support.small_flora(), RefinementSettings()
+    monkeypatch.setattr(budget, "enough", lambda camera: 100.0)
+    detail = afford(flora, result, behind, options)
+    assert detail.pixels.seen == options.facet
+    assert detail.pixels.hidden == 1.0
+    assert detail.refinement is result
+    assert afford(flora, result, behind, replace(options, max_polygons=100)).pixels.seen > options.facet
