@@ -17,8 +17,11 @@ from devtools import build
 
 FOLDER = build.ROOT / "tests" / "data"
 SAVED = json.loads((FOLDER / "saved_before.json").read_text(encoding="utf-8"))
-COUNTS = ("plants", "polygons_full", "polygons_meshed", "polygons_proxy")
-COUNTS += ("tetrahedra_made", "tetrahedra_terminal", "tetrahedra_proxy")
+#: What the file holds, and what is made of it. The latter was counted again when plants began to be opened late: more
+#: tetrahedra, since sub-plants that cross planes are divided as they are seen; fewer polygons, since leaves and twigs
+#: that hardly show are facets. It follows how finely the engine is tuned, its render does not.
+HELD = ("plants", "polygons_full")
+MADE = ("polygons_meshed", "polygons_proxy", "tetrahedra_made", "tetrahedra_terminal", "tetrahedra_proxy")
 #: Properties that are gone: never released, and their only use was to be turned into another.
 GONE = {"slope_limit"}
 
@@ -60,11 +63,12 @@ def _chosen(objects):
     }
 
 
-def test_it_refines_to_the_same_counts_and_names(saved_file):
+def test_it_refines_to_the_same_names_and_about_the_same_counts(saved_file):
     assert bpy.ops.tetflora.refine() == {'FINISHED'}
     counts = json.loads(saved_file.tetflora.statistics)
     saved = SAVED["refined"]["statistics"]
-    assert {name: counts[name] for name in COUNTS} == {name: saved[name] for name in COUNTS}
+    assert {name: counts[name] for name in HELD} == {name: saved[name] for name in HELD}
+    assert {name: counts[name] for name in MADE} == pytest.approx({name: saved[name] for name in MADE}, rel=0.2)
     assert sorted(o.name for o in bpy.data.objects if o.get("tetflora_kind")) == SAVED["names"]
     assert sorted(m.name for m in bpy.data.materials if m.name.startswith("TetFlora")) == SAVED["materials"]
 
