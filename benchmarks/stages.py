@@ -23,6 +23,7 @@ from tetflora_addon.blender.results import meshes
 from tetflora_addon.blender.scene.plants import read_plants
 from tetflora_addon.emission.forms import Refined, facet_blocks
 from tetflora_addon.emission.plants import explicit_blocks
+from tetflora_addon.proxies.facet_sizes import FacetPixels
 
 from .report import Targets
 
@@ -80,16 +81,16 @@ def run(quick: bool) -> dict[str, float]:
     camera, result = refine.partition(scene, depsgraph)
     wall = time.perf_counter() - wall
     taken, begun = time.process_time() - begun, time.process_time()
-    contents = result.contents
-    sizes = {"update": held(contents), "visibility": held(result.cells), "refinement": result.tree.nbytes}
+    shared = result.plants.nbytes + result.holdings.nbytes
+    sizes = {"update": shared, "visibility": held(result.cells), "refinement": result.tree.nbytes}
     for stage, wall_s in result.seconds.items():  # wall clock, scaled to processor time
         seconds[stage], left[stage] = wall_s / wall * taken, sizes[stage]
     begun = time.process_time()
-    for block in explicit_blocks(flora, result):
+    for block in explicit_blocks(flora, result, camera):
         lap("polygons", block.buffers.nbytes)
         meshes.write_mesh("block", block.buffers)
         lap("write", block.buffers.nbytes)
-    for facets in facet_blocks(Refined(flora, result, camera, 0.33)):
+    for facets in facet_blocks(Refined(flora, result, camera, FacetPixels(0.33))):
         lap("facets", facets.nbytes)
         meshes.write_mesh("facets", facets)
         lap("write", facets.nbytes)
