@@ -144,18 +144,26 @@ def left_open(refinement: Refinement) -> dict[str, float]:
 def rendered(scene: bpy.types.Scene, folder: Path, samples: int) -> dict[str, float]:
     """Render twice; seconds before the first sample (sync and BVH), of each, and of an image with `SAMPLES`.
 
-    With a single sample: render once, for the memory.
+    The same in processor seconds, which others that run beside it hardly change. With a single sample: render once, for
+    the memory.
     """
-    few_s = timed_render(scene, folder / "few.png", 1)
-    figures = {"render_s": few_s}
-    if samples > 1:
-        many_s = timed_render(scene, folder / "many.png", samples)
-        each = max(many_s - few_s, 0.0) / (samples - 1)
-        setup = max(few_s - each, 0.0)
-        figures = {
-            "render_s": many_s,
-            "render_setup_s": setup,
-            "render_sample_s": each,
-            f"render_{SAMPLES}_s": setup + SAMPLES * each,
+    taken = {number: _render_seconds(scene, folder / "picture.png", number) for number in sorted({1, samples})}
+    figures = {}
+    for place, clock in enumerate(("", "cpu_")):
+        first, last = taken[1][place], taken[samples][place]
+        each = max(last - first, 0.0) / max(samples - 1, 1)
+        setup = max(first - each, 0.0)
+        figures |= {
+            f"render_{clock}s": last,
+            f"render_setup_{clock}s": setup,
+            f"render_sample_{clock}s": each,
+            f"render_{SAMPLES}_{clock}s": setup + SAMPLES * each,
         }
     return figures | {"peak_render_mb": peak_mb()}
+
+
+def _render_seconds(scene: bpy.types.Scene, path: Path, samples: int) -> tuple[float, float]:
+    """Seconds of a render by the clock, and of all processors."""
+    processor = time.process_time()
+    seconds = timed_render(scene, path, samples)
+    return seconds, time.process_time() - processor

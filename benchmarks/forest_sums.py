@@ -70,9 +70,10 @@ def sums(records: Mapping[tuple[str, str], dict]) -> dict[str, float]:
 
 def _ratios(ours: dict, theirs: dict) -> dict[str, float]:
     """Ours over instances: render, everything until an image with `SAMPLES` samples, and memory."""
-    whole = f"render_{SAMPLES}_s"
+    whole, processor = f"render_{SAMPLES}_s", f"render_{SAMPLES}_cpu_s"
     return {
         "render_ratio": ours[whole] / theirs[whole],
+        "render_cpu_ratio": ours[processor] / theirs[processor],
         "total_ratio": (ours["refine_emit_s"] + ours[whole]) / (theirs["build_s"] + theirs[whole]),
         "memory_ratio": ours["peak_render_mb"] / theirs["peak_render_mb"],
     }
