@@ -91,7 +91,7 @@ def opened_to_the_end(one: Sight) -> Portions:
 @given(st.integers(0, 2**31))
 @settings(deadline=None, max_examples=10)
 def test_what_is_opened_ends_on_one_side_or_small(seed: int) -> None:
-    """And has, all together, the area of the whole, of which as much is seen as before."""
+    """And has, all together, the area of the whole, of which about as much is seen as before."""
     result = patchwork(seed)
     one = sight(result)
     before, after = one.portions(), opened_to_the_end(one)
@@ -101,7 +101,8 @@ def test_what_is_opened_ends_on_one_side_or_small(seed: int) -> None:
         whole, sum_ = (getattr(p.parts.totals, area).sum() for p in (before, after))
         assert sum_ == pytest.approx(whole, rel=0.05)
     shown = [p.parts.totals.optical_area @ p.visibility for p in (before, after)]
-    assert shown[1] == pytest.approx(shown[0], rel=0.15)
+    # A few points tell for each of the new parts, and what is hardly seen counts as not seen.
+    assert shown[1] == pytest.approx(shown[0], abs=0.1 * before.parts.totals.optical_area.sum())
 
 
 def test_what_is_not_mixed_inherits_what_is_seen_of_its_plant() -> None:
