@@ -31,8 +31,11 @@ FOLDER = ROOT / "out" / "forest"
 QUICK_FOLDER = ROOT / "out" / "forest-quick"
 WHATS = ("refine", "instances", "part")
 QUICK = ("birch", "mix")
-#: Samples of timed images, of images that are compared, and where light is measured.
-SAMPLES, COMPARED, LIT = 4, 64, 16
+#: Cases whose noise is measured as well; it is about the same in all.
+NOISY = ("birch", "mix", "eye")
+#: Samples of timed images, of images that are compared (with 64, FLIP of noise alone is .075), and where light is
+#: measured.
+SAMPLES, COMPARED, LIT = 4, 256, 16
 #: Gigabytes that the process may have.
 LIMITS = (2, 4, 8)
 _LONGEST = 3600  # seconds of one process
@@ -77,7 +80,7 @@ def measure(quick: bool) -> dict[str, float]:
     for case in cases:
         for what in WHATS:
             # A part of a small wood would be a tree or two.
-            samples, of = (COMPARED // (4 if quick else 1), ()) if what == "part" else (SAMPLES, small)
+            samples, of = (COMPARED // (8 if quick else 1), ()) if what == "part" else (SAMPLES, small)
             records[case, what] = measured(_folder(quick), case, "--what", what, "--samples", str(samples), *of, *brief)
     if not quick:
         records["light", "light"] = measured(_folder(quick), "light", "--samples", str(LIT))
@@ -133,7 +136,9 @@ def one(arguments: argparse.Namespace) -> dict:
             setattr(scene.tetflora, name, value == "True" if kind is bool else kind(value))
         figures = {"case": arguments.case, "what": arguments.what, "planted": planted}
         if arguments.what == "part":
-            return figures | forest_part.measure(scene, folder, arguments.samples, noise=not arguments.quick)
+            return figures | forest_part.measure(
+                scene, folder, arguments.samples, noise=arguments.case in NOISY and not arguments.quick
+            )
         if arguments.what == "instances":
             figures |= forest_instances.build(scene)
         else:

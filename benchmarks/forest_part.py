@@ -27,8 +27,8 @@ from .compare import difference, plant_mask
 from .forest_case import as_fine_as, detail_of
 from .row80 import timed_refine, timed_render
 
-#: Of the width and the height of the image: 480 × 270 of 1920 × 1080 pixels.
-WINDOW = 0.25
+#: Of the width and the height of the image: 320 × 180 of 1920 × 1080 pixels.
+WINDOW = 1.0 / 6.0
 #: Plants in the part, and polygons that they have when expanded.
 MOST, MOST_POLYGONS = 200, 5_000_000
 #: Where plants must be seen to count as standing in the window, metres above the ground.
