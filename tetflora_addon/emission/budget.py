@@ -35,15 +35,17 @@ BYTES_PER_SPHERE = 210
 #: Polygons and facets for each pixel of the image that are enough, and the number that is never too many.
 ENOUGH_A_PIXEL, NEVER_TOO_MANY = 2.5, 1_500_000.0
 #: Fraction of them that may be hidden, and how many hidden ones are never too many.
-_HIDDEN, _FEW_HIDDEN = 0.12, 300_000.0
+_HIDDEN, _FEW_HIDDEN = 0.22, 300_000.0
 #: Facets grow to so many times their size before real leaves become fewer.
-FACETS_FIRST = 4.0
+FACETS_FIRST = 6.0
 #: Reserved fraction of a budget that somebody has set, since expected numbers are means.
 _RESERVE = 0.06
 #: Fraction of the faces of twigs that are made where leaves are real.
 _TWIGS = 0.15
 _STEPS = 12  # of bisection on the logarithm of factors, between 1 and:
 _LARGEST = 256.0
+#: Largest factor on hidden facets that the image alone may ask for.
+_LARGEST_HIDDEN = 24.0
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,9 @@ def afford(
         for_hidden = min(unseen(hidden), max(_HIDDEN * allowed, min(_FEW_HIDDEN, allowed / 2)))
         factor = max(factor, _smallest(lambda f, seen=seen, left=allowed - for_hidden: seen(f) <= left))
         for_hidden = min(for_hidden, max(seen(factor), min(_FEW_HIDDEN, allowed / 2)))
-        hidden = max(hidden, _smallest(lambda f, unseen=unseen, left=for_hidden: unseen(f) <= left))
+        # Where only the picture asks for less, shadows and light of what is hidden are kept.
+        largest = _LARGEST if every else _LARGEST_HIDDEN
+        hidden = max(hidden, _smallest(lambda f, unseen=unseen, left=for_hidden: unseen(f) <= left, largest))
     limit = _limit(factor, settings)
     small = count.too_small(limit) if factor > 1.0 else np.zeros(0, bool)
     if small.any():
@@ -136,7 +140,7 @@ def _side(factor: float, settings: RefinementSettings) -> float:
 
     Real leaves are where the plants have them, facets are not: facets give way first.
     """
-    return max(min(factor**4, FACETS_FIRST), factor) * settings.facet
+    return max(min(factor**3, FACETS_FIRST), factor) * settings.facet
 
 
 def _limit(factor: float, settings: RefinementSettings) -> float:
@@ -178,6 +182,7 @@ class _Facets:
         # Among real leaves, hardly any twig is wide enough to be real.
         parts = self.portions.parts
         leaves = flora.face_counts(parts.branches) - flora.branch_faces(parts.branches)
+        leaves = leaves * _weights(flora)[flora.rows["species"][parts.branches.row]]
         leafy = flora.leaf_count[parts.branches.row] > 0
         self.faces_real = np.where(
             leafy & ~parts.alone, leaves + _TWIGS * (parts.totals.polygons - leaves), parts.totals.polygons
@@ -217,11 +222,19 @@ class _Facets:
         return held[cells.nodes] & (self.result.decision == Decision.EXPLICIT) & (feature < limit)
 
 
-def _smallest(fits: Callable[[float], bool]) -> float:
+def _weights(flora: Flora) -> NDArray[np.float64]:
+    """Triangles (species,) of a face of leaves over those of a quad: a spray of needles may be one face of many."""
+    forms = [[form for kind in kinds for form in kind] for kinds in flora.forms]
+    triangles = [sum(len(form.corner_verts) - 2 * form.polygons for form in own) for own in forms]
+    faces = [sum(form.polygons for form in own) for own in forms]
+    return np.maximum(np.array(triangles) / (2.0 * np.maximum(faces, 1)), 1.0)
+
+
+def _smallest(fits: Callable[[float], bool], largest: float = _LARGEST) -> float:
     """Minimum factor from 1 on that fits, or the largest where none does."""
     if fits(1.0):
         return 1.0
-    low, high = 0.0, np.log(_LARGEST)
+    low, high = 0.0, np.log(largest)
     for _ in range(_STEPS):
         middle = (low + high) / 2
         low, high = (low, middle) if fits(np.exp(middle)) else (middle, high)

@@ -30,7 +30,7 @@ MIXED = 24.0
 #: Points on the leaves of such a part, at most, that tell where it is seen.
 POINTS = 12
 #: Fraction of its area from which on a part counts as seen here and there.
-SOME = 0.05
+SOME = 0.01
 
 
 @dataclass(frozen=True)

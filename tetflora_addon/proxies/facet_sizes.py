@@ -29,6 +29,12 @@ from ..subplants.pieces import Pieces
 #: shows between crowns after all, and would be blots where a budget makes facets large.
 COARSE, COARSEST = 3.0, 9.0
 _WIDEST = 3.0
+#: How much larger than `COARSE` facets are from where on a budget may make them as large as it needs.
+_DEEP = 4.0
+#: Pixels that no facet within the view exceeds, for all that a budget asks.
+_BLOT = 10.0
+#: Largest side of facets beside the view, over their distance from it.
+_BESIDE = 0.3
 #: Power of the visibility by which facets are larger where they are seen in part, and the visibility that counts least.
 FADING, LEAST_VISIBILITY = 0.5, 0.05
 _HIDING_DEPTH = 4.0  # e^−4 = .02 is left
@@ -99,7 +105,13 @@ class FacetSizes(Arrays):
         coarse = np.minimum(self.coarse * pixels.seen, max(COARSE * pixels.seen, _WIDEST)) * self.extent
         blurred = np.minimum(_SOFT * np.maximum(self.clearance, 0.0), np.sqrt(self.totals.optical_area / _FEWEST))
         unseen = np.maximum(np.maximum(coarse, blurred), np.sqrt(HIDDEN_LEAVES * self.one_leaf))
-        side = np.where(self.hidden, pixels.hidden * unseen, side)
+        # What is only just hidden shows between crowns after all, and would be blots.
+        deep = np.clip((self.coarse - COARSE) / _DEEP, 0.0, 1.0)
+        beside = self.clearance > 0.0
+        most = np.where(beside, _BESIDE * self.clearance, max(_BLOT, COARSEST * pixels.seen) * self.extent)
+        # Beside the view they must not reach into it, or they would lose area.
+        unseen = np.clip(pixels.hidden ** np.where(beside, 1.0, deep) * unseen, unseen, np.maximum(unseen, most))
+        side = np.where(self.hidden, unseen, side)
         # Hidden wood is cut into no more facets than it has faces. Elsewhere it is cut as fine as the side requires, or
         # thin twigs would become blots.
         wood = np.where(self.hidden, np.maximum(side, self.least_wood), side)

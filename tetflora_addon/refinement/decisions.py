@@ -26,6 +26,8 @@ FEW, NO_GAIN, NO_POLYGONS = 0.005, 0.002, 20_000
 UNKNOWN = 4.0
 #: How much smaller than the limit leaves are at the far end of a tetrahedron that is divided for it.
 DEEP = 1.5
+#: Side of tetrahedra that facets stand for, over that of those of real leaves.
+FACET_BLOCK = 0.5
 
 
 class Decision(IntEnum):
@@ -133,9 +135,12 @@ def decide(cells: Terminals, transmittance: NDArray[np.float64], settings: Refin
     crossing = ~cells.whole & ~few & (cells.span > ACROSS_THE_BORDER * settings.block)
     no_gain = few | ((cells.pixels <= settings.block**2) & ~crossing)
     small = (contributions(cells, transmittance) <= settings.cutoff**2) & ~crossing
+    # Facets take their places from the plants, not from their tetrahedra, which only tell how much is seen.
+    facets = np.isinf(settings.proxy_block)
+    done = small | (no_gain & (cells.pixels <= (settings.block * FACET_BLOCK) ** 2)) if facets else small
     out = np.full(len(holds), Decision.SPLIT, dtype=np.int8)
     # Large leaves never become a proxy: a barely visible block of them is divided until its hidden parts show.
-    out[small & ~large_leaves & (cells.span <= settings.proxy_block)] = Decision.PROXY
+    out[done & ~large_leaves & (cells.span <= settings.proxy_block)] = Decision.PROXY
     out[large_leaves & no_gain & (~deep | small)] = Decision.EXPLICIT
     out[hidden] = Decision.HIDDEN
     out[hidden & (cells.span > settings.hidden_block)] = Decision.SPLIT
