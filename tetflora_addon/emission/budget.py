@@ -67,11 +67,6 @@ class Detail:
     leaf_limit: float
 
 
-def polygons_allowed(settings: RefinementSettings) -> float:
-    """Polygons that the settings allow, infinite where they set no limit."""
-    return min(settings.max_polygons or np.inf, settings.max_memory * 1e9 / BYTES_PER_POLYGON or np.inf)
-
-
 def enough(camera: Camera) -> float:
     """Polygons and facets that an image can show."""
     return max(ENOUGH_A_PIXEL * camera.width * camera.height, NEVER_TOO_MANY)

@@ -20,7 +20,6 @@ from tetflora_addon.emission.budget import (
     Detail,
     afford,
     enough,
-    polygons_allowed,
 )
 from tetflora_addon.emission.facets import facet_parts
 from tetflora_addon.emission.plants import Transition, explicit_blocks
@@ -159,10 +158,17 @@ def test_shells_are_not_made_larger(limit: int) -> None:
 
 
 def test_memory_and_polygons_limit_each_other() -> None:
-    both = replace(SETTINGS, max_polygons=5_000_000, max_memory=1.0)
-    assert polygons_allowed(both) == pytest.approx(1e9 / BYTES_PER_POLYGON)
-    assert polygons_allowed(replace(both, max_memory=100.0)) == 5_000_000
-    assert np.isinf(polygons_allowed(SETTINGS))
+    """Whichever is tighter decides, whatever the other allows."""
+    flora, _, camera, result = scene()
+    tight, loose = 5_000, 50_000
+
+    def side(polygons: int, gigabytes: float) -> float:
+        both = replace(SETTINGS, max_polygons=polygons, max_memory=gigabytes)
+        return afford(flora, result, camera, both).pixels.seen
+
+    tight_memory, loose_memory = (n * BYTES_PER_POLYGON / 1e9 for n in (tight, loose))
+    assert side(tight, loose_memory) == side(tight, 0.0) > side(loose, 0.0)
+    assert side(loose, tight_memory) == side(0, tight_memory) > side(0, loose_memory)
 
 
 def test_spheres_take_less_of_a_budget_of_memory_and_as_much_of_one_of_polygons() -> None:
