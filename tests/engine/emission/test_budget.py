@@ -113,10 +113,10 @@ def test_more_is_better() -> None:
 
 
 def mostly_hidden() -> Refinement:
-    """All plants near the eye, which would have the most facets, are hidden, those far off are seen."""
+    """All plants near the eye, which would have the most facets, are deeply hidden; those far off are seen."""
     *_, result = scene()
     hidden = result.tree.vertices(result.nodes)[:, :, 1].mean(axis=1) < 130
-    return with_decision(result, np.where(hidden, Decision.HIDDEN, Decision.PROXY), np.where(hidden, 0.01, 0.3))
+    return with_decision(result, np.where(hidden, Decision.HIDDEN, Decision.PROXY), np.where(hidden, 0.0, 0.3))
 
 
 @pytest.mark.parametrize("allowed", [2_000.0, 10_000.0])
