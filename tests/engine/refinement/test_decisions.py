@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tests.engine import support
 from tetflora_addon.refinement.contents import Totals
 from tetflora_addon.refinement.decisions import (
+    FACET_BLOCK,
     Decision,
     Terminals,
     decide,
@@ -113,8 +114,11 @@ def test_what_can_never_be(case: dict, cutoff: float) -> None:
         assert out in (Decision.EXPLICIT, Decision.SPLIT)
     if not large:
         assert out != Decision.EXPLICIT
-    if out == Decision.PROXY:
-        assert case["pixels"] * case["transmittance"] * case["opacity"] <= cutoff**2
+    if out == Decision.PROXY:  # facets take their places from the plants, to which a part of a block is enough
+        small = case["pixels"] * case["transmittance"] * case["opacity"] <= cutoff**2
+        assert small or case["pixels"] <= (FACET_BLOCK * options.block) ** 2
+        shells = replace(options, proxy_block=1e9)
+        assert small or become(**case, settings=shells) == Decision.SPLIT
     if out == Decision.SPLIT:
         assert become(**case, settings=replace(options, cutoff=cutoff / 2)) == Decision.SPLIT
 
