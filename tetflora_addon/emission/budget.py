@@ -110,24 +110,40 @@ def afford(
         if not np.isfinite(allowed):
             continue
 
-        def seen(by: float, weight: float = weight, every: bool = every) -> float:
-            pixels, limit = _side(by, settings), _limit(by, settings)
-            return count.seen(pixels, limit, weight) + count.polygons(pixels, limit, weight, every)
-
-        def unseen(by: float, weight: float = weight) -> float:
-            return weight * count.unseen(FacetPixels(settings.facet, by))
-
-        for_hidden = min(unseen(hidden), max(_HIDDEN * allowed, min(_FEW_HIDDEN, allowed / 2)))
-        factor = max(factor, _smallest(lambda f, seen=seen, left=allowed - for_hidden: seen(f) <= left))
-        for_hidden = min(for_hidden, max(seen(factor), min(_FEW_HIDDEN, allowed / 2)))
-        # Where only the picture asks for less, shadows and light of what is hidden are kept.
-        largest = _LARGEST if every else _LARGEST_HIDDEN
-        hidden = max(hidden, _smallest(lambda f, unseen=unseen, left=for_hidden: unseen(f) <= left, largest))
+        coarser, fewer = _factors(count, settings, allowed, weight, every, hidden)
+        factor, hidden = max(factor, coarser), max(hidden, fewer)
     limit = _limit(factor, settings)
     small = count.too_small(limit) if factor > 1.0 else np.zeros(0, bool)
     if small.any():
         result = replace(result, decision=np.where(small, Decision.PROXY, result.decision).astype(np.int8))
     return Detail(result, FacetPixels(_side(factor, settings), hidden), limit)
+
+
+def _factors(
+    count: _Facets, settings: RefinementSettings, allowed: float, weight: float, every: bool, hidden: float
+) -> tuple[float, float]:
+    """Factors on all facets and on hidden ones, beside ``hidden``, with which no more is made than allowed."""
+
+    def seen(factor: float) -> float:
+        pixels, limit = _side(factor, settings), _limit(factor, settings)
+        return count.seen(pixels, limit, weight) + count.polygons(pixels, limit, weight, every)
+
+    def unseen(factor: float, by: float) -> float:
+        return weight * count.unseen(FacetPixels(_side(factor, settings), by))
+
+    # Where only the picture asks for less, shadows and light of what is hidden are kept.
+    largest = _LARGEST if every else _LARGEST_HIDDEN
+    few = min(_FEW_HIDDEN, allowed / 2)
+    reserved = max(_HIDDEN * allowed, few)
+
+    def fits(factor: float) -> bool:
+        # Hidden facets do not grow for ever; what they need then is taken from those that are seen.
+        for_hidden = max(min(unseen(factor, hidden), reserved), unseen(factor, max(hidden, largest)))
+        return seen(factor) + for_hidden <= allowed
+
+    factor = _smallest(fits)
+    for_hidden = min(reserved, max(seen(factor), few))
+    return factor, _smallest(lambda by: unseen(factor, by) <= for_hidden, largest)
 
 
 def _side(factor: float, settings: RefinementSettings) -> float:

@@ -112,11 +112,11 @@ def test_more_is_better() -> None:
     assert np.all(np.diff([r.detail.pixels.seen for r in results]) <= 0)
 
 
-def mostly_hidden() -> Refinement:
-    """All plants near the eye, which would have the most facets, are deeply hidden; those far off are seen."""
+def mostly_hidden(light: float = 0.0) -> Refinement:
+    """All plants near the eye, which would have the most facets, are hidden as deeply; those far off are seen."""
     *_, result = scene()
     hidden = result.tree.vertices(result.nodes)[:, :, 1].mean(axis=1) < 130
-    return with_decision(result, np.where(hidden, Decision.HIDDEN, Decision.PROXY), np.where(hidden, 0.0, 0.3))
+    return with_decision(result, np.where(hidden, Decision.HIDDEN, Decision.PROXY), np.where(hidden, light, 0.3))
 
 
 @pytest.mark.parametrize("allowed", [2_000.0, 10_000.0])
@@ -133,6 +133,16 @@ def test_what_is_hidden_never_has_more_than_what_is_seen(monkeypatch: pytest.Mon
     assert after.hidden <= 1.15 * (after.seen + after.polygons)
     assert after.whole <= 1.15 * allowed
     assert after.detail.pixels.hidden > 1
+
+
+@given(st.floats(0.02, 0.9))
+@examples(deadline=None, max_examples=5)
+def test_what_is_hidden_and_cannot_become_less_is_paid_for_by_what_is_seen(fraction: float) -> None:
+    """Facets that are just hidden do not grow for ever; the limit that somebody sets holds all the same."""
+    fine = replace(SETTINGS, facet=0.1)
+    limit = fraction * made(fine, mostly_hidden(0.01)).whole
+    fitted = made(replace(fine, max_polygons=int(limit)), mostly_hidden(0.01))
+    assert 0.5 * limit < fitted.whole <= limit
 
 
 def test_enough_follows_the_pixels_of_the_image() -> None:
