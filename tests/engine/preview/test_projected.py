@@ -173,7 +173,7 @@ def test_panoramas_are_refused() -> None:
 @pytest.fixture(scope="module")
 def gathered() -> levels.Levels:
     flora, camera = support.small_flora(), support.camera((0, -30, 4), (0, 0, 1.5), pixels=200)
-    options = RefinementSettings(visibility_resolution=64, max_tetrahedra=20_000, leaf_limit=1.2, cutoff=4.0)
+    options = RefinementSettings(visibility_resolution=64, max_tetrahedra=20_000, leaf_limit=0.6, cutoff=4.0)
     loop = levels.gather(refine(flora, support.grove(16, 2.0), camera, options), flora, camera)
     seen = []
     while True:
