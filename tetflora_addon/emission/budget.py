@@ -45,7 +45,7 @@ _TWIGS = 0.15
 _STEPS = 12  # of bisection on the logarithm of factors, between 1 and:
 _LARGEST = 256.0
 #: Largest factor on hidden facets that the image alone may ask for.
-_LARGEST_HIDDEN = 24.0
+_LARGEST_HIDDEN = 100.0
 
 
 @dataclass(frozen=True)
@@ -137,8 +137,9 @@ def _factors(
     reserved = max(_HIDDEN * allowed, few)
 
     def fits(factor: float) -> bool:
-        # Hidden facets do not grow for ever; what they need then is taken from those that are seen.
-        for_hidden = max(min(unseen(factor, hidden), reserved), unseen(factor, max(hidden, largest)))
+        for_hidden = min(unseen(factor, hidden), reserved)
+        if every:  # hidden facets do not grow for ever; what they need then is taken from those that are seen
+            for_hidden = max(for_hidden, unseen(factor, max(hidden, largest)))
         return seen(factor) + for_hidden <= allowed
 
     factor = _smallest(fits)

@@ -31,10 +31,13 @@ COARSE, COARSEST = 3.0, 9.0
 _WIDEST = 3.0
 #: How much larger than `COARSE` facets are from where on a budget may make them as large as it needs.
 _DEEP = 4.0
-#: Pixels that no facet within the view exceeds, for all that a budget asks.
-_BLOT = 10.0
-#: Largest side of facets beside the view, over their distance from it.
-_BESIDE = 0.3
+#: Pixels that no facet within the view exceeds, however deep it is, for all that a budget asks.
+_BLOT = 40.0
+#: Factor on hidden facets beyond which these limits give way.
+_LOOSE = 16.0
+#: Largest side of facets beside the view over their distance from it; metres that count least, and from which on it
+#: grows faster: there the shadows of trees do not reach the view.
+_BESIDE = 0.1, 4.0, 15.0
 #: Power of the visibility by which facets are larger where they are seen in part, and the visibility that counts least.
 FADING, LEAST_VISIBILITY = 0.5, 0.05
 _HIDING_DEPTH = 4.0  # e^−4 = .02 is left
@@ -108,7 +111,12 @@ class FacetSizes(Arrays):
         # What is only just hidden shows between crowns after all, and would be blots.
         deep = np.clip((self.coarse - COARSE) / _DEEP, 0.0, 1.0)
         beside = self.clearance > 0.0
-        most = np.where(beside, _BESIDE * self.clearance, max(_BLOT, COARSEST * pixels.seen) * self.extent)
+        near, least, far = _BESIDE
+        away = np.maximum(self.clearance, least)
+        most = np.where(beside, near * away * (1.0 + (away / far) ** 2), 0.0)
+        blot = np.minimum((np.maximum(self.coarse, COARSE) / COARSE) ** 3 * max(_WIDEST, pixels.seen), _BLOT)
+        # Where a forest has too many even so, all of them grow.
+        most = np.where(beside, most, blot * self.extent) * max(pixels.hidden / _LOOSE, 1.0)
         # Beside the view they must not reach into it, or they would lose area.
         unseen = np.clip(pixels.hidden ** np.where(beside, 1.0, deep) * unseen, unseen, np.maximum(unseen, most))
         side = np.where(self.hidden, unseen, side)

@@ -33,7 +33,7 @@ from ..tetrahedra.tree import TetrahedralTree
 from .contents import Held, Totals, piece_totals, subplant_totals, sums
 
 #: Sub-plants larger than this many times the longest edge of a tetrahedron that is divided are opened.
-LARGE = 1.0
+LARGE = 1.6
 #: Pixels along a part for each of its points on leaves; fewest and most of these; points on wood for each of them.
 PIXELS_A_POINT, FEWEST, MOST, WOOD = 6.0, 4, 64, 0.25
 #: Sub-plants that are opened, and points that are lowered, at a time; bounds what that takes to some hundred megabytes.

@@ -39,7 +39,7 @@ from ..results.proxies import Baking, write_proxies
 from ..scene.camera import read_camera
 from ..scene.explicit import Explicit
 from ..worker import at_once, call_in_thread, in_thread, steps_in_thread
-from .contents import Given, compile_for, in_wind, load_for, read_scene, refinement_settings
+from .contents import Given, compile_for, in_wind, load_for, memory_left, read_scene, refinement_settings
 
 #: Fraction of the progress bar that the loop takes; the rest is for writing meshes.
 _LOOP_FRACTION = 0.6
@@ -211,7 +211,10 @@ def _write_refined(
     results: Results, flora: Flora, given: Given, camera: Camera, statistics: Statistics, clock: Stopwatch
 ) -> Generator[Progress, bool | None, None]:
     """Refine, and make meshes and proxies."""
-    scene, form, settings = results.scene, form_of(results.scene), refinement_settings(results.scene)
+    scene, form = results.scene, form_of(results.scene)
+    settings, left = refinement_settings(scene), memory_left(scene, camera)
+    # What the process holds already and what the image takes count too.
+    settings = replace(settings, max_memory=left / 1e9 if np.isfinite(left) else 0.0)
     disc = drawn_disc(scene.render.engine)
     work = _refined(flora, given, camera, settings, form.emission, disc, statistics, clock)
     refined = yield from steps_in_thread(work, Progress(0.05, "Refining, pass 1"))
