@@ -150,8 +150,10 @@ class _Maker:
             for group in (seen, ~seen & ~portions.beside, portions.beside & ~seen):
                 some = np.flatnonzero(group & ~open_here & ~parts.alone & (real < 1.0))
                 if len(some):
-                    made = self._of_subplants(parts.branches.take(some), sizes.take(some), real[some])
-                    yield self._beside(made, bool(portions.beside[some[0]] and not seen[some[0]])), bool(seen[some[0]])
+                    left_out = np.where(seen[some], real[some], 1.0 - sizes.enough[some])
+                    made = self._of_subplants(parts.branches.take(some), sizes.take(some), left_out)
+                    beside = bool(portions.beside[some[0]] and not seen[some[0]])
+                    yield self._beside(made, beside), not beside
             # What is opened for its detail alone keeps one visibility, as its real leaves do.
             portions = replace(portions, mixed=mixed).take(np.flatnonzero(open_here))
             portions = sight.opened(portions) if len(portions) else portions
@@ -162,7 +164,7 @@ class _Maker:
             if len(some):
                 made = self._of_bodies(some)
                 beside = bool(some.beside[0] and some.visibility[0] <= 0)
-                yield self._beside(made, beside), bool(some.visibility[0] > 0)
+                yield self._beside(made, beside), not beside
 
     def _beside(self, facets: Facets, beside: bool) -> Facets:
         """Facets beside the view must not reach into the image."""

@@ -9,7 +9,7 @@ the distance from the view.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,12 +27,16 @@ from ..subplants.pieces import Pieces
 #: How much larger facets of hidden tetrahedra are: where the optical depth in front just hides them, and at most, in
 #: proportion to the depth. For the depth alone they are never wider than so many pixels: some of what is deeply hidden
 #: shows between crowns after all, and would be blots where a budget makes facets large.
-COARSE, COARSEST = 3.0, 9.0
+COARSE, COARSEST = 3.0, 18.0
 _WIDEST = 3.0
 #: How much larger than `COARSE` facets are from where on a budget may make them as large as it needs.
 _DEEP = 4.0
 #: Pixels that no facet within the view exceeds, however deep it is, for all that a budget asks.
-_BLOT = 40.0
+_BLOT = 12.0
+#: One-sided layers of leaves that are enough where nothing is seen, and how much of its box a crown fills.
+_LAYERS, _FILLED = 6.0, 0.6
+#: Optical depth from which on fewer facets are enough, as little light comes from there, and the least fraction of them.
+_DEEPEST, _LEAST_KEPT = 7.0, 0.25
 #: Factor on hidden facets beyond which these limits give way.
 _LOOSE = 16.0
 #: Largest side of facets beside the view over their distance from it; metres that count least, and from which on it
@@ -80,6 +84,8 @@ class FacetSizes(Arrays):
     totals : Totals of n
     part : (n,) float64
         Which part of a branch, or of a sub-plant, each is.
+    kept : (n,) float64
+        Fraction of the area that is enough where nothing is seen, see `opaque_fractions`.
     """
 
     extent: NDArray[np.float64]
@@ -90,6 +96,7 @@ class FacetSizes(Arrays):
     clearance: NDArray[np.float64]
     totals: Totals
     part: NDArray[np.float64]
+    kept: NDArray[np.float64]
 
     @property
     def hidden(self) -> NDArray[np.bool_]:
@@ -111,18 +118,19 @@ class FacetSizes(Arrays):
         # What is only just hidden shows between crowns after all, and would be blots.
         deep = np.clip((self.coarse - COARSE) / _DEEP, 0.0, 1.0)
         beside = self.clearance > 0.0
-        near, least, far = _BESIDE
-        away = np.maximum(self.clearance, least)
+        near, nearest, far = _BESIDE
+        away = np.maximum(self.clearance, nearest)
         most = np.where(beside, near * away * (1.0 + (away / far) ** 2), 0.0)
-        blot = np.minimum((np.maximum(self.coarse, COARSE) / COARSE) ** 3 * max(_WIDEST, pixels.seen), _BLOT)
-        # Where a forest has too many even so, all of them grow.
-        most = np.where(beside, most, blot * self.extent) * max(pixels.hidden / _LOOSE, 1.0)
+        blot = np.minimum((np.maximum(self.coarse, COARSE) / COARSE) ** 1.5 * max(_WIDEST, pixels.seen), _BLOT)
+        # Where a forest has too many even so, those beside the view grow.
+        most = np.where(beside, most * max(pixels.hidden / _LOOSE, 1.0), blot * self.extent)
         # Beside the view they must not reach into it, or they would lose area.
         unseen = np.clip(pixels.hidden ** np.where(beside, 1.0, deep) * unseen, unseen, np.maximum(unseen, most))
         side = np.where(self.hidden, unseen, side)
         # Hidden wood is cut into no more facets than it has faces. Elsewhere it is cut as fine as the side requires, or
         # thin twigs would become blots.
-        wood = np.where(self.hidden, np.maximum(side, self.least_wood), side)
+        least = np.where(beside, self.least_wood, np.minimum(self.least_wood, blot * self.extent))
+        wood = np.where(self.hidden, np.maximum(side, least), side)
         return np.maximum(side, np.sqrt(self.one_leaf)), wood
 
     def counts(self, pixels: FacetPixels) -> NDArray[np.float64]:
@@ -130,7 +138,14 @@ class FacetSizes(Arrays):
         leaf, wood = self.sides(pixels)
         # Branches are closed: half of their surface is never seen.
         leaves = self.totals.leaf_area / np.maximum(leaf, 1e-12) ** 2
-        return leaves + self.totals.wood_area / 2 / np.maximum(wood, 1e-12) ** 2
+        number = leaves + self.totals.wood_area / 2 / np.maximum(wood, 1e-12) ** 2
+        return np.where(self.hidden, self.enough, 1.0) * number
+
+    @property
+    def enough(self) -> NDArray[np.float64]:
+        """Fraction (n,) of the facets of what is not seen that are made."""
+        depth = np.where(self.clearance > 0.0, COARSE, self.coarse) / COARSE * _HIDING_DEPTH
+        return self.kept * np.clip(_DEEPEST / np.maximum(depth, _HIDING_DEPTH), _LEAST_KEPT, 1.0)
 
 
 @dataclass(frozen=True)
@@ -206,8 +221,18 @@ def subplant_facet_sizes(
 ) -> FacetSizes:
     """Facets of sub-plants (n,) of given totals (n,), visibility (n,) and coarseness (n,) where that is 0."""
     place, faces = bounding_cylinders(flora, own)[0], flora.branch_faces(own)
-    one = np.ones(len(own))
-    return _facet_sizes(totals, place, flora.one_leaf_area(own), faces, one, camera, visibility, coarse)
+    sizes = _facet_sizes(totals, place, flora.one_leaf_area(own), faces, np.ones(len(own)), camera, visibility, coarse)
+    return replace(sizes, kept=opaque_fractions(flora, own, totals))
+
+
+def opaque_fractions(flora: Flora, own: Branches, totals: Totals) -> NDArray[np.float64]:
+    """Fraction (n,) of the optical area of sub-plants that makes them opaque to all but a few hundredths of light.
+
+    A spruce has twenty layers of needles across its crown. Where it is hidden, the first of them cast its shadow.
+    """
+    bound = flora.sampled_bound[own.row]
+    silhouette = _FILLED * 2.0 * bound[:, 0] * (bound[:, 2] - bound[:, 1]) * own.length**2
+    return np.minimum(_LAYERS * silhouette / np.maximum(totals.optical_area, 1e-300), 1.0)
 
 
 def piece_facet_sizes(
@@ -231,4 +256,4 @@ def _facet_sizes(
 ) -> FacetSizes:
     least = np.sqrt(totals.wood_area / 2 / np.maximum(faces, 1))
     extent, away = camera.extent_around(place), camera.clearance(place)
-    return FacetSizes(extent, one_leaf, least, visibility, coarse, away, totals, part)
+    return FacetSizes(extent, one_leaf, least, visibility, coarse, away, totals, part, np.ones(len(part)))
