@@ -119,20 +119,20 @@ def mostly_hidden(light: float = 0.0) -> Refinement:
     return with_decision(result, np.where(hidden, Decision.HIDDEN, Decision.PROXY), np.where(hidden, light, 0.3))
 
 
-@pytest.mark.parametrize("allowed", [2_000.0, 10_000.0])
+@pytest.mark.parametrize("allowed", [600.0, 1_200.0])
 def test_what_is_hidden_never_has_more_than_what_is_seen(monkeypatch: pytest.MonkeyPatch, allowed: float) -> None:
     """By default, wherever a picture shows fewer facets than a scene would have."""
-    *_, camera, _ = scene()
-    before = made(replace(SETTINGS, facet=0.1), mostly_hidden())
-    assert before.hidden > before.seen
+    flora, _, camera, _ = scene()
+    settings, result = replace(SETTINGS, facet=0.1), mostly_hidden()
+    count = budget._Facets(flora, result, camera)
+    assert count.unseen(FacetPixels(0.1)) + count.seen(0.1, SETTINGS.leaf_limit, 1.0) > allowed
     monkeypatch.setattr(budget, "NEVER_TOO_MANY", allowed)
     monkeypatch.setattr(budget, "ENOUGH_A_PIXEL", 0.0)
     monkeypatch.setattr(budget, "_FEW_HIDDEN", 0.0)
     assert enough(camera) == allowed
-    after = made(replace(SETTINGS, facet=0.1), mostly_hidden())
-    assert after.hidden <= 1.15 * (after.seen + after.polygons)
-    assert after.whole <= 1.15 * allowed
-    assert after.detail.pixels.hidden > 1
+    after = afford(flora, result, camera, settings)
+    assert count.unseen(after.pixels) <= 1.15 * count.seen(after.pixels.seen, after.leaf_limit, 1.0)
+    assert made(settings, result).whole <= 1.15 * allowed
 
 
 @given(st.floats(0.02, 0.9))

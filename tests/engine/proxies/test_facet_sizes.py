@@ -128,7 +128,7 @@ def test_deeper_hidden_is_coarser() -> None:
     hidden = result.chosen(Decision.HIDDEN)
     assert (coarse[~hidden] == 1.0).all()
     assert (coarse[hidden & ~result.in_view] == COARSE).all()
-    for light, expected in ((0.02, COARSE), (1e-3, 5.2), (1e-9, COARSEST), (0.0, COARSEST)):
+    for light, expected in ((0.02, COARSE), (1e-3, 5.2), (1e-9, 15.54), (1e-12, COARSEST), (0.0, COARSEST)):
         dark = replace(
             result,
             transmittance=np.full_like(result.transmittance, light),
