@@ -23,7 +23,7 @@ class RefinementSettings:
         Longest edge, in pixels at its depth, down to which hidden tetrahedra are divided. Facets take their places from
         the plants, so that they need no such limit; a shell fills its whole tetrahedron and does.
     proxy_block : float
-        The same for proxies that are seen.
+        The same for proxies that are seen; infinite for facets, which need no finer tetrahedra than their visibility.
     margin : float
         Fraction of the image's width and height by which the view is widened on each side: leaves that grow outside
         but reach in are real leaves.

@@ -147,4 +147,6 @@ def memory_left(scene: bpy.types.Scene, camera: Camera) -> float:
 def refinement_settings(scene: bpy.types.Scene) -> RefinementSettings:
     """The scene's settings, with the block sizes of its proxy form."""
     emission = form_of(scene).emission
-    return replace(settings_from(scene), hidden_block=emission.hidden_block, proxy_block=emission.proxy_block)
+    # Proxies that fill their tetrahedra are divided as long as they show; facets need no more than their visibility.
+    proxy_block = emission.proxy_block if emission.facets else min(emission.proxy_block, 1e9)
+    return replace(settings_from(scene), hidden_block=emission.hidden_block, proxy_block=proxy_block)
