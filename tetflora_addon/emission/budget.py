@@ -33,9 +33,9 @@ BYTES_PER_POLYGON = 610
 #: The same for a microsphere in a point cloud.
 BYTES_PER_SPHERE = 210
 #: Polygons and facets for each pixel of the image that are enough, and the number that is never too many.
-ENOUGH_A_PIXEL, NEVER_TOO_MANY = 2.4, 1_500_000.0
+ENOUGH_A_PIXEL, NEVER_TOO_MANY = 2.0, 1_500_000.0
 #: Fraction of them that may be hidden, and how many hidden ones are never too many.
-_HIDDEN, _FEW_HIDDEN = 0.22, 300_000.0
+_HIDDEN, _FEW_HIDDEN = 0.2, 300_000.0
 #: Facets grow to so many times their size before real leaves become fewer.
 FACETS_FIRST = 6.0
 #: Reserved fraction of a budget that somebody has set, since expected numbers are means.

@@ -23,15 +23,15 @@ from .settings import RefinementSettings
 
 #: Seconds of any refinement, of each plant, and of each polygon or facet.
 SECONDS = 1.0
-SECONDS_PER_PLANT = 2.0e-4
-SECONDS_PER_PRIMITIVE = 3.0e-6
+SECONDS_PER_PLANT = 2.5e-5
+SECONDS_PER_PRIMITIVE = 3.3e-6
 #: Polygons of leaves and branches, and facets, of a covered pixel at the limits below.
-POLYGONS_PER_PIXEL = 0.6
-FACETS_PER_PIXEL = 1.4
+POLYGONS_PER_PIXEL = 1.2
+FACETS_PER_PIXEL = 0.5
 #: Leaf limit and facet size that these numbers are for, pixels; numbers go with the inverse square.
 LEAF_LIMIT, FACET = 0.4, 0.33
 #: Of what is seen, for plants that are out of view or hidden.
-UNSEEN = 0.3
+UNSEEN = 0.5
 #: Bytes of each plant, and of each polygon or facet in Blender and the renderer together.
 BYTES_PER_PLANT = 500.0
 BYTES_PER_PRIMITIVE = 610.0
