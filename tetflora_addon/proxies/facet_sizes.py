@@ -36,7 +36,7 @@ _BLOT = 12.0
 #: One-sided layers of leaves that are enough where nothing is seen, and how much of its box a crown fills.
 _LAYERS, _FILLED = 6.0, 0.6
 #: Optical depth from which on fewer facets are enough, as little light comes from there, and the least fraction.
-_DEEPEST, _LEAST_KEPT = 7.0, 0.25
+_DEEPEST, _LEAST_KEPT = 6.0, 0.15
 #: Factor on hidden facets beyond which these limits give way.
 _LOOSE = 16.0
 #: Largest side of facets beside the view over their distance from it; metres that count least, and from which on it
