@@ -16,6 +16,7 @@ import weakref
 from contextlib import closing, suppress
 from pathlib import Path
 
+import bpy
 import pytest
 
 from tetflora_addon.blender import worker
@@ -295,8 +296,9 @@ while next(steps) is None:
 time.sleep(0.2)
 print("left")
 """
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=60, check=False
-    )
-    assert done.stdout.splitlines()[-1] == "left", done.stderr
+    script = f"import sys; sys.path.insert(0, {str(ROOT)!r})\n{script}"
+    blender = bpy.app.binary_path  # empty where bpy is a module of Python's
+    command = [blender, "-b", "--factory-startup", "--python-expr"] if blender else [sys.executable, "-c"]
+    done = subprocess.run([*command, script], cwd=ROOT, capture_output=True, text=True, timeout=60, check=False)
+    assert "left" in done.stdout.splitlines(), done.stderr
     assert done.returncode == 0

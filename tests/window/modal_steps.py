@@ -15,6 +15,7 @@ from devtools.aliases import INSTALLED, alias
 
 alias(INSTALLED)
 from tests.blender.scenes import add_plant, datablocks  # noqa: E402  (found only now)
+from tests.window.slow import slowly  # noqa: E402
 from tetflora_addon.blender.job import refine  # noqa: E402
 from tetflora_addon.blender.results.collection import has_results  # noqa: E402
 from tetflora_addon.errors import SpeciesError  # noqa: E402
@@ -57,17 +58,19 @@ def steps(ui):
 
     scene.tetflora.cutoff, scene.tetflora.leaf_limit = 0.5, 0.1
     messages = listen()
+    original = refine.loop.refine
+    refine.loop.refine = lambda *given: slowly(original, *given)  # or the loop would be over before Return comes
     begin(ui)
     yield from ui.until(lambda: any("Refining, pass" in message for message in messages), 60, "first pass")
     ui.press('RET')
     yield from ui.until(lambda: not running(ui), 60, "end after Return")
+    refine.loop.refine = original
     ui.values["stopped"] = [has_results(scene), json.loads(scene.tetflora.statistics)["complete"]]
     refine.clear(scene)
 
     # A pass that does not end by itself: Esc must not wait for it.
     bare = datablocks()
     begun, go = threading.Event(), threading.Event()
-    original = refine.loop.refine
     refine.loop.refine = lambda *given: held(begun, go, original, *given)
     begin(ui)
     yield from ui.until(begun.is_set, 60, "beginning of the pass")

@@ -14,7 +14,9 @@ sys.path.append(str(Path(__file__).resolve().parents[2]))
 from devtools.aliases import INSTALLED, alias
 
 alias(INSTALLED)
-from tetflora_addon.blender.viewport import state  # noqa: E402  (the same)
+from tests.window.slow import slowly  # noqa: E402  (found only now)
+from tetflora_addon.blender.viewport import levels as levels_job  # noqa: E402
+from tetflora_addon.blender.viewport import state  # noqa: E402
 
 STEP = 10  # pixels between two looks for a button
 SPECIES = ("broadleaf_tree", "conifer", "bush")
@@ -85,10 +87,13 @@ def steps(ui):
 
     # Stopped in the middle: what was there stays.
     scene.tetflora.cutoff, scene.tetflora.leaf_limit = 0.4, 0.1
+    original = levels_job.refine_loop
+    levels_job.refine_loop = lambda *given: slowly(original, *given)
     yield from press_button(ui, "tetflora.preview_levels")
     ui.values["running_before_esc"] = running(ui)
     ui.press('ESC')
     yield from ui.until(lambda: not running(ui), 30, "end after Esc")
+    levels_job.refine_loop = original
     ui.values["kept"] = state.find(scene).levels is levels
 
     # Frozen, and seen from above (figure 5).
