@@ -61,6 +61,8 @@ def steps(ui):
     yield 0.5
     ui.values["after_none"] = shapes(scene) is None
 
+    original = levels_job.refine_loop
+    levels_job.refine_loop = lambda *given: slowly(original, *given)
     yield from press_button(ui, "tetflora.preview_levels")
     ui.values["running"] = running(ui)
     yield from ui.until(lambda: not running(ui), 90, "levels")
@@ -87,8 +89,6 @@ def steps(ui):
 
     # Stopped in the middle: what was there stays.
     scene.tetflora.cutoff, scene.tetflora.leaf_limit = 0.4, 0.1
-    original = levels_job.refine_loop
-    levels_job.refine_loop = lambda *given: slowly(original, *given)
     yield from press_button(ui, "tetflora.preview_levels")
     ui.values["running_before_esc"] = running(ui)
     ui.press('ESC')
