@@ -41,7 +41,7 @@ _DEEPEST, _LEAST_KEPT = 6.0, 0.15
 _LOOSE = 16.0
 #: Largest side of facets beside the view over their distance from it; metres that count least, and from which on it
 #: grows faster: there the shadows of trees do not reach the view.
-_BESIDE = 0.1, 4.0, 15.0
+_BESIDE = 0.05, 8.0, 15.0
 #: Power of the visibility by which facets are larger where they are seen in part, and the visibility that counts least.
 FADING, LEAST_VISIBILITY = 0.5, 0.05
 _HIDING_DEPTH = 4.0  # e^−4 = .02 is left
