@@ -140,7 +140,7 @@ def refine(
         Whose shadows of what is hidden are refined if ``settings.shadow_cutoff`` is above 0.
     """
     clock = Stopwatch()
-    plants = SharedPlants(flora, seeds, camera)
+    plants = SharedPlants(flora, seeds, camera, filled=bool(np.isfinite(settings.proxy_block)))
     camera = widened_for(camera, settings.margin, flora, plants.parts.branches, polygons)
     slack = _slack(camera, settings.visibility_resolution)
     own = Held.none(Polygons) if polygons is None else in_the_root(polygons, large_polygons(polygons, camera))

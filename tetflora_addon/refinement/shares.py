@@ -36,6 +36,8 @@ from .contents import Held, Totals, piece_totals, subplant_totals, sums
 LARGE = 1.6
 #: Pixels along a part for each of its points on leaves; fewest and most of these; points on wood for each of them.
 PIXELS_A_POINT, FEWEST, MOST, WOOD = 6.0, 4, 64, 0.25
+#: How many times as many points there are where proxies fill their tetrahedra.
+FILLED = 4
 #: Sub-plants that are opened, and points that are lowered, at a time; bounds what that takes to some hundred megabytes.
 OPENED_AT_ONCE, LOWERED_AT_ONCE = 40_000, 1_000_000
 #: Draw of this module: where a part's run of samples starts.
@@ -114,7 +116,12 @@ class SharePoints(Arrays):
 
 
 def share_points(
-    flora: Flora, parts: PlantParts, pixels: NDArray[np.float64], lines: Axes | None = None, most: int = MOST
+    flora: Flora,
+    parts: PlantParts,
+    pixels: NDArray[np.float64],
+    lines: Axes | None = None,
+    most: int = MOST,
+    times: int = 1,
 ) -> SharePoints:
     """Points on parts of plants, all in the root.
 
@@ -128,8 +135,10 @@ def share_points(
     lines : Axes of n, optional
     most : int
         Points on the leaves of a part at most.
+    times : int
+        How many times as many as that.
     """
-    number = np.ceil(np.clip(pixels / PIXELS_A_POINT, FEWEST, most)).astype(np.int64)
+    number = times * np.ceil(np.clip(pixels / PIXELS_A_POINT, FEWEST, most)).astype(np.int64)
     made = []
     for leafy in (True, False):
         area = parts.totals.leaf_area if leafy else parts.totals.wood_area
@@ -215,6 +224,8 @@ class SharedPlants:
     flora : Flora
     seeds : Seeds
     camera : Camera
+    filled : bool
+        Whether proxies fill their tetrahedra, so that small ones without points would be holes.
 
     Attributes
     ----------
@@ -222,8 +233,8 @@ class SharedPlants:
     points : SharePoints
     """
 
-    def __init__(self, flora: Flora, seeds: Seeds, camera: Camera) -> None:
-        self.flora, self.camera = flora, camera
+    def __init__(self, flora: Flora, seeds: Seeds, camera: Camera, filled: bool = False) -> None:
+        self.flora, self.camera, self._times = flora, camera, FILLED if filled else 1
         self.parts = PlantParts.of_subplants(flora, trunks(flora.rows, seeds)) if len(seeds) else PlantParts.empty()
         self.points = self._points(self.parts, None) if len(seeds) else SharePoints.empty()
 
@@ -282,7 +293,7 @@ class SharedPlants:
         self.parts, self.points = PlantParts.concatenate(parts), SharePoints.concatenate(points)
 
     def _points(self, parts: PlantParts, lines: Axes | None) -> SharePoints:
-        return share_points(self.flora, parts, self.pixels(parts), lines)
+        return share_points(self.flora, parts, self.pixels(parts), lines, times=self._times)
 
     def totals(self, chosen: NDArray[np.bool_]) -> tuple[Totals, NDArray[np.int32]]:
         """Totals (k,) of points in chosen nodes, a mask (nodes,), and their nodes (k,)."""
