@@ -89,7 +89,7 @@ def test_the_thick_point_is_where_its_ray_is_longest_within(seed: int, camera: C
     vertices = tetrahedra(seed)
     kappa = np.random.default_rng(seed).uniform(0.0, 5.0, len(vertices))
     projected = project(vertices, kappa, camera)
-    np.testing.assert_allclose(projected.opacity, -np.expm1(-kappa * projected.thickness), rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(projected.opacity, -np.expm1(-kappa * projected.thickness), rtol=1e-12)
     thick = projected.corners[:, THICK]
     toward = thick - camera.position if camera.kind == "PERSP" else np.tile(-camera.frame[:, 2], (len(thick), 1))
     toward /= np.linalg.norm(toward, axis=1, keepdims=True)
