@@ -116,6 +116,18 @@ def allowance(max_memory: float, reserve: float = 0.0) -> float:
     return max(left, LEAST)
 
 
+def give_back() -> None:
+    """Return memory that is free to the system; some C libraries keep it, and renderers would be charged for it.
+
+    Windows gives large blocks back by itself.
+    """
+    with suppress(OSError, ValueError, AttributeError):
+        if sys.platform == "darwin":
+            ctypes.CDLL(None).malloc_zone_pressure_relief(None, c_size_t(0))
+        elif sys.platform != "win32":
+            ctypes.CDLL(None).malloc_trim(c_size_t(0))
+
+
 def _unix_total() -> int:
     machine = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     return min([machine, *_container_limits()])

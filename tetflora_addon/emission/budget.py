@@ -26,7 +26,7 @@ from ..refinement.loop import Refinement
 from ..refinement.settings import RefinementSettings
 from .facets import sizes_of
 from .plants import Transition
-from .portions import Sight
+from .portions import Portions, Sight
 
 #: Approximate bytes of a polygon in Blender (110) and in a renderer (500) together.
 BYTES_PER_POLYGON = 610
@@ -191,14 +191,7 @@ class _Facets:
         some = portions.visibility > 0
         self.flora, self.camera, self.portions = flora, camera, portions.take(np.flatnonzero(some))
         self.sizes = sizes_of(flora, self.portions, camera)
-        # Among real leaves, hardly any twig is wide enough to be real.
-        parts = self.portions.parts
-        leaves = flora.face_counts(parts.branches) - flora.branch_faces(parts.branches)
-        leaves = leaves * _weights(flora)[flora.rows["species"][parts.branches.row]]
-        leafy = flora.leaf_count[parts.branches.row] > 0
-        self.faces_real = np.where(
-            leafy & ~parts.alone, leaves + _TWIGS * (parts.totals.polygons - leaves), parts.totals.polygons
-        )
+        self.faces_real = _real_faces(flora, self.portions, Transition(flora, camera, 1.0))
         self.unseen_sizes = sizes_of(flora, portions.take(np.flatnonzero(~some)), camera)
         self.result, held, hidden = result, result.holdings.polygons, result.chosen(Decision.HIDDEN)
         self.cell = held.cell
@@ -232,6 +225,19 @@ class _Facets:
         # What is large there stays as it is as long as facets are smaller.
         feature = np.where(np.isinf(cells.feature), LARGE, cells.feature)
         return held[cells.nodes] & (self.result.decision == Decision.EXPLICIT) & (feature < limit)
+
+
+def _real_faces(flora: Flora, portions: Portions, transition: Transition) -> NDArray[np.float64]:
+    """Expected polygons (n,) of portions, were all of their leaves real; large faces count by their triangles."""
+    parts, row = portions.parts, portions.parts.branches.row
+    leafy = flora.leaf_count[row] > 0
+    each = np.where(leafy, flora.leaf_faces[row] / np.maximum(flora.leaf_count[row], 1e-300), 0.0)
+    leaves = np.where(leafy, parts.totals.leaf_area / np.maximum(flora.one_leaf_area(parts.branches), 1e-300), 0.0)
+    wood = np.maximum(parts.totals.polygons - leaves * each, 0.0)
+    triangles = transition.of_triangles(parts.branches, portions.visibility)
+    full = each * _weights(flora)[flora.rows["species"][row]]
+    # Among real leaves, hardly any twig is wide enough to be real.
+    return leaves * (full + triangles * (1.0 - full)) + np.where(leafy & ~parts.alone, _TWIGS, 1.0) * wood
 
 
 def _weights(flora: Flora) -> NDArray[np.float64]:

@@ -8,6 +8,7 @@ memory at a time. Proxies are in `facets` and `shells`.
 A leaf whose width in pixels is below the limit is a facet, one that is wider by `BAND` is real, and in between
 a fraction of them is real that grows with the width. Real leaves and facets are thinned out by hashes of their own
 keys: what has become real stays real as the camera comes closer, nothing pops, and the area is the same on average.
+Real leaves are single triangles first, and have their faces from a few pixels of width on, one after another.
 Wood goes by its own width or that of its leaves, whichever is larger: a trunk is a tube even among invisible leaves.
 """
 
@@ -36,6 +37,8 @@ from .portions import MIXED, Portions, Sight, in_chunks
 
 #: Width from which on all leaves are real over the width up to which none is.
 BAND = 2.5
+#: Width in pixels up to which real leaves are triangles.
+TRIANGLES = 2.0
 #: Power of the visibility by which the width of things counts as smaller.
 FADING = 0.25
 #: Among real leaves, wood counts as so many times as wide.
@@ -67,6 +70,11 @@ class Transition:
         place = np.log(np.maximum(pixels, 1e-300) / self.limit) / np.log(BAND)
         place = np.clip(place, 0.0, 1.0)
         return place * place * (3.0 - 2.0 * place)
+
+    def of_triangles(self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0) -> NDArray[np.float64]:
+        """Fraction (n,) of the real leaves of branches that are single triangles."""
+        small = self.limit / TRIANGLES
+        return 1.0 - self.fraction(self._width(branches) * small, branches.position, visibility)
 
     def of_branches(self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0) -> NDArray[np.float64]:
         """Real fraction (n,) of the leaves and the wood of sub-plants; of leafless ones by the base of their branch."""
@@ -210,13 +218,14 @@ def _block(
     of_branches = [flora.species_of(some.branches.row) for some in branches]
     of_bare = np.zeros(0, int) if bare is None else flora.species_of(bare.branches.row)
 
-    def fraction_of(some: Branches) -> NDArray[np.float64]:
-        return transition.of_branches(some, visibility[some.plant])
+    def fractions_of(some: Branches) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        seen = visibility[some.plant]
+        return transition.of_branches(some, seen), transition.of_triangles(some, seen)
 
     made: list[tuple[str, int, int, MeshBuffers | None]] = []
     for s in np.unique(np.concatenate([np.zeros(0, int), of_bare, *of_branches])):
         whole = [some.take(np.flatnonzero(kind == s)) for some, kind in zip(branches, of_branches, strict=True)]
-        leaves = leaf_meshes(flora, int(s), whole, None if transition is None else fraction_of)
+        leaves = leaf_meshes(flora, int(s), whole, None if transition is None else fractions_of)
         made += [(LEAF_KINDS[m.kind], m.form, int(s), m.buffers) for m in leaves]
         if transition is not None:
             kept = (transition.of_wood(some.branches, visibility[some.branches.plant]) for some in whole)

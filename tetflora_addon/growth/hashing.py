@@ -54,6 +54,8 @@ class Draw(IntEnum):
     SWAY_ALONG = 26
     SWAY_ACROSS = 27
     SWAY_UP = 28
+    LEAF_TRIANGLE = 29
+    LEAF_PLANE = 30
     BEND = 32  # one for each segment and axis from here on
 
 

@@ -37,6 +37,8 @@ class LeafModel:
         Texture coordinates by corner.
     material_index : (f,) int32, optional
         Material of each face, of models that have several.
+    textured : bool
+        Drawn as it is at any size: a texture may cut it out.
     """
 
     positions: NDArray[np.float64]
@@ -44,6 +46,7 @@ class LeafModel:
     face_offsets: NDArray[np.int32]
     uv: NDArray[np.float32]
     material_index: NDArray[np.int32] | None = None
+    textured: bool = False
 
     @property
     def polygons(self) -> int:
@@ -75,6 +78,11 @@ class LeafModel:
         pairs = np.sort(np.stack([self.corner_verts, self.corner_verts[self.next_corner]], axis=1), axis=1)
         edges, corner_edges = np.unique(pairs, axis=0, return_inverse=True)
         return edges.astype(np.int32), corner_edges.reshape(-1).astype(np.int32)
+
+    @cached_property
+    def closed(self) -> bool:
+        """Whether every edge belongs to two faces, as of fruit: half of the surface is never seen."""
+        return bool((np.bincount(self.edges[1]) == 2).all())
 
     @cached_property
     def face_vectors(self) -> NDArray[np.float64]:

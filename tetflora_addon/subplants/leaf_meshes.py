@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Leaves as polygons: copies of the species' leaf models, written straight into the arrays of their mesh.
 
-See section 5 of the paper.
+See section 5 of the paper. What is small in the image may be a triangle, see `species.leaf_triangles`.
 """
 
 from __future__ import annotations
@@ -31,119 +31,9 @@ from ..growth.foliage import (
 from ..growth.growth import WholeBranches, leaf_counts
 from ..growth.hashing import Draw, uniform
 from ..growth.wind import moment
-from ..species.leaf_models import LeafModel
+from ..species.leaf_triangles import leaf_triangles
+from .leaf_copies import LeafCopies, TriangleCopies
 from .pieces import chunks
-
-_ROWS_AT_ONCE = 4096
-
-
-class LeafCopies:
-    """A mesh of copies under construction.
-
-    Parameters
-    ----------
-    model : LeafModel
-    number : int
-        Of copies in the end.
-    transmission : float
-        Fraction of the light scattered through the leaf, the same for all.
-    moving : bool
-        Whether they have velocities.
-    """
-
-    def __init__(self, model: LeafModel, number: int, transmission: float, moving: bool = False) -> None:
-        self.model = model
-        self.done = 0
-        self.transmission = transmission
-        self.positions = np.zeros((number, 3 * len(model.positions)), np.float32)
-        self.velocity = np.zeros_like(self.positions) if moving else None
-        self.colour = np.zeros((number, model.polygons, 3), np.float32)
-
-    def add(
-        self,
-        position: NDArray[np.float64],
-        frame: NDArray[np.float32],
-        size: NDArray[np.float64],
-        colour: NDArray[np.float64],
-        motion: tuple[NDArray[np.float64], NDArray[np.float32]] | None = None,
-    ) -> None:
-        """Place the next n copies.
-
-        Parameters
-        ----------
-        position : (n, 3) float64
-            Of the model's origin, metres.
-        frame : (n, 3, 3) float32
-            Columns are the model's axes.
-        size : (n,) float64
-            Metres for one unit of the model.
-        colour : (n, 3) float64
-            Linear RGB.
-        motion : (n, 3) float64 and (n, 3, 3) float32, optional
-            How fast the origin moves and the columns change, a second.
-        """
-        new = slice(self.done, self.done + len(size))
-        self.done = new.stop
-        self.positions[new] = self._placed(position, frame, size)
-        if motion is not None:
-            self.velocity[new] = self._placed(*motion, size)
-        self.colour[new] = colour[:, None]
-
-    def _placed(
-        self, position: NDArray[np.float64], frame: NDArray[np.float32], size: NDArray[np.float64]
-    ) -> NDArray[np.float32]:
-        """Vertices (n, 3 × vertices) of copies; linear in position and frame, so that it serves velocities as well."""
-        shape = self.model.positions.astype(np.float32)
-        scaled = frame.transpose(1, 2, 0) * size.astype(np.float32)  # (3, 3, n)
-        points = np.zeros((len(shape), 3, len(size)), np.float32)
-        for axis in range(3):
-            point = points[:, axis]
-            np.multiply(shape[:, 0, None], scaled[axis, 0], out=point)
-            for column in (1, 2):
-                point += shape[:, column, None] * scaled[axis, column]
-            point += position[:, axis].astype(np.float32)
-        return points.reshape(3 * len(shape), len(size)).T
-
-    def buffers(self) -> MeshBuffers:
-        """The mesh, once all copies are placed."""
-        model, n = self.model, len(self.positions)
-        edges, edge_of_corner = model.edges
-        vertices, corners = len(model.positions), len(model.corner_verts)
-        starts = _stepped(model.face_offsets[:-1], corners, n)
-        materials = (
-            {} if model.material_index is None else {"material_index": ("FACE", _stepped(model.material_index, 0, n))}
-        )
-        motion = {} if self.velocity is None else {"velocity": ("POINT", self.velocity.reshape(-1, 3))}
-        return MeshBuffers(
-            positions=self.positions.reshape(-1, 3),
-            edge_verts=_stepped(edges.reshape(-1), vertices, n).reshape(-1, 2),
-            corner_verts=_stepped(model.corner_verts, vertices, n),
-            corner_edges=_stepped(edge_of_corner, len(edges), n),
-            face_offsets=np.append(starts, np.int32(n * corners)),
-            attributes={
-                "UVMap": ("CORNER", _stepped(model.uv.reshape(-1), 0, n).reshape(-1, 2)),
-                "tf_colour": ("FACE", self.colour.reshape(-1, 3)),
-                "tf_transmission": ("FACE", np.full(n * model.polygons, self.transmission, np.float32)),
-                **materials,
-                **motion,
-            },
-        )
-
-
-def _stepped(pattern: NDArray, step: int, rows: int) -> NDArray:
-    """A pattern (k,) over and over, greater by a step each time; as one row (rows * k,), in the pattern's own type.
-
-    What is filled is the source of what follows: additions then run along many rows, not along one short pattern.
-    """
-    out = np.zeros((rows, len(pattern)), pattern.dtype)
-    out[:1] = pattern
-    done = 1
-    while done < rows:
-        more = min(done, _ROWS_AT_ONCE, rows - done)  # a source of no more than so many rows stays in the cache
-        np.add(out[:more], out.dtype.type(done * step), out=out[done : done + more])
-        done += more
-    return out.reshape(-1)
-
 
 #: Vertices of leaves that are worked on at a time: some ten megabytes.
 _VERTICES_AT_ONCE = 120_000
@@ -172,7 +62,7 @@ def leaf_meshes(
     flora: Flora,
     species: int,
     whole: Sequence[WholeBranches],
-    fraction_of: Callable[[Branches], NDArray[np.float64]] | None = None,
+    fractions_of: Callable[[Branches], tuple[NDArray[np.float64], NDArray[np.float64]]] | None = None,
 ) -> Iterator[LeafMesh]:
     """Copies of the leaf models for the leaves on branches of one species, form by form.
 
@@ -182,20 +72,23 @@ def leaf_meshes(
     species : int
         Index into the flora's species.
     whole : sequence of WholeBranches
-    fraction_of : callable, optional
-        Fraction (n,) of the leaves of branches that are wanted; the leaves' own random numbers decide which.
+    fractions_of : callable, optional
+        Fractions (n,), (n,) of the leaves of branches that are wanted, and of these that are triangles; the leaves' own
+        random numbers decide which.
     """
     groups = [group for some in whole for group in _bearers(flora, some)]
-    if fraction_of is not None:
-        for group in groups:
-            group.fraction = fraction_of(group.whole.branches)
-    for kind in sorted({group.kind for group in groups}):
-        own = [group for group in groups if group.kind == kind]
+    if fractions_of is not None:
+        groups = [part for group in groups for part in group.parts(*fractions_of(group.whole.branches))]
+    for kind, small in sorted({(group.kind, group.small) for group in groups}):
+        own = [group for group in groups if (group.kind, group.small) == (kind, small)]
         forms = flora.forms[species][kind]
         numbers = sum(group.numbers(len(forms)) for group in own)
         for form in np.flatnonzero(numbers):
-            transmission = float(flora.leaf.transmission[own[0].row[0]])
-            copies = LeafCopies(forms[form], int(numbers[form]), transmission, moment(flora.rows) > 0)
+            given = int(numbers[form]), float(flora.leaf.transmission[own[0].row[0]]), moment(flora.rows) > 0
+            triangles = small and not forms[form].textured
+            copies = (
+                TriangleCopies(leaf_triangles(forms[form]), *given) if triangles else LeafCopies(forms[form], *given)
+            )
             for group in own:
                 group.add(copies, int(form), len(forms))
             yield LeafMesh(kind, int(form), copies.buffers())
@@ -225,13 +118,33 @@ class _Bearers:
     flora : Flora
     row : int
     whole : WholeBranches of n
+    small : bool
+        The leaves that are wanted here are triangles.
+    fraction, triangles : (n,) float64, optional
+        Fraction of the leaves that is wanted at all, and of these as triangles.
     """
 
-    def __init__(self, flora: Flora, row: int, whole: WholeBranches) -> None:
+    def __init__(
+        self,
+        flora: Flora,
+        row: int,
+        whole: WholeBranches,
+        small: bool = False,
+        fraction: NDArray[np.float64] | None = None,
+        triangles: NDArray[np.float64] | None = None,
+    ) -> None:
         self.flora, self.whole, self.counts = flora, whole, leaf_counts(flora.rows, whole.branches)
-        self.fraction: NDArray[np.float64] | None = None
+        self.small, self.fraction, self.triangles = small, fraction, triangles
         self.row = np.array([row])
         self.kind = int(flora.rows["leaf_kind"][row])
+
+    def parts(self, fraction: NDArray[np.float64], triangles: NDArray[np.float64]) -> Iterator[_Bearers]:
+        """The branches some of whose leaves are wanted as they are, and those with leaves as triangles."""
+        for small, share in ((False, 1.0 - triangles), (True, triangles)):
+            own = np.flatnonzero((fraction > 0.0) & (share > 0.0))
+            if len(own):
+                given = fraction[own], triangles[own]
+                yield _Bearers(self.flora, int(self.row[0]), self.whole.take(own), small, *given)
 
     def numbers(self, forms: int) -> NDArray[np.int64]:
         """How many leaves there are of each form."""
@@ -266,7 +179,8 @@ class _Bearers:
                 turned = settled(rows, self.row, again.frame, again.light, again.sky)
                 turned = in_wind(rows, branches, again, turned, seconds)
                 motion = (again.position - leaves.position) / seconds, (turned - frame) / np.float32(seconds)
-            copies.add(leaves.position, frame, leaves.size, leaf_colours(rows, self.row, key, outward), motion)
+            colours = leaf_colours(rows, self.row, key, outward)
+            copies.add(key, leaves.position, frame, leaves.size, colours, motion)
 
     def _chunks(self, vertices: int) -> Iterator[slice]:
         """Runs of branches, for leaves of a number of vertices."""
@@ -278,7 +192,13 @@ class _Bearers:
         """Branch within the run, number on it, and key of each wanted leaf."""
         owner, index = spread(self.counts[part])
         key = leaf_keys(self.whole.branches.take(part), owner, index)
-        if self.fraction is None or (self.fraction[part] >= 1.0).all():
+        if self.fraction is None:
             return owner, index, key
-        kept = np.flatnonzero(uniform(key, Draw.TRANSITION) < np.take(self.fraction[part], owner))
+        wanted, triangles = self.fraction[part], self.triangles[part]
+        kept = np.ones(len(key), bool)
+        if (wanted < 1.0).any():
+            kept &= uniform(key, Draw.TRANSITION) < wanted[owner]
+        if (triangles < 1.0).any() if self.small else (triangles > 0.0).any():
+            kept &= (uniform(key, Draw.LEAF_TRIANGLE) < triangles[owner]) == self.small
+        kept = np.flatnonzero(kept)
         return owner[kept], index[kept], key[kept]

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from tetflora_addon.growth.foliage import face_light
 from tetflora_addon.species.leaf_models import LEAF_MODELS
-from tetflora_addon.subplants.leaf_meshes import LeafCopies
+from tetflora_addon.species.leaf_triangles import leaf_triangles
+from tetflora_addon.subplants.leaf_copies import LeafCopies, TriangleCopies
 
 
 def frames(number: int, seed: int = 0) -> np.ndarray:
@@ -30,7 +31,7 @@ def test_each_copy_is_the_model(name: str, parts: list[int]) -> None:
     position, colour = rng.normal(size=(number, 3)) * 10, rng.random((number, 3))
     copies = LeafCopies(model, number, 0.25)
     for part in np.split(np.arange(number), np.cumsum(parts)[:-1]):
-        copies.add(position[part], frame[part].astype(np.float32), size[part], colour[part])
+        copies.add(part.astype(np.uint64), position[part], frame[part].astype(np.float32), size[part], colour[part])
     mesh = copies.buffers()
 
     expected = np.einsum("nij,vj->nvi", frame * size[:, None, None], model.positions) + position[:, None]
@@ -47,6 +48,26 @@ def test_each_copy_is_the_model(name: str, parts: list[int]) -> None:
     by_copy = mesh.attributes["tf_colour"][1].reshape(number, -1, 3)
     np.testing.assert_allclose(by_copy, np.broadcast_to(colour[:, None], by_copy.shape), atol=1e-7)
     assert (mesh.attributes["tf_transmission"][1] == np.float32(0.25)).all()
+
+
+def test_triangles_lie_where_their_keys_say() -> None:
+    """However many are placed at a time, a copy is one of the model's triangles, turned, scaled and moved."""
+    triangles, number = leaf_triangles(LEAF_MODELS["needles"]), 4000
+    rng = np.random.default_rng(2)
+    frame, size, position = frames(number), rng.uniform(0.01, 0.3, number), rng.normal(size=(number, 3))
+    key, colour = rng.integers(0, 2**63, number).astype(np.uint64), rng.random((number, 3))
+    meshes = []
+    for parts in ([number], [1500, 2500]):
+        copies = TriangleCopies(triangles, number, 0.25)
+        for part in np.split(np.arange(number), np.cumsum(parts)[:-1]):
+            copies.add(key[part], position[part], frame[part].astype(np.float32), size[part], colour[part])
+        meshes.append(copies.buffers())
+    assert (meshes[0].positions == meshes[1].positions).all()
+    placed = np.einsum("nij,kvj->nkvi", frame * size[:, None, None], triangles.positions) + position[:, None, None]
+    off = np.abs(meshes[0].positions.reshape(number, 1, 3, 3) - placed).max(axis=(2, 3))
+    assert off.min(axis=1).max() < 1e-5
+    taken = np.bincount(off.argmin(axis=1), minlength=len(triangles.share)) / number
+    np.testing.assert_allclose(taken, np.diff(triangles.share, prepend=0.0), atol=0.04)
 
 
 @given(st.integers(0, 2**31), st.floats(0, 1), st.sampled_from([0.0, 1e-7, 1e-5, 1e-3, 0.1, 2.0]))
@@ -79,5 +100,5 @@ def test_single_precision_turns_leaves_to_the_light(seed: int, light: float, til
 def test_no_copies_are_a_mesh_without_faces() -> None:
     """Of several forms of leaf, a chunk may have none of one."""
     copies = LeafCopies(LEAF_MODELS["ovate"], 0, 0.4)
-    copies.add(np.zeros((0, 3)), np.zeros((0, 3, 3), np.float32), np.zeros(0), np.zeros((0, 3)))
+    copies.add(np.zeros(0, np.uint64), np.zeros((0, 3)), np.zeros((0, 3, 3), np.float32), np.zeros(0), np.zeros((0, 3)))
     assert copies.buffers().polygons == 0

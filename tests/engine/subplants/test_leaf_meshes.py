@@ -10,6 +10,7 @@ import pytest
 from tests.engine import support
 from tetflora_addon.buffers import MeshBuffers, concatenate_buffers
 from tetflora_addon.growth.growth import radius_at
+from tetflora_addon.subplants.leaf_meshes import LeafMesh, leaf_meshes
 from tetflora_addon.subplants.pieces import Pieces, wood_areas
 
 
@@ -180,6 +181,28 @@ def test_species_of_one_seed_are_plants_of_their_own() -> None:
     together = support.tube_mesh(flora, pieces).polygons
     apart = [support.tube_mesh(flora, pieces.take(flora.species_of(pieces.branches.row) == s)).polygons for s in (0, 1)]
     assert together == sum(apart)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
+@pytest.mark.parametrize("species", ["maple", "cherry_blossom", "scots_pine"])
+def test_triangles_in_the_place_of_leaves(species: str, share: float) -> None:
+    """Each leaf is made once, as it is or as a triangle of the same area; the more are triangles, the same ones."""
+    flora = support.compiled(support.shipped(species))
+    whole = support.whole_of(flora, support.grown(flora, support.plants(3, scale=0.5))[1])
+
+    def made(wanted: float, triangles: float) -> list[LeafMesh]:
+        return list(leaf_meshes(flora, 0, [whole], lambda own: (np.full(len(own), f) for f in (wanted, triangles))))
+
+    def area(meshes: list[LeafMesh]) -> float:
+        return sum(support.face_areas(mesh.buffers).sum() for mesh in meshes)
+
+    every, some = made(1.0, 0.0), made(1.0, share)
+    for mesh in some:
+        check_topology(mesh.buffers)
+    if share == 1.0:
+        leaves = sum(m.buffers.polygons // flora.forms[0][m.kind][m.form].polygons for m in every)
+        assert sum(m.buffers.polygons for m in some) == leaves
+    np.testing.assert_allclose(area(some), area(every), rtol=1e-4)
 
 
 def test_concatenation() -> None:

@@ -16,6 +16,7 @@ from typing import TypeVar
 import bpy
 import numpy as np
 
+from ... import memory
 from ...buffers import MeshBuffers
 from ...camera.camera import Camera
 from ...compiled.flora import Flora, compile_species
@@ -121,6 +122,7 @@ def refine_steps(
     release_materials()
     hide_originals(scene, results.purpose, originals)
     results.finish()
+    memory.give_back()
     statistics.seconds = dict(clock.seconds)
     scene.tetflora.statistics = json.dumps(statistics.as_dict())
     return statistics

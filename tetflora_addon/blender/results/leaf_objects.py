@@ -80,7 +80,7 @@ def _model_of(species: Species, source: bpy.types.Object, depsgraph: bpy.types.D
     faces = [corners[a:b].tolist() for a, b in pairwise(offsets)]
     model = leaf_model(arrays.positions, faces)
     if UV_MAP in arrays.attributes:
-        model = replace(model, uv=arrays.attributes[UV_MAP][1])
+        model = replace(model, uv=arrays.attributes[UV_MAP][1], textured=True)
     if len(source.material_slots) > 1 and _INDEX in arrays.attributes:
         model = replace(model, material_index=arrays.attributes[_INDEX][1])
     return model
