@@ -122,19 +122,26 @@ def _timed(steps: Iterator[Progress], taken: list[tuple[float, str]]) -> Generat
 
 
 def left_open(refinement: Refinement) -> dict[str, float]:
-    """How many sub-plants and pieces of branches are open, by what was decided on the cells that hold them."""
+    """How many parts of plants are open, by what was decided on the tetrahedra that they are in.
+
+    A part that several tetrahedra share counts in each by the fraction of its area there. Whole plants are not open.
+    """
     nodes = np.zeros(len(refinement.tree), np.int8)
     nodes[refinement.nodes] = refinement.decision
-    contents = refinement.contents
-    found = sum(
-        np.bincount(nodes[kind.cell], minlength=len(Decision)) for kind in (contents.subplants, contents.pieces)
-    )
+    parts, points = refinement.plants.parts, refinement.plants.points
+    # Plants grow from the first row of their species.
+    trunks = np.flatnonzero(np.diff(refinement.plants.flora.rows["species"], prepend=-1))
+    whole = ~parts.alone & np.isin(parts.branches.row, trunks)
+    area = points.optical_area.astype(np.float64)
+    share = area / np.maximum(np.bincount(points.part, area, len(parts)), 1e-300)[points.part]
+    share[whole[points.part]] = 0.0
+    found = np.bincount(nodes[points.cell], share, minlength=len(Decision))
     cells = np.bincount(refinement.decision, minlength=len(Decision))
-    seen = int(found[Decision.EXPLICIT] + found[Decision.PROXY])
+    seen = float(found[Decision.EXPLICIT] + found[Decision.PROXY])
     return {
-        "open_hidden": int(found[Decision.HIDDEN]),
+        "open_hidden": float(found[Decision.HIDDEN]),
         "open_seen": seen,
-        "hidden_open": float(found[Decision.HIDDEN] / max(seen, 1)),
+        "hidden_open": float(found[Decision.HIDDEN] / max(seen, 1.0)),
         **{
             f"cells_{one.name.lower()}": int(cells[one]) for one in (Decision.HIDDEN, Decision.EXPLICIT, Decision.PROXY)
         },

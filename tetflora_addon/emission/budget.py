@@ -33,9 +33,9 @@ BYTES_PER_POLYGON = 610
 #: The same for a microsphere in a point cloud.
 BYTES_PER_SPHERE = 210
 #: Polygons and facets for each pixel of the image that are enough, and the number that is never too many.
-ENOUGH_A_PIXEL, NEVER_TOO_MANY = 2.0, 1_500_000.0
+ENOUGH_A_PIXEL, NEVER_TOO_MANY = 2.3, 1_500_000.0
 #: Fraction of them that may be hidden, and how many hidden ones are never too many.
-_HIDDEN, _FEW_HIDDEN = 0.2, 300_000.0
+_HIDDEN, _FEW_HIDDEN = 0.3, 300_000.0
 #: Facets grow to so many times their size before real leaves become fewer.
 FACETS_FIRST = 6.0
 #: Reserved fraction of a budget that somebody has set, since expected numbers are means.
@@ -45,7 +45,7 @@ _TWIGS = 0.15
 _STEPS = 12  # of bisection on the logarithm of factors, between 1 and:
 _LARGEST = 256.0
 #: Largest factor on hidden facets that the image alone may ask for.
-_LARGEST_HIDDEN = 24.0
+_LARGEST_HIDDEN = 96.0
 
 
 @dataclass(frozen=True)

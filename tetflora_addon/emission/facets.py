@@ -187,8 +187,8 @@ class _Maker:
         if transition is not None:
             seen = portions.visibility > 0
             real = np.where(portions.real & seen, transition.of_branches(branches, portions.visibility), 0.0)
-            among, bare = (transition.of_wood(branches, portions.visibility, leaves) for leaves in (True, False))
-            tubes = (seen & np.where(real > 0, among, bare))[owner]
+            tubes, twigs = transition.of_wood(branches, portions.visibility)
+            tubes = (seen & (tubes | (twigs & (real > 0))))[owner]
             real = real[owner]
         return piece_facets(flora, pieces, leaf, wood, weight, real, tubes)
 

@@ -33,16 +33,17 @@ from ..species.species import LEAF_KINDS
 from ..subplants.leaf_meshes import leaf_meshes
 from ..subplants.pieces import chunks, expand
 from ..subplants.tubes import tube_buffers
+from ..subplants.twigs import twig_buffers
 from .portions import MIXED, Portions, Sight, in_chunks
 
 #: Width from which on all leaves are real over the width up to which none is.
 BAND = 2.5
+#: Fraction of leaves that counts at least: opening sub-plants for a few real leaves is work as well.
+_LEAST_REAL = 0.1
 #: Width in pixels up to which real leaves are triangles.
 TRIANGLES = 2.0
 #: Power of the visibility by which the width of things counts as smaller.
 FADING = 0.25
-#: Among real leaves, wood counts as so many times as wide.
-TWIGS = 4.0
 
 
 @dataclass(frozen=True)
@@ -80,19 +81,17 @@ class Transition:
         """Real fraction (n,) of the leaves and the wood of sub-plants; of leafless ones by the base of their branch."""
         return self.fraction(self._width(branches), branches.position, visibility)
 
-    def of_wood(
-        self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0, among_leaves: bool = True
-    ) -> NDArray[np.bool_]:
-        """Branches (n,) whose wood is real, by its own width or also by that of the leaves on the branch."""
-        return uniform(branches.key, Draw.TRANSITION) < self.of_thickness(branches, visibility, among_leaves)
+    def of_thickness(self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0) -> NDArray[np.float64]:
+        """Fraction (n,) of branches like these that are tubes."""
+        return self.fraction(2.0 * branches.radius, branches.position, visibility)
 
-    def of_thickness(
-        self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0, among_leaves: bool = False
-    ) -> NDArray[np.float64]:
-        """Fraction (n,) of branches like these whose wood is real."""
-        own = 2.0 * branches.radius
-        width = np.minimum(TWIGS * own, np.maximum(own, self._width(branches))) if among_leaves else own
-        return self.fraction(width, branches.position, visibility)
+    def of_wood(
+        self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Branches (n,) that are tubes, and (n,) that are triangles if their leaves may be real."""
+        number = uniform(branches.key, Draw.TRANSITION)
+        tubes = number < self.of_thickness(branches, visibility)
+        return tubes, ~tubes & (number < self.of_branches(branches, visibility))
 
     def _width(self, branches: Branches) -> NDArray[np.float64]:
         row = branches.row
@@ -137,7 +136,7 @@ def explicit_blocks(
     sight = Sight(flora, result, camera, facets=transition is not None)
     portions = sight.portions()
     portions = portions.take(np.flatnonzero(_may_be_real(portions, transition)))
-    expected = portions.parts.totals.polygons
+    expected = portions.parts.totals.polygons * np.maximum(_real_leaves(portions, transition), _LEAST_REAL)
     done, whole = np.cumsum(expected), max(float(expected.sum()), 1.0)
     for number, run in enumerate(in_chunks(expected, BLOCK_POLYGONS)):
         fraction = float(done[run[-1]]) / whole if len(run) else 1.0
@@ -146,13 +145,19 @@ def explicit_blocks(
 
 def _may_be_real(portions: Portions, transition: Transition | None) -> NDArray[np.bool_]:
     """Portions (n,) of which leaves or wood may be polygons."""
+    may = _real_leaves(portions, transition) > 0
+    if transition is not None:
+        may |= (portions.best > 0) & (transition.of_thickness(portions.parts.branches, portions.best) > 0)
+    return may
+
+
+def _real_leaves(portions: Portions, transition: Transition | None) -> NDArray[np.float64]:
+    """Fraction (n,) of the leaves of portions that is real where they are seen best."""
     if transition is None:
-        return portions.real
-    branches, seen = portions.parts.branches, portions.visibility > 0
-    # What is seen here and there is seen better in places.
-    best = np.where(portions.mixed, 1.0, portions.visibility)
-    leaves = portions.real & (transition.of_branches(branches, best) > 0)
-    return seen & (leaves | (transition.of_thickness(branches, best) > 0))
+        return portions.real.astype(float)
+    return np.where(
+        portions.real & (portions.best > 0), transition.of_branches(portions.parts.branches, portions.best), 0.0
+    )
 
 
 def _real_parts(
@@ -228,12 +233,14 @@ def _block(
         leaves = leaf_meshes(flora, int(s), whole, None if transition is None else fractions_of)
         made += [(LEAF_KINDS[m.kind], m.form, int(s), m.buffers) for m in leaves]
         if transition is not None:
-            kept = (transition.of_wood(some.branches, visibility[some.branches.plant]) for some in whole)
-            whole = [some.take(np.flatnonzero(wood)) for some, wood in zip(whole, kept, strict=True)]
+            wood = [transition.of_wood(some.branches, visibility[some.branches.plant]) for some in whole]
+            twigs = [some.take(np.flatnonzero(thin)) for some, (_, thin) in zip(whole, wood, strict=True)]
+            whole = [some.take(np.flatnonzero(tubes)) for some, (tubes, _) in zip(whole, wood, strict=True)]
+            made.append(("bark", 0, int(s), twig_buffers(flora, twigs)))
         if bare is not None:
             own = bare.take(np.flatnonzero(of_bare == s))
-            keep = transition.of_wood(own.branches, visibility[own.branches.plant], among_leaves=False)
-            whole.append(own.take(np.flatnonzero(keep)))
+            tubes, _ = transition.of_wood(own.branches, visibility[own.branches.plant])
+            whole.append(own.take(np.flatnonzero(tubes)))
         made.append(("bark", 0, int(s), tube_buffers(flora, whole)))
         del whole
     # The caller copies each block into Blender; meanwhile its sources and the blocks already taken are not kept.

@@ -42,6 +42,8 @@ class Portions(Arrays):
     parts : PlantParts of n
     visibility : (n,) float64
         Mean fraction of light that nothing in front blocks, 0 where all of it is hidden or beside the view.
+    best : (n,) float64
+        The largest visibility in any of its tetrahedra.
     real : (n,) bool
         Whether some of it may be drawn as it is: it reaches into an explicit tetrahedron.
     mixed : (n,) bool
@@ -56,6 +58,7 @@ class Portions(Arrays):
 
     parts: PlantParts = field(metadata=nested(PlantParts))
     visibility: NDArray[np.float64]
+    best: NDArray[np.float64]
     real: NDArray[np.bool_] = field(metadata=column(dtype=bool))
     mixed: NDArray[np.bool_] = field(metadata=column(dtype=bool))
     beside: NDArray[np.bool_] = field(metadata=column(dtype=bool))
@@ -110,9 +113,12 @@ class Sight:
         unseen = np.maximum(1.0 - seen, 1e-12)
         first = np.full(count, -1, np.int64)
         first[points.part[::-1]] = np.arange(len(points))[::-1]
+        best = np.zeros(count)
+        np.maximum.at(best, points.part, visibility)
         return Portions(
             parts,
             np.where(seen > SOME, mean(visibility), 0.0),
+            np.where(seen > SOME, best, 0.0),
             mean(self._explicit[cell]) > 0,
             (seen > SOME) & (seen < 1.0 - SOME),
             mean(self._inside[cell]) <= 0.0,
@@ -147,7 +153,7 @@ class Sight:
         return self.plants.pixels(portions.parts)
 
 
-_INHERITED = ("visibility", "real", "mixed", "beside", "coarse", "rank")
+_INHERITED = ("visibility", "best", "real", "mixed", "beside", "coarse", "rank")
 
 
 def _rest(points: SharePoints) -> tuple[NDArray, NDArray, NDArray, NDArray]:

@@ -56,6 +56,7 @@ class Draw(IntEnum):
     SWAY_UP = 28
     LEAF_TRIANGLE = 29
     LEAF_PLANE = 30
+    TWIG_TURN = 31
     BEND = 32  # one for each segment and axis from here on
 
 

@@ -122,14 +122,14 @@ class FacetSizes(Arrays):
         away = np.maximum(self.clearance, nearest)
         most = np.where(beside, near * away * (1.0 + (away / far) ** 2), 0.0)
         blot = np.minimum((np.maximum(self.coarse, COARSE) / COARSE) ** 1.5 * max(_WIDEST, pixels.seen), _BLOT)
-        # Where a forest has too many even so, those beside the view grow.
-        most = np.where(beside, most * max(pixels.hidden / _LOOSE, 1.0), blot * self.extent)
+        # Where a forest has too many even so, these limits give way.
+        most = max(pixels.hidden / _LOOSE, 1.0) * np.where(beside, most, blot * self.extent)
         # Beside the view they must not reach into it, or they would lose area.
         unseen = np.clip(pixels.hidden ** np.where(beside, 1.0, deep) * unseen, unseen, np.maximum(unseen, most))
         side = np.where(self.hidden, unseen, side)
         # Hidden wood is cut into no more facets than it has faces. Elsewhere it is cut as fine as the side requires, or
         # thin twigs would become blots.
-        least = np.where(beside, self.least_wood, np.minimum(self.least_wood, blot * self.extent))
+        least = np.where(beside, self.least_wood, np.minimum(self.least_wood, most))
         wood = np.where(self.hidden, np.maximum(side, least), side)
         return np.maximum(side, np.sqrt(self.one_leaf)), wood
 

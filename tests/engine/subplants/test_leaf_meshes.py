@@ -12,6 +12,8 @@ from tetflora_addon.buffers import MeshBuffers, concatenate_buffers
 from tetflora_addon.growth.growth import radius_at
 from tetflora_addon.subplants.leaf_meshes import LeafMesh, leaf_meshes
 from tetflora_addon.subplants.pieces import Pieces, wood_areas
+from tetflora_addon.subplants.tubes import tube_buffers
+from tetflora_addon.subplants.twigs import twig_buffers
 
 
 def check_topology(mesh: MeshBuffers) -> None:
@@ -203,6 +205,29 @@ def test_triangles_in_the_place_of_leaves(species: str, share: float) -> None:
         leaves = sum(m.buffers.polygons // flora.forms[0][m.kind][m.form].polygons for m in every)
         assert sum(m.buffers.polygons for m in some) == leaves
     np.testing.assert_allclose(area(some), area(every), rtol=1e-4)
+
+
+def test_twigs_show_what_their_tubes_show() -> None:
+    """A triangle has half of the surface, from base to tip; over many, as much is seen from everywhere."""
+    flora = support.compiled(support.shipped("birch"))
+    pieces = support.grown(flora, support.plants(3, scale=0.3))[1]
+    whole = support.whole_of(flora, pieces.take(pieces.branches.row == pieces.branches.row.max()))
+    twigs, tubes = twig_buffers(flora, [whole]), tube_buffers(flora, [whole])
+    check_topology(twigs)
+    check_attributes(twigs)
+    assert twigs.polygons == len(whole)
+    assert support.face_areas(twigs).sum() == pytest.approx(support.face_areas(tubes).sum() / 2, rel=0.02)
+    a, b, c = twigs.positions[twigs.corner_verts].reshape(-1, 3, 3).transpose(1, 0, 2)
+    np.testing.assert_allclose((a + b) / 2, whole.branches.position, atol=1e-5)
+    corners = tubes.positions[tubes.corner_verts].reshape(-1, 4, 3)
+    across = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]) / 2
+    directions = np.random.default_rng(0).normal(size=(200, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    ours = np.abs(directions @ (np.cross(b - a, c - a) / 2).T).sum(axis=1)
+    theirs = np.abs(directions @ across.T).sum(axis=1) / 2
+    assert ours.mean() == pytest.approx(theirs.mean(), rel=0.03)
+    np.testing.assert_allclose(ours, theirs, rtol=0.15)  # tubes are bent
+    assert twig_buffers(flora, []) is None
 
 
 def test_concatenation() -> None:
