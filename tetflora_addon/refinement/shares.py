@@ -199,18 +199,18 @@ def opened(flora: Flora, parts: PlantParts) -> Iterator[tuple[PlantParts, NDArra
 
 def lowered(tree: TetrahedralTree, points: SharePoints) -> NDArray[np.int32]:
     """Terminal nodes (m,) that points are in, below those that they are known to be in."""
-    cell = points.cell.copy()
-    every = np.flatnonzero(tree.children[cell, 0] >= 0)
+    cell, children = points.cell.copy(), tree.children.reshape(-1)
+    every = np.flatnonzero(np.take(children, 2 * cell) >= 0)
     for start in range(0, len(every), LOWERED_AT_ONCE):
         moving = every[start : start + LOWERED_AT_ONCE]
-        place = np.take(points.position, moving, axis=0)
+        place = np.take(points.position, moving, axis=0).astype(np.float64)
         while len(moving):
             at = np.take(cell, moving)
             plane = tree.planes(at)
             side = plane[:, 3] + np.einsum("ni,ni->n", plane[:, :3], place) >= 0.0
-            at = tree.children[at, side.astype(np.intp)]
+            at = np.take(children, 2 * at + side)
             cell[moving] = at
-            left = np.flatnonzero(tree.children[at, 0] >= 0)
+            left = np.flatnonzero(np.take(children, 2 * at) >= 0)
             if len(left) < len(moving):
                 moving, place = moving[left], np.take(place, left, axis=0)
     return cell
