@@ -14,6 +14,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from tetflora_addon import memory
 from tetflora_addon.blender import worker
 from tetflora_addon.blender.job import refine
 from tetflora_addon.emission.budget import Detail
@@ -81,6 +82,7 @@ def refined(scene: bpy.types.Scene, at_once: bool = False) -> dict:
         seconds, processor = time.perf_counter() - start, time.process_time() - processor
     peak = peak_mb()
     found = left_open(kept.pop()) if kept else {}
+    memory.give_back()  # as the job has done, but for what was kept here to be counted
     forget_peak()  # counting made copies
     longest = sorted(taken, reverse=True)[:_NAMED]
     return {
