@@ -31,6 +31,7 @@ NAMES = (
     "curves",
     "foreign",
     "closed_form",
+    "edited_species",
     "fidelity",
     "populate",
     "viewport",

@@ -8,6 +8,7 @@ import json
 
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.proxies import facet_weights
+from tetflora_addon.refinement.statistics import at_once
 from tetflora_addon.species.catalogue import list_species, load_species
 
 
@@ -15,15 +16,14 @@ def main() -> None:
     """Fit all species and write them in the order of the catalogue."""
     facet_weights.TABLE.parent.mkdir(exist_ok=True)
     facet_weights.TABLE.unlink(missing_ok=True)
-    facet_weights.shipped.cache_clear()
     table = {}
     for identifier in sorted(list_species()):
         flora = compile_species([load_species(identifier)])
-        found = facet_weights.facet_weights(flora)
+        whole, own = at_once(facet_weights.fitting(flora, 0))
         table[facet_weights.digest(flora, 0)] = {
             "species": identifier,
-            "whole": found.whole.round(3).tolist(),
-            "own": found.own.round(3).tolist(),
+            "whole": whole.round(3).tolist(),
+            "own": own.round(3).tolist(),
         }
         print(identifier, flush=True)
     facet_weights.TABLE.write_text(json.dumps(table, separators=(",", ":")).replace('},"', '},\n"') + "\n")

@@ -65,7 +65,7 @@ def test_an_edited_species_is_looked_at_once(cache, tmp_path, monkeypatch):
 
     monkeypatch.setattr(facet_weights, "_found", {})
     facet_weights._of_flora.cache_clear()
-    monkeypatch.setattr(facet_weights, "fitted_weights", lambda *_: pytest.fail("looked at again"))
+    monkeypatch.setattr(facet_weights, "fitting", lambda *_: pytest.fail("looked at again"))
     refine.refine(scene, depsgraph())
     assert bpy.ops.tetflora.clear_cache() == {'FINISHED'}
     assert [p.name for p in (tmp_path / "cache").iterdir()] == ["notes.txt"]

@@ -268,7 +268,7 @@ def test_a_species_of_ones_own_is_looked_at_once_for_all_sessions(
     weights, clumping = facet_weights.facet_weights(alone), alone.clumping
     assert len(files(folder)) == 2
     monkeypatch.setattr(facet_weights, "_found", {})  # another session
-    monkeypatch.setattr(facet_weights, "fitted_weights", lambda _, n: pytest.fail(f"looked at {n} again"))
+    monkeypatch.setattr(facet_weights, "fitting", lambda _, n, _rays: pytest.fail(f"looked at {n} again"))
     monkeypatch.setattr(facet_weights, "shipped", lambda: {facet_weights.digest(compile_species([other]), 0): TABLE})
     both = compile_species([other, one])
     rows = both.rows["species"] == 1

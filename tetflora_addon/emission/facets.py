@@ -94,8 +94,8 @@ def _facets(
 ) -> Iterator[tuple[int | None, Facets, bool]]:
     """Facets in runs of about `FACETS_AT_ONCE`, species by species."""
     sight = Sight(flora, result, camera)
-    maker = _Maker(sight, facet_weights(flora), pixels, transition)
     portions = sight.portions()
+    maker = _Maker(sight, facet_weights(flora, _drawn(flora, portions, transition)), pixels, transition)
     of_species = flora.rows["species"][portions.parts.branches.row]
     for species in range(len(flora.species)):
         own = portions.take(np.flatnonzero(of_species == species))
@@ -109,6 +109,21 @@ def _facets(
     if len(proxies):
         for facets, seen in polygon_facets(proxies, result, camera, pixels.seen, FACETS_AT_ONCE):
             yield None, facets, seen
+
+
+def drawn_species(flora: Flora, result: Refinement, camera: Camera, transition: Transition | None) -> list[int]:
+    """Species of which facets may be drawn, by index; arguments as for `facet_parts`."""
+    return _drawn(flora, Sight(flora, result, camera).portions(), transition)
+
+
+def _drawn(flora: Flora, portions: Portions, transition: Transition | None) -> list[int]:
+    """Species of portions whose leaves are not all real; where they are, so is all wood."""
+    branches, visibility = portions.parts.branches, portions.visibility
+    facets = np.ones(len(portions), bool)
+    if transition is not None:
+        real = portions.real & (visibility > 0) & ~portions.mixed
+        facets = ~(real & (transition.of_branches(branches, visibility) >= 1.0))
+    return np.unique(flora.rows["species"][branches.row[facets]]).tolist()
 
 
 def sizes_of(flora: Flora, portions: Portions, camera: Camera) -> FacetSizes:

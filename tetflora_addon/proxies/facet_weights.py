@@ -7,6 +7,11 @@ area they would be up to three times as opaque. Rays are cast through grown sub-
 through their facets, at several numbers of facets; with the right weight as many rays are blocked. Weights are for
 facets what `compiled.clumping` is for evenly filled cells.
 
+Those of shipped species are tables, measured with all rays. Others, new or changed by an artist, are measured when
+their first facet is drawn, in steps of a fraction of a second, with fewer rays where more would say the same: within
+.02 of what all rays say (`tests/engine/proxies/test_quick_weights.py`). They follow from the species alone and are
+never refined later, so that no two frames of a film, and no two computers of a farm, have different ones.
+
 Sub-plants are tested together with their next siblings, because facets spill over. Where few facets stand for one,
 all that grow around it take part, because facets then reach across the gaps between neighbours of any parent. Facets
 of pieces are compared in the same way with what branches themselves bear.
@@ -15,7 +20,7 @@ of pieces are compared in the same way with what branches themselves bear.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Collection, Generator, Iterator
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from pathlib import Path
@@ -23,18 +28,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import GOLDEN_TURN, spiral, spread
 from ..compiled.flora import Flora
-from ..compiled.rays import Things, basis, covered, things_of
 from ..growth.branches import Branches
 from ..growth.growth import trunks
 from ..growth.hashing import mix
 from ..growth.seeds import Seeds
-from ..refinement.contents import piece_totals, subplant_totals
+from ..refinement.statistics import at_once
 from ..species.species import fingerprint
 from ..storage import remembered
-from ..subplants.pieces import Pieces, open_subplants
-from .microsurfaces import CIRCUMRADIUS, SIN_60, Facets, piece_facets, subplant_facets
+from ..subplants.pieces import open_subplants
+from .sights import FAMILIES, LARGEST, Families, View, least_weights, look
 
 #: Weights of the shipped species, made by ``python -m devtools.facet_tables``. Raise `_METHOD` when facets or weights
 #: are made differently.
@@ -44,17 +47,18 @@ _METHOD = 2
 COUNTS = 4.0 ** np.arange(-2, 6)
 #: With fewer facets for a sub-plant its neighbours count, and not only its siblings.
 _FEW = 4.0
-#: Families of a row that are tested, and polygons of all of them; maximum members of one, siblings or neighbours.
-_FAMILIES, _POLYGONS = 6, 50_000.0
+#: Polygons of all families of a row; maximum members of one, siblings or neighbours.
+_POLYGONS = 50_000.0
 _SIBLINGS, _NEIGHBOURS = 12, 60
 #: Facets for each number, over all families: copies are made up to the first; with fewer than the second a number is
 #: skipped; after more than the third no larger number is tried.
 _WANTED, _NEEDED, _MOST = 250.0, 60.0, 5_000.0
 _COPIES = 16
-#: Rays across a family, and directions of rays.
-_RAYS, _DIRECTIONS = 36, 4
-#: Maximum weight.
-_LARGEST = 1.6
+#: Blocked rays from which the weights of species that are not shipped follow, about; and the facets, over all views,
+#: that may lie in the way of each.
+RAYS, _PAIRS = 6_000.0, 40.0
+#: Name of the results in the cache folder. The first method, with all rays, had another.
+_KIND = "facet_shares"
 
 
 @dataclass(frozen=True)
@@ -91,39 +95,73 @@ _found: dict[str, NDArray[np.float64]] = {}
 _REMEMBERED = 256
 
 
-def facet_weights(flora: Flora) -> FacetWeights:
-    """Weights for a flora, cached in memory.
+def facet_weights(flora: Flora, species: Collection[int] | None = None) -> FacetWeights:
+    """Weights for a flora, cached in memory, of some of its species (index) or of all; the others' are 1.
 
-    Those of the shipped species are read from `TABLE`. Others take some seconds a species and are cached on disk too.
+    Those of the shipped species are read from `TABLE`. Others take a second or two each, and are cached on disk too.
     """
-    return _of_flora(flora.at_rest)
+    every = range(len(flora.species)) if species is None else species
+    return _of_flora(flora.at_rest, tuple(sorted(set(every))))
 
 
 @lru_cache(maxsize=8)
-def _of_flora(flora: Flora) -> FacetWeights:
+def _of_flora(flora: Flora, species: tuple[int, ...]) -> FacetWeights:
     weights = np.ones((2, len(flora.rows), len(COUNTS)))
-    for number, first in enumerate(flora.first_row):
-        name = digest(flora, number)
-        known = shipped().get(name)
-        found = _of_species(flora, number, name) if known is None else np.array([known["whole"], known["own"]])
-        weights[:, first : first + found.shape[1]] = found
+    for number in species:
+        at_once(measuring(flora, (number,)))
+        weights[:, flora.rows["species"] == number] = _known(flora, number)
     return FacetWeights(*weights)
 
 
-def _of_species(flora: Flora, number: int, name: str) -> NDArray[np.float64]:
-    """Weights (2, r, k) of one species, which do not depend on the other species of the flora."""
+def unmeasured(flora: Flora) -> list[int]:
+    """Species (index) whose weights nobody has measured yet."""
+    return [number for number in range(len(flora.species)) if _known(flora.at_rest, number) is None]
+
+
+def measuring(flora: Flora, species: Collection[int]) -> Generator[tuple[str, float], None, None]:
+    """Measure weights that are not known yet; `facet_weights` has them afterwards.
+
+    Yields
+    ------
+    str, float
+        Name of the species at work, and the fraction of its measurement that is done.
+    """
+    flora = flora.at_rest
+    for number in sorted(set(species) & set(unmeasured(flora))):
+        work, name = fitting(flora, number, RAYS), flora.species[number].name
+        while True:
+            try:
+                yield name, next(work)
+            except StopIteration as stop:
+                found = stop.value
+                break
+        content = digest(flora, number)
+        _keep(content, remembered(_KIND, content, found.shape, lambda found=found: found))
+
+
+def _known(flora: Flora, number: int) -> NDArray[np.float64] | None:
+    """Weights (2, r, k) of one species, which do not depend on the others of the flora; None if nobody has measured."""
+    name = digest(flora, number)
+    table = shipped().get(name)
+    if table is not None:
+        return np.array([table["whole"], table["own"]])
     if name not in _found:
-        rows = np.flatnonzero(flora.rows["species"] == number)
-
-        def find_out() -> NDArray[np.float64]:
-            fitted = fitted_weights(flora, np.array([number], np.int32))
-            return np.stack([fitted.get(int(row), np.ones((2, len(COUNTS)))) for row in rows], axis=1)
-
-        found = remembered("facet_weights", name, (2, len(rows), len(COUNTS)), find_out)
-        if len(_found) >= _REMEMBERED:
-            _found.clear()
-        _found[name] = found
+        rows = int((flora.rows["species"] == number).sum())
+        try:
+            _keep(name, remembered(_KIND, name, (2, rows, len(COUNTS)), _unknown))
+        except LookupError:
+            return None
     return _found[name]
+
+
+def _unknown() -> NDArray[np.float64]:
+    raise LookupError("not measured yet")
+
+
+def _keep(name: str, found: NDArray[np.float64]) -> None:
+    if len(_found) >= _REMEMBERED:
+        _found.clear()
+    _found[name] = found
 
 
 def digest(flora: Flora, number: int) -> str:
@@ -140,24 +178,43 @@ def shipped() -> dict[str, dict[str, list[list[float]]]]:
         return {}
 
 
-def fitted_weights(
-    flora: Flora, species: NDArray[np.int32]
-) -> dict[int, tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Weights (k,), (k,) by row of some species, of sub-plants and of what branches themselves bear."""
-    few, out = COUNTS < _FEW, {}
+def fitting(flora: Flora, number: int, rays: float = np.inf) -> Generator[float, None, NDArray[np.float64]]:
+    """Measure the weights (2, r, k) of one species: of sub-plants, and of what branches themselves bear.
+
+    Parameters
+    ----------
+    flora : Flora
+    number : int
+        Index of the species.
+    rays : float
+        Blocked rays that each weight is to follow from, about; the lattice is made coarser where there are more.
+
+    Yields
+    ------
+    float
+        Fraction that is done.
+    """
+    rows = np.flatnonzero(flora.rows["species"] == number)
+    few, out, seen, done = COUNTS < _FEW, np.ones((2, len(rows), len(COUNTS))), {}, 0
     for siblings, counts in ((False, few), (True, ~few)):
-        for row, families in _families(flora, species, siblings).items():
+        for row, families in _families(flora, number, siblings).items():
             apart = _apart(flora, families)
-            sights = _Sight.of_subplants(flora, *apart), _Sight.of_branches(flora, *apart)
-            for weights, sight in zip(out.setdefault(row, np.ones((2, len(COUNTS)))), sights, strict=True):
-                weights[counts] = _fitted(sight)[counts]
+            for kind, make in enumerate((Families.of_subplants, Families.of_branches)):
+                fitted = _fitted(make(flora, *apart), counts, rays, seen)
+                while True:
+                    try:
+                        yield min((done + next(fitted)) / (4 * len(rows)), 1.0)
+                    except StopIteration as stop:
+                        out[kind, row - rows[0], counts] = stop.value[counts]
+                        break
+                done += 1
     return out
 
 
-def _families(flora: Flora, species: NDArray[np.int32], siblings: bool) -> dict[int, list[Branches]]:
-    """Sub-plants of each row of some species that grow together, in a few plants or on a few parents of each row."""
-    which = np.repeat(species, _FAMILIES)
-    n = len(which)
+def _families(flora: Flora, number: int, siblings: bool) -> dict[int, list[Branches]]:
+    """Sub-plants of each row of a species that grow together, in a few plants or on a few parents of each row."""
+    n = FAMILIES
+    which = np.full(n, number, np.int32)
     names = tuple(s.identifier for s in flora.species)
     seeds = Seeds(names, which, np.arange(n), np.zeros((n, 3)), np.tile(np.eye(3), (n, 1, 1)), np.ones(n))
     level, plant, found = trunks(flora.rows, seeds), np.arange(n), {}
@@ -165,7 +222,7 @@ def _families(flora: Flora, species: NDArray[np.int32], siblings: bool) -> dict[
     while len(level):
         some = []
         for row in np.unique(level.row):
-            own, most = np.flatnonzero(level.row == row), _POLYGONS / _FAMILIES / max(flora.polygons[row], 1.0)
+            own, most = np.flatnonzero(level.row == row), _POLYGONS / FAMILIES / max(flora.polygons[row], 1.0)
             choose = _siblings if siblings else _neighbours
             for members in choose(level, own, parent if siblings else plant, most):
                 some.append(members)
@@ -182,7 +239,7 @@ def _siblings(
     """Sub-plants in the middle of some parents."""
     members = int(np.clip(most, 1, _SIBLINGS))
     parents = np.unique(parent[own])
-    for p in parents[np.argsort(mix(parents.astype(np.uint64)))[:_FAMILIES]]:
+    for p in parents[np.argsort(mix(parents.astype(np.uint64)))[:FAMILIES]]:
         born = own[parent[own] == p]
         first = (len(born) - min(members, len(born))) // 2
         yield born[first : first + members]
@@ -202,7 +259,7 @@ def _neighbours(
 
 def _affordable(flora: Flora, families: list[Branches]) -> list[Branches]:
     """As many of the families as their polygons allow, and at least one."""
-    families = [families[i] for i in np.argsort(mix(np.arange(len(families)).astype(np.uint64)))][:_FAMILIES]
+    families = [families[i] for i in np.argsort(mix(np.arange(len(families)).astype(np.uint64)))][:FAMILIES]
     total = np.cumsum([flora.face_counts(family).sum() for family in families])
     return [family for family, sum_ in zip(families, total, strict=True) if sum_ <= _POLYGONS] or families[:1]
 
@@ -217,156 +274,54 @@ def _apart(flora: Flora, families: list[Branches]) -> tuple[Branches, NDArray[np
     return Branches.concatenate(moved), len(families) * step
 
 
-def _fitted(sight: _Sight) -> NDArray[np.float64]:
-    """Weights (k,) for one row."""
+def _fitted(
+    sight: Families,
+    counts: NDArray[np.bool_],
+    rays: float,
+    seen: dict[object, list[tuple[View, NDArray[np.int64]]]],
+) -> Generator[float, None, NDArray[np.float64]]:
+    """Weights (k,) for one row, of which those of some counts (k,) matter; yields the fraction that is done.
+
+    What rays meet is looked up in ``seen``, and noted there.
+    """
     out = np.full(len(COUNTS), np.nan)
     if sight.area.mean() <= 0.0:
         return np.ones(len(COUNTS))
-    views = sight.views()
-    met = sum(sight.met(view) for view in views)
-    for k, count in enumerate(COUNTS):
+    if sight.content not in seen:
+        looked = []
+        for view in look(sight.grown(), sight.beyond):
+            looked.append(view)
+            yield 0.1 * len(looked)
+        seen[sight.content] = looked
+    views, met = zip(*seen[sight.content], strict=True)
+    # One more, for those that are skipped.
+    some = np.flatnonzero(counts | np.append(False, counts[:-1]))
+    for k, count in zip(some.tolist(), COUNTS[some].tolist(), strict=True):
         expected = count * len(sight.area)
         copies = int(np.clip(np.ceil(_WANTED / expected), 1, _COPIES))
-        if expected * copies < _NEEDED or met == 0:
+        if expected * copies < _NEEDED or not any(map(len, met)):
             continue
         side = np.sqrt(sight.area.mean() / count)
         facets = sight.facets(side, copies)
-        out[k] = _weight(np.concatenate([sight.least_weights(view, facets) for view in views]), met * copies)
+        blocked = copies * sum(map(len, met))
+        stride = _stride(blocked, rays, views[0].covered(facets))
+        least = [least_weights(view.coarser(stride), facets) for view in views]
+        out[k] = _weight(np.concatenate(least), max(round(blocked / stride**2), 1))
+        yield 0.5 + 0.5 * (k - some[0] + 1) / len(some)
         if expected > _MOST or (sight.leaf > side**2).all():
             break
     known = np.flatnonzero(np.isfinite(out))
     return np.interp(np.arange(len(out)), known, out[known]) if len(known) else np.ones(len(out))
 
 
+def _stride(blocked: float, rays: float, pairs: float) -> int:
+    """Each so many-th line of the lattice that is enough, given how many rays are blocked, and by how many facets."""
+    if not np.isfinite(rays):
+        return 1
+    most = np.sqrt(max(blocked / rays, pairs / (_PAIRS * rays)))
+    return int(np.clip(most, 1.0, max(1.0, np.sqrt(4.0 * blocked / rays))))
+
+
 def _weight(least: NDArray[np.float64], met: int) -> float:
     """Weight with which ``met`` rays are blocked, from the least weight (n,) with which each ray is."""
-    return float(np.partition(least, met - 1)[met - 1]) if met <= len(least) else _LARGEST
-
-
-@dataclass(frozen=True)
-class _View:
-    """Parallel rays through the points of a lattice on the plane of two axes."""
-
-    u: NDArray[np.float64]
-    v: NDArray[np.float64]
-    spacing: float
-
-    def flat(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Vectors (n, 3) on the plane (n, 2), in units of the lattice."""
-        return vectors @ np.stack([self.u, self.v], axis=1) / self.spacing
-
-
-@dataclass(frozen=True)
-class _Sight:
-    """Families of sub-plants, or what their branches themselves bear, as rays see it.
-
-    Attributes
-    ----------
-    flora : Flora
-    some : Branches of n
-    beyond : (3,) float64
-        Offset at which a copy meets none of them, metres.
-    things : Things
-        The real leaves and wood.
-    area, leaf : (n,) float64
-        Optical area of each, and area of one of its leaves, m².
-    pieces : Pieces or None
-        Of the branches, where only these count.
-    """
-
-    flora: Flora
-    some: Branches
-    beyond: NDArray[np.float64]
-    things: Things
-    area: NDArray[np.float64]
-    leaf: NDArray[np.float64]
-    pieces: Pieces | None
-
-    @classmethod
-    def of_subplants(cls, flora: Flora, some: Branches, beyond: NDArray[np.float64]) -> _Sight:
-        """Whole sub-plants."""
-        area = subplant_totals(flora, some).optical_area
-        return cls(flora, some, beyond, _grown(flora, some), area, flora.one_leaf_area(some), None)
-
-    @classmethod
-    def of_branches(cls, flora: Flora, some: Branches, beyond: NDArray[np.float64]) -> _Sight:
-        """Branches with their own leaves only."""
-        pieces, owner = open_subplants(flora, some)[2:]
-        area = np.bincount(owner, piece_totals(flora, pieces).optical_area, len(some))
-        return cls(flora, some, beyond, _grown(flora, some, orders=1), area, flora.one_leaf_area(some), pieces)
-
-    def views(self) -> list[_View]:
-        """Directions spread over the half sphere, with a lattice that is as fine for all of them."""
-        place = self.things.middle.T @ self.beyond
-        along = np.floor(place / (self.beyond @ self.beyond) * _FAMILIES + 0.5)
-        extent = 2.0 * float(self.things.radius.max())  # one straight branch has no extent but its own
-        for family in np.unique(along):
-            middle = self.things.middle[:, along == family]
-            extent = max(extent, float(np.ptp(middle, axis=1).max()))
-        index = np.arange(_DIRECTIONS) + 0.5
-        directions = spiral(index / _DIRECTIONS, index, GOLDEN_TURN)
-        return [_View(*basis(direction), extent / _RAYS) for direction in directions]
-
-    def met(self, view: _View) -> int:
-        """How many rays meet anything."""
-        place = view.flat(self.things.middle.T)
-        near = (np.abs(place - np.rint(place)) <= (self.things.radius / view.spacing)[:, None]).all(axis=1)
-        begin, rays = 0, []
-        for part in self.things.parts:
-            end = begin + len(part)
-            corners, first, number = part.outlines(np.flatnonzero(near[begin:end]), view.u, view.v)
-            rays.append(covered(corners / view.spacing, first, number)[1])
-            begin = end
-        return len(np.unique(_ray_numbers(np.concatenate(rays))))
-
-    def facets(self, side: float, copies: int) -> Facets:
-        """Facets of a side in metres for several copies of all side by side, each copy with other facets."""
-        if self.pieces is None:
-            several = Branches.concatenate([self._copy(self.some, n) for n in range(copies)])
-            return subplant_facets(self.flora, several, np.full(len(several), side))
-        several = []
-        for n in range(copies):
-            start, end = (place + n * self.beyond for place in (self.pieces.start, self.pieces.end))
-            several.append(replace(self.pieces, branches=self._copy(self.pieces.branches, n), start=start, end=end))
-        pieces = Pieces.concatenate(several)
-        return piece_facets(self.flora, pieces, np.full(len(pieces), side))
-
-    def _copy(self, branches: Branches, number: int) -> Branches:
-        key = mix(branches.key + np.uint64(number + 1))
-        return replace(branches, key=key, position=branches.position + number * self.beyond)
-
-    @staticmethod
-    def least_weights(view: _View, facets: Facets) -> NDArray[np.float64]:
-        """For each ray that any of the facets can block, the least weight with which one does."""
-        reach = CIRCUMRADIUS * facets.side[:, None]
-        centre, a, b = view.flat(facets.centre), view.flat(facets.across * reach), view.flat(facets.along * reach)
-        largest = np.sqrt(_LARGEST)
-        across = SIN_60 * np.abs(a)
-        low = np.ceil(centre - largest * np.maximum(across + np.abs(b) / 2, np.abs(b))).astype(np.int64)
-        high = np.floor(centre + largest * np.maximum(across + np.abs(b) / 2, np.abs(b))).astype(np.int64)
-        sizes = np.maximum(high - low + 1, 0)
-        facet, step = spread(sizes[:, 0] * sizes[:, 1])
-        columns = sizes[facet, 1]
-        point = low[facet] + np.stack([step // columns, step % columns], axis=1)
-        x, y = (point - centre[facet]).T
-        (ax, ay), (bx, by) = a[facet].T, b[facet].T
-        with np.errstate(divide="ignore", invalid="ignore"):
-            aside, up = (x * by - y * bx) / (ax * by - ay * bx), (ax * y - ay * x) / (ax * by - ay * bx)
-        # How many times as large the triangle has to be to reach the point: its sides are half a circumradius away.
-        scale = 2.0 * np.maximum(-up, SIN_60 * np.abs(aside) + up / 2)
-        inside = np.flatnonzero(scale <= largest)
-        ray, which = np.unique(_ray_numbers(point[inside]), return_inverse=True)
-        least = np.full(len(ray), np.inf)
-        np.minimum.at(least, which.reshape(-1), scale[inside] ** 2)
-        return least
-
-
-def _grown(flora: Flora, some: Branches, orders: int | None = None) -> Things:
-    """Leaves and wood of sub-plants of one species, of all orders or the given number."""
-    rows = len(flora.rows)
-    forms = flora.forms[int(flora.species_of(some.row[:1])[0])]
-    return things_of(flora.rows, forms, some, np.zeros(rows, np.intp), 0, np.ones(rows), orders)
-
-
-def _ray_numbers(point: NDArray[np.int64]) -> NDArray[np.int64]:
-    return (point[:, 0] << 32) + point[:, 1]
+    return float(np.partition(least, met - 1)[met - 1]) if met <= len(least) else LARGEST

@@ -15,9 +15,11 @@ from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.proxies import facet_weights as subject
+from tetflora_addon.proxies import sights
 from tetflora_addon.proxies.microsurfaces import CIRCUMRADIUS, facet_mesh, piece_facets, subplant_facets
 from tetflora_addon.refinement.contents import piece_totals, subplant_totals
 from tetflora_addon.refinement.rasterise import occluder_depth
+from tetflora_addon.refinement.statistics import at_once
 from tetflora_addon.species.catalogue import list_species, load_species
 from tetflora_addon.subplants.pieces import open_subplants
 
@@ -83,11 +85,9 @@ def test_tables_of_shipped_species_are_those_of_today() -> None:
     """Run ``python -m devtools.facet_tables`` and raise `_METHOD` after changes of species or of facets."""
     flora = compile_species([load_species("birch")])
     known = subject.shipped()[subject.digest(flora, 0)]
-    fitted = subject.fitted_weights(flora, np.zeros(1, np.int32))
-    assert len(fitted) == len(known["whole"])
-    for row, (whole, own) in fitted.items():
-        np.testing.assert_allclose(whole, known["whole"][row], atol=0.05)
-        np.testing.assert_allclose(own, known["own"][row], atol=0.05)
+    whole, own = at_once(subject.fitting(flora, 0))
+    np.testing.assert_allclose(whole, known["whole"], atol=0.02)
+    np.testing.assert_allclose(own, known["own"], atol=0.02)
 
 
 def test_every_shipped_species_has_a_table() -> None:
@@ -122,9 +122,9 @@ def test_the_least_weight_with_which_a_triangle_reaches_a_ray() -> None:
     )
     for point, expected in (((0.0, 0.0), 0.0), ((0.0, -0.5), 1.0), ((0.0, 1.0), 1.0), ((0.0, -0.25), 0.25)):
         moved = replace(one, centre=np.array([[-point[0] * 1.0, -point[1] * 1.0, 0.0]]))
-        view = subject._View(np.array([1.0, 0, 0]), np.array([0, 1.0, 0]), 1000.0)
+        view = sights.View(np.array([1.0, 0, 0]), np.array([0, 1.0, 0]), 1000.0)
         far = replace(moved, centre=moved.centre + 0.0)
-        least = subject._Sight.least_weights(view, far)
+        least = sights.least_weights(view, far)
         assert len(least) == 1
         assert least[0] == pytest.approx(expected, abs=1e-9)
 
@@ -132,13 +132,18 @@ def test_the_least_weight_with_which_a_triangle_reaches_a_ray() -> None:
 def test_a_species_is_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compiled again, alone or beside others, it has the weights that were found before."""
     asked = []
-    real = subject.fitted_weights
-    monkeypatch.setattr(subject, "fitted_weights", lambda f, n: asked.append(n.tolist()) or real(f, n))
+    real = subject.fitting
+
+    def noted(flora: Flora, number: int, rays: float):
+        asked.append(flora.species[number].identifier)
+        return real(flora, number, rays)
+
+    monkeypatch.setattr(subject, "fitting", noted)
     monkeypatch.setattr(subject, "shipped", dict)
     monkeypatch.setattr(subject, "_found", {})
     alone = subject.facet_weights(compile_species([load_species("birch")]))
     again = subject.facet_weights(compile_species([load_species("dead_tree"), load_species("birch")]))
-    assert asked == [[0], [0]]
+    assert asked == ["birch", "dead_tree"]
     rows = len(alone.whole)
     np.testing.assert_array_equal(again.whole[-rows:], alone.whole)
     np.testing.assert_array_equal(again.own[-rows:], alone.own)

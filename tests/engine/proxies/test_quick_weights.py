@@ -1,0 +1,103 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Weights of species that are not shipped: quick, in steps, only where facets are drawn, and those of all rays."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.engine import support
+from tetflora_addon.camera.camera import Camera
+from tetflora_addon.compiled.flora import Flora, compile_species
+from tetflora_addon.emission import facets
+from tetflora_addon.emission.plants import Transition
+from tetflora_addon.proxies import facet_weights as subject
+from tetflora_addon.refinement import loop
+from tetflora_addon.refinement.settings import RefinementSettings
+from tetflora_addon.refinement.statistics import at_once
+from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.species import Range, Species
+
+#: What the quick weights may differ by from those of all rays, as a fraction of the area.
+MOST = 0.02
+
+
+def edited(identifier: str, **factors: float) -> Species:
+    """A shipped species of which some ranges of all orders are multiplied."""
+    species = load_species(identifier)
+
+    def times(value: Range, factor: float) -> Range:
+        return Range(value.mean * factor, value.variation * factor)
+
+    orders = [
+        replace(order, **{key: times(getattr(order, key), factor) for key, factor in factors.items()})
+        for order in species.orders
+    ]
+    return replace(species, identifier="edited", orders=tuple(orders))
+
+
+@pytest.mark.parametrize("identifier", ["birch", "conifer", "fern", "flower", "grass", "palm", "bush"])
+def test_quick_weights_of_shipped_species_are_those_of_the_tables(identifier: str) -> None:
+    flora = compile_species([load_species(identifier)])
+    known = subject.shipped()[subject.digest(flora, 0)]
+    whole, own = at_once(subject.fitting(flora, 0, subject.RAYS))
+    np.testing.assert_allclose(whole, known["whole"], atol=MOST)
+    np.testing.assert_allclose(own, known["own"], atol=MOST)
+
+
+@pytest.mark.parametrize(
+    ("identifier", "factors"),
+    [("birch", {"leaves": 1.6}), ("bush", {"leaf_size": 1.5, "branches": 0.8}), ("conifer", {"length": 1.2})],
+)
+def test_quick_weights_of_edited_species_are_those_of_all_rays(identifier: str, factors: dict) -> None:
+    flora = compile_species([edited(identifier, **factors)])
+    quick, full = (at_once(subject.fitting(flora, 0, rays)) for rays in (subject.RAYS, np.inf))
+    np.testing.assert_allclose(quick, full, atol=MOST)
+
+
+def test_weights_are_measured_in_steps_and_what_is_stopped_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(subject, "_found", {})
+    flora = compile_species([edited("grass", leaves=1.3)])
+    fractions = list(subject.fitting(flora, 0, subject.RAYS))
+    assert len(fractions) > 4 * len(flora.rows)
+    assert fractions == sorted(fractions)
+    assert 0.0 < fractions[0] < fractions[-1] <= 1.0
+    steps = subject.measuring(flora, [0])
+    assert next(steps)[0] == flora.species[0].name
+    steps.close()
+    assert subject.unmeasured(flora) == [0]
+    at_once(subject.measuring(flora, [0]))
+    assert subject.unmeasured(flora) == []
+    assert list(subject.measuring(flora, [0])) == []
+
+
+def seen_from(distance: float, limit: float, monkeypatch: pytest.MonkeyPatch) -> tuple[list[int], list[str]]:
+    """Species of which facets may be drawn, and those that making all facets measures; of one edited plant."""
+    measured = []
+    real = subject.fitting
+
+    def noted(flora: Flora, number: int, rays: float):
+        measured.append(flora.species[number].identifier)
+        return real(flora, number, rays)
+
+    monkeypatch.setattr(subject, "fitting", noted)
+    monkeypatch.setattr(subject, "_found", {})
+    subject._of_flora.cache_clear()
+    flora = compile_species([edited("grass", leaves=1.4)])
+    seeds = replace(support.plants(1), species=np.zeros(1, np.int32))
+    frame = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    eye = np.array([0.0, -distance, 0.2])
+    camera = Camera("PERSP", eye, frame, (-0.5, 0.5, -0.5, 0.5), 0.01, 10.0 * distance, 200, 200)
+    refinement = at_once(loop.refine(flora, seeds, camera, RefinementSettings()))
+    transition = Transition(flora, camera, limit)
+    drawn = facets.drawn_species(flora, refinement, camera, transition)
+    list(facets.facet_parts(flora, refinement, camera, facets.FacetPixels(0.33), transition))
+    return drawn, measured
+
+
+def test_nothing_is_measured_where_no_facet_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert seen_from(2.0, 1e-9, monkeypatch) == ([], [])
+    assert seen_from(2.0, 1e9, monkeypatch) == ([0], ["edited"])
