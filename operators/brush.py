@@ -13,7 +13,7 @@ from bpy.props import EnumProperty, StringProperty
 from ..tetflora_addon.blender.placing.brush import Stroke, draped_circle
 from ..tetflora_addon.blender.placing.plant_objects import remove_empty_collections
 from ..tetflora_addon.blender.placing.properties import MODES
-from ..tetflora_addon.blender.runtime import redraw
+from ..tetflora_addon.blender.runtime import GoneError, redraw
 from ..tetflora_addon.errors import SceneError, TetFloraError
 from ..tetflora_addon.planting.strokes import dabs_along
 from .base import NO_VIEWPORT, counted
@@ -94,16 +94,21 @@ class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
         self._show(context, event)
         return {'RUNNING_MODAL'}
 
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def handle(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         try:
             return self._handle(context, event)
+        except GoneError:
+            raise
         except TetFloraError as error:
             self._stroke = None
             self.failed(error)
             return {'RUNNING_MODAL'}
-        except BaseException:
-            self.end(context)
-            raise
+
+    def end(self, context: bpy.types.Context) -> None:
+        if self._stroke is not None and self._stroke.changed:  # what was painted before something went away
+            bpy.ops.ed.undo_push(message=f"{_DONE[self._stroke.mode].capitalize()} Plants")
+        self._stroke = None
+        super().end(context)
 
     def _handle(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if self._resizing is not None:

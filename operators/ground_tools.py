@@ -13,7 +13,7 @@ from bpy_extras import view3d_utils
 
 from ..tetflora_addon.blender.placing.ground import Ground, Hit
 from ..tetflora_addon.blender.placing.plant_objects import add_plant, next_seed
-from ..tetflora_addon.blender.runtime import redraw
+from ..tetflora_addon.blender.runtime import GoneError, JobData, redraw
 from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, default_species, display_height, operator_items
 from ..tetflora_addon.blender.species.edits import catalogue
 from ..tetflora_addon.blender.viewport.points import GroundCursor, circle
@@ -42,6 +42,7 @@ class GroundTool(Tool):
 
     _cursor: GroundCursor | None = None
     _ground: Ground | None = None
+    _data: JobData | None = None
     _window: bpy.types.Window | None = None
     _steps: int = 0  # undo steps of this run that are done
     _undone: int = 0
@@ -75,6 +76,21 @@ class GroundTool(Tool):
         if context.workspace is not None:
             context.workspace.status_text_set(None)
         redraw()
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        try:
+            with self._data.watched():
+                return self.handle(context, event)
+        except GoneError as error:
+            self.end(context)
+            return self.failed(error)
+        except BaseException:
+            self.end(context)
+            raise
+
+    def handle(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Do what an event asks for; the result of ``modal``."""
+        raise NotImplementedError
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Blender ends the tool."""
@@ -115,6 +131,8 @@ class GroundTool(Tool):
 
     def _look_around(self, context: bpy.types.Context) -> None:
         self._ground = Ground(context.view_layer, context.evaluated_depsgraph_get())
+        self._data = JobData(self.bl_label, context.scene, context.view_layer)
+        self._data.add_objects(self._ground.objects)
 
 
 def _view_of(screen: bpy.types.Screen | None) -> bpy.types.Area | None:
@@ -178,14 +196,7 @@ class TETFLORA_OT_place_plant(GroundTool, bpy.types.Operator):
         self._show(context)
         return {'RUNNING_MODAL'}
 
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        try:
-            return self._handle(context, event)
-        except BaseException:
-            self.end(context)
-            raise
-
-    def _handle(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def handle(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if event.type in {'ESC', 'RIGHTMOUSE', 'RET', 'NUMPAD_ENTER'}:
             if event.value != 'PRESS':
                 return {'RUNNING_MODAL'}

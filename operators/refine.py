@@ -15,7 +15,7 @@ from ..tetflora_addon.blender.results import hiding
 from ..tetflora_addon.blender.results.collection import has_results, result_collections
 from ..tetflora_addon.blender.results.forms import few_bounces
 from ..tetflora_addon.blender.results.hiding import keep_results
-from ..tetflora_addon.blender.runtime import redraw
+from ..tetflora_addon.blender.runtime import redraw, stop_jobs
 from ..tetflora_addon.blender.scene.lights import read_world
 from ..tetflora_addon.blender.viewport import auto
 from ..tetflora_addon.errors import TetFloraError
@@ -80,7 +80,7 @@ def _unread_world(scene: bpy.types.Scene) -> str:
 
 def _unseen(scene: bpy.types.Scene, statistics: Statistics) -> str:
     """A warning if the camera sees no plant at all, so that nothing was divided after the first look; else empty."""
-    if statistics.passes != 1 or statistics.polygons_meshed or scene.tetflora.max_passes:
+    if scene.camera is None or statistics.passes != 1 or statistics.polygons_meshed or scene.tetflora.max_passes:
         return ""
     return (
         f'The camera "{scene.camera.name}" sees no plants. Press Numpad 0 to look through it, and check that it '
@@ -93,6 +93,8 @@ def _cut_off(scene: bpy.types.Scene) -> str:
 
     A new file's camera ends at 100 m: a forest then renders as nothing, and nobody sees why.
     """
+    if scene.camera is None:  # it was deleted with the last step
+        return ""
     camera, plants = scene.camera, [o for o in plants_of(scene.objects) if o.tetflora.enabled and not o.hide_render]
     to_camera = camera.matrix_world.normalized().inverted_safe()
     end = camera.data.clip_end
@@ -125,6 +127,7 @@ class TETFLORA_OT_clear(Reporting, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> set[str]:
         auto.stop()
+        stop_jobs("its results were cleared")
         hidden = hiding.hidden_originals(context.scene, 'VIEW')
         removed = f"{counted(refine.clear(context.scene), 'datablock')} removed"
         shown = sum(hiding.HIDDEN['VIEW'] not in original for original in hidden)
@@ -147,6 +150,7 @@ class TETFLORA_OT_keep_results(Reporting, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
         auto.stop()
+        stop_jobs("the results were kept as meshes")
         if not result_collections(scene, 'VIEW'):
             raise TetFloraError("Refine Automatically has not finished; wait, or click Refine")
         kept = keep_results(scene)

@@ -1,14 +1,23 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mechanics of a running Blender: handlers, listeners, timers, redraws and messages in the window."""
+"""The mechanics of a running Blender: handlers, listeners, timers, jobs, redraws and messages in the window.
+
+Between two steps of a job the artist, a script or another add-on may take away what it works on. A job lists that in
+`JobData` and runs in `guarded`: undo, loading, rendering, Clear and Keep Results end it while all is still there, and
+before each step it is asked whether anything was deleted. It then takes back what it has made and says why.
+"""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any, TypeVar
 
 import bpy
 from bpy.app.handlers import persistent
+
+from ..errors import SceneError
 
 #: Errors of the last render: a text for each frame that was rendered without its plants.
 failed_frames: list[str] = []
@@ -64,6 +73,127 @@ def call_off(function: Callable[[], float | None]) -> None:
     """
     if bpy.app.timers.is_registered(function):
         bpy.app.timers.unregister(function)
+
+
+_Result = TypeVar("_Result")
+
+
+def is_there(datablock: bpy.types.ID | None) -> bool:
+    """Whether there is a datablock and it has not been deleted since."""
+    try:
+        return datablock is not None and bool(datablock.session_uid)
+    except ReferenceError:
+        return False
+
+
+class GoneError(SceneError):
+    """What a job works on was taken away in its middle."""
+
+
+class JobData:
+    """What a job needs from its first step to its last.
+
+    Parameters
+    ----------
+    job : str
+        Its name for the artist.
+    scene : bpy.types.Scene
+    view_layer : bpy.types.ViewLayer, optional
+        Its dependency graph goes with it, and using that would crash Blender.
+    """
+
+    def __init__(self, job: str, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer | None = None) -> None:
+        self.job, self._reason = job, ""
+        self._scene = scene
+        self._layer = (0, "") if view_layer is None else (view_layer.as_pointer(), view_layer.name)
+        self._known: list[tuple[bpy.types.ID, str]] = []
+        self.add(f'the scene "{scene.name}"', scene)
+
+    def add(self, name: str, *datablocks: bpy.types.ID) -> None:
+        """Hold datablocks too; their name is for the message."""
+        self._known += [(datablock, name) for datablock in datablocks]
+
+    def add_objects(self, objects: Iterable[bpy.types.Object]) -> None:
+        """Hold objects by their own names."""
+        for obj in objects:
+            self.add(f'"{obj.name}"', obj)
+
+    def stop(self, reason: str) -> None:
+        """Let the next `check` fail, whatever is there."""
+        self._reason = self._reason or reason
+
+    def check(self, few: bool = False) -> None:
+        """See whether all is still there, or with ``few`` only the scene and its view layer.
+
+        Raises
+        ------
+        GoneError
+            Something is not, or the job was stopped; the message says what.
+        """
+        if not self._reason:
+            lost = next((name for datablock, name in self._known[: 1 if few else None] if not is_there(datablock)), "")
+            pointer, layer = self._layer
+            if not lost and pointer and all(pointer != one.as_pointer() for one in self._scene.view_layers):
+                lost = f'the view layer "{layer}"'
+            self._reason = f"{lost} was deleted" if lost else ""
+        if self._reason:
+            raise GoneError(f"{self.job} was stopped because {self._reason}; start it again")
+
+    @contextmanager
+    def watched(self, few: bool = False) -> Iterator[None]:
+        """`check`, and the same error where what is done meanwhile meets something that is not listed and gone."""
+        self.check(few)
+        try:
+            yield
+        except ReferenceError as error:
+            self.stop("something that it works on was deleted")
+            raise GoneError(f"{self.job} was stopped because {self._reason}; start it again") from error
+
+
+_running: list[tuple[JobData, Generator]] = []
+
+
+def guarded(data: JobData, steps: Generator[Any, Any, _Result]) -> Generator[Any, Any, _Result]:
+    """Run a job that must not outlive what it holds; steps that wait look for little.
+
+    Closing the steps has to leave everything as it was, whatever is gone.
+
+    Raises
+    ------
+    GoneError
+        Something is gone, or somebody stopped the job.
+    """
+    own, sent, waits = (data, steps), None, False
+    _running.append(own)
+    try:
+        while True:
+            with data.watched(few=waits):
+                try:
+                    item = steps.send(sent)
+                except StopIteration as stop:
+                    return stop.value
+            waits = getattr(item, "waiting", False)
+            sent = yield item
+    finally:
+        _running.remove(own)
+        steps.close()
+
+
+def stop_jobs(reason: str) -> None:
+    """End all jobs, now if they are between two steps: what they work on is about to go or to change."""
+    for data, steps in tuple(_running):
+        data.stop(reason)
+        if not steps.gi_running:
+            steps.close()
+
+
+_STOPPING = Handlers(
+    undo_pre=lambda *_: stop_jobs("Undo changed what it works on"),
+    redo_pre=lambda *_: stop_jobs("Redo changed what it works on"),
+    load_pre=lambda *_: stop_jobs("another file was opened"),
+    render_init=lambda *_: stop_jobs("a render began"),
+)
+register, unregister = _STOPPING.register, _STOPPING.unregister
 
 
 def redraw() -> None:

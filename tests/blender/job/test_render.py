@@ -214,6 +214,21 @@ def test_bounces_of_each_scene_come_back(stage, stub):
     assert [scene.cycles.transparent_max_bounces for scene in (stage, other)] == [10, 11]
 
 
+def test_a_scene_that_is_deleted_in_the_middle_of_a_render_stops_neither_saving_nor_its_end(stage, stub):
+    stage.render.engine = 'CYCLES'
+    stage.tetflora.proxy_form = 'SHELLS'
+    stage.cycles.transparent_max_bounces = 10
+    other = bpy.data.scenes.new("other")
+    render.on_render_pre(stage)
+    assert stage.cycles.transparent_max_bounces > 10
+    bpy.data.scenes.remove(stage)
+    render.on_save_pre("")
+    render.on_save_post("")
+    render.on_render_end(other)
+    render._rendering.outer = ""
+    render.on_load_post("")
+
+
 def test_an_unexpected_error_does_not_stop_later_frames(stage, stub, tmp_path, capfd):
     stub.error = ZeroDivisionError("oops")
     _still(stage, tmp_path / "a.png")

@@ -10,6 +10,7 @@ import bpy
 import pytest
 
 import operators
+from operators import ground_tools
 from panels import results
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, select, tiny_render
 from tetflora_addon.blender.job import refine, render
@@ -251,3 +252,40 @@ def test_refine_reports_what_is_wrong_and_changes_nothing(break_it, says):
     with pytest.raises(RuntimeError, match=says):
         _ops().refine()
     assert datablocks() == before
+
+
+class _Tool(ground_tools.GroundTool):
+    """A tool on the ground without a window, which points at its ground at each event."""
+
+    bl_label = "Point"
+
+    def __init__(self):
+        self.said = []
+        self._look_around(bpy.context)
+
+    def report(self, kind, text):
+        self.said.append((kind, text))
+
+    def handle(self, context, event):
+        return {'RUNNING_MODAL'} if self._ground.objects[0].name else {'PASS_THROUGH'}
+
+
+@pytest.mark.parametrize("removed", ["ground", "scene", "view layer"])
+def test_a_tool_on_the_ground_ends_with_a_message_when_that_goes(removed):
+    bpy.data.scenes.new("another")
+    bpy.context.scene.view_layers.new("other")
+    add_mesh("ground", size=8.0)
+    bpy.context.view_layer.update()
+    tool = _Tool()
+    assert tool.modal(bpy.context, None) == {'RUNNING_MODAL'}
+    if removed == "ground":
+        bpy.data.objects.remove(bpy.data.objects["ground"])
+    elif removed == "scene":
+        bpy.data.scenes.remove(bpy.context.scene)
+    else:
+        bpy.context.scene.view_layers.remove(bpy.context.view_layer)
+    assert tool.modal(bpy.context, None) == {'CANCELLED'}
+    assert tool._ground is None
+    ((kind, text),) = tool.said
+    assert kind == {'ERROR'}
+    assert text.startswith("Point was stopped because") and text.endswith("was deleted; start it again")

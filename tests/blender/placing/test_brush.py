@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from mathutils import Vector
 
+from devtools import session
 from tests.blender.scenes import add_mesh, add_plant, depsgraph, select
 from tetflora_addon.blender.materials import nodes
-from tetflora_addon.blender.placing import ground, properties
+from tetflora_addon.blender.placing import brush, ground, properties
 from tetflora_addon.blender.scene import fields
+from tetflora_addon.errors import SceneError
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -232,3 +234,38 @@ def test_settings_that_cannot_work_are_told_and_change_nothing():
         bpy.ops.tetflora.paint_plants()
     with pytest.raises(RuntimeError, match="requires a 3D viewport"):
         bpy.ops.tetflora.place_plant()
+
+
+REMOVALS = {
+    "plants": lambda: bpy.data.batch_remove(_plants()),
+    "ground": lambda: bpy.data.objects.remove(bpy.data.objects["ground"]),
+    "scene": lambda: bpy.data.scenes.remove(bpy.context.scene),
+    "undo": lambda: bpy.ops.ed.undo(),
+    "load": lambda: session.clean_file(),
+}
+
+
+@pytest.mark.parametrize("removal", REMOVALS)
+@pytest.mark.parametrize("mode", ["PAINT", "ERASE"])
+def test_a_stroke_whose_plants_or_ground_go_ends_with_a_message(removal, mode):
+    """In its middle, by another window or a script; what it had shown by then stays, what it had not is dropped."""
+    bpy.data.scenes.new("another")
+    add_mesh("ground", size=30.0)
+    _brush()
+    bpy.ops.ed.undo_push(message="Begin")
+    for n in range(4):
+        add_plant(f"bush {n}", location=(n - 2.0, 0.0, 0.0))
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="Planted")
+    scene, layer = bpy.context.scene, bpy.context.view_layer
+    stroke = brush.Stroke(scene, layer, depsgraph(), mode)
+    stroke.dab((0.0, 0.0, 0.0))
+    REMOVALS[removal]()
+    before = sorted(o.name for o in bpy.data.objects)
+    if mode == 'PAINT' and removal == "plants":
+        stroke.finish()  # it adds some, and needs none of those that stood there
+        return
+    with pytest.raises(SceneError, match=r"Paint Plants was stopped because .* was deleted; start it again"):
+        stroke.finish()
+    assert sorted(o.name for o in bpy.data.objects) == before
+    assert not stroke.changed

@@ -283,3 +283,25 @@ def test_after_an_unexpected_error_it_says_so_and_can_begin_anew(scene, monkeypa
     auto.schedule(scene)
     assert settle(monkeypatch) > 0
     assert results(scene) and auto.message() == ""
+
+
+@pytest.mark.parametrize("what", ["tree 1", "camera", "results"])
+def test_what_is_deleted_in_the_middle_is_noticed(scene, monkeypatch, what):
+    before = datablocks()
+    scene.tetflora.auto_refine = True
+    half_make(scene, monkeypatch, 1)
+    if what == "results":
+        bpy.data.collections.remove(results(scene)[0])
+    else:
+        bpy.data.objects.remove(bpy.data.objects[what])
+    settle(monkeypatch)
+    if what == "camera":
+        assert "camera" in auto.message()
+        assert not results(scene)
+        assert {kind: [n for n in names if n != what] for kind, names in before.items()} == datablocks() | {
+            "cameras": []
+        }
+    else:
+        assert len(results(scene)) == 1
+        assert json.loads(scene.tetflora.statistics)["plants"] == 3 - (what == "tree 1")
+        assert sum(o.name.startswith("TetFlora proxies") for o in bpy.data.objects) <= 1

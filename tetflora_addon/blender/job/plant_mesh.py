@@ -20,8 +20,10 @@ from ...growth.seeds import Seeds
 from ...refinement.statistics import Progress
 from ...species.species import Species
 from ..attributes import frames_of, world_matrix, write
-from ..results.leaf_objects import materials_of
+from ..results.leaf_objects import leaf_objects, materials_of
 from ..results.meshes import write_mesh
+from ..results.output import remove_made
+from ..runtime import JobData, guarded, is_there
 from ..scene.skeletons import kind_of
 from ..worker import call_in_thread
 from .contents import compile_for, expected_polygons
@@ -120,6 +122,15 @@ def make_plant_mesh_steps(
         An invalid species or transform, or too many polygons; nothing is made.
     """
     plants = list(plants)
+    data = JobData("Convert Plants to Meshes", scene, depsgraph.view_layer)
+    data.add_objects(plants)
+    data.add_objects(leaf_objects(scene).values())
+    return guarded(data, _make_plant_mesh_steps(data, scene, depsgraph, plants))
+
+
+def _make_plant_mesh_steps(
+    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, plants: list[bpy.types.Object]
+) -> Generator[Progress, object, list[bpy.types.Object]]:
     world = np.array([world_matrix(p, depsgraph) for p in plants]).reshape(-1, 4, 4)
     frame, scale, sound = frames_of(world[:, :3, :3])
     for plant, good in zip(plants, sound, strict=True):
@@ -132,7 +143,7 @@ def make_plant_mesh_steps(
         raise SceneError(
             f"{len(plants):,} plants have about {polygons:,.0f} polygons; select fewer, the limit is {MOST_POLYGONS:,}"
         )
-    made, switched = [], []
+    made, data_made, switched = [], [], []
     whole = False
     try:
         for number, (plant, seed) in enumerate(zip(plants, seeds, strict=True)):
@@ -140,16 +151,20 @@ def make_plant_mesh_steps(
             yield progress
             flora = floras[kind_of(plant)]
             parts = yield from call_in_thread(progress, plant_parts, flora, seed)
+            data.check()  # it may have waited for the thread meanwhile
             mesh = plant_mesh(scene, f"{plant.name} mesh", flora.species[0], parts)
+            data_made += [mesh, *mesh.materials]
             made.append(_placed(mesh, plant, frame[number] * scale[number], world[number, :3, 3]))
+            data.add("a mesh that it made", made[-1], mesh)
             if plant.tetflora.enabled:
                 plant.tetflora.enabled = False
                 switched.append(plant)
         whole = True
     finally:
         if not whole:
-            bpy.data.batch_remove([obj.data for obj in made])  # and the objects with them
-            for plant in switched:
+            bpy.data.batch_remove([obj for obj in made if is_there(obj)])
+            remove_made(data_made)
+            for plant in filter(is_there, switched):
                 plant.tetflora.enabled = True
     return made
 

@@ -21,10 +21,11 @@ from ...buffers import MeshBuffers
 from ...camera.camera import Camera
 from ...compiled.flora import Flora, compile_species
 from ...emission.budget import afford
+from ...emission.facets import drawn_species
 from ...emission.forms import EmissionForm, Refined
 from ...emission.plants import Block, Transition, expanded_blocks, explicit_blocks
 from ...emission.polygons import PolygonBlock, polygon_blocks
-from ...proxies.facet_weights import facet_weights
+from ...proxies.facet_weights import measuring, unmeasured
 from ...refinement import loop
 from ...refinement.decisions import Decision
 from ...refinement.loop import Refinement, step_of
@@ -35,11 +36,13 @@ from ..materials.materials import baked_material
 from ..results.collection import Results
 from ..results.forms import form_of
 from ..results.hiding import hide_originals, remove_results
-from ..results.leaf_objects import materials_of
+from ..results.leaf_objects import leaf_objects, materials_of
 from ..results.output import adopt_materials, release_materials, result_collections
 from ..results.proxies import Baking, write_proxies
+from ..runtime import JobData, guarded
 from ..scene.camera import read_camera
 from ..scene.explicit import Explicit
+from ..scene.objects import taking_part
 from ..worker import at_once, call_in_thread, in_thread, steps_in_thread
 from .contents import Given, compile_for, in_wind, load_for, memory_left, read_scene, refinement_settings
 
@@ -88,12 +91,33 @@ def refine_steps(
     TetFloraError
         No camera, nothing to refine, unknown species, unusable plants or meshes; the message says which.
     """
-    clock = Stopwatch()
+    layer = view_layer or depsgraph.view_layer
+    data = JobData("Refine", scene, layer)
+    if camera is None and scene.camera is not None:
+        data.add_objects([scene.camera])
+    data.add_objects(taking_part(scene))
+    data.add_objects(leaf_objects(scene).values())
+    results = Results(scene, 'RENDER' if for_render else 'VIEW', mark, data)
+    return guarded(data, _refine_steps(data, results, depsgraph, layer, beside, camera, given))
+
+
+def _refine_steps(
+    data: JobData,
+    results: Results,
+    depsgraph: bpy.types.Depsgraph,
+    layer: bpy.types.ViewLayer,
+    beside: Sequence[bpy.types.Collection],
+    camera: Camera | None,
+    given: Given | None,
+) -> Generator[Progress, bool | None, Statistics]:
+    clock, scene = Stopwatch(), results.scene
     yield Progress(0.0, "Reading the scene")
+    if camera is None or given is None:
+        depsgraph.update()  # reading what was deleted since the last step would crash Blender
     if camera is None:
-        camera = read_camera(scene, depsgraph, region_only=for_render)
+        camera = read_camera(scene, depsgraph, region_only=results.purpose == 'RENDER')
     if given is None:
-        given = read_scene(scene, depsgraph, view_layer or depsgraph.view_layer)
+        given = read_scene(scene, depsgraph, layer)
     clock.lap("read")
     progress = Progress(0.02, "Compiling species")
     yield progress
@@ -103,7 +127,6 @@ def refine_steps(
     full = yield from call_in_thread(progress, given.polygons_full, flora)
     statistics = Statistics(plants=len(given.seeds), polygons_full=full, seconds=clock.seconds)
     originals = []
-    results = Results(scene, 'RENDER' if for_render else 'VIEW', mark)
     for earlier in result_collections(scene, 'VIEW'):
         adopt_materials(scene, earlier)
     try:
@@ -115,6 +138,7 @@ def refine_steps(
             originals = given.explicit.originals if given.explicit is not None else []
             yield from _write_refined(results, flora, given, camera, statistics, clock)
         clock.lap("emit")
+        data.check()
     except BaseException:  # an error, Esc (GeneratorExit) or Ctrl+C
         results.discard()
         raise
@@ -205,9 +229,12 @@ def _refined(
     _count(statistics, refinement)
     if not form.facets:
         return Refined(flora, refinement, camera)
+    transition = Transition(flora, camera, detail.leaf_limit)
     yield Progress(_LOOP_FRACTION, "Analyzing leaf clustering")
-    facet_weights(flora)
-    return Refined(flora, refinement, camera, detail.pixels, Transition(flora, camera, detail.leaf_limit), disc)
+    if unmeasured(flora):
+        for name, done in measuring(flora, drawn_species(flora, refinement, camera, transition)):
+            yield Progress(_LOOP_FRACTION, f'Analyzing leaf clustering of "{name}": {done:.0%}')
+    return Refined(flora, refinement, camera, detail.pixels, transition, disc)
 
 
 def _write_refined(

@@ -138,7 +138,8 @@ def on_save_post(_path: object, _other: object = None) -> None:
     for collection in _named(_rendering.hidden):
         collection.hide_render = True
     for name in _rendering.bounces:
-        raise_bounces(bpy.data.scenes[name, None])
+        if (scene := bpy.data.scenes.get((name, None))) is not None:
+            raise_bounces(scene)
     unpack_override_marks()
     restore_marks(_rendering.lifted)
     _rendering.lifted.clear()
@@ -211,8 +212,9 @@ def _take_back(scene: bpy.types.Scene) -> None:
 
 
 def _set_bounces(scene: str) -> None:
-    for name, value in _rendering.bounces.get(scene, {}).items():
-        setattr(bpy.data.scenes[scene, None].cycles, name, value)
+    found = bpy.data.scenes.get((scene, None))  # a script may delete or rename it between two frames
+    for name, value in _rendering.bounces.get(scene, {}).items() if found is not None else ():
+        setattr(found.cycles, name, value)
 
 
 def _show_hidden() -> None:

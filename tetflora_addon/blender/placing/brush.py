@@ -18,6 +18,7 @@ from ...planting import strokes
 from ...planting.places import Placement
 from ...planting.strokes import Brush
 from ..attributes import world_matrix
+from ..runtime import JobData
 from ..scene.fields import fields_of, read_field
 from .distances import SQUARE, choose, distance_of, follows_species, painted_weights
 from .field_edits import add_points, editable, positions, take_points
@@ -159,9 +160,12 @@ class Stroke:
     ) -> None:
         settings = scene.tetflora.brush
         self.scene, self.mode = scene, mode
+        self.changed = False  # whether a flush has changed the scene
+        self._data = JobData("Paint Plants", scene, view_layer)
         brush_of(scene)  # reports wrong settings before anything changes
         self.standing = Standing(scene, depsgraph)
         self.ground = Ground(view_layer, depsgraph)
+        self._data.add_objects(self.ground.objects)
         self.key = strokes.stroke_key(settings.seed, settings.strokes)
         choose(settings, follows_species(settings))  # noted before the first stroke: old files have strokes and no note
         settings.strokes += 1
@@ -174,6 +178,10 @@ class Stroke:
 
     def dab(self, centre: Sequence[float], pressure: float = 1.0) -> int:
         """Do what the brush does at a place on the ground (3 floats); how many plants that adds or removes."""
+        with self._data.watched():
+            return self._dab(centre, pressure)
+
+    def _dab(self, centre: Sequence[float], pressure: float) -> int:
         brush, _ = brush_of(self.scene, pressure)
         dab, self.dabs = self.dabs, self.dabs + 1
         if self.mode == 'PAINT':
@@ -212,6 +220,11 @@ class Stroke:
 
     def flush(self) -> None:
         """Change the scene by what the dabs since the last flush decided."""
+        with self._data.watched():
+            self._flush()
+
+    def _flush(self) -> None:
+        changes = self.pending > 0
         if self._gone.any():
             for uid, places in self.standing.by_population(self._gone).items():
                 self._taken.setdefault(uid, []).append(places)
@@ -219,10 +232,15 @@ class Stroke:
         if any(len(keys) for _, keys in self._new):
             self._make(*(np.concatenate(part) for part in zip(*self._new, strict=True)))
         self._new, self._gone = [], np.zeros(len(self.standing.places), bool)
+        self.changed = self.changed or changes
 
     def finish(self) -> None:
         """Flush, and store in populations which plants the stroke removed."""
-        self.flush()
+        with self._data.watched():
+            self._finish()
+
+    def _finish(self) -> None:
+        self._flush()
         for population in self.scene.tetflora.populations:
             taken = self._taken.get(population.uid)
             if taken is None:

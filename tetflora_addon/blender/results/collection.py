@@ -9,6 +9,7 @@ import bpy
 from ...buffers import MeshBuffers, PointBuffers
 from ...species.species import Species
 from ..materials.nodes import tag
+from ..runtime import JobData, is_there
 from .meshes import point_object, write_mesh
 from .output import (
     KIND,
@@ -19,6 +20,7 @@ from .output import (
     mark_runtime,
     parent_of,
     remove_collection,
+    remove_made,
     result_collections,
 )
 
@@ -41,13 +43,17 @@ class Results:
     purpose : {'VIEW', 'RENDER'}
     mark : str
         Suffix of all names, where there are results of several cameras at the same time.
+    data : JobData, optional
+        Of the job, which ends when somebody deletes its results.
     """
 
-    def __init__(self, scene: bpy.types.Scene, purpose: str, mark: str = "") -> None:
+    def __init__(self, scene: bpy.types.Scene, purpose: str, mark: str = "", data: JobData | None = None) -> None:
         self.scene = scene
+        self.data = data
         self.purpose = purpose
         self.mark = f" {mark}" if mark else ""
         self.collection: bpy.types.Collection | None = None
+        self._made: list[bpy.types.ID] = []
 
     def open(self) -> None:
         """Make the collection and link it to the scene."""
@@ -55,6 +61,8 @@ class Results:
         self.collection[PURPOSE] = self.purpose
         self.collection[UNFINISHED] = True
         tag(self.collection)
+        if self.data is not None:
+            self.data.add("the result", self.collection)
         self.scene.collection.children.link(self.collection)
 
     def add(
@@ -67,7 +75,9 @@ class Results:
     ) -> bpy.types.Object:
         """Write one mesh as an object of the collection; of one species, or of None."""
         name = self._name(name)
-        return self._link(bpy.data.objects.new(name, write_mesh(name, buffers, materials)), kind, species)
+        mesh = write_mesh(name, buffers, materials)
+        self._made += [mesh, *materials]
+        return self._link(bpy.data.objects.new(name, mesh), kind, species)
 
     def add_points(
         self,
@@ -78,6 +88,7 @@ class Results:
         species: Species | None = None,
     ) -> bpy.types.Object:
         """Write one cloud of points, which has one material, as an object of the collection."""
+        self._made += materials
         return self._link(point_object(self._name(name), buffers, *materials), kind, species)
 
     def _name(self, name: str) -> str:
@@ -89,9 +100,13 @@ class Results:
         return stem.encode()[: _LONGEST - len(end)].decode(errors="ignore") + end
 
     def _link(self, made: bpy.types.Object, kind: str, species: Species | None) -> bpy.types.Object:
+        self._made += [made, made.data]
+        if self.data is not None:
+            self.data.add("a part of the result", made, made.data)
         tag(made.data)
         if species is not None:
             made.parent = parent_of(self.collection, species.identifier, species.name)
+            self._made.append(made.parent)
         made[KIND] = kind
         made.hide_select = True  # artists select and edit plants, not millions of polygons
         tag(made)
@@ -108,10 +123,12 @@ class Results:
             mark_runtime(self.collection, True)
 
     def discard(self) -> None:
-        """Remove everything made so far."""
-        if self.collection is not None:
-            remove_collection(self.scene, self.collection)
-            self.collection = None
+        """Remove everything made so far, whatever of it or of the scene somebody else has removed."""
+        if self.collection is not None and is_there(self.collection):
+            remove_collection(self.scene if is_there(self.scene) else None, self.collection)
+        self.collection = None
+        remove_made(self._made)
+        self._made = []
 
 
 def dress_results(scene: bpy.types.Scene) -> None:

@@ -56,11 +56,11 @@ def write_mesh(name: str, buffers: MeshBuffers, materials: Sequence[bpy.types.Ma
     mesh = bpy.data.meshes.new(name)
     try:
         _fill(mesh, buffers)
+        for material in materials:
+            mesh.materials.append(material)
     except BaseException:
         bpy.data.meshes.remove(mesh)
         raise
-    for material in materials:
-        mesh.materials.append(material)
     return mesh
 
 

@@ -8,11 +8,13 @@ layer. Results of a render and the artist's results share it, so that its name, 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import bpy
 
 from ..materials.nodes import is_ours, is_own, tag
+from ..runtime import is_there
 
 #: Custom property of a result object: 'leaf', 'blossom', 'bark', 'explicit' or 'proxy', or the parent of a species.
 KIND = "tetflora_kind"
@@ -146,26 +148,42 @@ def result_collections(scene: bpy.types.Scene, purpose: str | None = None) -> li
     return [c for c in made if purpose is None or c[PURPOSE] == purpose]
 
 
-def remove_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) -> int:
-    """Remove a result collection, linked to the scene or not; returns the number of datablocks removed."""
-    data, objects, groups = [], [], set()
-    for held in list(collection.objects):
-        if is_own(held) and held.get(KIND) == PARENT and len(held.users_collection) > 1:
-            continue  # other results use it too
-        if is_own(held):
-            objects.append(held)
-            if held.data is not None and is_own(held.data):
-                data.append(held.data)
-            groups |= {m.node_group for m in held.modifiers if m.type == 'NODES' and m.node_group is not None}
-        elif held.name not in scene.collection.objects:
-            scene.collection.objects.link(held)  # the artist's own object stays in the scene
-    for child in list(collection.children):
-        if child.name not in scene.collection.children:
-            scene.collection.children.link(child)
-    materials = {m for d in data for m in d.materials if m is not None and is_own(m)}
-    removed = [*objects, *(d for d in data if d.users <= 1), collection]
+def remove_collection(scene: bpy.types.Scene | None, collection: bpy.types.Collection) -> int:
+    """Remove a result collection, linked to a scene or not; returns the number of datablocks removed.
+
+    The artist's own objects in it stay in the scene, if that is there.
+    """
+    objects = list(collection.objects)
+    own = [o for o in objects if is_own(o) and not (o.get(KIND) == PARENT and len(o.users_collection) > 1)]
+    if scene is not None:
+        for theirs in objects:
+            if not is_own(theirs) and theirs.name not in scene.collection.objects:
+                scene.collection.objects.link(theirs)
+        for child in list(collection.children):
+            if child.name not in scene.collection.children:
+                scene.collection.children.link(child)
+    data = [o.data for o in own if o.data is not None and is_own(o.data)]
+    groups, materials = _groups(own), {m for d in data for m in d.materials if m is not None and is_own(m)}
+    removed = [*own, *(d for d in data if d.users <= 1), collection]
     bpy.data.batch_remove(removed)
     return len(removed) + _remove_unused(materials, groups)
+
+
+def remove_made(datablocks: Iterable[bpy.types.ID]) -> None:
+    """Remove objects that are in no collection, and data and materials of TetFlora's that nothing uses then."""
+    there = [datablock for datablock in dict.fromkeys(datablocks) if is_there(datablock)]
+    objects = [d for d in there if isinstance(d, bpy.types.Object) and is_own(d) and not d.users_collection]
+    groups = _groups(objects)
+    bpy.data.batch_remove(objects)
+    data = [d for d in there if is_there(d) and isinstance(d, bpy.types.Mesh | bpy.types.PointCloud) and not d.users]
+    bpy.data.batch_remove(data)
+    left = [d for d in there if is_there(d)]
+    _remove_unused({d for d in left if isinstance(d, bpy.types.Material) and is_own(d)}, groups)
+
+
+def _groups(objects: Iterable[bpy.types.Object]) -> set[bpy.types.NodeTree]:
+    """Groups of geometry nodes that objects use."""
+    return {m.node_group for o in objects for m in o.modifiers if m.type == 'NODES' and m.node_group is not None}
 
 
 def _remove_unused(materials: set[bpy.types.Material], groups: set[bpy.types.NodeTree]) -> int:

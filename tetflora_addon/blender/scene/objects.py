@@ -77,6 +77,12 @@ def takes_part(obj: bpy.types.Object) -> bool:
     return obj.tetflora.is_plant or obj.tetflora.is_field or obj.tetflora.is_explicit
 
 
+def taking_part(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """Objects of a scene that refinement reads, hidden ones included: plants, meshes, occluders and lamps."""
+    every = objects_within(scene.collection)
+    return [obj for obj in every if obj.type == 'LIGHT' or takes_part(obj) or obj.tetflora.is_occluder]
+
+
 def may_take_part(obj: bpy.types.Object) -> bool:
     """Whether an object takes part in refinement, or may instance some that do; cheap."""
     return takes_part(obj) or may_instance(obj)

@@ -25,7 +25,7 @@ from ..placing.plant_objects import prepare_scene
 from ..properties import auto_refine_switched
 from ..results.collection import has_results
 from ..results.leaf_objects import leaf_objects
-from ..runtime import Handlers, call_off, call_soon, redraw
+from ..runtime import GoneError, Handlers, call_off, call_soon, redraw
 from ..settings import wind_of
 from .state import camera_now
 
@@ -118,6 +118,9 @@ def tick() -> float | None:
     _state.working = True
     try:
         more = _begin(scene) if _state.steps is None else _slice(scene)
+    except GoneError:  # deleted by somebody of whom Blender has told nothing: what is left is refined anew
+        _state.steps, more = None, True
+        _state.due = time.monotonic() + QUIET
     except Exception as error:
         expected = isinstance(error, TetFloraError)
         _state.steps, more = None, False

@@ -19,8 +19,9 @@ from ...preview.light_plants import Shapes, bounds_of_plants, light_plants
 from ...refinement.loop import refine as refine_loop
 from ...refinement.statistics import Progress
 from ..job.contents import compile_for, load_for, read_scene, refinement_settings
-from ..runtime import Handlers, call_off, call_soon, redraw
+from ..runtime import Handlers, JobData, call_off, call_soon, guarded, redraw
 from ..scene.camera import read_camera
+from ..scene.objects import taking_part
 from ..scene.plants import NoPlantsError, read_plants
 from ..species import edits
 from ..worker import call_in_thread, steps_in_thread
@@ -40,17 +41,30 @@ def level_steps(
     TetFloraError
         As `job.refine_steps`.
     """
+    layer = view_layer or depsgraph.view_layer
+    data = JobData("Compute Levels", scene, layer)
+    data.add_objects(taking_part(scene))
+    if scene.camera is not None:
+        data.add_objects([scene.camera])
+    return guarded(data, _level_steps(data, scene, depsgraph, layer))
+
+
+def _level_steps(
+    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, layer: bpy.types.ViewLayer
+) -> Generator[Progress, None, Levels]:
     yield Progress(0.0, "Reading the scene")
+    depsgraph.update()  # reading what was deleted since the last step would crash Blender
     looked = camera_now(scene)
     before = find(scene)
     camera = before.frozen if before is not None and before.frozen is not None else read_camera(scene, depsgraph)
-    given = read_scene(scene, depsgraph, view_layer or depsgraph.view_layer)
+    given = read_scene(scene, depsgraph, layer)
     progress = Progress(0.02, "Compiling species")
     yield progress
     flora = yield from call_in_thread(progress, compile_species, load_for(given.species, scene, depsgraph))
     settings = refinement_settings(scene)
     states = refine_loop(flora, given.seeds, camera, settings, given.occluders, given.polygons, given.lights)
     levels = yield from steps_in_thread(_shown(gather(states, flora, camera)), Progress(0.05, "Level 0"))
+    data.check()
     preview = of(scene)
     preview.levels, preview.looked = levels, looked
     preview.made += 1
