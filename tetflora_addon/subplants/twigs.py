@@ -78,6 +78,7 @@ def _triangles(flora: Flora, whole: WholeBranches) -> MeshBuffers:
             "tf_transmission": ("FACE", np.zeros(number, np.float32)),
             **motion,
         },
+        smooth=True,
     )
 
 
