@@ -43,7 +43,7 @@ class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
         if active.type in FORM_TYPES and not faces:
             layout.operator(TETFLORA_OT_use_as_form.bl_idname, icon='CURVE_DATA')
         field = active.tetflora.is_field
-        if active.type in FIELD_TYPES and (field or not faces or has_nodes(active)):
+        if field or (active.type in FIELD_TYPES and (not faces or has_nodes(active))):
             text = "Field of Plants" if field else "Use as Field of Plants"
             icon = 'CHECKMARK' if field else 'POINTCLOUD_DATA'
             Button(TETFLORA_OT_mark_field, icon, text).draw(layout, depress=field)

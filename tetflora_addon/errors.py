@@ -1,10 +1,42 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Errors that a user can cause; their message names the thing and says what to do next."""
+"""Errors that a user can cause; their message names the thing and says what to do next.
+
+What they name comes from files of anybody, so that texts are made `readable`, and values `shown`, before they are told.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+#: Most characters of a message, of a name in menus, and of a value within a message.
+MESSAGE, NAME, VALUE = 2000, 100, 60
+
+#: Control characters, marks that turn the direction of writing, and halves of surrogate pairs.
+_UNREADABLE = re.compile("[\0-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufeff]+")
+
+
+def readable(text: str, most: int = MESSAGE) -> str:
+    """A text that every window and terminal can show: on one line, without control characters, not too long."""
+    text = _UNREADABLE.sub(" ", text[: 2 * most])
+    return text if len(text) <= most else text[: most - 3] + "..."
+
+
+def shown(value: Any) -> str:
+    """A value of a file, as messages quote it."""
+    try:
+        text = repr(value[: 2 * VALUE] if isinstance(value, str) else value)
+    except (RecursionError, ValueError):  # nested too deep, or an integer of thousands of digits
+        return f"a {type(value).__name__} too large to show"
+    return readable(text, VALUE)
 
 
 class TetFloraError(Exception):
     """Something the user gave or asked for cannot be used as it is."""
+
+    def __init__(self, message: object = "") -> None:
+        super().__init__(readable(str(message)))
 
 
 class SpeciesError(TetFloraError):

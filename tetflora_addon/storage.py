@@ -3,9 +3,10 @@
 """What takes long to compute is kept: in a folder across sessions, in memory within one.
 
 The cache folder has one file for each result, named after its kind and a digest of all that it follows from, so a file
-may become unused but never wrong. Processes may share the folder: files are written whole or not at all, even on a full
-disk. Damaged, foreign or unreadable files count as absent. Trouble with the folder is reported once on stderr and stops
-nothing. `keeping` does the same in memory for functions of arrays.
+may become unused but never wrong. Processes and users may share the folder: files are written whole or not at all, even
+on a full disk, never through links, and each user clears away what is his own. Damaged, foreign or unreadable files
+count as absent, and none is taken for larger than the result that is looked for. Trouble with the folder is reported
+once on stderr and stops nothing. `keeping` does the same in memory for functions of arrays.
 """
 
 from __future__ import annotations
@@ -16,50 +17,29 @@ import os
 import re
 import sys
 import time
-import uuid
+import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import wraps
+from itertools import islice
+from math import prod
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .errors import TetFloraError
-
-#: Names of files that are being written begin and end like this, whatever they are to become.
-PART = (".tetflora-", ".part")
-
-
-def write_whole(path: Path, content: bytes | str) -> None:
-    """Write a file beside its place and then put it there; text becomes UTF-8.
-
-    Readers in other processes see the old file or the new one, never a part of either.
-
-    Raises
-    ------
-    OSError
-        It cannot be written; an earlier file stays as it was.
-    """
-    place = Path(os.path.realpath(path))  # what a link leads to is replaced, not the link
-    part = place.with_name(uuid.uuid4().hex.join(PART))
-    try:
-        with part.open("xb") as file:
-            file.write(content.encode() if isinstance(content, str) else content)
-            file.flush()
-            os.fsync(file.fileno())  # drives in the network only say here that they are full
-        part.replace(place)
-    except BaseException:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
-        raise
-
+from .files import PART, inside, read_whole, write_whole
 
 #: Raise it when files are written in another way.
 _FORMAT = 1
-#: All files together take no more than so many bytes; those that were not used for longest go first. Each has a few
-#: kilobytes.
+#: All files of a user together take no more than so many bytes; those that were not used for longest go first. Each has
+#: a few kilobytes.
 MOST_BYTES = 64 << 20
+#: Entries of the folder that are looked at to make room: whoever fills it must not stop the others.
+_MOST_ENTRIES = 50_000
+#: Bytes of a file beside its values: names and headers.
+_HEADERS = 4096
 #: Seconds after which a file that was begun and not ended is taken for one of a process that was killed.
 _ABANDONED = 3600.0
 
@@ -106,6 +86,8 @@ def remembered(
     if _folder is None:
         return find_out()
     path = _folder / f"tetflora-{kind}-{_FORMAT}-{content}.npz"
+    if not _OURS.fullmatch(path.name):
+        raise ValueError(f"{path.name} is no name of a result")
     values = _read(path, shape)
     if values is None:
         values = find_out()
@@ -114,7 +96,7 @@ def remembered(
 
 
 def clear() -> int:
-    """Delete all results in the folder, and nothing else that lies there; returns how many there were.
+    """Delete all results of this user in the folder, and nothing else that lies there; returns how many there were.
 
     Raises
     ------
@@ -124,8 +106,9 @@ def clear() -> int:
     number = 0
     try:
         for entry in _entries(_OURS):
-            Path(entry).unlink(missing_ok=True)
-            number += 1
+            if _is_own(entry.stat(follow_symlinks=False)):
+                Path(entry).unlink(missing_ok=True)
+                number += 1
     except OSError as error:
         raise TetFloraError(
             f"Cannot clear the cache folder {_folder}: {error.strerror}. Check its permissions"
@@ -134,9 +117,11 @@ def clear() -> int:
 
 
 def _read(path: Path, shape: tuple[int, ...]) -> NDArray[np.float64] | None:
+    most = 8 * prod(shape) + _HEADERS
     try:
-        # Read first: numpy leaves damaged files open.
-        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as stored:
+        content = read_whole(path, most)
+        _refuse_packed(content, most)
+        with np.load(io.BytesIO(content), allow_pickle=False) as stored:
             values, name = stored["values"], str(stored["name"])
     except FileNotFoundError:
         return None
@@ -145,8 +130,27 @@ def _read(path: Path, shape: tuple[int, ...]) -> NDArray[np.float64] | None:
     if name != path.name or values.dtype != np.float64 or values.shape != shape or not np.isfinite(values).all():
         return _damaged(path)
     with suppress(OSError):  # a folder of somebody else's, to be read only
-        os.utime(path)
+        os.utime(path, follow_symlinks=os.utime not in os.supports_follow_symlinks)
     return values
+
+
+def _refuse_packed(content: bytes, most: int) -> None:
+    """Refuse an archive that would take more memory than it has bytes: ours are not compressed, and say their size.
+
+    Raises
+    ------
+    ValueError
+    """
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        for info in archive.infolist():
+            if info.compress_type != zipfile.ZIP_STORED or info.file_size > most:
+                raise ValueError("it is compressed")
+            with archive.open(info) as file:
+                if np.lib.format.read_magic(file) != (1, 0):
+                    raise ValueError("it has another format")
+                shape, _, dtype = np.lib.format.read_array_header_1_0(file)
+                if prod(shape) * dtype.itemsize > most:
+                    raise ValueError("it says to be larger than it is")
 
 
 def _damaged(path: Path) -> None:
@@ -158,36 +162,45 @@ def _write(path: Path, values: NDArray[np.float64]) -> None:
     np.savez(content, values=values, name=np.array(path.name))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, content.getvalue())
+        write_whole(inside(path.parent, path.name), content.getvalue())
         _make_room()
     except OSError as error:
         _warn(f"cannot write to the cache folder {path.parent}: {error.strerror}")
 
 
 def _make_room() -> None:
-    """Delete files that were not used for longest, as long as all are too large, and those that nobody will end.
+    """Delete this user's files that were not used for longest, as long as all of them are too large, and those that
+    nobody will end.
 
-    Any of them may be gone already: other processes tidy up as well.
+    Any of them may be gone already: other processes tidy up as well. What others own counts for them alone, or whoever
+    fills the folder would empty the rest of it.
     """
     now, files = time.time(), []
-    for entry in _entries(_BEGUN):
-        with suppress(FileNotFoundError):
-            if now - entry.stat().st_mtime > _ABANDONED:
+    for entry in islice(_entries(re.compile(f"{_OURS.pattern}|{_BEGUN.pattern}")), _MOST_ENTRIES):
+        with suppress(OSError):
+            status = entry.stat(follow_symlinks=False)
+            if not _is_own(status):
+                continue
+            if _OURS.fullmatch(entry.name):
+                files.append((status.st_mtime_ns, status.st_size, entry.path))
+            elif now - status.st_mtime > _ABANDONED:
                 os.unlink(entry)
-    for entry in _entries(_OURS):
-        with suppress(FileNotFoundError):
-            status = entry.stat()
-            files.append((status.st_mtime_ns, status.st_size, entry.path))
     total = sum(size for _, size, _ in files)
     for _, size, path in sorted(files):
         if total <= MOST_BYTES:
             break
-        Path(path).unlink(missing_ok=True)
+        with suppress(OSError):
+            os.unlink(path)
         total -= size
 
 
+def _is_own(status: os.stat_result) -> bool:
+    """Whether this user owns a file; everybody all of them where the system does not tell."""
+    return not hasattr(os, "getuid") or status.st_uid == os.getuid()
+
+
 def _entries(pattern: re.Pattern[str]) -> Iterator[os.DirEntry[str]]:
-    """Files of the folder by name; none if there is no folder."""
+    """Regular files of the folder by name; none if there is no folder."""
     if _folder is not None and _folder.is_dir():
         with os.scandir(_folder) as entries:
             yield from (e for e in entries if pattern.fullmatch(e.name) and e.is_file(follow_symlinks=False))

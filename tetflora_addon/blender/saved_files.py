@@ -21,7 +21,7 @@ from pathlib import Path
 import bpy
 
 from ..errors import SceneError
-from ..storage import PART
+from ..files import PART
 from .runtime import Handlers, complain
 
 #: Version of the layout of properties; a later one adds steps from earlier ones to `migrate`.

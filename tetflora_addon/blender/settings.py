@@ -8,6 +8,7 @@ Properties are generated from the engine's dataclasses, which hold their names, 
 from __future__ import annotations
 
 from dataclasses import fields
+from math import degrees
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,6 +16,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ..camera.view_cells import ViewCells
+from ..errors import SceneError, readable, shown
 from ..growth.wind import Wind
 from ..refinement.settings import QUALITIES, RefinementSettings
 from .preferences import QUALITY_ITEMS, preferences
@@ -44,6 +46,51 @@ def properties_of(settings: type, **common: Any) -> SimpleNamespace:
         if f.metadata:
             setattr(made, f.name, _MAKERS[type(f.default)](**{"default": f.default, **f.metadata, **common}))
     return made
+
+
+_ENDLESS = 1e30  # what Blender has for no bound is larger
+
+
+def limits_of(prop: bpy.types.Property) -> str:
+    """What a number has to be, for messages; angles in degrees."""
+    low, high = prop.hard_min, prop.hard_max
+    if prop.type == 'FLOAT' and prop.subtype == 'ANGLE':
+        low, high = degrees(low), degrees(high)
+    if low < -_ENDLESS:
+        return "a finite number"
+    return f"from {low:.6g} to {high:.6g}" if high < _ENDLESS else f"{low:.6g} or greater"
+
+
+def check_limits(group: bpy.types.PropertyGroup, owner: str) -> None:
+    """Refuse numbers and choices that no slider and no menu gives.
+
+    Scripts that write custom properties, and files of any origin, can store them past Blender's own checks, and Blender
+    takes nan for any number.
+
+    Parameters
+    ----------
+    owner : str
+        Named in the message.
+
+    Raises
+    ------
+    SceneError
+        Names the setting, its value and the limits.
+    """
+    for prop in group.bl_rna.properties:
+        if prop.type not in {'INT', 'FLOAT', 'ENUM'} or not group.is_property_set(prop.identifier):
+            continue
+        value = getattr(group, prop.identifier)
+        if prop.type == 'ENUM':
+            sound, limits = value != "", "one of the choices of its menu"
+        else:
+            numbers = value if getattr(prop, "is_array", False) else (value,)
+            sound, limits = all(prop.hard_min <= n <= prop.hard_max for n in numbers), limits_of(prop)
+        if not sound:
+            raise SceneError(
+                f"{readable(owner)}: {prop.name} is {shown(value)}; it must be {limits}. Set it again in the TetFlora "
+                "tab of the sidebar"
+            )
 
 
 _CELLS = properties_of(ViewCells)

@@ -4,14 +4,15 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from ..errors import SpeciesError
-from .schema import MAX_FILE_BYTES, read_species
+from ..errors import NAME, SpeciesError, readable, shown
+from ..files import IDENTIFIER_RULE, is_identifier, is_regular, json_of
+from .schema import read_species, species_file
 from .species import Species
 
 #: What lists begin with, and new plants are where nothing is chosen: a tree of which anybody expects a forest.
@@ -33,16 +34,19 @@ def builtin_folder() -> Path:
     return Path(__file__).resolve().parent.parent / "catalogue"
 
 
+def info_of(identifier: str, data: Mapping[str, object], path: Path) -> SpeciesInfo:
+    """What a menu shows of a decoded species, sound or not."""
+    name, description = readable(str(data.get("name", "")), NAME).strip(), readable(str(data.get("description", "")))
+    return SpeciesInfo(identifier, name or identifier, description, path)
+
+
 @lru_cache(maxsize=512)
-def _info(path: Path, stamp: tuple[int, int]) -> SpeciesInfo:
+def _info(path: Path, _stamp: tuple[int, int]) -> SpeciesInfo:
     try:
-        if stamp[1] > MAX_FILE_BYTES:
-            raise ValueError("larger than menus read")
-        data = json.loads(path.read_text(encoding="utf-8-sig"))
-        name, description = str(data.get("name", path.stem)), str(data.get("description", ""))
-    except (OSError, ValueError, AttributeError, RecursionError):
-        name, description = path.stem, "This file cannot be read; choose the species to see why"
-    return SpeciesInfo(path.stem, name, description, path)
+        data = json_of(species_file(path))
+        return info_of(path.stem, data, path)
+    except (SpeciesError, ValueError, AttributeError):
+        return info_of(path.stem, {"description": "This file cannot be read; choose the species to see why"}, path)
 
 
 @lru_cache(maxsize=256)
@@ -51,8 +55,42 @@ def _species(path: Path, _stamp: tuple[int, int]) -> Species:
 
 
 def _stamp(path: Path) -> tuple[int, int]:
-    status = path.stat()
+    try:
+        status = os.lstat(path)
+    except OSError:  # somebody has just deleted it
+        return 0, 0
     return status.st_mtime_ns, status.st_size
+
+
+def checked_identifier(text: str) -> str:
+    """An identifier of a species, which may have come from any file.
+
+    Raises
+    ------
+    SpeciesError
+        It could name no file of a species.
+    """
+    if not is_identifier(text):
+        raise SpeciesError(f"{shown(text)} cannot name a species. Use only {IDENTIFIER_RULE}")
+    return text
+
+
+def _files(folder: Path) -> Iterator[tuple[Path, str]]:
+    """Species files of a folder by name, and why each is no species; an empty text for those that may be one."""
+    try:
+        paths = sorted(folder.glob("*.json"))
+    except (OSError, ValueError):
+        paths = []
+    for path in paths:
+        if not is_identifier(path.stem):
+            yield path, f"skipped; rename the file. Use only {IDENTIFIER_RULE}"
+        else:
+            yield path, "" if is_regular(path) else "skipped; it is a link or a folder. Put the file itself there"
+
+
+def odd_files(folders: Sequence[Path]) -> list[str]:
+    """Files of the user's own folders that `list_species` skips, each with the reason and what to do."""
+    return [readable(f'"{path.name}": {reason}') for folder in folders for path, reason in _files(folder) if reason]
 
 
 def in_order(found: Mapping[str, SpeciesInfo]) -> dict[str, SpeciesInfo]:
@@ -67,14 +105,13 @@ def list_species(folders: Sequence[Path] = ()) -> dict[str, SpeciesInfo]:
     ----------
     folders : sequence of Path
         Folders of the user's own; a file there replaces a shipped one of the same name. Missing folders are passed
-        over.
+        over, and so are files that `odd_files` names.
     """
     found: dict[str, SpeciesInfo] = {}
     for folder in (builtin_folder(), *folders):
-        if folder.is_dir():
-            for path in sorted(folder.glob("*.json")):
-                if path.is_file():  # neither a folder nor a link that leads nowhere
-                    found[path.stem] = _info(path, _stamp(path))
+        for path, reason in _files(folder):
+            if not reason:
+                found[path.stem] = _info(path, _stamp(path))
     return in_order(found)
 
 
@@ -98,6 +135,6 @@ def load_species(
     """
     known = list_species(folders) if known is None else known
     if identifier not in known:
-        raise SpeciesError(f"Unknown species \"{identifier}\"; available: {', '.join(known) or 'none'}")
+        raise SpeciesError(f'Unknown species "{readable(identifier, NAME)}"; available: {", ".join(known) or "none"}')
     path = known[identifier].path
     return _species(path, _stamp(path))

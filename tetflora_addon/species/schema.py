@@ -7,16 +7,15 @@ The tables below are the reference of the file format; `docs/species.md` is writ
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..errors import SpeciesError
+from ..errors import NAME, SpeciesError, readable, shown
+from ..files import json_of, read_whole
 from .leaf_models import LEAF_MODELS, LeafModel, leaf_model
 from .members import expected_polygons
 from .skeletons import MAX_ORDERS
@@ -152,16 +151,16 @@ class _Reader:
 
     def number(self, value: Any, key: str, low: float, high: float) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.fail(key, f"must be a number from {low:g} to {high:g}, not {_shown(value)}")
+            raise self.fail(key, f"must be a number from {low:g} to {high:g}, not {shown(value)}")
         if not low <= value <= high:  # false for NaN as well
-            raise self.fail(key, f"must be from {low:g} to {high:g}, not {_shown(value)}")
+            raise self.fail(key, f"must be from {low:g} to {high:g}, not {shown(value)}")
         return float(value)
 
     def range(self, value: Any, key: str, low: float, high: float) -> Range:
         if isinstance(value, int | float) and not isinstance(value, bool):
             return Range(self.number(value, key, low, high))
         if not isinstance(value, list) or len(value) != 2:
-            raise self.fail(key, f"must be [mean, variation] within {low:g} to {high:g}, not {_shown(value)}")
+            raise self.fail(key, f"must be [mean, variation] within {low:g} to {high:g}, not {shown(value)}")
         mean = self.number(value[0], f"{key}[0] (mean)", low, high)
         variation = self.number(value[1], f"{key}[1] (variation)", 0, high - low)
         if mean - variation < low - 1e-12 or mean + variation > high + 1e-12:
@@ -176,46 +175,40 @@ class _Reader:
         if not (
             isinstance(value, list) and len(value) == 2 and all(isinstance(v, list) and len(v) == 3 for v in value)
         ):
-            raise self.fail(key, f"must be {form} with numbers from 0 to 1, not {_shown(value)}")
+            raise self.fail(key, f"must be {form} with numbers from 0 to 1, not {shown(value)}")
         channels = [self.range([m, v], f"{key}.{c}", 0, 1) for m, v, c in zip(*value, "rgb", strict=True)]
         return Colour(tuple(c.mean for c in channels), tuple(c.variation for c in channels))
 
     def rgb(self, value: Any, key: str) -> tuple[float, float, float]:
         if not isinstance(value, list | tuple) or len(value) != 3:
-            raise self.fail(key, f"must be [r, g, b] with numbers from 0 to 1, not {_shown(value)}")
+            raise self.fail(key, f"must be [r, g, b] with numbers from 0 to 1, not {shown(value)}")
         return tuple(self.number(v, f"{key}.{c}", 0, 1) for v, c in zip(value, "rgb", strict=True))
 
     def truth(self, value: Any, key: str) -> bool:
         if not isinstance(value, bool):
-            raise self.fail(key, f"must be true or false, not {_shown(value)}")
+            raise self.fail(key, f"must be true or false, not {shown(value)}")
         return value
 
     def choice(self, value: Any, key: str, choices: tuple[str, ...]) -> str:
         if value not in choices:
-            raise self.fail(key, f"must be one of {', '.join(choices)}, not {_shown(value)}")
+            raise self.fail(key, f"must be one of {', '.join(choices)}, not {shown(value)}")
         return value
 
     def keys(self, value: Any, key: str, allowed: Mapping[str, Any] | tuple[str, ...]) -> None:
         if not isinstance(value, dict):
-            raise self.fail(key, f"must be an object {{…}}, not {_shown(value)}")
+            raise self.fail(key, f"must be an object {{…}}, not {shown(value)}")
         for name in value:
             if name not in allowed:
+                name = readable(name, NAME)
                 near = get_close_matches(name.lower(), allowed, 1)
                 meant = f'did you mean "{near[0]}"? Allowed' if near else "allowed"
                 raise self.fail(f"{key}.{name}" if key else name, f"unknown key; {meant} keys: {', '.join(allowed)}")
 
     def text(self, value: Any, key: str, least: int = 1) -> str:
-        if not isinstance(value, str) or len(value.strip()) < least or len(value) > 1000:
-            raise self.fail(key, f"must be a string of {least} to 1000 characters, not {_shown(value)}")
-        return value
-
-
-def _shown(value: Any) -> str:
-    try:
-        text = repr(value)
-    except (RecursionError, ValueError):  # nested too deep, or an integer of thousands of digits
-        return f"a {type(value).__name__} too large to show"
-    return text if len(text) <= 60 else text[:57] + "..."
+        text = readable(value) if isinstance(value, str) else ""
+        if not isinstance(value, str) or len(text.strip()) < least or len(value) > 1000:
+            raise self.fail(key, f"must be a string of {least} to 1000 characters, not {shown(value)}")
+        return text
 
 
 def _read_order(reader: _Reader, data: Any, where: str, first: bool, last: bool) -> Order:
@@ -241,7 +234,7 @@ def _read_order(reader: _Reader, data: Any, where: str, first: bool, last: bool)
         elif key.kind == "integer":
             number = reader.number(value, path, key.low, key.high)
             if number != int(number):
-                raise reader.fail(path, f"must be a whole number, not {_shown(value)}")
+                raise reader.fail(path, f"must be a whole number, not {shown(value)}")
             values[name] = int(number)
         else:
             values[name] = reader.choice(value, path, CHOICES[key.kind])
@@ -276,7 +269,7 @@ def _read_leaf(reader: _Reader, data: Any, where: str) -> LeafModel | str:
         )
     if "model" in data:
         if not isinstance(data["model"], str) or data["model"] not in LEAF_MODELS:
-            raise reader.fail(f"{where}.model", f"must be one of {', '.join(LEAF_MODELS)}, not {_shown(data['model'])}")
+            raise reader.fail(f"{where}.model", f"must be one of {', '.join(LEAF_MODELS)}, not {shown(data['model'])}")
         return LEAF_MODELS[data["model"]]
     if "object" in data:
         return reader.text(data["object"], f"{where}.object")
@@ -323,16 +316,16 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
     """
     reader = _Reader(source)
     if not isinstance(data, dict):
-        raise reader.fail("species", f"must be an object {{…}}, not {_shown(data)}")
+        raise reader.fail("species", f"must be an object {{…}}, not {shown(data)}")
     reader.keys(data, "", SPECIES_KEYS)
     for key in ("format", "name", "orders", "leaf"):
         if key not in data:
             raise reader.fail(key, "missing; add this key")
     if data["format"] != FORMAT or isinstance(data["format"], bool):
-        raise reader.fail("format", f"must be {FORMAT} for this version of TetFlora, not {_shown(data['format'])}")
+        raise reader.fail("format", f"must be {FORMAT} for this version of TetFlora, not {shown(data['format'])}")
     orders = data["orders"]
     if not isinstance(orders, list) or not 1 <= len(orders) <= MAX_ORDERS:
-        found = len(orders) if isinstance(orders, list) else _shown(orders)
+        found = len(orders) if isinstance(orders, list) else shown(orders)
         raise reader.fail("orders", f"must be a list of 1 to {MAX_ORDERS} orders, has {found}")
     read = tuple(_read_order(reader, o, f"orders[{i}]", i == 0, i == len(orders) - 1) for i, o in enumerate(orders))
     spur = None
@@ -364,14 +357,19 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
     return species
 
 
-def _once(source: str, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """A JSON object whose keys all differ; Python's reader would take the last of equal ones and say nothing."""
-    data = dict(pairs)
-    if len(data) < len(pairs):
-        names = [name for name, _ in pairs]
-        twice = next(name for name in names if names.count(name) > 1)
-        raise SpeciesError(f"{source}: {twice}: duplicate key in one object; remove one of them")
-    return data
+def species_from_json(content: bytes | str, identifier: str, source: str) -> Species:
+    """Check the text of a species file, as `species_from_dict` checks what it decodes to.
+
+    Raises
+    ------
+    SpeciesError
+        It is not JSON, or breaks a rule of the format.
+    """
+    try:
+        data = json_of(content)
+    except ValueError as error:
+        raise SpeciesError(f"{source}: {error}") from None
+    return species_from_dict(data, identifier, source)
 
 
 def read_species(path: Path) -> Species:
@@ -382,15 +380,18 @@ def read_species(path: Path) -> Species:
     SpeciesError
         The file cannot be read, is not JSON, or breaks a rule of the format.
     """
+    return species_from_json(species_file(path), path.stem, path.name)
+
+
+def species_file(path: Path) -> bytes:
+    """The content of a species file.
+
+    Raises
+    ------
+    SpeciesError
+        It cannot be read.
+    """
     try:
-        if path.stat().st_size > MAX_FILE_BYTES:
-            raise SpeciesError(f"{path.name}: larger than {MAX_FILE_BYTES:,} bytes, the limit for a species file")
-        # Some editors begin a file with a mark of its encoding.
-        data = json.loads(path.read_text(encoding="utf-8-sig"), object_pairs_hook=partial(_once, path.name))
+        return read_whole(path, MAX_FILE_BYTES)
     except OSError as error:
         raise SpeciesError(f"{path.name}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise SpeciesError(f"{path.name}: is not valid JSON: not UTF-8 text; save the file as UTF-8") from None
-    except (RecursionError, ValueError) as error:
-        raise SpeciesError(f"{path.name}: is not valid JSON: {error}") from None
-    return species_from_dict(data, path.stem, path.name)

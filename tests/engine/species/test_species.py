@@ -255,7 +255,7 @@ def test_crown_shapes_are_ratios() -> None:
         (b'{"format": 1,}', "JSON"),
         (b"\xff\xfe{}", "JSON: not UTF-8 text"),
         (b"[" * 100_000, "JSON"),
-        (b"1" * 5000, "JSON"),
+        (b"1" * 5000, "must be an object"),
         (b"[1]", "object"),
         (b" " * (MAX_FILE_BYTES + 1), f"larger than {MAX_FILE_BYTES:,}"),
     ],

@@ -28,7 +28,7 @@ from ..scene.explicit import Explicit, read_explicit
 from ..scene.lights import read_lights, read_sources
 from ..scene.objects import read_occluders
 from ..scene.plants import NoPlantsError, read_plants
-from ..settings import wind_of
+from ..settings import check_limits, wind_of
 
 
 @dataclass(frozen=True)
@@ -69,6 +69,7 @@ def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_laye
     TetFloraError
         Nothing to refine, or unusable plants or meshes; the message says which.
     """
+    check_settings(scene)
     with originals_shown(scene, depsgraph):
         explicit = read_explicit(depsgraph, view_layer)
         try:
@@ -123,6 +124,18 @@ def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statisti
     given = read_scene(scene, depsgraph, depsgraph.view_layer)
     flora = compile_for(given.species, scene, depsgraph)
     return Statistics(plants=len(given.seeds), polygons_full=given.polygons_full(flora))
+
+
+def check_settings(scene: bpy.types.Scene) -> None:
+    """Refuse settings of a scene that are beyond their limits.
+
+    Raises
+    ------
+    SceneError
+        Names the setting, its value and the limits.
+    """
+    for group in (scene.tetflora, scene.tetflora.wind, scene.tetflora.output):
+        check_limits(group, f'Scene "{scene.name}"')
 
 
 def settings_from(scene: bpy.types.Scene) -> RefinementSettings:

@@ -27,7 +27,7 @@ from ..scene.objects import objects_within, renderable_objects
 from ..scene.skeletons import species_of
 from ..species.catalogue import display_height
 from ..species.edits import species_for
-from .contents import memory_left, picture_bytes, settings_from
+from .contents import check_settings, memory_left, picture_bytes, settings_from
 
 _LOOKED_AT = 2_000  # plants of each kind of storage that stand for all
 _PATIENCE = 30.0  # times that counting took before plants are counted again
@@ -59,6 +59,7 @@ def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimat
     if not stand.number:
         return None
     try:
+        check_settings(scene)
         camera = read_camera(scene, depsgraph)
     except TetFloraError:
         return None

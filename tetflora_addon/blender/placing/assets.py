@@ -8,6 +8,7 @@ only the open file has are left out: the file into which an asset is dragged wou
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,8 +17,8 @@ import bpy
 import numpy as np
 
 from ...errors import SceneError
+from ...files import read_whole, write_whole
 from ...species.catalogue import SpeciesInfo, list_species, load_species
-from ...storage import write_whole
 from ..preferences import species_folders
 from ..runtime import Handlers
 from ..saved_files import VERSION, write_blend
@@ -28,6 +29,7 @@ FILE = "tetflora_plants.blend"
 LIBRARY = "TetFlora"
 _CATALOG = "6f1d3a52-8f0b-4d7e-9a43-0c5c7a2be901"
 _CATALOGS_FILE = "blender_assets.cats.txt"
+_MOST_BYTES = 4_000_000
 
 
 def write_asset_library(folder: Path) -> tuple[Path, int]:
@@ -121,7 +123,7 @@ def _set_preview(obj: bpy.types.Object, thumbnail: Path) -> None:
 
 def _write_catalog(path: Path) -> None:
     try:
-        text = path.read_text(encoding="utf-8") if path.exists() else "VERSION 1\n"
+        text = read_whole(path, _MOST_BYTES).decode() if os.path.lexists(path) else "VERSION 1\n"
     except UnicodeDecodeError:
         raise SceneError(f"{path} is not a UTF-8 text file, as asset catalogs must be; repair or move it") from None
     if _CATALOG not in text:

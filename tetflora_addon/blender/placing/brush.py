@@ -20,6 +20,7 @@ from ...planting.strokes import Brush
 from ..attributes import world_matrix
 from ..runtime import JobData
 from ..scene.fields import fields_of, read_field
+from ..settings import check_limits
 from .distances import SQUARE, choose, distance_of, follows_species, painted_weights
 from .field_edits import add_points, editable, positions, take_points
 from .ground import Ground
@@ -44,9 +45,10 @@ def brush_of(scene: bpy.types.Scene, pressure: float = 1.0) -> tuple[Brush, tupl
     Raises
     ------
     SceneError
-        No species has a weight above 0, or the brush is too wide for its density.
+        No species has a weight above 0, a setting is beyond its limits, or the brush is too wide for its density.
     """
     settings = scene.tetflora.brush
+    check_limits(settings, "Brush")
     mix = painted_weights(scene)
     if not sum(mix.values()) > 0.0:
         raise SceneError("No species has a weight above 0; raise a weight in the Populate panel")

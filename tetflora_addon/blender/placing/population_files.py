@@ -10,16 +10,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from math import degrees, isfinite, radians
+from math import degrees, inf, radians
 from pathlib import Path
 from typing import Any
 
 import bpy
 import numpy as np
 
-from ...errors import SceneError
-from ...storage import write_whole
-from .populations import NAME, add_population, set_grounds
+from ...errors import NAME, SceneError, readable, shown
+from ...files import IDENTIFIER_RULE, is_identifier, json_of, read_whole, write_whole
+from ..settings import limits_of
+from .populations import add_population, set_grounds
 from .properties import TetFloraMixEntry, TetFloraPopulation
 from .rules import settings_of
 
@@ -28,7 +29,12 @@ FORMAT = "TetFlora populations"
 VERSION = 1
 
 _MIX = ("species", "weight", "companion", "companion_strength", "companion_distance")
-_ENDLESS = 1e30  # what Blender has for no bound is larger
+#: Settings that hold identifiers of species.
+_IDENTIFIERS = ("species", "companion")
+MAX_FILE_BYTES = 4_000_000
+MAX_TEXT = 1000
+#: Most entries of a list: populations of a file, species and grounds of a population.
+MAX_ENTRIES = 1000
 
 
 def as_data(populations: Iterable[TetFloraPopulation]) -> dict[str, Any]:
@@ -75,21 +81,24 @@ def read_populations(
         The file cannot be read, or breaks a rule of the format; names file and key. Nothing is added.
     """
     try:
-        data = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
+        entries = _checked(json_of(read_whole(path, MAX_FILE_BYTES), _refuse_constant))
     except OSError as error:
         raise SceneError(f"{path.name}: cannot read the file: {error.strerror}") from None
-    except (ValueError, RecursionError) as error:
-        raise SceneError(f"{path.name}: is not valid JSON: {error}") from None
-    try:
-        entries = _checked(data)
     except ValueError as error:
         raise SceneError(f"{path.name}: {error}") from None
-    missing: list[str] = []
-    for entry in entries:
-        population = add_population(scene, name=entry.get("name", NAME))
-        _fill(population, entry, scene, missing)
-        if not population.grounds and population.ground_collection is None:
-            set_grounds(population, grounds)
+    grounds, missing, group = list(grounds), [], scene.tetflora
+    before, active = len(group.populations), group.populations_index
+    try:
+        for entry in entries:
+            population = add_population(scene, name=entry["name"])
+            _fill(population, entry, scene, missing)
+            if not population.grounds and population.ground_collection is None:
+                set_grounds(population, grounds)
+    except BaseException:  # all or nothing
+        while len(group.populations) > before:
+            group.populations.remove(before)
+        group.populations_index = active
+        raise
     return len(entries), list(dict.fromkeys(missing))
 
 
@@ -141,10 +150,10 @@ def _checked(data: Any) -> list[dict[str, Any]]:
     """
     _keys("the file", data, {"format", "version", "populations"}, {"format", "version", "populations"})
     if data["format"] != FORMAT:
-        raise ValueError(f'"format" is {data["format"]!r}; population files have "{FORMAT}"')
+        raise ValueError(f'"format" is {shown(data["format"])}; population files have "{FORMAT}"')
     if data["version"] != VERSION or isinstance(data["version"], bool):
         raise ValueError(
-            f'"version" is {data["version"]!r}; this version of TetFlora reads {VERSION}; update the extension'
+            f'"version" is {shown(data["version"])}; this version of TetFlora reads {VERSION}; update the extension'
         )
     entries = _list_of("populations", data["populations"])
     simple = {p.identifier: p for p in _simple_settings(TetFloraPopulation)}
@@ -159,6 +168,8 @@ def _checked(data: Any) -> list[dict[str, Any]]:
             _keys(f"{where}: species {index}", part, {"species"}, set(mix))
             for key, value in part.items():
                 _check(f'{where}: species {index}: "{key}"', mix[key], value)
+                if key in _IDENTIFIERS and value and not is_identifier(value):
+                    raise ValueError(f'{where}: species {index}: "{key}" is {shown(value)}; use only {IDENTIFIER_RULE}')
         for key in simple.keys() & entry.keys():
             _check(f'{where}: "{key}"', simple[key], entry[key])
     return entries
@@ -170,11 +181,11 @@ def _check(where: str, prop: bpy.types.Property, value: Any) -> None:
             _text(where, value)
     elif prop.type == 'BOOLEAN':
         if not isinstance(value, bool):
-            raise ValueError(f"{where} is {value!r}; it must be true or false")
+            raise ValueError(f"{where} is {shown(value)}; it must be true or false")
     elif prop.type == 'ENUM':
         known = [item.identifier for item in prop.enum_items]
         if value not in known:
-            raise ValueError(f"{where} is {value!r}; it must be one of {', '.join(known)}")
+            raise ValueError(f"{where} is {shown(value)}; it must be one of {', '.join(known)}")
     elif prop.type == 'STRING':
         _text(where, value)
     else:
@@ -184,17 +195,15 @@ def _check(where: str, prop: bpy.types.Property, value: Any) -> None:
 def _check_number(where: str, prop: bpy.types.Property, value: Any) -> None:
     whole = prop.type == 'INT'
     if isinstance(value, bool) or not isinstance(value, int if whole else int | float):
-        raise ValueError(f"{where} is {value!r}; it must be a {'whole ' if whole else ''}number")
-    if not whole and not isfinite(value):
-        raise ValueError(f"{where} is {value!r}; it must be a finite number")
+        raise ValueError(f"{where} is {shown(value)}; it must be a {'whole ' if whole else ''}number")
+    if not whole and not -inf < value < inf:
+        raise ValueError(f"{where} is {shown(value)}; it must be a finite number")
     angle = prop.subtype == 'ANGLE'
     # Bounds are single-precision numbers: 0.1 as a file has it is less than 0.1 as Blender stores it.
     with np.errstate(over="ignore"):
         stored = value if whole else float(np.float32(radians(value) if angle else value))
     if not prop.hard_min <= stored <= prop.hard_max:
-        low, high = (degrees(b) if angle else b for b in (prop.hard_min, prop.hard_max))
-        limits = f"from {low:.6g} to {high:.6g}" if abs(high) < _ENDLESS else f"{low:.6g} or greater"
-        raise ValueError(f"{where} is {value!r}; it must be {limits}")
+        raise ValueError(f"{where} is {shown(value)}; it must be {limits_of(prop)}")
 
 
 def _keys(where: str, data: Any, needed: set[str], known: set[str]) -> None:
@@ -203,18 +212,25 @@ def _keys(where: str, data: Any, needed: set[str], known: set[str]) -> None:
     if needed - data.keys():
         raise ValueError(f'{where} has no "{min(needed - data.keys())}"')
     if data.keys() - known:
-        raise ValueError(f'{where} has an unknown key "{min(data.keys() - known)}"')
+        raise ValueError(f'{where} has an unknown key "{readable(min(data.keys() - known), NAME)}"')
 
 
 def _list_of(where: str, value: Any) -> list:
     if not isinstance(value, list):
         raise ValueError(f"{where} is {type(value).__name__}; it must be a list")
+    if len(value) > MAX_ENTRIES:
+        raise ValueError(f"{where} has {len(value):,} entries; {MAX_ENTRIES:,} is the limit")
     return value
 
 
 def _text(where: str, value: Any) -> None:
     if not isinstance(value, str):
-        raise ValueError(f"{where} is {value!r}; it must be a string")
+        raise ValueError(f"{where} is {shown(value)}; it must be a string")
+    if readable(value, MAX_TEXT) != value:
+        raise ValueError(
+            f"{where} is {shown(value)}; it must be one line of at most {MAX_TEXT} characters, and none that control "
+            "terminals"
+        )
 
 
 def _fill(population: TetFloraPopulation, entry: dict[str, Any], scene: bpy.types.Scene, missing: list[str]) -> None:

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
+from ...files import json_of
 from ...planting.places import Placement, place, without
 from ...planting.rules import Companion, Rules
 from ...planting.terrain import Path
@@ -28,6 +29,7 @@ from ..attributes import world_matrix
 from ..scene.fields import fields_of, read_field
 from ..scene.objects import objects_within
 from ..scene.skeletons import species_of
+from ..settings import check_limits
 from ..species.edits import catalogue
 from .distances import HECTARE, distance_of, empty_means, weights_of
 from .plant_objects import plants_of
@@ -177,7 +179,13 @@ def erased_places(population: bpy.types.PropertyGroup) -> tuple[Path, ...]:
 
 
 def _strokes(population: bpy.types.PropertyGroup) -> list[list[float]]:
-    return json.loads(population.erased) if population.erased else []
+    try:
+        strokes = json_of(population.erased) if population.erased else []
+        if all(len(stroke) % 2 and np.isfinite(np.array(stroke, np.float64)).all() for stroke in strokes):
+            return strokes
+    except (ValueError, TypeError):
+        pass
+    raise SceneError(f'"{population.name}": its erased places cannot be read; click Clear Erased Places')
 
 
 def grounds_of(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> list[bpy.types.Object]:
@@ -232,6 +240,8 @@ def place_population(
             if population.uid
             else "Select a mesh to plant on"
         )
+    for group in (population, *population.mix):
+        check_limits(group, f'"{population.name}"')
     rules, species = rules_from(population)
     if most is not None:
         rules = replace(rules, count=min(rules.count, most))

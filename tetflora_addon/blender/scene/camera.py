@@ -16,6 +16,7 @@ from ...camera.camera import Camera
 from ...errors import SceneError
 from ..attributes import frames_of, world_matrix
 
+_NARROW = 1e-9  # of windows that single precision turns into nothing
 #: Paths of animation that place an object, and how many values each has.
 _CHANNELS = {
     "location": 3,
@@ -70,6 +71,9 @@ def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, region_o
         plane = corners[:, :2] / -corners[:, 2:] if data.type == 'PERSP' else corners[:, :2]
         (left, bottom), (right, top) = plane.min(axis=0).tolist(), plane.max(axis=0).tolist()
         window = (left, right, bottom, top)
+        if not (right - left > _NARROW and top - bottom > _NARROW):  # false for nan as well
+            what = "Orthographic Scale" if data.type == 'ORTHO' else "Sensor Size"
+            raise SceneError(f'The camera "{name}" sees nothing; raise its {what} above 0')
         if region_only and scene.render.use_border:
             window, width, height = _region(scene.render, window, width, height)
     matrix = world_matrix(scene.camera, depsgraph).astype(np.float64)  # some versions give single precision

@@ -180,9 +180,21 @@ def copies_of(objects: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgrap
 
 
 def geometry_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.GeometrySet | None:
-    """What an object evaluates to; None if the dependency graph does not hold it (switched off in viewports)."""
+    """What an object evaluates to; None if the dependency graph does not hold it (switched off in viewports).
+
+    Raises
+    ------
+    SceneError
+        Objects of its type have no geometry.
+    """
     evaluated = obj.evaluated_get(depsgraph)
-    return evaluated.evaluated_geometry() if evaluated.is_evaluated else None
+    try:
+        return evaluated.evaluated_geometry() if evaluated.is_evaluated else None
+    except TypeError:
+        raise SceneError(
+            f'"{obj.name}" is no mesh or point cloud and cannot be a field of plants; turn off Field of Plants in the '
+            "TetFlora tab of the sidebar"
+        ) from None
 
 
 def rendered_objects(collection: bpy.types.Collection) -> Iterator[bpy.types.Object]:

@@ -6,8 +6,9 @@ Thumbnails are PNG files beside the species. Only sound species files are saved 
 """
 
 import json
+import os
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 from zlib import crc32
@@ -16,10 +17,10 @@ import bpy
 from bpy.props import EnumProperty, StringProperty
 from bpy.utils import previews
 
-from ...errors import SpeciesError
-from ...species.catalogue import SpeciesInfo, builtin_folder
-from ...species.schema import read_species
-from ...storage import write_whole
+from ...errors import NAME, SpeciesError, readable
+from ...files import inside, is_identifier, is_regular, write_whole
+from ...species.catalogue import SpeciesInfo, builtin_folder, checked_identifier
+from ...species.schema import species_file, species_from_json
 from ..preferences import own_species_folder, species_folders
 from .edits import catalogue, species_data, species_for, tell_listeners
 
@@ -45,10 +46,16 @@ _thumbnails: previews.ImagePreviewCollection | None = None
 
 def thumbnail_file(identifier: str) -> Path | None:
     """The thumbnail of a species: ``thumbnails/identifier.png`` in the user's folder or among the shipped ones."""
-    for folder in (*species_folders(), builtin_folder()):
-        path = folder / FOLDER / (identifier + THUMBNAIL_ENDING)
-        if identifier and path.is_file():
-            return path
+    return _found([folder / FOLDER for folder in (*species_folders(), builtin_folder())], identifier, THUMBNAIL_ENDING)
+
+
+def _found(folders: Iterable[Path], identifier: str, ending: str) -> Path | None:
+    """The first file of a species in some folders, if there is one."""
+    if is_identifier(identifier):
+        for folder in folders:
+            path = folder / (identifier + ending)
+            if is_regular(path):
+                return path
     return None
 
 
@@ -88,7 +95,7 @@ def unregister() -> None:
 
 def number_of(identifier: str) -> int:
     """A number that stays the same when species come and go, so that a stored choice keeps its meaning."""
-    return crc32(identifier.encode()) & 0x7FFFFFFF
+    return crc32(identifier.encode(errors="backslashreplace")) & 0x7FFFFFFF
 
 
 def items_for(present: str = "") -> list[Item]:
@@ -115,7 +122,7 @@ def _items(known: Mapping[str, SpeciesInfo], icons: Mapping[str, int], present: 
     ]
     if present and present not in known:
         text = "This species is not in the catalog; Refine fails until you add it or choose another"
-        items.append((present, f"{present} (missing)", text, 'ERROR', number_of(present)))
+        items.append((present, f"{readable(present, NAME)} (missing)", text, 'ERROR', number_of(present)))
     return items or [(NO_SPECIES, "No species found", "The catalog is empty", 'ERROR', 0)]
 
 
@@ -191,11 +198,7 @@ def _choose(group: SpeciesChoice, number: int) -> None:
 
 def own_file(identifier: str) -> Path | None:
     """The user's own file of a species, if there is one."""
-    for folder in species_folders():
-        path = folder / (identifier + ENDING)
-        if identifier and path.is_file():
-            return path
-    return None
+    return _found(species_folders(), identifier, ENDING)
 
 
 def as_text(data: dict[str, Any]) -> str:
@@ -220,9 +223,10 @@ def write_species(scene: bpy.types.Scene, identifier: str, path: Path) -> Path:
     Raises
     ------
     SpeciesError
-        The species is broken, or the file cannot be written.
+        The species is broken, the file's name is no identifier, or the file cannot be written.
     """
     species_for(scene, identifier)
+    checked_identifier(path.stem)
     try:
         write_whole(path, as_text(species_data(scene, identifier)))
     except OSError as error:
@@ -238,7 +242,22 @@ def save_species(scene: bpy.types.Scene, identifier: str) -> Path:
     SpeciesError
         As `write_species`; or there is no folder.
     """
-    return write_species(scene, identifier, own_species_folder() / (identifier + ENDING))
+    return write_species(scene, identifier, _own_place(identifier))
+
+
+def _own_place(identifier: str) -> Path:
+    """Where the user's own file of a species belongs.
+
+    Raises
+    ------
+    SpeciesError
+        It would not lie in the folder, or there is no folder.
+    """
+    folder = own_species_folder()
+    try:
+        return inside(folder, checked_identifier(identifier) + ENDING)
+    except OSError as error:
+        raise SpeciesError(f"{folder}: {error.strerror}") from None
 
 
 def load_species_file(path: Path, replace: bool = False) -> str:
@@ -256,13 +275,13 @@ def load_species_file(path: Path, replace: bool = False) -> str:
     SpeciesError
         The file breaks a rule of the format, as the message says, or another one of its name is there.
     """
-    read_species(path)
-    target = own_species_folder() / (path.stem + ENDING)
+    content = species_file(path)
+    species_from_json(content, checked_identifier(path.stem), path.name)
+    target = _own_place(path.stem)
     try:
-        content = path.read_bytes()
-        if target.is_file() and target.read_bytes() == content:
+        if is_regular(target) and species_file(target) == content:
             return path.stem
-        if target.exists() and not replace:
+        if os.path.lexists(target) and not replace:
             raise SpeciesError(
                 f'Your species folder already has another "{path.stem}"; turn on Replace in the file browser, or '
                 "rename it"
@@ -282,9 +301,10 @@ def delete_species_file(identifier: str) -> Path:
     SpeciesError
         There is none, or it cannot be deleted.
     """
-    path = own_file(identifier)
-    if path is None:
-        raise SpeciesError(f'"{identifier}" has no file in your species folder; built-in species cannot be deleted')
+    if own_file(identifier) is None:
+        name = readable(identifier, NAME)
+        raise SpeciesError(f'"{name}" has no file in your species folder; built-in species cannot be deleted')
+    path = _own_place(identifier)
     try:
         path.unlink()
     except OSError as error:

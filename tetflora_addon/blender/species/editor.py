@@ -111,7 +111,7 @@ def _integer(name: str, key: Key) -> dict[str, Any]:
         description=_description(name, key),
         min=int(key.low),
         max=int(key.high),
-        get=lambda self: int(number_in(value_of(self, name))),
+        get=lambda self: int(min(max(number_in(value_of(self, name)), key.low), key.high)),
         set=lambda self, value: write(self, name, value),
         options=set(),
     )

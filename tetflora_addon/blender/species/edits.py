@@ -9,6 +9,7 @@ format needs no migration of its own. `species_for` is the one door: refinement,
 import copy
 import json
 import re
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -19,9 +20,18 @@ from typing import Any
 import bpy
 from bpy.props import StringProperty
 
-from ...errors import SpeciesError
-from ...species.catalogue import SpeciesInfo, in_order, list_species, load_species
-from ...species.schema import species_from_dict
+from ...errors import NAME, SpeciesError, readable
+from ...files import is_identifier, json_of
+from ...species.catalogue import (
+    SpeciesInfo,
+    checked_identifier,
+    in_order,
+    info_of,
+    list_species,
+    load_species,
+    odd_files,
+)
+from ...species.schema import species_file, species_from_json
 from ...species.species import Species
 from ..preferences import species_folders
 from ..runtime import Listeners
@@ -35,6 +45,7 @@ _seen: dict[str, SpeciesInfo] | None = None
 _seen_at = 0.0
 _looking = True  # False within `looked_at_once`
 _read: dict[str, dict[str, Any]] = {}  # decoded files, as long as what was seen is trusted
+_odd: list[str] = []  # files of the folders that are no species, each with the reason
 
 
 class TetFloraSpeciesEdit(bpy.types.PropertyGroup):
@@ -52,12 +63,22 @@ def listed() -> dict[str, SpeciesInfo]:
     A panel asks for them hundreds of times while it is drawn, so in the window folders are looked at every `_TRUSTED`
     seconds only, and when TetFlora itself has changed a file.
     """
-    global _seen, _seen_at
+    global _seen, _seen_at, _odd
     now = time.monotonic()
     if _seen is None or (_looking and now - _seen_at >= _TRUSTED):
         _seen, _seen_at = list_species(species_folders()), now
         _read.clear()
+        told, _odd = _odd, odd_files(species_folders())
+        for text in _odd:
+            if text not in told:
+                print(f"TetFlora: warning: species folder: {text}", file=sys.stderr, flush=True)
     return _seen
+
+
+def skipped_files() -> list[str]:
+    """Files of the user's species folder that are not used, each with the reason and what to do."""
+    listed()
+    return _odd
 
 
 @contextmanager
@@ -95,10 +116,11 @@ def find_edit(scene: bpy.types.Scene | None, identifier: str) -> TetFloraSpecies
 
 
 def _edits(scene: bpy.types.Scene | None) -> Iterator[TetFloraSpeciesEdit]:
+    """Edits of this file; those whose identifiers break the rule are as good as absent, for paths are made of them."""
     # While add-ons are enabled at startup bpy.data has nothing.
     others = [s for s in getattr(bpy.data, "scenes", ()) if s != scene]
     for one in ([scene] if scene is not None else []) + others:
-        yield from one.tetflora.species_edits
+        yield from (edit for edit in one.tetflora.species_edits if is_identifier(edit.identifier))
 
 
 def species_for(scene: bpy.types.Scene | None, identifier: str) -> Species:
@@ -115,12 +137,7 @@ def species_for(scene: bpy.types.Scene | None, identifier: str) -> Species:
 
 @lru_cache(maxsize=64)
 def _species(text: str, identifier: str) -> Species:
-    source = f"{identifier} (edited in this file)"
-    try:
-        data = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise SpeciesError(f"{source}: is not valid JSON: {error}") from None
-    return species_from_dict(data, identifier, source)
+    return species_from_json(text, identifier, f"{identifier} (edited in this file)")
 
 
 def problem_of(scene: bpy.types.Scene | None, identifier: str) -> str:
@@ -162,31 +179,22 @@ def species_data(scene: bpy.types.Scene | None, identifier: str) -> dict[str, An
         return _decoded(edit.text, identifier)
     known = listed()
     if identifier not in known:
-        raise SpeciesError(f'Unknown species "{identifier}"; available: {", ".join(known) or "none"}')
+        raise SpeciesError(f'Unknown species "{readable(identifier, NAME)}"; available: {", ".join(known) or "none"}')
     if identifier not in _read:
         path = known[identifier].path
-        status = path.stat()
-        _read[identifier] = _decoded_file(path, status.st_mtime_ns, status.st_size)
+        _read[identifier] = _decoded(species_file(path), path.name)
     return _read[identifier]
 
 
 @lru_cache(maxsize=64)
-def _decoded(text: str, name: str) -> dict[str, Any]:
+def _decoded(text: bytes | str, name: str) -> dict[str, Any]:
     try:
-        data = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise SpeciesError(f"{name}: is not valid JSON: {error}") from None
+        data = json_of(text)
+    except ValueError as error:
+        raise SpeciesError(f"{name}: {error}") from None
     if not isinstance(data, dict):
         raise SpeciesError(f"{name}: must be a JSON object")
     return data
-
-
-@lru_cache(maxsize=64)
-def _decoded_file(path: Path, _modified: int, _size: int) -> dict[str, Any]:
-    try:
-        return _decoded(path.read_text(encoding="utf-8-sig"), path.name)
-    except (OSError, UnicodeDecodeError) as error:
-        raise SpeciesError(f"{path.name}: cannot read the file: {error}") from None
 
 
 def change_species(scene: bpy.types.Scene, identifier: str, change: Callable[[dict[str, Any]], None]) -> None:
@@ -211,7 +219,14 @@ def change_species(scene: bpy.types.Scene, identifier: str, change: Callable[[di
 
 
 def store_species(scene: bpy.types.Scene, identifier: str, data: dict[str, Any]) -> None:
-    """Keep a decoded species in this file under an identifier, in place of an earlier one."""
+    """Keep a decoded species in this file under an identifier, in place of an earlier one.
+
+    Raises
+    ------
+    SpeciesError
+        The identifier breaks the rule for them.
+    """
+    checked_identifier(identifier)
     text = json.dumps(data, ensure_ascii=False)
     edit = find_edit(scene, identifier)
     if edit is None:
@@ -243,9 +258,9 @@ def tell_listeners() -> None:
 
 def new_identifier(name: str, taken: Callable[[str], bool]) -> str:
     """An identifier for a name, fit for a file's name on every system, that nothing has yet."""
-    stem = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")[:60] or "species"
+    stem = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")[:50] or "species"
     number, identifier = 1, stem
-    while taken(identifier):
+    while taken(identifier) or not is_identifier(identifier):
         number += 1
         identifier = f"{stem}_{number}"
     return identifier
@@ -262,13 +277,12 @@ def edited_infos() -> dict[str, SpeciesInfo]:
     """What menus show of the species that this file has; the first scene's where scenes disagree."""
     found: dict[str, SpeciesInfo] = {}
     for edit in _edits(None):
-        if edit.identifier and edit.identifier not in found:
+        if edit.identifier not in found:
             try:
                 data = _decoded(edit.text, edit.identifier)
             except SpeciesError:
                 data = {}
-            name, description = str(data.get("name", edit.identifier)), str(data.get("description", ""))
-            found[edit.identifier] = SpeciesInfo(edit.identifier, name, description, Path())
+            found[edit.identifier] = info_of(edit.identifier, data, Path())
     return found
 
 

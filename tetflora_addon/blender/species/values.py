@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Values of the species editor: keys of the shown species and of the active order, read and written as JSON."""
 
-from math import isnan
+from math import isfinite
 from typing import Any
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ...errors import SpeciesError
+from ...errors import SpeciesError, readable
 from ...species.leaf_models import LEAF_MODELS
 from ...species.schema import ORDER_KEYS, QUALITY_LIMITS
 from ...species.skeletons import MAX_ORDERS
@@ -110,14 +110,14 @@ def set_species_value(editor: bpy.types.PropertyGroup, name: str, value: Any) ->
 def number_in(value: Any, *path: int) -> float:
     """A number inside nested lists; 0 where there is none. A range may be written as its mean alone."""
     if path and isinstance(value, int | float):
-        return 0.0 if path[0] else float(value)
+        return 0.0 if path[0] else number_in(value)
     try:
         for step in path:
             value = value[step]
         number = float(value)
     except (TypeError, ValueError, IndexError, KeyError):
         return 0.0
-    return 0.0 if isnan(number) else number
+    return number if isfinite(number) else 0.0
 
 
 def rounded(value: float) -> float:
@@ -202,7 +202,7 @@ def _object_property(kind: str) -> Any:
     return StringProperty(
         name=f"{kind.capitalize()} Object",
         description=f"Mesh object used as the {kind}: stalk at the origin, pointing along +Y, upper side facing +Z",
-        get=lambda self: str(_forms(self, kind).get("object", "")),
+        get=lambda self: readable(str(_forms(self, kind).get("object", ""))),
         set=lambda self, value: set_species_value(self, kind, {"object": value}),
         options={'SKIP_SAVE'},
     )
@@ -245,14 +245,14 @@ class WholeSpecies(SpeciesChoice):
     species_name: StringProperty(
         name="Name",
         description="Name shown in menus; the identifier that plants refer to does not change",
-        get=lambda self: str(species_value(self, "name", "")),
+        get=lambda self: readable(str(species_value(self, "name", ""))),
         set=lambda self, value: set_species_value(self, "name", value),
         options={'SKIP_SAVE'},
     )
     species_description: StringProperty(
         name="Description",
         description="Tooltip of the species in menus, in one sentence",
-        get=lambda self: str(species_value(self, "description", "")),
+        get=lambda self: readable(str(species_value(self, "description", ""))),
         set=lambda self, value: set_species_value(self, "description", value),
         options={'SKIP_SAVE'},
     )
