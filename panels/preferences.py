@@ -12,9 +12,11 @@ import bpy
 from ..operators.refine import TETFLORA_OT_clear_cache, TETFLORA_OT_refine
 from ..tetflora_addon import storage
 from ..tetflora_addon.blender.preferences import CACHE_VARIABLE, TetFloraPreferences, species_folders
+from ..tetflora_addon.blender.species.edits import skipped_files
 
 KEYMAP = "Object Mode"
 PIE = "TETFLORA_MT_pie"
+_MOST_TOLD = 3  # files of the species folder that are not used
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,8 @@ def _draw(self: TetFloraPreferences, context: bpy.types.Context) -> None:
     layout.prop(self, "species_folder")
     if self.species_folder and not species_folders():
         layout.label(text="This folder does not exist", icon='ERROR')
+    for text in skipped_files()[:_MOST_TOLD]:
+        layout.label(text=text, icon='ERROR')
     layout.prop(self, "new_quality")
     layout.prop(self, "new_memory")
     _draw_cache(layout.column(), self)

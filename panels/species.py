@@ -17,12 +17,13 @@ from ..operators.species import (
 )
 from ..tetflora_addon.blender.species.catalogue import own_file
 from ..tetflora_addon.blender.species.editor import VARIATION, order_keys
-from ..tetflora_addon.blender.species.edits import find_edit, problem_of
+from ..tetflora_addon.blender.species.edits import find_edit, problem_of, skipped_files
 from ..tetflora_addon.blender.species.values import NO_LEAF, OBJECT_LEAF, orders_of, present_order, present_species
 from ..tetflora_addon.blender.viewport import species
 from ..tetflora_addon.species.species import LEAF_KINDS
 from .base import Button, SidebarPanel, draw_buttons, draw_message, draw_properties, split_layout
 
+_MOST_TOLD = 3  # files of the folder that are not used
 # Prefixes of an order's keys about leaves; the others are about branches.
 _LEAVES = ("leaf", "leaves")
 
@@ -72,6 +73,8 @@ class TETFLORA_PT_species(SidebarPanel, bpy.types.Panel):
             layout.label(text=text, icon='LOCKED')
         if problem := problem_of(scene, identifier):
             draw_message(context, layout, problem)
+        for text in skipped_files()[:_MOST_TOLD]:
+            draw_message(context, layout, text)
         shown = species.shown_in(scene)
         row = layout.row(align=True)
         row.use_property_split = False

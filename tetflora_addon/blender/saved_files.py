@@ -16,12 +16,13 @@ import sys
 import uuid
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 
 import bpy
 
-from ..errors import SceneError
-from ..files import PART
+from ..errors import SceneError, shown
+from ..files import IDENTIFIER_RULE, PART, is_identifier
 from .runtime import Handlers, complain
 
 #: Version of the layout of properties; a later one adds steps from earlier ones to `migrate`.
@@ -101,6 +102,49 @@ def _whole(path: Path) -> bool:
         return image.size[0] > 0
     finally:
         bpy.data.images.remove(image)
+
+
+@cache
+def _parts(kind: type[bpy.types.PropertyGroup]) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    """Names of a group's stored texts, of groups within it, and of lists of groups."""
+    found: dict[str, list[str]] = {'STRING': [], 'POINTER': [], 'COLLECTION': []}
+    for prop in kind.bl_rna.properties:
+        within = getattr(getattr(prop, "fixed_type", None), "base", None)
+        stored = prop.type == 'STRING' and not prop.is_skip_save
+        if stored or (prop.type in found and getattr(within, "identifier", "") == 'PropertyGroup'):
+            found[prop.type].append(prop.identifier)
+    return tuple(found['STRING']), tuple(found['POINTER']), tuple(found['COLLECTION'])
+
+
+def _clear_unreadable(group: bpy.types.PropertyGroup) -> int:
+    """Empty texts of a group, and of those within, that are not UTF-8: Python raises an error at each look at them."""
+    cleared = 0
+    texts, pointers, lists = _parts(type(group))
+    for name in texts:
+        if group.is_property_set(name):
+            try:
+                getattr(group, name)
+            except UnicodeDecodeError:
+                group.property_unset(name)
+                cleared += 1
+    within = [getattr(group, name) for name in pointers if group.is_property_set(name)]
+    within += [entry for name in lists for entry in getattr(group, name)]
+    return cleared + sum(map(_clear_unreadable, within))
+
+
+def clear_unreadable() -> None:
+    """Empty texts of the open file that cannot be read, and report on stderr what of it will be ignored."""
+    owners = [o for o in (*bpy.data.objects, *bpy.data.scenes) if o.is_property_set("tetflora")]
+    if cleared := sum(_clear_unreadable(owner.tetflora) for owner in owners):
+        print(f"TetFlora: warning: {cleared} texts of this file are not UTF-8 and are empty now", file=sys.stderr)
+    edits = [edit.identifier for scene in bpy.data.scenes for edit in scene.tetflora.species_edits]
+    odd = [identifier for identifier in edits if identifier and not is_identifier(identifier)]
+    if odd:
+        print(
+            f"TetFlora: warning: this file has species of its own that are ignored: {shown(odd[0])} cannot name a "
+            f"species. Use only {IDENTIFIER_RULE}",
+            file=sys.stderr,
+        )
 
 
 def migrate() -> None:

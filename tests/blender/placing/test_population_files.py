@@ -5,12 +5,16 @@
 from __future__ import annotations
 
 import json
+import os
+import random
+from pathlib import Path
 
 import bpy
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from tests.attack import material
 from tests.blender.scenes import add_mesh, select
 from tetflora_addon import errors
 from tetflora_addon.blender.placing import population_files, populations, properties
@@ -119,6 +123,29 @@ def test_what_a_file_does_not_say_is_as_in_a_new_scene(tmp_path):
         (lambda d: d["populations"][0].update(image=7), '"image" is 7; it must be a string'),
         (lambda d: d["populations"][0].update(grounds=[None]), '"grounds" is None'),
         (lambda d: d["populations"][0].update(seed=2**40), '"seed" is'),
+        (lambda d: d["populations"][0].update(seed=10**400), '"seed" is inf; it must be a whole number'),
+        (lambda d: d["populations"][0].update(slope_max=10**400), '"slope_max" is inf; it must be a finite number'),
+        (
+            lambda d: d["populations"][0].update(altitude_min=1e300),
+            '"altitude_min" is 1e+300; it must be a finite number',
+        ),
+        (lambda d: d["populations"][0].update(name="a\0b"), '"name" is \'a\\x00b\'; it must be one line'),
+        (lambda d: d["populations"][0].update(uv_layer="a\nb"), '"uv_layer" is \'a\\nb\'; it must be one line'),
+        (lambda d: d["populations"][0].update(name="a" * 2000), "it must be one line of at most 1000 characters"),
+        (lambda d: d["populations"][0].update(grounds=["\ud800"]), "half of a surrogate pair"),
+        (lambda d: d["populations"][0].update({"\x1b[2J" * 999: 1}), 'population 1 has an unknown key " [2J'),
+        (
+            lambda d: d["populations"][0].update(species=[{"species": "../a"}]),
+            'species 1: "species" is \'../a\'; use only',
+        ),
+        (
+            lambda d: d["populations"][0].update(species=[{"species": "oak", "companion": "a b"}]),
+            'species 1: "companion" is \'a b\'; use only letters',
+        ),
+        (
+            lambda d: d["populations"].extend([{"name": "a"}] * 1000),
+            "populations has 1,001 entries; 1,000 is the limit",
+        ),
         (lambda d: d["populations"][0].update(species=[{"weight": 1}]), 'species 1 has no "species"'),
         (lambda d: d["populations"][0].update(species=[{"species": "a", "weight": -1}]), 'species 1: "weight" is -1'),
     ],
@@ -143,3 +170,80 @@ def test_what_is_no_json_is_refused(tmp_path, text):
         population_files.read_populations(bpy.context.scene, path)
     with pytest.raises(errors.SceneError, match=r"none\.json: cannot read the file"):
         population_files.read_populations(bpy.context.scene, tmp_path / "none.json")
+
+
+def _good(number):
+    return {"format": "TetFlora populations", "version": 1, "populations": [{"name": f"p{n}"} for n in range(number)]}
+
+
+def test_all_populations_of_a_file_come_or_none(tmp_path, monkeypatch):
+    """Whatever stops it, and however far it has come: the list and the active population are as they were."""
+    _add(), _add()
+    group = bpy.context.scene.tetflora
+    group.populations_index = 0
+    before = [p.uid for p in group.populations]
+    (tmp_path / "p.json").write_text(json.dumps(_good(5)), encoding="utf-8")
+    filled, real = [], population_files._fill
+
+    def fill(population, *rest):
+        filled.append(1)
+        real(population, *rest)
+        if len(filled) == 4:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(population_files, "_fill", fill)
+    with pytest.raises(KeyboardInterrupt):
+        population_files.read_populations(bpy.context.scene, tmp_path / "p.json")
+    assert [p.uid for p in group.populations] == before
+    assert group.populations_index == 0
+    assert population_files.read_populations(bpy.context.scene, tmp_path / "p.json") == (5, [])
+    assert len(group.populations) == 7
+
+
+def test_attack_on_population_files(tmp_path):
+    """Three hundred files from a fixed seed: each adds all of its populations, or none and says why."""
+    rng, read = random.Random(23), 0
+    ground = add_mesh("ground")
+    population = _add(image=bpy.data.images.new("mask", 4, 4))
+    population.mix.add().species = "bush"
+    data = population_files.as_data([population, population])
+    group = bpy.context.scene.tetflora
+    for _ in range(300):
+        group.populations.clear()
+        text = json.dumps(material.mutated(rng, data))
+        (tmp_path / "p.json").write_text(text, encoding="utf-8")
+        try:
+            number, _ = population_files.read_populations(bpy.context.scene, tmp_path / "p.json", [ground])
+        except errors.SceneError as error:
+            assert str(error).startswith("p.json: ")
+            assert errors.readable(str(error)) == str(error)
+            assert len(group.populations) == 0
+            continue
+        read += 1
+        assert len(group.populations) == number
+    assert 10 < read < 290
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links and pipes as Unix has them")
+def test_links_pipes_and_files_without_end_are_refused(tmp_path):
+    (tmp_path / "sound.json").write_text(json.dumps(_good(1)), encoding="utf-8")
+    (tmp_path / "link.json").symlink_to(tmp_path / "sound.json")
+    (tmp_path / "zero.json").symlink_to("/dev/zero")
+    os.mkfifo(tmp_path / "pipe.json")
+    with (tmp_path / "large.json").open("wb") as file:
+        file.truncate(1 << 40)
+    for name, why in (
+        ("link", "a link"),
+        ("zero", "a link"),
+        ("pipe", "not a regular"),
+        ("large", "larger than 4,000,000"),
+    ):
+        with pytest.raises(errors.SceneError, match=rf"{name}\.json: cannot read the file: .*{why}"):
+            population_files.read_populations(bpy.context.scene, tmp_path / f"{name}.json")
+    for path in (Path("a\0b.json"), tmp_path / "\ud800.json"):
+        with pytest.raises(errors.SceneError, match="no file can have such a name"):
+            population_files.read_populations(bpy.context.scene, path)
+        with pytest.raises(errors.SceneError, match="no file can have such a name"):
+            population_files.write_populations([_add()], path)
+    population_files.write_populations([_add(slope_max=0.5)], tmp_path / "link.json")
+    assert json.loads((tmp_path / "sound.json").read_text(encoding="utf-8")) == _good(1)

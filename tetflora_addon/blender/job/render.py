@@ -30,7 +30,7 @@ from ..results.hiding import (
 )
 from ..results.output import KIND, adopt_materials, release_materials
 from ..runtime import Handlers, Listeners, complain, failed_frames
-from ..saved_files import migrate
+from ..saved_files import clear_unreadable, migrate
 from ..scene.objects import has_contents, show_in, view_layer_groups
 from ..scene.plants import NoPlantsError
 from ..species.edits import looked_at_once
@@ -148,6 +148,7 @@ def on_save_post(_path: object, _other: object = None) -> None:
 
 def on_load_post(_path: object, _other: object = None) -> None:
     """After a file was read: forget earlier renders, show objects whose results it lacks, migrate properties."""
+    clear_unreadable()
     _rendering.busy, _rendering.outer = False, ""
     _rendering.scenes.clear()
     _rendering.bounces.clear()
