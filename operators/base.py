@@ -10,7 +10,7 @@ import bpy
 
 from ..tetflora_addon.blender.placing.plant_objects import plants_of
 from ..tetflora_addon.blender.worker import at_once
-from ..tetflora_addon.errors import TetFloraError
+from ..tetflora_addon.errors import TetFloraError, readable
 from ..tetflora_addon.refinement.statistics import Progress
 
 LINKED = (
@@ -43,17 +43,17 @@ class Tool:
 
     def done(self, text: str) -> set[str]:
         """Report what was done; the operator's result."""
-        self.report({'INFO'}, text)
+        self.report({'INFO'}, readable(text))
         return {'FINISHED'}
 
     def refused(self, text: str) -> set[str]:
         """Warn that there is nothing to do; the operator's result."""
-        self.report({'WARNING'}, text)
+        self.report({'WARNING'}, readable(text))
         return {'CANCELLED'}
 
     def failed(self, error: TetFloraError | str) -> set[str]:
         """Report an error; the operator's result, for which Blender pushes no undo step."""
-        self.report({'ERROR'}, str(error))
+        self.report({'ERROR'}, readable(str(error)))
         return {'CANCELLED'}
 
 

@@ -20,6 +20,7 @@ from ..tetflora_addon.blender.placing.populations import (
 )
 from ..tetflora_addon.blender.placing.rules import active_population, copy_settings
 from ..tetflora_addon.blender.viewport import points
+from ..tetflora_addon.errors import readable
 from .base import Reporting, Tool, counted, in_object_mode, need, select_only
 
 
@@ -246,7 +247,7 @@ class TETFLORA_OT_import_populations(Reporting, bpy.types.Operator, ImportHelper
         added = f"{counted(number, 'population')} added"
         if not missing:
             return self.done(f"{added}; click Update to place plants")
-        self.report({'WARNING'}, f"{added}; missing in this file and left empty: {', '.join(missing)}")
+        self.report({'WARNING'}, readable(f"{added}; missing in this file and left empty: {', '.join(missing)}"))
         return {'FINISHED'}
 
 

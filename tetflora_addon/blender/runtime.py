@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 import bpy
 from bpy.app.handlers import persistent
 
-from ..errors import SceneError
+from ..errors import SceneError, readable
 
 #: Errors of the last render: a text for each frame that was rendered without its plants.
 failed_frames: list[str] = []
@@ -206,6 +206,7 @@ def redraw() -> None:
 
 def complain(text: str) -> None:
     """Report an error where no operator can: in the terminal, and in the window if there is one."""
+    text = readable(text)
     print(f"TetFlora: error: {text}", file=sys.stderr, flush=True)
     _in_window(
         lambda: bpy.context.window_manager.popup_menu(

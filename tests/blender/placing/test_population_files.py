@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import sys
 from pathlib import Path
 
 import bpy
@@ -247,3 +248,16 @@ def test_links_pipes_and_files_without_end_are_refused(tmp_path):
             population_files.write_populations([_add()], path)
     population_files.write_populations([_add(slope_max=0.5)], tmp_path / "link.json")
     assert json.loads((tmp_path / "sound.json").read_text(encoding="utf-8")) == _good(1)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems refuse such names themselves")
+def test_paths_that_are_no_text_are_used_and_told(tmp_path):
+    """A folder of an old disk, in another encoding."""
+    _add()
+    folder = tmp_path / os.fsdecode(b"Gr\xf6\xdfe\x1b")
+    folder.mkdir()
+    assert bpy.ops.tetflora.export_populations(filepath=str(folder / "p.json")) == {'FINISHED'}
+    assert bpy.ops.tetflora.import_populations(filepath=str(folder / "p.json")) == {'FINISHED'}
+    with pytest.raises(RuntimeError, match="cannot read the file"):
+        bpy.ops.tetflora.import_populations(filepath=str(folder / os.fsdecode(b"\xff.json")))
+    assert len(bpy.context.scene.tetflora.populations) == 2
