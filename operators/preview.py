@@ -101,7 +101,7 @@ def look_from(space: bpy.types.SpaceView3D, camera: Camera) -> None:
     region = space.region_3d
     region.view_perspective = 'ORTHO' if camera.kind == "ORTHO" else 'PERSP'
     matrix = Matrix(camera.frame.tolist()).to_4x4()
-    matrix.translation = camera.position.tolist()
+    matrix.translation = (camera.position + camera.origin).tolist()
     left, right, bottom, top = camera.window
     if camera.kind == "PERSP":
         space.lens = min(max(_VIEWPORT / max(right - left, top - bottom), 1.0), 250.0)

@@ -5,20 +5,35 @@
 Blur makes an image reach further. A lens of radius R focused on depth f draws a point at depth z as a disc, whose
 radius at depth 1 is R |1/z − 1/f| (M. Potmesil and I. Chakravarty, "A lens and aperture camera model for synthetic
 image generation", Computer Graphics 15 (3), 1981). What lies beside the view by less than that is in the image.
+
+Coordinates begin near the camera, wherever in the world that is. Blender stores vertices in single precision: 1,000 km
+from the world's origin they are 6 cm apart, wider than a leaf. A job therefore counts from a corner of a wide grid
+(`Camera.local`), with everything that it reads; the objects that it makes carry the way back to the world. Corners are
+exact in single precision up to billions of metres.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+#: Side of the grid, metres. Up to half of it from the world's origin, coordinates are those of the world.
+GRID = 1024.0
 #: Cosine of the latitude from which on panoramas count as if no pixels were added towards the poles: 84 degrees.
 LEAST_COSINE = 0.1
 #: How far from several eyes things are at least to hide others from all of them, in cell radii.
 _OPEN = 2.0
+
+
+def origin_near(points: ArrayLike) -> NDArray[np.float64]:
+    """The corner (3,) of the grid that is nearest to most points (n, 3), or to one (3,); metres, world space."""
+    points = np.asarray(points, np.float64).reshape(-1, 3)
+    if not len(points):
+        return np.zeros(3)
+    return np.rint(np.median(points, axis=0) / GRID) * GRID + 0.0  # never −0
 
 
 @dataclass(frozen=True)
@@ -54,6 +69,8 @@ class Camera:
         How far, in depth, the position lies behind the eye, metres: not 0 where the camera stands for several.
     cell_radius : float
         Largest distance from that eye to the others that the camera stands for, metres; see `view_cells`.
+    origin : (3,) float64
+        Where in the world coordinates begin, metres: those of the camera, and of all that is refined for it.
     """
 
     kind: Literal["PERSP", "ORTHO", "PANO"]
@@ -69,6 +86,19 @@ class Camera:
     shutter: tuple[Camera, ...] = ()
     setback: float = 0.0
     cell_radius: float = 0.0
+    origin: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+
+    def local(self) -> Camera:
+        """The same camera in coordinates that begin near it."""
+        return self.counted_from(origin_near(self.position + self.origin))
+
+    def counted_from(self, origin: NDArray[np.float64]) -> Camera:
+        """The same camera in coordinates that begin at a place (3,) in the world."""
+        by = origin - self.origin
+        if not by.any():
+            return self
+        shutter = tuple(other.counted_from(origin) for other in self.shutter)
+        return replace(self, position=self.position - by, shutter=shutter, origin=origin)
 
     @property
     def eye(self) -> NDArray[np.float64]:

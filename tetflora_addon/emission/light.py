@@ -121,6 +121,11 @@ class Sources:
     occluders: NDArray[np.float64]
     ground: NDArray[np.float64]
 
+    def counted_from(self, origin: NDArray[np.float64]) -> Sources:
+        """The same in coordinates that begin at a place (3,) of the present ones."""
+        lights = tuple(light.counted_from(origin) for light in self.lights)
+        return replace(self, lights=lights, occluders=self.occluders - origin)
+
 
 class SheetList:
     """Small opaque surfaces that will be drawn, in the order in which they are added."""

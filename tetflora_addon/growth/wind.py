@@ -55,11 +55,12 @@ _APART = np.array([0.37, 0.23, 0.0])
 _MOMENT = 1e-3
 
 AIR_DTYPE = np.dtype(
-    [(name, np.float64) for name in ("time", "loop", "moment", "speed", "gusts")] + [("axes", np.float64, (3, 3))]
+    [(name, np.float64) for name in ("time", "loop", "moment", "speed", "gusts")]
+    + [("axes", np.float64, (3, 3)), ("origin", np.float64, (3,))]
 )
 """The wind: seconds, period after which all repeats (0: never), seconds between the two looks that tell how fast
 things move (0: not needed), metres a second, fraction by which gusts are stronger or
-weaker, and as rows where it blows to, across that, and up."""
+weaker, as rows where it blows to, across that, and up, and where in the world positions are counted from, metres."""
 
 WIND_COLUMNS = [("lean", np.float64), ("pace", np.float64), ("flutter", np.float64), ("flutter_rate", np.float64)] + [
     ("air", AIR_DTYPE)
@@ -83,6 +84,8 @@ class Wind:
         Seconds after which all movement repeats; 0 for never.
     moving : bool
         Whether vertices shall have velocities.
+    origin : tuple of float
+        Where in the world positions are counted from, metres.
 
     Raises
     ------
@@ -119,6 +122,7 @@ class Wind:
     time: float = 0.0
     loop: float = 0.0
     moving: bool = False
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         if not np.isfinite([self.speed, self.direction, self.gusts, self.time, self.loop]).all():
@@ -170,6 +174,7 @@ def windy_rows(
     air["time"], air["loop"], air["speed"], air["gusts"] = wind.time, wind.loop, wind.speed, wind.gusts
     air["moment"] = _MOMENT if wind.moving else 0.0
     air["axes"] = [[c, s, 0], [-s, c, 0], [0, 0, 1]]
+    air["origin"] = wind.origin
     return out
 
 
@@ -209,7 +214,10 @@ def sway(rows: NDArray[np.void], branches: Branches, ahead: float = 0.0) -> NDAr
     rate = np.clip(rows["pace"][row] / np.maximum(np.where(drawn, branches.scale, branches.length), 1e-9), *_RATES)
     key, place = branches.key, 0.0
     if drawn.any():
-        key, place = np.where(drawn, np.uint64(0), key), np.where(drawn, branches.position @ _APART, 0.0)
+        key, place = (
+            np.where(drawn, np.uint64(0), key),
+            np.where(drawn, (branches.position + air["origin"]) @ _APART, 0.0),
+        )
     force = np.zeros((3, len(row)))
     for axis, (amplitude, quicker, draw) in enumerate(zip(_SWAY, _SWAY_RATES, _SWAY_DRAWS, strict=True)):
         force[axis] = amplitude * np.sin(2 * np.pi * _cycles(air, rate * quicker, ahead, uniform(key, draw) + place))
@@ -222,6 +230,7 @@ def sway(rows: NDArray[np.void], branches: Branches, ahead: float = 0.0) -> NDAr
 def gusts(rows: NDArray[np.void], position: NDArray[np.float64], ahead: float = 0.0) -> NDArray[np.float64]:
     """Strength (n,) of the wind at places (n, 3) over its mean: within 1 ∓ Gusts."""
     air = rows["air"][0]
+    position = position + air["origin"]
     along, across = position @ air["axes"][0], position @ air["axes"][1]
     out = np.ones(len(position))
     for rate, weight, sideways in zip(_GUST_RATES, _GUST_WEIGHTS, _GUST_ACROSS, strict=True):

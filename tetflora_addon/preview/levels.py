@@ -89,7 +89,7 @@ class Levels:
     tree : TetrahedralTree
         Of the last state.
     camera : Camera
-        For which it was refined.
+        For which it was refined, and from whose `origin` all corners count.
     """
 
     def __init__(self, levels: list[Level], tree: TetrahedralTree, camera: Camera) -> None:
@@ -113,11 +113,11 @@ class Levels:
         return self.levels[min(max(number, 0), len(self.levels) - 1)]
 
     def vertices(self, level: Level, chosen: NDArray | slice = slice(None)) -> NDArray[np.float32]:
-        """Corners (t, 4, 3) float32 of a level's tetrahedra, or of some of them, metres."""
+        """Corners (t, 4, 3) float32 of a level's tetrahedra, or of some, metres from the camera's `origin`."""
         return self.tree.vertices(level.nodes[chosen]).astype(np.float32)
 
     def back_to_front(self, level: Level, camera: Camera, chosen: NDArray | None = None) -> NDArray[np.intp]:
-        """Exact back-to-front order for any camera of a level's places (t,), or only of those ``chosen`` (k,)."""
+        """Exact back-to-front order of a level's places (t,), or of those ``chosen`` (k,), for any camera there."""
         some = np.arange(len(level)) if chosen is None else chosen
         rank = self.tree.order(**camera.line_of_sight, back_to_front=True)
         return some[np.argsort(rank[self._below[level.nodes[some]]], kind="stable")]

@@ -13,8 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..camera.camera import origin_near
 from ..compiled.flora import Flora
 from ..compiled.samples import Points
+from ..growth.branches import Branches
 from ..growth.growth import trunks
 from ..growth.seeds import Seeds
 from .levels import as_shown
@@ -38,7 +40,7 @@ class Shapes:
     Attributes
     ----------
     positions : (v, 3) float32
-        Metres, world space.
+        Metres from ``origin``.
     colours : (v, 3) float32
         As a screen shows them, shaded by a fixed light.
     indices : (m, 3) int32 for faces, or (m, 2) int32 for edges
@@ -46,6 +48,8 @@ class Shapes:
         Plants that are shown.
     of : int
         Plants that there are.
+    origin : (3,) float64
+        Near most plants, metres, world space.
     """
 
     positions: NDArray[np.float32]
@@ -53,6 +57,7 @@ class Shapes:
     indices: NDArray[np.int32]
     plants: int
     of: int
+    origin: NDArray[np.float64]
 
 
 def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
@@ -60,20 +65,20 @@ def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
 
     Of more than ``most`` plants only some are shown; ``flora`` has the species in the order of ``seeds.identifiers``.
     """
-    of, seeds = len(seeds), seeds.take(slice(None, None, max(-(-len(seeds) // most), 1)))
-    trunk = trunks(flora.rows, seeds)
-    profile = np.stack([_profile(flora, int(row)) for row in flora.first_row])[seeds.species]  # (n, 6)
+    of, origin, trunk = _shown(flora, seeds, most)
+    species = flora.rows["species"][trunk.row]
+    profile = np.stack([_profile(flora, int(row)) for row in flora.first_row])[species]  # (n, 6)
     angle = np.arange(SIDES) * 2.0 * np.pi / SIDES
     around = np.stack([np.cos(angle), np.sin(angle), np.zeros(SIDES)], axis=1)
     low, high, *radii = profile.T
     crown = [np.stack([0 * low, 0 * low, low], axis=1)[:, None]]
-    outward = [np.broadcast_to([0.0, 0.0, -1.0], (len(seeds), 1, 3))]
+    outward = [np.broadcast_to([0.0, 0.0, -1.0], (len(trunk), 1, 3))]
     for fraction, radius, up in zip(_RINGS, radii[:2], (-0.1, 0.5), strict=True):
         height = (low + fraction * (high - low))[:, None, None] * [0.0, 0.0, 1.0]
         crown.append(radius[:, None, None] * around + height)
-        outward.append(np.broadcast_to((around + [0.0, 0.0, up]) / np.hypot(1.0, up), (len(seeds), SIDES, 3)))
+        outward.append(np.broadcast_to((around + [0.0, 0.0, up]) / np.hypot(1.0, up), (len(trunk), SIDES, 3)))
     crown.append(np.stack([0 * high, 0 * high, high], axis=1)[:, None])
-    outward.append(np.broadcast_to([0.0, 0.0, 1.0], (len(seeds), 1, 3)))
+    outward.append(np.broadcast_to([0.0, 0.0, 1.0], (len(trunk), 1, 3)))
     # The wood's own radius would be less than a pixel in the view of a forest.
     radius = np.maximum(trunk.radius / trunk.length, 0.012)[:, None, None]
     foot = radius * around
@@ -90,16 +95,16 @@ def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
     return Shapes(
         positions.reshape(-1, 3).astype(np.float32),
         as_shown(base * light[:, :, None]).reshape(-1, 3),
-        _repeated(_faces(), positions.shape[1], len(seeds)),
-        len(seeds),
+        _repeated(_faces(), positions.shape[1], len(trunk)),
+        len(trunk),
         of,
+        origin,
     )
 
 
 def bounds_of_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
     """Compiled bounds of plants as edges of boxes: the extent of their samples in the direction of their trunks."""
-    of, seeds = len(seeds), seeds.take(slice(None, None, max(-(-len(seeds) // most), 1)))
-    trunk = trunks(flora.rows, seeds)
+    of, origin, trunk = _shown(flora, seeds, most)
     radius, low, high = flora.sampled_bound[trunk.row].T * trunk.length
     corner = np.array([(x, y, z) for z in (0, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))], float)
     local = corner * [1.0, 1.0, 0.0] * radius[:, None, None]
@@ -108,8 +113,15 @@ def bounds_of_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Sha
     edges = [(i, (i + 1) % 4) for i in range(4)]
     edges += [(a + 4, b + 4) for a, b in edges] + [(i, i + 4) for i in range(4)]
     colours = np.repeat(as_shown(np.maximum(flora.leaf_colours(trunk), flora.wood_colour[trunk.row])), 8, axis=0)
-    indices = _repeated(np.array(edges), 8, len(seeds))
-    return Shapes(positions.reshape(-1, 3).astype(np.float32), colours, indices, len(seeds), of)
+    indices = _repeated(np.array(edges), 8, len(trunk))
+    return Shapes(positions.reshape(-1, 3).astype(np.float32), colours, indices, len(trunk), of, origin)
+
+
+def _shown(flora: Flora, seeds: Seeds, most: int) -> tuple[int, NDArray[np.float64], Branches]:
+    """How many plants there are, where coordinates begin (3,), and the trunks of at most so many."""
+    origin = origin_near(seeds.position)
+    some = seeds.take(slice(None, None, max(-(-len(seeds) // most), 1))).counted_from(origin)
+    return len(seeds), origin, trunks(flora.rows, some)
 
 
 def _profile(flora: Flora, row: int) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ leaves whose shadows have a shape become leaves, and the rest is divided until i
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -79,6 +79,10 @@ class Light:
     span: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 3)))
     ellipse: bool = False
     shadow: bool = True
+
+    def counted_from(self, origin: NDArray[np.float64]) -> Light:
+        """The same in coordinates that begin at a place (3,) of the present ones."""
+        return replace(self, position=self.position - origin)
 
 
 def light_views(

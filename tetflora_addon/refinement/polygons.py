@@ -11,6 +11,7 @@ fragments of a face add up to it whatever the sequence of cuts.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -141,6 +142,12 @@ class Meshes:
         self.solid, self.leaf = (
             joined([getattr(s, k) for s in surfaces], np.zeros(0, bool)) for k in ("solid", "leaf")
         )
+
+    def counted_from(self, origin: NDArray[np.float64]) -> Meshes:
+        """The same in coordinates that begin at a place (3,) of the present ones."""
+        moved = copy(self)
+        moved.origin = self.origin - origin
+        return moved
 
     # What follows is measured on demand: frames of an animation that reuse the result of another never need it.
 

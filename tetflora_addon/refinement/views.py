@@ -176,7 +176,7 @@ def is_anchored(camera: Camera, settings: RefinementSettings) -> bool:
 
 def root_for(camera: Camera, settings: RefinementSettings, bounds: NDArray[np.float64]) -> TetrahedralTree:
     """Root for a box (2, 3) around all that is in the scene, metres."""
-    return world_root(bounds) if is_anchored(camera, settings) else view_root(camera, bounds)
+    return world_root(bounds, camera.origin) if is_anchored(camera, settings) else view_root(camera, bounds)
 
 
 def buffers_for(

@@ -284,7 +284,7 @@ def world_cubes(bounds: ArrayLike) -> tuple[float, NDArray[np.int64], NDArray[np
     return side, low, np.maximum(np.ceil(bounds[1] / side).astype(np.int64) - low, 1)
 
 
-def world_root(bounds: ArrayLike) -> TetrahedralTree:
+def world_root(bounds: ArrayLike, origin: ArrayLike = (0.0, 0.0, 0.0)) -> TetrahedralTree:
     """Tree whose terminals are Kuhn's tetrahedra of the cubes around a scene.
 
     Parameters
@@ -292,6 +292,8 @@ def world_root(bounds: ArrayLike) -> TetrahedralTree:
     bounds : (2, 3) float64
         Lowest and highest corner of what is in the scene, metres. The eye may be anywhere: what is outside all cubes
         has an order too.
+    origin : (3,) float64
+        Where in the world coordinates begin, whole metres: cubes are those of the world.
 
     Returns
     -------
@@ -303,25 +305,26 @@ def world_root(bounds: ArrayLike) -> TetrahedralTree:
     ValueError
         If the bounds are not finite.
     """
-    side, low, number = world_cubes(bounds)
+    origin = np.asarray(origin, np.float64)
+    side, low, number = world_cubes(np.asarray(bounds, np.float64) + origin)
     tree = TetrahedralTree()
     nodes, corners = np.zeros(1, np.intp), low[None]
     for axis in range(3):
         if number[axis] < 2:
             continue
         step = np.eye(3, dtype=np.int64)[axis]
-        wall = np.tile([*step.astype(np.float64), -side * float(low[axis] + 1)], (len(nodes), 1))
+        wall = np.tile([*step.astype(np.float64), origin[axis] - side * float(low[axis] + 1)], (len(nodes), 1))
         nodes = tree.divide(nodes, wall).reshape(-1)
         corners = np.stack([corners, corners + step], axis=1).reshape(-1, 3)
-    _divide_cubes(tree, nodes, corners, side)
+    _divide_cubes(tree, nodes, corners * side - origin, side)
     return tree
 
 
-def _divide_cubes(tree: TetrahedralTree, nodes: NDArray[np.intp], corners: NDArray[np.int64], side: float) -> None:
-    """Divide cubes (n,) with lowest corners (n, 3), in sides, into six tetrahedra each."""
+def _divide_cubes(tree: TetrahedralTree, nodes: NDArray[np.intp], corners: NDArray[np.float64], side: float) -> None:
+    """Divide cubes (n,) with lowest corners (n, 3), metres, into six tetrahedra each."""
     # The planes of equal x and y, y and z, z and x meet in the diagonal. The first parts three tetrahedra from three,
     # and the other two cut off the one that lies between them.
-    xy, yz, zx = (_diagonal(corners, side, *axes) for axes in ((0, 1), (1, 2), (2, 0)))
+    xy, yz, zx = (_diagonal(corners, *axes) for axes in ((0, 1), (1, 2), (2, 0)))
     below, above = tree.divide(nodes, xy).T  # above: x ≥ y
     z_between, z_first = tree.divide(above, zx).T  # z_first: z ≥ x
     z_second, z_third = tree.divide(z_between, yz).T  # z_third: y ≥ z
@@ -341,12 +344,12 @@ def _divide_cubes(tree: TetrahedralTree, nodes: NDArray[np.intp], corners: NDArr
         way = np.concatenate([np.zeros((1, 3)), np.cumsum(steps[list(path)], axis=0)])
         if np.linalg.det(steps[list(path)]) < 0.0:
             way = way[[1, 0, 2, 3]]
-        tree.place(terminals, (corners[:, None] + way) * side)
+        tree.place(terminals, corners[:, None] + way * side)
 
 
-def _diagonal(corners: NDArray[np.int64], side: float, more: int, less: int) -> NDArray[np.float64]:
+def _diagonal(corners: NDArray[np.float64], more: int, less: int) -> NDArray[np.float64]:
     """Planes (n, 4) through cubes' diagonals, positive where coordinate ``more`` exceeds ``less``."""
     planes = np.zeros((len(corners), 4))
     planes[:, more], planes[:, less] = np.sqrt(0.5), -np.sqrt(0.5)
-    planes[:, 3] = np.sqrt(0.5) * side * (corners[:, less] - corners[:, more])
+    planes[:, 3] = np.sqrt(0.5) * (corners[:, less] - corners[:, more])
     return planes

@@ -14,6 +14,7 @@ from tetflora_addon import buffers
 from tetflora_addon.blender import settings
 from tetflora_addon.blender.job import contents, frame_cache, refine
 from tetflora_addon.blender.results import collection, meshes
+from tetflora_addon.blender.scene.camera import read_camera
 from tetflora_addon.blender.viewport import auto
 
 
@@ -125,7 +126,7 @@ def test_a_plant_is_made_into_a_mesh_at_rest(scene):
     """Meshes that are made of plants, and previews, do not depend on the frame."""
     flora = contents.compile_for(("bush",), scene, depsgraph())
     assert flora.calm is None
-    assert contents.in_wind(scene, flora).calm is flora
+    assert contents.in_wind(scene, flora, read_camera(scene, depsgraph())).calm is flora
 
 
 def test_velocities_are_there_where_there_is_motion_blur(scene):

@@ -328,3 +328,16 @@ def test_an_upright_line_leans_to_an_arc_of_its_length(height: float) -> None:
 def test_what_is_no_wind_is_refused(wrong: dict) -> None:
     with pytest.raises(TetFloraError, match="Wind"):
         Wind(**{"speed": 1.0, **wrong})
+
+
+def test_a_gust_is_where_it_is_in_the_world_wherever_coordinates_begin() -> None:
+    """Also of plants drawn by hand, whose phases are those of their places."""
+    near, origin = Wind(9.0, 0.7, 0.8, 12.5), (2048.0, -1024.0, 0.0)
+    moved = replace(near, origin=origin)
+    for flora in (support.small_flora(), drawn_flora()):
+        trunk = support.trunks(flora.rows, support.plants([1, 2, 3], position=(2050.0, -1020.0, 1.0)))
+        there = replace(trunk, position=trunk.position - origin)
+        rows, rows_moved = flora.in_wind(near).rows, flora.in_wind(moved).rows
+        np.testing.assert_allclose(gusts(rows_moved, there.position), gusts(rows, trunk.position), atol=1e-9)
+        np.testing.assert_allclose(sway(rows_moved, there), sway(rows, trunk), atol=1e-9)
+        assert np.abs(sway(rows, there) - sway(rows, trunk)).max() > 1e-3

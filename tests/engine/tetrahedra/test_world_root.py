@@ -66,6 +66,16 @@ def test_small_changes_of_the_scene_do_not_move_it() -> None:
     assert np.array_equal(one.vertices(one.terminals()), other.vertices(other.terminals()))
 
 
+def test_cubes_are_those_of_the_world_wherever_coordinates_begin() -> None:
+    bounds, origin = np.array([[3000.0, 2, 0], [5300, 9, 6]]), np.array([3072.0, 0, -1024])
+    one, other = world_root(bounds), world_root(bounds - origin, origin)
+    for tree in (one, other):
+        tree.split(tree.terminals())
+    assert np.array_equal(one.vertices(one.terminals()) - origin, other.vertices(other.terminals()))
+    points = np.random.default_rng(2).uniform(*bounds, (200, 3))
+    assert np.array_equal(one.locate(points), other.locate(points - origin))
+
+
 @pytest.mark.parametrize("bounds", [np.full((2, 3), np.nan), [[0, 0, 0], [1, 1, np.inf]]])
 def test_bounds_that_are_no_numbers_are_refused(bounds: np.ndarray) -> None:
     with pytest.raises(ValueError, match="finite"):

@@ -51,6 +51,19 @@ class Given:
         """All explicit polygons."""
         return None if self.explicit is None else Polygons.everything(self.explicit.meshes)
 
+    def counted_from(self, origin: np.ndarray) -> Given:
+        """The same in coordinates that begin at a place (3,) in the world, as those of the camera (`Camera.local`)."""
+        if not origin.any():
+            return self
+        explicit, sources = self.explicit, self.sources
+        return Given(
+            self.seeds.counted_from(origin),
+            None if explicit is None else replace(explicit, meshes=explicit.meshes.counted_from(origin)),
+            self.occluders - origin,
+            tuple(light.counted_from(origin) for light in self.lights),
+            None if sources is None else sources.counted_from(origin),
+        )
+
     def polygons_full(self, flora: Flora) -> int:
         """Polygons of everything, expanded: expected ones of plants, and those of meshes."""
         return round(expected_polygons(flora, self.seeds)) + (self.explicit.meshes.faces if self.explicit else 0)
@@ -107,10 +120,10 @@ def load_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph: bp
     return [resolved_species(scene, identifier, depsgraph) for identifier in identifiers]
 
 
-def in_wind(scene: bpy.types.Scene, flora: Flora) -> Flora:
-    """A flora in the scene's wind at its frame."""
+def in_wind(scene: bpy.types.Scene, flora: Flora, camera: Camera) -> Flora:
+    """A flora in the scene's wind at its frame, in the coordinates of a camera."""
     wind = wind_of(scene)
-    return flora if wind is None else flora.in_wind(wind)
+    return flora if wind is None else flora.in_wind(replace(wind, origin=tuple(camera.origin.tolist())))
 
 
 def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statistics:

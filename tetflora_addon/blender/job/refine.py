@@ -118,11 +118,14 @@ def _refine_steps(
         camera = read_camera(scene, depsgraph, region_only=results.purpose == 'RENDER')
     if given is None:
         given = read_scene(scene, depsgraph, layer)
+    camera = camera.local()
+    given = given.counted_from(camera.origin)
+    results.origin = camera.origin
     clock.lap("read")
     progress = Progress(0.02, "Compiling species")
     yield progress
     flora = yield from call_in_thread(progress, compile_species, load_for(given.species, scene, depsgraph))
-    flora = in_wind(scene, flora)
+    flora = in_wind(scene, flora, camera)
     clock.lap("compile")
     full = yield from call_in_thread(progress, given.polygons_full, flora)
     statistics = Statistics(plants=len(given.seeds), polygons_full=full, seconds=clock.seconds)
@@ -160,13 +163,16 @@ def refine(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, **options: ob
 def partition(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[Camera, Refinement]:
     """Camera and tetrahedra after refinement, without making anything; for images of the partition.
 
+    Both count from the camera's `origin`.
+
     Raises
     ------
     TetFloraError
         As `refine_steps`.
     """
-    camera, given = read_camera(scene, depsgraph), read_scene(scene, depsgraph, depsgraph.view_layer)
-    flora = in_wind(scene, compile_for(given.species, scene, depsgraph))
+    camera = read_camera(scene, depsgraph).local()
+    given = read_scene(scene, depsgraph, depsgraph.view_layer).counted_from(camera.origin)
+    flora = in_wind(scene, compile_for(given.species, scene, depsgraph), camera)
     return camera, at_once(_run_loop(flora, given, camera, refinement_settings(scene), Statistics()))
 
 

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import bpy
 
 from ...buffers import MeshBuffers, PointBuffers
@@ -45,12 +47,18 @@ class Results:
         Suffix of all names, where there are results of several cameras at the same time.
     data : JobData, optional
         Of the job, which ends when somebody deletes its results.
+
+    Attributes
+    ----------
+    origin : (3,) float
+        Where in the world positions in buffers are counted from, metres: objects are placed there.
     """
 
     def __init__(self, scene: bpy.types.Scene, purpose: str, mark: str = "", data: JobData | None = None) -> None:
         self.scene = scene
         self.data = data
         self.purpose = purpose
+        self.origin: Sequence[float] = (0.0, 0.0, 0.0)
         self.mark = f" {mark}" if mark else ""
         self.collection: bpy.types.Collection | None = None
         self._made: list[bpy.types.ID] = []
@@ -107,6 +115,7 @@ class Results:
         if species is not None:
             made.parent = parent_of(self.collection, species.identifier, species.name)
             self._made.append(made.parent)
+        made.location = self.origin
         made[KIND] = kind
         made.hide_select = True  # artists select and edit plants, not millions of polygons
         tag(made)

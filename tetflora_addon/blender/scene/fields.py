@@ -12,8 +12,10 @@ from collections.abc import Iterable, Sequence
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 from numpy.typing import NDArray
 
+from ...camera.camera import origin_near
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed
 from ...growth.seeds import Seeds
@@ -140,12 +142,14 @@ def write_field(
     """
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(len(seed))
-    write(mesh, "position", position)
+    origin = origin_near(position)
+    write(mesh, "position", position - origin)
     own = {"rotation": rotation, "scale": scale, "species": species, "seed": seed}
     for attribute, kind in FIELD_ATTRIBUTES.items():
         write(mesh, attribute, own[attribute], data_type=kind)
     mesh.update()
     obj = bpy.data.objects.new(name, mesh)
+    obj.matrix_world = Matrix.Translation(origin)
     group = obj.tetflora
     group.is_field = True
     for identifier, form in zip(identifiers, forms or [None] * len(identifiers), strict=True):

@@ -57,7 +57,8 @@ def _level_steps(
     looked = camera_now(scene)
     before = find(scene)
     camera = before.frozen if before is not None and before.frozen is not None else read_camera(scene, depsgraph)
-    given = read_scene(scene, depsgraph, layer)
+    camera = camera.local()
+    given = read_scene(scene, depsgraph, layer).counted_from(camera.origin)
     progress = Progress(0.02, "Compiling species")
     yield progress
     flora = yield from call_in_thread(progress, compile_species, load_for(given.species, scene, depsgraph))

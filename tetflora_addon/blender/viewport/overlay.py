@@ -123,13 +123,14 @@ def _opaque(colours: NDArray[np.float32], alpha: float) -> NDArray[np.float32]:
     return np.concatenate([colours, np.full((len(colours), 1), alpha, np.float32)], axis=1)
 
 
-def view_camera(region: bpy.types.RegionView3D, near: float) -> Camera:
-    """A viewport's view as the engine takes it; the size of its image does not matter here."""
+def view_camera(region: bpy.types.RegionView3D, near: float, origin: NDArray[np.float64]) -> Camera:
+    """A viewport's view as the engine takes it, counted from a place (3,); the size of its image does not matter."""
     matrix = np.array(region.view_matrix.inverted(), np.float64)
     kind = "PERSP" if region.is_perspective else "ORTHO"
     # From an orthographic view everything is in front: its eye is as far back as one likes.
     near = near if kind == "PERSP" else -np.inf
-    return Camera(kind, matrix[:3, 3], matrix[:3, :3], (-1.0, 1.0, -1.0, 1.0), near, np.inf, 1, 1)
+    whole = Camera(kind, matrix[:3, 3], matrix[:3, :3], (-1.0, 1.0, -1.0, 1.0), near, np.inf, 1, 1)
+    return whole.counted_from(origin)
 
 
 def _kept(preview: Preview, name: str, key: tuple, make: Callable[[], object]) -> object:
@@ -139,15 +140,21 @@ def _kept(preview: Preview, name: str, key: tuple, make: Callable[[], object]) -
     return preview.cache[name][1]
 
 
+def _draw(made: gpu.types.GPUBatch | None, origin: NDArray[np.float64]) -> None:
+    """Draw what counts from a place (3,) in the world."""
+    if made is not None:
+        with gpu.matrix.push_pop():
+            gpu.matrix.translate(origin.tolist())
+            made.draw(gpu.shader.from_builtin('SMOOTH_COLOR'))
+
+
 def _draw_plants(preview: Preview) -> None:
     shapes = preview.shapes
     made = _kept(preview, "plants", (preview.made,), lambda: plants(shapes))
-    if made is None:
-        return
     gpu.state.depth_test_set('LESS_EQUAL')
     gpu.state.depth_mask_set(True)
     gpu.state.face_culling_set('BACK')  # crowns and trunks are closed
-    made.draw(gpu.shader.from_builtin('SMOOTH_COLOR'))
+    _draw(made, shapes.origin)
     gpu.state.face_culling_set('NONE')
     gpu.state.depth_mask_set(False)
 
@@ -156,7 +163,7 @@ def _draw_levels(preview: Preview, settings: TetFloraPreview, space: bpy.types.S
     levels, level = preview.levels, preview.levels.at(settings.level)
     forms = frozenset(settings.forms)
     shown = (preview.made, level.number, forms)
-    shader = gpu.shader.from_builtin('SMOOTH_COLOR')
+    origin = levels.camera.origin
     gpu.state.blend_set('ALPHA')
     gpu.state.depth_test_set('LESS_EQUAL')
     gpu.state.depth_mask_set(False)  # clouds hide nothing
@@ -166,15 +173,13 @@ def _draw_levels(preview: Preview, settings: TetFloraPreview, space: bpy.types.S
             preview,
             f"projected {space.as_pointer()}",
             (*shown, *view),
-            lambda: _made_in_time(preview, level, forms, view_camera(space.region_3d, space.clip_start)),
+            lambda: _made_in_time(preview, level, forms, view_camera(space.region_3d, space.clip_start, origin)),
         )
-        if made is not None:
-            made.draw(shader)
+        _draw(made, origin)
     if settings.wires:
         key = (*shown, settings.colour)
         made = _kept(preview, "wires", key, lambda: wires(levels, level, settings.colour, forms))
-        if made is not None:
-            made.draw(shader)
+        _draw(made, origin)
     gpu.state.blend_set('NONE')
 
 
@@ -191,11 +196,11 @@ def _made_in_time(preview: Preview, level: Level, forms: frozenset[str], camera:
 
 
 def _draw_frozen(preview: Preview) -> None:
-    camera = preview.frozen
+    camera = preview.frozen.local()
     far = _reach(preview, camera)
     made = _kept(preview, "frozen", (*_place(camera), far), lambda: pyramid(camera, far, _FROZEN))
     gpu.state.depth_test_set('LESS_EQUAL')
-    made.draw(gpu.shader.from_builtin('SMOOTH_COLOR'))
+    _draw(made, camera.origin)
 
 
 def _reach(preview: Preview, camera: Camera) -> float:
@@ -206,7 +211,7 @@ def _reach(preview: Preview, camera: Camera) -> float:
     def farthest() -> float:
         level = preview.levels.levels[-1]
         middles = preview.levels.vertices(level).mean(axis=1)[level.visibility > 0.0]
-        depth = camera.to_camera_space(middles)[:, 2]
+        depth = camera.counted_from(preview.levels.camera.origin).to_camera_space(middles)[:, 2]
         return float(min(max(depth.max(initial=1.0), 1.0), camera.far))
 
     return _kept(preview, "reach", (preview.made, *_place(camera)), farthest)

@@ -18,6 +18,7 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 from numpy.typing import NDArray
 
+from ...camera.camera import origin_near
 from ...errors import TetFloraError
 from .. import compat
 from ..placing import properties
@@ -47,11 +48,12 @@ _SOON = 0.08  # seconds from a change to new dots
 class Dots:
     """The dots of a population."""
 
-    position: NDArray[np.float32]  # (n, 3), metres in world space
+    position: NDArray[np.float32]  # (n, 3), metres from the origin
     colour: NDArray[np.float32]  # (n, 4)
     plants: int  # that would be placed; at least, where ``more``
     more: bool
     message: str  # why there are fewer than asked for; empty if there are not
+    origin: NDArray[np.float64]  # (3,), near most of them, metres in world space
 
 
 @dataclass
@@ -120,11 +122,12 @@ def dots_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: 
     placement, _ = place_population(scene, depsgraph, population, own, grounds, MOST_PLACED)
     number = len(placement)
     drawn = np.linspace(0, number - 1, min(number, MOST_DOTS)).astype(np.int64) if number else np.zeros(0, np.int64)
-    position = placement.position[drawn].astype(np.float32)
+    origin = origin_near(placement.position)
+    position = (placement.position[drawn] - origin).astype(np.float32)
     position[:, 2] += _LIFT
     colour = np.ones((len(drawn), 4), np.float32)
     colour[:, :3] = PALETTE[placement.species[drawn] % len(PALETTE)]
-    return Dots(position, colour, number, number >= MOST_PLACED, placement.reason)
+    return Dots(position, colour, number, number >= MOST_PLACED, placement.reason, origin)
 
 
 def status(population: bpy.types.PropertyGroup) -> str:
@@ -184,7 +187,9 @@ def _draw() -> None:
         _state.batch = batch_for_shader(shader, 'POINTS', {"pos": _state.dots.position, "color": _state.dots.colour})
     gpu.state.depth_test_set('LESS_EQUAL')
     gpu.state.point_size_set(_SIZE * context.preferences.system.ui_scale)
-    _state.batch.draw(shader)
+    with gpu.matrix.push_pop():
+        gpu.matrix.translate(_state.dots.origin.tolist())
+        _state.batch.draw(shader)
     gpu.state.point_size_set(1.0)
     gpu.state.depth_test_set('NONE')
 
@@ -259,12 +264,16 @@ class GroundCursor:
         shader.bind()
         shader.uniform_float("viewportSize", size)
         for points, colour in self.lines:
-            batch = batch_for_shader(shader, 'LINE_STRIP', {"pos": np.ascontiguousarray(points, np.float32)})
-            # A dark line below makes the bright one seen on any ground.
-            for line, width in (((0.0, 0.0, 0.0, 0.5 * colour[3]), 2.0 * WIDTH), (colour, WIDTH)):
-                shader.uniform_float("lineWidth", width * scale)
-                shader.uniform_float("color", line)
-                batch.draw(shader)
+            origin = origin_near(points)
+            near = np.ascontiguousarray(points - origin, np.float32)
+            batch = batch_for_shader(shader, 'LINE_STRIP', {"pos": near})
+            with gpu.matrix.push_pop():
+                gpu.matrix.translate(origin.tolist())
+                # A dark line below makes the bright one seen on any ground.
+                for line, width in (((0.0, 0.0, 0.0, 0.5 * colour[3]), 2.0 * WIDTH), (colour, WIDTH)):
+                    shader.uniform_float("lineWidth", width * scale)
+                    shader.uniform_float("color", line)
+                    batch.draw(shader)
         gpu.state.blend_set('NONE')
 
 

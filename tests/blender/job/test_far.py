@@ -1,0 +1,123 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Far from the world's origin results are what they are near it: only their objects stand elsewhere."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from devtools import session
+from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph
+from tetflora_addon.blender.attributes import read, values_of
+from tetflora_addon.blender.job import refine
+from tetflora_addon.blender.results.output import KIND, PARENT
+from tetflora_addon.blender.viewport.levels import level_steps, read_shapes
+from tetflora_addon.blender.worker import at_once
+from tetflora_addon.camera.camera import GRID
+
+#: 1,000 km, where single precision has steps of 6 cm; places in the scene below are multiples of that.
+FAR = np.array([977 * GRID, -488 * GRID, GRID])
+
+
+@pytest.fixture
+def scene() -> bpy.types.Scene:
+    """A plant to become polygons, some to become proxies, a mesh of the artist's, ground and lights."""
+    session.clean_file()
+    scene = bpy.context.scene
+    scene.render.resolution_x, scene.render.resolution_y = 320, 240
+    add_camera(location=(0.0, -8.0, 1.5))
+    for n, place in enumerate([(0, 0, 0), (2.5, 9, 0), (-4, 22, 0), (6, 40, 0), (-9, 60, 0)]):
+        add_plant(f"plant {n}", seed=n, location=place)
+    rock = add_mesh("rock", size=0.5, z=1.0)
+    rock.location, rock.tetflora.is_explicit = (-1.5, -3.0, 0.0), True
+    ground = add_mesh("ground", size=64.0)
+    ground.tetflora.is_occluder = True
+    for kind, place in (('SUN', (0, 0, 0)), ('POINT', (3.0, -4.0, 5.0))):
+        lamp = bpy.data.objects.new(kind, bpy.data.lights.new(kind, kind))
+        lamp.data.energy, lamp.location, lamp.rotation_euler = 200.0 if kind == 'POINT' else 3.0, place, (0.5, 0.3, 0.0)
+        scene.collection.objects.link(lamp)
+    return scene
+
+
+def _moved(scene: bpy.types.Scene, by: np.ndarray) -> None:
+    for obj in scene.objects:
+        obj.location = np.array(obj.location) + by
+
+
+def _results(scene: bpy.types.Scene) -> dict[str, tuple[np.ndarray, dict[str, np.ndarray]]]:
+    """Places and attributes of all results, by name."""
+    refine.refine(scene, depsgraph())
+    bpy.context.view_layer.update()
+    made = [o for o in scene.objects if KIND in o and o[KIND] != PARENT]
+    found = {
+        o.name: (np.array(o.matrix_world), {a.name: values_of(a) for a in o.data.attributes if not a.is_internal})
+        for o in made
+    }
+    refine.clear(scene)
+    return found
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {},
+        {"proxy_form": 'SHELLS'},
+        {"proxy_form": 'MICROSPHERES', "anchored": True, "shadow_cutoff": 4.0},
+        {"baked_light": 'PROXIES'},
+        {"expand_everything": True},
+    ],
+    ids=["automatic", "shells", "anchored", "baked", "expanded"],
+)
+def test_results_far_out_are_those_at_the_origin(scene: bpy.types.Scene, settings: dict) -> None:
+    for name, value in settings.items():
+        setattr(scene.tetflora, name, value)
+    if "baked_light" in settings:  # sheets of a square metre would take a hundred times as long
+        scene.render.resolution_percentage = 25
+        for name in ("rock", "SUN"):
+            bpy.data.objects.remove(scene.objects[name])
+    near = _results(scene)
+    _moved(scene, FAR)
+    far = _results(scene)
+    assert near.keys() == far.keys()
+    assert len(near) >= 2
+    for name, (place, attributes) in far.items():
+        assert np.array_equal(place[:3, 3], FAR)
+        assert np.array_equal(near[name][0], np.eye(4))
+        assert attributes.keys() == near[name][1].keys()
+        for attribute, values in attributes.items():
+            assert np.array_equal(values, near[name][1][attribute]), (name, attribute)
+
+
+def test_between_the_places_of_the_grid_as_well(scene: bpy.types.Scene) -> None:
+    """1,000 km sharp: positions differ by what single precision does at half a grid, areas by nothing to speak of."""
+    near = _area(scene)
+    _moved(scene, np.array([1e6, 0.0, 0.0]))
+    assert _area(scene) == pytest.approx(near, rel=2e-3)
+
+
+def _area(scene: bpy.types.Scene) -> float:
+    """Area of all polygons of the results, m²."""
+    refine.refine(scene, depsgraph())
+    meshes = [o.data for o in scene.objects if o.get(KIND) in {"leaf", "bark"}]
+    total = 0.0
+    for mesh in meshes:
+        area = np.zeros(len(mesh.polygons), np.float32)
+        mesh.polygons.foreach_get("area", area)
+        total += float(area.sum(dtype=np.float64))
+        assert np.abs(read(mesh, "position")).max() < 2 * GRID
+    refine.clear(scene)
+    return total
+
+
+def test_previews_far_out_are_those_at_the_origin(scene: bpy.types.Scene) -> None:
+    scene.tetflora.preview.plants = 'LIGHT'
+    levels, shapes = at_once(level_steps(scene, depsgraph())), read_shapes(scene, depsgraph())
+    _moved(scene, FAR)
+    far_levels, far_shapes = at_once(level_steps(scene, depsgraph())), read_shapes(scene, depsgraph())
+    last, far_last = levels.levels[-1], far_levels.levels[-1]
+    assert np.array_equal(levels.vertices(last), far_levels.vertices(far_last))
+    assert np.array_equal(far_levels.camera.origin, FAR)
+    assert np.array_equal(shapes.positions, far_shapes.positions)
+    assert np.array_equal(far_shapes.origin, FAR)
