@@ -64,7 +64,7 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
         if not statistics.complete and statistics.passes:
             self.report({'INFO'}, "Stopped early; click Refine again to complete the result")
         outside = _cut_off(context.scene) or _unseen(context.scene, statistics)
-        for warning in (outside, few_bounces(context.scene), _unread_world(context.scene)):
+        for warning in (statistics.left_out, outside, few_bounces(context.scene), _unread_world(context.scene)):
             if warning:
                 self.report({'WARNING'}, warning)
         return {'FINISHED'}

@@ -20,7 +20,6 @@ from ..compiled.averages import own_leaf_integrals
 from ..compiled.flora import Flora
 from ..growth.branches import Branches
 from ..growth.growth import fullness
-from ..subplants.bodies import bounding_bodies
 from ..subplants.pieces import Pieces, leaf_fraction, outward_ends, wood_areas
 from .polygons import Polygons
 
@@ -231,6 +230,24 @@ def large_polygons(polygons: Polygons, camera: Camera) -> NDArray[np.bool_]:
     meshes, face = polygons.meshes, polygons.face
     optical = polygons.areas() * np.where(meshes.solid[face], 0.5, 1.0)
     return ~meshes.leaf[face] & (optical >= (LARGE * camera.extent_around(polygons.centre)) ** 2)
+
+
+def bounding_bodies(flora: Flora, subplants: Branches) -> NDArray[np.float64]:
+    """Bodies that hold all vertices of sub-plants, from the compiled bounds alone.
+
+    Returns
+    -------
+    (9, n) float64
+        A cylinder, and how far whatever is not within it reaches beyond: centre (3), axis (3), radius, half of the
+        height, and that pad. Metres, world space.
+    """
+    bound = (flora.bound[subplants.row] * subplants.length[:, None]).T
+    out = np.empty((9, len(subplants)))
+    out[3:6] = subplants.frame[:, :, 2].T
+    out[:3] = subplants.position.T + (bound[1] + bound[2]) / 2 * out[3:6]
+    out[6], out[7] = bound[0], (bound[2] - bound[1]) / 2
+    out[8] = subplants.radius * flora.widest[subplants.row] + flora.leaf_reach[subplants.row] * subplants.scale
+    return out
 
 
 def bounding_cylinders(flora: Flora, subplants: Branches) -> tuple[NDArray, NDArray, NDArray]:

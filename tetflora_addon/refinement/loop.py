@@ -8,7 +8,7 @@ A pass costs what it changes: only divided tetrahedra give their contents away, 
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ from .polygons import Polygons
 from .settings import RefinementSettings
 from .shares import SharedPlants
 from .statistics import Step, Stopwatch
+from .strays import Strays, strays_of
 from .views import buffers_for, is_anchored, pixels_of_buffer, root_for, widened_for
 from .visibility import AlphaBuffer, Buffers
 
@@ -65,6 +66,8 @@ class Refinement:
         False where a limit of the settings stopped the loop.
     seconds : dict of str to float
         Wall clock by step.
+    strays : Strays
+        What is left out.
     """
 
     tree: TetrahedralTree
@@ -77,6 +80,7 @@ class Refinement:
     passes: int
     complete: bool
     seconds: dict[str, float]
+    strays: Strays = field(default_factory=Strays)
 
     @property
     def nodes(self) -> NDArray[np.intp]:
@@ -140,6 +144,8 @@ def refine(
         Whose shadows of what is hidden are refined if ``settings.shadow_cutoff`` is above 0.
     """
     clock = Stopwatch()
+    strays = strays_of(flora, seeds, camera, polygons)
+    seeds, polygons = strays.others(seeds, polygons)
     plants = SharedPlants(flora, seeds, camera, filled=bool(np.isfinite(settings.proxy_block)))
     camera = widened_for(camera, settings.margin, flora, plants.parts.branches, polygons)
     slack = _slack(camera, settings.visibility_resolution)
@@ -183,7 +189,8 @@ def refine(
             splitting &= ~barred
         clock.lap("refinement")
         ranks, seconds = rank[cells.nodes], dict(clock.seconds)
-        state = Refinement(tree, plants, holdings, cells, transmittance, decision, ranks, passes, not limited, seconds)
+        found = cells, transmittance, decision, ranks, passes, not limited, seconds, strays
+        state = Refinement(tree, plants, holdings, *found)
         if not splitting.any():
             return state
         if (yield state):

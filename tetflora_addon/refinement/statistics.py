@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import TypeVar
 
 _Result = TypeVar("_Result")
+_NAMED = 3  # objects that a message names before it only counts
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,9 @@ class Statistics:
         Estimated megabytes of the meshes in Blender.
     steps : list of Step
         One for each pass through the loop.
+    strays : dict of str to float
+        Objects that were left out at least in part, because they are far beyond all others, and how far from the camera
+        that is, metres.
     """
 
     plants: int = 0
@@ -87,6 +91,17 @@ class Statistics:
     seconds: dict[str, float] = field(default_factory=dict)
     memory_mb: float = 0.0
     steps: list[Step] = field(default_factory=list)
+    strays: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def left_out(self) -> str:
+        """A warning about strays; empty where there are none."""
+        if not self.strays:
+            return ""
+        names = ", ".join(f'"{name}"' for name in sorted(self.strays)[:_NAMED])
+        more = f" and {len(self.strays) - _NAMED:,} more" if len(self.strays) > _NAMED else ""
+        away = f"{min(self.strays.values()) / 1e3:,.0f} km from the camera, far beyond all else"
+        return f"Left out, because too far to be seen: {names}{more}, {away}; move it closer or delete it"
 
     def as_dict(self) -> dict:
         """Plain dictionary, ready for JSON."""

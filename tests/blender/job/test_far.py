@@ -4,15 +4,18 @@
 
 from __future__ import annotations
 
+import json
+
 import bpy
 import numpy as np
 import pytest
 
 from devtools import session
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph
-from tetflora_addon.blender.attributes import read, values_of
+from tetflora_addon.blender.attributes import read, values_of, world_matrix
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.results.output import KIND, PARENT
+from tetflora_addon.blender.scene.fields import read_field, upright, write_field
 from tetflora_addon.blender.viewport.levels import level_steps, read_shapes
 from tetflora_addon.blender.worker import at_once
 from tetflora_addon.camera.camera import GRID
@@ -121,3 +124,47 @@ def test_previews_far_out_are_those_at_the_origin(scene: bpy.types.Scene) -> Non
     assert np.array_equal(far_levels.camera.origin, FAR)
     assert np.array_equal(shapes.positions, far_shapes.positions)
     assert np.array_equal(far_shapes.origin, FAR)
+
+
+@pytest.mark.parametrize("settings", [{}, {"anchored": True}, {"proxy_form": 'SHELLS', "anchored": True}], ids=str)
+@pytest.mark.parametrize("place", [(1e6, 0, 0), (0, 1e6, 0), (0, -2e4, 0)], ids=["beside", "ahead", "behind"])
+def test_a_stray_changes_nothing_and_is_named(
+    scene: bpy.types.Scene, capfd: pytest.CaptureFixture[str], settings: dict, place: tuple
+) -> None:
+    for name, value in settings.items():
+        setattr(scene.tetflora, name, value)
+    alone = _results(scene)
+    add_plant("slipped", location=place)
+    rock = add_mesh("lost rock")
+    rock.location, rock.tetflora.is_explicit = np.multiply(place, 1.5), True
+    with_stray = _results(scene)
+    assert alone.keys() == with_stray.keys()
+    for name, (_, attributes) in with_stray.items():
+        for attribute, values in attributes.items():
+            assert np.array_equal(values, alone[name][1][attribute]), (name, attribute)
+    capfd.readouterr()
+    assert bpy.ops.tetflora.refine() == {'FINISHED'}
+    kilometres = f"{np.abs(place).max() / 1e3:,.0f} km from the camera"
+    said = capfd.readouterr().out
+    assert '"lost rock", "slipped"' in said
+    assert kilometres in said
+    assert set(json.loads(scene.tetflora.statistics)["strays"]) == {"lost rock", "slipped"}
+
+
+def test_a_field_with_a_stray_is_named(scene: bpy.types.Scene) -> None:
+    points = np.array([[0.0, 12.0, 0.0], [3.0, 15.0, 0.0], [5e5, 0.0, 0.0]])
+    rows = upright(np.zeros(3)), np.ones(3), np.zeros(3, np.int32), np.arange(3, dtype=np.int32)
+    field = write_field("meadow", points, *rows, ["bush"])
+    scene.collection.objects.link(field)
+    statistics = refine.refine(scene, depsgraph())
+    assert statistics.strays == {"meadow": pytest.approx(5e5, rel=1e-3)}
+
+
+def test_a_new_field_far_out_keeps_its_places(scene: bpy.types.Scene) -> None:
+    """In the world's coordinates single precision would move plants by centimetres."""
+    points = np.array([[0.123, 12.456, 0.789], [3.21, 15.654, 0.987]]) + 1e6
+    rows = upright(np.zeros(2)), np.ones(2), np.zeros(2, np.int32), np.arange(2, dtype=np.int32)
+    field = write_field("meadow", points, *rows, ["bush"])
+    scene.collection.objects.link(field)
+    found = read_field(field, depsgraph(), world_matrix(field, depsgraph())[None])
+    assert np.abs(found.position - points).max() < 1e-4

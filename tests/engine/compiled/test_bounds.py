@@ -15,7 +15,7 @@ from tests.engine import support
 from tetflora_addon.compiled.bounds import ring_stretch, unit_bounds, widest_radii
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.branches import Branches
-from tetflora_addon.subplants.bodies import bounding_bodies
+from tetflora_addon.refinement.contents import bounding_bodies
 from tetflora_addon.subplants.pieces import open_subplants
 
 _FLOAT32 = 1e-6  # relative rounding of vertices

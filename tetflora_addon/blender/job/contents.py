@@ -19,6 +19,7 @@ from ...refinement.lights import Light
 from ...refinement.polygons import Polygons
 from ...refinement.settings import RefinementSettings
 from ...refinement.statistics import Statistics
+from ...refinement.strays import Strays
 from ...species.catalogue import list_species, load_species
 from ...species.species import Species
 from ..results.forms import form_of
@@ -27,19 +28,23 @@ from ..results.leaf_objects import resolved_species
 from ..scene.explicit import Explicit, read_explicit
 from ..scene.lights import read_lights, read_sources
 from ..scene.objects import read_occluders
-from ..scene.plants import NoPlantsError, read_plants
+from ..scene.plants import NoPlantsError, read_plants_of
 from ..settings import check_limits, wind_of
 
 
 @dataclass(frozen=True)
 class Given:
-    """Contents of a scene; ``explicit`` is None where no mesh takes part, ``sources`` where no light is baked."""
+    """Contents of a scene; ``explicit`` is None where no mesh takes part, ``sources`` where no light is baked.
+
+    ``owners`` are the objects of the plants in their order, each with the number of its own.
+    """
 
     seeds: Seeds
     explicit: Explicit | None
     occluders: np.ndarray
     lights: tuple[Light, ...]
     sources: Sources | None = None
+    owners: tuple[tuple[str, int], ...] = ()
 
     @property
     def species(self) -> tuple[str, ...]:
@@ -56,13 +61,25 @@ class Given:
         if not origin.any():
             return self
         explicit, sources = self.explicit, self.sources
-        return Given(
-            self.seeds.counted_from(origin),
-            None if explicit is None else replace(explicit, meshes=explicit.meshes.counted_from(origin)),
-            self.occluders - origin,
-            tuple(light.counted_from(origin) for light in self.lights),
-            None if sources is None else sources.counted_from(origin),
+        return replace(
+            self,
+            seeds=self.seeds.counted_from(origin),
+            explicit=None if explicit is None else replace(explicit, meshes=explicit.meshes.counted_from(origin)),
+            occluders=self.occluders - origin,
+            lights=tuple(light.counted_from(origin) for light in self.lights),
+            sources=None if sources is None else sources.counted_from(origin),
         )
+
+    def named(self, strays: Strays) -> dict[str, float]:
+        """Objects that strays belong to, and the least of their distances, metres."""
+        ends = np.cumsum([number for _, number in self.owners])
+        names = [self.owners[i][0] for i in np.searchsorted(ends, strays.plants, side="right").tolist()]
+        meshes = self.explicit.meshes if self.explicit is not None else None
+        names += [meshes.surfaces[meshes.surface[i]].name for i in strays.instances.tolist()]
+        found: dict[str, float] = {}
+        for name, away in zip(names, strays.away.tolist(), strict=True):
+            found[name] = min(away, found.get(name, np.inf))
+        return found
 
     def polygons_full(self, flora: Flora) -> int:
         """Polygons of everything, expanded: expected ones of plants, and those of meshes."""
@@ -86,17 +103,17 @@ def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_laye
     with originals_shown(scene, depsgraph):
         explicit = read_explicit(depsgraph, view_layer)
         try:
-            seeds = read_plants(scene, depsgraph, view_layer)
+            seeds, owners = read_plants_of(scene, depsgraph, view_layer)
         except NoPlantsError:
             if explicit is None:
                 raise
             none = np.zeros(0)
             frames = none.reshape(0, 3), none.reshape(0, 3, 3)
-            seeds = Seeds((), none.astype(np.int32), none.astype(np.int64), *frames, none)
+            seeds, owners = Seeds((), none.astype(np.int32), none.astype(np.int64), *frames, none), ()
         lights = read_lights(depsgraph, view_layer) if scene.tetflora.shadow_cutoff > 0.0 else ()
         baked = scene.tetflora.baked_light != 'OFF' and not scene.tetflora.expand_everything
         sources = read_sources(scene, depsgraph, view_layer) if baked else None
-        return Given(seeds, explicit, read_occluders(depsgraph, view_layer), lights, sources)
+        return Given(seeds, explicit, read_occluders(depsgraph, view_layer), lights, sources, owners)
 
 
 def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Flora:

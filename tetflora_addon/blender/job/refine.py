@@ -233,6 +233,7 @@ def _refined(
     refinement = detail.refinement
     clock.lap("refine")
     _count(statistics, refinement)
+    statistics.strays = given.named(refinement.strays)
     if not form.facets:
         return Refined(flora, refinement, camera)
     transition = Transition(flora, camera, detail.leaf_limit)

@@ -90,7 +90,7 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
                 _make(scene)
             made = True
         elif not scene.tetflora.refine_at_render and has_contents(scene) and not _has_meshes(scene):
-            _warn(scene)
+            _warn_of_nothing()
     except NoPlantsError:
         pass  # the artist has disabled or hidden all of them
     except TetFloraError as error:
@@ -187,6 +187,8 @@ def _make(scene: bpy.types.Scene) -> None:
             options = {"view_layer": layer, "for_render": True, "camera": camera, "given": given, "mark": key[:8]}
             before = result_collections(scene, 'RENDER')
             statistics = refine.refine(scene, layer.depsgraph, beside=before, **options)
+            if statistics.left_out:
+                _warn(statistics.left_out, " ".join(sorted(statistics.strays)))
             new = [c for c in result_collections(scene, 'RENDER') if c not in before]
             for collection in new:
                 frame_cache.store(scene, key, collection, statistics.memory_mb)
@@ -232,14 +234,18 @@ def _has_meshes(scene: bpy.types.Scene) -> bool:
     return any(KIND in obj for obj in scene.objects)
 
 
-def _warn(scene: bpy.types.Scene) -> None:
-    """Warn, once in a render of many frames, that the image will have no plants."""
-    text = "nothing is refined and Refine at Render is off, so the render shows no plants"
-    if text in _rendering.warnings:
-        return
-    _rendering.warnings.append(text)
+def _warn_of_nothing() -> None:
+    if _warn("nothing is refined and Refine at Render is off, so the render shows no plants", ""):
+        nothing_refined.notify()
+
+
+def _warn(text: str, about: str) -> bool:
+    """Warn in the terminal, once in a render of many frames; whether that was now."""
+    if about in _rendering.warnings:
+        return False
+    _rendering.warnings.append(about)
     print(f"TetFlora: warning: {text}", file=sys.stderr, flush=True)
-    nothing_refined.notify()
+    return True
 
 
 def _complain(scene: bpy.types.Scene, message: str) -> None:

@@ -44,6 +44,13 @@ def read_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_lay
         A species that the catalogue does not have, a scale of 0, or a transform that is not a number; the message names
         the objects.
     """
+    return read_plants_of(scene, depsgraph, view_layer)[0]
+
+
+def read_plants_of(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
+) -> tuple[Seeds, tuple[tuple[str, int], ...]]:
+    """The same, and the names of the objects that they belong to, in their order, each with the number of its own."""
     objects = sorted(renderable_objects(view_layer), key=lambda o: o.name_full)
     grouped = [(o, o.tetflora) for o in objects]  # asking an object for its group is half of the time
     grouped = [(o, group) for o, group in grouped if group.is_plant or group.is_field]
@@ -67,7 +74,10 @@ def read_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_lay
         off = found and not any(o.tetflora.enabled for o in (*own, *(c.owner for c in copies)))
         hidden = sum(o.tetflora.is_plant or o.tetflora.is_field for o in scene.objects) - len(own)
         raise NoPlantsError(_none_left(bool(off), [o.name for o in own if o.tetflora.is_field], hidden))
-    return _merged(read)
+    owners = [(name, len(seeds)) for name, seeds in read]
+    if single:
+        owners[:1] = [(obj.name, 1) for obj in single]
+    return _merged(read), tuple(owners)
 
 
 def _none_left(off: bool, fields: list[str], hidden: int) -> str:

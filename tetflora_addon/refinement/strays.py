@@ -1,0 +1,105 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strays: a few things far beyond all others that nobody sees, such as a plant that slipped to the end of the world.
+
+The root of the tree holds all that there is. One plant 1,000 km away takes twenty levels of division before there is
+anything of the size of the others, and with that what the settings allow. Strays are left out, and named.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera.camera import Camera
+from ..compiled.flora import Flora
+from ..growth.growth import trunks
+from ..growth.seeds import Seeds
+from .polygons import Polygons
+from .shares import PlantParts
+
+#: Strays are so many times as far from the camera as all others, or as so many metres if these are nearer.
+GAP, NEAR = 16.0, 1000.0
+#: There are at most so many, or that fraction of all things, and never more than of the others.
+MOST, FRACTION = 8, 0.01
+#: Pixels under which nobody sees a thing.
+UNSEEN = 1.0
+_NONE = np.zeros(0, np.int64)
+
+
+@dataclass(frozen=True)
+class Strays:
+    """What is left out of a scene.
+
+    Attributes
+    ----------
+    plants, instances : (k,) and (m,) int64
+        Rows of the seeds, and instances of other meshes.
+    away : (k + m,) float64
+        How far they are from the camera, metres.
+    """
+
+    plants: NDArray[np.int64] = field(default_factory=lambda: _NONE)
+    instances: NDArray[np.int64] = field(default_factory=lambda: _NONE)
+    away: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+
+    def others(self, seeds: Seeds, polygons: Polygons | None) -> tuple[Seeds, Polygons | None]:
+        """What is left of plants and polygons; None where no polygon is."""
+        if len(self.plants):
+            kept = np.ones(len(seeds), bool)
+            kept[self.plants] = False
+            seeds = seeds.take(kept)
+        if len(self.instances):
+            polygons = polygons.take(np.flatnonzero(~np.isin(polygons.instance, self.instances)))
+        return seeds, polygons if polygons is not None and len(polygons) else None
+
+
+def strays_of(flora: Flora, seeds: Seeds, camera: Camera, polygons: Polygons | None = None) -> Strays:
+    """Strays among plants and instances of other meshes; nothing depends on their order."""
+    centre, reach = seeds.position, np.zeros(len(seeds))
+    if polygons is not None and len(polygons):
+        others = _around_instances(polygons)
+        centre, reach = np.concatenate([centre, others[0]]), np.append(reach, others[1])
+    away = np.linalg.norm(centre - camera.eye, axis=1)
+    some = far_off(away - reach)
+    plants = some[some < len(seeds)]
+    if len(plants):
+        reach[plants] = PlantParts.of_subplants(flora, trunks(flora.rows, seeds.take(plants))).extent
+    for eye in (camera, *camera.shutter):
+        some = some[_unseen(eye, centre[some], reach[some], away[some])]
+    own = some < len(seeds)
+    return Strays(some[own], some[~own] - len(seeds), np.concatenate([away[some[own]], away[some[~own]]]))
+
+
+def far_off(away: NDArray[np.float64]) -> NDArray[np.int64]:
+    """The few (k,) of things by their distances (n,) that are far beyond all others, metres."""
+    most = min(max(MOST, int(FRACTION * len(away))), len(away) // 2)
+    if most == 0:
+        return _NONE
+    first = len(away) - most - 1
+    last = np.argpartition(away, first)[first:]
+    last = last[np.argsort(away[last], kind="stable")]
+    from_here = np.maximum(away[last], NEAR)
+    gaps = np.flatnonzero(from_here[1:] > GAP * from_here[:-1])
+    return np.sort(last[gaps[0] + 1 :]) if len(gaps) else _NONE
+
+
+def _unseen(
+    camera: Camera, centre: NDArray[np.float64], reach: NDArray[np.float64], away: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Things (n,) that are specks, or out of the view and too far for their shadows to fall into it."""
+    specks = 2.0 * reach < UNSEEN * camera.extent_around(centre)
+    depth = away if camera.kind == "PANO" else camera.to_camera_space(centre)[:, 2]
+    out = (depth - reach > camera.far) | (depth + reach < camera.near) | (camera.clearance(centre) > reach)
+    return specks | (out & (GAP * reach < away))
+
+
+def _around_instances(polygons: Polygons) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Middles (i, 3) of all instances of meshes, and how far they reach from there (i,), metres."""
+    number = len(polygons.meshes.surface)
+    low, high = np.full((number, 3), np.inf), np.full((number, 3), -np.inf)
+    np.minimum.at(low, polygons.instance, polygons.centre - polygons.reach[:, None])
+    np.maximum.at(high, polygons.instance, polygons.centre + polygons.reach[:, None])
+    return (low + high) / 2.0, np.linalg.norm(high - low, axis=1) / 2.0
