@@ -5,13 +5,14 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
 from devtools import session
-from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph
+from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, tiny_render
 from tetflora_addon.blender.attributes import read, values_of, world_matrix
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.results.output import KIND, PARENT
@@ -149,6 +150,17 @@ def test_a_stray_changes_nothing_and_is_named(
     assert '"lost rock", "slipped"' in said
     assert kilometres in said
     assert set(json.loads(scene.tetflora.statistics)["strays"]) == {"lost rock", "slipped"}
+
+
+def test_a_render_names_a_stray_once(scene: bpy.types.Scene, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    tiny_render().render.filepath = str(tmp_path / "frame")
+    add_plant("slipped", location=(1e6, 0.0, 0.0))
+    scene.tetflora.refine_at_render, scene.frame_end = True, 2
+    scene.camera.keyframe_insert("location", frame=1)
+    scene.camera.location.x += 2000.0  # the distance that the message tells changes
+    scene.camera.keyframe_insert("location", frame=2)
+    bpy.ops.render.render(animation=True)
+    assert capfd.readouterr().err.count('Left out, because too far to be seen: "slipped", 1,000 km') == 1
 
 
 def test_a_field_with_a_stray_is_named(scene: bpy.types.Scene) -> None:
