@@ -101,6 +101,16 @@ def test_between_the_places_of_the_grid_as_well(scene: bpy.types.Scene) -> None:
     assert _area(scene) == pytest.approx(near, rel=2e-3)
 
 
+def test_expanded_plants_are_whole_wherever_the_camera_is(scene: bpy.types.Scene) -> None:
+    scene.tetflora.expand_everything = True
+    near = _results(scene)
+    for plant in [o for o in scene.objects if o.tetflora.is_plant]:
+        plant.location = np.array(plant.location) + FAR
+    for name, (place, attributes) in _results(scene).items():
+        assert np.array_equal(place[:3, 3], FAR)
+        assert np.array_equal(attributes["position"], near[name][1]["position"])
+
+
 def _area(scene: bpy.types.Scene) -> float:
     """Area of all polygons of the results, m²."""
     refine.refine(scene, depsgraph())

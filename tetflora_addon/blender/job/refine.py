@@ -18,7 +18,7 @@ import numpy as np
 
 from ... import memory
 from ...buffers import MeshBuffers
-from ...camera.camera import Camera
+from ...camera.camera import Camera, origin_near
 from ...compiled.flora import Flora, compile_species
 from ...emission.budget import afford
 from ...emission.facets import drawn_species
@@ -119,6 +119,8 @@ def _refine_steps(
     if given is None:
         given = read_scene(scene, depsgraph, layer)
     camera = camera.local()
+    if scene.tetflora.expand_everything:  # for no camera: exports, and others' renderers
+        camera = camera.counted_from(origin_near(given.seeds.position))
     given = given.counted_from(camera.origin)
     results.origin = camera.origin
     clock.lap("read")
