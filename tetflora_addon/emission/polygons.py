@@ -86,7 +86,7 @@ def polygon_blocks(result: Refinement, camera: Camera, facet_pixels: float | Non
     polygons, rank = held.items.take(kept), rank[cell[kept]]
     order = np.argsort(rank, kind="stable")
     polygons = mended(polygons.take(order))
-    runs = list(chunks(np.ones(len(polygons)), BLOCK_POLYGONS))
+    runs = list(chunks(np.maximum(polygons.triangle_counts / 2, 1), BLOCK_POLYGONS))  # of quads; others by corners
     for number, run in enumerate(runs):
         own = polygons.take(run)
         surface = own.meshes.surface[own.instance]

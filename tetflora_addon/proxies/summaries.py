@@ -15,7 +15,7 @@ from ..compiled.flora import Flora
 from ..compiled.orientation import leaf_moments, own_leaf_moments, wood_moments
 from ..refinement.contents import Contents
 from ..refinement.polygons import MEASURED_AT_ONCE
-from ..subplants.pieces import Pieces, piece_leaf_colours
+from ..subplants.pieces import Pieces, chunks, piece_leaf_colours
 
 #: κ along an axis is ⟨|n·e|⟩, the moment gives ⟨(n·e)²⟩. The power of the second that is the first at 0, ⅓ (all ways:
 #: ½) and 1; at ½ (normals around a circle) it gives .646 for 2/π = .637.
@@ -109,8 +109,8 @@ def _add_polygons(sums: NDArray[np.float64], contents: Contents, index: NDArray[
     """Polygons are summed up triangle by triangle, which is exact under any sequence of cuts."""
     chosen = np.flatnonzero(index[contents.polygons.cell] >= 0)
     meshes = contents.polygons.items.meshes
-    for start in range(0, len(chosen), MEASURED_AT_ONCE):
-        some = chosen[start : start + MEASURED_AT_ONCE]
+    for run in chunks(contents.polygons.items.triangle_counts[chosen], MEASURED_AT_ONCE):
+        some = chosen[run]
         polygons = contents.polygons.items.take(some)
         owner, triangle, fraction = polygons.triangles()
         face = polygons.face[owner]

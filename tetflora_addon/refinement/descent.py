@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..subplants.pieces import chunks
 from ..tetrahedra.tree import TetrahedralTree
 from .contents import Held, polygon_totals
 from .polygons import Polygons, area_fractions
@@ -21,7 +22,7 @@ from .polygons import Polygons, area_fractions
 #: Metres (n,) at points (n, 3) that make no difference in the image.
 Slack = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
-#: Polygons that are lowered at a time; bounds what that takes to some hundred megabytes.
+#: Triangles of polygons that are lowered at a time; bounds what that takes to some hundred megabytes.
 LOWERED_AT_ONCE = 200_000
 
 
@@ -81,8 +82,7 @@ def push_down(tree: TetrahedralTree, held: Held[Polygons], slack: Slack | None =
     placed = [Held.none(Polygons)]
     while len(held):
         polygons, cells, crosses = held.items, held.cell.copy(), np.zeros(len(held), bool)
-        for start in range(0, len(polygons), LOWERED_AT_ONCE):
-            some = slice(start, start + LOWERED_AT_ONCE)
+        for some in chunks(polygons.triangle_counts, LOWERED_AT_ONCE):
             cells[some], crosses[some] = _lowered(tree, polygons.take(some), cells[some], slack)
         placed.append(replace(held, cell=cells).take(~crosses))
         polygons, cells, width = polygons.take(crosses), cells[crosses], held.totals.width[crosses]

@@ -19,9 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Arrays, spread
+from ..subplants.pieces import chunks
 
-#: Faces and triangles that are measured at a time; bounds what that takes to some hundred megabytes.
+#: Triangles that are measured at a time; bounds what that takes to some hundred megabytes.
 MEASURED_AT_ONCE = 200_000
+#: Faces of more corners are measured once, however many fragments of them there are.
+_FEW_CORNERS = 4
 #: A fragment that reaches beyond a plane by less than this fraction of its size is not cut again by rounding errors.
 _TOUCHING = 1e-9
 
@@ -202,12 +205,19 @@ class Meshes:
 
     def face_areas(self, face: NDArray[np.integer], instance: NDArray[np.integer]) -> NDArray[np.float64]:
         """Areas (n,) of faces of instances, m²."""
+        many = np.flatnonzero(self.face_size[face] > _FEW_CORNERS)
+        key = instance[many].astype(np.int64) * len(self.face_size) + face[many]
+        _, first, again = np.unique(key, return_index=True, return_inverse=True)
+        once = np.ones(len(face), bool)
+        once[many], once[many[first]] = False, True
         areas = np.zeros(len(face))
-        for start in range(0, len(face), MEASURED_AT_ONCE):
-            some = slice(start, start + MEASURED_AT_ONCE)
+        chosen = np.flatnonzero(once)
+        for run in chunks(self.face_size[face[chosen]] - 2, MEASURED_AT_ONCE):
+            some = chosen[run]
             owner, index = spread(self.face_size[face[some]] - 2)
             own = self.vectors(self.face_triangle[face[some]][owner] + index, instance[some][owner])
-            areas[some] = np.bincount(owner, np.linalg.norm(own, axis=1), len(face[some]))
+            areas[some] = np.bincount(owner, np.linalg.norm(own, axis=1), len(some))
+        areas[many] = areas[many[first]][again.reshape(-1)]
         return areas
 
 
@@ -296,6 +306,11 @@ class Polygons(Arrays):
         }
         return replace(parts[0], part=np.concatenate(shifted).astype(np.int32), **own)
 
+    @property
+    def triangle_counts(self) -> NDArray[np.int64]:
+        """Triangles (n,) that each consists of: 1 for a fragment."""
+        return np.where(self.part >= 0, 1, self.meshes.face_size[self.face] - 2)
+
     def triangles(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
         """Triangles of whole faces, and fragments, in the order of the polygons.
 
@@ -308,7 +323,7 @@ class Polygons(Arrays):
             Of the triangle's area; 1 except for fragments.
         """
         cut = self.part >= 0
-        owner, index = spread(np.where(cut, 1, self.meshes.face_size[self.face] - 2))
+        owner, index = spread(self.triangle_counts)
         triangle, fraction = self.meshes.face_triangle[self.face][owner] + index, np.ones(len(owner))
         own = np.flatnonzero(cut[owner])
         rows = self.part[owner[own]]
@@ -326,11 +341,11 @@ class Polygons(Arrays):
     def areas(self) -> NDArray[np.float64]:
         """Areas (n,), m²."""
         areas = np.zeros(len(self))
-        for start in range(0, len(self), MEASURED_AT_ONCE):
-            some = self.take(slice(start, start + MEASURED_AT_ONCE))
+        for run in chunks(self.triangle_counts, MEASURED_AT_ONCE):
+            some = self.take(run)
             owner, triangle, fraction = some.triangles()
             own = np.linalg.norm(self.meshes.vectors(triangle, some.instance[owner]), axis=1)
-            areas[start : start + len(some)] = np.bincount(owner, fraction * own, len(some))
+            areas[run] = np.bincount(owner, fraction * own, len(some))
         return areas
 
     def bounding_box(self) -> NDArray[np.float64]:

@@ -17,6 +17,7 @@ from ..errors import SpeciesError
 
 MAX_LEAF_POLYGONS = 2000
 MAX_LEAF_CORNERS = 4 * MAX_LEAF_POLYGONS  # of all faces; and vertices
+MAX_FACE_CORNERS = 128  # polygons are what blocks, budgets and limits count, so none may be much larger than another
 MAX_COORDINATE = 100.0  # in leaf lengths; keeps areas and bounds far from what floats can hold
 MAX_UV = 10_000.0
 
@@ -144,6 +145,10 @@ def leaf_model(positions: ArrayLike, faces: list[list[int]], uv: ArrayLike | Non
     if not 1 <= len(faces) <= MAX_LEAF_POLYGONS or min(sizes) < 3:
         raise SpeciesError(
             f"leaf model: must have 1 to {MAX_LEAF_POLYGONS} faces of 3 or more vertices, has {len(faces)}"
+        )
+    if max(sizes) > MAX_FACE_CORNERS:
+        raise SpeciesError(
+            f"leaf model: a face has {max(sizes):,} corners; {MAX_FACE_CORNERS} is the limit, so triangulate the face"
         )
     if max(sum(sizes), len(positions)) > MAX_LEAF_CORNERS:
         raise SpeciesError(f"leaf model: must have at most {MAX_LEAF_CORNERS} vertices and face corners")

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import os
+import time
 import zipfile
 from pathlib import Path
 
@@ -198,6 +199,18 @@ def test_no_frames_and_frames_named_twice(shot, tmp_path, capfd):
     assert _run(tmp_path / "job", "--frames", "9-2") == 2
     assert "9-2" in _error(capfd)
     assert _run(tmp_path / "job", "--chunk", "0") == 2
+
+
+def test_lists_of_very_many_frames():
+    """A frame that occurs twice is found at once, and none are counted that Blender does not have."""
+    begun = time.process_time()
+    with pytest.raises(errors.SceneError, match="Frame 300000 occurs twice"):
+        farm_template.frame_expression([(1, 300_000, 1), (300_000, 300_000, 1)])
+    with pytest.raises(ValueError, match="again and again"):
+        farm_template.frame_runs(",".join(["0-1048574"] * 10_000))
+    with pytest.raises(ValueError, match=r"^9{57}\.\.\. is not a range"):
+        farm_template.frame_runs("9" * 100_000)
+    assert time.process_time() - begun < 5
 
 
 def test_folders_that_cannot_be_used(shot, tmp_path, capfd):

@@ -31,8 +31,12 @@ Run = tuple[int, int, int]
 #: Last frame in Blender.
 LAST_FRAME = 1_048_574
 
-_RUN = re.compile(r"(-?\d+)(?:-(-?\d+)(?::(\d+))?)?")
+_NUMBER = r"[0-9]{1,9}"  # what Python makes of more digits, or of others, is of no use
+_RUN = re.compile(rf"(-?{_NUMBER})(?:-(-?{_NUMBER})(?::({_NUMBER}))?)?")
 _LONGEST_NAME = 128
+_LONGEST_SHOWN = 60
+#: Frames of Blender, those below zero included.
+_MOST_FRAMES = 2 * LAST_FRAME + 1
 
 
 @dataclass(frozen=True)
@@ -76,20 +80,24 @@ def frame_runs(text: str) -> list[Run]:
     Raises
     ------
     ValueError
-        Another expression, a range that runs backwards, or a frame that Blender does not have.
+        Another expression, a range that runs backwards, a frame that Blender does not have, or more frames than it has.
     """
-    runs = []
+    runs, number = [], 0
+    shown = text if len(text) <= _LONGEST_SHOWN else text[: _LONGEST_SHOWN - 3] + "..."
     for part in text.split(","):
         match = _RUN.fullmatch(part.strip())
         if match is None:
-            raise ValueError(f"{text} is not a range of frames such as 1-24, 7 or 1-99:2")
+            raise ValueError(f"{shown} is not a range of frames such as 1-24, 7 or 1-99:2")
         first = int(match[1])
         last = first if match[2] is None else int(match[2])
         step = int(match[3] or 1)
         if last < first or step < 1:
-            raise ValueError(f"{text} is not a range of frames such as 1-24, 7 or 1-99:2")
+            raise ValueError(f"{shown} is not a range of frames such as 1-24, 7 or 1-99:2")
         if max(-first, last) > LAST_FRAME:
-            raise ValueError(f"{text} exceeds the last frame that Blender supports, {LAST_FRAME:,}")
+            raise ValueError(f"{shown} exceeds the last frame that Blender supports, {LAST_FRAME:,}")
+        number += (last - first) // step + 1
+        if number > _MOST_FRAMES:
+            raise ValueError(f"{shown} names frames again and again: Blender has only {_MOST_FRAMES:,}")
         runs.append((first, last - (last - first) % step, step))
     return runs
 
@@ -110,8 +118,9 @@ def frame_expression(runs: Sequence[Run]) -> str:
     numbers = frame_numbers(runs)
     if not numbers:
         raise SceneError("No frames to render; raise the End frame of the scene, or use --frames")
-    if len(set(numbers)) < len(numbers):
-        twice = next(n for n in numbers if numbers.count(n) > 1)
+    seen: set[int] = set()
+    twice = next((n for n in numbers if n in seen or seen.add(n)), None)
+    if twice is not None:
         raise SceneError(f"Frame {twice} occurs twice in --frames; list each frame once")
     runs = [(first, last - (last - first) % step, step) for first, last, step in runs if last >= first]
     return ",".join(
