@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
+import ast
 import tomllib
 import zipfile
 from pathlib import Path, PurePosixPath
 
 import pytest
 
-from devtools import build
+from devtools import build, rooms
 
 AT_THE_ROOT = {"__init__.py", "blender_manifest.toml", "LICENSE"}
 FOLDERS = {"tetflora_addon", "operators", "panels"}
@@ -72,8 +73,37 @@ def test_manifest_says_what_the_project_promises(extension_zip: Path) -> None:
     assert about["id"] == "tetflora"
     assert about["license"] == ["SPDX:GPL-3.0-or-later"]
     assert about["blender_version_min"] == "4.5.0"
-    assert set(about["permissions"]) <= {"files"}
+    assert set(about["permissions"]) == {"files"}
+    assert all(
+        word in about["permissions"]["files"] for word in ("Read", "write", "delete", "species", "caches", "jobs")
+    )
+    assert len(about["permissions"]["files"]) <= 64  # as Blender's platform demands
     assert extension_zip.name == f"tetflora-{about['version']}.zip"
+
+
+def test_nothing_needs_a_permission_that_the_manifest_lacks() -> None:
+    """No network, camera, microphone or clipboard; and no other programs, which could do anything."""
+    banned = {
+        "socket",
+        "ssl",
+        "http",
+        "urllib",
+        "ftplib",
+        "smtplib",
+        "asyncio",
+        "requests",
+        "subprocess",
+        "aud",
+    }
+    words = {"clipboard", "popen", "online_access", "url_open", "path_open"}
+    for path in rooms.sources().values():
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                assert not {alias.name.split(".")[0] for alias in node.names} & banned, path
+            elif isinstance(node, ast.ImportFrom) and not node.level:
+                assert (node.module or "").split(".")[0] not in banned, path
+            elif isinstance(node, ast.Attribute):
+                assert node.attr not in words, path
 
 
 def test_the_version_has_its_section_in_the_changelog() -> None:

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, tiny_render
 from tetflora_addon import errors
 from tetflora_addon.blender import compat
-from tetflora_addon.blender.cli import command, farm, farm_template
+from tetflora_addon.blender.cli import assets, command, farm, farm_template
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -135,7 +135,7 @@ def _with_assets(shot: Path) -> dict[str, Path]:
 
 def test_files_of_the_scene_are_named(shot, tmp_path):
     paths = _with_assets(shot)
-    assert _run(tmp_path / "job") == 0
+    assert _run(tmp_path / "job", "--outside") == 0
     inputs = _read(tmp_path / "job", "asset_references")["assetReferences"]["inputs"]
     assert sorted(inputs["filenames"]) == sorted(map(str, (shot, *paths.values())))
     assert _read(tmp_path / "job", "parameter_values")["parameterValues"] == [{"name": "SceneFile", "value": str(shot)}]
@@ -143,7 +143,7 @@ def test_files_of_the_scene_are_named(shot, tmp_path):
 
 def test_a_copied_scene_finds_its_files_elsewhere(shot, tmp_path):
     paths = _with_assets(shot)
-    assert _run(tmp_path / "job", "--copy") == 0
+    assert _run(tmp_path / "job", "--copy", "--outside") == 0
     bundle = (tmp_path / "job").rename(tmp_path / "moved")
     assert _read(bundle, "asset_references")["assetReferences"]["inputs"]["filenames"] == []
     copied = bundle / str(_parameters(bundle)["SceneFile"])
@@ -160,12 +160,131 @@ def test_files_that_are_not_there_and_absolute_paths_are_told(shot, tmp_path, ca
     paths = _with_assets(shot)
     paths["leaf"].unlink()
     bpy.data.images["p_01.png"].filepath = str(paths["1"])
-    assert _run(tmp_path / "job", "--json") == 0
+    assert _run(tmp_path / "job", "--json", "--outside") == 0
     said = capfd.readouterr()
     figures = json.loads(said.out.strip().splitlines()[-1])
     assert figures["missing"] == [str(paths["leaf"])]
     assert figures["absolute_paths"] == [str(paths["1"])]
     assert said.err.count("tetflora: warning:") == 2
+
+
+def _image(path: str, source: str = 'FILE') -> None:
+    """An image datablock that names a file."""
+    image = bpy.data.images.new("named", 1, 1)
+    image.source, image.filepath_raw, image.use_fake_user = source, path, True
+
+
+def _files(folder: Path, *names: str, size: int = 3) -> None:
+    for name in names:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(b"x" * size)
+
+
+def _travelling(job: Path, shot: Path) -> set[str]:
+    """Names, within the folder of the .blend, of the files that a job names beside it."""
+    inputs = _read(job, "asset_references")["assetReferences"]["inputs"]
+    assert inputs["directories"] == []
+    return {os.path.relpath(name, shot.parent) for name in inputs["filenames"]} - {shot.name}
+
+
+def test_tiles_and_sequences_are_those_that_blender_reads(shot, tmp_path):
+    """Four digits, and brackets as they are: what else begins alike stays where it is."""
+    tiles = "t/a[1].1001.png", "t/a[1].1002.png"
+    _files(shot.parent, *tiles, "t/a[1].secret.png", "t/a[1].10010.png", "t/a1.1001.png")
+    parts = "t/b.u1_v1.exr", "t/b.u2_v1.exr"
+    _files(shot.parent, *parts, "t/b.exr", "t/b.u1_v1_.exr")
+    frames = "t/p_09.jp2", "t/p_10.jp2", "t/p_100.jp2"
+    _files(shot.parent, *frames, "t/p_9.jp2", "t/p_010.jp2", "t/p_09.jp3", "t/q_09.jp2")
+    for name in ("//t/a[1].<UDIM>.png", "//t/b.<UVTILE>.exr"):
+        _image(name, 'TILED')
+    _image("//t/p_09.jp2", 'SEQUENCE')
+    assert _run(tmp_path / "job") == 0
+    assert _travelling(tmp_path / "job", shot) == {*tiles, *parts, *frames}
+
+
+def test_only_files_that_blender_reads_travel(shot, tmp_path, capfd):
+    """A file from a stranger may name anything: keys, a whole home folder, a pipe that never ends."""
+    _files(shot.parent, "leaf.png", "id_rsa", "home.png/notes.txt", "private/a.vdb", "odd\nname.png")
+    os.mkfifo(shot.parent / "pipe.png")
+    others = "id_rsa", "home.png", "private", "pipe.png"
+    for name in ("leaf.png", *others):
+        _image(f"//{name}")
+    text = bpy.data.texts.new("diary")
+    text.filepath = "//leaf.txt"
+    _files(shot.parent, "leaf.txt")
+    assert _run(tmp_path / "job", "--copy", "--json") == 0
+    said = capfd.readouterr()
+    assert {p.name for p in (tmp_path / "job" / "scene").rglob("*")} == {"shot.blend", "leaf.png"}
+    figures = json.loads(said.out.strip().splitlines()[-1])
+    assert figures["skipped"] == sorted(str(shot.parent / name) for name in others)
+    assert said.err.count("not a file that Blender reads") == len(others)
+
+
+def test_caches_of_simulations_travel_without_what_else_lies_there(shot, tmp_path):
+    domain = add_mesh("domain").modifiers.new("Fluid", 'FLUID')
+    domain.fluid_type = 'DOMAIN'
+    domain.domain_settings.cache_directory = "//smoke"
+    kept = {"smoke/data/fluid_0001.vdb", "blendcache_shot/0_000001_00.bphys"}
+    _files(shot.parent, *kept, "smoke/diary.txt", "blendcache_shot/.netrc")
+    assert _run(tmp_path / "job") == 0
+    assert _travelling(tmp_path / "job", shot) == kept
+
+
+def test_what_lies_outside_is_asked_for(shot, tmp_path, capfd):
+    """Links count by what they lead to."""
+    _files(tmp_path, "elsewhere/secret.png")
+    (shot.parent / "leaf.png").symlink_to(tmp_path / "elsewhere" / "secret.png")
+    _image("//leaf.png")
+    for options in ((), ("--copy",)):
+        assert _run(tmp_path / "job", *options) == 1
+        assert "1 of the files lie outside the folder of shot.blend" in _error(capfd)
+        assert not (tmp_path / "job").exists()
+    assert _run(tmp_path / "job", "--copy", "--outside") == 0
+    assert not (tmp_path / "job" / "scene" / "leaf.png").is_symlink()
+
+
+def test_the_list_is_shown_with_sizes_before_anything_is_copied(shot, tmp_path, capfd, monkeypatch):
+    _files(shot.parent, "large.exr", size=30_000_000)
+    _image("//large.exr")
+    assert _run(tmp_path / "job", "--copy", "--max-size", 0.02) == 1
+    said = capfd.readouterr()
+    assert "large.exr" in said.err
+    assert "--max-size" in said.err
+    assert not (tmp_path / "job").exists()
+    listed = next(line for line in said.out.splitlines() if line.endswith("large.exr"))
+    assert listed.split()[:2] == ["30.000", "MB"]
+    assert _run(tmp_path / "job", "--copy") == 0
+    lines = capfd.readouterr().out.splitlines()
+    copied = [n for n, line in enumerate(lines) if line.startswith("copied ")]
+    assert 5 <= len(copied) <= 10
+    assert copied[0] > lines.index(listed)
+
+
+def test_a_file_that_grows_while_it_is_copied_is_no_endless_job(shot, tmp_path, capfd, monkeypatch):
+    _files(shot.parent, "leaf.png")
+    _image("//leaf.png")
+    monkeypatch.setattr(farm, "approve", lambda *_: _files(shot.parent, "leaf.png", size=4))
+    assert _run(tmp_path / "job", "--copy") == 1
+    assert "leaf.png has grown" in _error(capfd)
+    assert not (tmp_path / "job").exists()
+
+
+def test_very_many_files_are_refused(shot, monkeypatch):
+    _files(shot.parent, *(f"p_{n:02}.png" for n in range(10)))
+    _image("//p_01.png", 'SEQUENCE')
+    monkeypatch.setattr(assets, "MOST_FILES", 9)
+    with pytest.raises(errors.SceneError, match="more than 9 files"):
+        assets.used_files(shot)
+
+
+@pytest.mark.parametrize("name", ["a" * 300, "\udc80.png", "new\nline.png", "\x1b[31m.png", "{{Param.X}}.png"])
+def test_odd_names(shot, tmp_path, capfd, name):
+    """They are told in one line that a terminal does not take for something else."""
+    _image(f"//{name}")
+    assert _run(tmp_path / "job", "--copy", "--json") == 0
+    said = capfd.readouterr().err
+    assert said.count("\n") == said.count("tetflora: warning: missing file") == 1
+    assert "\x1b" not in said
 
 
 def test_a_file_that_was_never_saved(tmp_path, capfd):

@@ -8,7 +8,6 @@ import copy
 import json
 import math
 import random
-import time
 import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
@@ -24,7 +23,7 @@ from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.compiled.orientation import leaf_moments
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.species.catalogue import list_species, load_species
-from tetflora_addon.species.leaf_models import LEAF_MODELS, MAX_FACE_CORNERS, MAX_LEAF_POLYGONS, leaf_model
+from tetflora_addon.species.leaf_models import LEAF_MODELS, MAX_LEAF_POLYGONS, leaf_model
 from tetflora_addon.species.schema import MAX_FILE_BYTES, ORDER_KEYS, read_species, species_from_dict
 from tetflora_addon.species.skeletons import MAX_ORDERS
 from tetflora_addon.species.species import CROWN_SHAPES, crown_ratio
@@ -278,25 +277,6 @@ def test_a_key_twice_in_one_object_is_told(tmp_path: Path) -> None:
     path.write_text(text, encoding="utf-8")
     with pytest.raises(SpeciesError, match=r"twice\.json: branches: duplicate key"):
         read_species(path)
-
-
-def test_a_key_twice_among_very_many_is_found_at_once(tmp_path: Path) -> None:
-    """Each key was looked for among all: minutes for a file of the largest size."""
-    path = tmp_path / "twice.json"
-    path.write_text("{" + ",".join(f'"{n}": 0' for n in [*range(150_000), 149_999]) + "}", encoding="utf-8")
-    begun = time.process_time()
-    with pytest.raises(SpeciesError, match=r"twice\.json: 149999: duplicate key"):
-        read_species(path)
-    assert time.process_time() - begun < 5
-
-
-def test_faces_of_leaves_have_few_corners() -> None:
-    """Blocks and limits count polygons, so a face of thousands of corners would slip through all of them."""
-    turn = np.arange(MAX_FACE_CORNERS + 1) * 2 * np.pi / (MAX_FACE_CORNERS + 1)
-    disc = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
-    assert leaf_model(disc, [list(range(MAX_FACE_CORNERS))]).polygons == 1
-    leaf = {"vertices": disc.tolist(), "faces": [list(range(MAX_FACE_CORNERS + 1))]}
-    assert "triangulate" in refusal(support.small(leaf=leaf))
 
 
 def test_a_mark_of_the_encoding_does_no_harm(tmp_path: Path) -> None:

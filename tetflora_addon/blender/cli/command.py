@@ -27,12 +27,14 @@ from ..properties import TetFloraScene
 from ..runtime import failed_frames
 from ..saved_files import damaged, write_blend
 from ..scene.camera import read_camera
-from .farm import write_bundle
+from .farm import LIMIT_GB, write_bundle
 from .farm_template import LAST_FRAME, Run, frame_numbers, frame_runs
 
 NAME = "tetflora"
 #: Largest number of samples in Cycles.
 _MAX = 1 << 24
+#: Warnings of a kind that are printed one by one.
+_WARNINGS = 20
 
 _command: Any = None
 
@@ -116,6 +118,10 @@ def _parser() -> argparse.ArgumentParser:
     farm.add_argument("--chunk", type=_whole, default=1, metavar="N", help="frames that a worker renders per task")
     farm.add_argument("--frames", type=_frames, metavar="A-B", help="frames of the job (default: those of the scene)")
     farm.add_argument("--copy", action="store_true", help="copy the file and its assets into the job")
+    about = "include files that lie outside the folder of the .blend"
+    farm.add_argument("--outside", action="store_true", help=about)
+    about = "refuse a job whose files are larger together (default: %(default)g)"
+    farm.add_argument("--max-size", type=_positive, default=LIMIT_GB, metavar="GB", help=about)
     farm.set_defaults(run=_farm)
 
     for command in (refining, render):
@@ -195,12 +201,30 @@ def _stats(_options: argparse.Namespace) -> dict:
 
 
 def _farm(options: argparse.Namespace) -> dict:
-    written = write_bundle(bpy.context.scene, options.folder, options.chunk, options.frames, options.copy)
-    for path in written["missing"]:
-        print(f"tetflora: warning: missing file: {path}", file=sys.stderr, flush=True)
-    for path in written["absolute_paths"]:
-        about = "use File > External Data > Make Paths Relative if other machines cannot access it"
-        print(f"tetflora: warning: absolute path: {path}; {about}", file=sys.stderr, flush=True)
+    written = write_bundle(
+        bpy.context.scene,
+        options.folder,
+        options.chunk,
+        options.frames,
+        options.copy,
+        options.outside,
+        options.max_size * 1e9,
+        lambda text: print(text, flush=True),
+    )
+    for key, what, remedy in (
+        ("missing", "missing file", ""),
+        ("skipped", "not a file that Blender reads, so not in the job", ""),
+        (
+            "absolute_paths",
+            "absolute path",
+            "; use File > External Data > Make Paths Relative if other machines cannot access it",
+        ),
+    ):
+        for number, path in enumerate(written[key]):
+            if number == _WARNINGS:
+                print(f"tetflora: warning: {what}: {len(written[key]) - number:,} more", file=sys.stderr, flush=True)
+                break
+            print(f"tetflora: warning: {what}: {path}{remedy}", file=sys.stderr, flush=True)
     return written
 
 

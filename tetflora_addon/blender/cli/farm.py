@@ -3,7 +3,7 @@
 """``--command tetflora farm``: the open file as a job bundle for schedulers of Open Job Description.
 
 A bundle is a folder with the three files of `farm_template`, a folder with the extension's zip, its installer and the
-user's own species, and optionally a copy of the .blend with its assets. Copies keep their relative places, so that
+user's own species, and optionally a copy of the .blend with its `assets`. Copies keep their relative places, so that
 paths that begin with // stay valid, in linked libraries as well. The open file is only read.
 """
 
@@ -12,12 +12,10 @@ from __future__ import annotations
 import fnmatch
 import json
 import os
-import re
 import shutil
 import tomllib
 import zipfile
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -29,38 +27,31 @@ from ..preferences import species_folders
 from ..scene.camera import read_camera
 from ..scene.plants import NoPlantsError
 from . import farm_template
+from .assets import approve, copy_files, places_of, shown, used_files
 from .farm_template import Run
 
 #: Root of the extension as it is installed, or of the source tree.
 EXTENSION = Path(__file__).resolve().parents[3]
+#: What all files of a job may have together unless the artist says otherwise.
+LIMIT_GB = 20.0
 MANIFEST = "blender_manifest.toml"
 #: What Blender excludes from an extension by default.
 _LEFT_OUT = ("__pycache__/", ".*", "/*.zip")
+#: Species files are no larger, see `species.schema`.
+_LARGEST_SPECIES = 4_000_000
 #: Of all files in the zip, so that equal files give equal zips.
 _DATE = (1980, 1, 1, 0, 0, 0)
 
 
-@dataclass(frozen=True)
-class Assets:
-    """Files on disk that a scene uses besides its .blend; all paths absolute.
-
-    Attributes
-    ----------
-    files, folders : tuple of Path
-        Existing ones.
-    missing : tuple of Path
-    absolute : tuple of str
-        Paths in the file that do not begin with //: they are valid only on machines with the same drives.
-    """
-
-    files: tuple[Path, ...]
-    folders: tuple[Path, ...]
-    missing: tuple[Path, ...]
-    absolute: tuple[str, ...]
-
-
 def write_bundle(
-    scene: bpy.types.Scene, folder: Path, chunk: int = 1, runs: list[Run] | None = None, copy: bool = False
+    scene: bpy.types.Scene,
+    folder: Path,
+    chunk: int = 1,
+    runs: list[Run] | None = None,
+    copy: bool = False,
+    outside: bool = False,
+    limit: float = LIMIT_GB * 1e9,
+    tell: Callable[[str], None] = print,
 ) -> dict[str, Any]:
     """Write the open file as a job bundle.
 
@@ -76,6 +67,12 @@ def write_bundle(
         First, last and step of frames; by default the scene's.
     copy : bool
         Copy the .blend and its assets into the bundle instead of referring to them.
+    outside : bool
+        Include files that lie outside the folder of the .blend.
+    limit : float
+        Most bytes that all files may have together.
+    tell : callable
+        Takes lines of text: the files and their sizes before anything is written, then progress.
 
     Returns
     -------
@@ -95,7 +92,8 @@ def write_bundle(
     frames = farm_template.frame_expression(runs)
     plants = _plants(scene)
     assets = used_files(blend)
-    places = _places(blend, assets) if copy else {}
+    approve(blend, assets, outside, limit, tell)
+    places = places_of(blend, assets.files) if copy else {}
     folder = folder.absolute()
     made = _empty_folder(folder)
     name = os.path.basename(scene.render.filepath.replace("\\", "/")) or "frame_####"
@@ -104,17 +102,18 @@ def write_bundle(
         "template": farm_template.template(farm_template.Job(blend.stem, frames, chunk, name, inside)),
         "parameter_values": farm_template.parameter_values(None if copy else str(blend)),
         "asset_references": farm_template.asset_references(
-            [] if copy else [str(path) for path in (blend, *assets.files)],
-            [] if copy else [str(path) for path in assets.folders],
+            [] if copy else [str(path) for path in (blend, *assets.files)]
         ),
     }
     try:
         _write_files(folder / farm_template.FILES)
-        for path, place in places.items():
-            _copy(path, folder / farm_template.SCENE_FOLDER / place)
+        if copy:
+            inner = folder / farm_template.SCENE_FOLDER
+            sizes = {blend: blend.stat().st_size, **assets.files}
+            copy_files({path: inner / place for path, place in places.items()}, sizes, tell)
         for title, content in texts.items():
-            text = json.dumps(content, indent=2, ensure_ascii=False)
-            (folder / f"{title}.json").write_text(text + "\n", encoding="utf-8")
+            with (folder / f"{title}.json").open("x", encoding="utf-8") as file:
+                file.write(json.dumps(content, indent=2) + "\n")
     except BaseException as error:
         _take_away(folder, made)
         if isinstance(error, OSError):
@@ -126,35 +125,12 @@ def write_bundle(
         "plants": plants,
         "frames": len(numbers),
         "tasks": -(-len(numbers) // chunk),
-        "assets": len(assets.files) + len(assets.folders),
-        "missing": [str(path) for path in assets.missing],
-        "absolute_paths": list(assets.absolute),
+        "assets": len(assets.files),
+        "megabytes": (sum(assets.files.values()) + blend.stat().st_size) / 1e6,
+        "missing": [shown(path) for path in assets.missing],
+        "skipped": [shown(path) for path in assets.skipped],
+        "absolute_paths": [shown(text) for text in assets.absolute],
     }
-
-
-def used_files(blend: Path) -> Assets:
-    """Images, libraries, caches, sounds and fonts on disk that the open file uses, except packed ones."""
-    written = bpy.utils.blend_paths(absolute=False, packed=False, local=False)
-    paths = bpy.utils.blend_paths(absolute=True, packed=False, local=False)
-    files: set[Path] = set()
-    folders: set[Path] = set()
-    missing: set[Path] = set()
-    for path in {Path(os.path.normpath(text)) for text in paths if text}:
-        found = list(_files_of(path))
-        files.update(p for p in found if p.is_file())
-        folders.update(p for p in found if p.is_dir() and p not in blend.parents)  # not the whole project
-        if not found:
-            missing.add(path)
-    for user in (*bpy.data.images, *bpy.data.movieclips):
-        if user.source == 'SEQUENCE' and user.filepath:
-            files.update(_sequence(Path(os.path.normpath(bpy.path.abspath(user.filepath, library=user.library)))))
-    cache = blend.with_name(f"blendcache_{blend.stem}")
-    if cache.is_dir():
-        folders.add(cache)
-    absolute = {text for text in written if text and not text.startswith("//")}
-    return Assets(
-        tuple(sorted(files - {blend})), tuple(sorted(folders)), tuple(sorted(missing)), tuple(sorted(absolute))
-    )
 
 
 def write_zip(target: Path, root: Path = EXTENSION) -> None:
@@ -258,11 +234,11 @@ def _reason(error: OSError) -> str:
 
 
 def _take_away(folder: Path, made: bool) -> None:
-    for path in folder.iterdir():
-        if path.is_dir():
-            shutil.rmtree(path, ignore_errors=True)
-        else:
-            path.unlink(missing_ok=True)
+    """Remove what was written, and the folder itself if it was made."""
+    for name in (farm_template.FILES, farm_template.SCENE_FOLDER):
+        shutil.rmtree(folder / name, ignore_errors=True)
+    for path in folder.glob("*.json"):
+        path.unlink(missing_ok=True)
     if made:
         folder.rmdir()
 
@@ -273,44 +249,6 @@ def _write_files(folder: Path) -> None:
     write_zip(folder / f"tetflora-{version}.zip")
     shutil.copyfile(Path(__file__).with_name("farm_installer.py"), folder / farm_template.INSTALLER)
     for own in species_folders():
-        for path in sorted(own.glob("*.json")):
+        for path in sorted(p for p in own.glob("*.json") if p.is_file() and p.stat().st_size <= _LARGEST_SPECIES):
             (folder / "species").mkdir(exist_ok=True)
             shutil.copyfile(path, folder / "species" / path.name)
-
-
-def _places(blend: Path, assets: Assets) -> dict[Path, Path]:
-    """Place of each file in the bundle, with the same relative paths."""
-    everything = (blend, *assets.files, *assets.folders)
-    drives = {path.drive: path for path in reversed(everything)}
-    if len(drives) > 1:
-        other = next(path for path in everything if path.drive != blend.drive)
-        raise SceneError(f"{other} is not on the drive of {blend.name}; pack it into the file, or copy it there")
-    root = os.path.commonpath([path.parent for path in everything])
-    return {path: path.relative_to(root) for path in everything}
-
-
-def _copy(path: Path, target: Path) -> None:
-    target.parent.mkdir(parents=True, exist_ok=True)
-    if path.is_dir():
-        shutil.copytree(path, target, dirs_exist_ok=True)
-    else:
-        shutil.copyfile(path, target)
-
-
-def _files_of(path: Path) -> Iterator[Path]:
-    """The file, or all tiles of an image that is stored in tiles."""
-    if re.search(r"<(UDIM|UVTILE)>", path.name):
-        pattern = re.sub(r"<(UDIM|UVTILE)>", "*", path.name)
-        if path.parent.is_dir():
-            yield from sorted(p for p in path.parent.iterdir() if fnmatch.fnmatchcase(p.name, pattern))
-    elif path.exists():
-        yield path
-
-
-def _sequence(path: Path) -> Iterator[Path]:
-    """All images of a sequence: names that differ from that of one image in the last number."""
-    match = re.fullmatch(r"(.*?)(\d+)(\D*)", path.name)
-    if match is None or not path.parent.is_dir():
-        return
-    same = re.compile(re.escape(match[1]) + r"\d+" + re.escape(match[3]))
-    yield from sorted(p for p in path.parent.iterdir() if same.fullmatch(p.name))

@@ -218,7 +218,7 @@ def parameter_values(scene: str | None) -> dict[str, Any]:
     return {"parameterValues": [] if scene is None else [{"name": "SceneFile", "value": scene}]}
 
 
-def asset_references(files: Sequence[str], folders: Sequence[str]) -> dict[str, Any]:
-    """Files and folders outside of the bundle that Deadline Cloud transfers to the workers."""
-    inputs = {"filenames": list(files), "directories": list(folders)}
+def asset_references(files: Sequence[str]) -> dict[str, Any]:
+    """Files outside of the bundle that Deadline Cloud transfers to the workers."""
+    inputs = {"filenames": list(files), "directories": []}
     return {"assetReferences": {"inputs": inputs, "outputs": {"directories": []}, "referencedPaths": []}}

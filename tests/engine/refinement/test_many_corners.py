@@ -1,0 +1,48 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Faces of many corners, such as outlines that were traced: they cost what their corners do."""
+
+from __future__ import annotations
+
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from tests.engine import support
+from tests.engine.refinement.test_polygons import placed, refined, surface
+from tetflora_addon.emission import polygons as emitted
+from tetflora_addon.emission.polygons import polygon_blocks
+from tetflora_addon.refinement.polygons import Meshes, Polygons
+
+
+def test_a_face_of_many_corners_is_measured_once_for_all_of_its_fragments() -> None:
+    """Each fragment asks for the area of its whole face; 4,000 corners took gigabytes."""
+    corners, fragments = 4_000, 10_000
+    turn = np.arange(corners) * 2 * np.pi / corners
+    radius = np.where(np.arange(corners) % 2, 1.0, 0.5)
+    disc = surface(np.stack([radius * np.cos(turn), radius * np.sin(turn), 0 * turn], 1), [list(range(corners))])
+    meshes = placed(disc, 0)
+    face, instance = np.zeros(fragments, int), np.arange(fragments) % 3
+    whole = Polygons.everything(meshes).areas()
+    tracemalloc.start()
+    areas = meshes.face_areas(face, instance)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    np.testing.assert_allclose(areas, whole[instance], rtol=1e-12)
+    assert peak < 20e6
+
+
+def test_blocks_of_faces_with_many_corners_are_no_larger_than_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are cut by corners, as if of quads."""
+    limit, corners, copies = 500, 200, 40
+    monkeypatch.setattr(emitted, "BLOCK_POLYGONS", limit)
+    turn = np.arange(corners) * 2 * np.pi / corners
+    disc = surface(np.stack([np.cos(turn), 0 * turn, np.sin(turn)], 1) / 9, [list(range(corners))])
+    matrices = np.tile(np.eye(4), (copies, 1, 1))
+    matrices[:, 1, 3] = np.linspace(0, 3, copies)
+    camera = support.camera((0, -6, 0), (0, 60, 0), 160, 1.0)
+    blocks = list(polygon_blocks(refined(Meshes([disc], np.zeros(copies, int), matrices), camera), camera))
+    assert sum(b.buffers.polygons for b in blocks) >= copies
+    assert len(blocks) > 3
+    assert max(len(b.buffers.corner_verts) for b in blocks) <= 4 * limit + corners
