@@ -17,7 +17,7 @@ from pathlib import Path
 
 import bpy
 
-from ...errors import SceneError
+from ...errors import SceneError, readable
 
 #: Most files of a job.
 MOST_FILES = 100_000
@@ -116,18 +116,18 @@ def approve(blend: Path, assets: Assets, outside: bool, limit: float, tell: Call
     folder = os.path.realpath(blend.parent)
     sizes = {blend: os.path.getsize(blend), **assets.files}
     far = [path for path in assets.files if not Path(os.path.realpath(path)).is_relative_to(folder)]
-    tell("\n".join(f"{size / 1e6:12,.3f} MB  {shown(path)}" for path, size in sizes.items()))
+    tell("\n".join(f"{size / 1e6:12,.3f} MB  {readable(str(path))}" for path, size in sizes.items()))
     total = sum(sizes.values())
     tell(f"{total / 1e6:12,.3f} MB  in {len(sizes):,} files")
     if far and not outside:
         raise SceneError(
-            f"{len(far):,} of the files lie outside the folder of {shown(blend.name)}, the first of them "
-            f"{shown(far[0])}; check the list, then use --outside to include them, or copy or pack them"
+            f"{len(far):,} of the files lie outside the folder of {blend.name}, the first of them "
+            f"{far[0]}; check the list, then use --outside to include them, or copy or pack them"
         )
     if total > limit:
         largest = max(sizes, key=lambda path: sizes[path])
         raise SceneError(
-            f"The files have {total / 1e9:,.1f} GB together, the largest is {shown(largest)}; {limit / 1e9:g} GB is "
+            f"The files have {total / 1e9:,.1f} GB together, the largest is {largest}; {limit / 1e9:g} GB is "
             "the limit, which --max-size changes"
         )
 
@@ -150,7 +150,7 @@ def copy_files(places: dict[Path, Path], sizes: dict[Path, int], tell: Callable[
             while piece := source.read(_PIECE):
                 left -= len(piece)
                 if left < 0:
-                    raise SceneError(f"{shown(path)} has grown since it was listed; wait until it is written")
+                    raise SceneError(f"{path} has grown since it was listed; wait until it is written")
                 copy.write(piece)
                 copied += len(piece)
                 if copied * _TOLD >= (told + 1) * total:
@@ -162,14 +162,9 @@ def places_of(blend: Path, files: Iterable[Path]) -> dict[Path, Path]:
     """Place of the .blend and of each file in the bundle, with the same relative paths."""
     everything = (blend, *files)
     if other := next((path for path in everything if path.drive != blend.drive), None):
-        raise SceneError(f"{shown(other)} is not on the drive of {blend.name}; pack it into the file, or copy it there")
+        raise SceneError(f"{other} is not on the drive of {blend.name}; pack it into the file, or copy it there")
     root = os.path.commonpath([path.parent for path in everything])
     return {path: path.relative_to(root) for path in everything}
-
-
-def shown(path: Path | str) -> str:
-    """A path from a file for a line of text: without what could look like another line."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in str(path))
 
 
 def _normal(text: str) -> Path:

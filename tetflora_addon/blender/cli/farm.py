@@ -21,13 +21,13 @@ from typing import Any
 
 import bpy
 
-from ...errors import SceneError
+from ...errors import SceneError, readable
 from ..job.contents import estimate
 from ..preferences import species_folders
 from ..scene.camera import read_camera
 from ..scene.plants import NoPlantsError
 from . import farm_template
-from .assets import approve, copy_files, places_of, shown, used_files
+from .assets import approve, copy_files, places_of, used_files
 from .farm_template import Run
 
 #: Root of the extension as it is installed, or of the source tree.
@@ -127,9 +127,9 @@ def write_bundle(
         "tasks": -(-len(numbers) // chunk),
         "assets": len(assets.files),
         "megabytes": (sum(assets.files.values()) + blend.stat().st_size) / 1e6,
-        "missing": [shown(path) for path in assets.missing],
-        "skipped": [shown(path) for path in assets.skipped],
-        "absolute_paths": [shown(text) for text in assets.absolute],
+        "missing": [readable(str(path)) for path in assets.missing],
+        "skipped": [readable(str(path)) for path in assets.skipped],
+        "absolute_paths": [readable(text) for text in assets.absolute],
     }
 
 

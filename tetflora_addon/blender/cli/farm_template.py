@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...errors import SceneError
+from ...errors import VALUE, SceneError, readable
 
 #: Folder of the bundle with everything that a worker needs besides Blender and the scene.
 FILES = "tetflora"
@@ -34,7 +34,6 @@ LAST_FRAME = 1_048_574
 _NUMBER = r"[0-9]{1,9}"  # what Python makes of more digits, or of others, is of no use
 _RUN = re.compile(rf"(-?{_NUMBER})(?:-(-?{_NUMBER})(?::({_NUMBER}))?)?")
 _LONGEST_NAME = 128
-_LONGEST_SHOWN = 60
 #: Frames of Blender, those below zero included.
 _MOST_FRAMES = 2 * LAST_FRAME + 1
 
@@ -83,21 +82,21 @@ def frame_runs(text: str) -> list[Run]:
         Another expression, a range that runs backwards, a frame that Blender does not have, or more frames than it has.
     """
     runs, number = [], 0
-    shown = text if len(text) <= _LONGEST_SHOWN else text[: _LONGEST_SHOWN - 3] + "..."
+    quoted = readable(text, VALUE)
     for part in text.split(","):
         match = _RUN.fullmatch(part.strip())
         if match is None:
-            raise ValueError(f"{shown} is not a range of frames such as 1-24, 7 or 1-99:2")
+            raise ValueError(f"{quoted} is not a range of frames such as 1-24, 7 or 1-99:2")
         first = int(match[1])
         last = first if match[2] is None else int(match[2])
         step = int(match[3] or 1)
         if last < first or step < 1:
-            raise ValueError(f"{shown} is not a range of frames such as 1-24, 7 or 1-99:2")
+            raise ValueError(f"{quoted} is not a range of frames such as 1-24, 7 or 1-99:2")
         if max(-first, last) > LAST_FRAME:
-            raise ValueError(f"{shown} exceeds the last frame that Blender supports, {LAST_FRAME:,}")
+            raise ValueError(f"{quoted} exceeds the last frame that Blender supports, {LAST_FRAME:,}")
         number += (last - first) // step + 1
         if number > _MOST_FRAMES:
-            raise ValueError(f"{shown} names frames again and again: Blender has only {_MOST_FRAMES:,}")
+            raise ValueError(f"{quoted} names frames again and again: Blender has only {_MOST_FRAMES:,}")
         runs.append((first, last - (last - first) % step, step))
     return runs
 
