@@ -1,0 +1,24 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An attack on the engine, from a fixed seed; ``python -m benchmarks attack`` runs ten times as many cases."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.attack import engine_cases
+from tests.attack.watch import attack
+
+CASES = 2400
+
+
+@pytest.mark.parametrize("kind", engine_cases.SHARES)
+def test_attack(kind: str, tmp_path: Path) -> None:
+    findings = attack({kind: engine_cases.kinds(CASES)[kind]}, tmp_path)
+    assert not findings.raw
+    assert not findings.outside
+    assert not findings.slow
+    assert findings.refused < findings.cases
+    assert findings.figures()["peak_mb"] < 2000
