@@ -46,8 +46,8 @@ results: environment
 # The second also runs when the first has failed.
 test: environment
 	@code=0; \
-	$(PY) -m pytest -q -n 2 tests/engine || code=1; \
-	$(PY) -m pytest -q -n 2 --dist loadfile tests/blender tests/packaging tests/examples || code=1; \
+	$(PY) -m pytest -q -n 2 tests/engine tests/attack/engine || code=1; \
+	$(PY) -m pytest -q -n 2 --dist loadfile tests/blender tests/attack/blender tests/packaging tests/examples || code=1; \
 	exit $$code
 
 test-lts:

@@ -39,6 +39,7 @@ NAMES = (
     "wind",
     "endurance",
     "farm",
+    "attack",
 )
 #: Modules that are not called as their benchmark.
 MODULES = {"curves": "forest_curves"}
