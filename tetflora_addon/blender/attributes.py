@@ -63,6 +63,7 @@ _TYPES = {
     (np.dtype(np.bool_), ()): 'BOOLEAN',
 }
 _TINY = 1e-9  # shortest axis of an object's matrix that is not taken for a scale of 0
+_HUGE = 1e9  # beyond it squares of areas and volumes are no numbers any more
 
 
 def type_for(values: NDArray) -> str | None:
@@ -157,7 +158,7 @@ def frames_of(linear: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray
     scale : (n,) float64
         Mean length of the three axes.
     sound : (n,) bool
-        False where an axis has no length or is not a number; the frame is then meaningless.
+        False where an axis has no length, one beyond all measure, or is not a number; the frame is then meaningless.
     """
     lengths = np.linalg.norm(linear, axis=1)  # (n, 3): of the columns
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
@@ -167,7 +168,11 @@ def frames_of(linear: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray
         rest = np.linalg.norm(x, axis=1, keepdims=True)
         x = x / rest
         frame = np.stack([x, np.cross(z, x), z], axis=2)
-        sound = (lengths > _TINY).all(axis=1) & (rest[:, 0] > _TINY) & np.isfinite(frame).all(axis=(1, 2))
+        sound = (
+            ((lengths > _TINY) & (lengths < _HUGE)).all(axis=1)
+            & (rest[:, 0] > _TINY)
+            & np.isfinite(frame).all(axis=(1, 2))
+        )
     return frame, lengths.mean(axis=1), sound
 
 

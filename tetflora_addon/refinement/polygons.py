@@ -25,6 +25,8 @@ from ..subplants.pieces import chunks
 MEASURED_AT_ONCE = 200_000
 #: Faces of more corners are measured once, however many fragments of them there are.
 _FEW_CORNERS = 4
+#: Metres, and factors, from which on squares of areas need not be numbers any more.
+_FARTHEST = 1e12
 #: A fragment that reaches beyond a plane by less than this fraction of its size is not cut again by rounding errors.
 _TOUCHING = 1e-9
 
@@ -93,20 +95,20 @@ class Meshes:
     Raises
     ------
     ValueError
-        A position or matrix holds something that is no finite number; the message names the surface.
+        A position or matrix holds what is no number, or one beyond all measure; the message names the surface.
     """
 
     def __init__(self, surfaces: Sequence[Surface], surface: NDArray[np.integer], matrices: NDArray) -> None:
         self.surfaces = tuple(surfaces)
         self.surface = np.asarray(surface, np.int32)
         matrices = np.asarray(matrices, np.float64).reshape(-1, 4, 4)
-        sound = np.isfinite(matrices).all(axis=(1, 2))
-        broken = [s.name for s in surfaces if not np.isfinite(s.positions).all()]
+        sound = (np.abs(matrices) < _FARTHEST).all(axis=(1, 2))  # false for nan as well
+        broken = [s.name for s in surfaces if not (np.abs(s.positions) < _FARTHEST).all()]
         broken += [surfaces[s].name for s in self.surface[~sound]]
         if broken:
             raise ValueError(
-                f'"{broken[0]}" has vertices or a transform that are not finite; delete the vertices or reset '
-                "the transform"
+                f'"{broken[0]}" has vertices or a transform that are not finite, or beyond {_FARTHEST:g} m; delete the '
+                "vertices or reset the transform"
             )
         # Rows times these are vectors in the world; the cofactors do the same for area vectors.
         self.linear = np.ascontiguousarray(matrices[:, :3, :3].transpose(0, 2, 1))

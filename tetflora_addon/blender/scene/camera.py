@@ -71,11 +71,11 @@ def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, region_o
         plane = corners[:, :2] / -corners[:, 2:] if data.type == 'PERSP' else corners[:, :2]
         (left, bottom), (right, top) = plane.min(axis=0).tolist(), plane.max(axis=0).tolist()
         window = (left, right, bottom, top)
-        if not (right - left > _NARROW and top - bottom > _NARROW):  # false for nan as well
-            what = "Orthographic Scale" if data.type == 'ORTHO' else "Sensor Size"
-            raise SceneError(f'The camera "{name}" sees nothing; raise its {what} above 0')
-        if region_only and scene.render.use_border:
-            window, width, height = _region(scene.render, window, width, height)
+    if not (window[1] - window[0] > _NARROW and window[3] - window[2] > _NARROW):  # false for nan as well
+        what = {'ORTHO': "Orthographic Scale", 'PANO': "Field of View or Lens"}.get(data.type, "Sensor Size")
+        raise SceneError(f'The camera "{name}" sees nothing; raise its {what} above 0')
+    if region_only and scene.render.use_border and data.type != 'PANO':
+        window, width, height = _region(scene.render, window, width, height)
     matrix = world_matrix(scene.camera, depsgraph).astype(np.float64)  # some versions give single precision
     radius, focus = _lens(data, matrix, depsgraph)
     camera = _placed(
@@ -129,7 +129,7 @@ def _placed(
 
 
 def _panorama(data: bpy.types.Camera, width: int, height: int) -> tuple[tuple[float, float, float, float], int, int]:
-    """Window in radians of longitude and latitude, and size of the image."""
+    """Window in radians of longitude and latitude, of no extent where the lens is no number; and size of the image."""
     if data.panorama_type == 'EQUIRECTANGULAR':
         left, right = sorted((data.longitude_min, data.longitude_max))
         bottom, top = sorted((data.latitude_min, data.latitude_max))
@@ -143,6 +143,8 @@ def _panorama(data: bpy.types.Camera, width: int, height: int) -> tuple[tuple[fl
         angle = data.sensor_width / max(width, height) / max(data.fisheye_lens, 1e-3)
     else:
         angle = 2.0 * math.pi / max(width, 2 * height)
+    if not angle > 0.0:  # nan as well
+        return (0.0, 0.0, 0.0, 0.0), width, height
     pixels = max(round(math.pi / max(angle, 1e-5)), 1)
     return (-math.pi, math.pi, -math.pi / 2.0, math.pi / 2.0), 2 * pixels, pixels
 
