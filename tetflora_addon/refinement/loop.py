@@ -35,6 +35,9 @@ from .visibility import AlphaBuffer, Buffers
 GENERATIONS = 3
 #: Pixels of the image by which things may always reach beyond a plane; smaller sub-plants stay whole.
 SLACK = 2.0
+#: Fragments of polygons, beside two for each polygon, from which on none are cut any more: each goes where most of it
+#: is. Large faces that cross each other's space a thousand times would fill all memory.
+MOST_FRAGMENTS = 300_000
 #: Weight of the pixels of what is divided for its shadow: as often as possible, where it is in view.
 ALWAYS = 1e30
 
@@ -151,7 +154,7 @@ def refine(
     slack = _slack(camera, settings.visibility_resolution)
     own = Held.none(Polygons) if polygons is None else in_the_root(polygons, large_polygons(polygons, camera))
     tree = root_for(camera, settings, _bounds(flora, plants, polygons))
-    holdings = Holdings(push_down(tree, own, slack))
+    holdings, most = Holdings(push_down(tree, own, slack)), MOST_FRAGMENTS + 2 * len(own)
     divided = np.arange(len(tree)) == 0
     plants.update(tree, divided, np.where(divided, np.inf, 0.0))
     clock.lap("update")
@@ -203,7 +206,8 @@ def refine(
         dividing, edge = np.zeros(len(tree), bool), np.zeros(len(tree))
         dividing[parents] = True
         edge[parents] = np.sqrt(squared_edges(tree.vertices(parents)).max(axis=1))
-        new = push_down(tree, holdings.take_out(dividing), slack)
+        loose = slack if len(holdings) <= most else _no_cuts
+        new = push_down(tree, holdings.take_out(dividing), loose)
         holdings.put(new)
         changed = plants.update(tree, dividing, edge)
         changed[new.cell] = True
@@ -263,6 +267,11 @@ def _slack(camera: Camera, resolution: int) -> Slack:
         return pixels * camera.extent_around(points)
 
     return slack
+
+
+def _no_cuts(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A slack beyond which nothing reaches."""
+    return np.full(len(points), np.inf)
 
 
 def _split(
