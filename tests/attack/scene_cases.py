@@ -235,7 +235,7 @@ def commands(rng: random.Random, jail: Jail) -> None:
     scene.render.filepath = rng.choice(["//frame_####", "", "//{{Param.X}}", "//a\nb", "//" + "x" * 300])
     with suppress(RuntimeError):
         bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
-    name = re.sub("[/\0]", "", rng.choice([*material.IDENTIFIERS, "job", "job", "job"])).lstrip(".") or "job"
+    name = re.sub("[/\0\ud800]", "", rng.choice([*material.IDENTIFIERS, "job", "job", "job"])).lstrip(".") or "job"
     job = folder / name
     arguments = rng.choice(
         [
