@@ -132,10 +132,12 @@ class TETFLORA_OT_edit_orders(Reporting, bpy.types.Operator):
         scene = context.scene
         editor = scene.tetflora.species_editor
         number = len(orders_of(editor))
+        if not number:
+            return self.refused("The species has orders that cannot be read; revert it first")
         if self.action == 'SPUR':
             change_species(scene, present_species(editor), _toggle_spur)
             return {'FINISHED'}
-        if self.action == 'ADD' and not 0 < number < MAX_ORDERS:
+        if self.action == 'ADD' and number >= MAX_ORDERS:
             return self.refused(f"A species cannot have more than {MAX_ORDERS} orders")
         if self.action == 'REMOVE' and number < 2:
             return self.refused("The trunk cannot be removed: a species has at least one order")

@@ -309,3 +309,14 @@ def test_panels_look_at_folders_once_in_a_while_and_see_own_changes_at_once(monk
     edits.catalogue()
     edits.catalogue()
     assert len(looked) == 4
+
+
+@pytest.mark.parametrize("orders", [[1.0], [], {}, None, "a"])
+@pytest.mark.parametrize("action", ["ADD", "REMOVE", "SPUR"])
+def test_orders_that_cannot_be_read_are_not_edited(orders, action):
+    """Species of a .blend may hold anything; an attack found a traceback."""
+    edit = bpy.context.scene.tetflora.species_edits.add()
+    edit.identifier, edit.text = "mine", json.dumps({"format": 1, "name": "Mine", "orders": orders})
+    bpy.context.scene.tetflora.species_editor.species = "mine"
+    assert bpy.ops.tetflora.edit_orders(action=action) == {'CANCELLED'}
+    assert json.loads(edit.text)["orders"] == orders
