@@ -17,15 +17,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..buffers import MeshBuffers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
+from ..growth.hashing import Draw, uniform
 from ..proxies.facet_sizes import FacetPixels, polygon_facet_sizes
+from ..proxies.facet_weights import facet_weights
 from ..refinement.contents import LARGE
 from ..refinement.decisions import Decision, contributions
 from ..refinement.loop import Refinement
 from ..refinement.settings import RefinementSettings
-from .facets import sizes_of
-from .plants import Transition
+from .facets import portion_facets, sizes_of
+from .plants import Transition, portion_blocks
 from .portions import Portions, Sight
 
 #: Approximate bytes of a polygon in Blender (110) and in a renderer (500) together.
@@ -42,6 +45,9 @@ FACETS_FIRST = 6.0
 _RESERVE = 0.06
 #: Fraction of the faces of twigs that are made where leaves are real.
 _TWIGS = 0.15
+#: Parts of plants that are drawn to find out what to expect; polygons that are too few to tell; and how far
+#: expectations may be corrected.
+_DRAWN, _SOME, _ROUGH = 3000, 300.0, (0.4, 2.5)
 _STEPS = 12  # of bisection on the logarithm of factors, between 1 and:
 _LARGEST = 256.0
 #: Largest factor on hidden facets that the image alone may ask for.
@@ -105,18 +111,30 @@ def afford(
     # What other meshes have out of sight takes from what somebody allows, not from what the image shows.
     limits = [(enough(camera), 1.0, False), ((1 - _RESERVE) * most, 1.0, True)]
     limits += [((1 - _RESERVE) * memory, primitive_bytes / BYTES_PER_POLYGON, True)]
-    factor = hidden = 1.0
-    for allowed, weight, every in limits:
-        if not np.isfinite(allowed):
-            continue
-
-        coarser, fewer = _factors(count, settings, allowed, weight, every, hidden)
-        factor, hidden = max(factor, coarser), max(hidden, fewer)
+    factor, hidden = _affordable(count, settings, limits)
+    if factor > 1.0 or hidden > 1.0:
+        # What is expected of parts that will be opened is rough; some of them tell by how much.
+        count.calibrate(FacetPixels(_side(factor, settings), hidden), _limit(factor, settings))
+        factor, hidden = _affordable(count, settings, limits)
     limit = _limit(factor, settings)
     small = count.too_small(limit) if factor > 1.0 else np.zeros(0, bool)
     if small.any():
         result = replace(result, decision=np.where(small, Decision.PROXY, result.decision).astype(np.int8))
     return Detail(result, FacetPixels(_side(factor, settings), hidden), limit)
+
+
+def _affordable(
+    count: _Facets, settings: RefinementSettings, limits: list[tuple[float, float, bool]]
+) -> tuple[float, float]:
+    """Factors on all facets and on hidden ones with which none of the limits is passed: what is allowed, the weight of
+    a facet, and whether other meshes count out of sight as well.
+    """
+    factor = hidden = 1.0
+    for allowed, weight, every in limits:
+        if np.isfinite(allowed):
+            coarser, fewer = _factors(count, settings, allowed, weight, every, hidden)
+            factor, hidden = max(factor, coarser), max(hidden, fewer)
+    return factor, hidden
 
 
 def _factors(
@@ -187,7 +205,9 @@ class _Facets:
     """Expected polygons and facets of a refinement."""
 
     def __init__(self, flora: Flora, result: Refinement, camera: Camera) -> None:
-        portions = Sight(flora, result, camera).portions()
+        self.sight = Sight(flora, result, camera)
+        self.every = portions = self.sight.portions()
+        self.real_found = self.facets_found = 1.0
         some = portions.visibility > 0
         self.flora, self.camera, self.portions = flora, camera, portions.take(np.flatnonzero(some))
         self.sizes = sizes_of(flora, self.portions, camera)
@@ -203,12 +223,29 @@ class _Facets:
         transition = Transition(self.flora, self.camera, limit)
         branches = self.portions.parts.branches
         real = np.where(self.portions.real, transition.of_branches(branches, self.portions.visibility), 0.0)
-        facets = weight * self.sizes.counts(FacetPixels(pixels))
-        return float((real * self.faces_real + (1.0 - real) * facets).sum())
+        facets = self.facets_found * weight * self.sizes.counts(FacetPixels(pixels))
+        return float((self.real_found * real * self.faces_real + (1.0 - real) * facets).sum())
 
     def unseen(self, pixels: FacetPixels) -> float:
         """Facets of all plants that are not seen."""
-        return float(self.unseen_sizes.counts(pixels).sum())
+        return self.facets_found * float(self.unseen_sizes.counts(pixels).sum())
+
+    def calibrate(self, pixels: FacetPixels, limit: float) -> None:
+        """Draw some of the plants, and expect of all what was found of these."""
+        chosen = uniform(self.every.parts.branches.key, Draw.TRANSITION) < min(_DRAWN / max(len(self.every), 1), 1.0)
+        some = self.every.take(np.flatnonzero(chosen))
+        transition = Transition(self.flora, self.camera, limit)
+        weights = facet_weights(self.flora, ())
+        real = sum(_cost(block.buffers) for block in portion_blocks(self.sight, some, transition))
+        facets = sum(len(made) for _, made, _ in portion_facets(self.sight, some, weights, pixels, transition))
+        sizes, fraction = sizes_of(self.flora, some, self.camera), np.where(some.real, 1.0, 0.0)
+        fraction *= np.where(some.visibility > 0, transition.of_branches(some.parts.branches, some.visibility), 0.0)
+        expected = (fraction * _real_faces(self.flora, some, transition)).sum()
+        left = ((1.0 - fraction) * sizes.counts(pixels)).sum()
+        self.real_found, self.facets_found = (
+            float(np.clip((found + _SOME) / (thought + _SOME), *_ROUGH))
+            for found, thought in ((real, expected), (facets, left))
+        )
 
     def polygons(self, pixels: float, limit: float, weight: float, every: bool) -> float:
         """Polygons of other meshes, and facets in their place; of what is seen, or of all."""
@@ -225,6 +262,11 @@ class _Facets:
         # What is large there stays as it is as long as facets are smaller.
         feature = np.where(np.isinf(cells.feature), LARGE, cells.feature)
         return held[cells.nodes] & (self.result.decision == Decision.EXPLICIT) & (feature < limit)
+
+
+def _cost(mesh: MeshBuffers) -> float:
+    """Polygons of a mesh; those of more than two triangles count by these."""
+    return float(np.maximum((np.diff(mesh.face_offsets) - 2) / 2.0, 1.0).sum())
 
 
 def _real_faces(flora: Flora, portions: Portions, transition: Transition) -> NDArray[np.float64]:

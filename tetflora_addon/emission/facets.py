@@ -21,6 +21,7 @@ from ..compiled.flora import Flora
 from ..growth.axes import axes
 from ..growth.branches import Branches
 from ..growth.growth import WholeBranches
+from ..growth.hashing import Draw, uniform
 from ..proxies.facet_sizes import HIDDEN_LEAVES, FacetPixels, FacetSizes, piece_facet_sizes, subplant_facet_sizes
 from ..proxies.facet_weights import FacetWeights, facet_weights
 from ..proxies.microsurfaces import Facets, concatenate_facets, kept_out_of_view, piece_facets, subplant_facets
@@ -95,14 +96,8 @@ def _facets(
     """Facets in runs of about `FACETS_AT_ONCE`, species by species."""
     sight = Sight(flora, result, camera)
     portions = sight.portions()
-    maker = _Maker(sight, facet_weights(flora, _drawn(flora, portions, transition)), pixels, transition)
-    of_species = flora.rows["species"][portions.parts.branches.row]
-    for species in range(len(flora.species)):
-        own = portions.take(np.flatnonzero(of_species == species))
-        expected = sizes_of(flora, own, camera).counts(pixels) + 1
-        for run in in_chunks(expected, FACETS_AT_ONCE):
-            for facets, seen in maker.facets(own.take(run)):
-                yield species, facets, seen
+    weights = facet_weights(flora, _drawn(flora, portions, transition))
+    yield from portion_facets(sight, portions, weights, pixels, transition)
     explicit = result.chosen(Decision.EXPLICIT) if transition else np.zeros(len(result.tree), bool)
     held = result.holdings.polygons
     proxies = held.take((result.chosen(Decision.PROXY, Decision.HIDDEN) & ~explicit)[held.cell])
@@ -124,6 +119,20 @@ def _drawn(flora: Flora, portions: Portions, transition: Transition | None) -> l
         real = portions.real & (visibility > 0) & ~portions.mixed
         facets = ~(real & (transition.of_branches(branches, visibility) >= 1.0))
     return np.unique(flora.rows["species"][branches.row[facets]]).tolist()
+
+
+def portion_facets(
+    sight: Sight, portions: Portions, weights: FacetWeights, pixels: FacetPixels, transition: Transition | None
+) -> Iterator[tuple[int, Facets, bool]]:
+    """Facets of some portions (n,), species by species; weights do not change how many there are."""
+    flora, maker = sight.flora, _Maker(sight, weights, pixels, transition)
+    of_species = flora.rows["species"][portions.parts.branches.row]
+    for species in range(len(flora.species)):
+        own = portions.take(np.flatnonzero(of_species == species))
+        expected = sizes_of(flora, own, sight.camera).counts(pixels) + 1
+        for run in in_chunks(expected, FACETS_AT_ONCE):
+            for facets, seen in maker.facets(own.take(run)):
+                yield species, facets, seen
 
 
 def sizes_of(flora: Flora, portions: Portions, camera: Camera) -> FacetSizes:
@@ -203,7 +212,8 @@ class _Maker:
             seen = portions.visibility > 0
             real = np.where(portions.real & seen, transition.of_branches(branches, portions.visibility), 0.0)
             tubes, twigs = transition.of_wood(branches, portions.visibility)
-            tubes = (seen & (tubes | (twigs & (real > 0))))[owner]
+            bare = uniform(branches.key, Draw.TRANSITION) < transition.of_thickness(branches, portions.visibility)
+            tubes = (seen & np.where(real > 0, tubes | twigs, bare))[owner]
             real = real[owner]
         return piece_facets(flora, pieces, leaf, wood, weight, real, tubes)
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..buffers import BLOCK_POLYGONS, MeshBuffers
+from ..buffers import BLOCK_POLYGONS, MeshBuffers, concatenate_buffers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.axes import axes
@@ -42,6 +42,8 @@ BAND = 2.5
 _LEAST_REAL = 0.1
 #: Width in pixels up to which real leaves are triangles.
 TRIANGLES = 2.0
+#: Among real leaves, wood counts as so many times as wide: a triangle is thrice as wide at its base as the wood.
+TWIGS = 4.0
 #: Power of the visibility by which the width of things counts as smaller.
 FADING = 0.25
 
@@ -88,10 +90,12 @@ class Transition:
     def of_wood(
         self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Branches (n,) that are tubes, and (n,) that are triangles if their leaves may be real."""
+        """Branches (n,) that are tubes, if their leaves may be real, and (n,) that are triangles then."""
         number = uniform(branches.key, Draw.TRANSITION)
-        tubes = number < self.of_thickness(branches, visibility)
-        return tubes, ~tubes & (number < self.of_branches(branches, visibility))
+        own, leaves = 2.0 * branches.radius, self.of_branches(branches, visibility)
+        among = self.fraction(np.minimum(TWIGS * own, self._width(branches)), branches.position, visibility)
+        tubes = number < np.maximum(among, self.of_thickness(branches, visibility))
+        return tubes, ~tubes & (number < leaves)
 
     def _width(self, branches: Branches) -> NDArray[np.float64]:
         row = branches.row
@@ -134,7 +138,12 @@ def explicit_blocks(
     in explicit tetrahedra for the most part is polygons.
     """
     sight = Sight(flora, result, camera, facets=transition is not None)
-    portions = sight.portions()
+    yield from portion_blocks(sight, sight.portions(), transition)
+
+
+def portion_blocks(sight: Sight, portions: Portions, transition: Transition | None = None) -> Iterator[Block]:
+    """The polygons of `explicit_blocks` of some portions (n,)."""
+    flora = sight.flora
     portions = portions.take(np.flatnonzero(_may_be_real(portions, transition)))
     expected = portions.parts.totals.polygons * np.maximum(_real_leaves(portions, transition), _LEAST_REAL)
     done, whole = np.cumsum(expected), max(float(expected.sum()), 1.0)
@@ -232,16 +241,17 @@ def _block(
         whole = [some.take(np.flatnonzero(kind == s)) for some, kind in zip(branches, of_branches, strict=True)]
         leaves = leaf_meshes(flora, int(s), whole, None if transition is None else fractions_of)
         made += [(LEAF_KINDS[m.kind], m.form, int(s), m.buffers) for m in leaves]
+        twigs = []
         if transition is not None:
             wood = [transition.of_wood(some.branches, visibility[some.branches.plant]) for some in whole]
             twigs = [some.take(np.flatnonzero(thin)) for some, (_, thin) in zip(whole, wood, strict=True)]
             whole = [some.take(np.flatnonzero(tubes)) for some, (tubes, _) in zip(whole, wood, strict=True)]
-            made.append(("bark", 0, int(s), twig_buffers(flora, twigs)))
         if bare is not None:
             own = bare.take(np.flatnonzero(of_bare == s))
-            tubes, _ = transition.of_wood(own.branches, visibility[own.branches.plant])
-            whole.append(own.take(np.flatnonzero(tubes)))
-        made.append(("bark", 0, int(s), tube_buffers(flora, whole)))
+            thick = transition.of_thickness(own.branches, visibility[own.branches.plant])
+            whole.append(own.take(np.flatnonzero(uniform(own.branches.key, Draw.TRANSITION) < thick)))
+        bark = [tube_buffers(flora, whole), twig_buffers(flora, twigs)]
+        made.append(("bark", 0, int(s), concatenate_buffers([some for some in bark if some is not None])))
         del whole
     # The caller copies each block into Blender; meanwhile its sources and the blocks already taken are not kept.
     del branches, bare

@@ -29,6 +29,8 @@ from ..subplants.pieces import Pieces
 #: shows between crowns after all, and would be blots where a budget makes facets large.
 COARSE, COARSEST = 3.0, 18.0
 _WIDEST = 3.0
+#: The same, in sides of facets that are seen.
+_JUST_HIDDEN = 1.5
 #: How much larger than `COARSE` facets are from where on a budget may make them as large as it needs.
 _DEEP = 4.0
 #: Pixels that no facet within the view exceeds, however deep it is, for all that a budget asks.
@@ -43,7 +45,9 @@ _LOOSE = 16.0
 #: grows faster: there the shadows of trees do not reach the view.
 _BESIDE = 0.05, 8.0, 15.0
 #: Power of the visibility by which facets are larger where they are seen in part, and the visibility that counts least.
-FADING, LEAST_VISIBILITY = 0.5, 0.05
+FADING, LEAST_VISIBILITY = 0.5, 0.08
+#: Sides of facets of wood, however little is seen of it, over those that are seen well.
+_SHARD = 1.7
 _HIDING_DEPTH = 4.0  # e^−4 = .02 is left
 #: Side of facets per metre from the view: the sun is .0093 radians wide, so their shadows are half as soft as large.
 _SOFT = 0.02
@@ -112,7 +116,7 @@ class FacetSizes(Arrays):
         """Sides (n,), (n,) of facets of leaves and of wood, metres."""
         fading = np.maximum(self.visibility, LEAST_VISIBILITY) ** -FADING
         side = fading * pixels.seen * self.extent
-        coarse = np.minimum(self.coarse * pixels.seen, max(COARSE * pixels.seen, _WIDEST)) * self.extent
+        coarse = np.minimum(self.coarse * pixels.seen, max(_JUST_HIDDEN * pixels.seen, _WIDEST)) * self.extent
         blurred = np.minimum(_SOFT * np.maximum(self.clearance, 0.0), np.sqrt(self.totals.optical_area / _FEWEST))
         unseen = np.maximum(np.maximum(coarse, blurred), np.sqrt(HIDDEN_LEAVES * self.one_leaf))
         # What is only just hidden shows between crowns after all, and would be blots.
@@ -126,11 +130,13 @@ class FacetSizes(Arrays):
         most = max(pixels.hidden / _LOOSE, 1.0) * np.where(beside, most, blot * self.extent)
         # Beside the view they must not reach into it, or they would lose area.
         unseen = np.clip(pixels.hidden ** np.where(beside, 1.0, deep) * unseen, unseen, np.maximum(unseen, most))
+        # Wood is lighter or darker than leaves: where it shows after all, a large facet of it is a shard.
+        wood = np.minimum(side, _SHARD * max(pixels.seen, 1.0) * self.extent)
         side = np.where(self.hidden, unseen, side)
         # Hidden wood is cut into no more facets than it has faces. Elsewhere it is cut as fine as the side requires, or
         # thin twigs would become blots.
         least = np.where(beside, self.least_wood, np.minimum(self.least_wood, most))
-        wood = np.where(self.hidden, np.maximum(side, least), side)
+        wood = np.where(self.hidden, np.maximum(side, least), wood)
         return np.maximum(side, np.sqrt(self.one_leaf)), wood
 
     def counts(self, pixels: FacetPixels) -> NDArray[np.float64]:
