@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import os
 import random
-import resource
 import sys
 import time
 import traceback
@@ -21,6 +20,7 @@ from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from benchmarks.report import forget_peak, peak_mb
 from tetflora_addon.errors import TetFloraError
 
 #: Processor seconds that no case may take.
@@ -91,14 +91,13 @@ class Findings:
 
     def figures(self) -> dict[str, float]:
         """For the benchmark's record."""
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         return {
             "cases": self.cases,
             "refused": self.refused,
             "raw_exceptions": len(self.raw),
             "writes_outside": len(self.outside),
             "over_5s": len(self.slow),
-            "peak_mb": peak / (1e6 if sys.platform == "darwin" else 1e3),
+            "peak_mb": peak_mb(),
         }
 
 
@@ -114,6 +113,7 @@ def attack(kinds: Mapping[str, tuple[Case, int]], folder: Path, seed: int = 1) -
         Case i of a kind follows from the seed, the kind's name and i alone.
     """
     jail, findings = Jail.made(folder), Findings()
+    forget_peak()  # of other tests in this process
     for kind, (case, number) in kinds.items():
         for index in range(number):
             one(f"{kind} {index}", case, random.Random(f"{seed} {kind} {index}"), jail, findings)

@@ -51,7 +51,7 @@ def _without_labels(settings_class):
         (settings.RefinementSettings, properties.TetFloraScene, {"hidden_block", "proxy_block", "margin"}),
         (rules.Rules, TetFloraPopulation, {"density", "weights", "companions"}),
         (strokes.Brush, TetFloraBrush, {"density", "scale_min", "scale_max", "weights"}),
-        (wind.Wind, TetFloraWind, {"time", "loop", "moving"}),
+        (wind.Wind, TetFloraWind, {"time", "loop", "moving", "origin"}),
     ],
     ids=lambda value: getattr(value, "__name__", ""),
 )

@@ -61,6 +61,10 @@ def limits_of(prop: bpy.types.Property) -> str:
     return f"from {low:.6g} to {high:.6g}" if high < _ENDLESS else f"{low:.6g} or greater"
 
 
+#: Choices that other extensions add; while those are absent, the default takes their place.
+_OPEN = {"proxy_form"}
+
+
 def check_limits(group: bpy.types.PropertyGroup, owner: str) -> None:
     """Refuse numbers and choices that no slider and no menu gives.
 
@@ -79,6 +83,8 @@ def check_limits(group: bpy.types.PropertyGroup, owner: str) -> None:
     """
     for prop in group.bl_rna.properties:
         if prop.type not in {'INT', 'FLOAT', 'ENUM'} or not group.is_property_set(prop.identifier):
+            continue
+        if prop.identifier in _OPEN:
             continue
         value = getattr(group, prop.identifier)
         if prop.type == 'ENUM':
