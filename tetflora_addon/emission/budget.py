@@ -36,7 +36,7 @@ BYTES_PER_POLYGON = 610
 #: The same for a microsphere in a point cloud.
 BYTES_PER_SPHERE = 210
 #: Polygons and facets for each pixel of the image that are enough, and the number that is never too many.
-ENOUGH_A_PIXEL, NEVER_TOO_MANY = 2.2, 1_500_000.0
+ENOUGH_A_PIXEL, NEVER_TOO_MANY = 1.95, 1_500_000.0
 #: Fraction of them that may be hidden, and how many hidden ones are never too many.
 _HIDDEN, _FEW_HIDDEN = 0.3, 300_000.0
 #: Facets grow to so many times their size before real leaves become fewer.
