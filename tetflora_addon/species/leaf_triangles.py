@@ -21,7 +21,7 @@ TRIANGLE = leaf_model([[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0,
 #: Planes that stand for the faces of one material.
 _PLANES = 4
 #: Normals within so many radians of each other are one plane.
-_FLAT = 0.05
+_FLAT = 0.01
 _MOVES = 64
 
 
