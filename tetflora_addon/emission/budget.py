@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ..buffers import MeshBuffers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
-from ..growth.hashing import Draw, uniform
+from ..growth.hashing import uniform
 from ..proxies.facet_sizes import FacetPixels, polygon_facet_sizes
 from ..proxies.facet_weights import facet_weights
 from ..refinement.contents import LARGE
@@ -48,6 +48,8 @@ _TWIGS = 0.15
 #: Parts of plants that are drawn to find out what to expect; polygons that are too few to tell; and how far
 #: expectations may be corrected.
 _DRAWN, _SOME, _ROUGH = 3000, 300.0, (0.4, 2.5)
+#: Draw of this module: which parts. That of the transition would choose those whose wood is real.
+_SAMPLE = 224
 _STEPS = 12  # of bisection on the logarithm of factors, between 1 and:
 _LARGEST = 256.0
 #: Largest factor on hidden facets that the image alone may ask for.
@@ -144,10 +146,10 @@ def _factors(
 
     def seen(factor: float) -> float:
         pixels, limit = _side(factor, settings), _limit(factor, settings)
-        return count.seen(pixels, limit, weight) + count.polygons(pixels, limit, weight, every)
+        return count.seen(pixels, limit, weight, every) + count.polygons(pixels, limit, weight, every)
 
     def unseen(factor: float, by: float) -> float:
-        return weight * count.unseen(FacetPixels(_side(factor, settings), by))
+        return weight * count.unseen(FacetPixels(_side(factor, settings), by), every)
 
     # Where only the picture asks for less, shadows and light of what is hidden are kept.
     largest = _LARGEST if every else _LARGEST_HIDDEN
@@ -207,7 +209,7 @@ class _Facets:
     def __init__(self, flora: Flora, result: Refinement, camera: Camera) -> None:
         self.sight = Sight(flora, result, camera)
         self.every = portions = self.sight.portions()
-        self.real_found = self.facets_found = 1.0
+        self.found = np.ones(2)  # of polygons and of facets, what was found over what was expected
         some = portions.visibility > 0
         self.flora, self.camera, self.portions = flora, camera, portions.take(np.flatnonzero(some))
         self.sizes = sizes_of(flora, self.portions, camera)
@@ -218,21 +220,25 @@ class _Facets:
         self.hidden = hidden[held.cell] | ~result.in_view[held.cell]
         self.faces = polygon_facet_sizes(held, camera, hidden)
 
-    def seen(self, pixels: float, limit: float, weight: float) -> float:
-        """Polygons, and facets counted with a weight, of all plants that are seen."""
+    def seen(self, pixels: float, limit: float, weight: float, safe: bool) -> float:
+        """Polygons, and facets counted with a weight, of all plants that are seen.
+
+        safe: never fewer than were expected before `calibrate`; some plants do not tell exactly about all.
+        """
         transition = Transition(self.flora, self.camera, limit)
         branches = self.portions.parts.branches
         real = np.where(self.portions.real, transition.of_branches(branches, self.portions.visibility), 0.0)
-        facets = self.facets_found * weight * self.sizes.counts(FacetPixels(pixels))
-        return float((self.real_found * real * self.faces_real + (1.0 - real) * facets).sum())
+        found = np.maximum(self.found, float(safe))
+        facets = found[1] * weight * self.sizes.counts(FacetPixels(pixels))
+        return float((found[0] * real * self.faces_real + (1.0 - real) * facets).sum())
 
-    def unseen(self, pixels: FacetPixels) -> float:
-        """Facets of all plants that are not seen."""
-        return self.facets_found * float(self.unseen_sizes.counts(pixels).sum())
+    def unseen(self, pixels: FacetPixels, safe: bool = False) -> float:
+        """Facets of all plants that are not seen; safe as for `seen`."""
+        return float(max(self.found[1], float(safe))) * float(self.unseen_sizes.counts(pixels).sum())
 
     def calibrate(self, pixels: FacetPixels, limit: float) -> None:
         """Draw some of the plants, and expect of all what was found of these."""
-        chosen = uniform(self.every.parts.branches.key, Draw.TRANSITION) < min(_DRAWN / max(len(self.every), 1), 1.0)
+        chosen = uniform(self.every.parts.branches.key, _SAMPLE) < min(_DRAWN / max(len(self.every), 1), 1.0)
         some = self.every.take(np.flatnonzero(chosen))
         transition = Transition(self.flora, self.camera, limit)
         weights = facet_weights(self.flora, ())
@@ -242,10 +248,7 @@ class _Facets:
         fraction *= np.where(some.visibility > 0, transition.of_branches(some.parts.branches, some.visibility), 0.0)
         expected = (fraction * _real_faces(self.flora, some, transition)).sum()
         left = ((1.0 - fraction) * sizes.counts(pixels)).sum()
-        self.real_found, self.facets_found = (
-            float(np.clip((found + _SOME) / (thought + _SOME), *_ROUGH))
-            for found, thought in ((real, expected), (facets, left))
-        )
+        self.found = np.clip((np.array([real, facets]) + _SOME) / (np.array([expected, left]) + _SOME), *_ROUGH)
 
     def polygons(self, pixels: float, limit: float, weight: float, every: bool) -> float:
         """Polygons of other meshes, and facets in their place; of what is seen, or of all."""

@@ -21,7 +21,6 @@ from ..compiled.flora import Flora
 from ..growth.axes import axes
 from ..growth.branches import Branches
 from ..growth.growth import WholeBranches
-from ..growth.hashing import Draw, uniform
 from ..proxies.facet_sizes import HIDDEN_LEAVES, FacetPixels, FacetSizes, piece_facet_sizes, subplant_facet_sizes
 from ..proxies.facet_weights import FacetWeights, facet_weights
 from ..proxies.microsurfaces import Facets, concatenate_facets, kept_out_of_view, piece_facets, subplant_facets
@@ -212,7 +211,7 @@ class _Maker:
             seen = portions.visibility > 0
             real = np.where(portions.real & seen, transition.of_branches(branches, portions.visibility), 0.0)
             tubes, twigs = transition.of_wood(branches, portions.visibility)
-            bare = uniform(branches.key, Draw.TRANSITION) < transition.of_thickness(branches, portions.visibility)
+            bare = transition.of_bare_wood(branches, portions.visibility)
             tubes = (seen & np.where(real > 0, tubes | twigs, bare))[owner]
             real = real[owner]
         return piece_facets(flora, pieces, leaf, wood, weight, real, tubes)

@@ -87,6 +87,10 @@ class Transition:
         """Fraction (n,) of branches like these that are tubes."""
         return self.fraction(2.0 * branches.radius, branches.position, visibility)
 
+    def of_bare_wood(self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0) -> NDArray[np.bool_]:
+        """Branches (n,) that are tubes although none of their leaves is real."""
+        return uniform(branches.key, Draw.TRANSITION) < self.of_thickness(branches, visibility)
+
     def of_wood(
         self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -248,8 +252,8 @@ def _block(
             whole = [some.take(np.flatnonzero(tubes)) for some, (tubes, _) in zip(whole, wood, strict=True)]
         if bare is not None:
             own = bare.take(np.flatnonzero(of_bare == s))
-            thick = transition.of_thickness(own.branches, visibility[own.branches.plant])
-            whole.append(own.take(np.flatnonzero(uniform(own.branches.key, Draw.TRANSITION) < thick)))
+            tubes = transition.of_bare_wood(own.branches, visibility[own.branches.plant])
+            whole.append(own.take(np.flatnonzero(tubes)))
         bark = [tube_buffers(flora, whole), twig_buffers(flora, twigs)]
         made.append(("bark", 0, int(s), concatenate_buffers([some for some in bark if some is not None])))
         del whole

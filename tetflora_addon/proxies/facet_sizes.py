@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Sizes of the facets that stand for sub-plants, pieces and polygons, and how many that will make.
 
-Facets are less than a pixel wide where they are seen. Hidden ones are three times as wide and stand for several leaves,
-because hidden plants only cast shadows and light up others. They grow with the depth at which they are hidden and with
+Facets are about a pixel wide where they are seen. Hidden ones are wider and stand for several leaves, because hidden
+plants only cast shadows and light up others. They grow with the depth at which they are hidden and with
 the distance from the view.
 """
 

@@ -58,7 +58,7 @@ class LeafModel:
     def content(self) -> bytes:
         """Bytes that are equal for equal models; what caches are keyed by."""
         arrays = (self.positions, self.corner_verts, self.face_offsets, self.uv, self.material_index)
-        return b"".join(a.tobytes() for a in arrays if a is not None)
+        return b"".join(a.tobytes() for a in arrays if a is not None) + (b"textured" if self.textured else b"")
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, LeafModel) and self.content == other.content

@@ -10,6 +10,7 @@ Of closed models, as fruit, that is half of the surface.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +51,7 @@ class LeafTriangles:
         return np.minimum(np.searchsorted(self.share, number, side="right"), len(self.share) - 1)
 
 
+@lru_cache(maxsize=256)
 def leaf_triangles(model: LeafModel) -> LeafTriangles:
     """The triangles of a leaf model: as long as it is, as wide as its area demands."""
     vectors = model.face_vectors

@@ -85,10 +85,9 @@ def leaf_meshes(
         numbers = sum(group.numbers(len(forms)) for group in own)
         for form in np.flatnonzero(numbers):
             given = int(numbers[form]), float(flora.leaf.transmission[own[0].row[0]]), moment(flora.rows) > 0
-            triangles = small and not forms[form].textured
-            copies = (
-                TriangleCopies(leaf_triangles(forms[form]), *given) if triangles else LeafCopies(forms[form], *given)
-            )
+            model = forms[form]
+            triangles = small and not model.textured
+            copies = TriangleCopies(leaf_triangles(model), *given) if triangles else LeafCopies(model, *given)
             for group in own:
                 group.add(copies, int(form), len(forms))
             yield LeafMesh(kind, int(form), copies.buffers())

@@ -89,11 +89,11 @@ class TetrahedralTree:
 
     def vertices(self, nodes: ArrayLike) -> NDArray[np.float64]:
         """Tetrahedra ``(n, 4, 3)`` float64 of nodes ``(n,)``, metres; NaN for regions without one."""
-        return np.take(self._rows["vertices"], nodes, axis=0)
+        return np.take(self._rows["vertices"][: self._size], nodes, axis=0)
 
     def planes(self, nodes: ArrayLike) -> NDArray[np.float64]:
         """Cutting planes ``(n, 4)`` float64 of nodes ``(n,)``; zeros where the node is terminal."""
-        return np.take(self._rows["plane"], nodes, axis=0)
+        return np.take(self._rows["plane"][: self._size], nodes, axis=0)
 
     def terminals(self) -> NDArray[np.intp]:
         """Numbers ``(t,)`` of the nodes that are not divided, ascending."""
