@@ -220,7 +220,7 @@ class _Facets:
         self.hidden = hidden[held.cell] | ~result.in_view[held.cell]
         self.faces = polygon_facet_sizes(held, camera, hidden)
 
-    def seen(self, pixels: float, limit: float, weight: float, safe: bool) -> float:
+    def seen(self, pixels: float, limit: float, weight: float, safe: bool = False) -> float:
         """Polygons, and facets counted with a weight, of all plants that are seen.
 
         safe: never fewer than were expected before `calibrate`; some plants do not tell exactly about all.
