@@ -88,6 +88,8 @@ class Findings:
     raw: list[str] = field(default_factory=list)
     outside: list[str] = field(default_factory=list)
     slow: list[str] = field(default_factory=list)
+    #: Megabytes that the process had before the first case: in a test, what earlier tests have left.
+    begun_mb: float = 0.0
 
     def figures(self) -> dict[str, float]:
         """For the benchmark's record."""
@@ -98,6 +100,7 @@ class Findings:
             "writes_outside": len(self.outside),
             "over_5s": len(self.slow),
             "peak_mb": peak_mb(),
+            "grown_mb": peak_mb() - self.begun_mb,
         }
 
 
@@ -112,8 +115,8 @@ def attack(kinds: Mapping[str, tuple[Case, int]], folder: Path, seed: int = 1) -
     seed : int
         Case i of a kind follows from the seed, the kind's name and i alone.
     """
-    jail, findings = Jail.made(folder), Findings()
     forget_peak()  # of other tests in this process
+    jail, findings = Jail.made(folder), Findings(begun_mb=peak_mb())
     for kind, (case, number) in kinds.items():
         for index in range(number):
             one(f"{kind} {index}", case, random.Random(f"{seed} {kind} {index}"), jail, findings)

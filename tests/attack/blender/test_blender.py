@@ -26,4 +26,4 @@ def test_attack(clean_file: object, kind: str, tmp_path: Path) -> None:
     assert not findings.outside
     assert not findings.slow
     assert findings.refused < findings.cases
-    assert findings.figures()["peak_mb"] < 2000
+    assert findings.figures()["grown_mb"] < 1000
