@@ -212,9 +212,9 @@ class _Facets:
         self.found = np.ones(2)  # of polygons and of facets, what was found over what was expected
         some = portions.visibility > 0
         self.flora, self.camera, self.portions = flora, camera, portions.take(np.flatnonzero(some))
-        self.sizes = sizes_of(flora, self.portions, camera)
+        self.sizes = sizes_of(flora, self.portions, self.sight.shadows)
         self.faces_real = _real_faces(flora, self.portions, Transition(flora, camera, 1.0))
-        self.unseen_sizes = sizes_of(flora, portions.take(np.flatnonzero(~some)), camera)
+        self.unseen_sizes = sizes_of(flora, portions.take(np.flatnonzero(~some)), self.sight.shadows)
         self.result, held, hidden = result, result.holdings.polygons, result.chosen(Decision.HIDDEN)
         self.cell = held.cell
         self.hidden = hidden[held.cell] | ~result.in_view[held.cell]
@@ -244,7 +244,7 @@ class _Facets:
         weights = facet_weights(self.flora, ())
         real = sum(_cost(block.buffers) for block in portion_blocks(self.sight, some, transition))
         facets = sum(len(made) for _, made, _ in portion_facets(self.sight, some, weights, pixels, transition))
-        sizes, fraction = sizes_of(self.flora, some, self.camera), np.where(some.real, 1.0, 0.0)
+        sizes, fraction = sizes_of(self.flora, some, self.sight.shadows), np.where(some.real, 1.0, 0.0)
         fraction *= np.where(some.visibility > 0, transition.of_branches(some.parts.branches, some.visibility), 0.0)
         expected = (fraction * _real_faces(self.flora, some, transition)).sum()
         left = ((1.0 - fraction) * sizes.counts(pixels)).sum()

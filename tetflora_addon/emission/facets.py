@@ -24,6 +24,7 @@ from ..growth.growth import WholeBranches
 from ..proxies.facet_sizes import HIDDEN_LEAVES, FacetPixels, FacetSizes, piece_facet_sizes, subplant_facet_sizes
 from ..proxies.facet_weights import FacetWeights, facet_weights
 from ..proxies.microsurfaces import Facets, concatenate_facets, kept_out_of_view, piece_facets, subplant_facets
+from ..proxies.thrown_shadows import ThrownShadows
 from ..refinement.contents import piece_totals
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
@@ -128,16 +129,16 @@ def portion_facets(
     of_species = flora.rows["species"][portions.parts.branches.row]
     for species in range(len(flora.species)):
         own = portions.take(np.flatnonzero(of_species == species))
-        expected = sizes_of(flora, own, sight.camera).counts(pixels) + 1
+        expected = sizes_of(flora, own, sight.shadows).counts(pixels) + 1
         for run in in_chunks(expected, FACETS_AT_ONCE):
             for facets, seen in maker.facets(own.take(run)):
                 yield species, facets, seen
 
 
-def sizes_of(flora: Flora, portions: Portions, camera: Camera) -> FacetSizes:
+def sizes_of(flora: Flora, portions: Portions, shadows: ThrownShadows) -> FacetSizes:
     """Sizes of the facets of portions (n,), were they drawn as they are."""
     parts = portions.parts
-    given = parts.totals, camera, portions.visibility, portions.coarse
+    given = parts.totals, shadows, portions.visibility, portions.coarse
     # A branch alone is placed by its middle; how long its pieces are decides nothing here.
     sizes = subplant_facet_sizes(flora, parts.branches, *given)
     sides = flora.rows["sides"][parts.branches.row] * flora.rows["segments"][parts.branches.row]
@@ -160,7 +161,7 @@ class _Maker:
         bodies = [Portions.empty()]
         while len(portions):
             parts, seen = portions.parts, portions.visibility > 0
-            sizes = sizes_of(flora, portions, sight.camera)
+            sizes = sizes_of(flora, portions, sight.shadows)
             extent = sight.pixels(portions)
             mixed = seen & portions.mixed & (extent > MIXED)
             detail = seen & (extent > DETAIL) & (sizes.counts(self.pixels) > FEW)
@@ -203,7 +204,7 @@ class _Maker:
         flora, branches, transition = self.sight.flora, portions.parts.branches, self.transition
         pieces, owner = whole_pieces(flora.rows, WholeBranches(branches, axes(flora.rows, branches)))
         visibility, coarse = portions.visibility[owner], portions.coarse[owner]
-        sizes = piece_facet_sizes(flora, pieces, piece_totals(flora, pieces), self.sight.camera, visibility, coarse)
+        sizes = piece_facet_sizes(flora, pieces, piece_totals(flora, pieces), self.sight.shadows, visibility, coarse)
         leaf, wood = sizes.sides(self.pixels)
         weight = self.weights.of_pieces(pieces.branches.row, sizes.whole_optical / np.maximum(leaf, 1e-12) ** 2)
         real = tubes = None

@@ -21,6 +21,7 @@ from ..arrays import Arrays, column, nested
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..proxies.facet_sizes import coarseness
+from ..proxies.thrown_shadows import ThrownShadows
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 from ..refinement.shares import PlantParts, SharePoints, lowered, opened, share_points
@@ -91,6 +92,8 @@ class Sight:
         self._explicit = result.chosen(Decision.EXPLICIT)
         self._inside = result.in_view | self._explicit
         self._coarse = coarseness(result)
+        lowest = result.plants.parts.branches.position[:, 2].min(initial=np.inf)
+        self.shadows = ThrownShadows(camera, result.lights, float(lowest))
 
     def portions(self) -> Portions:
         """All parts, front to back."""

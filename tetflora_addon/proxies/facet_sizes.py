@@ -23,6 +23,7 @@ from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 from ..refinement.polygons import Polygons
 from ..subplants.pieces import Pieces
+from .thrown_shadows import ThrownShadows
 
 #: How much larger facets of hidden tetrahedra are: where the optical depth in front just hides them, and at most, in
 #: proportion to the depth. For the depth alone they are never wider than so many pixels: some of what is deeply hidden
@@ -42,8 +43,10 @@ _DEEPEST, _LEAST_KEPT = 6.0, 0.15
 #: Factor on hidden facets beyond which these limits give way.
 _LOOSE = 16.0
 #: Largest side of facets beside the view over their distance from it; metres that count least, and from which on it
-#: grows faster: there the shadows of trees do not reach the view.
-_BESIDE = 0.05, 8.0, 15.0
+#: grows faster.
+_BESIDE = 0.1, 8.0, 15.0
+#: The same of those that throw shadows into the view, over the metres that these fall.
+_THROWN = 0.02
 #: Power of the visibility by which facets are larger where they are seen in part, and the visibility that counts least.
 FADING, LEAST_VISIBILITY = 0.5, 0.08
 #: Sides of facets of wood, however little is seen of it, over those that are seen well.
@@ -85,6 +88,8 @@ class FacetSizes(Arrays):
         How much larger than seen ones facets are where nothing is seen.
     clearance : (n,) float64
         Metres from the space that the image shows; negative within.
+    shadow : (n,) float64
+        Metres from there to where its shadow enters that space, infinite where it does not.
     totals : Totals of n
     part : (n,) float64
         Which part of a branch, or of a sub-plant, each is.
@@ -98,6 +103,7 @@ class FacetSizes(Arrays):
     visibility: NDArray[np.float64]
     coarse: NDArray[np.float64]
     clearance: NDArray[np.float64]
+    shadow: NDArray[np.float64]
     totals: Totals
     part: NDArray[np.float64]
     kept: NDArray[np.float64]
@@ -124,7 +130,8 @@ class FacetSizes(Arrays):
         beside = self.clearance > 0.0
         near, nearest, far = _BESIDE
         away = np.maximum(self.clearance, nearest)
-        most = np.where(beside, near * away * (1.0 + (away / far) ** 2), 0.0)
+        thrown = _THROWN * np.maximum(self.shadow, nearest)
+        most = np.where(beside, np.minimum(near * away * (1.0 + (away / far) ** 2), thrown), 0.0)
         blot = np.minimum((np.maximum(self.coarse, COARSE) / COARSE) ** 1.5 * max(_WIDEST, pixels.seen), _BLOT)
         # Where a forest has too many even so, these limits give way.
         most = max(pixels.hidden / _LOOSE, 1.0) * np.where(beside, most, blot * self.extent)
@@ -223,11 +230,11 @@ def polygon_facet_sizes(held: Held[Polygons], camera: Camera, hidden: NDArray[np
 
 
 def subplant_facet_sizes(
-    flora: Flora, own: Branches, totals: Totals, camera: Camera, visibility: NDArray, coarse: NDArray
+    flora: Flora, own: Branches, totals: Totals, shadows: ThrownShadows, visibility: NDArray, coarse: NDArray
 ) -> FacetSizes:
     """Facets of sub-plants (n,) of given totals (n,), visibility (n,) and coarseness (n,) where that is 0."""
     place, faces = bounding_cylinders(flora, own)[0], flora.branch_faces(own)
-    sizes = _facet_sizes(totals, place, flora.one_leaf_area(own), faces, np.ones(len(own)), camera, visibility, coarse)
+    sizes = _facet_sizes(totals, place, flora.one_leaf_area(own), faces, np.ones(len(own)), shadows, visibility, coarse)
     return replace(sizes, kept=opaque_fractions(flora, own, totals))
 
 
@@ -242,12 +249,12 @@ def opaque_fractions(flora: Flora, own: Branches, totals: Totals) -> NDArray[np.
 
 
 def piece_facet_sizes(
-    flora: Flora, own: Pieces, totals: Totals, camera: Camera, visibility: NDArray, coarse: NDArray
+    flora: Flora, own: Pieces, totals: Totals, shadows: ThrownShadows, visibility: NDArray, coarse: NDArray
 ) -> FacetSizes:
     """Facets of pieces (n,); parameters as for `subplant_facet_sizes`."""
     place, faces = (own.start + own.end) / 2, flora.rows["sides"][own.branches.row]
     part = own.t1 - own.t0
-    return _facet_sizes(totals, place, flora.one_leaf_area(own.branches), faces, part, camera, visibility, coarse)
+    return _facet_sizes(totals, place, flora.one_leaf_area(own.branches), faces, part, shadows, visibility, coarse)
 
 
 def _facet_sizes(
@@ -256,10 +263,11 @@ def _facet_sizes(
     one_leaf: NDArray,
     faces: NDArray,
     part: NDArray,
-    camera: Camera,
+    shadows: ThrownShadows,
     visibility: NDArray,
     coarse: NDArray,
 ) -> FacetSizes:
     least = np.sqrt(totals.wood_area / 2 / np.maximum(faces, 1))
-    extent, away = camera.extent_around(place), camera.clearance(place)
-    return FacetSizes(extent, one_leaf, least, visibility, coarse, away, totals, part, np.ones(len(part)))
+    extent, away = shadows.camera.extent_around(place), shadows.camera.clearance(place)
+    falls = shadows.distance(place, away)
+    return FacetSizes(extent, one_leaf, least, visibility, coarse, away, falls, totals, part, np.ones(len(part)))

@@ -35,6 +35,8 @@ _GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 _GOLDEN = (np.sqrt(5) - 1) / 2
 _MOVED = 0.04  # of the length of a sub-plant's branch
 _SKY = np.array([0.0, 0.0, 1.0])
+#: Reaches by which facets beside the view are moved at most, and the least squared slope of the way out that counts.
+_MOST_MOVED, _LEAST_SLOPE = 3.0, 0.25
 SIN_60 = np.sqrt(3) / 2
 #: Distance of the corners of an equilateral triangle of area 1 from its middle.
 CIRCUMRADIUS = 2 / 27**0.25
@@ -139,13 +141,22 @@ def piece_facets(
 
 
 def kept_out_of_view(facets: Facets, clearance: Callable[[NDArray], NDArray], smallest: float) -> Facets:
-    """Facets that are out of view, shrunk where they would reach into it, but to no less than a fraction of their side.
+    """Facets that are out of view, moved away from it where they would reach into it, so that they keep their area.
 
-    ``clearance`` gives the distance (n,) of points (n, 3) from the view in metres.
+    Where there is no room beside it, they are shrunk, but to no less than a fraction of their side. ``clearance`` gives
+    the distance (n,) of points (n, 3) from the view in metres.
     """
-    reach = CIRCUMRADIUS * facets.side
-    fraction = np.clip(clearance(facets.centre) / np.maximum(reach, 1e-12), smallest, 1.0)
-    return replace(facets, side=facets.side * fraction)
+    reach, centre = CIRCUMRADIUS * facets.side, facets.centre
+    short = reach - clearance(centre)
+    some = np.flatnonzero((short > 0.0) & (short < _MOST_MOVED * reach))
+    if len(some):
+        here, step = centre[some], 0.1 * reach[some, None]
+        slope = np.stack([clearance(here + step * axis) - clearance(here) for axis in np.eye(3)], axis=1) / step
+        steep = np.maximum(np.einsum("ni,ni->n", slope, slope), _LEAST_SLOPE)
+        centre = centre.copy()
+        centre[some] += (short[some] / steep)[:, None] * slope
+    fraction = np.clip(clearance(centre) / np.maximum(reach, 1e-12), smallest, 1.0)
+    return replace(facets, centre=centre, side=facets.side * fraction)
 
 
 def _trapped(colour: NDArray[np.float64], weight: NDArray[np.float64]) -> NDArray[np.float64]:

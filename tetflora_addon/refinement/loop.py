@@ -71,6 +71,8 @@ class Refinement:
         Wall clock by step.
     strays : Strays
         What is left out.
+    lights : sequence of Light
+        Those that throw shadows.
     """
 
     tree: TetrahedralTree
@@ -84,6 +86,7 @@ class Refinement:
     complete: bool
     seconds: dict[str, float]
     strays: Strays = field(default_factory=Strays)
+    lights: Sequence[Light] = ()
 
     @property
     def nodes(self) -> NDArray[np.intp]:
@@ -144,7 +147,8 @@ def refine(
     polygons : Polygons, optional
         Explicit polygons to refine along with the plants.
     lights : sequence of Light
-        Whose shadows of what is hidden are refined if ``settings.shadow_cutoff`` is above 0.
+        Facets of what throws shadows into the view are finer; the tetrahedra of what is hidden are refined for their
+        shadows as well if ``settings.shadow_cutoff`` is above 0.
     """
     clock = Stopwatch()
     strays = strays_of(flora, seeds, camera, polygons)
@@ -158,8 +162,8 @@ def refine(
     divided = np.arange(len(tree)) == 0
     plants.update(tree, divided, np.where(divided, np.inf, 0.0))
     clock.lap("update")
-    lights = lights if settings.shadow_cutoff > 0.0 else ()
-    ground = seen_ground(camera, occluders, _height(seeds, polygons)) if lights else None
+    shadowed = bool(lights) and settings.shadow_cutoff > 0.0
+    ground = seen_ground(camera, occluders, _height(seeds, polygons)) if shadowed else None
     buffers = buffers_for(camera, settings.visibility_resolution, occluders)
     # Generations count from the root's own pieces. Passes do not count: a late one may divide what is still coarse.
     deepest = tree.levels - 1 + settings.max_levels
@@ -192,7 +196,7 @@ def refine(
             splitting &= ~barred
         clock.lap("refinement")
         ranks, seconds = rank[cells.nodes], dict(clock.seconds)
-        found = cells, transmittance, decision, ranks, passes, not limited, seconds, strays
+        found = cells, transmittance, decision, ranks, passes, not limited, seconds, strays, lights
         state = Refinement(tree, plants, holdings, *found)
         if not splitting.any():
             return state

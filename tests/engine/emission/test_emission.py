@@ -173,7 +173,8 @@ def test_facets_are_about_as_many_as_expected() -> None:
     for decision, visibility in ((Decision.PROXY, 1.0), (Decision.PROXY, 0.2), (Decision.HIDDEN, 1e-3)):
         one = with_decision(result, decision, visibility)
         for pixels in (FacetPixels(0.3), FacetPixels(1.0, 2.0)):
-            expected = facets.sizes_of(flora, Sight(flora, one, camera).portions(), camera).counts(pixels).sum()
+            sight = Sight(flora, one, camera)
+            expected = facets.sizes_of(flora, sight.portions(), sight.shadows).counts(pixels).sum()
             made = support.facet_buffers(flora, one, camera, pixels).polygons
             assert made == pytest.approx(expected, rel=0.15), (decision, visibility, pixels)
 

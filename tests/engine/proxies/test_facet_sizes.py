@@ -26,6 +26,7 @@ from tetflora_addon.proxies.facet_sizes import (
     subplant_facet_sizes,
 )
 from tetflora_addon.proxies.microsurfaces import facet_mesh, subplant_facets
+from tetflora_addon.proxies.thrown_shadows import ThrownShadows
 from tetflora_addon.refinement.contents import subplant_totals
 from tetflora_addon.refinement.decisions import Decision
 
@@ -44,7 +45,9 @@ def sizes(
         clearance=lambda points: np.full(len(points), clearance),
     )
     totals = subplant_totals(flora, own)
-    return subplant_facet_sizes(flora, own, totals, camera, np.full(PLANTS, visibility), np.full(PLANTS, coarse)), own
+    return subplant_facet_sizes(
+        flora, own, totals, ThrownShadows(camera), np.full(PLANTS, visibility), np.full(PLANTS, coarse)
+    ), own
 
 
 @given(st.floats(-100.0, 1e5), st.floats(1e-4, 10.0))

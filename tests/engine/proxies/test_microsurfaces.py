@@ -19,6 +19,7 @@ from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.proxies.facet_sizes import COARSE, FacetPixels, piece_facet_sizes, subplant_facet_sizes
 from tetflora_addon.proxies.microsurfaces import facet_mesh, piece_facets, subplant_facets
+from tetflora_addon.proxies.thrown_shadows import ThrownShadows
 from tetflora_addon.refinement.contents import bounding_cylinders, piece_totals, subplant_totals
 
 
@@ -138,13 +139,13 @@ def test_hidden_wood_gets_no_more_facets_than_it_has_faces() -> None:
         ),
     ):
         none, coarse = np.zeros(len(things)), np.full(len(things), COARSE)
-        sizes = sizes_of(flora, things, totals, camera, none, coarse)
+        sizes = sizes_of(flora, things, totals, ThrownShadows(camera), none, coarse)
         made = facet_mesh(make(flora, things, *sizes.sides(FacetPixels(1.0))))
         assert made.polygons == pytest.approx(sizes.counts(FacetPixels(1.0)).sum(), rel=0.02)
         wood = part(made, False)
         assert wood.sum() <= faces * 1.01
         assert support.face_areas(made)[wood].sum() == pytest.approx(totals.wood_area.sum() / 2, rel=0.1)
-        seen = sizes_of(flora, things, totals, camera, none + 1, coarse)
+        seen = sizes_of(flora, things, totals, ThrownShadows(camera), none + 1, coarse)
         assert part(facet_mesh(make(flora, things, *seen.sides(FacetPixels(12.0)))), False).sum() > faces * 5
         assert (seen.sides(FacetPixels(3.0))[0] >= np.sqrt(seen.one_leaf)).all()
 

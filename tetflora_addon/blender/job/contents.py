@@ -26,7 +26,7 @@ from ..results.forms import form_of
 from ..results.hiding import originals_shown
 from ..results.leaf_objects import resolved_species
 from ..scene.explicit import Explicit, read_explicit
-from ..scene.lights import read_lights, read_sources
+from ..scene.lights import read_lights, read_sources, sky_suns
 from ..scene.objects import read_occluders
 from ..scene.plants import NoPlantsError, read_plants_of
 from ..settings import check_limits, wind_of
@@ -110,7 +110,7 @@ def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_laye
             none = np.zeros(0)
             frames = none.reshape(0, 3), none.reshape(0, 3, 3)
             seeds, owners = Seeds((), none.astype(np.int32), none.astype(np.int64), *frames, none), ()
-        lights = read_lights(depsgraph, view_layer) if scene.tetflora.shadow_cutoff > 0.0 else ()
+        lights = (*read_lights(depsgraph, view_layer), *sky_suns(scene))
         baked = scene.tetflora.baked_light != 'OFF' and not scene.tetflora.expand_everything
         sources = read_sources(scene, depsgraph, view_layer) if baked else None
         return Given(seeds, explicit, read_occluders(depsgraph, view_layer), lights, sources, owners)

@@ -178,6 +178,13 @@ def read_world(scene: bpy.types.Scene) -> WorldLight:
     return WorldLight(*found, note="; ".join(notes))
 
 
+def sky_suns(scene: bpy.types.Scene) -> tuple[Light, ...]:
+    """Suns of a scene's world, where that is a sky; images of skies are not searched for any."""
+    tree = None if scene.world is None else tree_in_use(scene.world)
+    kinds = set() if tree is None else {node.type for node in tree.nodes}
+    return read_world(scene).suns if "TEX_SKY" in kinds and "TEX_ENVIRONMENT" not in kinds else ()
+
+
 def _surroundings(socket: bpy.types.NodeSocket, factor: float, notes: list[str]) -> tuple[World, tuple[Light, ...]]:
     """Sky and suns of what feeds a background's colour."""
     if not socket.is_linked:

@@ -1,0 +1,77 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which things beside the view throw shadows into it, and from how far.
+
+Of what stands beside the view, most can be noticed by little more than the light that it sends back. What stands
+between a light and the view is noticed by the shape of its shadow, and wants finer facets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera.camera import Camera
+from ..refinement.lights import Light
+
+#: Places along a shadow that are looked at; they lie the farther apart the longer it is.
+_STEPS = 12
+#: Metres to the first of them, and where a shadow without a floor ends.
+_FIRST, _LONGEST = 1.0, 300.0
+#: Where no light is known: length of shadows over the distance from the view.
+_UNKNOWN = 2.5
+
+
+@dataclass(frozen=True)
+class ThrownShadows:
+    """Where shadows of things end up.
+
+    Attributes
+    ----------
+    camera : Camera
+    lights : sequence of Light
+        Those that throw shadows.
+    floor : float
+        Height below which nothing receives any, metres.
+    """
+
+    camera: Camera
+    lights: Sequence[Light] = ()
+    floor: float = -np.inf
+
+    def distance(self, points: NDArray[np.float64], clearance: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Metres (n,) that shadows of points (n, 3) fall before they are in view; infinite where they never are.
+
+        ``clearance`` (n,) is that of the points from the view, metres; a shadow falls at least so far, and within the
+        view it falls no metre. Where no light is known, as under an image of the sky, it is a multiple of that.
+        """
+        if not any(light.shadow for light in self.lights):
+            return _UNKNOWN * np.maximum(clearance, 0.0)
+        found = np.where(clearance > 0.0, np.inf, 0.0)
+        beside = np.flatnonzero(clearance > 0.0)
+        for light in self.lights:
+            if len(beside) and light.shadow:
+                found[beside] = np.minimum(found[beside], self._of(light, points[beside]))
+        return np.maximum(found, np.maximum(clearance, 0.0))
+
+    def _of(self, light: Light, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        if light.kind == "SUN":
+            ray = np.broadcast_to(light.direction, points.shape)
+        else:
+            ray = points - light.position
+            ray = ray / np.maximum(np.linalg.norm(ray, axis=1, keepdims=True), 1e-12)
+        # Nothing is seen below the floor.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            down = np.where(ray[:, 2] < 0.0, (self.floor - points[:, 2]) / ray[:, 2], np.inf)
+        longest = np.clip(down, _FIRST, _LONGEST)
+        found, before = np.full(len(points), np.inf), np.zeros(len(points))
+        for step in range(1, _STEPS + 1):
+            fallen = _FIRST * (longest / _FIRST) ** (step / _STEPS)
+            # A place stands for the way from the one before.
+            near = self.camera.clearance(points + fallen[:, None] * ray) <= (fallen - before) / 2.0
+            found = np.where(near, np.minimum(found, fallen), found)
+            before = fallen
+        return found
