@@ -10,7 +10,7 @@ import bpy
 
 from ...buffers import MeshBuffers, PointBuffers
 from ...species.species import Species
-from ..materials.nodes import tag
+from ..materials.nodes import is_own, tag
 from ..runtime import JobData, is_there
 from .meshes import point_object, write_mesh
 from .output import (
@@ -62,10 +62,13 @@ class Results:
         self.mark = f" {mark}" if mark else ""
         self.collection: bpy.types.Collection | None = None
         self._made: list[bpy.types.ID] = []
+        self._names: list[tuple[bpy.types.ID, str]] = []
 
     def open(self) -> None:
         """Make the collection and link it to the scene."""
-        self.collection = bpy.data.collections.new(NAMES[self.purpose] + self.mark)
+        name = NAMES[self.purpose] + self.mark
+        self.collection = bpy.data.collections.new(name)
+        self._names.append((self.collection, name))
         self.collection[PURPOSE] = self.purpose
         self.collection[UNFINISHED] = True
         tag(self.collection)
@@ -85,7 +88,7 @@ class Results:
         name = self._name(name)
         mesh = write_mesh(name, buffers, materials)
         self._made += [mesh, *materials]
-        return self._link(bpy.data.objects.new(name, mesh), kind, species)
+        return self._link(name, bpy.data.objects.new(name, mesh), kind, species)
 
     def add_points(
         self,
@@ -97,7 +100,8 @@ class Results:
     ) -> bpy.types.Object:
         """Write one cloud of points, which has one material, as an object of the collection."""
         self._made += materials
-        return self._link(point_object(self._name(name), buffers, *materials), kind, species)
+        name = self._name(name)
+        return self._link(name, point_object(name, buffers, *materials), kind, species)
 
     def _name(self, name: str) -> str:
         """A name that ends in a number, with the mark; shortened so that Blender does not cut off the end."""
@@ -107,8 +111,9 @@ class Results:
         end = f" {number}{self.mark}"
         return stem.encode()[: _LONGEST - len(end)].decode(errors="ignore") + end
 
-    def _link(self, made: bpy.types.Object, kind: str, species: Species | None) -> bpy.types.Object:
+    def _link(self, name: str, made: bpy.types.Object, kind: str, species: Species | None) -> bpy.types.Object:
         self._made += [made, made.data]
+        self._names += [(made, name), (made.data, name)]
         if self.data is not None:
             self.data.add("a part of the result", made, made.data)
         tag(made.data)
@@ -124,8 +129,15 @@ class Results:
         return made
 
     def finish(self) -> None:
-        """Everything is made: the output settings decide about the artist's results; files never hold a render's."""
+        """Everything is made and earlier results are gone, whose names these take.
+
+        The output settings decide about the artist's results; files never hold a render's.
+        """
         del self.collection[UNFINISHED]
+        for made, name in self._names:
+            if made.name != name and is_own(made):
+                made.name = name
+                tag(made)
         if self.purpose == 'VIEW':
             dress_collection(self.scene, self.collection)
         else:
