@@ -47,7 +47,7 @@ def report_made(operator: Tool, made: Made) -> set[str]:
     if made.reason:
         operator.report({'WARNING'}, f"{counted(made.number, 'plant')} of {made.wanted:,} placed{where}: {made.reason}")
         return {'FINISHED'}
-    returned = f"; {made.returned:,} deleted plants restored" if made.returned else ""
+    returned = f"; {counted(made.returned, 'deleted plant')} restored" if made.returned else ""
     erased = f"; {made.erased:,} omitted where you erased" if made.erased else ""
     return operator.done(f"{counted(made.number, 'plant')} placed{where}{returned}{erased}")
 
