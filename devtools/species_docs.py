@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import fields
 
 from tetflora_addon.species.leaf_models import LEAF_MODELS
+from tetflora_addon.species.leaf_schema import OUTLINES
 from tetflora_addon.species.schema import FOLLOWS, LENGTH_HIGH, ORDER_KEYS, Key
 from tetflora_addon.species.species import CROWN_SHAPES, LEAF_KINDS
 
@@ -67,9 +69,26 @@ def leaf_table() -> str:
     return "\n".join(lines)
 
 
+def outline_tables() -> str:
+    """Markdown tables of the fields of outlines, by kind."""
+    blocks = []
+    for kind, shape in OUTLINES.items():
+        lines = [f"| `{kind}` | limits | default | meaning |", "|---|---|---|---|"]
+        for f in fields(shape):
+            names = f.metadata.get("names")
+            default = "–" if f.name == "leaflet" else f"`{json.dumps(f.default)}`"
+            limits = ", ".join(f"`{n}`" for n in names) if names else "a `blade`"
+            if "low" in f.metadata:
+                limits = f"{f.metadata['low']:g} to {f.metadata['high']:g}"
+            lines.append(f"| `{f.name}` | {limits} | {default} | {f.metadata['meaning']} |")
+        blocks.append("\n".join(lines))
+    return "\n\n".join(blocks)
+
+
 def updated(page: str) -> str:
     """The page with its tables written anew; they stand between comments that name them."""
-    for name, text in (("keys", key_table()), ("crowns", crown_list()), ("leaves", leaf_table())):
+    tables = {"keys": key_table(), "crowns": crown_list(), "leaves": leaf_table(), "outlines": outline_tables()}
+    for name, text in tables.items():
         pattern = re.compile(rf"(<!-- {name} -->\n).*?(<!-- end of {name} -->)", re.DOTALL)
         if not pattern.search(page):
             raise ValueError(f"{PAGE.name} has no place for {name}")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import SpeciesError
 from .leaf_outlines import Blade, simplified, traced
-from .leaf_surfaces import Surface, drawn, joined, surface, tube
+from .leaf_surfaces import LeafSurface, drawn, joined, surface, tube
 
 #: Tolerance of the outline that all others are taken from.
 FINEST = 2e-4
@@ -70,7 +70,7 @@ def crossings(points: NDArray[np.float64]) -> int:
     return int(across.sum() // 2)
 
 
-def blade_surface(blade: Blade, tolerance: float, amount: float = 1.0) -> Surface:
+def blade_surface(blade: Blade, tolerance: float, amount: float = 1.0) -> LeafSurface:
     """A blade as polygons, in units of the whole leaf's length.
 
     Parameters
@@ -206,7 +206,7 @@ def bend(blade: Blade, flat: NDArray[np.float64], amount: float = 1.0) -> NDArra
     )
 
 
-def _petiole(blade: Blade, rows: int) -> Surface:
+def _petiole(blade: Blade, rows: int) -> LeafSurface:
     """The petiole: a tube from the twig to the blade, a little bent; its texture lies below that of the blade."""
     rings = 4 if rows > 8 else 2
     along = np.linspace(0.0, 1.0, rings)

@@ -10,7 +10,7 @@ import numpy as np
 
 from .leaf_blades import blade_surface
 from .leaf_outlines import Blade, limited
-from .leaf_surfaces import VARIANTS, Surface, drawn, joined, tube
+from .leaf_surfaces import VARIANTS, LeafSurface, drawn, joined, tube
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Compound:
     turn: float = limited(0.0, -180, 180, "turn of the whole leaf about its rachis, degrees")
 
 
-def compound_surface(compound: Compound, tolerance: float, amount: float = 1.0) -> Surface:
+def compound_surface(compound: Compound, tolerance: float, amount: float = 1.0) -> LeafSurface:
     """A compound leaf within a tolerance, in units of its length."""
     place, angle, length = _leaflets(compound)
     blade = blade_surface(compound.leaflet, tolerance / compound.length, amount)
@@ -50,15 +50,15 @@ def compound_surface(compound: Compound, tolerance: float, amount: float = 1.0) 
         at = np.zeros((VARIANTS, 3))
         at[:, 1], at[:, 2] = place[i], 0.0 if petals else -compound.curl * place[i] ** 2
         # Each variant's leaflets are those of others: one after the other.
-        moved = Surface(np.roll(blade.positions, i, axis=0), *_faces(blade))
+        moved = LeafSurface(np.roll(blade.positions, i, axis=0), *_faces(blade))
         parts.append(moved.moved(frame, at))
     if compound.stem and tolerance < 0.02:
         parts.append(_rachis(compound, float(place.max()), tolerance))
     made = joined(parts)
-    return Surface(made.positions, made.corner_verts, made.face_offsets, made.uv, made.solid, tolerance)
+    return LeafSurface(made.positions, made.corner_verts, made.face_offsets, made.uv, made.solid, tolerance)
 
 
-def _faces(blade: Surface) -> tuple:
+def _faces(blade: LeafSurface) -> tuple:
     return blade.corner_verts, blade.face_offsets, blade.uv, blade.solid, blade.error
 
 
@@ -89,7 +89,7 @@ def _leaflets(compound: Compound) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return places, turns, sizes
 
 
-def _rachis(compound: Compound, end: float, tolerance: float) -> Surface:
+def _rachis(compound: Compound, end: float, tolerance: float) -> LeafSurface:
     rings = 3 if tolerance > 0.004 else 8
     points = np.zeros((VARIANTS, rings, 3))
     points[..., 1] = np.linspace(0.0, end, rings)

@@ -19,10 +19,12 @@ from .leaf_compounds import Compound, compound_surface
 from .leaf_models import LeafModel
 from .leaf_needles import Needles, needle_surface
 from .leaf_outlines import Blade, distance_to_links
-from .leaf_surfaces import Surface
+from .leaf_surfaces import LeafSurface
 
 #: Tolerances of levels, in lengths of the leaf.
 TOLERANCES = (0.03, 0.012, 0.004, 0.0015, 0.0005, 0.0002)
+#: Polygons of a leaf that no level has more of.
+MOST_POLYGONS = 20_000
 #: A level is worth while where its error is at most this fraction of that of the level before,
 _FINER = 0.75
 #: and takes its place where it has no more than so many times its polygons.
@@ -53,7 +55,7 @@ class LeafLevel:
     error: float
 
 
-def surface_of(shape: Shape, tolerance: float, amount: float = 1.0, factor: float = 1.0) -> Surface:
+def surface_of(shape: Shape, tolerance: float, amount: float = 1.0, factor: float = 1.0) -> LeafSurface:
     """Polygons of a shape within a tolerance, before they have the area of a model and are turned.
 
     ``amount`` says how much variants differ, 0 to 1; ``factor`` makes needles thicker.
@@ -65,7 +67,7 @@ def surface_of(shape: Shape, tolerance: float, amount: float = 1.0, factor: floa
     return blade_surface(shape, tolerance / (1.0 - shape.petiole), amount)
 
 
-def fitted(shape: Shape, tolerance: float, area: float, amount: float = 1.0) -> Surface:
+def fitted(shape: Shape, tolerance: float, area: float, amount: float = 1.0) -> LeafSurface:
     """Polygons of a shape within a tolerance, all variants of which have a one-sided area.
 
     Blades become wider or narrower for that, needles thicker or thinner.
@@ -97,6 +99,8 @@ def leaf_levels(model: LeafModel) -> tuple[LeafLevel, ...]:
         made = fitted(model.shape, tolerance, model.area)
         if made.error > _FINER * error:
             continue
+        if made.polygons > MOST_POLYGONS:
+            break
         level = LeafLevel(_model_of(made), made.positions.astype(np.float32), made.error)
         if found and level.model.polygons <= _DEARER * found[-1].model.polygons:
             found[-1] = level
@@ -164,6 +168,6 @@ def _parts(points: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     return np.array_split(points, len(points) // 256 + 1)
 
 
-def _model_of(made: Surface) -> LeafModel:
+def _model_of(made: LeafSurface) -> LeafModel:
     """A model of the first variant of a surface."""
     return LeafModel(made.positions[0], made.corner_verts, made.face_offsets, made.uv.astype(np.float32))

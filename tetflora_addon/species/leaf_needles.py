@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .leaf_outlines import limited
-from .leaf_surfaces import VARIANTS, Surface, drawn, joined, surface, tube
+from .leaf_surfaces import VARIANTS, LeafSurface, drawn, joined, surface, tube
 
 _GOLDEN_ANGLE = np.radians(137.508)
 #: What is not seen of the gaps between needles, of their distance along the shoot.
@@ -48,7 +48,7 @@ class Needles:
         return _GAP * self.shoot * self.shoots / self.needles
 
 
-def needle_surface(needles: Needles, tolerance: float, factor: float = 1.0) -> Surface:
+def needle_surface(needles: Needles, tolerance: float, factor: float = 1.0) -> LeafSurface:
     """Needles within a tolerance, in units of the whole leaf's length; all are thicker by a factor."""
     parts = []
     step = needles.spread / max(needles.shoots - 1, 1)
@@ -61,10 +61,10 @@ def needle_surface(needles: Needles, tolerance: float, factor: float = 1.0) -> S
         parts.append(_shoot(needles, i, tolerance, factor).moved(frame, np.zeros(3)))
     error = needles.gap if tolerance > _FLAT else min(tolerance, needles.gap)
     made = joined(parts)
-    return Surface(made.positions, made.corner_verts, made.face_offsets, made.uv, made.solid, error)
+    return LeafSurface(made.positions, made.corner_verts, made.face_offsets, made.uv, made.solid, error)
 
 
-def _shoot(needles: Needles, number: int, tolerance: float, factor: float) -> Surface:
+def _shoot(needles: Needles, number: int, tolerance: float, factor: float) -> LeafSurface:
     """One shoot along y with its needles."""
     count = max(needles.needles // needles.shoots, needles.bundle)
     i = np.arange(count)
@@ -108,7 +108,7 @@ def _needles(
     needles: Needles,
     tolerance: float,
     factor: float,
-) -> Surface:
+) -> LeafSurface:
     """Needles from starts (k, n, 3) in directions, of lengths (k, n), bent towards vectors (k, n, 3)."""
     flat, three = tolerance > _FLAT, tolerance > _THREE
     along = (

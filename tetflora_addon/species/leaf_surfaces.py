@@ -22,7 +22,7 @@ def drawn(number: int, count: int = VARIANTS) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True)
-class Surface:
+class LeafSurface:
     """Faces of a leaf.
 
     Attributes
@@ -61,7 +61,7 @@ class Surface:
         )
         return (np.linalg.norm(vectors, axis=2) * np.where(self.solid, 0.25, 0.5)).sum(axis=1)
 
-    def moved(self, matrix: NDArray[np.float64], place: NDArray[np.float64]) -> Surface:
+    def moved(self, matrix: NDArray[np.float64], place: NDArray[np.float64]) -> LeafSurface:
         """The surface with its points times a matrix (3, 3) or (k, 3, 3), whose columns are its axes, at a place."""
         points = self.positions @ np.swapaxes(matrix, -1, -2) + np.reshape(place, (-1, 1, 3))
         return replace(self, positions=points)
@@ -73,7 +73,7 @@ def surface(
     uv: NDArray[np.float64],
     solid: bool = False,
     error: float = 0.0,
-) -> Surface:
+) -> LeafSurface:
     """A surface of triangles and quads.
 
     Parameters
@@ -83,7 +83,7 @@ def surface(
         Vertices; of triangles one is named twice in a row, or the last is -1. Less than three different ones are none.
     uv : (v, 2) float64
     solid, error
-        As of `Surface`.
+        As of `LeafSurface`.
     """
     faces = np.where(faces < 0, faces[:, :1], faces)
     kept = faces != np.roll(faces, -1, axis=1)
@@ -93,16 +93,16 @@ def surface(
     used, corners = np.unique(corners, return_inverse=True)
     corners = corners.reshape(-1)
     offsets = np.concatenate([[0], np.cumsum(kept.sum(axis=1))]).astype(np.int32)
-    return Surface(
+    return LeafSurface(
         positions[:, used], corners.astype(np.int32), offsets, uv[used][corners], np.full(len(faces), solid), error
     )
 
 
-def joined(parts: Sequence[Surface]) -> Surface:
+def joined(parts: Sequence[LeafSurface]) -> LeafSurface:
     """Several surfaces with equal numbers of variants as one."""
     vertices = np.cumsum([0, *(part.positions.shape[1] for part in parts)])
     corners = np.cumsum([0, *(len(part.corner_verts) for part in parts)])
-    return Surface(
+    return LeafSurface(
         np.concatenate([part.positions for part in parts], axis=1),
         np.concatenate([p.corner_verts + v for p, v in zip(parts, vertices, strict=False)]).astype(np.int32),
         np.concatenate([[0], *(p.face_offsets[1:] + c for p, c in zip(parts, corners, strict=False))]).astype(np.int32),
@@ -114,7 +114,7 @@ def joined(parts: Sequence[Surface]) -> Surface:
 
 def tube(
     points: NDArray[np.float64], radius: NDArray[np.float64], sides: int, across: NDArray[np.float64] | None = None
-) -> Surface:
+) -> LeafSurface:
     """A tube along points (k, n, 3) with radii (n,), ended by a point where the last of them is 0.
 
     Its texture runs once around in u, and along in v; ``across`` (3,) is a direction that it does not lead along.

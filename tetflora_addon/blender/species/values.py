@@ -175,7 +175,7 @@ def _form(editor: bpy.types.PropertyGroup, kind: str) -> str:
         return OBJECT_LEAF
     if kind == "blossom" and species_value(editor, kind, None) is None:
         return NO_LEAF
-    return model if (model := form.get("model")) in LEAF_MODELS else OWN_LEAF
+    return model if (model := form.get("model")) in LEAF_MODELS and "outline" not in form else OWN_LEAF
 
 
 def _set_form(editor: bpy.types.PropertyGroup, kind: str, identifier: str) -> None:
