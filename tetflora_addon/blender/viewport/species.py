@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One plant of the species in the editor, live in the viewport: rebuilt after each change, never rendered or saved.
 
-The preview belongs to the session, not to the file: what is shown is remembered here by names, its datablocks are
-runtime data, and undo may take them away at any time; the next change, or the undo itself, brings them back.
+The preview belongs to the session, not to the file: what is shown is remembered here by names, and its datablocks are
+runtime data. They change without steps of undo, and undo keeps what is equal in two steps with its pointers, into
+datablocks that it frees: Blender would crash. So they are taken away before each undo and made anew after it.
 """
 
 from __future__ import annotations
@@ -149,6 +150,12 @@ def _remove() -> None:
     bpy.data.batch_remove([*objects, *{o.data for o in objects if is_ours(o.data)}, *_collections()])
 
 
+def _before_undo(_scene: bpy.types.Scene, _other: object = None) -> None:
+    if _objects() or _collections():
+        _remove()
+        _call_soon()
+
+
 def _on_undo(_scene: bpy.types.Scene, _other: object = None) -> None:
     # Undo may also bring back a preview that was switched off since.
     if _state.scene is not None or _objects():
@@ -160,7 +167,9 @@ def _on_load_pre(_path: object, _other: object = None) -> None:
     call_off(_on_timer)
 
 
-_HANDLERS = Handlers(undo_post=_on_undo, redo_post=_on_undo, load_pre=_on_load_pre)
+_HANDLERS = Handlers(
+    undo_pre=_before_undo, redo_pre=_before_undo, undo_post=_on_undo, redo_post=_on_undo, load_pre=_on_load_pre
+)
 
 
 def register() -> None:
