@@ -22,6 +22,7 @@ NAMES = (
     "averages",
     "extinction",
     "looks",
+    "leaf_looks",
     "tetrahedra",
     "landscape",
     "growth",

@@ -138,7 +138,7 @@ class Graph:
         return node.outputs[0]
 
     def vector(self, operation: str, *values: Any) -> bpy.types.NodeSocket:
-        """Vector operation; the result is a number for ``'DOT_PRODUCT'`` and ``'LENGTH'``.
+        """Vector operation; the result is a number for ``'DOT_PRODUCT'``, ``'DISTANCE'`` and ``'LENGTH'``.
 
         The second operand of ``'SCALE'`` is the factor.
         """
@@ -146,7 +146,7 @@ class Graph:
         names = ("Vector", "Scale") if operation == 'SCALE' else ("Vector", "Vector_001")
         for key, value in zip(names, values, strict=False):
             self.feed(find_socket(node.inputs, key), value)
-        return find_socket(node.outputs, "Value" if operation in {'DOT_PRODUCT', 'LENGTH'} else "Vector")
+        return find_socket(node.outputs, "Value" if operation in {'DOT_PRODUCT', 'DISTANCE', 'LENGTH'} else "Vector")
 
     def mix(self, factor: Any, first: Any, second: Any) -> bpy.types.NodeSocket:
         """Mix two shaders; factor 0 gives the first."""
