@@ -117,11 +117,11 @@ def test_a_leaf_lit_from_behind_shows_its_transmission_only():
     assert np.ptp(seen[..., 1]) > 0.05 * wanted[1], "no veins"
 
 
-def test_leaves_that_let_little_light_through_have_no_veins():
+def test_needles_have_no_veins():
     small_scene(sky=0.0, samples=64, sun=180.0, size=32)
-    sheet((0.2, 0.4, 0.1), 0.12, materials.leaf_material("Pine"))
+    sheet((0.2, 0.4, 0.1), 0.12, materials.leaf_material("Pine", "needle"))
     seen = picture()
-    assert np.ptp(seen[..., 1]) < 0.03 * seen[..., 1].mean()
+    assert np.ptp(seen[..., 1]) < 0.25 * seen[..., 1].mean(), "more than mottling"
 
 
 @pytest.mark.parametrize("engine", ["CYCLES", "EEVEE"])

@@ -77,13 +77,17 @@ def meadow(name: str) -> bpy.types.Material:
 
 
 def sky(name: str) -> bpy.types.World:
-    """Blue above, pale at the horizon."""
+    """Blue above, pale at the horizon.
+
+    What it sheds on the ground has the color of daylight of 15,000 K, as under a clear sky, and a quarter of the sun's
+    strength: shade is cool, not blue-black.
+    """
     world = bpy.data.worlds.new(name)
     tree = shader_tree(world)
     tree.nodes.clear()
     new, link = tree.nodes.new, tree.links.new
     place, split, ramp = (new(f"ShaderNode{kind}") for kind in ("TexCoord", "SeparateXYZ", "ValToRGB"))
-    _set_stops(ramp, ((0.0, (0.75, 0.84, 0.93)), (0.45, (0.12, 0.3, 0.75))))
+    _set_stops(ramp, ((0.0, (0.75, 0.84, 0.93)), (0.45, (0.2, 0.3, 0.51))))
     link(place.outputs["Generated"], split.inputs[0])
     link(split.outputs["Z"], ramp.inputs[0])
     background, output = new("ShaderNodeBackground"), new("ShaderNodeOutputWorld")

@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which blade leaves have follows from their outline, so no species file needs to say."""
+
+import numpy as np
+import pytest
+
+from tetflora_addon.blender.results import leaf_blades
+from tetflora_addon.species import catalogue, leaf_models
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+SHIPPED = {
+    "oak": "lobed",
+    "black_oak": "lobed",
+    "maple": "palmate",
+    "beech": "pinnate",
+    "birch": "pinnate",
+    "aspen": "pinnate",
+    "willow": "narrow",
+    "bamboo": "parallel",
+    "grass": "parallel",
+    "palm": "parallel",
+    "spruce": "needle",
+    "scots_pine": "needle",
+    "cypress": "needle",
+    "fern": "plain",
+    "rowan": "plain",
+}
+
+
+@pytest.mark.parametrize("identifier", list(SHIPPED))
+def test_shipped_species(identifier):
+    species = catalogue.load_species(identifier)
+    assert leaf_blades.blade_kind(species.leaf[0], species.leaf_transmission) == SHIPPED[identifier]
+
+
+def test_blossoms_have_petals_and_fruit_is_plain():
+    open_flower = leaf_models.LEAF_MODELS["blossom"]
+    assert leaf_blades.blade_kind(open_flower, 0.4, "blossom") == "petal"
+    assert leaf_blades.blade_kind(open_flower, 0.1, "blossom") == "plain"
+
+
+def test_a_finely_toothed_leaf_is_not_lobed():
+    """Its teeth take little of its hull."""
+    turn = 2 * np.pi * np.arange(80) / 80
+    far = 0.5 + 0.012 * (np.arange(80) % 2)
+    toothed = np.stack([0.6 * far * np.sin(turn), 0.5 + far * np.cos(turn), 0 * turn], axis=1)
+    model = leaf_models.leaf_model(toothed, [list(range(80))])
+    assert leaf_blades.blade_kind(model, 0.4) == "pinnate"
+
+
+def test_the_material_knows_the_length_of_leaves_and_parallel_veins_their_width():
+    grass = catalogue.load_species("grass")
+    made = leaf_blades.species_leaf_material(grass, "leaf")
+    group = next(n for n in made.node_tree.nodes if n.type == 'GROUP' and "Leaf Length" in n.inputs)
+    assert group.inputs["Leaf Length"].default_value == pytest.approx(0.42, rel=0.01)
+    width = np.ptp(grass.leaf[0].uv[:, 0])
+    assert group.inputs["Veins"].default_value * width == pytest.approx(11.0, rel=0.01)
