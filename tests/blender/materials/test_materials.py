@@ -92,7 +92,7 @@ def test_leaves_return_what_they_are_said_to_on_the_mean_of_both_sides(transmiss
     lower = picture().mean(axis=(0, 1))
     tint, gloss = np.array(microsphere.THROUGH_TINT[:3]), materials.GLOSS
     wanted = (1.0 - gloss) * np.array([0.5, 0.4, 0.6]) * ((1.0 - transmission) + transmission * tint) + gloss
-    np.testing.assert_allclose((upper + lower) / 2, wanted, rtol=0.01)
+    np.testing.assert_allclose((upper + lower) / 2, wanted, atol=0.01)
     if transmission < 1.0:
         assert (lower > 1.03 * upper).all()
 
@@ -171,7 +171,7 @@ def test_bark_lets_no_light_through():
 
 
 def test_microsurfaces_match_leaves_and_bark():
-    """From afar all that is left of bark is its mean; so small a piece of it is a tenth off, and leaves show veins."""
+    """From afar all that is left of bark is its mean; so small a piece of it is a tenth off. Leaves have two sides."""
     colour = (0.3, 0.2, 0.1)
     seen = {}
     for name, transmission in (("leaf", 0.4), ("bark", 0.0)):
@@ -179,9 +179,11 @@ def test_microsurfaces_match_leaves_and_bark():
             session.clean_file()
             small_scene(sky=0.5, samples=64, sun=30.0)
             made = materials.proxy_material() if kind == "proxy" else getattr(materials, f"{name}_material")("Oak")
-            sheet(colour, transmission, made)
-            seen[name, kind] = picture().mean(axis=(0, 1))
-    np.testing.assert_allclose(seen["leaf", "proxy"], seen["leaf", "leaf"], rtol=0.15)
+            flat = sheet(colour, transmission, made)
+            sides = [picture().mean(axis=(0, 1))]
+            flat.rotation_euler = (0.0, np.pi, 0.0)
+            seen[name, kind] = np.mean([*sides, picture().mean(axis=(0, 1))], axis=0)
+    np.testing.assert_allclose(seen["leaf", "proxy"], seen["leaf", "leaf"], rtol=0.1)
     np.testing.assert_allclose(seen["bark", "proxy"], seen["bark", "bark"], rtol=0.1)
 
 

@@ -27,11 +27,11 @@ BLADE = "TetFlora Leaf Blade"
 _VERSION = 2
 
 #: How much more than the mean of both sides a leaf's underside reflects diffusely, and the upper side less: fewer
-#: pigments lie under its surface, hence most in blue. Half of what three species show (docs/species.md), because
+#: pigments lie under its surface, hence most in blue. A third of what three species show (docs/species.md), because
 #: proxies have no sides: where leaves become proxies, light must not jump.
-PALER = (0.24, 0.18, 0.5)
+PALER = (0.16, 0.12, 0.3)
 #: How much more than the mean of both sides the upper side mirrors: its wax is smooth, the underside hairy.
-GLOSSIER = 0.2
+GLOSSIER = 0.1
 #: What of `GLOSS` is mirrored at all angles, and how much is added at a grazing one: g (a + b (1 - cos)^5), whose mean
 #: over all directions is g, as the cosine-weighted mean of (1 - cos)^5 is 1/21.
 _FACING, _GRAZING = 0.85, 0.15 * 21.0
