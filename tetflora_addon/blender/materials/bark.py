@@ -17,7 +17,7 @@ from typing import Any
 import bpy
 
 from ...errors import SpeciesError
-from .nodes import Graph, find_socket, shader_group
+from .nodes import Graph, find_socket, shader_group, smooth_step
 
 GIRTH = "TetFlora Bark Place"
 
@@ -171,12 +171,6 @@ def _noise(graph: Graph, place: Socket, detail: float, roughness: float, distort
     """Fractal noise from 0 to 1, .5 on average."""
     inputs = {"Vector": place, "Scale": 1.0, "Detail": detail, "Roughness": roughness, "Distortion": distortion}
     return find_socket(graph.node("ShaderNodeTexNoise", inputs).outputs, "Fac")
-
-
-def smooth_step(graph: Graph, value: Socket, low: Socket | float, high: Socket | float) -> Socket:
-    """0 under `low`, 1 over `high`, smooth between; falls where `low` is above `high`."""
-    inputs = {"Value": value, "From Min": low, "From Max": high}
-    return graph.node("ShaderNodeMapRange", inputs, interpolation_type='SMOOTHSTEP').outputs[0]
 
 
 def _cracked(graph: Graph, bent: Socket, width: float) -> Socket:

@@ -16,16 +16,15 @@ from typing import Any
 
 import bpy
 
-from ...light.scattering import GLOSS
-from .bark import smooth_step
-from .microsphere import THROUGH_TINT, UNIT
-from .nodes import LEAF_GREEN, Graph, find_socket, shader_group
+from ...light.scattering import GLOSS, THROUGH_TINT
+from .nodes import LEAF_GREEN, Graph, find_socket, shader_group, smooth_step
 
 BLADE = "TetFlora Leaf Blade"
 
 # Raise this when nodes or numbers change; `blade_version` then makes new materials as well.
 _VERSION = 2
 
+UNIT = (0.0, 1.0)
 #: How much more than the mean of both sides a leaf's underside reflects diffusely, and the upper side less: fewer
 #: pigments lie under its surface, hence most in blue. A third of what three species show (docs/species.md), because
 #: proxies have no sides: where leaves become proxies, light must not jump.
@@ -168,7 +167,7 @@ def _built(graph: Graph, given: Any, blade: Blade) -> dict[str, Any]:
     back, through = (_varied(graph, mottled, *line) for line in ((tone, _VEIN_HUE), (glow, _THROUGH_HUE)))
     paler = graph.vector('SCALE', PALER, graph.math('MULTIPLY', side, given["Paler Underside"]))
     back = graph.vector('MULTIPLY', back, graph.vector('ADD', paler, (1.0, 1.0, 1.0)))
-    through = graph.vector('MULTIPLY', through, THROUGH_TINT[:3])
+    through = graph.vector('MULTIPLY', through, tuple(THROUGH_TINT.tolist()))
     back, through = (graph.tinted(given["Colour"], colour) for colour in (back, through))
     if blade.wear:
         dead = _dead(graph, given, place, own, noise)

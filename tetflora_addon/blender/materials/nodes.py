@@ -211,6 +211,12 @@ def find_socket(sockets: Any, key: str) -> bpy.types.NodeSocket:
     raise KeyError(f"No socket {key} among {', '.join(socket.name for socket in sockets)}")
 
 
+def smooth_step(graph: Graph, value: Any, low: Any, high: Any) -> bpy.types.NodeSocket:
+    """0 under `low`, 1 over `high`, smooth between; falls where `low` is above `high`."""
+    inputs = {"Value": value, "From Min": low, "From Max": high}
+    return graph.node("ShaderNodeMapRange", inputs, interpolation_type='SMOOTHSTEP').outputs[0]
+
+
 def shader_group(
     name: str,
     version: int,
