@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which blade leaves have follows from their outline, so no species file needs to say."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tetflora_addon.blender.results import leaf_blades
-from tetflora_addon.species import catalogue, leaf_models
+from tetflora_addon.species import catalogue, leaf_compounds, leaf_models, leaf_outlines
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -33,6 +35,19 @@ SHIPPED = {
 def test_shipped_species(identifier):
     species = catalogue.load_species(identifier)
     assert leaf_blades.blade_kind(species.leaf[0], species.leaf_transmission) == SHIPPED[identifier]
+
+
+@pytest.mark.parametrize("identifier", ["oak", "maple", "beech", "birch", "willow"])
+def test_outlines_and_far_polygons_agree(identifier):
+    species = catalogue.load_species(identifier)
+    far = replace(species.leaf[0], shape=None)
+    assert leaf_blades.blade_kind(far, species.leaf_transmission) == SHIPPED[identifier]
+
+
+def test_compound_leaves_have_the_blade_of_their_leaflets():
+    shape = leaf_compounds.Compound(leaflet=leaf_outlines.Blade(width=0.4))
+    model = replace(catalogue.load_species("rowan").leaf[0], shape=shape)
+    assert leaf_blades.blade_kind(model, 0.4) == "pinnate"
 
 
 def test_blossoms_have_petals_and_fruit_is_plain():

@@ -43,8 +43,8 @@ _VEIN_MEAN = 0.06 / 0.5
 _BEND = 0.9
 #: Half widths at the base of the midrib and of what is darker beside it: all, and none; leaf lengths.
 _RIB, _HALO = (0.003, 0.009), (0.009, 0.03)
-#: Angles of the main veins of palmate blades beside the midrib, degrees.
-_PALM = (45.0, 78.0)
+#: Angles of the main veins of palmate blades of five lobes beside the midrib, degrees.
+_PALM = (44.0, 88.0)
 #: Cells of the net to a vein of second order, and the mean of its lines, measured.
 _NET, _NET_MEAN = 4.5, 0.257
 #: Height of the blade's undulation, leaf lengths.
@@ -58,7 +58,7 @@ Socket = Any  # or None, where there is nothing
 
 
 @dataclass(frozen=True)
-class Blade:
+class BladeLook:
     """How leaves of a kind look.
 
     Attributes
@@ -99,15 +99,15 @@ class Blade:
     net: bool = False
 
 
-BLADES: dict[str, Blade] = {
-    "pinnate": Blade(veins=9.0, angle=48.0, net=True),
-    "lobed": Blade(veins=6.0, angle=52.0, rough=0.45, net=True),
-    "palmate": Blade(veins=6.0, angle=48.0, palmate=True, net=True),
-    "narrow": Blade(veins=12.0, angle=35.0, midrib=0.6, lines=0.1),
-    "parallel": Blade(veins=60.0, angle=0.0, midrib=0.3, lines=0.12, dark=0.2, relief=0.03, wear=0.12),
-    "plain": Blade(veins=0.0, angle=0.0),
-    "needle": Blade(veins=0.0, angle=0.0, rough=0.4, wear=0.03),
-    "petal": Blade(veins=14.0, angle=12.0, midrib=0.0, lines=0.06, dark=0.15, relief=0.02, rough=0.7, wear=0.0),
+BLADES: dict[str, BladeLook] = {
+    "pinnate": BladeLook(veins=9.0, angle=48.0, net=True),
+    "lobed": BladeLook(veins=6.0, angle=52.0, rough=0.45, net=True),
+    "palmate": BladeLook(veins=6.0, angle=48.0, palmate=True, net=True),
+    "narrow": BladeLook(veins=12.0, angle=35.0, midrib=0.6, lines=0.1),
+    "parallel": BladeLook(veins=60.0, angle=0.0, midrib=0.3, lines=0.12, dark=0.2, relief=0.03, wear=0.12),
+    "plain": BladeLook(veins=0.0, angle=0.0),
+    "needle": BladeLook(veins=0.0, angle=0.0, rough=0.4, wear=0.03),
+    "petal": BladeLook(veins=14.0, angle=12.0, midrib=0.0, lines=0.06, dark=0.15, relief=0.02, rough=0.7, wear=0.0),
 }
 """Kinds of blades by name; their order is part of the version of materials."""
 
@@ -153,7 +153,7 @@ def blade_version(kind: str) -> int:
     return 100 * _VERSION + list(BLADES).index(kind)
 
 
-def _built(graph: Graph, given: Any, blade: Blade) -> dict[str, Any]:
+def _built(graph: Graph, given: Any, blade: BladeLook) -> dict[str, Any]:
     """What the group's outputs are linked to, by name."""
     place = graph.attribute("UVMap", "Vector")
     own = graph.math('FRACT', graph.vector('DOT_PRODUCT', graph.attribute("tf_colour", "Vector"), _DIGITS))
@@ -186,7 +186,7 @@ def _built(graph: Graph, given: Any, blade: Blade) -> dict[str, Any]:
 
 
 def _venation(
-    graph: Graph, given: Any, blade: Blade, place: Socket
+    graph: Graph, given: Any, blade: BladeLook, place: Socket
 ) -> tuple[Socket | None, Socket | None, Socket | None]:
     """Tone of the lines in reflected and in passing light, 0 on average, and the height of the blade, from 0 to 1.
 
@@ -228,11 +228,13 @@ def _venation(
         net = graph.math('SUBTRACT', smooth_step(graph, edge.outputs["Distance"], 0.12, 0.02), _NET_MEAN)
         net = graph.math('MULTIPLY', net, given["Vein Lines"])
         lines, glow = (graph.math('MULTIPLY_ADD', net, by, tone) for by, tone in ((0.35, lines), (0.5, glow)))
+    blade_only = graph.math('GREATER_THAN', uv["Y"], 0.0)  # petioles lie below 0 in the UV map
+    lines, glow = (graph.math('MULTIPLY', tone, blade_only) for tone in (lines, glow))
     return lines, glow, dome
 
 
 def _nearest_rib(graph: Graph, aside: Socket, along: Socket) -> tuple[Socket, Socket]:
-    """Places across and along the nearest of five main veins that leave the base at angles of 0, 45 and 78 degrees."""
+    """Places across and along the nearest of five main veins that leave the base at angles of 0, 44 and 88 degrees."""
     angle = graph.math('ARCTAN2', aside, along)
     length = graph.math('SQRT', graph.math('MULTIPLY_ADD', aside, aside, graph.math('MULTIPLY', along, along)))
     main = graph.math('MULTIPLY', graph.math('GREATER_THAN', angle, radians(_PALM[0] / 2)), radians(_PALM[0]))

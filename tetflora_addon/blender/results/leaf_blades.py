@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which blade the leaves of a species have: from the outline of their model and from what light they let through."""
+"""Which blade the leaves of a species have: from their outline and from what light they let through."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...species.leaf_compounds import Compound
 from ...species.leaf_models import LeafModel
+from ...species.leaf_needles import Needles
+from ...species.leaf_outlines import Blade
 from ...species.species import LEAF_KINDS, Species
 from ..materials.materials import leaf_material
 
@@ -22,6 +25,8 @@ _PARALLEL, _NARROW, _PALMATE = 0.2, 0.3, 0.95
 _LOBED = 0.86
 #: Parallel veins across a blade.
 _ACROSS = 11.0
+#: Most teeth of one side in which veins end.
+_FEW = 10
 _DIRECTIONS = tau * np.arange(48) / 48
 
 
@@ -39,17 +44,14 @@ def species_leaf_material(species: Species, kind: str) -> bpy.types.Material:
     model = forms[0] if isinstance(forms[0], LeafModel) else None
     through = species.leaf_transmission if kind == "leaf" else species.blossom_transmission
     looks = {"leaf_length": _length(species, kind)}
-    if model is None:
-        blade = "pinnate"
-    else:
-        blade = blade_kind(model, through, kind)
-        if blade == "parallel":
-            looks["veins"] = _ACROSS / max(_extent(model)[0], 1e-3)
+    blade = "pinnate" if model is None else blade_kind(model, through, kind)
+    if model is not None and (veins := _number(model, blade)):
+        looks["veins"] = veins
     return leaf_material(species.name if kind == "leaf" else f"{species.name} {kind}", blade, **looks)
 
 
 def blade_kind(model: LeafModel, transmission: float, kind: str = "leaf") -> str:
-    """One of `blade.BLADES` for a leaf model, by its texture coordinates: the pattern lies in these.
+    """One of `blade.BLADES` for a leaf model, by its outline, else by its UV map: the pattern lies in that.
 
     Parameters
     ----------
@@ -59,19 +61,44 @@ def blade_kind(model: LeafModel, transmission: float, kind: str = "leaf") -> str
     kind : str
         One of `LEAF_KINDS`.
     """
-    if transmission < _THICK:
+    if transmission < _THICK or isinstance(model.shape, Needles):
         return "needle" if kind == "leaf" else "plain"
     if kind != "leaf":
         return "petal"
+    outline = _outline(model)
+    if outline is not None and not outline.palmate:
+        return _simple(outline.width, outline.lobes > 0)
+    if outline is not None:
+        return "palmate"
     width, length = _extent(model)
     if _leaflets(model, length):
         return "plain"
     ratio = width / max(length, 1e-6)
+    return "palmate" if ratio > _PALMATE else _simple(ratio, _filled(model) < _LOBED)
+
+
+def _simple(ratio: float, lobed: bool) -> str:
+    """Blade of a leaf with one midrib, by width over length."""
     if ratio < _NARROW:
         return "parallel" if ratio < _PARALLEL else "narrow"
-    if ratio > _PALMATE:
-        return "palmate"
-    return "lobed" if _filled(model) < _LOBED else "pinnate"
+    return "lobed" if lobed else "pinnate"
+
+
+def _outline(model: LeafModel) -> Blade | None:
+    """Outline of the leaf or of its leaflets, each of which has the whole UV map."""
+    shape = model.shape.leaflet if isinstance(model.shape, Compound) else model.shape
+    return shape if isinstance(shape, Blade) else None
+
+
+def _number(model: LeafModel, blade: str) -> float | None:
+    """Veins to a leaf's length where the outline tells: they end in lobes, and in teeth if these are few."""
+    outline = _outline(model)
+    if blade == "parallel":
+        return _ACROSS / max(_extent(model)[0] if outline is None else outline.width, 1e-3)
+    if outline is None or blade not in ("lobed", "pinnate"):
+        return None
+    ends = outline.lobes if blade == "lobed" else outline.teeth
+    return 1.15 * (ends + 0.5) if 3 <= ends <= _FEW else None
 
 
 def _extent(model: LeafModel) -> NDArray[np.floating]:
