@@ -37,7 +37,7 @@ GENERATIONS = 3
 SLACK = 2.0
 #: Fragments of polygons, beside two for each polygon, from which on none are cut any more: each goes where most of it
 #: is. Large faces that cross each other's space a thousand times would fill all memory.
-MOST_FRAGMENTS = 300_000
+MOST_FRAGMENTS = 200_000
 #: Weight of the pixels of what is divided for its shadow: as often as possible, where it is in view.
 ALWAYS = 1e30
 
