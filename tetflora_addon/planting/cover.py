@@ -43,7 +43,7 @@ class Habitat(Enum):
 
 
 @dataclass(frozen=True)
-class Ground:
+class Floor:
     """Maps of the ground under plants.
 
     Attributes
@@ -66,7 +66,7 @@ class Ground:
         ----------
         habitat : Habitat
         species : int or None
-            What sheds it; anything if None.
+            What sheds it; anything if None, nothing that stands if -1.
         seed : int
             Of the patches.
         """
@@ -90,13 +90,15 @@ class Ground:
             return np.maximum(1.0 - _step(light, 0.25, 0.85), 0.1) * np.maximum(_step(light, 0.0, 0.06), _LEAST)
         if habitat.falls:
             whole = self.fallen.sum(axis=0)
+            if species is not None and not 0 <= species < len(self.fallen):
+                return np.zeros(len(light))
             own = whole if species is None else self.fallen[species]
             covered = 1.0 - np.exp(-whole / (_LEAVES if habitat is Habitat.LITTER else _WOOD))
             return covered * own / np.maximum(whole, 1e-12)
         return np.ones(len(light))
 
 
-def mapping(sheet: Sheet, canopy: Canopy, kinds: int) -> Generator[float, None, Ground]:
+def mapping(sheet: Sheet, canopy: Canopy, kinds: int) -> Generator[float, None, Floor]:
     """Light and what falls on the ground under plants; yields the fraction of the work that is done."""
     steps, parts = (light_on(sheet, canopy), fallen_on(sheet, canopy, kinds)), []
     for number, step in enumerate(steps):
@@ -106,11 +108,11 @@ def mapping(sheet: Sheet, canopy: Canopy, kinds: int) -> Generator[float, None, 
             except StopIteration as stop:
                 parts.append(stop.value)
                 break
-    return Ground(sheet, *parts)
+    return Floor(sheet, *parts)
 
 
 @dataclass(frozen=True)
-class Layer:
+class Stratum:
     """One kind of plants of a ground cover, for the color of the ground.
 
     Attributes
@@ -130,14 +132,18 @@ class Layer:
     colour: NDArray[np.float64]
 
 
-def tints(layers: Sequence[Layer], soil: NDArray[np.float64], cells: int) -> NDArray[np.float64]:
-    """Mean color (cells, 3) of soil and what covers it: what lies there hides as much as if it were strewn by chance."""
-    areas = np.stack([layer.number * layer.area * layer.suits for layer in layers] or [np.zeros(cells)])
-    colours = np.stack([layer.colour for layer in layers] or [soil])
-    whole = areas.sum(axis=0)
-    mean = areas.T @ colours / np.maximum(whole, 1e-12)[:, None]
-    bare = np.exp(-whole)[:, None]
-    return bare * soil + (1.0 - bare) * mean
+def covered(strata: Sequence[Stratum], cells: int) -> NDArray[np.float64]:
+    """Fraction (cells,) of the ground that plants hide from above, as if they were strewn by chance."""
+    return 1.0 - np.exp(-sum((one.number * one.area * one.suits for one in strata), np.zeros(cells)))
+
+
+def tinted(strata: Sequence[Stratum], soil: NDArray[np.float64], cells: int) -> NDArray[np.float64]:
+    """Mean linear RGB (cells, 3) of bare soil (3,) and what lies on it."""
+    areas = [one.number * one.area * one.suits for one in strata]
+    whole = sum(areas, np.full(cells, 1e-12))
+    mean = sum((area[:, None] * one.colour for area, one in zip(areas, strata, strict=True)), np.zeros((cells, 3)))
+    hidden = covered(strata, cells)[:, None]
+    return (1.0 - hidden) * soil + hidden * mean / whole[:, None]
 
 
 def _step(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.float64]:

@@ -143,7 +143,7 @@ class Site:
     ) -> Sample:
         """Suitable ones among the places of children ``first`` to ``first + count - 1`` of a key, in their order.
 
-        Stops when ``enough`` are found, with at least as many. ``suits`` is what one species asks for besides the rules.
+        Stops when ``enough`` are found, with at least as many. ``suits`` is what one species asks for besides.
         """
         parts, drawn, found = [], 0, 0
         lost = dict.fromkeys(REMEDIES, 0)
