@@ -22,6 +22,8 @@ _PATCHES = 2**34  # keys of patches, away from those of plants and clumps
 #: Fallen leaves that cover ground as far as it is covered at all, m² on a square meter; wood lies where they do, but is
 #: spread wider.
 _LEAVES, _WOOD = 1.2, 3.0
+#: Fraction of low plants that dense litter smothers.
+_SMOTHERED = 0.45
 #: Roots and shadow of a dense crown leave this much of what wants shade.
 _LEAST = 0.15
 
@@ -85,9 +87,10 @@ class Floor:
         if habitat is Habitat.LIGHT:
             return _step(light, 0.12, 0.6)
         if habitat is Habitat.HALF_SHADE:
-            return _step(light, 0.03, 0.2) * (1.0 - 0.85 * _step(light, 0.45, 0.95))
+            return self._smothered() * _step(light, 0.03, 0.2) * (1.0 - 0.85 * _step(light, 0.45, 0.95))
         if habitat is Habitat.SHADE:
-            return np.maximum(1.0 - _step(light, 0.25, 0.85), 0.1) * np.maximum(_step(light, 0.0, 0.06), _LEAST)
+            shade = np.maximum(1.0 - _step(light, 0.25, 0.85), 0.1)
+            return self._smothered() * shade * np.maximum(_step(light, 0.0, 0.06), _LEAST)
         if habitat.falls:
             whole = self.fallen.sum(axis=0)
             if species is not None and not 0 <= species < len(self.fallen):
@@ -96,6 +99,10 @@ class Floor:
             covered = 1.0 - np.exp(-whole / (_LEAVES if habitat is Habitat.LITTER else _WOOD))
             return covered * own / np.maximum(whole, 1e-12)
         return np.ones(len(light))
+
+    def _smothered(self) -> NDArray[np.float64]:
+        """What fallen leaves leave of low plants, (cells,)."""
+        return 1.0 - _SMOTHERED * (1.0 - np.exp(-self.fallen.sum(axis=0) / _LEAVES))
 
 
 def mapping(sheet: Sheet, canopy: Canopy, kinds: int) -> Generator[float, None, Floor]:

@@ -9,12 +9,10 @@ are a centimeter or two high, so that what grows on them sideways lies on the gr
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from math import pi, sqrt
 from typing import Any
 
 from .leaf_models import LeafModel
-from .members import expected_members
 from .schema import FORMAT
 from .species import LEAF_KINDS, Species
 
@@ -31,6 +29,10 @@ _CONE = [[0.13, 0.075, 0.038], [0.03, 0.018, 0.01]]
 _WEATHERED = (0.125, 0.108, 0.088)
 _STEM = 0.03  # meters, of the stem in the middle of a patch
 _TREE = 3.0  # meters: what is lower has no branches that are dead wood
+_KEPT = {
+    *("length", "thickness", "taper", "sides", "angle", "angle_tip", "branches", "branch_start"),
+    *("crown", "whorl", "count_by_length", "branch_colour"),
+}
 _CONES = 0.45  # of a patch, on average
 
 
@@ -115,7 +117,7 @@ def branch_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | N
     if species.orders[0].length.mean < _TREE or len(species.orders) < 3:
         return None
     length = min(max(0.22 * species.orders[0].length.mean * min(species.orders[1].length.mean, 1.0), 0.7), 2.2)
-    orders = [_bare(dict(order), species.name) for order in page["orders"][1:4]]
+    orders = [_bare(order) for order in page["orders"][1:4]]
     for order in orders:
         # Twigs of a branch that fell spread over the ground, and many are gone.
         order |= {"spray": 0.92, "azimuth": [180, 25], "attraction": 0, "segments": 4, "curvature": [0, 26]}
@@ -176,12 +178,6 @@ FALLEN: dict[str, Callable[[Species, Mapping[str, Any]], dict[str, Any] | None]]
 }
 
 
-def leafless(species: Species) -> bool:
-    """Whether a species has no leaves that could fall."""
-    members = expected_members(replace(species, spur=None))
-    return sum(members.leaves) <= 0
-
-
 def _wood(
     species: Species, page: Mapping[str, Any], orders: list[dict[str, Any]], kind: str, description: str
 ) -> dict[str, Any]:
@@ -196,10 +192,9 @@ def _wood(
     }
 
 
-def _bare(order: dict[str, Any], _name: str) -> dict[str, Any]:
+def _bare(order: Mapping[str, Any]) -> dict[str, Any]:
     """An order of a page without leaves, short shoots, forks and whatever else grows on it but branches."""
-    kept = ("length", "thickness", "taper", "sides", "angle", "angle_tip", "branches", "branch_start", "crown", "bark")
-    return {key: value for key, value in order.items() if key in (*kept, "whorl", "count_by_length", "branch_colour")}
+    return {key: value for key, value in order.items() if key in _KEPT}
 
 
 def _fewer(value: Any, most: float) -> tuple[float, float]:

@@ -32,15 +32,15 @@ from .terrain import MASKS, read_ground
 NAME = "Ground cover"
 #: What grows: species, habitat, plants on a square meter of ground that suits.
 GROWN = (
-    ("wood_grass", 'LIGHT', 7.0),
+    ("wood_grass", 'LIGHT', 9.0),
     ("grass", 'LIGHT', 0.25),
     ("flower", 'LIGHT', 0.15),
     ("fern", 'HALF_SHADE', 0.12),
     ("wood_sorrel", 'HALF_SHADE', 3.0),
-    ("moss", 'SHADE', 3.0),
+    ("moss", 'SHADE', 4.0),
 )
 #: What falls: kind, habitat, pieces on a square meter of ground that is wholly covered, of how many species.
-DROPPED = (("litter", 'LITTER', 7.0, 4), ("branch", 'DEAD_WOOD', 0.35, 2), ("log", 'DEAD_WOOD', 0.012, 1))
+DROPPED = (("litter", 'LITTER', 9.0, 4), ("branch", 'DEAD_WOOD', 0.35, 2), ("log", 'DEAD_WOOD', 0.012, 1))
 #: Plants that a cover is made of at most by itself; on larger ground they stand farther apart.
 MOST = 1_000_000
 #: Lower plants shed nothing that would be seen, meters.
