@@ -125,7 +125,8 @@ class TetFloraMixEntry(bpy.types.PropertyGroup, SpeciesChoice):
     shed_by: StringProperty(
         name="Shed By",
         description="Identifier of the species that sheds what lies there; any if empty",
-        **_LIVE,
+        options={'HIDDEN'},
+        update=_notify,
     )
 
 
