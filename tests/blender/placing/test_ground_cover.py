@@ -159,6 +159,25 @@ def test_cover_keeps_no_tree_away_and_casts_no_shade():
     assert _group().populations[0].made == trees
 
 
+def test_the_brush_paints_and_thins_through_a_cover_and_erases_it():
+    _wood()
+    cover = _cover()
+    covered = cover.made
+    brush = _group().brush
+    brush.density, brush.radius, brush.distance_from, brush.min_distance = 20.0, 5.0, 'OWN', 0.5
+    trees = len(canopy_of(bpy.context.scene, depsgraph())[0])
+    assert bpy.ops.tetflora.paint_plants(mode='PAINT', stroke="8 8 0") == {'FINISHED'}
+    bpy.context.view_layer.update()
+    assert len(canopy_of(bpy.context.scene, depsgraph())[0]) > trees
+    bpy.ops.tetflora.paint_plants(mode='THIN', stroke="8 8 0")
+    assert fields.stored_size(_field()) == covered
+    assert bpy.ops.tetflora.paint_plants(mode='ERASE', stroke="8 8 0") == {'FINISHED'}
+    assert fields.stored_size(_field()) < covered
+    _cover()  # and what was erased stays bare
+    left = fields.read_field(_field(), depsgraph(), np.eye(4)[None]).position
+    assert np.hypot(left[:, 0] - 8.0, left[:, 1] - 8.0).min() >= 5.0
+
+
 def test_a_frozen_cover_is_refused_and_stays():
     _wood()
     cover = _cover()

@@ -8,8 +8,9 @@ the cover is an ordinary one: it can be changed, updated, frozen and removed.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable
+from collections.abc import Generator, Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 import numpy as np
@@ -45,6 +46,8 @@ DROPPED = (("litter", 'LITTER', 9.0, 4), ("branch", 'DEAD_WOOD', 0.35, 2), ("log
 MOST = 1_000_000
 #: Lower plants shed nothing that would be seen, meters.
 _SHEDS = 1.2
+#: What is covered where the plants above are of no population.
+_ANYBODY = "plants"
 #: Soil without anything on it, linear RGB.
 HUMUS = np.array([0.036, 0.025, 0.016])
 
@@ -88,11 +91,23 @@ def cover_steps(
     population: bpy.types.PropertyGroup,
     soil: bool = True,
     grounds: Iterable[bpy.types.Object] | None = None,
+    masks: Mapping[str, Any] | None = None,
 ) -> Generator[float, None, Covered]:
     """Cover the ground of a population; yields the fraction of the work that is done.
 
     What an earlier run made for the same population is replaced; settings that were changed since stay. Closing the
     steps leaves everything as it was.
+
+    Parameters
+    ----------
+    population : TetFloraPopulation
+        A population, or the settings for new ones.
+    soil : bool
+        Give the ground a material.
+    grounds : iterable of bpy.types.Object, optional
+        Other ground than the population's.
+    masks : mapping, optional
+        Other values of some of `terrain.MASKS` than the population's, for a cover that is new.
 
     Raises
     ------
@@ -100,7 +115,7 @@ def cover_steps(
         It has no ground or no plants above it, or the cover is frozen.
     """
     yield 0.0
-    uid = population.uid
+    uid = population.uid or _ANYBODY
     found = _cover_of(scene, uid)
     if found is not None:
         refuse_frozen(found)
@@ -109,8 +124,8 @@ def cover_steps(
         raise SceneError(
             f'"{population.name}" has no ground in this scene; select meshes and click Use Selected Meshes'
         )
-    masks = {name: getattr(population, name) for name in MASKS}
-    ground = read_ground(grounds, depsgraph, **masks)
+    own = {name: getattr(population, name) for name in MASKS} | dict(masks or {})
+    ground = read_ground(grounds, depsgraph, **own)
     canopy, above = canopy_of(scene, depsgraph)
     if not len(canopy):
         raise SceneError(f'"{population.name}" has no plants whose ground could be covered; click Update first')
@@ -128,7 +143,7 @@ def cover_steps(
     number = None
     if found is None:
         number = len(scene.tetflora.populations)
-        found = _add(scene, population, grounds)
+        found = _add(scene, population, grounds, masks or {})
     _mix(found, parts, ground.map_area)
     try:
         made = make_plants(scene, depsgraph, found)
@@ -145,7 +160,10 @@ def _cover_of(scene: bpy.types.Scene, uid: str) -> bpy.types.PropertyGroup | Non
 
 
 def _add(
-    scene: bpy.types.Scene, population: bpy.types.PropertyGroup, grounds: list[bpy.types.Object]
+    scene: bpy.types.Scene,
+    population: bpy.types.PropertyGroup,
+    grounds: list[bpy.types.Object],
+    masks: Mapping[str, Any],
 ) -> bpy.types.PropertyGroup:
     """A population for the cover, on the same ground and within the same limits; the covered one stays active."""
     index, uid = scene.tetflora.populations_index, population.uid
@@ -156,7 +174,9 @@ def _add(
     if source is not None:
         copy_settings(source, cover)
         scene.tetflora.populations_index = index
-    cover.covers, cover.as_field, cover.by_density, cover.density = uid, 'FIELD', True, 0.0
+    for name, value in masks.items():
+        setattr(cover, name, value)
+    cover.covers, cover.as_field, cover.by_density, cover.density = uid or _ANYBODY, 'FIELD', True, 0.0
     cover.min_distance, cover.distance_from = 0.0, 'OWN'
     cover.clumping = cover.edge_falloff = 0.0
     cover.scale_min, cover.scale_max, cover.scale_at_top, cover.tilt = 0.7, 1.25, 1.0, 1.0
