@@ -21,7 +21,7 @@ from ..settings import properties_of
 from ..species.catalogue import NO_SPECIES, SpeciesChoice, items_for, number_of
 from ..species.edits import catalogue
 from .distances import SOURCES, choose, empty_means, follows_species
-from .rules import EMPTIES_UNASKED
+from .plant_objects import EMPTIES_UNASKED
 
 #: Most plants that Populate creates as objects.
 MOST_EMPTIES = 100_000

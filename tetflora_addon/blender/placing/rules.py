@@ -33,11 +33,9 @@ from ..settings import check_limits
 from ..species.edits import catalogue
 from .canopy import not_of_covers, suits_of
 from .distances import HECTARE, distance_of, empty_means, weights_of
-from .plant_objects import plants_of
+from .plant_objects import EMPTIES_UNASKED, plants_of
 from .terrain import MASKS, read_ground
 
-#: Up to this many become empties by default; with more, Blender becomes slow.
-EMPTIES_UNASKED = 10_000
 #: Identity and state of a population; all else are settings, which can be copied and written to files.
 IDENTITY = {
     *("rna_type", "name", "uid", "frozen", "collection", "made", "message", "placed_by", "erased"),
