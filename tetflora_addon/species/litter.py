@@ -9,10 +9,13 @@ are a centimeter or two high, so that what grows on them sideways lies on the gr
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import fields
 from math import pi, sqrt
 from typing import Any
 
 from .leaf_models import LeafModel
+from .leaf_outlines import Blade
+from .leaf_schema import MAX_FORMS
 from .schema import FORMAT
 from .species import LEAF_KINDS, Species
 
@@ -21,6 +24,12 @@ NEEDLES = 0.2
 #: Leaves of a patch, and what fraction of its circle they cover, counted singly.
 _LEAVES, _COVERED = (16, 44), 0.62
 _RADIUS = (0.12, 0.45)  # meters, of a patch
+#: How blades bend as they dry.
+_BENT = (
+    {"fold": 0.12, "curl": 0.12, "wave": 0.02},
+    {"fold": 0.5, "curl": -0.3, "wave": 0.03},
+    {"fold": -0.35, "curl": 0.4, "wave": 0.03},
+)
 #: Linear RGB of dead leaves and needles, of wood without bark, and of cones: mean and variation.
 _BROWN = ((0.175, 0.092, 0.036), (0.115, 0.064, 0.024))
 _NEEDLE_BROWN = ((0.135, 0.068, 0.031), (0.06, 0.032, 0.014))
@@ -83,13 +92,16 @@ def litter_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | N
         "branch_start": 0,
         "branch_colour": _TWIG,
     }
+    own_forms = page["leaf"] if isinstance(page["leaf"], list) else [page["leaf"]]
     made = {
         "format": FORMAT,
         "name": f"{species.name} litter"[:1000],
         "description": f"Fallen {'needles, twigs and cones' if needles else 'leaves'} of {species.name}, a patch of "
         f"{200 * radius:.0f} cm"[:1000],
         "bark": species.bark,
-        "leaf": page["leaf"],
+        "leaf": [one for form, own in zip(species.leaf, own_forms, strict=True) for one in _dried(form, own)][
+            :MAX_FORMS
+        ],
         "leaf_transmission": round(0.4 * species.leaf_transmission, 3),
         "orders": [middle, around],
     }
@@ -176,6 +188,14 @@ FALLEN: dict[str, Callable[[Species, Mapping[str, Any]], dict[str, Any] | None]]
     "branch": branch_page,
     "log": log_page,
 }
+
+
+def _dried(form: LeafModel | str, own: dict[str, Any]) -> list[dict[str, Any]]:
+    """A leaf as it dries: flat, cupped and rolled back, where its blade is known; else as the page has it."""
+    if not isinstance(form, LeafModel) or not isinstance(form.shape, Blade):
+        return [own]
+    blade = {f.name: getattr(form.shape, f.name) for f in fields(Blade) if getattr(form.shape, f.name) != f.default}
+    return [{"outline": {"kind": "blade", **blade, **bent}} for bent in _BENT]
 
 
 def _wood(
