@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields
-from math import pi, sqrt
+from math import cos, pi, sin, sqrt
 from typing import Any
 
 from .leaf_models import LeafModel
@@ -27,21 +27,23 @@ _RADIUS = (0.12, 0.45)  # meters, of a patch
 #: How blades bend as they dry.
 _BENT = (
     {"fold": 0.12, "curl": 0.12, "wave": 0.02},
-    {"fold": 0.5, "curl": -0.3, "wave": 0.03},
-    {"fold": -0.35, "curl": 0.4, "wave": 0.03},
+    {"fold": 0.38, "curl": -0.2, "wave": 0.03},
+    {"fold": -0.25, "curl": 0.25, "wave": 0.03},
 )
 #: Linear RGB of dead leaves and needles, of wood without bark, and of cones: mean and variation.
 _BROWN = ((0.175, 0.092, 0.036), (0.115, 0.064, 0.024))
 _NEEDLE_BROWN = ((0.135, 0.068, 0.031), (0.06, 0.032, 0.014))
 _TWIG = [[0.075, 0.052, 0.034], [0.02, 0.014, 0.01]]
 _CONE = [[0.13, 0.075, 0.038], [0.03, 0.018, 0.01]]
-_WEATHERED = (0.125, 0.108, 0.088)
+_CUT = [[0.17, 0.115, 0.07], [0.03, 0.02, 0.014]]
+_WEATHERED = (0.088, 0.074, 0.058)
 _STEM = 0.03  # meters, of the stem in the middle of a patch
 _TREE = 3.0  # meters: what is lower has no branches that are dead wood
 _KEPT = {
     *("length", "thickness", "taper", "sides", "angle", "angle_tip", "branches", "branch_start"),
     *("crown", "whorl", "count_by_length", "branch_colour"),
 }
+_BURIED = 0.18  # meters, of the lower end of a log
 _CONES = 0.45  # of a patch, on average
 
 
@@ -154,32 +156,51 @@ def log_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | None
     trunk = species.orders[0]
     if trunk.length.mean < _TREE or len(species.orders) < 2:
         return None
-    length = min(max(0.25 * trunk.length.mean, 1.2), 4.0)
-    radius = min(max(0.8 * trunk.length.mean * trunk.thickness.mean, 0.04), 0.25)
+    length = min(max(0.25 * trunk.length.mean, 1.2), 2.7)
+    radius = min(max(0.8 * trunk.length.mean * trunk.thickness.mean, 0.04), _BURIED)
     colour = page["orders"][0].get("branch_colour")
+    # A stem that leads down, so that the log begins in the ground and comes out of it on its way.
+    stem = {
+        "length": [_BURIED, 0],
+        "thickness": [1, 0],
+        "taper": 1,
+        "sides": 3,
+        "angle": [180, 0],
+        "branches": [1, 0],
+        "branch_start": 0.98,
+        "branch_colour": _weathered(colour, 0.65),
+    }
     log = {
-        "length": _pair(length, 0.4 * length),
-        "thickness": _pair(radius / length, 0.15 * radius / length),
+        "length": _pair(length / _BURIED, 0.3 * length / _BURIED),
+        "thickness": _pair(radius / _BURIED, 0),
         "taper": 0.8,
         "segments": 8,
-        "sides": 14,
-        "curvature": [0, 10],
-        "angle": [89.5, 0.5],
+        "sides": 16,
+        "curvature": [0, 8],
+        "angle": [93.5, 0.5],
         "branches": [6, 3],
-        "branch_start": 0.1,
-        "branch_colour": _weathered(colour, 0.5),
+        "branch_start": 0.2,
+        "branch_colour": _weathered(colour, 0.65),
+        "leaf_kind": "blossom",
+        "leaves": [1, 0],
+        "leaf_start": 0.99,
+        "leaf_size": _pair(2.04 * 0.8 * radius, 0),
+        "leaf_angle": [90, 0],
+        "leaf_light": 0,
+        "leaf_colour": _CUT,
     }
     stub = {
-        "length": [0.07, 0.05],
-        "thickness": [0.28, 0.1],
-        "taper": 0.6,
+        "length": [0.06, 0.045],
+        "thickness": [0.26, 0.1],
+        "taper": 0.12,
         "segments": 2,
         "sides": 6,
         "angle": [66, 16],
         "azimuth": [137.5, 40],
-        "branch_colour": _weathered(colour, 0.6),
+        "branch_colour": _weathered(colour, 0.7),
     }
-    return _wood(species, page, [log, stub], "log", f"A fallen log of {species.name}, about {length:.1f} m long")
+    made = _wood(species, page, [stem, log, stub], "log", f"A fallen log of {species.name}, about {length:.1f} m long")
+    return made | {"blossom": _disc(), "blossom_transmission": 0}
 
 
 #: Pages by the ending of the identifier that the fallen parts of a species have.
@@ -231,6 +252,16 @@ def _weathered(colour: Any, how: float) -> list[list[float]]:
 
 def _pair(mean: float, variation: float) -> list[float]:
     return [round(mean, 4), round(min(variation, mean), 4)]
+
+
+def _disc() -> dict[str, Any]:
+    """The end of a log, one unit across, that looks along it."""
+    number = 16
+    turns = [2 * pi * k / number for k in range(number)]
+    return {
+        "vertices": [[round(0.5 * cos(t), 4), round(0.5 * sin(t), 4), 0.0] for t in turns],
+        "faces": [list(range(number))],
+    }
 
 
 def _cone() -> dict[str, Any]:
