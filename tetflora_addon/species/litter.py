@@ -34,7 +34,7 @@ _BENT = (
 _BROWN = ((0.175, 0.092, 0.036), (0.115, 0.064, 0.024))
 _NEEDLE_BROWN = ((0.135, 0.068, 0.031), (0.06, 0.032, 0.014))
 _TWIG = [[0.075, 0.052, 0.034], [0.02, 0.014, 0.01]]
-_CONE = [[0.13, 0.075, 0.038], [0.03, 0.018, 0.01]]
+_CONE = [[0.075, 0.043, 0.023], [0.02, 0.012, 0.007]]
 _CUT = [[0.17, 0.115, 0.07], [0.03, 0.02, 0.014]]
 _WEATHERED = (0.088, 0.074, 0.058)
 _STEM = 0.03  # meters, of the stem in the middle of a patch
@@ -43,7 +43,9 @@ _KEPT = {
     *("length", "thickness", "taper", "sides", "angle", "angle_tip", "branches", "branch_start"),
     *("crown", "whorl", "count_by_length", "branch_colour"),
 }
-_BURIED = 0.18  # meters, of the lower end of a log
+#: Meters across which a handful of needles is strewn, their number, and the width of each.
+_STREWN, _HANDFUL, _NEEDLE = 0.13, 22, 0.0018
+_BURIED = 0.12  # meters, of the lower end of a log
 _CONES = 0.45  # of a patch, on average
 
 
@@ -63,8 +65,14 @@ def litter_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | N
     needles = species.leaf_transmission < NEEDLES
     areas = [form.area for form in species.leaf if isinstance(form, LeafModel)]
     area = size**2 * (sum(areas) / len(areas) if areas else 0.4)
+    # Shoots fall apart: on the ground lie single needles, a handful to a leaf of the patch.
+    needle = min(max(0.12 * size, 0.016), 0.045)
+    if needles:
+        size, area = _STREWN, _HANDFUL * needle * _NEEDLE
     number = min(max(_COVERED * pi * _RADIUS[1] ** 2 / area, _LEAVES[0]), _LEAVES[1])
     radius = min(max(sqrt(number * area / (_COVERED * pi)), _RADIUS[0], 1.3 * size), _RADIUS[1])
+    if needles:
+        number, radius = _LEAVES[1], 0.3
     twigs = 6 if needles else 7
     colour, variation = _NEEDLE_BROWN if needles else _BROWN
     around = {
@@ -78,32 +86,31 @@ def litter_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | N
         "azimuth": [137.5, 40],
         "leaves": _pair(number / twigs, 0.3 * number / twigs),
         "leaf_start": 0.22,
-        "leaf_size": _pair(0.95 * size, 0.2 * size),
+        "leaf_size": _pair(0.95 * size, 0.15 * size),
         "leaf_angle": [75, 70],
         "leaf_azimuth": [137.5, 120],
-        "leaf_light": [0.9, 0.09],
+        "leaf_light": [0.97, 0.03] if needles else [0.92, 0.07],
         "branch_colour": _TWIG,
         "leaf_colour": [list(colour), list(variation)],
         "leaf_colour_tip": [round(1.12 * c, 3) for c in colour],
     }
     middle = {
         "length": [_STEM, 0.004],
-        "thickness": [0.045 if needles else 0.02, 0.004],
+        "thickness": [0.05 if needles else 0.02, 0.004],
         "sides": 3,
         "branches": [twigs, 1],
         "branch_start": 0,
         "branch_colour": _TWIG,
     }
     own_forms = page["leaf"] if isinstance(page["leaf"], list) else [page["leaf"]]
+    dried = [one for form, own in zip(species.leaf, own_forms, strict=True) for one in _dried(form, own)]
     made = {
         "format": FORMAT,
         "name": f"{species.name} litter"[:1000],
         "description": f"Fallen {'needles, twigs and cones' if needles else 'leaves'} of {species.name}, a patch of "
         f"{200 * radius:.0f} cm"[:1000],
         "bark": species.bark,
-        "leaf": [one for form, own in zip(species.leaf, own_forms, strict=True) for one in _dried(form, own)][
-            :MAX_FORMS
-        ],
+        "leaf": _strewn(needle) if needles else dried[:MAX_FORMS],
         "leaf_transmission": round(0.4 * species.leaf_transmission, 3),
         "orders": [middle, around],
     }
@@ -156,7 +163,7 @@ def log_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | None
     trunk = species.orders[0]
     if trunk.length.mean < _TREE or len(species.orders) < 2:
         return None
-    length = min(max(0.25 * trunk.length.mean, 1.2), 2.7)
+    length = min(max(0.25 * trunk.length.mean, 1.2), 1.84)
     radius = min(max(0.8 * trunk.length.mean * trunk.thickness.mean, 0.04), _BURIED)
     colour = page["orders"][0].get("branch_colour")
     # A stem that leads down, so that the log begins in the ground and comes out of it on its way.
@@ -177,7 +184,7 @@ def log_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | None
         "segments": 8,
         "sides": 16,
         "curvature": [0, 8],
-        "angle": [93.5, 0.5],
+        "angle": [96, 1],
         "branches": [6, 3],
         "branch_start": 0.2,
         "branch_colour": _weathered(colour, 0.65),
@@ -252,6 +259,21 @@ def _weathered(colour: Any, how: float) -> list[list[float]]:
 
 def _pair(mean: float, variation: float) -> list[float]:
     return [round(mean, 4), round(min(variation, mean), 4)]
+
+
+def _strewn(needle: float) -> dict[str, Any]:
+    """A handful of needles of a length in meters, strewn by the golden angle, each turned otherwise."""
+    vertices, faces = [], []
+    length, half = needle / _STREWN, 0.5 * _NEEDLE / _STREWN
+    for k in range(_HANDFUL):
+        away, turn, along = 0.5 * sqrt((k + 0.5) / _HANDFUL), 2.39996 * k, 5.1 * k + 0.7 * k * k
+        x, y, z = away * cos(turn), 0.5 + away * sin(turn), 0.01 * (k % 5)
+        ax, ay = cos(along) * length / 2, sin(along) * length / 2
+        bx, by = -sin(along) * half, cos(along) * half
+        ends = ((-ax - bx, -ay - by), (ax - bx, ay - by), (ax + bx, ay + by), (-ax + bx, -ay + by))
+        vertices += [[round(x + u, 4), round(y + v, 4), round(z, 3)] for u, v in ends]
+        faces.append([4 * k + i for i in range(4)])
+    return {"vertices": vertices, "faces": faces}
 
 
 def _disc() -> dict[str, Any]:
