@@ -123,6 +123,11 @@ def afford(
     limits = [(enough(camera), 1.0, False), ((1 - _RESERVE) * most, 1.0, True)]
     limits += [((1 - _RESERVE) * memory, primitive_bytes / BYTES_PER_POLYGON, True)]
     count.tolerance = _tolerance(count, settings, limits)
+    hard = min(allowed for allowed, _, every in limits if every)
+    if np.isfinite(hard) and count.finer(settings.leaf_limit) > _RESERVE * hard:
+        # A limit that somebody has set holds, however roughly near leaves can be counted.
+        count.calibrate(FacetPixels(settings.facet), settings.leaf_limit)
+        count.tolerance = _tolerance(count, settings, limits)
     factor, hidden = _affordable(count, settings, limits)
     if factor > 1.0 or hidden > 1.0:
         # What is expected of parts that will be opened is rough; some of them tell by how much.

@@ -142,3 +142,14 @@ def test_budgets_expect_what_is_made() -> None:
     count = _Facets(flora, result, camera)
     assert made[0] > 1.2 * made[1]
     assert count.finer(settings.leaf_limit) == pytest.approx(made[0] - made[1], rel=0.5)
+
+
+@pytest.mark.parametrize("share", [0.8, 0.4, 0.1])
+def test_limits_hold_up_close(share: float) -> None:
+    """However fine leaves could be, no more is made than somebody allows."""
+    flora, camera, seeds, _ = near(1.0)
+    settings = RefinementSettings()
+    _, blocks = refined(camera, flora, seeds, settings)
+    most = int(share * polygons([b.buffers for b in blocks]))
+    _, blocks = refined(camera, flora, seeds, replace(settings, max_polygons=most))
+    assert polygons([b.buffers for b in blocks]) <= most
