@@ -34,8 +34,8 @@ class Compound:
     turn: float = limited(0.0, -180, 180, "turn of the whole leaf about its rachis, degrees")
 
 
-def compound_surface(compound: Compound, tolerance: float, amount: float = 1.0) -> LeafSurface:
-    """A compound leaf within a tolerance, in units of its length."""
+def compound_surface(compound: Compound, tolerance: float, amount: float = 1.0, factor: float = 1.0) -> LeafSurface:
+    """A compound leaf within a tolerance, in units of its length; its leaflets are wider by a factor."""
     place, angle, length = _leaflets(compound)
     blade = blade_surface(compound.leaflet, tolerance / compound.length, amount)
     parts, petals = [], compound.around > 0
@@ -45,8 +45,9 @@ def compound_surface(compound: Compound, tolerance: float, amount: float = 1.0) 
         cos, sin, high, flat = np.cos(lean), np.sin(lean), np.sin(rise), np.cos(rise)
         along = np.stack([sin * flat, cos * flat, high], axis=1)
         across = np.stack([cos, -sin, np.zeros(VARIANTS)], axis=1)
+        up = np.cross(across, along)
         size = length[i] * (1.0 + 0.05 * amount * drawn(100 + i))
-        frame = np.stack([across, along, np.cross(across, along)], axis=2) * size[:, None, None]
+        frame = np.stack([factor * across, along, up], axis=2) * size[:, None, None]
         at = np.zeros((VARIANTS, 3))
         at[:, 1], at[:, 2] = place[i], 0.0 if petals else -compound.curl * place[i] ** 2
         # Each variant's leaflets are those of others: one after the other.

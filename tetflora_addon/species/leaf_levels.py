@@ -29,6 +29,8 @@ MOST_POLYGONS = 20_000
 _FINER = 0.75
 #: and takes its place where it has no more than so many times its polygons.
 _DEARER = 1.35
+#: Faces with less than this as texture coordinate v, negative, are stems; their tints, of petioles and of shoots.
+_STEM, _TINTS = 1e-6, ((1.25, 1.1, 0.9), (1.7, 0.75, 0.6))
 _FITS, _THICKER = 12, 1.5
 #: Points on each edge of a coarse model at which its distance from the shape is measured.
 _ON_EDGE = 9
@@ -48,35 +50,40 @@ class LeafLevel:
         Vertices of each variant, in units of the leaf's size.
     error : float
         Largest distance of the margin from that of the shape, in lengths of the leaf.
+    tint : (f, 3) float32
+        What the colour of a leaf is times that of each face: shoots are brown, petioles pale.
     """
 
     model: LeafModel
     shapes: NDArray[np.float32]
     error: float
+    tint: NDArray[np.float32]
 
 
 def surface_of(shape: Shape, tolerance: float, amount: float = 1.0, factor: float = 1.0) -> LeafSurface:
     """Polygons of a shape within a tolerance, before they have the area of a model and are turned.
 
-    ``amount`` says how much variants differ, 0 to 1; ``factor`` makes needles thicker.
+    ``amount`` says how much variants differ, 0 to 1; ``factor`` makes needles thicker and leaflets wider.
     """
     if isinstance(shape, Needles):
         return needle_surface(shape, tolerance, factor)
     if isinstance(shape, Compound):
-        return compound_surface(shape, tolerance, amount)
+        return compound_surface(shape, tolerance, amount, factor)
     return blade_surface(shape, tolerance / (1.0 - shape.petiole), amount)
 
 
-def fitted(shape: Shape, tolerance: float, area: float, amount: float = 1.0) -> LeafSurface:
+def fitted(shape: Shape, tolerance: float, area: float, reach: float = np.inf, amount: float = 1.0) -> LeafSurface:
     """Polygons of a shape within a tolerance, all variants of which have a one-sided area.
 
-    Blades become wider or narrower for that, needles thicker or thinner.
+    None reaches farther than the model. Blades and leaflets become wider or narrower for the area, needles thicker.
     """
     made = surface_of(shape, tolerance, amount)
-    if isinstance(shape, Needles):  # the surface grows with the thickness almost evenly
+    smaller = min(reach / float(np.linalg.norm(made.positions, axis=2).max()), 1.0)
+    if not isinstance(shape, Blade):  # the surface grows with the thickness or width almost evenly
         mean, thick = made.areas().mean(), surface_of(shape, tolerance, amount, _THICKER).areas().mean()
-        factor = 1.0 + (_THICKER - 1.0) * (area - mean) / (thick - mean)
+        factor = 1.0 + (_THICKER - 1.0) * (area / smaller**2 - mean) / (thick - mean)
         made = surface_of(shape, tolerance, amount, float(np.clip(factor, 0.2, 5.0)))
+    made = replace(made, positions=made.positions * smaller, error=made.error * smaller)
     for _ in range(_FITS):
         ratio = area / made.areas()
         if np.abs(ratio - 1.0).max() < 1e-7:
@@ -96,12 +103,15 @@ def leaf_levels(model: LeafModel) -> tuple[LeafLevel, ...]:
     found: list[LeafLevel] = []
     error = coarse_error(model)
     for tolerance in TOLERANCES:
-        made = fitted(model.shape, tolerance, model.area)
+        made = fitted(model.shape, tolerance, model.area, model.reach)
         if made.error > _FINER * error:
             continue
         if made.polygons > MOST_POLYGONS:
             break
-        level = LeafLevel(_model_of(made), made.positions.astype(np.float32), made.error)
+        stem = made.uv[made.face_offsets[:-1] + 1, 1] < -_STEM
+        stem |= made.uv[made.face_offsets[:-1], 1] < -_STEM
+        tint = np.where(stem[:, None], _TINTS[isinstance(model.shape, Needles)], 1.0).astype(np.float32)
+        level = LeafLevel(_model_of(made), made.positions.astype(np.float32), made.error, tint)
         if found and level.model.polygons <= _DEARER * found[-1].model.polygons:
             found[-1] = level
         else:
@@ -127,6 +137,8 @@ def chosen_level(model: LeafModel, pixels: NDArray[np.float64]) -> NDArray[np.in
 
     The coarsest one whose error is within it.
     """
+    if pixels.max(initial=0.0) * coarse_error(model) <= 1.0:  # far away: nobody needs to make them
+        return np.zeros(len(pixels), np.int64)
     errors = level_errors(model)
     return np.searchsorted(-errors, -1.0 / np.maximum(pixels, 1e-300), side="left").clip(0, len(errors) - 1)
 
@@ -142,14 +154,18 @@ def coarse_error(model: LeafModel) -> float:
         return 0.0
     if isinstance(model.shape, Needles):
         return max(4.0 * model.shape.gap, 0.02)
-    made = fitted(model.shape, TOLERANCES[2], model.area, amount=0.0)
-    fine, coarse = _margin(_model_of(made)), _margin(model)
+    made = fitted(model.shape, TOLERANCES[2], model.area, model.reach, amount=0.0)
+    fine, coarse = _margin(_model_of(made), not isinstance(model.shape, Compound)), _margin(model, stems=True)
     return max(_farthest(fine, coarse), _farthest(coarse, fine))
 
 
-def _margin(model: LeafModel) -> NDArray[np.float64]:
-    """Edges (e, 2, 3) that belong to one face only; all of closed models."""
+def _margin(model: LeafModel, stems: bool) -> NDArray[np.float64]:
+    """Edges (e, 2, 3) that belong to one face only; all of closed models. Without stems, whose v is negative, if so."""
     edges, of_corner = model.edges
+    if not stems:
+        stem = np.zeros(len(edges), bool)
+        stem[of_corner[model.uv[:, 1] < -_STEM]] = True
+        edges, of_corner = edges[~stem], (np.cumsum(~stem) - 1)[of_corner[~stem[of_corner]]]
     single = edges[np.bincount(of_corner, minlength=len(edges)) == 1]
     return model.positions[single if len(single) else edges]
 

@@ -97,6 +97,7 @@ def _shoot(needles: Needles, number: int, tolerance: float, factor: float) -> Le
     stem[..., 1] = np.linspace(0.0, needles.shoot, rings)
     radius = needles.stem / 2.0 * np.linspace(1.0, _TAPER, rings)
     made.append(tube(stem, radius, 3 if tolerance > _THREE else 5))
+    made[-1].uv[:, 1] -= 1.0  # below that of needles, as petioles
     return joined(made)
 
 

@@ -77,14 +77,21 @@ class Blade:
         """Whether rays lead from the base."""
         return self.lobing == "palmate"
 
+    @property
+    def _rise(self) -> float:
+        """Fraction of a tooth that rises: teeth point to the tip, or along the lobe that they are on."""
+        return 0.5 if self.palmate else _RISE
+
     def knots(self, side: int) -> NDArray[np.float64]:
         """Parameters (n,) of one half's tips, notches and ends, in order; between them it is smooth."""
         found = [np.linspace(0.0, 1.0, _START)]
         if self.teeth:
             steps = np.arange(self.teeth)[:, None]
-            within = np.array([0.0, _RISE])
+            within = np.array([0.0, self._rise])
             if self.tooth == "doubly serrate":
-                within = np.concatenate([within, (np.arange(_DOUBLE) + np.array([[0.0], [_RISE]])).ravel() / _DOUBLE])
+                within = np.concatenate(
+                    [within, (np.arange(_DOUBLE) + np.array([[0.0], [self._rise]])).ravel() / _DOUBLE]
+                )
             elif self.tooth != "serrate":
                 within = np.arange(4) / 4
             found.append(self._parameter(((steps + within) / self.teeth).ravel()))
@@ -175,15 +182,20 @@ class Blade:
         first = min(self.width / 2.0 / np.sin(step), 1.2)
         return number * step, np.maximum(1.0 + (first - 1.0) * number**1.2, 0.25 * first)
 
+    def _in_lobe(self, angle: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Lobe (n,) of a palmate blade on whose far side angles (n,) lie, and how far it is to the next, 0 to 1."""
+        ends = np.append(self._palm()[0], self._most_angle())
+        i = np.clip(np.searchsorted(ends, angle, side="right") - 1, 0, len(ends) - 2)
+        return i, (angle - ends[i]) / (ends[i + 1] - ends[i])
+
     def _palmate(self, s: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """As `_pinnate`, of rays from the base."""
         most = self._most_angle()
         angle = (1.0 - s) * most
         tips, lengths = self._palm()
         ends, length = np.append(tips, most), np.append(lengths, 0.45 * lengths[-1])
-        i = np.clip(np.searchsorted(ends, angle, side="right") - 1, 0, len(ends) - 2)
+        i, place = self._in_lobe(angle)
         low, high, a, b = ends[i], ends[i + 1], length[i], length[i + 1]
-        place = (angle - low) / (high - low)
         middle = (1.0 - self.lobe_depth) * (a + b) / 2.0
         last = i == len(ends) - 2  # from the last lobe to the base there is no sinus
         pointed = np.where(
@@ -211,20 +223,25 @@ class Blade:
         along = self._along(s)
         phase = self.teeth * along
         if self.tooth in ("serrate", "doubly serrate"):
-            height = _saw(phase) - 0.5
+            height = _saw(phase, self._rise) - 0.5
             if self.tooth == "doubly serrate":
-                height = height + _SECOND * (_saw(_DOUBLE * phase) - 0.5)
+                height = height + _SECOND * (_saw(_DOUBLE * phase, self._rise) - 0.5)
         elif self.tooth == "crenate":
             height = np.sqrt(np.clip((1.0 - np.cos(2.0 * np.pi * phase)) / 2.0, 0.0, 1.0)) - 0.6
         else:
             height = -0.5 * np.cos(2.0 * np.pi * phase)
-        return self.tooth_size * height * np.clip(12.0 * np.minimum(along, 1.0 - along), 0.0, 1.0)
+        height = height * np.clip(12.0 * np.minimum(along, 1.0 - along), 0.0, 1.0)
+        if self.palmate and self.lobes:  # on the flanks of lobes
+            height = height * np.clip(
+                1.4 * np.abs(np.sin(2.0 * np.pi * self._in_lobe((1.0 - s) * self._most_angle())[1])), 0.0, 1.0
+            )
+        return self.tooth_size * height
 
 
-def _saw(phase: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Teeth that rise slowly and fall fast, 0 to 1."""
+def _saw(phase: NDArray[np.float64], rise: float) -> NDArray[np.float64]:
+    """Teeth, 0 to 1, that rise over a fraction of their length and fall over the rest."""
     u = phase % 1.0
-    return np.where(u < _RISE, u / _RISE, (1.0 - u) / (1.0 - _RISE))
+    return np.where(u < rise, u / rise, (1.0 - u) / (1.0 - rise))
 
 
 def _straight(

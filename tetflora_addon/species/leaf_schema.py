@@ -154,7 +154,7 @@ def outlined_model(shape: Blade | Needles | Compound) -> LeafModel:
     """The coarsest level of an outline that has no other: few faces, with the outline's own area."""
     tolerance = TOLERANCES[0]
     area = float(surface_of(shape, TOLERANCES[2], 0.0).areas().mean())
-    made = fitted(shape, tolerance, area, 0.0)
+    made = fitted(shape, tolerance, area, amount=0.0)
     return LeafModel(
         np.round(made.positions[0], 6), made.corner_verts, made.face_offsets, made.uv.astype(np.float32), shape=shape
     )

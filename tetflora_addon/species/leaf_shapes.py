@@ -21,7 +21,7 @@ LEAF_SHAPES: dict[str, Blade | Needles | Compound] = {
     ),
     # An aspen: as broad as it is long, on a long stalk, with blunt teeth.
     "round": Blade(
-        width=0.88, widest=0.38, base="truncate", apex="acute", teeth=10, tooth="crenate", tooth_size=0.03,
+        width=0.88, widest=0.38, base="truncate", apex="acute", teeth=15, tooth="crenate", tooth_size=0.022,
         fold=0.11, curl=0.06, wave=0.018, waves=2.5, petiole=0.12,
     ),
     # A willow: narrow, finely serrate.
@@ -41,8 +41,8 @@ LEAF_SHAPES: dict[str, Blade | Needles | Compound] = {
     ),
     # A Norway maple: five pointed lobes with few large teeth.
     "maple": Blade(
-        width=1.12, widest=0.4, base="truncate", apex="acute", lobing="palmate", lobes=5, lobe_depth=0.42,
-        lobe_round=0.15, teeth=9, tooth="serrate", tooth_size=0.05, fold=0.14, curl=0.1, wave=0.015, waves=2.0,
+        width=1.12, widest=0.4, base="truncate", apex="acute", lobing="palmate", lobes=5, lobe_depth=0.44,
+        lobe_round=0.1, teeth=10, tooth="serrate", tooth_size=0.075, fold=0.14, curl=0.1, wave=0.015, waves=2.0,
     ),
     # A poplar or downy birch: triangular, doubly serrate.
     "deltoid": Blade(

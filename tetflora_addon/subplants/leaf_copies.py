@@ -151,7 +151,7 @@ class LevelCopies(LeafCopies):
 
     def __init__(self, level: LeafLevel, number: int, transmission: float, moving: bool = False) -> None:
         super().__init__(level.model, number, transmission, moving)
-        self.shapes = level.shapes.transpose(1, 2, 0)
+        self.shapes, self.tint = level.shapes.transpose(1, 2, 0), level.tint
 
     def _shapes(self, key: NDArray[np.uint64], new: slice) -> NDArray[np.float32]:
         variants = self.shapes.shape[2]
@@ -159,6 +159,7 @@ class LevelCopies(LeafCopies):
 
     def buffers(self) -> MeshBuffers:
         """The mesh, once all copies are placed."""
+        np.minimum(self.colour * self.tint, 1.0, out=self.colour)
         return replace(super().buffers(), smooth=True)
 
 

@@ -52,7 +52,7 @@ def test_models_are_what_they_were(name: str) -> None:
 def test_levels_have_the_area_of_their_model(name: str) -> None:
     model = LEAF_MODELS[name]
     for level in leaf_levels(model):
-        made = fitted(model.shape, level.error, model.area)
+        made = fitted(model.shape, level.error, model.area, model.reach)
         np.testing.assert_allclose(made.areas(), model.area, rtol=1e-5)
     assert len(leaf_levels(model)) >= 3
 
@@ -75,6 +75,7 @@ def test_levels_are_sound(name: str) -> None:
         assert np.bincount(level.model.edges[1]).max() <= 2
         assert np.isfinite(level.model.uv).all()
         assert level.shapes.shape[0] >= 4
+        assert np.linalg.norm(level.shapes, axis=2).max() <= 1.02 * model.reach  # what bounds count on
         assert not np.array_equal(level.shapes[0], level.shapes[1])
 
 
@@ -103,6 +104,15 @@ def test_the_coarsest_level_that_suffices_is_chosen(name: str, length: float) ->
     level = int(chosen_level(model, np.array([length]))[0])
     assert errors[level] * length <= 1.0 + 1e-9
     assert level == 0 or errors[level - 1] * length > 1.0
+
+
+@pytest.mark.parametrize("name", ["kite", "needles"])
+def test_stems_have_a_tint(name: str) -> None:
+    """Petioles and shoots, and nothing else: what lies below the blade in the texture."""
+    level = leaf_levels(LEAF_MODELS[name])[-1]
+    low = np.minimum.reduceat(level.model.uv[:, 1], level.model.face_offsets[:-1])
+    assert ((level.tint != 1.0).any(axis=1) == (low < -1e-6)).all()
+    assert 0.001 < (level.tint != 1.0).any(axis=1).mean() < 0.2
 
 
 def test_needles_are_as_many_as_they_should_be() -> None:
