@@ -38,6 +38,7 @@ NAMES = (
     "viewport",
     "animation",
     "wind",
+    "dolly",
     "endurance",
     "farm",
     "attack",
