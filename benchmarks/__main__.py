@@ -20,6 +20,7 @@ NAMES = (
     "plants",
     "bounds",
     "averages",
+    "forms_published",
     "extinction",
     "looks",
     "leaf_looks",

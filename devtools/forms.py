@@ -93,7 +93,7 @@ def ranges(identifier: str) -> Iterator[tuple[str, float, float, str]]:
     data = published()
     forms = data["forms"]
     for figure, (low, high, source, of) in forms["species"].get(identifier, {}).items():
-        yield figure, low, high, f"{forms['sources'][source]}. {of}"
+        yield figure, low, high, f"{forms['sources'][source]}. Of {of}"
     law = forms["open_grown"]
     if identifier in law["species"]:
         spread = float(np.exp(1.96 * np.sqrt(law["species"][identifier][2])))
@@ -103,13 +103,19 @@ def ranges(identifier: str) -> Iterator[tuple[str, float, float, str]]:
         kept = data["leaf_inclination"]
         mean, number, deviation = np.array(kept["species"][one["inclination"]], float).T
         middle, margin = float(np.average(mean, weights=number)), kept["margin"]
-        source = f"{kept['source']} {one['inclination']}"
+        source = f"{kept['source'].rstrip('.')}. Of {one['inclination']}"
         yield "leaf_inclination", middle - margin, middle + margin, source
         yield "leaf_inclination_spread", deviation.min() - margin, deviation.max() + margin, source
     if one["density"]:
         kept = data["leaf_area_density"]
+        source = f"{kept['source'].rstrip('.')}. Of {one['density']}"
         low, _, high = kept["genera"][one["density"]]["p10_p50_p90"]
-        yield "leaf_area_density", low / kept["widened"], high * kept["widened"], f"{kept['source']} {one['density']}"
+        yield (
+            "leaf_area_density",
+            low / kept["widened"],
+            high * kept["widened"],
+            f"{kept['source'].rstrip('.')}. Of {one['density']}",
+        )
 
 
 def compared(identifier: str) -> list[Figure]:
