@@ -16,7 +16,7 @@ QUICK_TARGETS: Targets = TARGETS
 
 
 def run(quick: bool) -> dict[str, object]:
-    """Measure all species; ``table`` has a row for each figure: species, figure, unit, range, source, value."""
+    """Measure all species; ``table`` has a row for each figure: species, habit, figure, unit, range, source, value."""
     rows = [row for identifier in forms.species() for row in forms.compared(identifier)]
     return {
         "species": len({row.species for row in rows}),
@@ -25,6 +25,7 @@ def run(quick: bool) -> dict[str, object]:
         "table": [
             {
                 "species": row.species,
+                "habit": row.habit,
                 "figure": row.figure,
                 "unit": forms.FIGURES[row.figure][1],
                 "low": round(row.low, 4),

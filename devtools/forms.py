@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -61,6 +61,8 @@ class Figure:
     ----------
     species, figure : str
         Identifier, and key of `FIGURES`.
+    habit : float
+        Of the species that is measured: 0 stands free, 1 in a dense stand.
     low, high : float
         Published range, in the figure's unit.
     source : str
@@ -70,6 +72,7 @@ class Figure:
     """
 
     species: str
+    habit: float
     figure: str
     low: float
     high: float
@@ -88,12 +91,15 @@ def published() -> dict[str, Any]:
     return json.loads(DATA.read_text(encoding="utf-8"))
 
 
-def ranges(identifier: str) -> Iterator[tuple[str, float, float, str]]:
-    """Figures of a species: key of `FIGURES`, lowest, highest, source."""
+def ranges(identifier: str, habit: float = 0.0) -> Iterator[tuple[str, float, float, str]]:
+    """Figures of a species that stands free, or of habit 1: key of `FIGURES`, lowest, highest, source."""
     data = published()
     forms = data["forms"]
-    for figure, (low, high, source, of) in forms["species"].get(identifier, {}).items():
+    kept = forms["stands"] if habit else forms
+    for figure, (low, high, source, of) in kept["species"].get(identifier, {}).items():
         yield figure, low, high, f"{forms['sources'][source]}. Of {of}"
+    if habit:
+        return
     law = forms["open_grown"]
     if identifier in law["species"]:
         spread = float(np.exp(1.96 * np.sqrt(law["species"][identifier][2])))
@@ -119,9 +125,13 @@ def ranges(identifier: str) -> Iterator[tuple[str, float, float, str]]:
 
 
 def compared(identifier: str) -> list[Figure]:
-    """All published figures of a shipped species beside what is measured."""
-    values = measured(identifier)
-    return [Figure(identifier, *row, values[row[0]]) for row in ranges(identifier)]
+    """All published figures of a shipped species beside what is measured, standing free and in a stand."""
+    habits = [habit for habit in (0.0, 1.0) if any(ranges(identifier, habit))]
+    return [
+        Figure(identifier, habit, *row, measured(identifier, habit)[row[0]])
+        for habit in habits
+        for row in ranges(identifier, habit)
+    ]
 
 
 def species() -> list[str]:
@@ -130,9 +140,9 @@ def species() -> list[str]:
 
 
 @cache
-def measured(identifier: str) -> dict[str, float]:
-    """Means of `SEEDS` plants of a shipped species, in the units of `FIGURES`."""
-    flora = compile_species([load_species(identifier)])
+def measured(identifier: str, habit: float = 0.0) -> dict[str, float]:
+    """Means of `SEEDS` plants of a shipped species of a habit, in the units of `FIGURES`."""
+    flora = compile_species([replace(load_species(identifier), habit=habit)])
     plants = [measures(flora, seed) for seed in range(SEEDS)]
     values = {name: float(np.mean([one[name] for one in plants])) for name in plants[0]}
     law = published()["forms"]["open_grown"]["species"].get(identifier)

@@ -99,7 +99,8 @@ def form_table() -> str:
             low, high, value = (f"{number:.{decimals}f}" for number in (one.low, one.high, one.value))
             paper, _, of = one.source.partition(". Of ")
             number = sources.setdefault(paper, len(sources) + 1)
-            cells = (name, f"{title}, {unit}", f"{low} to {high}", value, f"[{number}] {of}".strip())
+            where = f"{name}, in a stand" if one.habit else name
+            cells = (where, f"{title}, {unit}", f"{low} to {high}", value, f"[{number}] {of}".strip())
             lines.append(f"| {' | '.join(cells)} |")
     lines += ["", *(f"{number}. {paper}" for paper, number in sources.items())]
     return "\n".join(lines)

@@ -126,7 +126,7 @@ ORDER_KEYS: dict[str, Key] = {
 }
 
 SPECIES_KEYS = (
-    "format", "name", "description", "orders", "bark", "quality", "exact", "leaf", "leaf_transmission",
+    "format", "name", "description", "orders", "bark", "quality", "habit", "exact", "leaf", "leaf_transmission",
     "blossom", "blossom_transmission", "spur",
 )  # fmt: skip
 QUALITY_LIMITS = (0.001, 1000.0)
@@ -298,6 +298,7 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
         spur=spur,
         bark=reader.choice(data.get("bark", BARKS[0]), "bark", BARKS),
         quality=reader.number(data.get("quality", 1.0), "quality", *QUALITY_LIMITS),
+        habit=reader.number(data.get("habit", 0.0), "habit", 0, 1),
         exact=reader.truth(data.get("exact", False), "exact"),
     )
     polygons = expected_polygons(species) * species.quality

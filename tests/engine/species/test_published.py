@@ -163,13 +163,15 @@ def test_plants_are_as_published(name: str) -> None:
 
 def test_figures_name_what_is_measured_and_where_it_is_published() -> None:
     kept = PUBLISHED["forms"]
-    assert set(kept["species"]) <= set(support.SPECIES)
+    of_species = [kept["species"], kept["stands"]["species"]]
+    assert set().union(*of_species) <= set(support.SPECIES)
     for name in forms.species():
-        for figure, low, high, source in forms.ranges(name):
+        for figure, low, high, source in [*forms.ranges(name), *forms.ranges(name, 1.0)]:
             assert figure in forms.FIGURES
             assert low < high, (name, figure)
             assert len(source) > 40
-    used = {row[2] for one in kept["species"].values() for row in one.values()} | {kept["open_grown"]["source"]}
+    used = {row[2] for some in of_species for one in some.values() for row in one.values()}
+    used |= {kept["open_grown"]["source"]}
     assert used == set(kept["sources"])
 
 

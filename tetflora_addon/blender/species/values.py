@@ -292,3 +292,14 @@ class WholeSpecies(SpeciesChoice):
         set=lambda self, value: set_species_value(self, "quality", rounded(value)),
         options={'SKIP_SAVE'},
     )
+    habit: FloatProperty(
+        name="Forest Habit",
+        description="0: trees that stand free; 1: those of a dense stand, with bare, slender trunks and narrow crowns",
+        min=0.0,
+        max=1.0,
+        subtype='FACTOR',
+        default=0.0,
+        get=lambda self: number_in(species_value(self, "habit", 0.0)),
+        set=lambda self, value: set_species_value(self, "habit", rounded(value)),
+        options={'SKIP_SAVE'},
+    )
