@@ -225,7 +225,7 @@ def _leaves(flora: Flora, whole: WholeBranches) -> Iterator[tuple[NDArray, NDArr
             middle = np.array([np.mean(model.positions, axis=0)])
             place = leaves.position[own, None] + size[:, None, None] * np.einsum("nij,fj->nfi", frame[own], middle)
             place = np.repeat(place, len(faces), axis=1).reshape(-1, 3)
-            long, wide = np.ptp(model.positions[:, 1]), np.ptp(model.positions[:, 0])
+            long, wide = model.positions[:, 1].max(), np.ptp(model.positions[:, 0])
             area = (size[:, None] ** 2 * areas).reshape(-1)
             yield place, area, vectors.reshape(-1, 3), size.mean() * long, size.mean() * wide, len(own)
 
