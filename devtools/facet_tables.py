@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from concurrent.futures import ProcessPoolExecutor, as_completed
 
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.proxies import facet_weights
@@ -20,21 +21,27 @@ def main(anew: bool) -> None:
     """Fit the species that the table does not have as they are now, or all anew; it is written after each of them."""
     facet_weights.TABLE.parent.mkdir(exist_ok=True)
     before = {} if anew else facet_weights.shipped()
-    floras = {name: compile_species([load_species(name)]) for name in sorted(list_species())}
-    digests = {name: facet_weights.digest(flora, 0) for name, flora in floras.items()}
+    digests = {name: facet_weights.digest(compile_species([load_species(name)]), 0) for name in sorted(list_species())}
     table = {digest: before[digest] for digest in digests.values() if digest in before}
-    for identifier, flora in floras.items():
-        if digests[identifier] in table:
-            continue
-        whole, own = at_once(facet_weights.fitting(flora, 0))
-        table[digests[identifier]] = {
-            "species": identifier,
-            "whole": whole.round(3).tolist(),
-            "own": own.round(3).tolist(),
-        }
-        _write(table)
-        print(identifier, flush=True)
+    missing = [name for name, digest in digests.items() if digest not in table]
+    with ProcessPoolExecutor() as pool:
+        for done in as_completed([pool.submit(_fitted, name) for name in missing]):
+            digest, weights = done.result()
+            table[digest] = weights
+            _write(table)
+            print(weights["species"], flush=True)
     _write(table)
+
+
+def _fitted(identifier: str) -> tuple[str, dict]:
+    """The line of one species, with its digest."""
+    flora = compile_species([load_species(identifier)])
+    whole, own = at_once(facet_weights.fitting(flora, 0))
+    return facet_weights.digest(flora, 0), {
+        "species": identifier,
+        "whole": whole.round(3).tolist(),
+        "own": own.round(3).tolist(),
+    }
 
 
 def _write(table: dict[str, dict]) -> None:
