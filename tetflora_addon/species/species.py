@@ -19,7 +19,9 @@ from .leaf_models import LeafModel
 from .skeletons import Skeleton
 
 LEAF_KINDS = ("leaf", "blossom")
-BARKS = ("ridged", "plated", "smooth", "banded", "ringed", "fibrous", "jointed")
+BARKS = (
+    "ridged", "plated", "smooth", "banded", "ringed", "fibrous", "jointed", "netted", "peeling", "scaly",
+)  # fmt: skip
 """Characters of bark that materials know."""
 
 

@@ -31,7 +31,7 @@ def tube_buffers(flora: Flora, whole: Sequence[WholeBranches]) -> MeshBuffers | 
     Returns
     -------
     MeshBuffers or None
-        Quads with ``UVMap``, ``tf_colour`` and ``tf_transmission``; None without branches.
+        Quads with ``UVMap``, ``tf_colour``, ``tf_transmission`` and ``tf_girth``; None without branches.
     """
     sides_of = [flora.rows["sides"][some.branches.row] for some in whole]
     rings_of = [some.lines.segments + flora.rows["rings"][some.branches.row] + 1 for some in whole]
@@ -107,6 +107,7 @@ class _Tubes:
         self.corner_verts, self.corner_edges = np.zeros((2, faces, 4), np.int32)
         self.uv = np.zeros((faces, 8), np.float32)
         self.colour = np.zeros((faces, 3), np.float32)
+        self.girth = np.zeros(faces, np.float32)
 
     def buffers(self) -> MeshBuffers:
         """The mesh."""
@@ -122,6 +123,7 @@ class _Tubes:
                 "UVMap": ("CORNER", self.uv.reshape(-1, 2)),
                 "tf_colour": ("FACE", self.colour),
                 "tf_transmission": ("FACE", np.zeros(faces, np.float32)),
+                "tf_girth": ("FACE", self.girth),
                 **motion,
             },
             smooth=True,
@@ -142,10 +144,13 @@ class _Tubes:
             self._add_shape(self.velocity, centre, (away - reach) / np.float32(seconds), sides)
         self._add_topology(lower.astype(np.int32), number, sides)
         # v counts lengths of the perimeter at the branch's base, so that a texture is as wide as it is high.
-        v = rings.t * np.take(branches.length / np.maximum(2 * np.pi * branches.radius, 1e-9), rings.branch)
+        girth = base_girth(branches)
+        v = rings.t * np.take(branches.length / np.maximum(girth, 1e-9), rings.branch)
         colour = branch_colours(flora.rows, branches.row, branches.key).astype(np.float32)
         colour = np.ascontiguousarray(colour)[np.take(rings.branch, lower)]
         self._add_looks(v[lower], v[lower + 1], colour, sides)
+        every = slice(self.faces, self.faces + len(lower) * sides)
+        self.girth[every] = np.repeat(np.take(girth, np.take(rings.branch, lower)), sides)
         self.vertices += number * sides
         self.edges += (number + len(lower)) * sides
         self.faces += len(lower) * sides
@@ -195,6 +200,11 @@ class _Tubes:
         new += high.astype(np.float32)[:, None] * at_high
         new += u
         self.colour[self.faces : self.faces + number] = np.repeat(colour, sides, axis=0)
+
+
+def base_girth(branches: Branches) -> NDArray[np.float64]:
+    """Length (n,) around branches at their base, without flare, metres: what v counts."""
+    return 2 * np.pi * branches.radius
 
 
 def _interleaved(*columns: NDArray) -> NDArray:

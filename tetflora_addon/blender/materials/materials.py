@@ -92,8 +92,12 @@ def bark_material(species_name: str, character: str = "ridged") -> bpy.types.Mat
     def build(graph: Graph, material: bpy.types.Material) -> None:
         colour = graph.attribute("tf_colour", "Color")
         bark = graph.node("ShaderNodeGroup", {"Colour": colour}, node_tree=bark_group(character)).outputs
-        looks = {name: bark[name] for name in ("Colour", "Normal")}
-        _lead_out(graph, _scattered(graph, {**looks, "Transmission": 0.0, "Gloss": 0.0}))
+        dull = {"Transmission": 0.0, "Gloss": 0.0}
+        normal = graph.node("ShaderNodeNewGeometry").outputs["Normal"]
+        young = _scattered(graph, {**dull, "Colour": colour, "Normal": normal})
+        for engine, tone in (('CYCLES', graph.scaled(bark["Colour"], bark["Gain"])), ('EEVEE', bark["Colour"])):
+            old = _scattered(graph, {**dull, "Colour": tone, "Normal": bark["Normal"]})
+            _lead_out(graph, graph.mix(bark["Shown"], young, old), engine=engine)
         # The correction takes up to a tenth of the light away from what is rough, unlike for proxies.
         disable_bump_correction(material)
         material.diffuse_color = (0.18, 0.12, 0.08, 1.0)
@@ -174,7 +178,7 @@ def _scattered(graph: Graph, looks: dict[str, Any]) -> bpy.types.Node:
     return graph.node("ShaderNodeGroup", looks, node_tree=scatter_group())
 
 
-def _lead_out(graph: Graph, shader: Any, thickness: Any = None) -> None:
+def _lead_out(graph: Graph, shader: Any, thickness: Any = None, engine: str = 'ALL') -> None:
     """Link a shader to the output. EEVEE would take the extent of the whole mesh for a thickness that is not linked."""
     thickness = graph.value(0.0) if thickness is None else thickness
-    graph.node("ShaderNodeOutputMaterial", {"Surface": shader, "Thickness": thickness})
+    graph.node("ShaderNodeOutputMaterial", {"Surface": shader, "Thickness": thickness}, target=engine)
