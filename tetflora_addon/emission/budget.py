@@ -28,6 +28,7 @@ from ..refinement.contents import LARGE
 from ..refinement.decisions import Decision, contributions
 from ..refinement.loop import Refinement
 from ..refinement.settings import RefinementSettings
+from ..subplants.wood_detail import finer
 from .facets import portion_facets, sizes_of
 from .leaf_detail import TOLERANCE, LeafDetail
 from .plants import Transition, portion_blocks
@@ -329,6 +330,8 @@ def _real_faces(flora: Flora, portions: Portions, transition: Transition) -> NDA
     each = np.where(leafy, flora.leaf_faces[row] / np.maximum(flora.leaf_count[row], 1e-300), 0.0)
     leaves = np.where(leafy, parts.totals.leaf_area / np.maximum(flora.one_leaf_area(parts.branches), 1e-300), 0.0)
     wood = np.maximum(parts.totals.polygons - leaves * each, 0.0)
+    if (pixels := transition.detail.wood) is not None:
+        wood = wood * finer(flora, parts.branches, parts.alone, pixels)
     triangles = transition.of_triangles(parts.branches, portions.visibility)
     full = each * _weights(flora)[flora.rows["species"][row]]
     # Among real leaves, hardly any twig is wide enough to be real.

@@ -19,6 +19,7 @@ from ..growth.growth import WholeBranches
 from ..refinement.shares import PlantParts
 from ..species.leaf_levels import chosen_level, coarse_error, level_polygons
 from ..species.species import LEAF_KINDS
+from ..subplants.wood_detail import Pixels
 
 #: Pixels by which the margin of a leaf may be off.
 TOLERANCE = 0.5
@@ -45,6 +46,15 @@ class LeafDetail:
     flora: Flora
     camera: Camera
     tolerance: float = TOLERANCE
+
+    @property
+    def wood(self) -> Pixels | None:
+        """How large pixels are at wood, that is as fine as leaves; None where it is coarse everywhere."""
+        coarser, camera = self.tolerance / TOLERANCE, self.camera
+        if not np.isfinite(coarser):
+            return None
+        slope = 0.0 if camera.kind == "ORTHO" else camera.pixel_size
+        return Pixels(lambda points: coarser * camera.extent_around(points), coarser * slope)
 
     def lengths(self, whole: WholeBranches, visibility: NDArray[np.float64] | float = 1.0) -> NDArray[np.float64]:
         """Lengths (n,) of the leaves of branches in tolerances, where they come nearest.

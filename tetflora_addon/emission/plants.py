@@ -234,7 +234,7 @@ def _real_parts(
 
 
 def expanded_blocks(flora: Flora, seeds: Seeds, camera: Camera | None = None) -> Iterator[Block]:
-    """Polygons of all plants, seen or not; for comparison. A camera sees near leaves as finely as everywhere."""
+    """Polygons of all plants, seen or not; for comparison. A camera sees what is near as finely as everywhere."""
     plants = trunks(flora.rows, seeds)
     detail = None if camera is None else LeafDetail(flora, camera)
     runs = list(chunks(flora.polygons[plants.row], BLOCK_POLYGONS))
@@ -280,7 +280,7 @@ def _block(
             own = bare.take(np.flatnonzero(of_bare == s))
             tubes = transition.of_bare_wood(own.branches, visibility[own.branches.plant])
             whole.append(own.take(np.flatnonzero(tubes)))
-        bark = [tube_buffers(flora, whole), twig_buffers(flora, twigs)]
+        bark = [tube_buffers(flora, whole, None if detail is None else detail.wood), twig_buffers(flora, twigs)]
         made.append(("bark", 0, int(s), concatenate_buffers([some for some in bark if some is not None])))
         del whole
     # The caller copies each block into Blender; meanwhile its sources and the blocks already taken are not kept.

@@ -235,8 +235,10 @@ def test_wood_says_how_thick_it_is_at_its_base() -> None:
     flora = support.small_flora()
     whole = support.whole_of(flora, support.grown(flora, support.plants(5))[1])
     girth = 2 * np.pi * whole.branches.radius
+    rows = flora.rows[whole.branches.row]
+    faces_of = rows["sides"] * (rows["segments"] + rows["rings"])
     for mesh, faces in (
-        (tube_buffers(flora, [whole]), flora.rows["sides"][whole.branches.row]),
+        (tube_buffers(flora, [whole]), faces_of),
         (twig_buffers(flora, [whole]), np.ones(len(girth), int)),
     ):
         domain, values = mesh.attributes["tf_girth"]

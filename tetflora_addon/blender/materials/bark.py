@@ -35,7 +35,7 @@ _THICKEST = 6.0
 _SHIFT = 10.0
 # Perimeter of the branch on which there are `Bark.scale` features to a radius, metres; also of one that does not say.
 _USUAL = 1.57
-# How much more light relief costs in Cycles than tilted normals explain.
+# Light that relief costs in Cycles over what tilted normals explain.
 _STEEPER = 1.15
 # No flare makes a branch so many times thicker that it is not smooth any more.
 _UNFLARED = 0.6
@@ -44,7 +44,7 @@ _MOSSY, _MOSS_GIRTH = 3.0, (0.3, 0.9)
 # Where light and rain come from: moss faces north and up.
 _SHADY = (0.0, 0.76, 0.65)
 # Colours of moss and lichen over the lightness of the bark under them.
-_MOSS, _LICHEN = (0.9, 1.1, 0.28), (1.15, 1.2, 1.0)
+_MOSS, _LICHEN = (0.95, 1.07, 0.42), (1.15, 1.2, 1.0)
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ def bark_group(character: str) -> bpy.types.NodeTree:
         shown = graph.math('GREATER_THAN', girth, graph.math('MULTIPLY', given["Smooth Under"], _UNFLARED))
         tilt = graph.vector('DOT_PRODUCT', bump, graph.node("ShaderNodeNewGeometry").outputs["Normal"])
         gain = graph.math('DIVIDE', 2.0, graph.math('ADD', 1.0, graph.math('MAXIMUM', tilt, 0.0)))
-        # What a slope reflects onto the slope opposite is not made up for by a tilted normal; measured.
+        # Tilted normals explain most of the loss; the rest is measured.
         gain = graph.math('MULTIPLY_ADD', gain, _STEEPER, 1.0 - _STEEPER)
         return {"Colour": colour, "Normal": bump, "Gain": gain, "Shown": shown}
 
@@ -228,14 +228,14 @@ def _bark(character: str) -> Bark:
 
 
 _CHARACTERS: dict[str, Bark] = {
-    "ridged": Bark(patterns.ridged, 8.0, 7.0, (0.329, 0.298, 0.257), 1.0, 0.35, 0.12, 0.7, 1.0, 0.6),
+    "ridged": Bark(patterns.ridged, 12.0, 8.0, (0.344, 0.312, 0.269), 1.0, 0.35, 0.12, 0.7, 1.0, 0.6),
     "plated": Bark(patterns.plated, 4.4, 2.6, (0.416, 0.279, 0.217), 1.0, 0.22, 0.2, 0.8, 0.3, 0.4),
     "smooth": Bark(patterns.smooth, 6.0, 0.3, (0.537, 0.546, 0.515), 1.0, 0.05, 0.05, 0.3, 0.8, 0.9),
     "banded": Bark(patterns.banded, 7.0, 0.2, (0.636, 0.614, 0.595), 1.0, 0.05, 0.1, 0.3, 0.4, 0.5),
     "ringed": Bark(patterns.ringed, 2.2, 1.2, (0.519, 0.519, 0.519), 0.7, 0.07, 0.2, 0.6, power=0.0),
     "fibrous": Bark(patterns.fibrous, 9.0, 14.0, (0.543, 0.481, 0.429), 1.0, 0.3, 0.1, 0.5, 0.5, 0.3),
     "jointed": Bark(patterns.jointed, 3.0, 8.0, (0.443, 0.443, 0.443), 0.32, 0.03, 0.02, 0.08, power=0.0),
-    "netted": Bark(patterns.netted, 6.5, 5.0, (0.571, 0.513, 0.444), 1.0, 0.35, 0.15, 0.7, 0.7, 0.6),
+    "netted": Bark(patterns.netted, 9.0, 5.5, (0.57, 0.512, 0.442), 1.0, 0.35, 0.15, 0.7, 0.7, 0.6),
     "peeling": Bark(patterns.peeling, 14.0, 0.22, (0.762, 0.752, 0.737), 1.0, 0.12, 0.12, 0.4, 0.4, 0.3),
     "scaly": Bark(patterns.scaly, 7.0, 1.2, (0.678, 0.603, 0.545), 1.0, 0.25, 0.12, 0.6, 0.4, 0.5),
 }

@@ -108,9 +108,10 @@ def ridged(graph: Graph, place: Place) -> tuple[Socket, Socket]:
     grain = _noise(graph, _times(graph, bent, 1.6, 5.0), 5.0, 0.68)[0]
     distance = graph.math('MULTIPLY_ADD', grain, 0.16, _edges(graph, bent))
     ridge = smooth_step(graph, distance, 0.09, 0.36)
-    across = _edges(graph, _bent(graph, _times(graph, bent, 0.8, 2.1), wave, 1.0))
-    ridge = graph.math('MULTIPLY', ridge, graph.math('MULTIPLY_ADD', smooth_step(graph, across, 0.0, 0.09), 0.5, 0.5))
-    height = graph.math('MULTIPLY_ADD', grain, 0.55, ridge)
+    across = _edges(graph, _bent(graph, _times(graph, bent, 0.8, 2.6), wave, 1.0))
+    across = smooth_step(graph, graph.math('MULTIPLY_ADD', grain, 0.2, across), 0.08, 0.2)
+    ridge = graph.math('MULTIPLY', ridge, graph.math('MULTIPLY_ADD', across, 0.6, 0.4))
+    height = graph.math('MULTIPLY_ADD', grain, 0.75, graph.math('MULTIPLY_ADD', ridge, 0.95, -0.05))
     tones = (0.2, (0.1, 0.085, 0.07)), (0.55, (0.4, 0.35, 0.29)), (0.9, (0.66, 0.62, 0.55)), (1.0, (0.8, 0.79, 0.74))
     return _tones(graph, graph.math('MULTIPLY', height, 0.75), tones), height
 
