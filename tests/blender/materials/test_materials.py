@@ -136,12 +136,13 @@ def test_bark_keeps_the_mean_colour(character, engine):
     assert seen.std(axis=(0, 1))[0] > 0.005, "no pattern"
 
 
-def flat_bark(character):
+def flat_bark(character, **inputs):
     """A material that gives off what bark reflects, whatever the light."""
 
     def build(graph, _material):
         group = bark.bark_group(character)
-        looks = graph.node("ShaderNodeGroup", {"Colour": graph.attribute("tf_colour", "Color")}, node_tree=group)
+        given = {"Colour": graph.attribute("tf_colour", "Color"), **inputs}
+        looks = graph.node("ShaderNodeGroup", given, node_tree=group)
         shine = graph.node("ShaderNodeEmission", {"Color": looks.outputs["Colour"], "Strength": 1.0})
         graph.node("ShaderNodeOutputMaterial", {"Surface": shine})
 
@@ -171,14 +172,15 @@ def test_moss_grows_low_on_thick_wood_and_not_on_thin():
     assert green(0.04, -4) == pytest.approx(green(0.04, 3), rel=0.05)
 
 
-def test_features_of_thin_and_thick_branches_differ_less_than_their_girth():
-    """A limb has fewer ridges around than the bole, and narrower ones: number by the root of the girth."""
+def test_features_are_as_many_as_the_root_of_the_girth():
+    """A limb of a quarter of the bole's radius has half as many plates around, so they are half as wide."""
 
-    def around(radius):
-        column = bark_seen("ridged", radius, material=lambda: flat_bark("ridged"))[..., 1]
-        return (np.diff((column > column.mean()).astype(int), axis=0) > 0).sum(axis=0).mean()
+    def seen(radius, scale):
+        inputs = {"Scale": scale, "Lichen": 0.0, "Moss": 0.0, "Full Over": 0.1, "Smooth Under": 0.0}
+        return bark_seen("plated", radius, material=lambda: flat_bark("plated", **inputs))
 
-    assert 1.2 < around(0.5) / around(0.125) < 2.8
+    np.testing.assert_allclose(seen(0.4, 4.0), seen(0.1, 8.0), atol=0.05)
+    assert np.abs(seen(0.4, 4.0) - seen(0.1, 4.0)).mean() > 0.02
 
 
 def test_young_twigs_are_smooth():
