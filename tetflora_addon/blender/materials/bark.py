@@ -20,7 +20,7 @@ import bpy
 from ...errors import SpeciesError
 from . import bark_patterns as patterns
 from .bark_patterns import Place, Socket
-from .nodes import Graph, find_socket, shader_group, smooth_step
+from .nodes import Graph, shader_group, smooth_step
 
 PLACE = "TetFlora Bark Place"
 
@@ -41,6 +41,8 @@ _STEEPER = 1.15
 _UNFLARED = 0.6
 # Moss grows up to this height above the base of a branch, on branches of these perimeters, metres.
 _MOSSY, _MOSS_GIRTH = 3.0, (0.3, 0.9)
+# Patches of moss and lichen to a meter.
+_PATCHES = 5.0
 # Where light and rain come from: moss faces north and up.
 _SHADY = (0.0, 0.76, 0.65)
 # Colours of moss and lichen over the lightness of the bark under them.
@@ -195,9 +197,8 @@ def _overgrown(
     """Moss where it is damp, lichen where a noise is low: as light as the bark beneath, so that the mean stays."""
     place, girth, age = at
     radii = graph.math('DIVIDE', girth, tau)
-    metres = graph.vector('SCALE', place.round, radii)
-    inputs = {"Vector": metres, "Scale": 5.0, "Detail": 5.0, "Roughness": 0.65}
-    noise = find_socket(graph.node("ShaderNodeTexNoise", inputs).outputs, "Fac")
+    metres = graph.vector('SCALE', place.round, graph.math('MULTIPLY', radii, _PATCHES))
+    noise = graph.noise(metres, 5.0, 0.65)[0]
     normal = graph.node("ShaderNodeNewGeometry").outputs["Normal"]
     damp = smooth_step(graph, graph.vector('DOT_PRODUCT', normal, _SHADY), -0.3, 0.9)
     low = smooth_step(graph, graph.math('MULTIPLY', place.along, radii), _MOSSY, 0.0)
@@ -210,8 +211,7 @@ def _overgrown(
     lichen = graph.math('MULTIPLY', smooth_step(graph, noise, 0.37, 0.34), graph.math('MULTIPLY', given["Lichen"], age))
     light = graph.node("ShaderNodeRGBToBW", {"Color": colour}).outputs[0]
     for tint, amount in ((_LICHEN, lichen), (_MOSS, moss)):
-        inputs = {"Factor_Float": amount, "A_Color": colour, "B_Color": graph.vector('SCALE', tint, light)}
-        colour = find_socket(graph.node("ShaderNodeMix", inputs, data_type='RGBA').outputs, "Result_Color")
+        colour = graph.mixed(amount, colour, graph.vector('SCALE', tint, light))
     return colour, graph.math('MULTIPLY_ADD', moss, 0.4, height)
 
 

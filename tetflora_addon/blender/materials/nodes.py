@@ -169,6 +169,24 @@ class Graph:
         grey = self.node("ShaderNodeCombineColor", {"Red": factor, "Green": factor, "Blue": factor})
         return self.tinted(colour, grey)
 
+    def step(self, value: Any, low: Any, high: Any) -> bpy.types.NodeSocket:
+        """0 under `low`, 1 over `high`, smooth between; falls where `low` is above `high`."""
+        inputs = {"Value": value, "From Min": low, "From Max": high}
+        return self.node("ShaderNodeMapRange", inputs, interpolation_type='SMOOTHSTEP').outputs[0]
+
+    def mixed(self, factor: Any, a: Any, b: Any) -> bpy.types.NodeSocket:
+        """Colours mixed; those that are no sockets are (r, g, b)."""
+        inputs = {"Factor_Float": factor}
+        for key, colour in (("A_Color", a), ("B_Color", b)):
+            inputs[key] = (*colour, 1.0) if isinstance(colour, tuple) else colour
+        return find_socket(self.node("ShaderNodeMix", inputs, data_type='RGBA').outputs, "Result_Color")
+
+    def noise(self, place: Any, detail: float, roughness: float) -> tuple[Any, Any]:
+        """Fractal noise from 0 to 1, .5 on average: a number and three."""
+        inputs = {"Vector": place, "Scale": 1.0, "Detail": detail, "Roughness": roughness}
+        outputs = self.node("ShaderNodeTexNoise", inputs).outputs
+        return find_socket(outputs, "Fac"), find_socket(outputs, "Color")
+
     def arrange(self) -> None:
         """Lay the nodes out in columns by their distance from the outputs, for whoever opens the editor."""
         column = {node: 0 for node in self.tree.nodes}
@@ -212,9 +230,8 @@ def find_socket(sockets: Any, key: str) -> bpy.types.NodeSocket:
 
 
 def smooth_step(graph: Graph, value: Any, low: Any, high: Any) -> bpy.types.NodeSocket:
-    """0 under `low`, 1 over `high`, smooth between; falls where `low` is above `high`."""
-    inputs = {"Value": value, "From Min": low, "From Max": high}
-    return graph.node("ShaderNodeMapRange", inputs, interpolation_type='SMOOTHSTEP').outputs[0]
+    """`Graph.step`."""
+    return graph.step(value, low, high)
 
 
 def shader_group(
