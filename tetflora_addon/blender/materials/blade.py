@@ -50,7 +50,7 @@ _NET, _NET_MEAN = 4.5, 0.257
 #: Height of the blade's undulation, leaf lengths.
 _SWELL = 0.05
 #: Reflected and transmitted color of dead tissue.
-_DEAD, _DEAD_THROUGH = (0.17, 0.085, 0.03, 1.0), (0.1, 0.04, 0.008, 1.0)
+_DEAD, _DEAD_THROUGH = (0.12, 0.062, 0.022, 1.0), (0.07, 0.028, 0.006, 1.0)
 #: Digits of a leaf's color: far enough apart for leaves of nearly the same color, and robust against rounding.
 _DIGITS = (1187.0, 2039.0, 3121.0)
 
@@ -94,17 +94,17 @@ class BladeLook:
     relief: float = 0.025
     mottling: float = 0.3
     rough: float = 0.5
-    wear: float = 0.08
+    wear: float = 0.05
     palmate: bool = False
     net: bool = False
 
 
 BLADES: dict[str, BladeLook] = {
     "pinnate": BladeLook(veins=9.0, angle=48.0, net=True),
-    "lobed": BladeLook(veins=6.0, angle=52.0, rough=0.45, net=True),
+    "lobed": BladeLook(veins=6.0, angle=52.0, net=True),
     "palmate": BladeLook(veins=6.0, angle=48.0, palmate=True, net=True),
     "narrow": BladeLook(veins=12.0, angle=35.0, midrib=0.6, lines=0.1),
-    "parallel": BladeLook(veins=60.0, angle=0.0, midrib=0.3, lines=0.12, dark=0.2, relief=0.03, wear=0.12),
+    "parallel": BladeLook(veins=60.0, angle=0.0, midrib=0.3, lines=0.12, dark=0.2, relief=0.03, wear=0.1),
     "plain": BladeLook(veins=0.0, angle=0.0),
     "needle": BladeLook(veins=0.0, angle=0.0, rough=0.4, wear=0.03),
     "petal": BladeLook(veins=14.0, angle=12.0, midrib=0.0, lines=0.06, dark=0.15, relief=0.02, rough=0.7, wear=0.0),
@@ -254,7 +254,7 @@ def _varied(graph: Graph, mottled: Socket, tone: Socket, hue: tuple[float, float
 def _dead(graph: Graph, given: Any, place: Socket, own: Socket, noise: Socket) -> Socket:
     """Share of dead tissue: none on most leaves; on a few the tip, the ends of lobes, and spots."""
     worn = graph.math('SUBTRACT', own, graph.math('SUBTRACT', 1.0, given["Wear"]))
-    worn = graph.math('MULTIPLY', worn, 1.0 / 0.08)
+    worn = graph.math('DIVIDE', worn, graph.math('MAXIMUM', given["Wear"], 1e-3))
     away = graph.vector('DISTANCE', place, (0.5, 0.4, 0.0))
     field = graph.math('MULTIPLY_ADD', noise, 0.7, away)
     rim = graph.math('MULTIPLY_ADD', worn, 0.18, field)
