@@ -43,7 +43,8 @@ def species_leaf_material(species: Species, kind: str) -> bpy.types.Material:
     forms = species.forms(LEAF_KINDS.index(kind))
     model = forms[0] if isinstance(forms[0], LeafModel) else None
     through = species.leaf_transmission if kind == "leaf" else species.blossom_transmission
-    looks = {"leaf_length": _length(species, kind)}
+    leaflet = model.shape.length if model is not None and isinstance(model.shape, Compound) else 1.0
+    looks = {"leaf_length": leaflet * _length(species, kind)}
     blade = "pinnate" if model is None else blade_kind(model, through, kind)
     if model is not None and (veins := _number(model, blade)):
         looks["veins"] = veins
