@@ -20,7 +20,7 @@ from ..materials.materials import leaf_material
 #: Transmission under which leaves are needles, scales or succulent.
 _THICK = 0.2
 #: Width over length: under the first, veins are parallel; under the second, leaves are narrow; over the third, palmate.
-_PARALLEL, _NARROW, _PALMATE = 0.2, 0.3, 0.95
+_PARALLEL, _NARROW, _PALMATE = 0.15, 0.3, 0.95
 #: Area over that of the convex hull, under which a leaf is lobed.
 _LOBED = 0.86
 #: Parallel veins across a blade.
