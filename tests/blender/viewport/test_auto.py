@@ -305,3 +305,29 @@ def test_what_is_deleted_in_the_middle_is_noticed(scene, monkeypatch, what):
         assert len(results(scene)) == 1
         assert json.loads(scene.tetflora.statistics)["plants"] == 3 - (what == "tree 1")
         assert sum(o.name.startswith("TetFlora proxies") for o in bpy.data.objects) <= 1
+
+
+def test_undo_and_redo_meet_no_results_that_they_do_not_know(scene, monkeypatch):
+    # Blender keeps the scene where it is equal in two steps: it pointed to results made after both, which undo frees.
+    scene.tetflora.auto_refine = True
+    settle(monkeypatch)
+    bpy.ops.ed.undo_push(message="refined")
+    for number in range(3):
+        bpy.data.objects["tree 0"].location.x += 1.0
+        bpy.ops.ed.undo_push(message=f"move {number}")
+    settle(monkeypatch)
+    met = []
+    handlers = bpy.app.handlers.undo_pre, bpy.app.handlers.redo_pre
+    for handler in handlers:
+        handler.append(lambda *_: met.append(len(results(bpy.context.scene))))
+    try:
+        for step in (bpy.ops.ed.undo, bpy.ops.ed.undo, bpy.ops.ed.redo, bpy.ops.ed.redo):
+            step()
+            bpy.context.view_layer.update()
+            assert settle(monkeypatch) > 0
+            assert len(results(bpy.context.scene)) == 1
+            assert len(bpy.data.collections) == 1
+    finally:
+        for handler in handlers:
+            handler.pop()
+    assert met == [0, 0, 0, 0]

@@ -3,8 +3,9 @@
 """Refine Automatically: in the window, shortly after the camera, plants or settings change, in slices between redraws.
 
 A change stops the work, which starts again after `QUIET` seconds without changes. Where the digest of everything that
-refinement depends on is the same as last time, nothing is done. Earlier results stay until there are new ones. Undo,
-loading, rendering, and operators that change results stop the work too, because it holds datablocks that they remove.
+refinement depends on is the same as last time, nothing is done. Earlier results stay until there are new ones, but not
+through undo. Undo, loading, rendering, and operators that change results stop the work too, because it holds datablocks
+that they remove.
 """
 
 from __future__ import annotations
@@ -20,11 +21,12 @@ from ...errors import TetFloraError
 from ...refinement.statistics import Progress
 from ..job import refine
 from ..job.frame_cache import choices, scene_digest
-from ..materials.nodes import is_ours
+from ..materials.nodes import is_ours, is_own
 from ..placing.plant_objects import prepare_scene
 from ..properties import auto_refine_switched
 from ..results.collection import has_results
 from ..results.leaf_objects import leaf_objects
+from ..results.output import PURPOSE, remove_collection
 from ..runtime import GoneError, Handlers, call_off, call_soon, redraw
 from ..settings import wind_of
 from .state import camera_now
@@ -221,6 +223,27 @@ def on_interruption(*_arguments: object) -> None:
         schedule(scene)
 
 
+def before_undo(*_arguments: object) -> None:
+    """Take away what comes back by itself: it was made without a step of undo.
+
+    Undo keeps datablocks that are equal in two steps, such as the scene, with their pointers. Those to results that
+    neither step knows would lead to freed memory, and Blender would crash.
+    """
+    on_interruption()
+    for scene in bpy.data.scenes:
+        if scene.library is None and scene.tetflora.auto_refine and has_results(scene):
+            refine.clear(scene, for_render=False)
+
+
+def after_undo(*_arguments: object) -> None:
+    """Refine again; results that the step knew are gone from a scene that was kept."""
+    for collection in [c for c in bpy.data.collections if PURPOSE in c and is_own(c) and not c.users]:
+        remove_collection(None, collection)
+    scene = bpy.context.scene
+    if scene is not None and scene.tetflora.auto_refine:
+        schedule(scene)
+
+
 def on_load(*_arguments: object) -> None:
     """Another file: its results are none of ours."""
     _done.clear()
@@ -232,8 +255,10 @@ def on_load(*_arguments: object) -> None:
 _HANDLERS = Handlers(
     depsgraph_update_post=on_change,
     frame_change_post=on_frame,
-    undo_pre=on_interruption,
-    redo_pre=on_interruption,
+    undo_pre=before_undo,
+    redo_pre=before_undo,
+    undo_post=after_undo,
+    redo_post=after_undo,
     render_init=on_interruption,
     load_pre=(on_interruption, on_load),
 )
