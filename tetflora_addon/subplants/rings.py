@@ -154,7 +154,7 @@ def foot_rings(flora: Flora, whole: WholeBranches, fine: Fineness) -> tuple[Ring
     centre = np.einsum("nij,nj->ni", turn, path.reshape(-1, 3)) + np.repeat(wood.position, places, axis=0)
     axes = np.einsum("nij,anj->ain", turn, axes)
     owner = np.repeat(np.arange(many), places)
-    t = np.tile(np.linspace(0.0, 1.0, places), many)
+    t = -np.tile(np.linspace(0.0, 1.0, places), many)  # as deep as the foot, for materials: below the base
     reach = (width.ravel() * axes).astype(np.float32)
     still = None if whole.lines.later is None else (centre, reach)
     return Rings(wood, owner, t, centre, reach, _goes_on(owner), still), own[which]

