@@ -22,6 +22,7 @@ from mathutils import Vector
 from numpy.typing import NDArray
 
 from examples.row80 import add_daylight
+from tetflora_addon import memory
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.job.plant_mesh import single_seed
 from tetflora_addon.compiled.flora import compile_species
@@ -35,12 +36,12 @@ from tetflora_addon.subplants.leaf_copies import LevelCopies
 from .compare import flip_map, read_picture, render
 from .report import Targets, forget_peak, peak_mb
 
-FRAMES, QUICK_FRAMES = 60, 8
+FRAMES, QUICK_FRAMES = 60, 6
 FAR, NEAR = 400.0, 0.15
-SIZE, QUICK_SIZE = (960, 540), (480, 270)
+SIZE, QUICK_SIZE = (960, 540), (320, 180)
 SAMPLES, QUICK_SAMPLES = 16, 4
 #: The tree of the leaf, and what stands behind it.
-TREE, BEHIND, NUMBER = "oak", ("oak", "beech", "birch", "spruce", "maple"), 40
+TREE, BEHIND, NUMBER = "oak", ("oak", "beech", "birch", "spruce", "maple"), 14
 #: Leaves of so many pixels are near, and so many of a frame are measured, the longest.
 _LONG, _MEASURED = 40.0, 60
 
@@ -76,6 +77,8 @@ def run(quick: bool) -> dict[str, float]:
     with tempfile.TemporaryDirectory() as folder:
         for distance in distances:
             place(scene, target, towards, float(distance))
+            refine.clear(scene)  # or what was expanded would count
+            memory.give_back()
             forget_peak()
             with recording() as drawn:
                 statistics = _made(scene, expand=False)
