@@ -41,7 +41,7 @@ GROWN = (
     ("moss", 'SHADE', 4.0),
 )
 #: What falls: kind, habitat, pieces on a square meter of ground that is wholly covered, of how many species.
-DROPPED = (("litter", 'LITTER', 9.0, 4), ("branch", 'DEAD_WOOD', 0.35, 2), ("log", 'DEAD_WOOD', 0.012, 1))
+DROPPED = (("litter", 'LITTER', 12.0, 4), ("branch", 'DEAD_WOOD', 0.35, 2), ("log", 'DEAD_WOOD', 0.012, 1))
 #: Plants that a cover is made of at most by itself; on larger ground they stand farther apart.
 MOST = 1_000_000
 #: Lower plants shed nothing that would be seen, meters.
