@@ -107,8 +107,8 @@ def test_masks_of_the_population_hold_for_its_cover():
     x = fields.read_field(_field(), depsgraph(), np.eye(4)[None]).position[:, 0]
     assert cover.vertex_group == "west"
     assert (np.abs(x + 6.0) >= 1.5).all()
-    # The weight falls from the west to nothing in the east.
-    assert (x < -2.0).mean() > 0.55
+    # The weight falls from the west to nothing in the east; without it a third would be here.
+    assert (x < -2.0).mean() > 0.48
     assert (x > 6.0).sum() < (x < -8.0).sum()
 
 
