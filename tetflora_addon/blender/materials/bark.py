@@ -37,8 +37,6 @@ _SHIFT = 10.0
 _USUAL = 1.57
 # Light that relief costs in Cycles over what tilted normals explain.
 _STEEPER = 1.15
-# No flare makes a branch so many times thicker that it is not smooth any more.
-_UNFLARED = 0.6
 # Moss grows up to this height above the base of a branch, on branches of these perimeters, metres.
 _MOSSY, _MOSS_GIRTH = 3.0, (0.3, 0.9)
 # Patches of moss and lichen to a meter.
@@ -169,12 +167,13 @@ def bark_group(character: str) -> bpy.types.NodeTree:
         change = graph.vector('SCALE', around_one, graph.math('MULTIPLY', given["Contrast"], age))
         colour = graph.tinted(given["Colour"], graph.vector('ADD', change, (1.0, 1.0, 1.0)))
         if bark.moss or bark.lichen:
-            colour, height = _overgrown(graph, given, (place, girth, age), colour, height)
+            colour = _overgrown(graph, given, (place, girth, age), colour)
         # Thickness must not be part of the height, whose slope alone is wanted.
         width = graph.math('DIVIDE', where["Perimeter"], graph.math('MULTIPLY', scale, tau))
         depth = graph.math('MULTIPLY', graph.math('MULTIPLY', width, given["Depth"]), age)
         bump = graph.node("ShaderNodeBump", {"Strength": 1.0, "Distance": depth, "Height": height})
-        shown = graph.math('GREATER_THAN', girth, graph.math('MULTIPLY', given["Smooth Under"], _UNFLARED))
+        # Only trunks flare, and these are thick.
+        shown = graph.math('GREATER_THAN', girth, given["Smooth Under"])
         tilt = graph.vector('DOT_PRODUCT', bump, graph.node("ShaderNodeNewGeometry").outputs["Normal"])
         gain = graph.math('DIVIDE', 2.0, graph.math('ADD', 1.0, graph.math('MAXIMUM', tilt, 0.0)))
         # Tilted normals explain most of the loss; the rest is measured.
@@ -191,14 +190,12 @@ def base_girth(graph: Graph) -> Socket:
     return graph.math('MULTIPLY_ADD', graph.math('LESS_THAN', girth, 1e-6), _USUAL, girth)
 
 
-def _overgrown(
-    graph: Graph, given: Any, at: tuple[Place, Socket, Socket], colour: Socket, height: Socket
-) -> tuple[Socket, Socket]:
+def _overgrown(graph: Graph, given: Any, at: tuple[Place, Socket, Socket], colour: Socket) -> Socket:
     """Moss where it is damp, lichen where a noise is low: as light as the bark beneath, so that the mean stays."""
     place, girth, age = at
     radii = graph.math('DIVIDE', girth, tau)
     metres = graph.vector('SCALE', place.round, graph.math('MULTIPLY', radii, _PATCHES))
-    noise = graph.noise(metres, 5.0, 0.65)[0]
+    noise = graph.noise(metres, 4.0, 0.65)[0]
     normal = graph.node("ShaderNodeNewGeometry").outputs["Normal"]
     damp = smooth_step(graph, graph.vector('DOT_PRODUCT', normal, _SHADY), -0.3, 0.9)
     low = smooth_step(graph, graph.math('MULTIPLY', place.along, radii), _MOSSY, 0.0)
@@ -212,7 +209,7 @@ def _overgrown(
     light = graph.node("ShaderNodeRGBToBW", {"Color": colour}).outputs[0]
     for tint, amount in ((_LICHEN, lichen), (_MOSS, moss)):
         colour = graph.mixed(amount, colour, graph.vector('SCALE', tint, light))
-    return colour, graph.math('MULTIPLY_ADD', moss, 0.4, height)
+    return colour
 
 
 def bark_version(character: str) -> int:
@@ -228,16 +225,16 @@ def _bark(character: str) -> Bark:
 
 
 _CHARACTERS: dict[str, Bark] = {
-    "ridged": Bark(patterns.ridged, 12.0, 8.0, (0.344, 0.312, 0.269), 1.0, 0.26, 0.12, 0.7, 1.0, 0.6),
-    "plated": Bark(patterns.plated, 4.4, 2.6, (0.416, 0.279, 0.217), 1.0, 0.18, 0.2, 0.8, 0.3, 0.4),
-    "smooth": Bark(patterns.smooth, 6.0, 0.3, (0.537, 0.546, 0.515), 1.0, 0.02, 0.05, 0.3, 0.8, 0.9),
+    "ridged": Bark(patterns.ridged, 12.0, 8.0, (0.345, 0.313, 0.27), 1.0, 0.26, 0.22, 0.8, 1.0, 0.6),
+    "plated": Bark(patterns.plated, 4.4, 2.6, (0.416, 0.279, 0.217), 1.0, 0.18, 0.25, 0.8, 0.3, 0.4),
+    "smooth": Bark(patterns.smooth, 6.0, 0.3, (0.537, 0.546, 0.515), 1.0, 0.02, 0.12, 0.4, 0.8, 0.9),
     "banded": Bark(patterns.banded, 7.0, 0.2, (0.636, 0.614, 0.595), 1.0, 0.05, 0.1, 0.3, 0.4, 0.5),
     "ringed": Bark(patterns.ringed, 2.2, 1.2, (0.519, 0.519, 0.519), 0.7, 0.07, 0.2, 0.6, power=0.0),
-    "fibrous": Bark(patterns.fibrous, 9.0, 14.0, (0.543, 0.481, 0.429), 1.0, 0.3, 0.1, 0.5, 0.5, 0.3),
+    "fibrous": Bark(patterns.fibrous, 9.0, 14.0, (0.543, 0.481, 0.429), 1.0, 0.3, 0.16, 0.5, 0.5, 0.3),
     "jointed": Bark(patterns.jointed, 3.0, 8.0, (0.443, 0.443, 0.443), 0.32, 0.03, 0.02, 0.08, power=0.0),
-    "netted": Bark(patterns.netted, 9.0, 5.5, (0.57, 0.512, 0.442), 1.0, 0.26, 0.15, 0.7, 0.7, 0.6),
+    "netted": Bark(patterns.netted, 9.0, 5.5, (0.57, 0.512, 0.442), 1.0, 0.26, 0.22, 0.8, 0.7, 0.6),
     "peeling": Bark(patterns.peeling, 14.0, 0.22, (0.762, 0.752, 0.737), 1.0, 0.1, 0.12, 0.4, 0.4, 0.3),
-    "scaly": Bark(patterns.scaly, 7.0, 1.2, (0.678, 0.603, 0.545), 1.0, 0.18, 0.12, 0.6, 0.4, 0.5),
+    "scaly": Bark(patterns.scaly, 7.0, 1.2, (0.678, 0.603, 0.545), 1.0, 0.18, 0.2, 0.6, 0.4, 0.5),
 }
 
 #: Characters of bark, as species name them.

@@ -89,15 +89,17 @@ def ridged(graph: Graph, place: Place) -> tuple[Socket, Socket]:
     """Ridges that part and meet, deep fissures between them, and cracks across."""
     wave = graph.noise(_times(graph, place.cells, 0.45, 0.9), 1.0, 0.5)[1]
     bent = _bent(graph, place.cells, wave, 2.2, 0.6)
-    grain = graph.noise(_times(graph, bent, 1.6, 5.0), 5.0, 0.68)[0]
+    grain = graph.noise(_times(graph, bent, 1.6, 5.0), 3.0, 0.68)[0]
     distance = graph.math('MULTIPLY_ADD', grain, 0.16, _edges(graph, bent))
     ridge = graph.step(distance, 0.09, 0.36)
     across = _edges(graph, _bent(graph, _times(graph, bent, 0.8, 2.6), wave, 1.0))
     across = graph.step(graph.math('MULTIPLY_ADD', grain, 0.2, across), 0.08, 0.2)
-    ridge = graph.math('MULTIPLY', ridge, graph.math('MULTIPLY_ADD', across, 0.6, 0.4))
+    # Cracks across are in the color alone: nodes of the height are worked out three times.
     height = graph.math('MULTIPLY_ADD', grain, 0.75, graph.math('MULTIPLY_ADD', ridge, 0.95, -0.05))
+    cracked = graph.math('MULTIPLY', ridge, graph.math('MULTIPLY_ADD', across, 0.6, 0.4))
+    tone = graph.math('MULTIPLY_ADD', grain, 0.75, graph.math('MULTIPLY_ADD', cracked, 0.95, -0.05))
     tones = (0.2, (0.1, 0.085, 0.07)), (0.55, (0.4, 0.35, 0.29)), (0.9, (0.66, 0.62, 0.55)), (1.0, (0.8, 0.79, 0.74))
-    return _tones(graph, graph.math('MULTIPLY', height, 0.75), tones), height
+    return _tones(graph, graph.math('MULTIPLY', tone, 0.75), tones), height
 
 
 def plated(graph: Graph, place: Place) -> tuple[Socket, Socket]:
