@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the cost of a wood follows: pixels, plants, plants a hectare, height of the camera.
 
-    python -m benchmarks curves                # processor seconds and memory of refine and emit
+    python -m benchmarks curves                # processor seconds and memory, with targets
     python -m benchmarks.forest_curves --plot  # docs/images/forest_curves.png, of what the last run left
 
 Each point is the wood of `forest`, of birches at full HD, with one thing changed, in a process of its own. A slope is

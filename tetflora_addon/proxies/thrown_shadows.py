@@ -3,7 +3,8 @@
 """Which things beside the view throw shadows into it, and from how far.
 
 Of what stands beside the view, most can be noticed by little more than the light that it sends back. What stands
-between a light and the view is noticed by the shape of its shadow, and wants finer facets.
+between a light and the view is noticed by the shape of its shadow, and wants finer facets: the space that the paper
+refines "in order to calculate accurate shadows" (section 6.1).
 """
 
 from __future__ import annotations
