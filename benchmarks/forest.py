@@ -4,7 +4,7 @@
 
     python -m benchmarks forest [--quick]          # everything, with targets
     python -m benchmarks.forest birch --no-render  # one case, as a line of JSON
-    python -m benchmarks.forest mix --size 480x270 --side 50 --samples 2
+    python -m benchmarks.forest mix --size 480x270 --side 50 --samples 2 --cover
     python -m benchmarks.forest eye --what part    # against expansion, where it can be expanded
     python -m benchmarks.forest missing            # everything that an earlier run has not left in out/forest
 
@@ -128,7 +128,7 @@ def one(arguments: argparse.Namespace) -> dict:
             planted = forest_scene.build_million(scene, arguments.asked)
         else:
             case = forest_scene.case_of(arguments.case)
-            changes = {name: getattr(arguments, name) for name in ("asked", "side", "distance", "eye", "away")}
+            changes = {name: getattr(arguments, name) for name in ("asked", "side", "distance", "eye", "away", "cover")}
             case = replace(case, **{name: value for name, value in changes.items() if value})
             planted = forest_scene.build(scene, case, arguments.size)
         for name, value in arguments.set:
@@ -172,6 +172,7 @@ def main() -> int:
     add("--distance", type=float, help="minimum distance between plants, metres")
     add("--eye", type=float, help="height of the camera, metres")
     add("--away", type=float, help="least distance of the camera from the middle, metres; it looks so far")
+    add("--cover", action="store_true", help="with ground cover")
     add("--size", type=_size, default=(1920, 1080), metavar="WxH")
     add("--set", type=_setting, nargs="+", default=[], metavar="NAME=VALUE", help="settings of the scene")
     add("--at-once", action="store_true", help="as scripts and renders refine, not in steps as the window does")

@@ -53,6 +53,8 @@ class Case:
     away : float
         Least distance of the camera from the middle of the ground, metres, and how far ahead it then looks. 0: to the
         middle.
+    cover : bool
+        The ground is covered.
     """
 
     species: tuple[str, ...]
@@ -62,6 +64,7 @@ class Case:
     inside: bool = False
     side: float = SIDE
     away: float = 0.0
+    cover: bool = False
 
 
 def case_of(name: str) -> Case:
@@ -88,13 +91,15 @@ def build(scene: bpy.types.Scene, case: Case, size: tuple[int, int] = (WIDTH, HE
     """Fill an empty scene with ground, plants, camera, sun and sky; how many plants there are."""
     bpy.ops.mesh.primitive_grid_add(size=case.side, x_subdivisions=SUBDIVISIONS, y_subdivisions=SUBDIVISIONS)
     bpy.ops.tetflora.populate(count=case.asked, min_distance=case.distance, species=", ".join(case.species))
+    if case.cover:
+        bpy.ops.tetflora.ground_cover()
     add_camera(scene, case)
     add_light(scene)
     render = scene.render
     render.resolution_x, render.resolution_y, render.resolution_percentage = *size, 100
     scene.tetflora.refine_at_render = False
     bpy.context.view_layer.update()
-    return scene.tetflora.populations[0].made
+    return sum(population.made for population in scene.tetflora.populations)
 
 
 def add_camera(scene: bpy.types.Scene, case: Case) -> None:

@@ -29,7 +29,7 @@ QUICK_TARGETS: Targets = TARGETS
 def run(quick: bool) -> dict[str, float]:
     """Measure all barks; `cycles_<bark>` is its time over that of the plain material."""
     scene = bpy.context.scene
-    trunk, plain = _trunk_scene(scene), _plain_material()
+    trunk, plain = _trunk_scene(scene), plain_material()
     scene.cycles.samples = 8 if quick else 32
     ratios = {}
     for character in bark.BARKS:
@@ -67,7 +67,7 @@ def _trunk_scene(scene: bpy.types.Scene) -> bpy.types.Object:
     return trunk
 
 
-def _plain_material() -> bpy.types.Material:
+def plain_material() -> bpy.types.Material:
     """Principled as Blender gives it, with the colour of the faces."""
     material = bpy.data.materials.new("Plain")
     tree = compat.shader_tree(material)

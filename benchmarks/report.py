@@ -81,7 +81,10 @@ def table(record: dict) -> str:
     """Figures beside their targets, one a line."""
     lines = [f"{record['name']}  (Blender {record['blender']}, {record['machine']}, {record['commit']})"]
     for key, value in record["figures"].items():
-        shown = f"{value:,}" if isinstance(value, int) else f"{value:,.4g}"
+        if isinstance(value, list):
+            shown = f"{len(value)} rows"
+        else:
+            shown = f"{value:,}" if isinstance(value, int) else f"{value:,.4g}"
         target = record["targets"].get(key, {})
         limits = "  ".join(f"{'≤' if kind == 'max' else '≥'} {limit:,g}" for kind, limit in target.items())
         lines.append(f"  {key:24s} {shown:>14s}   {limits}")

@@ -1,19 +1,24 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``python -m devtools.species_docs`` writes the tables of docs/species.md from the tables that the reader checks by.
+"""``python -m devtools.species_docs`` writes the tables of docs/species.md.
 
-A test says whether the page is current.
+Keys, crowns and leaves come from the tables that the reader checks by, forms of the shipped species from published
+figures and plants that are measured. Tests say whether the page is current.
 """
 
 from __future__ import annotations
 
 import json
 import re
+from dataclasses import fields
 
+from tetflora_addon.species.catalogue import load_species
 from tetflora_addon.species.leaf_models import LEAF_MODELS
+from tetflora_addon.species.leaf_schema import OUTLINES
 from tetflora_addon.species.schema import FOLLOWS, LENGTH_HIGH, ORDER_KEYS, Key
 from tetflora_addon.species.species import CROWN_SHAPES, LEAF_KINDS
 
+from . import forms
 from .house import ROOT
 
 PAGE = ROOT / "docs" / "species.md"
@@ -67,9 +72,53 @@ def leaf_table() -> str:
     return "\n".join(lines)
 
 
+def outline_tables() -> str:
+    """Markdown tables of the fields of outlines, by kind."""
+    blocks = []
+    for kind, shape in OUTLINES.items():
+        lines = [f"| `{kind}` | limits | default | meaning |", "|---|---|---|---|"]
+        for f in fields(shape):
+            names = f.metadata.get("names")
+            default = "–" if f.name == "leaflet" else f"`{json.dumps(f.default)}`"
+            limits = ", ".join(f"`{n}`" for n in names) if names else "a `blade`"
+            if "low" in f.metadata:
+                limits = f"{f.metadata['low']:g} to {f.metadata['high']:g}"
+            lines.append(f"| `{f.name}` | {limits} | {default} | {f.metadata['meaning']} |")
+        blocks.append("\n".join(lines))
+    return "\n\n".join(blocks)
+
+
+def form_table() -> str:
+    """Markdown table of published figures of the shipped species beside those of plants, and a list of the sources."""
+    sources: dict[str, int] = {}
+    lines = ["| species | figure | published | measured | source |", "|---|---|---|---|---|"]
+    for identifier in forms.species():
+        name = load_species(identifier).name
+        for one in forms.compared(identifier):
+            title, unit, decimals = forms.FIGURES[one.figure]
+            low, high, value = (f"{number:.{decimals}f}" for number in (one.low, one.high, one.value))
+            paper, _, of = one.source.partition(". Of ")
+            number = sources.setdefault(paper, len(sources) + 1)
+            where = f"{name}, in a stand" if one.habit else name
+            cells = (where, f"{title}, {unit}", f"{low} to {high}", value, f"[{number}] {of}".strip())
+            lines.append(f"| {' | '.join(cells)} |")
+    lines += ["", *(f"{number}. {paper}" for paper, number in sources.items())]
+    return "\n".join(lines)
+
+
 def updated(page: str) -> str:
-    """The page with its tables written anew; they stand between comments that name them."""
-    for name, text in (("keys", key_table()), ("crowns", crown_list()), ("leaves", leaf_table())):
+    """The page with the tables of the file format written anew; they stand between comments that name them."""
+    tables = {"keys": key_table(), "crowns": crown_list(), "leaves": leaf_table(), "outlines": outline_tables()}
+    return _filled(page, tables)
+
+
+def with_forms(page: str) -> str:
+    """The page with the table of forms written anew; takes a few seconds, because plants are grown."""
+    return _filled(page, {"forms": form_table()})
+
+
+def _filled(page: str, texts: dict[str, str]) -> str:
+    for name, text in texts.items():
         pattern = re.compile(rf"(<!-- {name} -->\n).*?(<!-- end of {name} -->)", re.DOTALL)
         if not pattern.search(page):
             raise ValueError(f"{PAGE.name} has no place for {name}")
@@ -78,4 +127,4 @@ def updated(page: str) -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(updated(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    PAGE.write_text(with_forms(updated(PAGE.read_text(encoding="utf-8"))), encoding="utf-8")

@@ -6,6 +6,7 @@ import bpy
 
 from ..operators.add import TETFLORA_OT_populate
 from ..operators.brush import TETFLORA_OT_paint_plants
+from ..operators.ground_cover import TETFLORA_OT_ground_cover
 from ..operators.marks import TETFLORA_OT_mark_occluder
 from ..operators.populations import (
     TETFLORA_OT_add_population,
@@ -81,6 +82,7 @@ class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
             Button(TETFLORA_OT_update_population, 'FILE_REFRESH', "Update").draw(row)
             Button(TETFLORA_OT_reroll_population, 'MOD_NOISE', "Re-roll").draw(row)
             Button(TETFLORA_OT_freeze_population, 'FREEZE', "Freeze").draw(row, depress=settings.frozen)
+            Button(TETFLORA_OT_ground_cover, 'OUTLINER_OB_CURVES').draw(layout)
         else:
             Button(TETFLORA_OT_populate, 'OUTLINER_OB_POINTCLOUD', "Populate Selected Meshes").draw(layout)
         _draw_status(context, layout, settings)
@@ -132,6 +134,7 @@ class TETFLORA_PT_populate_species(_PartOfPopulate, bpy.types.Panel):
             layout.prop(entry, "companion_choice")
             if entry.companion:
                 draw_properties(layout.column(align=True), entry, "companion_strength", "companion_distance")
+            layout.prop(entry, "habitat")
 
 
 class TETFLORA_PT_populate_where(_PartOfPopulate, bpy.types.Panel):

@@ -113,7 +113,7 @@ class TETFLORA_PT_species_whole(_SpeciesPart, bpy.types.Panel):
                 column.prop_search(editor, f"{kind}_object", bpy.data, "objects")
             if form != NO_LEAF:
                 column.prop(editor, f"{kind}_transmission", text="Translucency")
-        draw_properties(column, editor, "bark", "quality", "exact")
+        draw_properties(column, editor, "bark", "quality", "habit", "exact")
 
 
 class TETFLORA_PT_species_orders(_SpeciesPart, bpy.types.Panel):

@@ -91,7 +91,7 @@ class PointBuffers:
 
 
 def concatenate_buffers(parts: Sequence[MeshBuffers]) -> MeshBuffers | None:
-    """Several meshes as one; they carry the same attributes. None where there are none."""
+    """Several meshes as one, with the attributes of the first, 0 where another has none. None where there are none."""
     parts = [p for p in parts if p.polygons]
     if len(parts) < 2:
         return parts[0] if parts else None
@@ -100,6 +100,7 @@ def concatenate_buffers(parts: Sequence[MeshBuffers]) -> MeshBuffers | None:
         sizes = np.cumsum([0] + [len(getattr(p, offset_by)) for p in parts[:-1]])
         return np.concatenate([getattr(p, name) + np.int32(s) for p, s in zip(parts, sizes, strict=True)])
 
+    first = parts[0].attributes.items()
     corners = np.cumsum([0] + [len(p.corner_verts) for p in parts]).astype(np.int32)
     starts = [p.face_offsets[:-1] + c for p, c in zip(parts, corners[:-1], strict=True)]
     return MeshBuffers(
@@ -108,9 +109,14 @@ def concatenate_buffers(parts: Sequence[MeshBuffers]) -> MeshBuffers | None:
         corner_verts=joined("corner_verts", "positions"),
         corner_edges=joined("corner_edges", "edge_verts"),
         face_offsets=np.concatenate([*starts, corners[-1:]]),
-        attributes={
-            name: (domain, np.concatenate([p.attributes[name][1] for p in parts]))
-            for name, (domain, _) in parts[0].attributes.items()
-        },
+        attributes={name: (own[0], np.concatenate([_values(p, name, *own) for p in parts])) for name, own in first},
         smooth=parts[0].smooth,
     )
+
+
+def _values(mesh: MeshBuffers, name: str, domain: str, like: NDArray) -> NDArray:
+    """Values of an attribute of a mesh; zeros if it has none of that name."""
+    if name in mesh.attributes:
+        return mesh.attributes[name][1]
+    sizes = {"POINT": len(mesh.positions), "FACE": mesh.polygons, "CORNER": len(mesh.corner_verts)}
+    return np.zeros((sizes[domain], *like.shape[1:]), like.dtype)

@@ -18,6 +18,8 @@ from .flora import compile_species
 _WITHIN = 0.9  # of the leaves are in what counts as the crown; single shoots beyond it take no room
 _TALLEST = 0.98  # of the leaves are lower than the plant is tall
 _LEAF_LEANS = 0.25  # of the length of leaves, which makes the crown of grass: its axes are next to nothing
+LEVEL = 0.7  # of the area of leaves is seen from above, between those that stand in all directions and those that lie
+_LOWEST = 0.03  # of the leaves are lower than the crown's base
 _PLANTS = 16  # over which the length of trunks is averaged
 
 
@@ -31,11 +33,26 @@ class Crown:
         Meters.
     polygons : float
         Expected number of the whole plant.
+    base : float
+        Meters below which there are next to no leaves.
+    leaves, wood : float
+        Expected one-sided area of the leaves and surface of the branches, m².
+    colour : tuple of float
+        Mean linear RGB of both, weighted by how much of them is seen from above.
     """
 
     radius: float
     height: float
     polygons: float
+    base: float = 0.0
+    leaves: float = 0.0
+    wood: float = 0.0
+    colour: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def seen(self) -> float:
+        """Area that leaves and wood hide from above, counted singly, m²."""
+        return LEVEL * self.leaves + self.wood / np.pi
 
 
 @lru_cache(maxsize=256)
@@ -58,4 +75,10 @@ def crown_of(species: Species) -> Crown:
     reach = _LEAF_LEANS * float(flora.leaf_reach[row])
     radius = float(np.quantile(np.hypot(place[:, 0], place[:, 1]), _WITHIN)) + reach
     height = max(float(np.quantile(place[:, 2], _TALLEST)), radius)
-    return Crown(radius, height, expected_polygons(flora.species[0]))
+    base = float(np.quantile(place[:, 2], _LOWEST)) if flora.leaf_count[row] > 0 else 0.0
+    leaves, wood = flora.leaf_areas(trunk), flora.wood_areas(trunk)
+    areas = np.array([LEVEL * leaves.mean(), wood.mean() / np.pi])
+    colours = np.stack([flora.leaf_colours(trunk).mean(axis=0), flora.wood_colour[row]])
+    colour = tuple((areas @ colours / areas.sum()).tolist())
+    polygons = expected_polygons(flora.species[0])
+    return Crown(radius, height, polygons, max(base, 0.0), float(leaves.mean()), float(wood.mean()), colour)

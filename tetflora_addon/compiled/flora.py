@@ -20,6 +20,7 @@ from ..growth.branches import Branches
 from ..growth.growth import fullness
 from ..growth.rows import LATERAL, build_rows
 from ..growth.wind import Wind, is_windy, widest_sway, windy_rows
+from ..species.habit import with_habit
 from ..species.leaf_models import LeafModel
 from ..species.quality import with_quality
 from ..species.species import LEAF_KINDS, Species
@@ -199,7 +200,7 @@ def compile_species(species: Sequence[Species]) -> Flora:
     SpeciesError
         A species whose leaf is still the name of a Blender object (the bridge to Blender has to replace it first).
     """
-    return _compiled(tuple(with_quality(one, one.quality) for one in species))
+    return _compiled(tuple(with_quality(with_habit(one, one.habit), one.quality) for one in species))
 
 
 @lru_cache(maxsize=8)

@@ -5,7 +5,8 @@
 A picture shows no more than about one facet for each pixel and layer of what is seen. If the result of refinement has
 more, the widths below which leaves become facets and the facets themselves grow by one factor until it fits. What is
 hidden or beside the view only casts shadows and sends light back: its facets get a part of the budget of their own,
-and never more than what is seen. Shells have one size; there, real leaves go to the tetrahedra that gain most by them
+and never more than what is seen. Before any of that, near leaves have coarser margins, until what makes them finer is
+a small part. Shells have one size; there, real leaves go to the tetrahedra that gain most by them
 for each polygon.
 """
 
@@ -27,7 +28,9 @@ from ..refinement.contents import LARGE
 from ..refinement.decisions import Decision, contributions
 from ..refinement.loop import Refinement
 from ..refinement.settings import RefinementSettings
+from ..subplants.wood_detail import finer
 from .facets import portion_facets, sizes_of
+from .leaf_detail import TOLERANCE, LeafDetail
 from .plants import Transition, portion_blocks
 from .portions import Portions, Sight
 
@@ -54,6 +57,8 @@ _STEPS = 12  # of bisection on the logarithm of factors, between 1 and:
 _LARGEST = 256.0
 #: Largest factor on hidden facets that the image alone may ask for.
 _LARGEST_HIDDEN = 96.0
+#: Fraction of what is allowed that finer levels of near leaves may always have, and tolerances that are tried.
+_FINE, _TOLERANCES = 0.25, (*(TOLERANCE * 2.0**k for k in range(9)), np.inf)
 
 
 @dataclass(frozen=True)
@@ -68,11 +73,14 @@ class Detail:
         Sides of facets.
     leaf_limit : float
         Width in pixels up to which leaves are facets.
+    tolerance : float
+        Pixels by which the margins of near leaves may be off; infinite where only their models are drawn.
     """
 
     refinement: Refinement
     pixels: FacetPixels
     leaf_limit: float
+    tolerance: float = TOLERANCE
 
 
 def enough(camera: Camera) -> float:
@@ -107,12 +115,20 @@ def afford(
     most = settings.max_polygons or np.inf
     if faces is not None:
         allowed = (1 - _RESERVE) * min(memory, most)
-        return replace(detail, refinement=_fitted_shells(result, allowed, faces)) if np.isfinite(allowed) else detail
+        if not np.isfinite(allowed):
+            return detail
+        return replace(detail, refinement=_fitted_shells(result, allowed, faces), tolerance=np.inf)
     count = _Facets(flora, result, camera)
     # A sphere is a whole polygon for the limit on polygons, but only a part of one for memory: a budget for each.
     # What other meshes have out of sight takes from what somebody allows, not from what the image shows.
     limits = [(enough(camera), 1.0, False), ((1 - _RESERVE) * most, 1.0, True)]
     limits += [((1 - _RESERVE) * memory, primitive_bytes / BYTES_PER_POLYGON, True)]
+    count.tolerance = _tolerance(count, settings, limits)
+    hard = min(allowed for allowed, _, every in limits if every)
+    if np.isfinite(hard) and count.finer(settings.leaf_limit) > _RESERVE * hard:
+        # A limit that somebody has set holds, however roughly near leaves can be counted.
+        count.calibrate(FacetPixels(settings.facet), settings.leaf_limit)
+        count.tolerance = _tolerance(count, settings, limits)
     factor, hidden = _affordable(count, settings, limits)
     if factor > 1.0 or hidden > 1.0:
         # What is expected of parts that will be opened is rough; some of them tell by how much.
@@ -122,7 +138,21 @@ def afford(
     small = count.too_small(limit) if factor > 1.0 else np.zeros(0, bool)
     if small.any():
         result = replace(result, decision=np.where(small, Decision.PROXY, result.decision).astype(np.int8))
-    return Detail(result, FacetPixels(_side(factor, settings), hidden), limit)
+    return Detail(result, FacetPixels(_side(factor, settings), hidden), limit, count.tolerance)
+
+
+def _tolerance(count: _Facets, settings: RefinementSettings, limits: list[tuple[float, float, bool]]) -> float:
+    """The smallest tolerance with which nothing else has to grow, or finer leaves are a small part of what is allowed.
+
+    How wide leaves are that are real is that of a budget that suffices.
+    """
+    allowed = _FINE * min(limit for limit, *_ in limits)
+    for tolerance in _TOLERANCES:
+        count.tolerance = tolerance
+        more = count.finer(_limit(1.0, settings))
+        if more <= 0.0 or more <= allowed or _affordable(count, settings, limits)[0] <= 1.0:
+            break
+    return tolerance
 
 
 def _affordable(
@@ -213,12 +243,31 @@ class _Facets:
         some = portions.visibility > 0
         self.flora, self.camera, self.portions = flora, camera, portions.take(np.flatnonzero(some))
         self.sizes = sizes_of(flora, self.portions, self.sight.shadows)
-        self.faces_real = _real_faces(flora, self.portions, Transition(flora, camera, 1.0))
+        self.faces_coarse = _real_faces(flora, self.portions, Transition(flora, camera, 1.0, np.inf))
+        self.tolerance = TOLERANCE
         self.unseen_sizes = sizes_of(flora, portions.take(np.flatnonzero(~some)), self.sight.shadows)
         self.result, held, hidden = result, result.holdings.polygons, result.chosen(Decision.HIDDEN)
         self.cell = held.cell
         self.hidden = hidden[held.cell] | ~result.in_view[held.cell]
         self.faces = polygon_facet_sizes(held, camera, hidden)
+
+    @property
+    def tolerance(self) -> float:
+        """Pixels by which the margins of near leaves may be off."""
+        return self._tolerance
+
+    @tolerance.setter
+    def tolerance(self, tolerance: float) -> None:
+        self._tolerance = tolerance
+        self.faces_finer = LeafDetail(self.flora, self.camera, tolerance).more(
+            self.portions.parts, self.portions.visibility
+        )
+
+    def finer(self, limit: float) -> float:
+        """Polygons of near leaves beyond those of their models."""
+        branches = self.portions.parts.branches
+        fraction = Transition(self.flora, self.camera, limit).of_branches(branches, self.portions.visibility)
+        return float((np.where(self.portions.real, fraction, 0.0) * self.faces_finer).sum())
 
     def seen(self, pixels: float, limit: float, weight: float, safe: bool = False) -> float:
         """Polygons, and facets counted with a weight, of all plants that are seen.
@@ -230,7 +279,8 @@ class _Facets:
         real = np.where(self.portions.real, transition.of_branches(branches, self.portions.visibility), 0.0)
         found = np.maximum(self.found, float(safe))
         facets = found[1] * weight * self.sizes.counts(FacetPixels(pixels))
-        return float((found[0] * real * self.faces_real + (1.0 - real) * facets).sum())
+        faces = found[0] * (self.faces_coarse + self.faces_finer)
+        return float((real * faces + (1.0 - real) * facets).sum())
 
     def unseen(self, pixels: FacetPixels, safe: bool = False) -> float:
         """Facets of all plants that are not seen; safe as for `seen`."""
@@ -240,13 +290,14 @@ class _Facets:
         """Draw some of the plants, and expect of all what was found of these."""
         chosen = uniform(self.every.parts.branches.key, _SAMPLE) < min(_DRAWN / max(len(self.every), 1), 1.0)
         some = self.every.take(np.flatnonzero(chosen))
-        transition = Transition(self.flora, self.camera, limit)
+        transition = Transition(self.flora, self.camera, limit, self.tolerance)
         weights = facet_weights(self.flora, ())
         real = sum(_cost(block.buffers) for block in portion_blocks(self.sight, some, transition))
         facets = sum(len(made) for _, made, _ in portion_facets(self.sight, some, weights, pixels, transition))
         sizes, fraction = sizes_of(self.flora, some, self.sight.shadows), np.where(some.real, 1.0, 0.0)
         fraction *= np.where(some.visibility > 0, transition.of_branches(some.parts.branches, some.visibility), 0.0)
-        expected = (fraction * _real_faces(self.flora, some, transition)).sum()
+        faces = _real_faces(self.flora, some, transition) + transition.detail.more(some.parts, some.visibility)
+        expected = (fraction * faces).sum()
         left = ((1.0 - fraction) * sizes.counts(pixels)).sum()
         self.found = np.clip((np.array([real, facets]) + _SOME) / (np.array([expected, left]) + _SOME), *_ROUGH)
 
@@ -279,6 +330,8 @@ def _real_faces(flora: Flora, portions: Portions, transition: Transition) -> NDA
     each = np.where(leafy, flora.leaf_faces[row] / np.maximum(flora.leaf_count[row], 1e-300), 0.0)
     leaves = np.where(leafy, parts.totals.leaf_area / np.maximum(flora.one_leaf_area(parts.branches), 1e-300), 0.0)
     wood = np.maximum(parts.totals.polygons - leaves * each, 0.0)
+    if (pixels := transition.detail.wood) is not None:
+        wood = wood * finer(flora, parts.branches, parts.alone, pixels)
     triangles = transition.of_triangles(parts.branches, portions.visibility)
     full = each * _weights(flora)[flora.rows["species"][row]]
     # Among real leaves, hardly any twig is wide enough to be real.

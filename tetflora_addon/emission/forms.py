@@ -19,6 +19,7 @@ from ..proxies.microsurfaces import Facets, concatenate_facets, facet_mesh
 from ..refinement.loop import Refinement
 from .budget import BYTES_PER_POLYGON, BYTES_PER_SPHERE
 from .facets import Parts, facet_parts, spheres
+from .leaf_detail import TOLERANCE
 from .light import BakedLight, baked_attributes
 from .plants import Transition
 from .shells import proxy_shells
@@ -41,6 +42,8 @@ class Refined:
         As for `plants.explicit_blocks`; None in forms without facets.
     disc : float
         Area that the renderer draws of a sphere of radius 1.
+    tolerance : float
+        Pixels by which the margins of near leaves may be off.
     """
 
     flora: Flora
@@ -49,6 +52,7 @@ class Refined:
     pixels: FacetPixels | None = None
     transition: Transition | None = None
     disc: float = np.pi
+    tolerance: float = TOLERANCE
 
     @property
     def facet_pixels(self) -> float | None:

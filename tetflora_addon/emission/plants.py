@@ -8,7 +8,8 @@ memory at a time. Proxies are in `facets` and `shells`.
 A leaf whose width in pixels is below the limit is a facet, one that is wider by `BAND` is real, and in between
 a fraction of them is real that grows with the width. Real leaves and facets are thinned out by hashes of their own
 keys: what has become real stays real as the camera comes closer, nothing pops, and the area is the same on average.
-Real leaves are single triangles first, and have their faces from a few pixels of width on, one after another.
+Real leaves are single triangles first, and have their faces from a few pixels of width on, one after another; where
+these can be told from what they stand for, finer ones, see `leaf_detail`.
 Wood goes by its own width or that of its leaves, whichever is larger: a trunk is a tube even among invisible leaves.
 """
 
@@ -34,6 +35,7 @@ from ..subplants.leaf_meshes import leaf_meshes
 from ..subplants.pieces import chunks, expand
 from ..subplants.tubes import tube_buffers
 from ..subplants.twigs import twig_buffers
+from .leaf_detail import FADING, TOLERANCE, LeafDetail
 from .portions import MIXED, Portions, Sight, in_chunks
 
 #: Width from which on all leaves are real over the width up to which none is.
@@ -44,8 +46,6 @@ _LEAST_REAL = 0.1
 TRIANGLES = 2.0
 #: Among real leaves, wood counts as so many times as wide: a triangle is thrice as wide at its base as the wood.
 TWIGS = 4.0
-#: Power of the visibility by which the width of things counts as smaller.
-FADING = 0.25
 
 
 @dataclass(frozen=True)
@@ -59,11 +59,19 @@ class Transition:
     limit : float
         Width in pixels up to which leaves are facets, where nothing hides them. What is hidden in part counts as
         smaller: the roots of its visibility.
+    tolerance : float
+        Pixels by which margins of near leaves may be off.
     """
 
     flora: Flora
     camera: Camera
     limit: float
+    tolerance: float = TOLERANCE
+
+    @property
+    def detail(self) -> LeafDetail:
+        """How finely near leaves are drawn."""
+        return LeafDetail(self.flora, self.camera, self.tolerance)
 
     def fraction(
         self, width: NDArray[np.float64], position: NDArray[np.float64], visibility: NDArray[np.float64] | float = 1.0
@@ -134,26 +142,37 @@ class Block:
 
 
 def explicit_blocks(
-    flora: Flora, result: Refinement, camera: Camera, transition: Transition | None = None
+    flora: Flora,
+    result: Refinement,
+    camera: Camera,
+    transition: Transition | None = None,
+    tolerance: float = np.inf,
 ) -> Iterator[Block]:
     """Polygons of explicit tetrahedra, and thick wood of all that is seen, in blocks from front to back.
 
     With a transition, small leaves are left to facets, by a random number of each leaf. Without, everything that lies
-    in explicit tetrahedra for the most part is polygons.
+    in explicit tetrahedra for the most part is polygons, and the margins of near leaves may be off by a tolerance.
     """
     sight = Sight(flora, result, camera, facets=transition is not None)
-    yield from portion_blocks(sight, sight.portions(), transition)
+    yield from portion_blocks(sight, sight.portions(), transition, tolerance)
 
 
-def portion_blocks(sight: Sight, portions: Portions, transition: Transition | None = None) -> Iterator[Block]:
+def portion_blocks(
+    sight: Sight, portions: Portions, transition: Transition | None = None, tolerance: float = np.inf
+) -> Iterator[Block]:
     """The polygons of `explicit_blocks` of some portions (n,)."""
     flora = sight.flora
+    detail = LeafDetail(flora, sight.camera, tolerance) if transition is None else transition.detail
     portions = portions.take(np.flatnonzero(_may_be_real(portions, transition)))
-    expected = portions.parts.totals.polygons * np.maximum(_real_leaves(portions, transition), _LEAST_REAL)
+    expected = portions.parts.totals.polygons + detail.more(
+        portions.parts, np.where(portions.best > 0, portions.best, 1.0)
+    )
+    expected *= np.maximum(_real_leaves(portions, transition), _LEAST_REAL)
     done, whole = np.cumsum(expected), max(float(expected.sum()), 1.0)
     for number, run in enumerate(in_chunks(expected, BLOCK_POLYGONS)):
         fraction = float(done[run[-1]]) / whole if len(run) else 1.0
-        yield from _block(flora, *_real_parts(sight, portions.take(run), transition), number, fraction, transition)
+        parts = _real_parts(sight, portions.take(run), transition)
+        yield from _block(flora, *parts, number, fraction, detail, transition)
 
 
 def _may_be_real(portions: Portions, transition: Transition | None) -> NDArray[np.bool_]:
@@ -214,13 +233,14 @@ def _real_parts(
     return made, thin, np.concatenate(visibility)
 
 
-def expanded_blocks(flora: Flora, seeds: Seeds) -> Iterator[Block]:
-    """Polygons of all plants, seen or not; for comparison."""
+def expanded_blocks(flora: Flora, seeds: Seeds, camera: Camera | None = None) -> Iterator[Block]:
+    """Polygons of all plants, seen or not; for comparison. A camera sees what is near as finely as everywhere."""
     plants = trunks(flora.rows, seeds)
+    detail = None if camera is None else LeafDetail(flora, camera)
     runs = list(chunks(flora.polygons[plants.row], BLOCK_POLYGONS))
     for number, run in enumerate(runs):
         whole = list(expand(flora, plants.take(run)))
-        yield from _block(flora, whole, None, np.zeros(0), number, (number + 1) / len(runs))
+        yield from _block(flora, whole, None, np.zeros(0), number, (number + 1) / len(runs), detail)
 
 
 def _block(
@@ -230,6 +250,7 @@ def _block(
     visibility: NDArray[np.float64],
     number: int,
     fraction: float,
+    detail: LeafDetail | None = None,
     transition: Transition | None = None,
 ) -> Iterator[Block]:
     """Meshes of branches of any species, and of the wood alone of ``bare`` ones."""
@@ -240,10 +261,15 @@ def _block(
         seen = visibility[some.plant]
         return transition.of_branches(some, seen), transition.of_triangles(some, seen)
 
+    def lengths_of(some: WholeBranches) -> NDArray[np.float64]:
+        return detail.lengths(some, visibility[some.branches.plant] if len(visibility) else 1.0)
+
     made: list[tuple[str, int, int, MeshBuffers | None]] = []
     for s in np.unique(np.concatenate([np.zeros(0, int), of_bare, *of_branches])):
         whole = [some.take(np.flatnonzero(kind == s)) for some, kind in zip(branches, of_branches, strict=True)]
-        leaves = leaf_meshes(flora, int(s), whole, None if transition is None else fractions_of)
+        leaves = leaf_meshes(
+            flora, int(s), whole, None if transition is None else fractions_of, None if detail is None else lengths_of
+        )
         made += [(LEAF_KINDS[m.kind], m.form, int(s), m.buffers) for m in leaves]
         twigs = []
         if transition is not None:
@@ -254,7 +280,7 @@ def _block(
             own = bare.take(np.flatnonzero(of_bare == s))
             tubes = transition.of_bare_wood(own.branches, visibility[own.branches.plant])
             whole.append(own.take(np.flatnonzero(tubes)))
-        bark = [tube_buffers(flora, whole), twig_buffers(flora, twigs)]
+        bark = [tube_buffers(flora, whole, None if detail is None else detail.wood), twig_buffers(flora, twigs)]
         made.append(("bark", 0, int(s), concatenate_buffers([some for some in bark if some is not None])))
         del whole
     # The caller copies each block into Blender; meanwhile its sources and the blocks already taken are not kept.

@@ -58,6 +58,8 @@ class Draw(IntEnum):
     LEAF_PLANE = 30
     TWIG_TURN = 31
     BEND = 32  # one for each segment and axis from here on
+    LEAF_LEVEL = 226  # beyond those of all segments; 224 is that of `emission.budget`
+    LEAF_VARIANT = 227
 
 
 def mix(z: NDArray[np.uint64]) -> NDArray[np.uint64]:

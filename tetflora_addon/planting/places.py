@@ -8,7 +8,7 @@ a seed gives the same arrangement in every version of Blender.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +18,7 @@ from ..arrays import Arrays
 from ..errors import SceneError
 from ..growth.hashing import child_key, key_of_seed, uniform
 from .companions import Company
+from .cover import Suits
 from .plane import Spacing
 from .rules import MOST_PLANTS, Rules, check_rules, species_by_weight
 from .site import REMEDIES, Sample, Site, SiteDraw, lines_of_paths
@@ -89,6 +90,7 @@ def place(
     rules: Rules,
     older: NDArray[np.float64] | None = None,
     older_species: NDArray[np.int32] | None = None,
+    suits: Mapping[int, Suits] | None = None,
 ) -> Placement:
     """Scatter plants over the ground as the rules ask, evenly as seen on a map.
 
@@ -100,6 +102,8 @@ def place(
         Places of plants that stand already, meters; new ones keep their distance from them, and may seek or shun them.
     older_species : (m,) int32, optional
         Their species as index into the weights of the rules; -1 for others, which all are if not given.
+    suits : mapping of int to callable, optional
+        How suitable the ground is for a species (index into the weights), besides what the rules say of all.
 
     Raises
     ------
@@ -111,8 +115,8 @@ def place(
     Places are drawn by hashes of the seed and of their number, and kept as often as they are suitable (rejection
     sampling); those that are kept first come first (dart throwing: R. Cook, "Stochastic sampling in computer graphics",
     1986). By density, as many places are drawn as would stand on wholly suitable ground. By count, more are drawn, in a
-    bounded number of rounds, until there are enough. Where species seek or shun each other, they are placed one after
-    the other, each with its fraction of the count.
+    bounded number of rounds, until there are enough. Where species seek or shun each other, or some ground suits one
+    better than another, they are placed one after the other, each with its fraction of the count.
     """
     check_rules(rules)
     older = np.zeros((0, 2)) if older is None else np.asarray(older, dtype=np.float64)[:, :2]
@@ -122,8 +126,8 @@ def place(
     key = key_of_seed(rules.seed)
     spacing = Spacing(rules.min_distance, older)
     company = Company(rules, older, older_species)
-    sowing = _Sowing(site, rules, spacing, company)
-    if not company.rules:
+    sowing = _Sowing(site, rules, spacing, company, suits or {})
+    if not company.rules and not suits:
         sowing.sow(key, None, 1.0)
     else:
         weights = np.maximum(rules.weights, 0.0)
@@ -168,8 +172,10 @@ def new_seeds(seeds: NDArray[np.int64], roll: int = 0) -> NDArray[np.int32]:
 class _Sowing:
     """Plants so far, and what became of the places that were drawn."""
 
-    def __init__(self, site: Site, rules: Rules, spacing: Spacing, company: Company) -> None:
-        self.site, self.rules, self.spacing, self.company = site, rules, spacing, company
+    def __init__(
+        self, site: Site, rules: Rules, spacing: Spacing, company: Company, suits: Mapping[int, Suits]
+    ) -> None:
+        self.site, self.rules, self.spacing, self.company, self.suits = site, rules, spacing, company, suits
         self.wanted = 0
         self.drawn, self.suitable = 0, 0
         self.lost = dict.fromkeys(REMEDIES, 0)
@@ -178,6 +184,7 @@ class _Sowing:
 
     def sow(self, key: NDArray[np.uint64], species: int | None, part: float) -> None:
         """Place plants of one species, or of all by their weights, and ``part`` of the number asked for."""
+        suits = self.suits.get(species)
         if self.rules.by_density:
             expected = self.rules.density * self.site.area * part
             if expected > MOST_PLANTS:
@@ -188,7 +195,7 @@ class _Sowing:
             # What is left of a whole plant comes by chance.
             places = int(expected + uniform(key, SiteDraw.SUITABLE))
             for first in range(0, places, _LARGEST_ROUND):
-                sample = self.site.draw(key, first, min(places - first, _LARGEST_ROUND))
+                sample = self.site.draw(key, first, min(places - first, _LARGEST_ROUND), suits=suits)
                 self.wanted += len(sample.key)
                 self._admit(sample, species, len(sample.key))
             return
@@ -201,7 +208,7 @@ class _Sowing:
             # Twice as many as are missing, for distances take some; where little is suitable, just more than needed.
             rate = max(beside / drawn, _RAREST) if drawn else 1.0
             batch = min(max(2 * missing, int(1.1 * missing / rate), _SMALLEST_ROUND), _LARGEST_ROUND)
-            sample = self.site.draw(key, drawn, batch, missing if free else None)
+            sample = self.site.draw(key, drawn, batch, missing if free else None, suits)
             drawn += sample.drawn
             suitable += len(sample.key)
             came, stayed = self._admit(sample, species, missing)

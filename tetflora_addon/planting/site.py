@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from ..growth.hashing import child_key, key_of_seed, uniform
+from .cover import Suits
 from .plane import NO_DISTANCE, Lines, clumps, inside_any
 from .rules import Rules
 from .terrain import Path, Terrain, border_of, sampled
@@ -48,6 +49,7 @@ REMEDIES = {
     "paths": "the Paths curves leave almost no ground; lower Path Distance, or clear Paths",
     "edge": "all ground is close to the border; lower Edge Falloff",
     "clumping": "clumping leaves too little ground; lower Clumping, or change Clump Size",
+    "habitat": "no ground has the light or the plants above that the species ask for; change Grows in the species list",
 }
 
 
@@ -131,23 +133,32 @@ class Site:
         """Square metres of the map on which places are drawn; each counts as much as it is suitable at most."""
         return float(self.cumulative[-1])
 
-    def draw(self, key: NDArray[np.uint64], first: int, count: int, enough: int | None = None) -> Sample:
+    def draw(
+        self,
+        key: NDArray[np.uint64],
+        first: int,
+        count: int,
+        enough: int | None = None,
+        suits: Suits | None = None,
+    ) -> Sample:
         """Suitable ones among the places of children ``first`` to ``first + count - 1`` of a key, in their order.
 
-        Stops when ``enough`` are found, with at least as many.
+        Stops when ``enough`` are found, with at least as many. ``suits`` is what one species asks for besides.
         """
         parts, drawn, found = [], 0, 0
         lost = dict.fromkeys(REMEDIES, 0)
         while drawn < count and (enough is None or found < enough):
             chunk = min(count - drawn, CHUNK)
             keys = child_key(key, np.arange(first + drawn, first + drawn + chunk))
-            parts.append(self._suitable(keys, lost))
+            parts.append(self._suitable(keys, lost, suits))
             drawn += chunk
             found += len(parts[-1][2])
         position, up, keys = (np.concatenate(column) for column in zip(*parts, strict=True))
         return Sample(position, up, keys, drawn, lost)
 
-    def _suitable(self, keys: NDArray[np.uint64], lost: dict[str, int]) -> tuple[NDArray, NDArray, NDArray[np.uint64]]:
+    def _suitable(
+        self, keys: NDArray[np.uint64], lost: dict[str, int], suits: Suits | None
+    ) -> tuple[NDArray, NDArray, NDArray[np.uint64]]:
         index = np.searchsorted(self.cumulative, uniform(keys, SiteDraw.TRIANGLE) * self.cumulative[-1], side="right")
         index = np.minimum(index, len(self.cumulative) - 1)
         # One row of nine numbers at a time: places are in no order, and each row is a wait for memory.
@@ -159,14 +170,16 @@ class Site:
         left = np.arange(len(keys))
         wanted = uniform(keys, SiteDraw.SUITABLE) * self.most[index]
         suitable = np.ones(len(keys))
-        for name, factor in self._factors(index, barycentric, points):
+        for name, factor in self._factors(index, barycentric, points, suits):
             suitable[left] *= factor(left)
             stay = wanted[left] < suitable[left]
             lost[name] += len(left) - int(stay.sum())
             left = left[stay]
         return points[left], self.normal[index[left]], keys[left]
 
-    def _factors(self, index: NDArray[np.int64], barycentric: NDArray, points: NDArray) -> Iterator[tuple[str, object]]:
+    def _factors(
+        self, index: NDArray[np.int64], barycentric: NDArray, points: NDArray, suits: Suits | None
+    ) -> Iterator[tuple[str, object]]:
         """Rules by name, each a function from indices of places to how suitable they are; cheap ones first."""
         rules, ground = self.rules, self.ground
         if self.weight is not None:
@@ -184,6 +197,8 @@ class Site:
             yield "edge", lambda i: self.border.nearness(points[i, :2])
         if rules.clumping > 0.0:
             yield "clumping", lambda i: clumps(points[i, :2], rules.clump_size, rules.clumping, self._key)
+        if suits is not None:
+            yield "habitat", lambda i: suits(points[i, :2])
 
     def _image_value(self, index: NDArray[np.int64], barycentric: NDArray[np.float64]) -> NDArray[np.float64]:
         uv = _mean(np.take(self.uv.reshape(-1, 6), index, axis=0), barycentric)

@@ -83,6 +83,13 @@ class Terrain:
         if self.uv is not None and np.shape(self.uv) != (count, 3, 2):
             raise ValueError(f"uv has shape {np.shape(self.uv)}, expected ({count}, 3, 2)")
 
+    @property
+    def map_area(self) -> float:
+        """Area of all triangles on the map, m²; what lies above other ground counts as well."""
+        a, b, c = np.moveaxis(self.triangles[..., :2], 1, 0)
+        (ux, uy), (vx, vy) = (b - a).T, (c - a).T
+        return float(0.5 * np.abs(ux * vy - uy * vx).sum())
+
 
 def border_of(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     """Edges of only one triangle, (e, 2, 3); corners at exactly the same place are one."""

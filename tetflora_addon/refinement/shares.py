@@ -36,6 +36,11 @@ from .contents import Held, Totals, piece_totals, subplant_totals, sums
 LARGE = 1.6
 #: Pixels along a part for each of its points on leaves; fewest and most of these; points on wood for each of them.
 PIXELS_A_POINT, FEWEST, MOST, WOOD = 6.0, 4, 64, 0.25
+#: Wood that is wider in the view than this part of the image is looked for where it is, whatever share of its plant it
+#: has: such sub-plants are opened at once, and their branches have points so many widths apart, at most so many.
+THICK, APART, MOST_ALONG = 0.08, 1.0, 96
+#: Places on a branch at which it is asked how wide it is.
+_PLACES = np.linspace(0.0, 1.0, 9)
 #: How many times as many points there are where proxies fill their tetrahedra.
 FILLED = 4
 #: Sub-plants that are opened, and points that are lowered, at a time; bounds what that takes to some hundred megabytes.
@@ -122,6 +127,7 @@ def share_points(
     lines: Axes | None = None,
     most: int = MOST,
     times: int = 1,
+    along: NDArray[np.int64] | int = 0,
 ) -> SharePoints:
     """Points on parts of plants, all in the root.
 
@@ -137,12 +143,15 @@ def share_points(
         Points on the leaves of a part at most.
     times : int
         How many times as many as that.
+    along : (n,) int64, optional
+        Points on the wood of branches alone at least.
     """
     number = times * np.ceil(np.clip(pixels / PIXELS_A_POINT, FEWEST, most)).astype(np.int64)
     made = []
     for leafy in (True, False):
         area = parts.totals.leaf_area if leafy else parts.totals.wood_area
-        count = np.where(area > 0, number if leafy else np.ceil(WOOD * number).astype(np.int64), 0)
+        wood = np.maximum(np.ceil(WOOD * number).astype(np.int64), along)
+        count = np.where(area > 0, number if leafy else wood, 0)
         owner, index = spread(count)
         even = (area / np.maximum(count, 1))[owner]
         if lines is not None:
@@ -237,6 +246,8 @@ class SharedPlants:
         self.flora, self.camera, self._times = flora, camera, FILLED if filled else 1
         self.parts = PlantParts.of_subplants(flora, trunks(flora.rows, seeds)) if len(seeds) else PlantParts.empty()
         self.points = self._points(self.parts, None) if len(seeds) else SharePoints.empty()
+        while (near := self.thick(self.parts) & self.parts.can_open(flora)).any():
+            self._open(near, self.points.take(np.flatnonzero(~near[self.points.part])))
 
     @property
     def nbytes(self) -> int:
@@ -246,6 +257,19 @@ class SharedPlants:
     def pixels(self, parts: PlantParts) -> NDArray[np.float64]:
         """Extent (n,) of parts in the image."""
         return parts.extent / self.camera.extent_around(parts.branches.position)
+
+    def thick(self, parts: PlantParts) -> NDArray[np.bool_]:
+        """Parts (n,) whose own branch is wide in the view somewhere, as if it were straight."""
+        branches, camera = parts.branches, self.camera
+        axis = branches.length[:, None] * branches.frame[:, :, 2]
+        # As far from a place as its branch may come into view.
+        beside = branches.radius + 0.5 * branches.length / (len(_PLACES) - 1)
+        width = 2.0 * branches.radius / (THICK * min(camera.width, camera.height))
+        out = np.zeros(len(parts), bool)
+        for place in _PLACES:
+            at = branches.position + place * axis
+            out |= (width > camera.extent_around(at)) & (camera.clearance(at) < beside)
+        return out
 
     def update(self, tree: TetrahedralTree, dividing: NDArray[np.bool_], edge: NDArray[np.float64]) -> NDArray:
         """Hand points in divided nodes on, and open what is large there.
@@ -293,7 +317,11 @@ class SharedPlants:
         self.parts, self.points = PlantParts.concatenate(parts), SharePoints.concatenate(points)
 
     def _points(self, parts: PlantParts, lines: Axes | None) -> SharePoints:
-        return share_points(self.flora, parts, self.pixels(parts), lines, times=self._times)
+        along = 0
+        if lines is not None:
+            along = parts.branches.length / np.maximum(2.0 * APART * parts.branches.radius, 1e-300)
+            along = np.where(self.thick(parts), np.minimum(along, MOST_ALONG), 0.0).astype(np.int64)
+        return share_points(self.flora, parts, self.pixels(parts), lines, times=self._times, along=along)
 
     def totals(self, chosen: NDArray[np.bool_]) -> tuple[Totals, NDArray[np.int32]]:
         """Totals (k,) of points in chosen nodes, a mask (nodes,), and their nodes (k,)."""

@@ -7,13 +7,17 @@ A leaf model lies with its base at the origin, its midrib along +y, one unit lon
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SpeciesError
+from .leaf_compounds import Compound
+from .leaf_needles import Needles
+from .leaf_outlines import Blade
+from .leaf_shapes import LEAF_SHAPES
 
 MAX_LEAF_POLYGONS = 2000
 MAX_LEAF_CORNERS = 4 * MAX_LEAF_POLYGONS  # of all faces; and vertices
@@ -40,6 +44,8 @@ class LeafModel:
         Material of each face, of models that have several.
     textured : bool
         Drawn as it is at any size: a texture may cut it out.
+    shape : Blade, Needles or Compound, optional
+        What it stands for, which leaves are drawn as that are near; see `leaf_levels`.
     """
 
     positions: NDArray[np.float64]
@@ -48,6 +54,7 @@ class LeafModel:
     uv: NDArray[np.float32]
     material_index: NDArray[np.int32] | None = None
     textured: bool = False
+    shape: Blade | Needles | Compound | None = None
 
     @property
     def polygons(self) -> int:
@@ -56,15 +63,15 @@ class LeafModel:
 
     @cached_property
     def content(self) -> bytes:
-        """Bytes that are equal for equal models; what caches are keyed by."""
+        """Bytes that are equal for models that look the same from afar; what stored tables are keyed by."""
         arrays = (self.positions, self.corner_verts, self.face_offsets, self.uv, self.material_index)
         return b"".join(a.tobytes() for a in arrays if a is not None) + (b"textured" if self.textured else b"")
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, LeafModel) and self.content == other.content
+        return isinstance(other, LeafModel) and (self.content, self.shape) == (other.content, other.shape)
 
     def __hash__(self) -> int:
-        return hash(self.content)
+        return hash((self.content, self.shape))
 
     @cached_property
     def next_corner(self) -> NDArray[np.int32]:
@@ -229,7 +236,7 @@ _LOBED = [(0.17, 0.2), (0.1, 0.34), (0.28, 0.5), (0.16, 0.62), (0.28, 0.8), (0.1
 _MAPLE = [(0.2, -0.05), (0.4, 0.12), (0.29, 0.22), (0.56, 0.56), (0.24, 0.5), (0.2, 0.74)]
 _DELTOID = [(0.3, 0.1), (0.37, 0.3), (0.19, 0.66)]
 
-LEAF_MODELS: dict[str, LeafModel] = {
+_COARSE: dict[str, LeafModel] = {
     "kite": _kite(0.32, 0.05, 0.05),
     "ovate": _folded(0.30, 0.08, 0.10),
     "round": _folded(0.42, 0.05, 0.06),
@@ -240,4 +247,5 @@ LEAF_MODELS: dict[str, LeafModel] = {
     "deltoid": _outlined(_DELTOID, 0.14, 0.08),
     "blossom": _flower(5, 0.24, 0.12),
 }
-"""The built-in polygon lists by name."""
+LEAF_MODELS: dict[str, LeafModel] = {n: replace(model, shape=LEAF_SHAPES.get(n)) for n, model in _COARSE.items()}
+"""The built-in polygon lists by name, with what they stand for."""

@@ -16,7 +16,7 @@ from typing import Any
 
 from ..errors import NAME, SpeciesError, readable, shown
 from ..files import json_of, read_whole
-from .leaf_models import LEAF_MODELS, LeafModel, leaf_model
+from .leaf_schema import read_forms
 from .members import expected_polygons
 from .skeletons import MAX_ORDERS
 from .species import BARKS, CROWN_SHAPES, LEAF_KINDS, Colour, Order, Range, Species
@@ -126,10 +126,9 @@ ORDER_KEYS: dict[str, Key] = {
 }
 
 SPECIES_KEYS = (
-    "format", "name", "description", "orders", "bark", "quality", "exact", "leaf", "leaf_transmission",
+    "format", "name", "description", "orders", "bark", "quality", "habit", "exact", "leaf", "leaf_transmission",
     "blossom", "blossom_transmission", "spur",
 )  # fmt: skip
-MAX_FORMS = 8
 QUALITY_LIMITS = (0.001, 1000.0)
 #: The short shoot of a species that asks for some and describes none.
 DEFAULT_SPUR = {"length": [0.05, 0.02], "thickness": [0.03, 0.005], "angle": [50, 15], "leaves": [4, 1]}
@@ -137,7 +136,6 @@ DEFAULT_SPUR = {"length": [0.05, 0.02], "thickness": [0.03, 0.005], "angle": [50
 FOLLOWS = {"curvature_tip": "curvature", "angle_tip": "angle", "leaf_colour_tip": "leaf_colour"}
 #: What a key of a kind may be, where that is one of a few names.
 CHOICES = {"shape": CROWN_SHAPES, "kind": LEAF_KINDS}
-LEAF_KEYS = ("model", "object", "vertices", "faces", "uv")
 
 
 class _Reader:
@@ -251,52 +249,6 @@ def _expected(key: Key) -> str:
     return f"a number from {key.low:g} to {key.high:g}"
 
 
-def _read_forms(reader: _Reader, data: Any, key: str) -> tuple[LeafModel | str, ...]:
-    """A leaf, or a list of forms among which each leaf has one by chance."""
-    if not isinstance(data, list):
-        return (_read_leaf(reader, data, key),)
-    if not 1 <= len(data) <= MAX_FORMS:
-        raise reader.fail(key, f"must have 1 to {MAX_FORMS} forms, has {len(data)}")
-    return tuple(_read_leaf(reader, one, f"{key}[{i}]") for i, one in enumerate(data))
-
-
-def _read_leaf(reader: _Reader, data: Any, where: str) -> LeafModel | str:
-    reader.keys(data, where, LEAF_KEYS)
-    forms = [k for k in ("model", "object", "vertices") if k in data]
-    if len(forms) != 1:
-        raise reader.fail(
-            where, "must have exactly one of model (built-in), object (Blender mesh) or vertices with faces"
-        )
-    if "model" in data:
-        if not isinstance(data["model"], str) or data["model"] not in LEAF_MODELS:
-            raise reader.fail(f"{where}.model", f"must be one of {', '.join(LEAF_MODELS)}, not {shown(data['model'])}")
-        return LEAF_MODELS[data["model"]]
-    if "object" in data:
-        return reader.text(data["object"], f"{where}.object")
-    faces = data.get("faces")
-    if not isinstance(faces, list) or not all(
-        isinstance(f, list) and all(isinstance(v, int) and not isinstance(v, bool) for v in f) for f in faces
-    ):
-        raise reader.fail(f"{where}.faces", "must be a list of faces, each a list of vertex indices")
-    for key, form in (("vertices", "[x, y, z]"), ("uv", "[u, v]")):
-        if key in data and not _is_list_of_points(data[key], form.count(",") + 1):
-            raise reader.fail(f"{where}.{key}", f"must be a list of {form} numbers")
-    try:
-        return leaf_model(data["vertices"], faces, data.get("uv"))
-    except SpeciesError as error:
-        raise reader.fail(where, str(error)) from None
-
-
-def _is_list_of_points(value: Any, size: int) -> bool:
-    # numpy would take texts and truths for numbers, and stumble over integers that no float can hold.
-    return isinstance(value, list) and all(
-        isinstance(point, list)
-        and len(point) == size
-        and all(isinstance(x, int | float) and not isinstance(x, bool) and not abs(x) > 1e300 for x in point)
-        for point in value
-    )
-
-
 def species_from_dict(data: Any, identifier: str, source: str) -> Species:
     """Check a decoded species file and turn it into a `Species`.
 
@@ -339,13 +291,14 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
         name=reader.text(data["name"], "name"),
         description=reader.text(data.get("description", ""), "description", least=0),
         orders=read,
-        leaf=_read_forms(reader, data["leaf"], "leaf"),
+        leaf=read_forms(reader, data["leaf"], "leaf"),
         leaf_transmission=reader.number(data.get("leaf_transmission", 0.4), "leaf_transmission", 0, 1),
-        blossom=_read_forms(reader, data["blossom"], "blossom") if "blossom" in data else (),
+        blossom=read_forms(reader, data["blossom"], "blossom") if "blossom" in data else (),
         blossom_transmission=reader.number(data.get("blossom_transmission", 0.4), "blossom_transmission", 0, 1),
         spur=spur,
         bark=reader.choice(data.get("bark", BARKS[0]), "bark", BARKS),
         quality=reader.number(data.get("quality", 1.0), "quality", *QUALITY_LIMITS),
+        habit=reader.number(data.get("habit", 0.0), "habit", 0, 1),
         exact=reader.truth(data.get("exact", False), "exact"),
     )
     polygons = expected_polygons(species) * species.quality

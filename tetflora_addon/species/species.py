@@ -19,7 +19,9 @@ from .leaf_models import LeafModel
 from .skeletons import Skeleton
 
 LEAF_KINDS = ("leaf", "blossom")
-BARKS = ("ridged", "plated", "smooth", "banded", "ringed", "fibrous", "jointed")
+BARKS = (
+    "ridged", "plated", "smooth", "banded", "ringed", "fibrous", "jointed", "netted", "peeling", "scaly",
+)  # fmt: skip
 """Characters of bark that materials know."""
 
 
@@ -191,6 +193,8 @@ class Species:
         One of `BARKS`.
     quality : float
         Polygons of a plant, of those that the description gives; compiling applies it.
+    habit : float
+        How far trees, which stand free as described, are those of a dense stand, 0 to 1; compiling applies it.
     exact : bool
         Every plant is the same: ranges have their means, and seeds do not matter.
     form : Skeleton or None
@@ -208,6 +212,7 @@ class Species:
     spur: Order | None = None
     bark: str = "ridged"
     quality: float = 1.0
+    habit: float = 0.0
     exact: bool = False
     form: Skeleton | None = None
 

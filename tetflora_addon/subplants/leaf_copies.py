@@ -4,11 +4,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..buffers import MeshBuffers
 from ..growth.hashing import Draw, uniform
+from ..species.leaf_levels import LeafLevel
 from ..species.leaf_models import LeafModel
 from ..species.leaf_triangles import TRIANGLE, LeafTriangles
 
@@ -134,6 +137,30 @@ class TriangleCopies(LeafCopies):
     def _materials(self) -> NDArray[np.int32] | None:
         index = self.triangles.material_index
         return None if index is None else index[self.plane]
+
+
+class LevelCopies(LeafCopies):
+    """Copies of a finer level of a leaf, of which their keys choose a variant; shaded smooth.
+
+    Parameters
+    ----------
+    level : LeafLevel
+    number, transmission, moving
+        As of `LeafCopies`.
+    """
+
+    def __init__(self, level: LeafLevel, number: int, transmission: float, moving: bool = False) -> None:
+        super().__init__(level.model, number, transmission, moving)
+        self.shapes, self.tint = level.shapes.transpose(1, 2, 0), level.tint
+
+    def _shapes(self, key: NDArray[np.uint64], new: slice) -> NDArray[np.float32]:
+        variants = self.shapes.shape[2]
+        return self.shapes[:, :, (uniform(key, Draw.LEAF_VARIANT) * variants).astype(np.int64)]
+
+    def buffers(self) -> MeshBuffers:
+        """The mesh, once all copies are placed."""
+        np.minimum(self.colour * self.tint, 1.0, out=self.colour)
+        return replace(super().buffers(), smooth=True)
 
 
 def _placed(

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Leaves as polygons: copies of the species' leaf models, written straight into the arrays of their mesh.
 
-See section 5 of the paper. What is small in the image may be a triangle, see `species.leaf_triangles`.
+See section 5 of the paper. What is small in the image may be a triangle, see `species.leaf_triangles`; what is large
+has finer levels, see `species.leaf_levels`.
 """
 
 from __future__ import annotations
@@ -31,12 +32,18 @@ from ..growth.foliage import (
 from ..growth.growth import WholeBranches, leaf_counts
 from ..growth.hashing import Draw, uniform
 from ..growth.wind import moment
+from ..species.leaf_levels import chosen_level, leaf_levels
+from ..species.leaf_models import LeafModel
 from ..species.leaf_triangles import leaf_triangles
-from .leaf_copies import LeafCopies, TriangleCopies
+from .leaf_copies import LeafCopies, LevelCopies, TriangleCopies
 from .pieces import chunks
 
 #: Vertices of leaves that are worked on at a time: some ten megabytes.
 _VERTICES_AT_ONCE = 120_000
+#: The step of leaves that are triangles; that of others is their level, 0 for the model of the species.
+_TRIANGLE = -1
+#: Leaves change their level at lengths from this fraction of that of the first ones on, each by its own number.
+_EARLIEST = 0.7
 
 
 @dataclass(frozen=True)
@@ -63,6 +70,7 @@ def leaf_meshes(
     species: int,
     whole: Sequence[WholeBranches],
     fractions_of: Callable[[Branches], tuple[NDArray[np.float64], NDArray[np.float64]]] | None = None,
+    lengths_of: Callable[[WholeBranches], NDArray[np.float64]] | None = None,
 ) -> Iterator[LeafMesh]:
     """Copies of the leaf models for the leaves on branches of one species, form by form.
 
@@ -75,22 +83,33 @@ def leaf_meshes(
     fractions_of : callable, optional
         Fractions (n,), (n,) of the leaves of branches that are wanted, and of these that are triangles; the leaves' own
         random numbers decide which.
+    lengths_of : callable, optional
+        Lengths (n,) of the leaves of branches in the image, in errors that do not show; those of long ones are finer.
     """
     groups = [group for some in whole for group in _bearers(flora, some)]
     if fractions_of is not None:
         groups = [part for group in groups for part in group.parts(*fractions_of(group.whole.branches))]
-    for kind, small in sorted({(group.kind, group.small) for group in groups}):
-        own = [group for group in groups if (group.kind, group.small) == (kind, small)]
+    if lengths_of is not None:
+        groups = [level for group in groups for level in group.levels(lengths_of(group.whole))]
+    for kind, step in sorted({(group.kind, group.step) for group in groups}):
+        own = [group for group in groups if (group.kind, group.step) == (kind, step)]
         forms = flora.forms[species][kind]
-        numbers = sum(group.numbers(len(forms)) for group in own)
+        numbers = sum(group.numbers() for group in own)
         for form in np.flatnonzero(numbers):
             given = int(numbers[form]), float(flora.leaf.transmission[own[0].row[0]]), moment(flora.rows) > 0
-            model = forms[form]
-            triangles = small and not model.textured
-            copies = TriangleCopies(leaf_triangles(model), *given) if triangles else LeafCopies(model, *given)
+            copies = _copies(forms[form], step, *given)
             for group in own:
-                group.add(copies, int(form), len(forms))
+                group.add(copies, int(form))
             yield LeafMesh(kind, int(form), copies.buffers())
+
+
+def _copies(model: LeafModel, step: int, number: int, transmission: float, moving: bool) -> LeafCopies:
+    """Room for a number of leaves of one step."""
+    if step > 0:
+        return LevelCopies(leaf_levels(model)[step - 1], number, transmission, moving)
+    if step == _TRIANGLE and not model.textured:
+        return TriangleCopies(leaf_triangles(model), number, transmission, moving)
+    return LeafCopies(model, number, transmission, moving)
 
 
 def _bearers(flora: Flora, whole: WholeBranches) -> Iterator[_Bearers]:
@@ -117,10 +136,12 @@ class _Bearers:
     flora : Flora
     row : int
     whole : WholeBranches of n
-    small : bool
-        The leaves that are wanted here are triangles.
+    step : int
+        The leaves that are wanted here: -1 triangles, 0 models of the species, from 1 on their levels.
     fraction, triangles : (n,) float64, optional
         Fraction of the leaves that is wanted at all, and of these as triangles.
+    lengths : (n,) float64, optional
+        Of leaves, as of `leaf_meshes`; where it is given, only those of the step are wanted.
     """
 
     def __init__(
@@ -128,41 +149,56 @@ class _Bearers:
         flora: Flora,
         row: int,
         whole: WholeBranches,
-        small: bool = False,
+        step: int = 0,
         fraction: NDArray[np.float64] | None = None,
         triangles: NDArray[np.float64] | None = None,
+        lengths: NDArray[np.float64] | None = None,
     ) -> None:
         self.flora, self.whole, self.counts = flora, whole, leaf_counts(flora.rows, whole.branches)
-        self.small, self.fraction, self.triangles = small, fraction, triangles
+        self.step, self.fraction, self.triangles, self.lengths = step, fraction, triangles, lengths
         self.row = np.array([row])
         self.kind = int(flora.rows["leaf_kind"][row])
+        self.forms = flora.forms[int(flora.rows["species"][row])][self.kind]
 
     def parts(self, fraction: NDArray[np.float64], triangles: NDArray[np.float64]) -> Iterator[_Bearers]:
         """The branches some of whose leaves are wanted as they are, and those with leaves as triangles."""
-        for small, share in ((False, 1.0 - triangles), (True, triangles)):
+        for step, share in ((0, 1.0 - triangles), (_TRIANGLE, triangles)):
             own = np.flatnonzero((fraction > 0.0) & (share > 0.0))
             if len(own):
                 given = fraction[own], triangles[own]
-                yield _Bearers(self.flora, int(self.row[0]), self.whole.take(own), small, *given)
+                yield _Bearers(self.flora, int(self.row[0]), self.whole.take(own), step, *given)
 
-    def numbers(self, forms: int) -> NDArray[np.int64]:
+    def levels(self, lengths: NDArray[np.float64]) -> Iterator[_Bearers]:
+        """The branches by the levels that some of their leaves have; triangles stay what they are."""
+        if self.step == _TRIANGLE:
+            yield self
+            return
+        ends = [[chosen_level(form, lengths * share) for form in self.forms] for share in (_EARLIEST, 1.0)]
+        low, high = np.min(ends[0], axis=0), np.max(ends[1], axis=0)
+        for step in range(int(high.max(initial=0)) + 1):
+            own = np.flatnonzero((low <= step) & (step <= high))
+            if len(own):
+                given = (None if of is None else of[own] for of in (self.fraction, self.triangles))
+                mixed = lengths[own] if (low[own] < high[own]).any() else None
+                yield _Bearers(self.flora, int(self.row[0]), self.whole.take(own), step, *given, mixed)
+
+    def numbers(self) -> NDArray[np.int64]:
         """How many leaves there are of each form."""
-        if forms == 1 and self.fraction is None:
+        if len(self.forms) == 1 and self.fraction is None and self.lengths is None:
             return np.array([self.counts.sum()])
-        out = np.zeros(forms, np.int64)
+        out = np.zeros(len(self.forms), np.int64)
         for part in self._chunks(1):
-            key = self._leaves(part)[2]
-            out += np.bincount(leaf_forms(forms, key), minlength=forms)
+            out += np.bincount(self._leaves(part)[3], minlength=len(self.forms))
         return out
 
-    def add(self, copies: LeafCopies, form: int, forms: int) -> None:
+    def add(self, copies: LeafCopies, form: int) -> None:
         """Place all leaves of one of the forms."""
         rows = self.flora.rows
         for part in self._chunks(len(copies.model.positions)):
             bearers = self.whole.take(part)
-            owner, index, key = self._leaves(part)
-            if forms > 1:
-                chosen = np.flatnonzero(leaf_forms(forms, key) == form)
+            owner, index, key, forms = self._leaves(part)
+            if len(self.forms) > 1:
+                chosen = np.flatnonzero(forms == form)
                 owner, index, key = owner[chosen], index[chosen], key[chosen]
             t = leaf_places(rows, bearers.branches, owner, index, self.counts[part], key)
             leaves = place_leaves(rows, bearers.branches, bearers.lines, owner, index, key, t)
@@ -187,17 +223,23 @@ class _Bearers:
             if self.counts[run].any():
                 yield run
 
-    def _leaves(self, part: slice) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.uint64]]:
-        """Branch within the run, number on it, and key of each wanted leaf."""
+    def _leaves(self, part: slice) -> tuple[NDArray[np.int64], ...]:
+        """Branch within the run, number on it, key and form of each wanted leaf."""
         owner, index = spread(self.counts[part])
         key = leaf_keys(self.whole.branches.take(part), owner, index)
-        if self.fraction is None:
-            return owner, index, key
-        wanted, triangles = self.fraction[part], self.triangles[part]
         kept = np.ones(len(key), bool)
-        if (wanted < 1.0).any():
-            kept &= uniform(key, Draw.TRANSITION) < wanted[owner]
-        if (triangles < 1.0).any() if self.small else (triangles > 0.0).any():
-            kept &= (uniform(key, Draw.LEAF_TRIANGLE) < triangles[owner]) == self.small
+        if self.fraction is not None:
+            wanted, triangles, small = self.fraction[part], self.triangles[part], self.step == _TRIANGLE
+            if (wanted < 1.0).any():
+                kept &= uniform(key, Draw.TRANSITION) < wanted[owner]
+            if (triangles < 1.0).any() if small else (triangles > 0.0).any():
+                kept &= (uniform(key, Draw.LEAF_TRIANGLE) < triangles[owner]) == small
+        form = leaf_forms(len(self.forms), key) if len(self.forms) > 1 else np.zeros(len(key), np.int64)
+        if self.lengths is not None:
+            length = self.lengths[part][owner] * (_EARLIEST + (1.0 - _EARLIEST) * uniform(key, Draw.LEAF_LEVEL))
+            for number, model in enumerate(self.forms):
+                kept &= (form != number) | (chosen_level(model, length) == self.step)
+        if kept.all():
+            return owner, index, key, form
         kept = np.flatnonzero(kept)
-        return owner[kept], index[kept], key[kept]
+        return owner[kept], index[kept], key[kept], form[kept]

@@ -10,82 +10,111 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import unit
 from ..buffers import MeshBuffers
 from ..compiled.flora import Flora
-from ..growth.axes import Axes
 from ..growth.branches import Branches
 from ..growth.foliage import branch_colours
-from ..growth.growth import WholeBranches, radius_at
+from ..growth.growth import WholeBranches
 from ..growth.wind import moment
+from .feet import PLACES, keep_inside, root_sides
 from .pieces import chunks
+from .rings import Rings, fine_counts, fine_numbers, fine_rings, foot_rings, ring_counts, rings_of
+from .wood_detail import Fineness, Pixels, fineness
 
-_AT_JOINT = 1e-6  # fractions of a segment closer to a joint than this are at it
 #: Rings that are worked on at a time: some ten megabytes.
 _RINGS_AT_ONCE = 48_000
 
 
-def tube_buffers(flora: Flora, whole: Sequence[WholeBranches]) -> MeshBuffers | None:
+def tube_buffers(flora: Flora, whole: Sequence[WholeBranches], pixels: Pixels | None = None) -> MeshBuffers | None:
     """Tubes of whole branches of any rows.
+
+    Parameters
+    ----------
+    flora : Flora
+    whole : sequence of WholeBranches
+    pixels : Pixels, optional
+        How large they are; near branches are rounder then, and bent, and have feet.
 
     Returns
     -------
     MeshBuffers or None
-        Quads with ``UVMap``, ``tf_colour`` and ``tf_transmission``; None without branches.
+        Quads with ``UVMap``, ``tf_colour``, ``tf_transmission`` and ``tf_girth``; None without branches.
     """
-    sides_of = [flora.rows["sides"][some.branches.row] for some in whole]
-    rings_of = [some.lines.segments + flora.rows["rings"][some.branches.row] + 1 for some in whole]
-    sides, rings = (np.concatenate([np.zeros(0, np.int64), *each]) for each in (sides_of, rings_of))
-    if len(sides) == 0:
+    sorts = sorted((sort for some in whole for sort in _sorts(flora, some, pixels)), key=lambda sort: sort.sides)
+    if not sorts:
         return None
-    tubes = _Tubes(int((sides * rings).sum()), int((sides * (rings - 1)).sum()), moment(flora.rows) > 0)
-    for k in np.unique(sides):
-        for group, group_sides, group_rings in zip(whole, sides_of, rings_of, strict=True):
-            own = np.flatnonzero(group_sides == k)
-            for some in _chunks(group_rings[own]):
-                tubes.add(flora, _rings_of(flora, group.take(own[some])), int(k))
+    vertices, faces = (sum(numbers) for numbers in zip(*(sort.numbers() for sort in sorts), strict=True))
+    tubes = _Tubes(vertices, faces, moment(flora.rows) > 0)
+    while sorts:
+        for rings, sides, inside in sorts.pop(0).made(flora):
+            tubes.add(flora, rings, sides, inside)
     return tubes.buffers()
 
 
-def _chunks(rings: NDArray[np.int64]) -> Iterator[slice]:
-    return chunks(rings, _RINGS_AT_ONCE)
-
-
 @dataclass(frozen=True)
-class _Rings:
-    """Places on branches (k) around which there are rings of vertices.
+class _Sort:
+    """Branches of one number of sides.
 
     Attributes
     ----------
-    branches : Branches of k
-    lines : Axes of k
-    branch : (r,) int64
-        Rings of a branch follow one another.
-    t : (r,) float64
-    centre : (r, 3) float64
-    goes_on : (r,) bool
-        Whether a tube leads from a ring to the next.
-    later : (r, 3) float64 or None
-        Centres a moment later, where it is asked how plants move.
+    whole : WholeBranches of n
+    sides : int
+    rings, beside : (n,) int64
+        Rings of tubes, and those of roots, of which there are `PLACES` to each.
+    fine : Fineness of n, or None
+        Where branches are more than coarse tubes.
+    counts : (n, S) int64 or None
+        Parts of the segments of these.
     """
 
-    branches: Branches
-    lines: Axes
-    branch: NDArray[np.int64]
-    t: NDArray[np.float64]
-    centre: NDArray[np.float64]
-    goes_on: NDArray[np.bool_]
-    later: NDArray[np.float64] | None = None
+    whole: WholeBranches
+    sides: int
+    rings: NDArray[np.int64]
+    beside: NDArray[np.int64] | None = None
+    fine: Fineness | None = None
+    counts: NDArray[np.int64] | None = None
+
+    def numbers(self) -> tuple[int, int]:
+        """Vertices and faces."""
+        vertices, faces = self.sides * int(self.rings.sum()), self.sides * int((self.rings - 1).sum())
+        if self.beside is None:
+            return vertices, faces
+        rings, sides = int(self.beside.sum()), root_sides(self.sides)
+        return vertices + sides * rings, faces + sides * (rings - rings // PLACES)
+
+    def made(self, flora: Flora) -> Iterator[tuple[Rings, int, WholeBranches | None]]:
+        """Rings, how many vertices they have, and branches within whose bounds they have to stay."""
+        if self.fine is None:
+            for some in chunks(self.rings, _RINGS_AT_ONCE):
+                yield rings_of(flora, self.whole.take(some)), self.sides, None
+            return
+        for some in chunks(self.rings * self.sides, 8 * _RINGS_AT_ONCE):
+            whole, fine = self.whole.take(some), self.fine.take(some)
+            yield fine_rings(flora, whole, fine, self.counts[some]), self.sides, whole
+            if (foot := foot_rings(flora, whole, fine)) is not None:
+                yield foot[0], root_sides(self.sides), whole.take(foot[1])
 
 
-def _rings_of(flora: Flora, whole: WholeBranches) -> _Rings:
-    owner, t, centre = whole.knots(flora.rows)
-    goes_on = np.zeros(len(owner), bool)
-    goes_on[:-1] = owner[1:] == owner[:-1]
-    later = None
-    if whole.lines.later is not None:
-        later = WholeBranches(whole.branches, whole.lines.later).knots(flora.rows)[2]
-    return _Rings(whole.branches, whole.lines, owner, t, centre, goes_on, later)
+def _sorts(flora: Flora, whole: WholeBranches, pixels: Pixels | None) -> Iterator[_Sort]:
+    """Branches by their sides."""
+    if not len(whole):
+        return
+    sides = flora.rows["sides"][whole.branches.row]
+    near = np.zeros(len(whole), bool)
+    if pixels is not None:
+        fine = fineness(flora, whole, pixels)
+        near = fine.weight > 0
+    far = np.flatnonzero(~near)
+    rings = ring_counts(flora, whole.branches, whole.lines.segments)
+    for k in np.unique(sides[far]):
+        own = far[sides[far] == k]
+        yield _Sort(whole.take(own), int(k), rings[own])
+    near = np.flatnonzero(near)
+    for k in np.unique(fine.sides[near]) if len(near) else ():
+        own = near[fine.sides[near] == k]
+        some, how = whole.take(own), fine.take(own)
+        counts = fine_counts(flora, some, how, pixels)
+        yield _Sort(some, int(k), *fine_numbers(flora, some, counts), how, counts)
 
 
 class _Tubes:
@@ -107,6 +136,7 @@ class _Tubes:
         self.corner_verts, self.corner_edges = np.zeros((2, faces, 4), np.int32)
         self.uv = np.zeros((faces, 8), np.float32)
         self.colour = np.zeros((faces, 3), np.float32)
+        self.girth = np.zeros(faces, np.float32)
 
     def buffers(self) -> MeshBuffers:
         """The mesh."""
@@ -122,44 +152,55 @@ class _Tubes:
                 "UVMap": ("CORNER", self.uv.reshape(-1, 2)),
                 "tf_colour": ("FACE", self.colour),
                 "tf_transmission": ("FACE", np.zeros(faces, np.float32)),
+                "tf_girth": ("FACE", self.girth),
                 **motion,
             },
             smooth=True,
         )
 
-    def add(self, flora: Flora, rings: _Rings, sides: int) -> None:
-        """Tubes of one number of sides."""
+    def add(self, flora: Flora, rings: Rings, sides: int, inside: WholeBranches | None = None) -> None:
+        """Tubes of one number of sides; ``inside`` whose bounds they have to stay, if that is not certain."""
         branches, number = rings.branches, len(rings.t)
         lower = np.flatnonzero(rings.goes_on)
-        across = _ring_axes(rings.lines, rings.branch, rings.t)
-        radius = radius_at(flora.rows, _without_places(branches, rings.branch), rings.t)
-        reach = radius.astype(np.float32) * across
-        self._add_shape(self.positions, rings.centre.T.astype(np.float32), reach, sides)
+        self._add_shape(self.positions, rings.centre.T.astype(np.float32), rings.reach, sides, rings.swelling)
+        if inside is not None:
+            own = self.positions[self.vertices : self.vertices + number * sides]
+            keep_inside(flora, inside.branches, np.repeat(rings.branch, sides), own)
         if rings.later is not None:
             seconds = moment(flora.rows)
-            away = radius.astype(np.float32) * _ring_axes(rings.lines.later, rings.branch, rings.t)
-            centre = ((rings.later - rings.centre) / seconds).T.astype(np.float32)
-            self._add_shape(self.velocity, centre, (away - reach) / np.float32(seconds), sides)
+            centre = ((rings.later[0] - rings.centre) / seconds).T.astype(np.float32)
+            moved = (rings.later[1] - rings.reach) / np.float32(seconds)
+            self._add_shape(self.velocity, centre, moved, sides, rings.swelling)
         self._add_topology(lower.astype(np.int32), number, sides)
         # v counts lengths of the perimeter at the branch's base, so that a texture is as wide as it is high.
-        v = rings.t * np.take(branches.length / np.maximum(2 * np.pi * branches.radius, 1e-9), rings.branch)
+        girth = base_girth(branches)
+        v = rings.t * np.take(branches.length / np.maximum(girth, 1e-9), rings.branch)
         colour = branch_colours(flora.rows, branches.row, branches.key).astype(np.float32)
         colour = np.ascontiguousarray(colour)[np.take(rings.branch, lower)]
         self._add_looks(v[lower], v[lower + 1], colour, sides)
+        every = slice(self.faces, self.faces + len(lower) * sides)
+        self.girth[every] = np.repeat(np.take(girth, np.take(rings.branch, lower)), sides)
         self.vertices += number * sides
         self.edges += (number + len(lower)) * sides
         self.faces += len(lower) * sides
 
     def _add_shape(
-        self, out: NDArray[np.float32], centre: NDArray[np.float32], reach: NDArray[np.float32], sides: int
+        self,
+        out: NDArray[np.float32],
+        centre: NDArray[np.float32],
+        reach: NDArray[np.float32],
+        sides: int,
+        swelling: NDArray[np.float32] | None,
     ) -> None:
         """Vertices around centres (3, rings), along both axes (2, 3, rings) of each ring; or, as well, velocities."""
         rings = centre.shape[1]
         angle = 2 * np.pi * np.arange(sides) / sides
         points = np.zeros((sides, 3, rings), np.float32)
-        for point, x, y in zip(points, np.cos(angle), np.sin(angle), strict=True):  # over a tube's few sides
+        for k, (point, x, y) in enumerate(zip(points, np.cos(angle), np.sin(angle), strict=True)):  # a tube's sides
             np.multiply(reach[0], np.float32(x), out=point)
             point += reach[1] * np.float32(y)
+            if swelling is not None:
+                point *= swelling[k]
             point += centre
         new = out[self.vertices : self.vertices + rings * sides]
         new.reshape(rings, -1)[...] = points.reshape(-1, rings).T
@@ -197,32 +238,11 @@ class _Tubes:
         self.colour[self.faces : self.faces + number] = np.repeat(colour, sides, axis=0)
 
 
+def base_girth(branches: Branches) -> NDArray[np.float64]:
+    """Length (n,) around branches at their base, without flare, metres: what v counts."""
+    return 2 * np.pi * branches.radius
+
+
 def _interleaved(*columns: NDArray) -> NDArray:
     """First of each, then second of each, and so on."""
     return np.stack(columns, axis=1).reshape(-1)
-
-
-def _without_places(branches: Branches, index: NDArray[np.int64]) -> Branches:
-    """Selection of all that numbers and radii depend on; places and frames, which are most of the memory, are zero."""
-    n = len(index)
-    names = ("row", "plant", "key", "length", "radius", "scale", "vigour", "outward")
-    rest = {name: np.take(getattr(branches, name), index) for name in names}
-    return Branches(position=np.broadcast_to(0.0, (n, 3)), frame=np.broadcast_to(0.0, (n, 3, 3)), **rest)
-
-
-def _ring_axes(lines: Axes, branch: NDArray[np.int64], t: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Both axes (2, 3, n) across a branch at rings; at a joint, half way between those of the two segments."""
-    frames = lines.frames[:, :, :, :2].astype(np.float32)
-    number = np.take(lines.segments, branch)
-    along = t * number
-    joint = np.rint(along).astype(np.int64)
-    at_joint = np.flatnonzero((np.abs(along - joint) < _AT_JOINT) & (joint > 0) & (joint < number))
-    segment = np.minimum(along.astype(np.int64), number - 1)
-    segment[at_joint] = joint[at_joint]
-    light = Axes(lines.knots, frames, lines.segments)
-    out = light.frame(branch, segment).transpose(2, 1, 0)
-    if len(at_joint):
-        before = light.frame(branch[at_joint], joint[at_joint] - 1)
-        for axis in range(2):
-            out[axis][:, at_joint] = unit(before[:, :, axis] + out[axis][:, at_joint].T).T
-    return out

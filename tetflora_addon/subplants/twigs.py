@@ -22,6 +22,7 @@ from ..growth.growth import WholeBranches
 from ..growth.hashing import Draw, uniform
 from ..growth.wind import moment
 from .pieces import Pieces, wood_areas
+from .tubes import base_girth
 
 
 def twig_buffers(flora: Flora, whole: Sequence[WholeBranches]) -> MeshBuffers | None:
@@ -62,7 +63,8 @@ def _triangles(flora: Flora, whole: WholeBranches) -> MeshBuffers:
         ]
         velocity = np.stack([speed[0], speed[0], speed[1]], axis=1).reshape(-1, 3)
         motion = {"velocity": ("POINT", velocity.astype(np.float32))}
-    high = branches.length / np.maximum(2.0 * np.pi * branches.radius, 1e-9)
+    girth = base_girth(branches)
+    high = branches.length / np.maximum(girth, 1e-9)
     uv = np.zeros((number, 3, 2), np.float32)
     uv[:, 1, 0], uv[:, 2, 0], uv[:, 2, 1] = 1.0, 0.5, high
     each = np.arange(3 * number, dtype=np.int32)
@@ -76,6 +78,7 @@ def _triangles(flora: Flora, whole: WholeBranches) -> MeshBuffers:
             "UVMap": ("CORNER", uv.reshape(-1, 2)),
             "tf_colour": ("FACE", branch_colours(flora.rows, branches.row, branches.key).astype(np.float32)),
             "tf_transmission": ("FACE", np.zeros(number, np.float32)),
+            "tf_girth": ("FACE", girth.astype(np.float32)),
             **motion,
         },
         smooth=True,

@@ -17,8 +17,8 @@ from tetflora_addon.species import species
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
-def tube(radius, colour, material, turns=0):
-    """A branch along x, seven perimeters long, in the middle of the view; u starts at `turns`."""
+def tube(radius, colour, material, turns=0, start=2):
+    """A branch along x, seven perimeters long, in the middle of the view; u starts at `turns`, v at `start`."""
     sides, rings = 16, 8
     step, angle = np.arange(rings + 1) / rings, 2 * np.pi * np.arange(sides) / sides
     length = 7 * 2 * np.pi * radius
@@ -27,7 +27,8 @@ def tube(radius, colour, material, turns=0):
     i, k = (a.ravel() for a in np.meshgrid(np.arange(rings), np.arange(sides), indexing="ij"))
     corners = np.stack([i * sides + k, i * sides + (k + 1) % sides], axis=1)
     corners = np.concatenate([corners, corners[:, ::-1] + sides], axis=1)
-    u, v = np.stack([k, k + 1, k + 1, k], axis=1) / sides + turns, 7 * np.stack([i, i, i + 1, i + 1], axis=1) / rings
+    u, v = np.stack([k, k + 1, k + 1, k], axis=1) / sides + turns, np.stack([i, i, i + 1, i + 1], axis=1)
+    v = start + 7 * v / rings
     pairs = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     edges, edge_of_corner = np.unique(pairs, axis=0, return_inverse=True)
     polygons = buffers.MeshBuffers(
@@ -40,18 +41,19 @@ def tube(radius, colour, material, turns=0):
             "UVMap": ("CORNER", np.stack([u, v], axis=2).reshape(-1, 2).astype(np.float32)),
             "tf_colour": ("FACE", np.tile(np.float32(colour), (len(corners), 1))),
             "tf_transmission": ("FACE", np.zeros(len(corners), np.float32)),
+            "tf_girth": ("FACE", np.full(len(corners), 2 * np.pi * radius, np.float32)),
         },
         smooth=True,
     )
     return added("tube", polygons, material)
 
 
-def bark_seen(character, radius, engine="CYCLES", turns=0, colour=(0.4, 0.3, 0.2)):
-    """Picture of the middle half of a branch, five perimeters of it, under an even sky of 1."""
+def bark_seen(character, radius, engine="CYCLES", turns=0, colour=(0.4, 0.3, 0.2), start=2, material=None):
+    """Picture of the middle half of a branch, five perimeters of it, under an even sky of 1; no moss on such a one."""
     session.clean_file()
     engine = compat.eevee_engine() if engine == "EEVEE" else engine
     small_scene(sky=1.0, samples=16, size=96, engine=engine, width=4 * 2 * np.pi * radius)
-    tube(radius, colour, materials.bark_material("Oak", character), turns)
+    tube(radius, colour, material() if material else materials.bark_material("Oak", character), turns, start)
     seen = picture()
     tall = len(seen)
     reach = int(0.8 * tall / (8 * np.pi))  # from the axis, of the radius
@@ -92,7 +94,7 @@ def test_leaves_return_what_they_are_said_to_on_the_mean_of_both_sides(transmiss
     lower = picture().mean(axis=(0, 1))
     tint, gloss = np.array(microsphere.THROUGH_TINT[:3]), materials.GLOSS
     wanted = (1.0 - gloss) * np.array([0.5, 0.4, 0.6]) * ((1.0 - transmission) + transmission * tint) + gloss
-    np.testing.assert_allclose((upper + lower) / 2, wanted, rtol=0.01)
+    np.testing.assert_allclose((upper + lower) / 2, wanted, atol=0.01)
     if transmission < 1.0:
         assert (lower > 1.03 * upper).all()
 
@@ -117,20 +119,68 @@ def test_a_leaf_lit_from_behind_shows_its_transmission_only():
     assert np.ptp(seen[..., 1]) > 0.05 * wanted[1], "no veins"
 
 
-def test_leaves_that_let_little_light_through_have_no_veins():
+def test_needles_have_no_veins():
     small_scene(sky=0.0, samples=64, sun=180.0, size=32)
-    sheet((0.2, 0.4, 0.1), 0.12, materials.leaf_material("Pine"))
+    sheet((0.2, 0.4, 0.1), 0.12, materials.leaf_material("Pine", "needle"))
     seen = picture()
-    assert np.ptp(seen[..., 1]) < 0.03 * seen[..., 1].mean()
+    assert np.ptp(seen[..., 1]) < 0.25 * seen[..., 1].mean(), "more than mottling"
 
 
 @pytest.mark.parametrize("engine", ["CYCLES", "EEVEE"])
-@pytest.mark.parametrize("character", ["ridged", "plated", "smooth", "banded", "ringed", "fibrous", "jointed"])
+@pytest.mark.parametrize("character", species.BARKS)
 def test_bark_keeps_the_mean_colour(character, engine):
-    """Proxies have the flat colour; 3 % is what eyes pass over."""
-    seen = bark_seen(character, 0.05 if character == "jointed" else 0.4, engine)
-    np.testing.assert_allclose(seen.mean(axis=(0, 1)), (0.4, 0.3, 0.2), rtol=0.03)
+    """Proxies have the flat colour; 4 % is what eyes pass over."""
+    colour = (0.2, 0.15, 0.1)  # as light as bark is
+    seen = bark_seen(character, 0.05 if character == "jointed" else 0.4, engine, colour=colour)
+    np.testing.assert_allclose(seen.mean(axis=(0, 1)), colour, rtol=0.04)
     assert seen.std(axis=(0, 1))[0] > 0.005, "no pattern"
+
+
+def flat_bark(character, **inputs):
+    """A material that gives off what bark reflects, whatever the light."""
+
+    def build(graph, _material):
+        group = bark.bark_group(character)
+        given = {"Colour": graph.attribute("tf_colour", "Color"), **inputs}
+        looks = graph.node("ShaderNodeGroup", given, node_tree=group)
+        shine = graph.node("ShaderNodeEmission", {"Color": looks.outputs["Colour"], "Strength": 1.0})
+        graph.node("ShaderNodeOutputMaterial", {"Surface": shine})
+
+    return nodes.surface_material("flat bark", 1, build)
+
+
+@pytest.mark.parametrize("radius", [0.15, 0.4])
+@pytest.mark.parametrize("character", species.BARKS)
+def test_mean_albedo_of_bark_is_the_colour_of_its_proxies(character, radius):
+    """Moss too is as light as what it covers: within .01, at the foot, but for black ones of birches, and above it."""
+    wanted = np.array([0.3, 0.24, 0.18])
+    light = np.array([0.2126, 0.7152, 0.0722])
+    for start in (2,) if character == "peeling" else (-1, 2):
+        seen = bark_seen(character, radius, colour=wanted, start=start, material=lambda: flat_bark(character))
+        mean = seen.mean(axis=(0, 1))
+        assert mean @ light == pytest.approx(wanted @ light, abs=0.01)
+        if start > 0:
+            np.testing.assert_allclose(mean, wanted, atol=0.01)
+
+
+def test_moss_grows_low_on_thick_wood_and_not_on_thin():
+    def green(radius, start):
+        seen = bark_seen("ridged", radius, start=start, material=lambda: flat_bark("ridged")).mean(axis=(0, 1))
+        return seen[1] / seen[0]
+
+    assert green(0.4, -4) > 1.1 * green(0.4, 3)
+    assert green(0.04, -4) == pytest.approx(green(0.04, 3), rel=0.05)
+
+
+def test_features_are_as_many_as_the_root_of_the_girth():
+    """A limb of a quarter of the bole's radius has half as many plates around, so they are half as wide."""
+
+    def seen(radius, scale):
+        inputs = {"Scale": scale, "Lichen": 0.0, "Moss": 0.0, "Full Over": 0.1, "Smooth Under": 0.0}
+        return bark_seen("plated", radius, material=lambda: flat_bark("plated", **inputs))
+
+    np.testing.assert_allclose(seen(0.4, 4.0), seen(0.1, 8.0), atol=0.05)
+    assert np.abs(seen(0.4, 4.0) - seen(0.1, 4.0)).mean() > 0.02
 
 
 def test_young_twigs_are_smooth():
@@ -142,8 +192,8 @@ def test_young_twigs_are_smooth():
 
 
 def test_bark_has_no_seam():
-    """Where u goes over from 1 to 0, as where it goes on to 1 and further."""
-    np.testing.assert_allclose(bark_seen("plated", 0.4, turns=1), bark_seen("plated", 0.4), atol=0.01)
+    """Where u goes over from 1 to 0, as where it goes on to 1 and further; rounding moves fine features a little."""
+    np.testing.assert_allclose(bark_seen("plated", 0.4, turns=1), bark_seen("plated", 0.4), atol=0.02)
 
 
 def test_branches_of_other_colours_have_other_patterns():
@@ -171,7 +221,7 @@ def test_bark_lets_no_light_through():
 
 
 def test_microsurfaces_match_leaves_and_bark():
-    """From afar all that is left of bark is its mean; so small a piece of it is a tenth off, and leaves show veins."""
+    """From afar all that is left of bark is its mean; so small a piece of it is a tenth off. Leaves have two sides."""
     colour = (0.3, 0.2, 0.1)
     seen = {}
     for name, transmission in (("leaf", 0.4), ("bark", 0.0)):
@@ -179,9 +229,11 @@ def test_microsurfaces_match_leaves_and_bark():
             session.clean_file()
             small_scene(sky=0.5, samples=64, sun=30.0)
             made = materials.proxy_material() if kind == "proxy" else getattr(materials, f"{name}_material")("Oak")
-            sheet(colour, transmission, made)
-            seen[name, kind] = picture().mean(axis=(0, 1))
-    np.testing.assert_allclose(seen["leaf", "proxy"], seen["leaf", "leaf"], rtol=0.15)
+            flat = sheet(colour, transmission, made)
+            sides = [picture().mean(axis=(0, 1))]
+            flat.rotation_euler = (0.0, np.pi, 0.0)
+            seen[name, kind] = np.mean([*sides, picture().mean(axis=(0, 1))], axis=0)
+    np.testing.assert_allclose(seen["leaf", "proxy"], seen["leaf", "leaf"], rtol=0.1)
     np.testing.assert_allclose(seen["bark", "proxy"], seen["bark", "bark"], rtol=0.1)
 
 

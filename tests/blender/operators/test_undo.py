@@ -158,6 +158,8 @@ CASES: list[Case] = [
     ("remove_population, plants stay", populated, "remove_population", {"keep_plants": True}),
     ("select_population", lambda: (populated(), select()), "select_population", {}),
     ("forget_erased", lambda: (populated(), erase_place()), "forget_erased", {}),
+    ("ground_cover", populated, "ground_cover", {}),
+    ("ground_cover again", lambda: (populated(), cover(), change_population()), "ground_cover", {}),
     ("set_population_ground", lambda: (populated(), select(add_mesh("other"))), "set_population_ground", {}),
 ]
 #: Operators with an undo step that cannot be called without a file from outside; their own case is below.
@@ -172,6 +174,10 @@ def mark_ground() -> None:
 def change_population() -> None:
     scene().tetflora.populations[0].count = 7
     scene().tetflora.populations[0].seed = 5
+
+
+def cover() -> None:
+    assert ops().ground_cover() == {'FINISHED'}
 
 
 def erase_place() -> None:

@@ -165,7 +165,7 @@ def test_a_field_that_can_have_no_points_is_named(scene, kind):
     for do in (
         lambda: refine.refine(scene, depsgraph()),
         lambda: populations.make_plants(scene, depsgraph(), population),
-        lambda: brush.Standing(scene, depsgraph()),
+        lambda: brush.Standing(scene, depsgraph(), covers=True),
     ):
         with pytest.raises(errors.SceneError, match=r'"odd" is no mesh or point cloud .*turn off Field of Plants'):
             do()

@@ -16,14 +16,19 @@ from tetflora_addon.compiled.bounds import ring_stretch, unit_bounds, widest_rad
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.branches import Branches
 from tetflora_addon.refinement.contents import bounding_bodies
-from tetflora_addon.subplants.pieces import open_subplants
+from tetflora_addon.subplants.pieces import expand, open_subplants
+from tetflora_addon.subplants.tubes import tube_buffers
+from tetflora_addon.subplants.wood_detail import Pixels
 
 _FLOAT32 = 1e-6  # relative rounding of vertices
 
 
 def vertices(flora: Flora, subplant: Branches) -> np.ndarray:
-    """All vertices (v, 3) of one sub-plant."""
+    """All vertices (v, 3) of one sub-plant, and those that its wood has where it is near."""
     tubes, leaves = support.meshes(flora, support.expanded(flora, subplant))
+    pixel = subplant.radius[0] / 40.0
+    near = tube_buffers(flora, list(expand(flora, subplant)), Pixels(lambda points: np.full(len(points), pixel)))
+    tubes = tubes if near is None else [*tubes, near]
     return np.concatenate([mesh.positions for mesh in (*tubes, *leaves)]).astype(np.float64)
 
 
@@ -200,7 +205,7 @@ def test_samples_are_inside_the_bound(species: int) -> None:
             first, number = points.runs(some)
             for i in np.flatnonzero(number):
                 local = points.position[first[i] : first[i] + number[i]].astype(float)
-                radius, low, high = tight[i] * (1 + np.sign([1, -1, 1]) * 1e-6) + np.array([1, -1, 1]) * 1e-6
+                radius, low, high = tight[i] + np.array([1, -1, 1]) * 1e-6 * (1.0 + np.abs(tight[i]))
                 assert np.hypot(local[:, 0], local[:, 1]).max() <= radius
                 assert local[:, 2].min() >= low
                 assert local[:, 2].max() <= high

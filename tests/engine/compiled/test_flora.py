@@ -134,7 +134,7 @@ def test_orientation_of_standing_plants_to_a_hundredth(name: str) -> None:
     """Level sprays, hanging leaves, leaves turned to the sky: boughs as they stand, all together."""
     flora = support.flora()
     species = support.SPECIES.index(name)
-    number = int(np.clip(1e6 / flora.polygons[flora.first_row[species]], 4, 60))
+    number = int(np.clip(2e6 / flora.polygons[flora.first_row[species]], 4, 60))
     boughs, *_ = open_subplants(flora, support.trunks(flora.rows, support.plants(np.arange(number), species)))
     _, leaves = support.meshes(flora, support.expanded(flora, boughs))
     weight = subplant_totals(flora, boughs).leaf_area

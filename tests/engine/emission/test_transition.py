@@ -200,3 +200,19 @@ def test_few_are_opened_at_a_time_and_it_changes_nothing(monkeypatch: pytest.Mon
     monkeypatch.setattr(shares, "OPENED_AT_ONCE", 3)
     assert np.array_equal(facets(), once)
     assert max(opened) == 3
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_trunk_that_fills_the_picture_is_there_whatever_share_it_has(seed: int) -> None:
+    """Hardly any of a tall birch is seen from so near: none of its few points need be there."""
+    flora = support.flora()
+    birch = support.SPECIES.index("birch")
+    seeds = support.plants([seed], birch)
+    radius = float(trunks(flora.rows, seeds).radius[0])
+    camera = support.camera((0.0, -8.0 * radius, 1.3), (0.0, 0.0, 1.3), pixels=256)
+    result = run(flora, seeds, camera)[1]
+    blocks = list(explicit_blocks(flora, result, camera, Transition(flora, camera, 0.5)))
+    bark = [b.buffers.positions for b in blocks if b.kind == "bark"]
+    assert bark
+    points = np.concatenate(bark)
+    assert (np.hypot(points[:, 0], points[:, 1]) < 3.0 * radius).any()

@@ -73,8 +73,9 @@ def shared(
     tree = view_root(camera, bounding_box(flora, plants.parts.branches))
     root = np.arange(len(tree)) == 0
     plants.update(tree, root, np.where(root, np.inf, 0.0))
+    at_once = plants.parts.alone.sum()  # thick wood in view is opened before anything is divided
     while rounds > 0:
-        rounds -= bool(plants.parts.alone.any())
+        rounds -= bool(plants.parts.alone.sum() > at_once)
         nodes = np.unique(plants.points.cell)
         divide(tree, plants, nodes[rng.random(len(nodes)) < 0.7])
     return tree, plants

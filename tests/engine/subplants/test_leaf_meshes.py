@@ -46,7 +46,7 @@ def check_topology(mesh: MeshBuffers) -> None:
 
 
 def check_attributes(mesh: MeshBuffers) -> None:
-    assert set(mesh.attributes) == {"UVMap", "tf_colour", "tf_transmission"}
+    assert set(mesh.attributes) - {"tf_girth"} == {"UVMap", "tf_colour", "tf_transmission"}
     assert mesh.attributes["UVMap"][0] == "CORNER"
     assert mesh.attributes["UVMap"][1].shape[1] == 2
     for name in ("tf_colour", "tf_transmission"):
@@ -228,6 +228,22 @@ def test_twigs_show_what_their_tubes_show() -> None:
     assert ours.mean() == pytest.approx(theirs.mean(), rel=0.03)
     np.testing.assert_allclose(ours, theirs, rtol=0.15)  # tubes are bent
     assert twig_buffers(flora, []) is None
+
+
+def test_wood_says_how_thick_it_is_at_its_base() -> None:
+    """What v counts, on tubes as on twigs: one number for each branch."""
+    flora = support.small_flora()
+    whole = support.whole_of(flora, support.grown(flora, support.plants(5))[1])
+    girth = 2 * np.pi * whole.branches.radius
+    rows = flora.rows[whole.branches.row]
+    faces_of = rows["sides"] * (rows["segments"] + rows["rings"])
+    for mesh, faces in (
+        (tube_buffers(flora, [whole]), faces_of),
+        (twig_buffers(flora, [whole]), np.ones(len(girth), int)),
+    ):
+        domain, values = mesh.attributes["tf_girth"]
+        assert domain == "FACE"
+        np.testing.assert_allclose(np.sort(values), np.sort(np.repeat(girth, faces)), rtol=1e-6)
 
 
 def test_concatenation() -> None:

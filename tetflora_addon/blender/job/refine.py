@@ -138,7 +138,7 @@ def _refine_steps(
         if scene.tetflora.expand_everything:
             results.open()
             # Explicit objects stay visible themselves.
-            yield from _write_blocks(results, flora, expanded_blocks(flora, given.seeds), statistics, 0.05)
+            yield from _write_blocks(results, flora, expanded_blocks(flora, given.seeds, camera), statistics, 0.05)
         else:
             originals = given.explicit.originals if given.explicit is not None else []
             yield from _write_refined(results, flora, given, camera, statistics, clock)
@@ -237,13 +237,13 @@ def _refined(
     _count(statistics, refinement)
     statistics.strays = given.named(refinement.strays)
     if not form.facets:
-        return Refined(flora, refinement, camera)
-    transition = Transition(flora, camera, detail.leaf_limit)
+        return Refined(flora, refinement, camera, tolerance=detail.tolerance)
+    transition = Transition(flora, camera, detail.leaf_limit, detail.tolerance)
     yield Progress(_LOOP_FRACTION, "Analyzing leaf clustering")
     if unmeasured(flora):
         for name, done in measuring(flora, drawn_species(flora, refinement, camera, transition)):
             yield Progress(_LOOP_FRACTION, f'Analyzing leaf clustering of "{name}": {done:.0%}')
-    return Refined(flora, refinement, camera, detail.pixels, transition, disc)
+    return Refined(flora, refinement, camera, detail.pixels, transition, disc, detail.tolerance)
 
 
 def _write_refined(
@@ -261,7 +261,7 @@ def _write_refined(
     baking = None
     if given.sources is not None:
         baking = Baking(given.sources, leaves=scene.tetflora.baked_light == 'ALL')
-    blocks = explicit_blocks(flora, refined.refinement, camera, refined.transition)
+    blocks = explicit_blocks(flora, refined.refinement, camera, refined.transition, refined.tolerance)
     yield from _write_blocks(results, flora, blocks, statistics, _LOOP_FRACTION, baking)
     if given.explicit is not None:
         blocks = polygon_blocks(refined.refinement, camera, refined.facet_pixels)

@@ -3,8 +3,9 @@
 """Bark by nodes: patterns that follow each branch by its UV map, fade on thin twigs, and keep the mean colour.
 
 A pattern lives on a cylinder of radius 1, of which the branch is an unrolled image: (cos 2πu, sin 2πu, 2πv). It
-therefore closes without a seam at u = 0, is as wide as it is high, and grows with the branch. How thick the branch is
-where it is seen follows from the slope of u along the surface, which Bump nodes know: no mesh carries it.
+therefore closes without a seam at u = 0 and is as wide as it is high. How many features there are to a radius follows
+from the branch's girth at its base, one number for each branch. How thick the branch is where it is seen follows from
+the slope of u along the surface, which Bump nodes know.
 """
 
 from __future__ import annotations
@@ -17,12 +18,14 @@ from typing import Any
 import bpy
 
 from ...errors import SpeciesError
-from .nodes import Graph, find_socket, shader_group
+from . import bark_patterns as patterns
+from .bark_patterns import Place, Socket
+from .nodes import Graph, shader_group, smooth_step
 
-GIRTH = "TetFlora Bark Place"
+PLACE = "TetFlora Bark Place"
 
 # Raise this when nodes of a group change; `bark_version` then makes new materials as well.
-_VERSION = 2
+_VERSION = 3
 
 # A perimeter of this length tilts the Bump node's normal by 45 degrees: the middle of the range that matters, metres.
 _REFERENCE = 0.25
@@ -30,8 +33,18 @@ _REFERENCE = 0.25
 _THICKEST = 6.0
 # How far the pattern of a branch is moved per unit of its colour, in radii: branches differ in colour, so in pattern.
 _SHIFT = 10.0
-
-Socket = Any
+# Perimeter of the branch on which there are `Bark.scale` features to a radius, metres; also of one that does not say.
+_USUAL = 1.57
+# Light that relief costs in Cycles over what tilted normals explain.
+_STEEPER = 1.15
+# Moss grows up to this height above the base of a branch, on branches of these perimeters, metres.
+_MOSSY, _MOSS_GIRTH = 3.0, (0.3, 0.9)
+# Patches of moss and lichen to a meter.
+_PATCHES = 5.0
+# Where light and rain come from: moss faces north and up.
+_SHADY = (0.0, 0.76, 0.65)
+# Colours of moss and lichen over the lightness of the bark under them.
+_MOSS, _LICHEN = (0.95, 1.07, 0.42), (1.15, 1.2, 1.0)
 
 
 @dataclass(frozen=True)
@@ -41,34 +54,36 @@ class Bark:
     Attributes
     ----------
     pattern : callable
-        (graph, place, scale, stretch) → (tone, height): both sockets of numbers from 0 to 1.
+        (graph, place) → (factors of the colour, height in widths of a feature): sockets.
     scale : float
-        Features to a radius of the branch; 2π times as many around it.
+        Features to a radius, on a branch of .25 m radius; 2π times as many around it.
     stretch : float
         How much longer along the branch than around it features are.
-    mean : float
-        Mean of the pattern's tone over the surface, measured; a little less where the relief costs light in Cycles
-        (rays of a tilted normal's half space that end inside the branch, up to 4 %), none of which EEVEE sees: half
-        the loss is made up for, so that neither is off by more than 3 %.
+    mean : (3,) float
+        Mean of the pattern's factors over the surface, measured.
     contrast : float
-        Change of the colour's factor from tone 0 to tone 1.
-    hue : (3,) float
-        Factor of the contrast in red, green and blue.
+        1: factors as the pattern has them.
     depth : float
-        Of the relief, in perimeters of the branch.
+        Of the relief, in widths of a feature.
     smooth, full : float
         Perimeters under which there is no pattern, and over which it is complete, metres.
+    moss, lichen : float
+        How much of it there is.
+    power : float
+        Features to a radius go by this power of the radius: at 1 they are as wide on all branches.
     """
 
-    pattern: Callable[[Graph, Socket, Socket, Socket], tuple[Socket, Socket]]
+    pattern: Callable[[Graph, Place], tuple[Socket, Socket]]
     scale: float
     stretch: float
-    mean: float
+    mean: tuple[float, float, float]
     contrast: float
-    hue: tuple[float, float, float]
     depth: float
     smooth: float
     full: float
+    moss: float = 0.0
+    lichen: float = 0.0
+    power: float = 0.5
 
 
 def place_group() -> bpy.types.NodeTree:
@@ -77,9 +92,9 @@ def place_group() -> bpy.types.NodeTree:
     Returns
     -------
     bpy.types.NodeTree
-        Outputs Place, on the cylinder of radius 1 (in radii, moved by the branch's colour), and Perimeter, metres.
-        The perimeter P is that of the branch where it is seen: a relief of height u times D tilts the normal by θ with
-        tan θ = D |∇u| = D / P (Mikkelsen 2010, "Bump mapping unparametrized surfaces on the GPU").
+        Outputs Place, on the cylinder of radius 1 (in radii, moved by the branch's colour), Turn, Along (radii), and
+        Perimeter, metres. The perimeter P is that of the branch where it is seen: a relief of height u times D tilts
+        the normal by θ with tan θ = D |∇u| = D / P (Mikkelsen 2010, "Bump mapping unparametrized surfaces on the GPU").
     """
 
     def build(graph: Graph, _given: Any) -> dict[str, Any]:
@@ -96,9 +111,10 @@ def place_group() -> bpy.types.NodeTree:
         sine = graph.math('SQRT', graph.math('SUBTRACT', 1.0, graph.math('MULTIPLY', cosine, cosine)))
         cotangent = graph.math('DIVIDE', cosine, graph.math('MAXIMUM', sine, 1e-3))
         perimeter = graph.math('MINIMUM', graph.math('MULTIPLY', cotangent, _REFERENCE), _THICKEST)
-        return {"Place": place, "Perimeter": perimeter}
+        return {"Place": place, "Turn": uv["X"], "Along": z, "Perimeter": perimeter}
 
-    return shader_group(GIRTH, _VERSION, (), (("Place", 'Vector'), ("Perimeter", 'Float')), build)
+    outputs = (("Place", 'Vector'), *((name, 'Float') for name in ("Turn", "Along", "Perimeter")))
+    return shader_group(PLACE, _VERSION, (), outputs, build)
 
 
 def bark_group(character: str) -> bpy.types.NodeTree:
@@ -112,8 +128,11 @@ def bark_group(character: str) -> bpy.types.NodeTree:
     Returns
     -------
     bpy.types.NodeTree
-        Inputs Colour, Scale, Stretch, Contrast, Depth, Smooth Under, Full Over; outputs Colour, whose mean over the
-        surface is the colour that went in, and Normal.
+        Inputs Colour, Scale, Stretch, Contrast, Depth, Smooth Under, Full Over, Moss, Lichen; outputs Colour, whose
+        mean over the surface is the colour that went in, Normal, Gain, and Shown, which is 0 where both are those of
+        a smooth twig: Cycles then passes over all nodes of the pattern, which is most of the wood in a crown. Gain is
+        what Cycles loses at a normal that is tilted by θ, and EEVEE does not: of the light that comes evenly from the
+        normal's half space the fraction (1 + cos θ) / 2 lies above the surface itself.
 
     Raises
     ------
@@ -123,29 +142,74 @@ def bark_group(character: str) -> bpy.types.NodeTree:
     bark = _bark(character)
     inputs = (
         ("Colour", 'Color', (0.16, 0.11, 0.07, 1.0), None, "Mean color"),
-        ("Scale", 'Float', bark.scale, (0.0, 1000.0), "Number of features per branch radius"),
+        ("Scale", 'Float', bark.scale, (0.0, 1000.0), "Number of features per radius of a branch of 0.25 m"),
         ("Stretch", 'Float', bark.stretch, (0.01, 100.0), "Length to width of the features"),
         ("Contrast", 'Float', bark.contrast, (0.0, 4.0), "Contrast around the mean color"),
-        ("Depth", 'Float', bark.depth, (0.0, 1.0), "Depth of the relief, in perimeters"),
+        ("Depth", 'Float', bark.depth, (0.0, 4.0), "Depth of the relief, in widths of a feature"),
         ("Smooth Under", 'Float', bark.smooth, (0.0, 10.0), "Perimeter of a young branch (m)"),
         ("Full Over", 'Float', bark.full, (0.0, 10.0), "Perimeter of an old branch (m)"),
+        ("Moss", 'Float', bark.moss, (0.0, 2.0), "Moss low on thick wood that faces north or up"),
+        ("Lichen", 'Float', bark.lichen, (0.0, 2.0), "Pale patches of lichen"),
     )
 
     def build(graph: Graph, given: Any) -> dict[str, Any]:
         where = graph.node("ShaderNodeGroup", node_tree=place_group()).outputs
-        tone, height = bark.pattern(graph, where["Place"], given["Scale"], given["Stretch"])
+        girth = base_girth(graph)
+        share = graph.math('POWER', graph.math('DIVIDE', girth, _USUAL), bark.power)
+        scale = graph.math('MULTIPLY', given["Scale"], share)
+        along = graph.math('DIVIDE', scale, given["Stretch"])
+        by = graph.node("ShaderNodeCombineXYZ", {"X": scale, "Y": scale, "Z": along})
+        cells = graph.vector('MULTIPLY', where["Place"], by)
+        place = Place(where["Place"], cells, where["Turn"], where["Along"], scale, given["Stretch"])
+        tone, height = bark.pattern(graph, place)
         age = smooth_step(graph, where["Perimeter"], given["Smooth Under"], given["Full Over"])
-        around_zero = graph.math('SUBTRACT', tone, bark.mean)
-        change = graph.math('MULTIPLY', around_zero, graph.math('MULTIPLY', given["Contrast"], age))
-        factor = graph.vector('ADD', graph.vector('SCALE', bark.hue, change), (1.0, 1.0, 1.0))
+        around_one = graph.vector('SUBTRACT', graph.vector('DIVIDE', tone, bark.mean), (1.0, 1.0, 1.0))
+        change = graph.vector('SCALE', around_one, graph.math('MULTIPLY', given["Contrast"], age))
+        colour = graph.tinted(given["Colour"], graph.vector('ADD', change, (1.0, 1.0, 1.0)))
+        if bark.moss or bark.lichen:
+            colour = _overgrown(graph, given, (place, girth, age), colour)
         # Thickness must not be part of the height, whose slope alone is wanted.
-        depth = graph.math('MULTIPLY', where["Perimeter"], given["Depth"])
-        depth = graph.math('MULTIPLY', depth, age)
+        width = graph.math('DIVIDE', where["Perimeter"], graph.math('MULTIPLY', scale, tau))
+        depth = graph.math('MULTIPLY', graph.math('MULTIPLY', width, given["Depth"]), age)
         bump = graph.node("ShaderNodeBump", {"Strength": 1.0, "Distance": depth, "Height": height})
-        return {"Colour": graph.tinted(given["Colour"], factor), "Normal": bump}
+        # Only trunks flare, and these are thick.
+        shown = graph.math('GREATER_THAN', girth, given["Smooth Under"])
+        tilt = graph.vector('DOT_PRODUCT', bump, graph.node("ShaderNodeNewGeometry").outputs["Normal"])
+        gain = graph.math('DIVIDE', 2.0, graph.math('ADD', 1.0, graph.math('MAXIMUM', tilt, 0.0)))
+        # Tilted normals explain most of the loss; the rest is measured.
+        gain = graph.math('MULTIPLY_ADD', gain, _STEEPER, 1.0 - _STEEPER)
+        return {"Colour": colour, "Normal": bump, "Gain": gain, "Shown": shown}
 
-    name = f"TetFlora {character.capitalize()} Bark"
-    return shader_group(name, _VERSION, inputs, (("Colour", 'Color'), ("Normal", 'Vector')), build)
+    outputs = ("Colour", 'Color'), ("Normal", 'Vector'), ("Gain", 'Float'), ("Shown", 'Float')
+    return shader_group(f"TetFlora {character.capitalize()} Bark", _VERSION, inputs, outputs, build)
+
+
+def base_girth(graph: Graph) -> Socket:
+    """Length around the branch at its base, metres; a usual one where the mesh does not say."""
+    girth = graph.attribute("tf_girth", "Fac")
+    return graph.math('MULTIPLY_ADD', graph.math('LESS_THAN', girth, 1e-6), _USUAL, girth)
+
+
+def _overgrown(graph: Graph, given: Any, at: tuple[Place, Socket, Socket], colour: Socket) -> Socket:
+    """Moss where it is damp, lichen where a noise is low: as light as the bark beneath, so that the mean stays."""
+    place, girth, age = at
+    radii = graph.math('DIVIDE', girth, tau)
+    metres = graph.vector('SCALE', place.round, graph.math('MULTIPLY', radii, _PATCHES))
+    noise = graph.noise(metres, 4.0, 0.65)[0]
+    normal = graph.node("ShaderNodeNewGeometry").outputs["Normal"]
+    damp = smooth_step(graph, graph.vector('DOT_PRODUCT', normal, _SHADY), -0.3, 0.9)
+    low = smooth_step(graph, graph.math('MULTIPLY', place.along, radii), _MOSSY, 0.0)
+    # What does not say how thick it is may be no wood.
+    thick = smooth_step(graph, graph.attribute("tf_girth", "Fac"), *_MOSS_GIRTH)
+    damp = graph.math('MULTIPLY', graph.math('MULTIPLY', damp, low), thick)
+    # Moss settles in what lies deep first.
+    there = graph.math('MULTIPLY_ADD', graph.math('MULTIPLY', damp, given["Moss"]), 0.45, noise)
+    moss = graph.math('MULTIPLY', smooth_step(graph, there, 0.72, 0.92), age)
+    lichen = graph.math('MULTIPLY', smooth_step(graph, noise, 0.37, 0.34), graph.math('MULTIPLY', given["Lichen"], age))
+    light = graph.node("ShaderNodeRGBToBW", {"Color": colour}).outputs[0]
+    for tint, amount in ((_LICHEN, lichen), (_MOSS, moss)):
+        colour = graph.mixed(amount, colour, graph.vector('SCALE', tint, light))
+    return colour
 
 
 def bark_version(character: str) -> int:
@@ -160,107 +224,17 @@ def _bark(character: str) -> Bark:
     return _CHARACTERS[character]
 
 
-def _stretched(graph: Graph, place: Socket, scale: Socket, stretch: Socket) -> Socket:
-    """Place in features: `scale` to a radius, `stretch` times longer along the branch."""
-    along = graph.math('DIVIDE', scale, stretch)
-    by = graph.node("ShaderNodeCombineXYZ", {"X": scale, "Y": scale, "Z": along})
-    return graph.vector('MULTIPLY', place, by)
-
-
-def _noise(graph: Graph, place: Socket, detail: float, roughness: float, distortion: float = 0.0) -> Socket:
-    """Fractal noise from 0 to 1, .5 on average."""
-    inputs = {"Vector": place, "Scale": 1.0, "Detail": detail, "Roughness": roughness, "Distortion": distortion}
-    return find_socket(graph.node("ShaderNodeTexNoise", inputs).outputs, "Fac")
-
-
-def smooth_step(graph: Graph, value: Socket, low: Socket | float, high: Socket | float) -> Socket:
-    """0 under `low`, 1 over `high`, smooth between; falls where `low` is above `high`."""
-    inputs = {"Value": value, "From Min": low, "From Max": high}
-    return graph.node("ShaderNodeMapRange", inputs, interpolation_type='SMOOTHSTEP').outputs[0]
-
-
-def _cracked(graph: Graph, bent: Socket, width: float) -> Socket:
-    """Cells from 1 down to 0 in the cracks between them."""
-    inputs = {"Vector": bent, "Scale": 1.0, "Randomness": 1.0}
-    cells = graph.node("ShaderNodeTexVoronoi", inputs, feature='DISTANCE_TO_EDGE')
-    return smooth_step(graph, cells.outputs["Distance"], 0.0, width)
-
-
-def _bent(graph: Graph, place: Socket, noise: Socket, amount: float) -> Socket:
-    """Places moved by a noise, along the diagonal."""
-    return graph.vector('ADD', place, graph.vector('SCALE', (amount, amount, amount), noise))
-
-
-def _ridged(graph: Graph, place: Socket, scale: Socket, stretch: Socket) -> tuple[Socket, Socket]:
-    """Long ridges that part and meet again, with furrows between them and cracks across."""
-    cells = _stretched(graph, place, scale, stretch)
-    noise = _noise(graph, graph.vector('MULTIPLY', cells, (1.0, 1.0, 2.5)), 4.0, 0.65)
-    ridge = _cracked(graph, _bent(graph, cells, noise, 1.3), 0.34)
-    tone = graph.math('MULTIPLY', ridge, graph.math('MULTIPLY_ADD', noise, 2.0, -0.15))
-    return tone, graph.math('MULTIPLY_ADD', noise, 0.8, ridge)
-
-
-def _plated(graph: Graph, place: Socket, scale: Socket, stretch: Socket) -> tuple[Socket, Socket]:
-    """Plates with cracks between them, in thin layers."""
-    cells = _stretched(graph, place, scale, stretch)
-    noise = _noise(graph, graph.vector('SCALE', cells, 2.0), 4.0, 0.6)
-    plate = _cracked(graph, _bent(graph, cells, noise, 0.6), 0.16)
-    layers = graph.math('MULTIPLY_ADD', noise, 1.8, -0.2)
-    return graph.math('MULTIPLY', plate, layers), graph.math('MULTIPLY_ADD', noise, 0.5, plate)
-
-
-def _smooth(graph: Graph, place: Socket, scale: Socket, stretch: Socket) -> tuple[Socket, Socket]:
-    """Skin with soft blotches and faint wrinkles across."""
-    noise = _noise(graph, _stretched(graph, place, scale, stretch), 5.0, 0.65)
-    return noise, noise
-
-
-def _banded(graph: Graph, place: Socket, scale: Socket, stretch: Socket) -> tuple[Socket, Socket]:
-    """Pale skin with dark lenses across: balls around points, cut by the cylinder, are lenses of all sizes."""
-    cells = _stretched(graph, place, scale, stretch)
-    noise = _noise(graph, graph.vector('SCALE', cells, 0.3), 4.0, 0.65)
-    spots = graph.node("ShaderNodeTexVoronoi", {"Vector": cells, "Scale": 1.0, "Randomness": 1.0}).outputs["Distance"]
-    away = graph.math('SUBTRACT', spots, graph.math('MULTIPLY', noise, 1.3))
-    clear = smooth_step(graph, away, -0.5, -0.36)
-    return graph.math('MULTIPLY', clear, graph.math('MULTIPLY_ADD', noise, 0.5, 0.6)), clear
-
-
-def _ringed(graph: Graph, place: Socket, scale: Socket, stretch: Socket) -> tuple[Socket, Socket]:
-    """Scars of fallen fronds: rings that hang unevenly, each standing out over the next, with fibres between."""
-    noise = _noise(graph, _stretched(graph, place, scale, stretch), 4.0, 0.6)
-    along = graph.node("ShaderNodeSeparateXYZ", {"Vector": place}).outputs["Z"]
-    turn = graph.math('FRACT', graph.math('MULTIPLY_ADD', noise, 1.2, graph.math('MULTIPLY', along, 3.6)))
-    scar = graph.math('MULTIPLY', smooth_step(graph, turn, 0.0, 0.2), smooth_step(graph, turn, 1.0, 0.5))
-    tone = graph.math('MULTIPLY', scar, graph.math('MULTIPLY_ADD', noise, 1.6, 0.0))
-    return tone, graph.math('MULTIPLY_ADD', noise, 0.3, scar)
-
-
-def _jointed(graph: Graph, place: Socket, scale: Socket, stretch: Socket) -> tuple[Socket, Socket]:
-    """Culms with three joints to four perimeters, and wax under each."""
-    noise = _noise(graph, _stretched(graph, place, scale, stretch), 2.0, 0.6)
-    along = graph.node("ShaderNodeSeparateXYZ", {"Vector": place}).outputs["Z"]
-    part = graph.math('FRACT', graph.math('MULTIPLY', along, 0.75 / tau))
-    joint = graph.math('MULTIPLY', smooth_step(graph, part, 0.0, 0.025), smooth_step(graph, part, 1.0, 0.995))
-    wax = smooth_step(graph, part, 0.9, 1.0)
-    skin = graph.math('ADD', graph.math('MULTIPLY', noise, 0.8), wax)
-    return graph.math('MULTIPLY', joint, skin), joint
-
-
-def _fibrous(graph: Graph, place: Socket, scale: Socket, stretch: Socket) -> tuple[Socket, Socket]:
-    """Long strips that peel."""
-    noise = _noise(graph, _stretched(graph, place, scale, stretch), 4.0, 0.7)
-    strip = smooth_step(graph, noise, 0.3, 0.7)
-    return strip, strip
-
-
 _CHARACTERS: dict[str, Bark] = {
-    "ridged": Bark(_ridged, 4.6, 5.5, 0.283, 1.7, (1.0, 1.0, 1.0), 0.005, 0.12, 0.7),
-    "plated": Bark(_plated, 2.8, 2.5, 0.414, 1.5, (0.9, 1.05, 1.05), 0.0065, 0.2, 0.8),
-    "smooth": Bark(_smooth, 3.0, 0.5, 0.5, 1.5, (1.0, 1.0, 1.0), 0.003, 0.05, 0.3),
-    "banded": Bark(_banded, 4.5, 0.16, 0.787, 1.0, (1.0, 1.0, 1.0), 0.002, 0.1, 0.3),
-    "ringed": Bark(_ringed, 2.2, 1.2, 0.511, 1.4, (1.0, 1.0, 1.0), 0.005, 0.2, 0.6),
-    "fibrous": Bark(_fibrous, 8.0, 16.0, 0.485, 1.3, (1.0, 1.0, 1.0), 0.0045, 0.1, 0.5),
-    "jointed": Bark(_jointed, 3.0, 8.0, 0.458, 0.7, (1.0, 1.0, 1.0), 0.01, 0.02, 0.08),
+    "ridged": Bark(patterns.ridged, 12.0, 8.0, (0.345, 0.313, 0.27), 1.0, 0.26, 0.22, 0.8, 1.0, 0.6),
+    "plated": Bark(patterns.plated, 4.4, 2.6, (0.416, 0.279, 0.217), 1.0, 0.18, 0.25, 0.8, 0.3, 0.4),
+    "smooth": Bark(patterns.smooth, 6.0, 0.3, (0.537, 0.546, 0.515), 1.0, 0.02, 0.12, 0.4, 0.8, 0.9),
+    "banded": Bark(patterns.banded, 7.0, 0.2, (0.636, 0.614, 0.595), 1.0, 0.05, 0.1, 0.3, 0.4, 0.5),
+    "ringed": Bark(patterns.ringed, 2.2, 1.2, (0.519, 0.519, 0.519), 0.7, 0.07, 0.2, 0.6, power=0.0),
+    "fibrous": Bark(patterns.fibrous, 9.0, 14.0, (0.543, 0.481, 0.429), 1.0, 0.3, 0.16, 0.5, 0.5, 0.3),
+    "jointed": Bark(patterns.jointed, 3.0, 8.0, (0.443, 0.443, 0.443), 0.32, 0.03, 0.02, 0.08, power=0.0),
+    "netted": Bark(patterns.netted, 9.0, 5.5, (0.57, 0.512, 0.442), 1.0, 0.26, 0.22, 0.8, 0.7, 0.6),
+    "peeling": Bark(patterns.peeling, 14.0, 0.22, (0.762, 0.752, 0.737), 1.0, 0.1, 0.12, 0.4, 0.4, 0.3),
+    "scaly": Bark(patterns.scaly, 7.0, 1.2, (0.678, 0.603, 0.545), 1.0, 0.18, 0.2, 0.6, 0.4, 0.5),
 }
 
 #: Characters of bark, as species name them.

@@ -14,93 +14,59 @@ import bpy
 from ...emission.light import BACK, FRONT
 from ...light.scattering import GLOSS
 from ..compat import disable_bump_correction
-from .bark import bark_group, bark_version, smooth_step
-from .microsphere import scatter_group
-from .nodes import LEAF_GREEN, Graph, find_socket, shader_group, surface_material
+from .bark import bark_group, bark_version
+from .blade import blade_group, blade_version
+from .microsphere import WHITE, scatter_group
+from .nodes import Graph, find_socket, surface_material
 
-BLADE = "TetFlora Leaf Blade"
 PROXY = "TetFlora proxy"
 SPHERE = "TetFlora microsphere"
 BAKED = "TetFlora baked"
 
 # Raise these when what they count changes: existing files then get the new nodes beside the old ones.
-_LEAF_VERSION = 2
-_BLADE_VERSION = 1
 _PROXY_VERSION = 2
 _SPHERE_VERSION = 1
 _BAKED_VERSION = 1
 
-# How much more than the mean of both sides a leaf's underside reflects, and the upper side less: fewer pigments lie
-# under its surface, hence most in blue, of which a leaf has least.
-PALER = (0.07, 0.05, 0.22)
-# Lightness of the midrib and of the veins that branch off it, over that of the blade.
-MIDRIB, VEINS = 0.45, 0.2
-# Veins to a leaf's length on either side, and how far along the leaf they run per unit that they run outwards.
-_VEIN_COUNT, _VEIN_SLOPE = 9.0, 0.65
-# Transmission under which leaves show no veins (needles, scales), and over which they show all.
-_OPAQUE, _THIN = 0.15, 0.35
 
-
-def blade_group() -> bpy.types.NodeTree:
-    """The group "TetFlora Leaf Blade": midrib and veins, and a paler underside.
-
-    Returns
-    -------
-    bpy.types.NodeTree
-        Inputs Colour, Transmission, Midrib, Veins, Paler Underside; outputs Colour, and Reflected Tint for the scatter
-        group. In the UV map the midrib is expected at u = .5 from v = 0 to 1, in units of the leaf's length, as leaf
-        models have it. Over the leaf the mean of Colour is that of the input, and over both sides the mean of the tint
-        is 1: light lines lie in darker surroundings.
-    """
-    inputs = (
-        ("Colour", 'Color', LEAF_GREEN, None, "Mean color"),
-        ("Transmission", 'Float', 0.4, (0.0, 1.0), "Thick leaves show no veins"),
-        ("Midrib", 'Float', MIDRIB, (0.0, 2.0), "How much lighter the midrib is"),
-        ("Veins", 'Float', VEINS, (0.0, 1.0), "How much lighter the veins are"),
-        ("Paler Underside", 'Float', 1.0, (0.0, 4.0)),
-    )
-
-    def build(graph: Graph, given: Any) -> dict[str, Any]:
-        uv = graph.node("ShaderNodeSeparateXYZ", {"Vector": graph.attribute("UVMap", "Vector")}).outputs
-        aside = graph.math('ABSOLUTE', graph.math('SUBTRACT', uv["X"], 0.5))
-        # The halo is three times as wide as the rib and a third as dark as that is light, so that the mean stays.
-        rib, halo = smooth_step(graph, aside, 0.008, 0.002), smooth_step(graph, aside, 0.022, 0.008)
-        rib = graph.math('MULTIPLY_ADD', halo, -1.0 / 3.0, rib)
-        start = graph.math('MULTIPLY_ADD', aside, -_VEIN_SLOPE, uv["Y"])
-        wave = graph.math('PINGPONG', graph.math('MULTIPLY', start, _VEIN_COUNT), 0.5)
-        # A step from .02 to .1 covers .06 of each .5.
-        vein = graph.math('SUBTRACT', smooth_step(graph, wave, 0.1, 0.02), 0.06 / 0.5)
-        vein = graph.math('MULTIPLY', vein, smooth_step(graph, aside, 0.015, 0.05))
-        lines = graph.math('MULTIPLY', vein, given["Veins"])
-        lines = graph.math('ADD', lines, graph.math('MULTIPLY', rib, given["Midrib"]))
-        factor = graph.math('MULTIPLY_ADD', lines, smooth_step(graph, given["Transmission"], _OPAQUE, _THIN), 1.0)
-        back = graph.node("ShaderNodeNewGeometry").outputs["Backfacing"]
-        side = graph.math('MULTIPLY', graph.math('MULTIPLY_ADD', back, 2.0, -1.0), given["Paler Underside"])
-        tint = graph.vector('ADD', graph.vector('SCALE', PALER, side), (1.0, 1.0, 1.0))
-        return {"Colour": graph.scaled(given["Colour"], factor), "Reflected Tint": tint}
-
-    outputs = ("Colour", 'Color'), ("Reflected Tint", 'Color')
-    return shader_group(BLADE, _BLADE_VERSION, inputs, outputs, build)
-
-
-def leaf_material(species_name: str) -> bpy.types.Material:
+def leaf_material(species_name: str, kind: str = "pinnate", **looks: float) -> bpy.types.Material:
     """Material "TetFlora <species> leaf": reads ``tf_colour`` and ``tf_transmission`` of each face, veins by ``UVMap``.
 
     Parameters
     ----------
     species_name : str
         Name as the artist reads it; each species has a material of its own to edit.
+    kind : str
+        One of `blade.BLADES`. A species whose kind changed gets a new material; the old one stays beside it.
+    **looks
+        Values of the group's inputs that a new material begins with, by name with underscores.
+
+    Notes
+    -----
+    Light that has been scattered before meets the plain leaf, as of proxies: nobody sees veins in it, and Cycles skips
+    all nodes of the side of a mix that does not count.
     """
 
-    def build(graph: Graph, _material: bpy.types.Material) -> None:
+    def build(graph: Graph, material: bpy.types.Material) -> None:
+        colour, transmission = graph.attribute("tf_colour", "Color"), graph.attribute("tf_transmission", "Fac")
+        given = {name.replace("_", " ").title(): value for name, value in looks.items()}
+        blade = graph.node("ShaderNodeGroup", {"Colour": colour, **given}, node_tree=blade_group(kind)).outputs
+        near = {
+            "Colour": WHITE,
+            "Transmission": transmission,
+            "Reflected Tint": blade["Reflected"],
+            "Through Tint": blade["Through"],
+            "Gloss": blade["Gloss"],
+            "Gloss Roughness": blade["Roughness"],
+            "Normal": blade["Normal"],
+        }
         normal = graph.node("ShaderNodeNewGeometry").outputs["Normal"]
-        inputs = {"Colour": graph.attribute("tf_colour", "Color")}
-        inputs["Transmission"] = graph.attribute("tf_transmission", "Fac")
-        blade = graph.node("ShaderNodeGroup", inputs, node_tree=blade_group()).outputs
-        looks = {name: blade[name] for name in ("Colour", "Reflected Tint")}
-        _lead_out(graph, _scattered(graph, {**inputs, **looks, "Normal": normal}))
+        plain = {"Colour": colour, "Transmission": transmission, "Normal": normal}
+        scattered = graph.node("ShaderNodeLightPath").outputs["Is Diffuse Ray"]
+        _lead_out(graph, graph.mix(scattered, _scattered(graph, near), _scattered(graph, plain)))
+        disable_bump_correction(material)
 
-    return surface_material(f"TetFlora {species_name} leaf", _LEAF_VERSION, build)
+    return surface_material(f"TetFlora {species_name} leaf", blade_version(kind), build)
 
 
 def bark_material(species_name: str, character: str = "ridged") -> bpy.types.Material:
@@ -126,8 +92,12 @@ def bark_material(species_name: str, character: str = "ridged") -> bpy.types.Mat
     def build(graph: Graph, material: bpy.types.Material) -> None:
         colour = graph.attribute("tf_colour", "Color")
         bark = graph.node("ShaderNodeGroup", {"Colour": colour}, node_tree=bark_group(character)).outputs
-        looks = {name: bark[name] for name in ("Colour", "Normal")}
-        _lead_out(graph, _scattered(graph, {**looks, "Transmission": 0.0, "Gloss": 0.0}))
+        dull = {"Transmission": 0.0, "Gloss": 0.0}
+        normal = graph.node("ShaderNodeNewGeometry").outputs["Normal"]
+        young = _scattered(graph, {**dull, "Colour": colour, "Normal": normal})
+        for engine, tone in (('CYCLES', graph.scaled(bark["Colour"], bark["Gain"])), ('EEVEE', bark["Colour"])):
+            old = _scattered(graph, {**dull, "Colour": tone, "Normal": bark["Normal"]})
+            _lead_out(graph, graph.mix(bark["Shown"], young, old), engine=engine)
         # The correction takes up to a tenth of the light away from what is rough, unlike for proxies.
         disable_bump_correction(material)
         material.diffuse_color = (0.18, 0.12, 0.08, 1.0)
@@ -208,7 +178,7 @@ def _scattered(graph: Graph, looks: dict[str, Any]) -> bpy.types.Node:
     return graph.node("ShaderNodeGroup", looks, node_tree=scatter_group())
 
 
-def _lead_out(graph: Graph, shader: Any, thickness: Any = None) -> None:
+def _lead_out(graph: Graph, shader: Any, thickness: Any = None, engine: str = 'ALL') -> None:
     """Link a shader to the output. EEVEE would take the extent of the whole mesh for a thickness that is not linked."""
     thickness = graph.value(0.0) if thickness is None else thickness
-    graph.node("ShaderNodeOutputMaterial", {"Surface": shader, "Thickness": thickness})
+    graph.node("ShaderNodeOutputMaterial", {"Surface": shader, "Thickness": thickness}, target=engine)

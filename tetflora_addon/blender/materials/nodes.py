@@ -138,7 +138,7 @@ class Graph:
         return node.outputs[0]
 
     def vector(self, operation: str, *values: Any) -> bpy.types.NodeSocket:
-        """Vector operation; the result is a number for ``'DOT_PRODUCT'`` and ``'LENGTH'``.
+        """Vector operation; the result is a number for ``'DOT_PRODUCT'``, ``'DISTANCE'`` and ``'LENGTH'``.
 
         The second operand of ``'SCALE'`` is the factor.
         """
@@ -146,7 +146,7 @@ class Graph:
         names = ("Vector", "Scale") if operation == 'SCALE' else ("Vector", "Vector_001")
         for key, value in zip(names, values, strict=False):
             self.feed(find_socket(node.inputs, key), value)
-        return find_socket(node.outputs, "Value" if operation in {'DOT_PRODUCT', 'LENGTH'} else "Vector")
+        return find_socket(node.outputs, "Value" if operation in {'DOT_PRODUCT', 'DISTANCE', 'LENGTH'} else "Vector")
 
     def mix(self, factor: Any, first: Any, second: Any) -> bpy.types.NodeSocket:
         """Mix two shaders; factor 0 gives the first."""
@@ -168,6 +168,24 @@ class Graph:
         """Colour times a number, at most 1."""
         grey = self.node("ShaderNodeCombineColor", {"Red": factor, "Green": factor, "Blue": factor})
         return self.tinted(colour, grey)
+
+    def step(self, value: Any, low: Any, high: Any) -> bpy.types.NodeSocket:
+        """0 under `low`, 1 over `high`, smooth between; falls where `low` is above `high`."""
+        inputs = {"Value": value, "From Min": low, "From Max": high}
+        return self.node("ShaderNodeMapRange", inputs, interpolation_type='SMOOTHSTEP').outputs[0]
+
+    def mixed(self, factor: Any, a: Any, b: Any) -> bpy.types.NodeSocket:
+        """Colours mixed; those that are no sockets are (r, g, b)."""
+        inputs = {"Factor_Float": factor}
+        for key, colour in (("A_Color", a), ("B_Color", b)):
+            inputs[key] = (*colour, 1.0) if isinstance(colour, tuple) else colour
+        return find_socket(self.node("ShaderNodeMix", inputs, data_type='RGBA').outputs, "Result_Color")
+
+    def noise(self, place: Any, detail: float, roughness: float) -> tuple[Any, Any]:
+        """Fractal noise from 0 to 1, .5 on average: a number and three."""
+        inputs = {"Vector": place, "Scale": 1.0, "Detail": detail, "Roughness": roughness}
+        outputs = self.node("ShaderNodeTexNoise", inputs).outputs
+        return find_socket(outputs, "Fac"), find_socket(outputs, "Color")
 
     def arrange(self) -> None:
         """Lay the nodes out in columns by their distance from the outputs, for whoever opens the editor."""
@@ -209,6 +227,11 @@ def find_socket(sockets: Any, key: str) -> bpy.types.NodeSocket:
             if getattr(socket, attribute) == key:
                 return socket
     raise KeyError(f"No socket {key} among {', '.join(socket.name for socket in sockets)}")
+
+
+def smooth_step(graph: Graph, value: Any, low: Any, high: Any) -> bpy.types.NodeSocket:
+    """`Graph.step`."""
+    return graph.step(value, low, high)
 
 
 def shader_group(

@@ -21,6 +21,7 @@ from ..attributes import world_matrix
 from ..runtime import JobData
 from ..scene.fields import fields_of, read_field
 from ..settings import check_limits
+from .canopy import not_of_covers
 from .distances import SQUARE, choose, distance_of, follows_species, painted_weights
 from .field_edits import add_points, editable, positions, take_points
 from .ground import Ground
@@ -83,9 +84,11 @@ class Standing:
     removable : (n,) bool
     """
 
-    def __init__(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-        self.objects = plants_of(scene.objects)
-        self.fields = fields_of(scene.objects)
+    def __init__(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, covers: bool) -> None:
+        """Read a scene, with or without what covers the ground."""
+        found = scene.objects if covers else not_of_covers(scene)
+        self.objects = plants_of(found)
+        self.fields = fields_of(found)
         places = [np.array([o.matrix_world.translation for o in self.objects], np.float64).reshape(-1, 3)]
         source, number = [np.full(len(self.objects), _OBJECTS)], [np.arange(len(self.objects))]
         removable = [
@@ -165,7 +168,8 @@ class Stroke:
         self.changed = False  # whether a flush has changed the scene
         self._data = JobData("Paint Plants", scene, view_layer)
         brush_of(scene)  # reports wrong settings before anything changes
-        self.standing = Standing(scene, depsgraph)
+        # Moss neither counts for the density of trees nor keeps them away.
+        self.standing = Standing(scene, depsgraph, covers=mode == 'ERASE')
         self.ground = Ground(view_layer, depsgraph)
         self._data.add_objects(self.ground.objects)
         self.key = strokes.stroke_key(settings.seed, settings.strokes)

@@ -23,6 +23,8 @@ from ..attributes import write
 from ..compat import shader_tree
 from ..species.catalogue import default_species
 from ..species.edits import catalogue
+from ..worker import at_once
+from .cover import cover_steps
 from .plant_objects import add_plants
 
 Stops = tuple[tuple[float, tuple[float, float, float]], ...]
@@ -30,6 +32,8 @@ Stops = tuple[tuple[float, tuple[float, float, float]], ...]
 NAME = "First forest"
 EYE_HEIGHT = 1.7  # metres
 SAMPLES = 24
+#: Attribute of the ground that is 0 on the path and 1 beside it.
+OFF_PATH = "off_path"
 _MARK = "tetflora_first_forest"  # on the collection, so that it may be renamed
 _STARTUP = {"Cube": 'MESH', "Camera": 'CAMERA', "Light": 'LIGHT'}
 _WEST, _EAST, _SOUTH, _NORTH = -48.0, 48.0, -14.0, 112.0  # of the ground, metres; the camera looks north
@@ -38,17 +42,14 @@ _CANDIDATES = 4000
 _PATH = 2.2  # metres from the middle of the path to its edge
 
 
-def meadow(name: str) -> bpy.types.Material:
-    """Moss and litter by noise, and trodden earth where the attribute ``aside`` (metres from the path) is small."""
-    material = bpy.data.materials.new(name)
+def tread(material: bpy.types.Material) -> None:
+    """Trodden earth on a soil where the attribute ``aside`` (meters from the middle of the path) is small."""
     tree = shader_tree(material)
-    tree.nodes.clear()
     new, link = tree.nodes.new, tree.links.new
+    surface = next(node for node in tree.nodes if node.type == 'BSDF_PRINCIPLED')
+    floor = surface.inputs["Base Color"].links[0].from_socket
     place = new("ShaderNodeTexCoord")
-    patches = _ramp(tree, place, 0.35, 6.0, ((0.38, (0.055, 0.085, 0.02)), (0.62, (0.16, 0.13, 0.055))))
-    grain = _ramp(tree, place, 5.0, 8.0, ((0.3, (0.35, 0.35, 0.35)), (0.7, (1.5, 1.4, 1.3))))
-    floor = _mixed(tree, 'MULTIPLY', 1.0, patches, grain)
-    earth = _ramp(tree, place, 9.0, 6.0, ((0.35, (0.11, 0.08, 0.05)), (0.65, (0.26, 0.2, 0.13))))
+    earth = _ramp(tree, place, 9.0, 6.0, ((0.35, (0.085, 0.06, 0.038)), (0.65, (0.19, 0.14, 0.09))))
     aside = new("ShaderNodeAttribute")
     aside.attribute_name = "aside"
     edge = new("ShaderNodeTexNoise")
@@ -64,26 +65,21 @@ def meadow(name: str) -> bpy.types.Material:
     for socket, value in (("From Min", 1.3), ("From Max", 2.6), ("To Min", 0.0), ("To Max", 1.0)):
         weight.inputs[socket].default_value = value
     link(ragged.outputs[0], weight.inputs["Value"])
-    colour = _mixed(tree, 'MIX', weight.outputs[0], earth, floor)
-    bump = new("ShaderNodeBump")
-    bump.inputs["Strength"].default_value, bump.inputs["Distance"].default_value = 0.6, 0.05
-    link(grain, bump.inputs["Height"])
-    surface = new("ShaderNodeBsdfDiffuse")
-    link(colour, surface.inputs["Color"])
-    link(bump.outputs["Normal"], surface.inputs["Normal"])
-    output = new("ShaderNodeOutputMaterial")
-    link(surface.outputs[0], output.inputs["Surface"])
-    return material
+    link(_mixed(tree, 'MIX', weight.outputs[0], earth, floor), surface.inputs["Base Color"])
 
 
 def sky(name: str) -> bpy.types.World:
-    """Blue above, pale at the horizon."""
+    """Blue above, pale at the horizon.
+
+    What it sheds on the ground has the color of daylight of 15,000 K, as under a clear sky, and a quarter of the sun's
+    strength: shade is cool, not blue-black.
+    """
     world = bpy.data.worlds.new(name)
     tree = shader_tree(world)
     tree.nodes.clear()
     new, link = tree.nodes.new, tree.links.new
     place, split, ramp = (new(f"ShaderNode{kind}") for kind in ("TexCoord", "SeparateXYZ", "ValToRGB"))
-    _set_stops(ramp, ((0.0, (0.75, 0.84, 0.93)), (0.45, (0.12, 0.3, 0.75))))
+    _set_stops(ramp, ((0.0, (0.75, 0.84, 0.93)), (0.45, (0.2, 0.3, 0.51))))
     link(place.outputs["Generated"], split.inputs[0])
     link(split.outputs["Z"], ramp.inputs[0])
     background, output = new("ShaderNodeBackground"), new("ShaderNodeOutputWorld")
@@ -179,8 +175,10 @@ def build(context: bpy.types.Context, seed: int) -> tuple[bpy.types.Scene, str]:
     collection = bpy.data.collections.new(NAME)
     collection[_MARK] = True
     scene.collection.children.link(collection)
-    collection.objects.link(_ground())
+    ground = _ground()
+    collection.objects.link(ground)
     _plant(scene, seed)
+    _cover(scene, ground)
     camera = _camera()
     collection.objects.link(camera)
     scene.camera = camera
@@ -244,8 +242,9 @@ def _ground() -> bpy.types.Object:
     faces = np.stack([first, first + 1, first + len(xs) + 1, first + len(xs)], axis=1)
     mesh = bpy.data.meshes.new("Forest ground")
     mesh.from_pydata(points.tolist(), [], faces.tolist(), shade_flat=False)
-    mesh.materials.append(meadow("Forest floor"))
-    write(mesh, "aside", np.abs(points[:, 0] - path(points[:, 1])).astype(np.float32))
+    aside = np.abs(points[:, 0] - path(points[:, 1])).astype(np.float32)
+    write(mesh, "aside", aside)
+    write(mesh, OFF_PATH, np.clip((aside - 1.2) / 2.0, 0.0, 1.0))
     ground = bpy.data.objects.new("Forest ground", mesh)
     ground.tetflora.is_occluder = True
     return ground
@@ -282,6 +281,18 @@ def _plant(scene: bpy.types.Scene, seed: int) -> None:
             wanted=layer.number,
         )
         add_plants(scene, placement, [layer.species if layer.species in known else default_species()])
+
+
+def _cover(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
+    """Cover the ground beside the path; the population of the cover is not the active one."""
+    layer = scene.view_layers[0]
+    layer.update()
+    steps = cover_steps(
+        scene, layer.depsgraph, scene.tetflora.populate, grounds=[ground], masks={"vertex_group": OFF_PATH}
+    )
+    at_once(steps)
+    tread(ground.material_slots[0].material)
+    scene.tetflora.populations_index = -1  # Populate begins with settings for a new one
 
 
 def _camera() -> bpy.types.Object:

@@ -22,6 +22,8 @@ from ..species.edits import catalogue
 
 COLLECTION = "TetFlora plants"
 FIELD = "Field of plants"
+#: Up to this many become empties by default; with more, Blender becomes slow.
+EMPTIES_UNASKED = 10_000
 POPULATION_MARK = "tetflora_population"  # on the collection of a population's plants
 _FIELD_MARK = "tetflora_field"  # on the objects of fields that TetFlora made and may remove
 _MARK = "tetflora_plants"  # on the collection, so that it may be renamed

@@ -28,9 +28,11 @@ ENDING = ".json"
 FORMAT = "TetFlora populations"
 VERSION = 1
 
-_MIX = ("species", "weight", "companion", "companion_strength", "companion_distance")
+_MIX = ("species", "weight", "companion", "companion_strength", "companion_distance", "habitat", "shed_by")
+#: Keys that are written only where they say something: earlier versions do not know them.
+_RARE = {"habitat": 'ANYWHERE', "shed_by": ""}
 #: Settings that hold identifiers of species.
-_IDENTIFIERS = ("species", "companion")
+_IDENTIFIERS = ("species", "companion", "shed_by")
 MAX_FILE_BYTES = 4_000_000
 MAX_TEXT = 1000
 #: Most entries of a list: populations of a file, species and grounds of a population.
@@ -106,7 +108,12 @@ def _population_data(population: TetFloraPopulation) -> dict[str, Any]:
     data: dict[str, Any] = {"name": population.name}
     data["grounds"] = [entry.object.name for entry in population.grounds if entry.object is not None]
     data["species"] = [
-        {name: _value(entry.bl_rna.properties[name], getattr(entry, name)) for name in _MIX} for entry in population.mix
+        {
+            name: _value(entry.bl_rna.properties[name], getattr(entry, name))
+            for name in _MIX
+            if getattr(entry, name) != _RARE.get(name)
+        }
+        for entry in population.mix
     ]
     for prop in _simple_settings(population):
         value = getattr(population, prop.identifier)

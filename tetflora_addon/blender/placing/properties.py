@@ -21,7 +21,7 @@ from ..settings import properties_of
 from ..species.catalogue import NO_SPECIES, SpeciesChoice, items_for, number_of
 from ..species.edits import catalogue
 from .distances import SOURCES, choose, empty_means, follows_species
-from .rules import EMPTIES_UNASKED
+from .plant_objects import EMPTIES_UNASKED
 
 #: Most plants that Populate creates as objects.
 MOST_EMPTIES = 100_000
@@ -32,6 +32,14 @@ STORAGE_ITEMS = (
 )
 #: Painted plants become empties as long as the scene has no more plants than this that are objects.
 MOST_PAINTED_EMPTIES = 2_000
+HABITATS = (
+    ('ANYWHERE', "Anywhere", "In light and shade alike", 0),
+    ('LIGHT', "In Light", "In gaps and at edges, where the sky is seen", 1),
+    ('HALF_SHADE', "In Half Shade", "Between dense crowns and open ground", 2),
+    ('SHADE', "In Shade", "Under dense crowns", 3),
+    ('LITTER', "Where Leaves Fall", "Under the crowns that shed it", 4),
+    ('DEAD_WOOD', "Where Wood Falls", "Under the crowns that shed it, and around them", 5),
+)
 NOBODY = ("NONE", "None", "No companion", 'NONE', 0)
 
 #: Called without arguments after each change of a setting; the preview of points listens.
@@ -107,6 +115,19 @@ class TetFloraMixEntry(bpy.types.PropertyGroup, SpeciesChoice):
     )
     companion_strength: _COMPANION.strength
     companion_distance: _COMPANION.distance
+    habitat: EnumProperty(
+        name="Grows",
+        description="Where under the other plants this species is found",
+        items=HABITATS,
+        default='ANYWHERE',
+        **_LIVE,
+    )
+    shed_by: StringProperty(
+        name="Shed By",
+        description="Identifier of the species that sheds what lies there; any if empty",
+        options={'HIDDEN'},
+        update=_notify,
+    )
 
 
 class TetFloraGround(bpy.types.PropertyGroup):
@@ -133,6 +154,7 @@ class TetFloraPopulation(bpy.types.PropertyGroup):
     message: StringProperty(name="Message", **_HIDDEN)
     placed_by: StringProperty(name="Placed By", **_HIDDEN)  # `rules.fingerprint` of when it was placed
     erased: StringProperty(name="Erased Places", **_HIDDEN)  # as `rules.note_erased` writes it
+    covers: StringProperty(name="Covers", **_HIDDEN)  # ``uid`` of the population whose ground it covers
 
     grounds: CollectionProperty(name="Grounds", description="Meshes that the plants grow on", type=TetFloraGround)
     ground_collection: PointerProperty(

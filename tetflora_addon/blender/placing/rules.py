@@ -31,20 +31,20 @@ from ..scene.objects import objects_within
 from ..scene.skeletons import species_of
 from ..settings import check_limits
 from ..species.edits import catalogue
+from .canopy import not_of_covers, suits_of
 from .distances import HECTARE, distance_of, empty_means, weights_of
-from .plant_objects import plants_of
+from .plant_objects import EMPTIES_UNASKED, plants_of
 from .terrain import MASKS, read_ground
 
-#: Up to this many become empties by default; with more, Blender becomes slow.
-EMPTIES_UNASKED = 10_000
 #: Identity and state of a population; all else are settings, which can be copied and written to files.
 IDENTITY = {
     *("rna_type", "name", "uid", "frozen", "collection", "made", "message", "placed_by", "erased"),
-    *("mix_index", "distance_from"),
+    *("mix_index", "distance_from", "covers"),
 }
 _COMPANION = ("companion", "companion_strength", "companion_distance")
 _DIGITS = 4  # of erased places: tenths of a millimetre
 _ENTRY = ("species", "weight", *_COMPANION)
+_HABITAT = ("habitat", "shed_by")
 
 
 def settings_of(group: type[bpy.types.PropertyGroup] | bpy.types.PropertyGroup) -> list[bpy.types.Property]:
@@ -58,7 +58,10 @@ def fingerprint(population: bpy.types.PropertyGroup) -> str:
     A setting that a later version adds changes nothing for populations that do not use it.
     """
     values: list[Any] = [[e.object.name_full for e in population.grounds if e.object is not None]]
-    values += [[getattr(entry, name) for name in _ENTRY] for entry in population.mix]
+    for entry in population.mix:
+        values.append([getattr(entry, name) for name in _ENTRY])
+        if entry.habitat != 'ANYWHERE':
+            values.append([entry.habitat, entry.shed_by])
     for name, default in _defaults(type(population)):
         value = distance_of(population) if name == "min_distance" else getattr(population, name)
         if isinstance(value, bpy.types.ID):
@@ -100,6 +103,8 @@ def copy_settings(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGro
         new = target.mix.add()
         new.species, new.weight = entry.species, entry.weight
         copy_companion(entry, new)
+        for name in _HABITAT:
+            setattr(new, name, getattr(entry, name))
 
 
 def copy_companion(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
@@ -246,7 +251,9 @@ def place_population(
     if most is not None:
         rules = replace(rules, count=min(rules.count, most))
     masks = {name: getattr(population, name) for name in MASKS}
-    found = place(read_ground(grounds, depsgraph, **masks), rules, *standing(scene, depsgraph, own, species))
+    ground = read_ground(grounds, depsgraph, **masks)
+    suits = suits_of(scene, depsgraph, population, ground.triangles, species)
+    found = place(ground, rules, *standing(scene, depsgraph, own, species), suits=suits)
     return without(found, erased_places(population)), species
 
 
@@ -266,7 +273,8 @@ def standing(
         Identifiers that the result counts through; others have -1.
     """
     numbers = {identifier: number for number, identifier in enumerate(species)}
-    objects = [o for o in scene.objects if o not in without] if without else scene.objects
+    # What covers the ground keeps nobody away.
+    objects = [o for o in not_of_covers(scene) if o not in without]
     single = plants_of(objects)
     position = [np.array([o.matrix_world.translation for o in single], dtype=np.float64).reshape(-1, 3)]
     kinds = [np.array([numbers.get(o.tetflora.species, -1) for o in single], dtype=np.int32)]

@@ -13,10 +13,11 @@ from ...errors import SpeciesError
 from ...species.leaf_models import LeafModel, leaf_model
 from ...species.species import LEAF_KINDS, Species
 from ..attributes import evaluated_mesh
-from ..materials.materials import bark_material, leaf_material
+from ..materials.materials import bark_material
 from ..materials.nodes import is_ours
 from ..scene.skeletons import form_of, read_skeleton, species_of
 from ..species.edits import species_for
+from .leaf_blades import species_leaf_material
 from .meshes import UV_MAP, read_mesh_arrays
 from .output import replaced_material
 
@@ -107,7 +108,7 @@ def materials_of(scene: bpy.types.Scene, species: Species, kind: str, form: int)
     own = _brought(scene, species.identifier, kind, form)
     if any(own):
         return own
-    return [_in_viewports(leaf_material(species.name if kind == "leaf" else f"{species.name} {kind}"), species, kind)]
+    return [_in_viewports(species_leaf_material(species, kind), species, kind)]
 
 
 def brought_materials(scene: bpy.types.Scene, kind_of_plant: str) -> list[list[str]]:

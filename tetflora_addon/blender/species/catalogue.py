@@ -19,7 +19,7 @@ from bpy.utils import previews
 
 from ...errors import NAME, SpeciesError, readable
 from ...files import inside, is_identifier, is_regular, write_whole
-from ...species.catalogue import SpeciesInfo, builtin_folder, checked_identifier
+from ...species.catalogue import FIRST_BEFORE, SpeciesInfo, builtin_folder, checked_identifier
 from ...species.schema import species_file, species_from_json
 from ..preferences import own_species_folder, species_folders
 from .edits import catalogue, species_data, species_for, tell_listeners
@@ -139,13 +139,13 @@ def display_height(identifier: str) -> float:
         return FALLBACK_HEIGHT
 
 
-def default_species(by_name: bool = False) -> str:
+def default_species(before: bool = False) -> str:
     """The species that the catalogue offers first.
 
     Parameters
     ----------
-    by_name : bool
-        The first by name instead: what an empty choice meant in files that were saved before there was another order.
+    before : bool
+        What an empty choice meant in files that were saved before lists had this order.
 
     Raises
     ------
@@ -155,7 +155,7 @@ def default_species(by_name: bool = False) -> str:
     known = catalogue()
     if not known:
         raise SpeciesError("The catalog has no species; reinstall TetFlora, or set a Species Folder in the preferences")
-    return min(known, key=lambda identifier: known[identifier].name.lower()) if by_name else next(iter(known))
+    return FIRST_BEFORE if before and FIRST_BEFORE in known else next(iter(known))
 
 
 class SpeciesChoice:

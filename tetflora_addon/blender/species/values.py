@@ -175,7 +175,7 @@ def _form(editor: bpy.types.PropertyGroup, kind: str) -> str:
         return OBJECT_LEAF
     if kind == "blossom" and species_value(editor, kind, None) is None:
         return NO_LEAF
-    return model if (model := form.get("model")) in LEAF_MODELS else OWN_LEAF
+    return model if (model := form.get("model")) in LEAF_MODELS and "outline" not in form else OWN_LEAF
 
 
 def _set_form(editor: bpy.types.PropertyGroup, kind: str, identifier: str) -> None:
@@ -290,5 +290,16 @@ class WholeSpecies(SpeciesChoice):
         precision=3,
         get=lambda self: number_in(species_value(self, "quality", 1.0)),
         set=lambda self, value: set_species_value(self, "quality", rounded(value)),
+        options={'SKIP_SAVE'},
+    )
+    habit: FloatProperty(
+        name="Forest Habit",
+        description="0: trees that stand free; 1: those of a dense stand, with bare, slender trunks and narrow crowns",
+        min=0.0,
+        max=1.0,
+        subtype='FACTOR',
+        default=0.0,
+        get=lambda self: number_in(species_value(self, "habit", 0.0)),
+        set=lambda self, value: set_species_value(self, "habit", rounded(value)),
         options={'SKIP_SAVE'},
     )

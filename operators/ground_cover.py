@@ -1,0 +1,56 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cover the ground of a population."""
+
+from collections.abc import Generator
+
+import bpy
+from bpy.props import BoolProperty
+
+from ..tetflora_addon.blender.placing.cover import Covered, cover_steps, covered_population
+from ..tetflora_addon.blender.placing.rules import active_population
+from ..tetflora_addon.blender.viewport import points
+from ..tetflora_addon.refinement.statistics import Progress
+from .base import ModalJob, counted, in_object_mode, need
+
+
+class TETFLORA_OT_ground_cover(ModalJob, bpy.types.Operator):
+    """Cover the ground under the active population with grass, moss and herbs by the light there, and with leaves,
+    branches and logs of its species where they fall.
+
+    The cover is a population of its own; use again to renew it after changes above.
+    """
+
+    bl_idname = "tetflora.ground_cover"
+    bl_label = "Ground Cover"
+    needs = (
+        in_object_mode,
+        need(lambda context: active_population(context.scene), "Add a population first; its ground is then covered"),
+    )
+
+    soil: BoolProperty(
+        name="Soil",
+        description="Give the ground a material in the colors of what lies there, unless it has one of yours",
+        default=True,
+    )
+
+    def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, Covered]:
+        scene, depsgraph = context.scene, context.evaluated_depsgraph_get()
+        steps = cover_steps(scene, depsgraph, covered_population(scene), self.soil)
+        try:
+            while True:
+                yield Progress(next(steps), "Light and litter under the plants")
+        except StopIteration as stop:
+            return stop.value
+
+    def finish(self, context: bpy.types.Context, result: Covered) -> set[str]:
+        points.schedule()
+        kept = ""
+        if result.bare:
+            kept = f'; "{result.bare[0]}" keeps its own material'
+        if not result.made.number:
+            return self.refused(f"Nothing grows here: {result.made.reason}")
+        return self.done(f"{counted(result.made.number, 'plant')} cover the ground{kept}")
+
+
+CLASSES = (TETFLORA_OT_ground_cover,)

@@ -1,0 +1,287 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Ground Cover: a population under another, soil in its colors, and what of the artist's is left alone."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from tests.blender.scenes import add_mesh, add_plant, depsgraph, select
+from tetflora_addon.blender.attributes import values_of
+from tetflora_addon.blender.materials.soil import is_soil
+from tetflora_addon.blender.placing import population_files, populations, rules
+from tetflora_addon.blender.placing.canopy import canopy_of
+from tetflora_addon.blender.placing.cover import MOST, cover_steps
+from tetflora_addon.blender.scene import fields
+from tetflora_addon.blender.species.edits import change_species, find_edit, species_for
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+
+def _group():
+    return bpy.context.scene.tetflora
+
+
+def _covers():
+    return [p for p in _group().populations if p.covers]
+
+
+def _field(population=None):
+    (field,) = populations.own_objects(bpy.context.scene, population or _covers()[0])
+    return field
+
+
+def _wood(size=12.0, **options):
+    """A ground with trees in its western half."""
+    ground = add_mesh("ground", size=size)
+    ground.vertex_groups.new(name="west").add([0, 3], 1.0, 'REPLACE')
+    select(ground)
+    values = {"count": 14, "species": "birch:2, spruce", "min_distance": 1.0, **options}
+    assert bpy.ops.tetflora.populate(**values) == {'FINISHED'}
+    return ground
+
+
+def _cover(**options):
+    assert bpy.ops.tetflora.ground_cover(**options) == {'FINISHED'}
+    bpy.context.view_layer.update()
+    return _covers()[0]
+
+
+def _places(name, population=None):
+    """Places of the plants of one species of a cover."""
+    field = _field(population)
+    kinds = [entry.species for entry in field.tetflora.field_species]
+    read = fields.read_field(field, depsgraph(), np.eye(4)[None])
+    return read.position[read.species == kinds.index(name)]
+
+
+def test_the_ground_of_a_population_is_covered_by_what_grows_and_falls_there():
+    ground = _wood()
+    cover = _cover()
+    species = {entry.species: entry for entry in cover.mix}
+    assert {"moss", "wood_grass", "wood_sorrel", "fern", "birch_litter", "spruce_litter"} <= set(species)
+    assert {"birch_branch", "spruce_branch"} <= set(species)
+    assert species["birch_litter"].shed_by == "birch"
+    assert species["wood_grass"].habitat == 'LIGHT'
+    assert cover.covers == _group().populations[0].uid
+    assert _group().populations_index == 0  # the trees stay what the panel shows
+    assert [entry.object for entry in cover.grounds] == [ground]
+    assert cover.made == fields.stored_size(_field()) > 2000
+    assert len(_places("birch_litter")) > 100
+    for name in species:
+        species_for(bpy.context.scene, name)
+    # 8 to 17 plants on a square meter: as many as the panel's number promises at most.
+    assert cover.made < cover.density / 10_000 * 24.0**2
+
+
+def test_litter_lies_under_its_own_trees_and_grass_in_the_light():
+    _wood(size=15.0, count=60, min_distance=0.5)
+    trees = [o for o in bpy.context.scene.objects if o.tetflora.is_plant]
+    for tree in trees:  # birches in the west, spruces beside them, nothing in the east
+        tree.location.x = -12.0 + 0.2 * tree.location.x if tree.tetflora.species == "birch" else -2.0
+        tree.location.z = 0.0
+    bpy.context.view_layer.update()
+    _cover()
+    assert _places("birch_litter")[:, 0].mean() < -7.0
+    assert abs(_places("spruce_litter")[:, 0].mean() + 2.0) < 3.0
+    assert _places("wood_grass")[:, 0].mean() > 3.0
+    assert _places("moss")[:, 0].mean() < _places("wood_grass")[:, 0].mean() - 3.0
+
+
+def test_masks_of_the_population_hold_for_its_cover():
+    _wood(size=12.0)
+    population = _group().populations[0]
+    population.vertex_group = "west"
+    path = bpy.data.curves.new("path", 'CURVE')
+    spline = path.splines.new('POLY')
+    spline.points.add(1)
+    for point, y in zip(spline.points, (-20.0, 20.0), strict=True):
+        point.co = (-6.0, y, 0.0, 1.0)
+    population.paths = bpy.data.collections.new("paths")
+    population.paths.objects.link(bpy.data.objects.new("path", path))
+    bpy.context.scene.collection.children.link(population.paths)
+    population.path_distance = 1.5
+    cover = _cover()
+    x = fields.read_field(_field(), depsgraph(), np.eye(4)[None]).position[:, 0]
+    assert cover.vertex_group == "west"
+    assert (np.abs(x + 6.0) >= 1.5).all()
+    # The weight falls from the west to nothing in the east; without it a third would be here.
+    assert (x < -2.0).mean() > 0.48
+    assert (x > 6.0).sum() < (x < -8.0).sum()
+
+
+def test_again_replaces_and_keeps_what_the_artist_changed():
+    _wood()
+    cover = _cover()
+    entry = next(e for e in cover.mix if e.species == "moss")
+    entry.weight = 0.0
+    cover.name = "Mine"
+    change_species(bpy.context.scene, "birch_litter", lambda page: page.update(name="My litter"))
+    _cover()
+    assert len(_covers()) == 1
+    assert len([o for o in bpy.context.scene.objects if o.tetflora.is_field]) == 1
+    assert _covers()[0].name == "Mine"
+    assert "My litter" in find_edit(bpy.context.scene, "birch_litter").text
+    assert len(_places("moss")) == 0
+    assert _covers()[0].made > 0
+
+
+def test_the_button_on_the_cover_renews_it_and_update_does_the_same():
+    _wood()
+    first = _cover().made
+    _group().populations_index = 1
+    _cover()
+    assert len(_group().populations) == 2
+    assert _covers()[0].made == first
+    assert bpy.ops.tetflora.update_population() == {'FINISHED'}
+    assert _group().populations[1].made == first
+
+
+def test_the_same_scene_gets_the_same_cover():
+    _wood()
+    _cover()
+    before = {name: values_of(_field().data.attributes[name]).copy() for name in ("position", "seed", "species")}
+    assert bpy.ops.tetflora.update_population() == {'FINISHED'}  # the trees, at the same places
+    _cover()
+    for name, values in before.items():
+        assert (values_of(_field().data.attributes[name]) == values).all()
+
+
+def test_cover_keeps_no_tree_away_and_casts_no_shade():
+    _wood(min_distance=2.0)
+    trees = _group().populations[0].made
+    canopy, _ = canopy_of(bpy.context.scene, depsgraph())
+    _cover()
+    assert len(canopy_of(bpy.context.scene, depsgraph())[0]) == len(canopy) == trees
+    assert bpy.ops.tetflora.update_population() == {'FINISHED'}
+    assert _group().populations[0].made == trees
+
+
+def test_the_brush_paints_and_thins_through_a_cover_and_erases_it():
+    _wood()
+    cover = _cover()
+    covered = cover.made
+    brush = _group().brush
+    brush.density, brush.radius, brush.distance_from, brush.min_distance = 20.0, 5.0, 'OWN', 0.5
+    trees = len(canopy_of(bpy.context.scene, depsgraph())[0])
+    assert bpy.ops.tetflora.paint_plants(mode='PAINT', stroke="8 8 0") == {'FINISHED'}
+    bpy.context.view_layer.update()
+    assert len(canopy_of(bpy.context.scene, depsgraph())[0]) > trees
+    bpy.ops.tetflora.paint_plants(mode='THIN', stroke="8 8 0")
+    assert fields.stored_size(_field()) == covered
+    assert bpy.ops.tetflora.paint_plants(mode='ERASE', stroke="8 8 0") == {'FINISHED'}
+    assert fields.stored_size(_field()) < covered
+    _cover()  # and what was erased stays bare
+    left = fields.read_field(_field(), depsgraph(), np.eye(4)[None]).position
+    assert np.hypot(left[:, 0] - 8.0, left[:, 1] - 8.0).min() >= 5.0
+
+
+def test_a_frozen_cover_is_refused_and_stays():
+    _wood()
+    cover = _cover()
+    cover.frozen, made = True, cover.made
+    with pytest.raises(RuntimeError, match='"Ground cover" is frozen'):
+        bpy.ops.tetflora.ground_cover()
+    assert _covers()[0].made == made
+
+
+def test_without_population_ground_or_plants_it_says_what_to_do():
+    with pytest.raises(RuntimeError, match="Add a population first"):
+        bpy.ops.tetflora.ground_cover()
+    ground = _wood()
+    for tree in [o for o in bpy.context.scene.objects if o.tetflora.is_plant]:
+        bpy.data.objects.remove(tree)
+    with pytest.raises(RuntimeError, match="no plants whose ground could be covered; click Update first"):
+        bpy.ops.tetflora.ground_cover()
+    bpy.ops.tetflora.update_population()
+    bpy.data.objects.remove(ground)
+    with pytest.raises(RuntimeError, match="no ground in this scene; select meshes and click Use Selected Meshes"):
+        bpy.ops.tetflora.ground_cover()
+    assert not _covers()
+    assert not _group().species_edits
+
+
+def test_closing_the_steps_leaves_everything_as_it_was():
+    _wood()
+    before = (len(_group().populations), len(bpy.data.objects), len(bpy.data.materials), len(bpy.data.images))
+    steps = cover_steps(bpy.context.scene, depsgraph(), _group().populations[0])
+    for fraction in steps:
+        assert 0.0 <= fraction <= 1.0
+        if fraction >= 0.8:
+            break
+    steps.close()
+    after = (len(_group().populations), len(bpy.data.objects), len(bpy.data.materials), len(bpy.data.images))
+    assert after == before
+    assert not _group().species_edits
+
+
+def test_soil_is_browner_under_trees_and_greener_in_the_light():
+    ground = _wood(size=15.0, count=60, min_distance=0.5)
+    for tree in [o for o in bpy.context.scene.objects if o.tetflora.is_plant]:
+        tree.location.x = -10.0 + 0.2 * tree.location.x
+    bpy.context.view_layer.update()
+    _cover()
+    material = ground.material_slots[0].material
+    assert is_soil(material)
+    image = next(n.image for n in material.node_tree.nodes if n.type == 'TEX_IMAGE')
+    assert image.packed_file is not None  # it is in the file, and needs none beside it
+    columns, rows = image.size
+    pixels = np.zeros(4 * columns * rows, np.float32)
+    image.pixels.foreach_get(pixels)
+    rgba = pixels.reshape(rows, columns, 4)
+    west, east = rgba[:, : columns // 3].mean(axis=(0, 1)), rgba[:, -columns // 4 :].mean(axis=(0, 1))
+    assert east[3] > west[3] + 0.05
+    assert west[0] - west[1] > east[0] - east[1]  # redder than green where litter lies
+    # The map lies over the ground.
+    nodes = material.node_tree.nodes
+    assert [s.default_value for s in nodes["Soil Corner"].inputs][:2] == pytest.approx([-15.0, -15.0])
+    assert [s.default_value for s in nodes["Soil Size"].inputs][:2] == pytest.approx([30.0, 30.0])
+
+
+def test_a_material_of_the_artist_stays_and_soil_is_there_for_use():
+    ground = _wood()
+    own = bpy.data.materials.new("mine")
+    ground.data.materials.append(own)
+    _cover()
+    assert ground.material_slots[0].material == own
+    (soil,) = [m for m in bpy.data.materials if is_soil(m)]
+    assert soil.use_fake_user
+    _cover(soil=False)
+    assert len([m for m in bpy.data.materials if is_soil(m)]) == 1
+
+
+def test_changed_nodes_of_the_soil_stay_and_its_map_follows():
+    ground = _wood()
+    _cover()
+    material = ground.material_slots[0].material
+    first = next(n.image for n in material.node_tree.nodes if n.type == 'TEX_IMAGE').name
+    material.node_tree.nodes.new("ShaderNodeEmission").name = "mine"
+    _cover()
+    assert ground.material_slots[0].material == material
+    assert "mine" in material.node_tree.nodes
+    assert len([i for i in bpy.data.images if i.get("tetflora_soil")]) == 1
+    assert first  # the map before it is gone, the new one is in its place
+
+
+def test_habitats_are_written_to_files_and_read_again(tmp_path):
+    _wood()
+    _cover()
+    path = tmp_path / "wood.json"
+    population_files.write_populations(_group().populations, path)
+    number, _ = population_files.read_populations(bpy.context.scene, path, [])
+    assert number == 2
+    read = _group().populations[3]
+    assert [(e.species, e.habitat, e.shed_by) for e in read.mix] == [
+        (e.species, e.habitat, e.shed_by) for e in _group().populations[1].mix
+    ]
+    assert "habitat" not in population_files.as_data([_group().populations[0]])["populations"][0]["species"][0]
+
+
+def test_large_ground_has_no_more_plants_than_blender_bears():
+    _wood(size=2000.0)
+    add_plant("one", "birch")
+    cover = _cover(soil=False)
+    assert cover.density / 10_000 * 4000.0**2 == pytest.approx(MOST, rel=1e-3)
+    assert not rules.is_outdated(cover)

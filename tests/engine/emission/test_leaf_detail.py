@@ -1,0 +1,155 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Near leaves get the detail that the picture asks for: by size alone, as budgeted, and far ones stay as they were."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.engine import support
+from tests.engine.refinement.test_loop import run
+from tests.engine.subplants.test_leaf_meshes import check_topology
+from tetflora_addon.buffers import MeshBuffers
+from tetflora_addon.camera.camera import Camera
+from tetflora_addon.emission.budget import _Facets, afford
+from tetflora_addon.emission.leaf_detail import LeafDetail
+from tetflora_addon.emission.plants import Transition, expanded_blocks, explicit_blocks
+from tetflora_addon.growth.growth import WholeBranches
+from tetflora_addon.refinement.settings import RefinementSettings
+from tetflora_addon.species.leaf_levels import leaf_levels
+from tetflora_addon.subplants.leaf_meshes import leaf_meshes
+
+
+def near(distance: float, name: str = "oak", pixels: int = 400) -> tuple:
+    """A tree and a camera so far from its middle."""
+    flora = support.compiled(support.shipped(name))
+    _, pieces = support.grown(flora, support.plants(3))
+    target = pieces.end[len(pieces) // 2]
+    camera = support.camera(tuple(target + [0.0, -distance, 0.0]), tuple(target), pixels=pixels, view=0.6)
+    return flora, camera, support.plants(3), pieces
+
+
+def leaves(blocks) -> list[MeshBuffers]:
+    return [block.buffers for block in blocks if block.kind != "bark"]
+
+
+def polygons(meshes: list[MeshBuffers]) -> int:
+    return sum(mesh.polygons for mesh in meshes)
+
+
+def area(meshes: list[MeshBuffers]) -> float:
+    return float(sum(support.face_areas(mesh).sum() for mesh in meshes))
+
+
+def test_leaves_far_away_are_their_models() -> None:
+    """To the bit, with and without a camera."""
+    flora, _, seeds, _ = near(1.0)
+    far = support.camera((0, -400, 5), (0, 0, 5), pixels=400)
+    for one, other in zip(
+        leaves(expanded_blocks(flora, seeds)), leaves(expanded_blocks(flora, seeds, far)), strict=True
+    ):
+        assert one.positions.tobytes() == other.positions.tobytes()
+        assert one.corner_verts.tobytes() == other.corner_verts.tobytes()
+
+
+@pytest.mark.parametrize("name", ["oak", "birch"])
+def test_near_leaves_are_finer_and_keep_their_area(name: str) -> None:
+    """Each leaf is there once: together they have the area of the models."""
+    flora, camera, seeds, _ = near(2.5, name, 200)
+    plain, fine = leaves(expanded_blocks(flora, seeds)), leaves(expanded_blocks(flora, seeds, camera))
+    assert polygons(fine) > 1.3 * polygons(plain)
+    assert area(fine) == pytest.approx(area(plain), rel=0.02)  # petioles have two sides
+    assert any(mesh.smooth for mesh in fine)
+    for mesh in fine:
+        check_topology(mesh)
+
+
+def test_the_nearer_the_finer_and_never_too_many() -> None:
+    """Polygons follow the pixels of leaves, and are bounded by those of the finest level."""
+    counts = []
+    for distance in (30.0, 8.0, 2.0):
+        flora, camera, seeds, _ = near(distance)
+        counts.append(polygons(leaves(expanded_blocks(flora, seeds, camera))))
+    assert counts == sorted(counts)
+    assert counts[-1] < 0.1 * flora.leaf_count[0] * leaf_levels(flora.forms[0][0][0])[-1].model.polygons
+
+
+def test_levels_do_not_depend_on_the_order() -> None:
+    """Branches of a crown in any order, all or one by one, give the same leaves."""
+    flora, camera, _, pieces = near(1.0)
+    whole = support.whole_of(flora, pieces)
+    detail = LeafDetail(flora, camera)
+    whole = whole.take(np.flatnonzero(detail.lengths(whole) > 0)[:60])
+
+    def places(some: list[WholeBranches]) -> np.ndarray:
+        found = np.concatenate([mesh.buffers.positions for mesh in leaf_meshes(flora, 0, some, None, detail.lengths)])
+        return found[np.lexsort(found.T)]
+
+    every, turned = places([whole]), places([whole.take(np.arange(len(whole))[::-1])])
+    assert len(every) > 1000
+    assert every.tobytes() == turned.tobytes()
+    assert every.tobytes() == places([whole.take(np.array([i])) for i in range(len(whole))]).tobytes()
+
+
+def test_lengths_are_those_in_the_image() -> None:
+    """Never shorter than where leaves are, not much longer where they are not near; 0 only where models suffice."""
+    flora, camera, _, pieces = near(3.0)
+    whole = support.whole_of(flora, pieces)
+    lengths = LeafDetail(flora, camera).lengths(whole)
+    size = flora.rows["leaf_size"][whole.branches.row].sum(axis=1) * whole.branches.scale
+    knots = whole.lines.knots
+    extent = camera.extent_around(knots.reshape(-1, 3)).reshape(len(whole), -1).min(axis=1)
+    seen = size / extent / 0.5
+    some = lengths > 0
+    assert some.any()
+    assert (lengths[some] >= seen[some]).all()
+    assert (lengths[some] < 1.5 * seen[some]).mean() > 0.8
+    errors = LeafDetail(flora, camera)._errors()[0]
+    assert (seen[~some] * errors <= 1.0).all()
+
+
+def refined(camera: Camera, flora, seeds, settings: RefinementSettings) -> tuple:
+    """Detail that is affordable, and leaves that come of it."""
+    _, result = run(flora, seeds, camera)
+    detail = afford(flora, result, camera, settings)
+    transition = Transition(flora, camera, detail.leaf_limit, detail.tolerance)
+    return detail, list(explicit_blocks(flora, detail.refinement, camera, transition))
+
+
+def test_finer_leaves_give_way_first() -> None:
+    """Under a budget margins become coarser before facets and limits grow; without one they have the tolerance."""
+    flora, camera, seeds, _ = near(1.5)
+    settings = RefinementSettings()
+    free, blocks = refined(camera, flora, seeds, settings)
+    whole = polygons([b.buffers for b in blocks])
+    assert free.tolerance == LeafDetail(flora, camera).tolerance
+    tight, blocks = refined(camera, flora, seeds, replace(settings, max_polygons=int(0.7 * whole)))
+    assert tight.tolerance > free.tolerance
+    assert polygons([b.buffers for b in blocks]) < 0.8 * whole
+
+
+def test_budgets_expect_what_is_made() -> None:
+    """What near leaves are expected to have beyond their models is about what they have."""
+    flora, camera, seeds, _ = near(6.0)
+    settings = RefinementSettings()
+    _, result = run(flora, seeds, camera)
+    transition = Transition(flora, camera, settings.leaf_limit)
+    coarse = Transition(flora, camera, settings.leaf_limit, np.inf)
+    made = [polygons(leaves(explicit_blocks(flora, result, camera, one))) for one in (transition, coarse)]
+    count = _Facets(flora, result, camera)
+    assert made[0] > 1.2 * made[1]
+    assert count.finer(settings.leaf_limit) == pytest.approx(made[0] - made[1], rel=0.5)
+
+
+@pytest.mark.parametrize("share", [0.8, 0.4, 0.1])
+def test_limits_hold_up_close(share: float) -> None:
+    """However fine leaves could be, no more is made than somebody allows."""
+    flora, camera, seeds, _ = near(1.0)
+    settings = RefinementSettings()
+    _, blocks = refined(camera, flora, seeds, settings)
+    most = int(share * polygons([b.buffers for b in blocks]))
+    _, blocks = refined(camera, flora, seeds, replace(settings, max_polygons=most))
+    assert polygons([b.buffers for b in blocks]) <= most

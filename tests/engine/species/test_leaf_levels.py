@@ -1,0 +1,124 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Finer levels of leaves: the area of their model, errors that hold, and the coarsest that suffices."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tetflora_addon.species.leaf_levels import (
+    LeafLevel,
+    chosen_level,
+    fitted,
+    leaf_levels,
+    level_errors,
+    level_polygons,
+    surface_of,
+)
+from tetflora_addon.species.leaf_models import _COARSE, LEAF_MODELS, LeafModel
+from tetflora_addon.species.leaf_needles import Needles
+from tetflora_addon.species.leaf_outlines import distance_to_links
+
+#: Polygons that no level has.
+MOST = 4000
+
+
+def single_edges(model: LeafModel) -> np.ndarray:
+    """Edges (e, 2) of one face only."""
+    edges, of_corner = model.edges
+    return edges[np.bincount(of_corner, minlength=len(edges)) == 1]
+
+
+def one_sided(level: LeafLevel, variant: int, solid: np.ndarray) -> float:
+    model = replace(level.model, positions=level.shapes[variant].astype(float))
+    return float((np.linalg.norm(model.face_vectors, axis=1) * np.where(solid, 0.5, 1.0)).sum())
+
+
+@pytest.mark.parametrize("name", LEAF_MODELS)
+def test_models_are_what_they_were(name: str) -> None:
+    """What stands for leaves from afar, and what tables are stored by, does not know of finer levels."""
+    assert LEAF_MODELS[name].content == _COARSE[name].content
+    assert LEAF_MODELS[name] != _COARSE[name]
+    assert leaf_levels(_COARSE[name]) == ()
+    assert (chosen_level(_COARSE[name], np.array([0.0, 1e9])) == 0).all()
+
+
+@pytest.mark.parametrize("name", LEAF_MODELS)
+def test_levels_have_the_area_of_their_model(name: str) -> None:
+    model = LEAF_MODELS[name]
+    for level in leaf_levels(model):
+        made = fitted(model.shape, level.error, model.area, model.reach)
+        np.testing.assert_allclose(made.areas(), model.area, rtol=1e-5)
+    assert len(leaf_levels(model)) >= 3
+
+
+@pytest.mark.parametrize("name", LEAF_MODELS)
+def test_levels_are_sound(name: str) -> None:
+    """Finer and finer, of faces with an area, whose edges have one or two of them, and within reach of the image."""
+    model = LEAF_MODELS[name]
+    errors, polygons = level_errors(model), level_polygons(model)
+    assert (np.diff(errors) < 0).all()
+    assert (np.diff(polygons) > 0).all()
+    assert leaf_levels(model)[-1].error <= 0.0005
+    assert polygons[-1] <= MOST
+    for level in leaf_levels(model):
+        for shape in level.shapes:
+            made = replace(level.model, positions=shape.astype(float))
+            areas = np.linalg.norm(made.face_vectors, axis=1)
+            assert areas.min() > 0
+            assert (areas > 1e-12 * model.area).mean() > 0.99
+        assert np.bincount(level.model.edges[1]).max() <= 2
+        assert np.isfinite(level.model.uv).all()
+        assert level.shapes.shape[0] >= 4
+        assert np.linalg.norm(level.shapes, axis=2).max() <= 1.02 * model.reach  # what bounds count on
+        assert not np.array_equal(level.shapes[0], level.shapes[1])
+
+
+@pytest.mark.parametrize("name", [n for n, m in LEAF_MODELS.items() if not isinstance(m.shape, Needles)])
+def test_margins_are_within_their_errors(name: str) -> None:
+    """Measured from each variant's margin at a tolerance that is far finer."""
+    model = LEAF_MODELS[name]
+    finest = surface_of(model.shape, 2e-4)
+    fine = LeafModel(finest.positions[0], finest.corner_verts, finest.face_offsets, finest.uv.astype(np.float32))
+    # Petioles and stems, whose texture lies below that of blades, are not in the coarsest levels.
+    true = np.setdiff1d(single_edges(fine), fine.corner_verts[fine.uv[:, 1] < -1e-6])
+    for level in leaf_levels(model)[:-1]:
+        made = surface_of(model.shape, level.error)
+        coarse = LeafModel(made.positions[0], made.corner_verts, made.face_offsets, made.uv.astype(np.float32))
+        own = single_edges(coarse)
+        for variant in range(0, len(made.positions), 2):
+            points, ends = finest.positions[variant][true], made.positions[variant][own]
+            off = distance_to_links(points[:, None], ends[None, :, 0], ends[None, :, 1]).min(axis=1)
+            assert off.max() <= 1.05 * made.error + 2e-4
+
+
+@given(st.sampled_from(sorted(LEAF_MODELS)), st.floats(1e-3, 1e5))
+def test_the_coarsest_level_that_suffices_is_chosen(name: str, length: float) -> None:
+    model = LEAF_MODELS[name]
+    errors = level_errors(model)
+    level = int(chosen_level(model, np.array([length]))[0])
+    assert errors[level] * length <= 1.0 + 1e-9
+    assert level == 0 or errors[level - 1] * length > 1.0
+
+
+@pytest.mark.parametrize("name", ["kite", "needles"])
+def test_stems_have_a_tint(name: str) -> None:
+    """Petioles and shoots, and nothing else: what lies below the blade in the texture."""
+    level = leaf_levels(LEAF_MODELS[name])[-1]
+    low = np.minimum.reduceat(level.model.uv[:, 1], level.model.face_offsets[:-1])
+    assert ((level.tint != 1.0).any(axis=1) == (low < -1e-6)).all()
+    assert 0.001 < (level.tint != 1.0).any(axis=1).mean() < 0.2
+
+
+def test_needles_are_as_many_as_they_should_be() -> None:
+    """From the first finer level on each stands for itself: a prism with its own texture up close."""
+    shape = LEAF_MODELS["needles"].shape
+    for tolerance, sides in ((0.012, 1), (0.0015, 3), (0.0002, 4)):
+        made = surface_of(shape, tolerance)
+        tips = np.isclose(made.uv[:, 1], 1.0) & np.isclose(made.uv[:, 0], 0.5)
+        assert tips.sum() // sides >= shape.needles // shape.bundle

@@ -1,0 +1,172 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Near wood: round, bent and footed where a pixel shows it, and the coarse tube, to the bit, everywhere else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.engine import support
+from tests.engine.subplants.test_leaf_meshes import check_topology
+from tetflora_addon.buffers import MeshBuffers
+from tetflora_addon.compiled.averages import tube_perimeter
+from tetflora_addon.compiled.flora import Flora
+from tetflora_addon.growth.growth import WholeBranches
+from tetflora_addon.subplants.feet import PLACES, buttresses, has_foot, root_number, roots
+from tetflora_addon.subplants.pieces import expand
+from tetflora_addon.subplants.tubes import tube_buffers
+from tetflora_addon.subplants.wood_detail import DEVIATION, MOST_SIDES, Pixels, fine_sides, fineness, finer, round_up_to
+
+
+def even(pixel: float) -> Pixels:
+    """The same number of metres to a pixel everywhere."""
+    return Pixels(lambda points: np.full(len(points), pixel))
+
+
+def grown(flora: Flora, species: int = 0, seed: int = 1) -> list[WholeBranches]:
+    return list(expand(flora, support.trunks(flora.rows, support.plants([seed], species))))
+
+
+def straight(**order0: object) -> tuple[Flora, WholeBranches]:
+    """A branch that neither bends nor bears others."""
+    base = {"curvature": [0, 0], "angle": [0, 0], "branches": [0, 0], "sides": 5}
+    flora = support.compiled(support.small(order0={**base, **order0}))
+    return flora, grown(flora)[0]
+
+
+def assert_same(one: MeshBuffers, other: MeshBuffers) -> None:
+    for name in ("positions", "edge_verts", "corner_verts", "corner_edges", "face_offsets"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    for name, (_, values) in one.attributes.items():
+        np.testing.assert_array_equal(values, other.attributes[name][1])
+
+
+@pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
+def test_wood_from_afar_is_the_coarse_tube_to_the_bit(species: int) -> None:
+    flora = support.flora()
+    whole = grown(flora, species)
+    assert_same(tube_buffers(flora, whole), tube_buffers(flora, whole, even(1.0)))
+
+
+@pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
+def test_meshes_of_near_wood(species: int) -> None:
+    """Whole pipes, with the surface of coarse ones but for feet, collars, and what bends and flares."""
+    flora = support.flora()
+    whole = [some.take(np.s_[::7]) for some in grown(flora, species)]
+    coarse, near = tube_buffers(flora, whole), tube_buffers(flora, whole, even(0.001))
+    check_topology(near)
+    assert near.polygons > coarse.polygons or max(some.branches.radius.max() for some in whole) < 0.002
+    assert (near.attributes["tf_girth"][1] > 0).all()
+    feet = has_foot(flora.rows, whole[0].branches).any()
+    areas = support.face_areas(coarse).sum(), support.face_areas(near).sum()
+    assert 0.97 < areas[1] / areas[0] < (1.5 if feet else 1.25)
+
+
+@pytest.mark.parametrize("sides", [3, 4, 7, 14, 64])
+def test_sides_pass_for_circles(sides: int) -> None:
+    pixels = np.geomspace(0.01, 2000.0, 200)
+    found = fine_sides(np.full(200, sides), pixels)
+    off = pixels * (1.0 - np.cos(np.pi / found))
+    assert ((off <= DEVIATION * (1 + 1e-6)) | (2 * found > MOST_SIDES)).all()
+    assert (found[pixels < DEVIATION / (1.0 - np.cos(np.pi / sides))] == sides).all()
+    assert (np.diff(found) >= 0).all()
+    assert (found % sides == 0).all()
+
+
+def test_round_tubes_are_as_thick_as_coarse_ones() -> None:
+    """Half of the perimeter is what is seen on average."""
+    flora, whole = straight()
+    coarse, near = tube_buffers(flora, [whole]), tube_buffers(flora, [whole], even(0.0005))
+    assert near.polygons >= 8 * coarse.polygons
+    assert support.face_areas(near).sum() == pytest.approx(support.face_areas(coarse).sum(), rel=2e-3)
+
+
+def test_nothing_appears_at_once() -> None:
+    """Where a branch begins to be finer, its rings are where they were, to within the deviation."""
+    flora = support.compiled(support.small(order0={"curvature": [80, 0], "segments": 6, "sides": 8}))
+    whole = grown(flora)[0]
+    limit = float(round_up_to(np.array([8]))[0])
+    pixels = fineness(flora, whole, even(1.0)).pixels[0]
+    pixel = pixels / limit
+    coarse, near = tube_buffers(flora, [whole], even(1.001 * pixel)), tube_buffers(flora, [whole], even(0.99 * pixel))
+    assert near.polygons > coarse.polygons
+    apart = np.linalg.norm(coarse.positions[:, None] - near.positions, axis=2).min(axis=1)
+    assert apart.max() < 2 * DEVIATION * pixel
+
+
+def test_joints_become_a_curve_within_the_wood() -> None:
+    """Segments are off the curve by no more than the deviation, which goes through the joints."""
+    flora = support.compiled(
+        support.small(order0={"curvature": [40, 0], "segments": 4, "thickness": 0.1, "taper": 0.8})
+    )
+    whole, pixel = grown(flora)[0], 0.002
+    near = tube_buffers(flora, [whole], even(pixel))
+    sides = int(fineness(flora, whole, even(pixel)).sides[0])
+    centre = near.positions.reshape(-1, sides, 3).mean(axis=1).astype(np.float64)
+    step = np.diff(centre, axis=0)
+    length = np.linalg.norm(step, axis=1)
+    turn = np.arccos(np.clip((step[1:] * step[:-1]).sum(axis=1) / (length[1:] * length[:-1]), -1, 1))
+    assert (turn * (length[1:] + length[:-1]) / 16 < 2 * DEVIATION * pixel).all()
+    coarse = tube_buffers(flora, [whole]).positions.reshape(5, -1, 3).mean(axis=1)
+    np.testing.assert_allclose(np.linalg.norm(centre[:, None] - coarse, axis=2).min(axis=0), 0.0, atol=1e-4)
+
+
+def test_near_wood_is_the_same_in_any_order() -> None:
+    flora = support.flora()
+    whole = grown(flora, 0)[1]
+    pixel = even(0.002)
+
+    def sorted_points(order: np.ndarray) -> np.ndarray:
+        points = tube_buffers(flora, [whole.take(order)], pixel).positions
+        return points[np.lexsort(points.T)]
+
+    every = np.arange(len(whole))
+    np.testing.assert_array_equal(sorted_points(every), sorted_points(every[::-1]))
+
+
+def test_buttresses_take_what_they_give() -> None:
+    """The radius is that of the coarse tube on average around the foot; no two trunks have the same foot."""
+    flora, whole = straight(flare=1.0, segments=8)
+    near, coarse = tube_buffers(flora, [whole], even(0.001)), tube_buffers(flora, [whole])
+    sides = int(fineness(flora, whole, even(0.001)).sides[0])
+
+    def radii(mesh: MeshBuffers, number: int, height: float) -> np.ndarray:
+        rings = mesh.positions[: len(mesh.positions) // number * number].reshape(-1, number, 3)
+        ring = rings[np.abs(rings[:, :, 2].mean(axis=1) - height).argmin()]
+        return np.linalg.norm(ring[:, :2], axis=1)
+
+    foot = radii(near, sides, 0.0)
+    assert np.ptp(foot) > 0.5 * whole.branches.radius[0]
+    as_round = tube_perimeter(np.array([5]))[0] / (2 * np.pi)
+    assert foot.mean() == pytest.approx(as_round * radii(coarse, 5, 0.0).mean(), rel=0.06)
+    top = radii(near, sides, float(whole.branches.length[0]))
+    assert np.ptp(top) < 1e-3 * top.mean()
+    angle, size = buttresses(np.arange(9, dtype=np.uint64))
+    assert len(np.unique(np.round(angle[:, 0], 6))) == 9
+    assert ((size > 0).sum(axis=1) == root_number(np.arange(9, dtype=np.uint64))).all()
+
+
+def test_roots_lead_into_the_ground() -> None:
+    flora, whole = straight(flare=1.0)
+    path, width, trunk = roots(flora.rows, whole.branches, np.ones(1))
+    assert len(path) == root_number(whole.branches.key).sum()
+    assert path.shape[1] == PLACES
+    assert (trunk == 0).all()
+    away = np.linalg.norm(path[:, :, :2], axis=2)
+    assert (away[:, 0] < 1.5 * whole.branches.radius[0]).all(), "begins in the trunk"
+    assert (away[:, -1] > 2.0 * whole.branches.radius[0]).all()
+    assert (path[:, -1, 2] + width[:, -1] < 0).all(), "ends in the ground"
+    assert ((path[:, :, 2] + width).max(axis=1) > 0).all(), "can be seen"
+
+
+def test_the_budget_expects_what_near_wood_has() -> None:
+    flora = support.flora()
+    for species in (0, 3):
+        for some in grown(flora, species)[:2]:
+            for pixel in (0.004, 0.001):
+                made = tube_buffers(flora, [some], even(pixel)).polygons
+                rows = flora.rows[some.branches.row]
+                coarse = rows["sides"] * (rows["segments"] + rows["rings"])
+                expected = (coarse * finer(flora, some.branches, np.ones(len(some), bool), even(pixel))).sum()
+                assert 0.4 < made / expected < 2.5

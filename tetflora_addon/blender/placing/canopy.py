@@ -1,0 +1,126 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The plants of a scene as what stands over the ground, and the maps of light and litter under them.
+
+Populations that cover the ground of others are left out: they stand under the crowns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import fields
+from hashlib import blake2b
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiled.crowns import Crown, crown_of
+from ...errors import SpeciesError
+from ...planting.canopy import Canopy, Sheet
+from ...planting.cover import Floor, Habitat, Suits, mapping
+from ..attributes import world_matrix
+from ..scene.fields import fields_of, read_field
+from ..scene.skeletons import species_of
+from ..species.catalogue import display_height
+from ..species.edits import species_for
+from ..worker import at_once
+
+_UNKNOWN = (0.2, 0.3, 0.5)  # crown of a species that cannot be compiled: radius, base over height; area over radius³
+_kept: dict[str, Floor] = {}  # the last one, by content: settings change more often than the plants above
+
+
+def is_cover(population: bpy.types.PropertyGroup) -> bool:
+    """Whether a population grows under others: some of its species ask for light, shade or what falls."""
+    return bool(population.covers) or any(entry.habitat != 'ANYWHERE' for entry in population.mix)
+
+
+def not_of_covers(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """Objects of a scene less those of populations that cover the ground."""
+    covers = {p.uid for p in scene.tetflora.populations if is_cover(p)}
+    return [o for o in scene.objects if o.tetflora.population not in covers] if covers else list(scene.objects)
+
+
+def canopy_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[Canopy, tuple[str, ...]]:
+    """What stands in a scene, and the identifiers of its species."""
+    objects = not_of_covers(scene)
+    numbers: dict[str, int] = {}
+
+    def number_of(identifier: str) -> int:
+        return numbers.setdefault(identifier, len(numbers))
+
+    single = [o for o in objects if o.tetflora.is_plant]
+    places = np.array([np.array(o.matrix_world) for o in single], dtype=np.float64).reshape(-1, 4, 4)
+    position, scale = [places[:, :3, 3]], [np.cbrt(np.abs(np.linalg.det(places[:, :3, :3])))]
+    kinds = [np.array([number_of(o.tetflora.species) for o in single], dtype=np.int32)]
+    for field in fields_of(objects):
+        read = read_field(field, depsgraph, world_matrix(field, depsgraph)[None])
+        own = np.array([number_of(species_of(kind)) for kind in read.identifiers], dtype=np.int32)
+        position.append(read.position)
+        scale.append(read.scale)
+        kinds.append(own[read.species])
+    species = np.concatenate(kinds)
+    size = np.concatenate(scale)
+    crowns = [crown_for(scene, identifier) for identifier in numbers]
+    radius, base, top, area = np.array([(c.radius, c.base, c.height, c.leaves) for c in crowns]).reshape(-1, 4).T
+    canopy = Canopy(
+        np.concatenate(position),
+        radius[species] * size,
+        base[species] * size,
+        top[species] * size,
+        area[species] * size**2,
+        species,
+    )
+    return canopy, tuple(numbers)
+
+
+def crown_for(scene: bpy.types.Scene, identifier: str) -> Crown:
+    """The mean crown of a species; a guess where it cannot be compiled."""
+    try:
+        return crown_of(species_for(scene, identifier))
+    except SpeciesError:  # missing, broken, or with an object for a leaf
+        height = display_height(identifier)
+        radius = _UNKNOWN[0] * height
+        return Crown(radius, height, 0.0, _UNKNOWN[1] * height, _UNKNOWN[2] * radius**3)
+
+
+def floor_steps(canopy: Canopy, triangles: NDArray[np.float64], kinds: int) -> Generator[float, None, Floor]:
+    """Maps of the ground (t, 3, 3) under plants; those of the same ground and plants are made once."""
+    sheet = Sheet.over(triangles.reshape(-1, 3))
+    content = blake2b(repr((sheet, kinds)).encode(), digest_size=16)
+    ordered = canopy.ordered()
+    for column in fields(ordered):
+        content.update(np.ascontiguousarray(getattr(ordered, column.name)).tobytes())
+    key = content.hexdigest()
+    if key not in _kept:
+        made = yield from mapping(sheet, ordered, kinds)
+        _kept.clear()
+        _kept[key] = made
+    return _kept[key]
+
+
+def suits_of(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    population: bpy.types.PropertyGroup,
+    triangles: NDArray[np.float64],
+    species: tuple[str, ...],
+) -> dict[int, Suits]:
+    """How suitable the ground (t, 3, 3) is for those species of a population that do not grow anywhere."""
+    wanted = {e.species: e for e in population.mix if e.habitat != 'ANYWHERE' and e.species in species}
+    if not wanted:
+        return {}
+    canopy, above = canopy_of(scene, depsgraph)
+    floor = at_once(floor_steps(canopy, triangles, len(above)))
+    return {
+        number: floor.suits(Habitat[wanted[name].habitat], shedder_of(wanted[name], above), population.seed + number)
+        for number, name in enumerate(species)
+        if name in wanted
+    }
+
+
+def shedder_of(entry: bpy.types.PropertyGroup, above: tuple[str, ...]) -> int | None:
+    """Index of the species that sheds an entry's plants: None for any, -1 where no plant of it stands."""
+    if not entry.shed_by:
+        return None
+    return above.index(entry.shed_by) if entry.shed_by in above else -1

@@ -1,0 +1,296 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Ground Cover: a population on the ground of another, of what grows in its light and shade and falls from its crowns.
+
+What falls from a species is a species of its own, kept in the file as one that the artist edited. The population of
+the cover is an ordinary one: it can be changed, updated, frozen and removed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SceneError, TetFloraError
+from ...files import is_identifier
+from ...growth.hashing import child_key, key_of_seed, uniform
+from ...planting.canopy import Canopy
+from ...planting.cover import Floor, Habitat, Stratum, covered, tinted
+from ...species.litter import FALLEN
+from ..materials.soil import is_soil, soil_material
+from ..species.edits import catalogue, species_data, species_for, store_species
+from .canopy import canopy_of, crown_for, floor_steps, is_cover, shedder_of
+from .distances import HECTARE
+from .populations import Made, add_population, make_plants, refuse_frozen, remove_population
+from .rules import active_population, copy_settings, grounds_of
+from .terrain import MASKS, read_ground
+
+NAME = "Ground cover"
+#: What grows: species, habitat, plants on a square meter of ground that suits.
+GROWN = (
+    ("wood_grass", 'LIGHT', 9.0),
+    ("grass", 'LIGHT', 0.25),
+    ("flower", 'LIGHT', 0.15),
+    ("fern", 'HALF_SHADE', 0.12),
+    ("wood_sorrel", 'HALF_SHADE', 3.0),
+    ("moss", 'SHADE', 4.0),
+)
+#: What falls: kind, habitat, pieces on a square meter of ground that is wholly covered, of how many species.
+DROPPED = (("litter", 'LITTER', 12.0, 4), ("branch", 'DEAD_WOOD', 0.35, 2), ("log", 'DEAD_WOOD', 0.012, 1))
+#: Plants that a cover is made of at most by itself; on larger ground they stand farther apart.
+MOST = 1_000_000
+#: Lower plants shed nothing that would be seen, meters.
+_SHEDS = 1.2
+#: What is covered where the plants above are of no population.
+_ANYBODY = "plants"
+#: Soil without anything on it, linear RGB.
+HUMUS = np.array([0.036, 0.025, 0.016])
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One species of a cover."""
+
+    species: str
+    habitat: str
+    number: float
+    shed_by: str = ""
+
+
+@dataclass(frozen=True)
+class Covered:
+    """What covering made.
+
+    Attributes
+    ----------
+    made : Made
+    bare : list of str
+        Grounds that keep a material of the artist's.
+    """
+
+    made: Made
+    bare: list[str]
+
+
+def covered_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None:
+    """The population whose ground the button covers: the active one, or the one under which the active one grows."""
+    active = active_population(scene)
+    if active is None or not active.covers:
+        return active
+    return next((p for p in scene.tetflora.populations if p.uid == active.covers), active)
+
+
+def cover_steps(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    population: bpy.types.PropertyGroup,
+    soil: bool = True,
+    grounds: Iterable[bpy.types.Object] | None = None,
+    masks: Mapping[str, Any] | None = None,
+) -> Generator[float, None, Covered]:
+    """Cover the ground of a population; yields the fraction of the work that is done.
+
+    What an earlier run made for the same population is replaced; settings that were changed since stay. Closing the
+    steps leaves everything as it was.
+
+    Parameters
+    ----------
+    population : TetFloraPopulation
+        A population, or the settings for new ones.
+    soil : bool
+        Give the ground a material.
+    grounds : iterable of bpy.types.Object, optional
+        Other ground than the population's.
+    masks : mapping, optional
+        Other values of some of `terrain.MASKS` than the population's, for a cover that is new.
+
+    Raises
+    ------
+    SceneError
+        It has no ground or no plants above it, or the cover is frozen.
+    """
+    yield 0.0
+    uid = population.uid or _ANYBODY
+    found = _cover_of(scene, uid)
+    if found is not None:
+        refuse_frozen(found)
+    grounds = grounds_of(scene, population) if grounds is None else list(grounds)
+    if not grounds:
+        raise SceneError(
+            f'"{population.name}" has no ground in this scene; select meshes and click Use Selected Meshes'
+        )
+    own = {name: getattr(population, name) for name in MASKS} | dict(masks or {})
+    ground = read_ground(grounds, depsgraph, **own)
+    canopy, above = canopy_of(scene, depsgraph)
+    if not len(canopy):
+        raise SceneError(f'"{population.name}" has no plants whose ground could be covered; click Update first')
+    yield 0.05
+    steps = floor_steps(canopy, ground.triangles, len(above))
+    while True:
+        try:
+            yield 0.05 + 0.7 * next(steps)
+        except StopIteration as stop:
+            floor = stop.value
+            break
+    yield 0.8
+    # From here on the scene changes.
+    parts = _parts(scene, canopy, above)
+    number = None
+    if found is None:
+        number = len(scene.tetflora.populations)
+        found = _add(scene, population, grounds, masks or {})
+    _mix(found, parts, ground.map_area)
+    try:
+        made = make_plants(scene, depsgraph, found)
+    except TetFloraError:
+        if number is not None:
+            remove_population(scene, number)
+        raise
+    bare = _lay_soil(scene, found, grounds, floor, above) if soil else []
+    return Covered(made, bare)
+
+
+def _cover_of(scene: bpy.types.Scene, uid: str) -> bpy.types.PropertyGroup | None:
+    return next((p for p in scene.tetflora.populations if p.covers == uid or (p.uid == uid and is_cover(p))), None)
+
+
+def _add(
+    scene: bpy.types.Scene,
+    population: bpy.types.PropertyGroup,
+    grounds: list[bpy.types.Object],
+    masks: Mapping[str, Any],
+) -> bpy.types.PropertyGroup:
+    """A population for the cover, on the same ground and within the same limits; the covered one stays active."""
+    index, uid = scene.tetflora.populations_index, population.uid
+    cover = add_population(scene, grounds, name=NAME)
+    populations = scene.tetflora.populations
+    # Fetched again: adding to a list moves what is in it.
+    source = next((p for p in populations if p.uid == uid), None)
+    if source is not None:
+        copy_settings(source, cover)
+        scene.tetflora.populations_index = index
+    for name, value in masks.items():
+        setattr(cover, name, value)
+    cover.covers, cover.as_field, cover.by_density, cover.density = uid or _ANYBODY, 'FIELD', True, 0.0
+    cover.min_distance, cover.distance_from = 0.0, 'OWN'
+    cover.clumping = cover.edge_falloff = 0.0
+    cover.scale_min, cover.scale_max, cover.scale_at_top, cover.tilt = 0.7, 1.25, 1.0, 1.0
+    cover.seed = int(uniform(child_key(key_of_seed(cover.seed), 2), 0) * 2**31)
+    cover.mix.clear()
+    return cover
+
+
+def _parts(scene: bpy.types.Scene, canopy: Canopy, above: tuple[str, ...]) -> list[_Part]:
+    """Species of a cover; those of what falls are made where the file does not have them."""
+    known = catalogue()
+    parts = [_Part(*one) for one in GROWN if one[0] in known]
+    # Those that shed most come first.
+    leaves = np.bincount(canopy.species, canopy.area + 1e-6 * canopy.top, minlength=len(above))
+    tall = np.zeros(len(above))
+    np.maximum.at(tall, canopy.species, canopy.top)
+    order = [above[i] for i in np.argsort(-leaves, kind="stable") if tall[i] >= _SHEDS]
+    for kind, habitat, number, most in DROPPED:
+        made = [(name, fallen) for name in order if (fallen := _fallen(scene, name, kind))][:most]
+        parts += [_Part(fallen, habitat, number, name) for name, fallen in made]
+    return parts
+
+
+def _fallen(scene: bpy.types.Scene, identifier: str, kind: str) -> str:
+    """Identifier of what falls from a species, made if the file and the catalog do not have it; empty if nothing falls.
+
+    One that is there stays as it is, because it may be the artist's own.
+    """
+    name = f"{identifier}_{kind}"
+    if name in catalogue():
+        return name
+    try:
+        page = FALLEN[kind](species_for(scene, identifier), species_data(scene, identifier))
+    except TetFloraError:  # broken, or not there: Refine says so
+        return ""
+    if page is None or not is_identifier(name):
+        return ""
+    store_species(scene, name, page)
+    return name
+
+
+def _mix(cover: bpy.types.PropertyGroup, parts: list[_Part], area: float) -> None:
+    """Add what the mixture of a cover lacks; what it has stays as the artist left it."""
+    there = {entry.species for entry in cover.mix}
+    before = sum(entry.weight for entry in cover.mix)
+    for part in parts:
+        if part.species not in there:
+            entry = cover.mix.add()
+            entry.species, entry.weight = part.species, part.number
+            entry.habitat, entry.shed_by = part.habitat, part.shed_by
+    whole = sum(entry.weight for entry in cover.mix)
+    if before and cover.density:
+        cover.density *= whole / before
+    else:
+        cover.density = whole * HECTARE * min(1.0, MOST / max(whole * area, 1e-9))
+
+
+def _lay_soil(
+    scene: bpy.types.Scene,
+    cover: bpy.types.PropertyGroup,
+    grounds: list[bpy.types.Object],
+    floor: Floor,
+    above: tuple[str, ...],
+) -> list[str]:
+    """Give the ground a soil in the colors of its cover; names of the grounds that keep a material of the artist's."""
+    fits = [obj for obj in grounds if _may_have_soil(obj)]
+    before = next((slot.material for obj in fits for slot in obj.material_slots if is_soil(slot.material)), None)
+    lying, growing = _strata(scene, cover, floor, above)
+    sheet = floor.sheet
+    shape, cells = (sheet.rows, sheet.columns), len(floor.light)
+    green = covered(growing, cells)
+    areas = np.array([one.number * one.area * one.suits.mean() for one in growing] or [0.0])
+    colours = np.stack([one.colour for one in growing] or [HUMUS])
+    tint = areas @ colours / max(areas.sum(), 1e-12)
+    material = soil_material(
+        f"{cover.name} soil",
+        tinted(lying, HUMUS, cells).reshape(*shape, 3),
+        green.reshape(shape),
+        tint,
+        sheet.low,
+        sheet.cell * np.array([sheet.columns, sheet.rows]),
+        before,
+    )
+    for obj in fits:
+        if obj.material_slots:
+            slot = next((s for s in obj.material_slots if s.material is None or is_soil(s.material)), None)
+            if slot is not None:
+                slot.material = material
+        else:
+            obj.data.materials.append(material)
+    kept = [obj.name for obj in grounds if obj not in fits]
+    if kept:
+        material.use_fake_user = True  # for the artist to use
+    return kept
+
+
+def _may_have_soil(obj: bpy.types.Object) -> bool:
+    """Whether a ground is of this file and has no material but soil."""
+    local = obj.library is None and obj.data.library is None and obj.override_library is None
+    return local and all(slot.material is None or is_soil(slot.material) for slot in obj.material_slots)
+
+
+def _strata(
+    scene: bpy.types.Scene, cover: bpy.types.PropertyGroup, floor: Floor, above: tuple[str, ...]
+) -> tuple[list[Stratum], list[Stratum]]:
+    """What lies on the ground, and what grows on it."""
+    weights = sum(entry.weight for entry in cover.mix) or 1.0
+    thin = cover.density / HECTARE / weights
+    lying: list[Stratum] = []
+    growing: list[Stratum] = []
+    for entry in cover.mix:
+        habitat, crown = Habitat[entry.habitat], crown_for(scene, entry.species)
+        suits: NDArray[np.float64] = floor.map_of(habitat, shedder_of(entry, above))
+        patch = 0.6 if habitat.value[1] else 1.0  # of the ground is within patches
+        one = Stratum(patch * suits, thin * entry.weight, crown.seen, np.array(crown.colour))
+        (lying if habitat.falls else growing).append(one)
+    return lying, growing

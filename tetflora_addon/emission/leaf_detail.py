@@ -1,0 +1,116 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How finely near leaves are drawn: lengths in the image, from which `species.leaf_levels` says the level.
+
+The coarsest level whose margin is within a tolerance of the leaf's own is enough. What counts is how long leaves of a
+branch are in the image where it comes nearest: nothing depends on the order of branches or on earlier images.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera.camera import Camera
+from ..compiled.flora import Flora
+from ..growth.growth import WholeBranches
+from ..refinement.shares import PlantParts
+from ..species.leaf_levels import chosen_level, coarse_error, level_polygons
+from ..species.species import LEAF_KINDS
+from ..subplants.wood_detail import Pixels
+
+#: Pixels by which the margin of a leaf may be off.
+TOLERANCE = 0.5
+#: Power of the visibility by which the width of things counts as smaller.
+FADING = 0.25
+#: A leaf is no more than so many times as near as its branch, as far as this counts.
+_NEARER = 4.0
+#: Mean of what random numbers of leaves make of their lengths, see `leaf_meshes`.
+_MEAN = 0.85
+
+
+@dataclass(frozen=True)
+class LeafDetail:
+    """Lengths of leaves in the image.
+
+    Attributes
+    ----------
+    flora : Flora
+    camera : Camera
+    tolerance : float
+        Pixels by which margins may be off; infinite for none but the models of the species.
+    """
+
+    flora: Flora
+    camera: Camera
+    tolerance: float = TOLERANCE
+
+    @property
+    def wood(self) -> Pixels | None:
+        """How large pixels are at wood, that is as fine as leaves; None where it is coarse everywhere."""
+        coarser, camera = self.tolerance / TOLERANCE, self.camera
+        if not np.isfinite(coarser):
+            return None
+        slope = 0.0 if camera.kind == "ORTHO" else camera.pixel_size
+        return Pixels(lambda points: coarser * camera.extent_around(points), coarser * slope)
+
+    def lengths(self, whole: WholeBranches, visibility: NDArray[np.float64] | float = 1.0) -> NDArray[np.float64]:
+        """Lengths (n,) of the leaves of branches in tolerances, where they come nearest.
+
+        What is hidden in part counts as shorter. 0 where the models of the species are certainly fine enough.
+        """
+        visibility = np.broadcast_to(visibility, len(whole)) ** FADING
+        branches, camera = whole.branches, self.camera
+        out = np.zeros(len(branches))
+        most = 1.0 / np.maximum(self._errors()[self.flora.rows["species"][branches.row]], 1e-300)
+        size = self.flora.rows["leaf_size"][branches.row].sum(axis=1) * branches.scale
+        size = size * np.maximum(self.flora.rows["leaf_size_tip"][branches.row], 1.0)
+        # The base tells of most branches that they are too far away.
+        around = camera.extent_around(branches.position)
+        pixels = size / self._nearest(around, branches.length + size) / self.tolerance * visibility
+        near = np.flatnonzero(pixels > most)
+        if not len(near):
+            return out
+        knots = whole.lines.knots[near]
+        extent = camera.extent_around(knots.reshape(-1, 3)).reshape(len(near), -1).min(axis=1)
+        between = np.linalg.norm(np.diff(knots, axis=1), axis=2).max(axis=1) / 2.0
+        nearest = self._nearest(extent, between + size[near])
+        out[near] = size[near] / np.maximum(nearest, extent / _NEARER) / self.tolerance * visibility[near]
+        return out
+
+    def more(self, parts: PlantParts, visibility: NDArray[np.float64] | float = 1.0) -> NDArray[np.float64]:
+        """Expected polygons (n,) of the leaves of parts beyond those of their models, were all of them real."""
+        row, leaves = parts.branches.row, self.leaves(parts)
+        out = np.zeros(len(row))
+        if not np.isfinite(self.tolerance):
+            return out
+        extent = np.maximum(self.camera.extent_around(parts.branches.position), 1e-300) * self.tolerance
+        width = _MEAN * visibility**FADING * self.flora.leaf_width[row] * parts.branches.scale / extent
+        species = self.flora.rows["species"][row]
+        for s in np.flatnonzero(self._errors() > 0):
+            own = np.flatnonzero((species == s) & (leaves > 0))
+            if len(own):
+                forms = self.flora.forms[s][0]
+                more = [level_polygons(f)[chosen_level(f, width[own] / f.width)] - f.polygons for f in forms]
+                out[own] = np.mean(more, axis=0)
+        return out * leaves
+
+    def leaves(self, parts: PlantParts) -> NDArray[np.float64]:
+        """Expected leaves (n,) of parts."""
+        one = self.flora.one_leaf_area(parts.branches)
+        return np.where(
+            self.flora.leaf_count[parts.branches.row] > 0, parts.totals.leaf_area / np.maximum(one, 1e-300), 0.0
+        )
+
+    def _errors(self) -> NDArray[np.float64]:
+        """Largest error (species,) of a species' models."""
+        forms = ([f for kind in range(len(LEAF_KINDS)) for f in own[kind]] for own in self.flora.forms)
+        return np.array([max((coarse_error(f) for f in own), default=0.0) for own in forms])
+
+    def _nearest(self, extent: NDArray[np.float64], away: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Metres (n,) that a pixel spans at things up to a distance (n,) nearer than where it spans ``extent`` (n,)."""
+        if self.camera.kind == "ORTHO":
+            return extent
+        return np.maximum(extent - self.camera.pixel_size * away, 1e-9)

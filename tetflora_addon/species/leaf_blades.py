@@ -1,0 +1,220 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blades as polygons: the outline within a tolerance, columns of faces beside the midrib, and how a leaf is bent."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SpeciesError
+from .leaf_outlines import Blade, simplified, traced
+from .leaf_surfaces import LeafSurface, drawn, joined, surface, tube
+
+#: Tolerance of the outline that all others are taken from.
+FINEST = 2e-4
+#: How far the fold along the midrib is rounded.
+_ROUND = 0.02
+_REPAIRS = 16
+#: Distance of rays over the root of the tolerance: what a surface that is bent as leaves are sags between them.
+_STEP = 1.6
+_MOST_COLUMNS = 8
+_PETIOLE = 0.011  # radius at the blade, in leaf lengths
+
+
+@lru_cache(maxsize=64)
+def _dense(blade: Blade, side: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Parameters (n,) and points (n, 2) of one half's margin, to the finest tolerance."""
+    s = traced(blade, side, FINEST / 2)
+    return s, blade.margin(s, side)
+
+
+def outline(blade: Blade, tolerance: float = FINEST) -> NDArray[np.float64]:
+    """Closed outline (n, 2) of a flat blade within a tolerance, from the base along its right half and back."""
+    halves = []
+    for side in (1, -1):
+        _, points = _dense(blade, side)
+        halves.append(points[simplified(points[:, None], tolerance)])
+    return np.concatenate([halves[0], halves[1][-2:0:-1]])
+
+
+def check_outline(blade: Blade) -> None:
+    """Refuse outlines that cross themselves.
+
+    Raises
+    ------
+    SpeciesError
+        Names what may be changed.
+    """
+    points = outline(blade, 0.002)
+    if crossings(points):
+        raise SpeciesError(
+            "the outline crosses itself; use a smaller tooth_size or lobe_depth, fewer teeth, or a rounded base"
+        )
+
+
+def crossings(points: NDArray[np.float64]) -> int:
+    """Number of pairs of links of a closed line (n, 2) that cross each other."""
+    a, b = points, np.roll(points, -1, axis=0)
+    link = b - a
+
+    def side(p: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Which side of link i (rows) points j (columns) lie on."""
+        away = p[None] - a[:, None]
+        return link[:, None, 0] * away[..., 1] - link[:, None, 1] * away[..., 0]
+
+    first, last = side(a), side(b)
+    across = (first * last < -1e-18) & (first.T * last.T < -1e-18)
+    return int(across.sum() // 2)
+
+
+def blade_surface(blade: Blade, tolerance: float, amount: float = 1.0) -> LeafSurface:
+    """A blade as polygons, in units of the whole leaf's length.
+
+    Parameters
+    ----------
+    blade : Blade
+    tolerance : float
+        Of the outline, in lengths of the blade.
+    amount : float
+        How much its variants differ, 0 to 1.
+    """
+    step = _STEP * np.sqrt(tolerance)
+    rows = max(int(np.ceil(1.0 / step)), 1)
+    columns = _columns(blade, step)
+    flat, faces = [], []
+    count, middle = 0, np.linspace(0.0, 1.0, rows + 1)
+    ribs = np.stack([np.zeros(rows + 1), middle], axis=1)
+    for side in (1, -1):
+        s, points = _dense(blade, side)
+        chosen = simplified(bend(blade, points, amount).swapaxes(0, 1), tolerance)
+        own, made = _half(blade, side, s[chosen], points[chosen], ribs, columns, step)
+        faces.append(made + count)
+        flat.append(own)
+        count += len(own)
+    places = np.concatenate(flat)
+    # Both halves share the midrib; what is the same place is one vertex.
+    _, first, inverse = np.unique(np.round(places, 9) + 0.0, axis=0, return_index=True, return_inverse=True)
+    every = inverse.reshape(-1)[np.concatenate(faces)]
+    places = places[first]
+    bent = bend(blade, places, amount)
+    scale, start = 1.0 - blade.petiole, np.array([0.0, blade.petiole, 0.0])
+    made = surface(bent * scale + start, every, places + [0.5, 0.0], error=tolerance * scale)
+    return joined([made, _petiole(blade, rows)]) if blade.petiole and tolerance < 0.02 else made
+
+
+def _columns(blade: Blade, step: float) -> NDArray[np.float64]:
+    """Fractions of the way from the midrib to the margin at which columns of faces end, for rays a step apart."""
+    wide = 1.0 if blade.palmate else blade.width / 2.0
+    number = min(int(wide / (3.0 * step)), _MOST_COLUMNS)
+    if number < 1:
+        return np.zeros(0)
+    return np.concatenate([[0.07] if step < 0.05 else [], 0.85 * np.arange(1, number + 1) / number])
+
+
+def _half(
+    blade: Blade,
+    side: int,
+    s: NDArray[np.float64],
+    margin: NDArray[np.float64],
+    ribs: NDArray[np.float64],
+    columns: NDArray[np.float64],
+    step: float,
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Flat places (v, 2) and faces (f, 4) of one half whose margin has points (n, 2) of parameters (n,)."""
+    if blade.palmate:  # rays begin at the base, and the last one is the midrib
+        ribs, rib_s = ribs[:1], np.ones(1)
+    else:
+        fine = np.linspace(0.0, 1.0, 1025)
+        rib_s = np.interp(ribs[:, 1], blade.feet(fine), fine)
+    feet = np.stack([np.zeros_like(s), blade.feet(s)], axis=1)
+    key = np.zeros(len(s), bool)
+    key[simplified(margin[:, None], min(step, 0.03))] = True
+    key[np.searchsorted(s, np.arange(step / 2, 1.0, step))] = True
+    last = key.copy()  # rays that lead on to the column beside the margin
+    for _ in range(_REPAIRS):
+        chosen = [np.flatnonzero(key)] * (len(columns) - 1) + [np.flatnonzero(last)] * min(len(columns), 1)
+        inner = [feet[own] + t * (margin[own] - feet[own]) for own, t in zip(chosen, columns, strict=True)]
+        rays = [np.arange(0), *chosen, np.arange(len(s))]
+        lines = [(rib_s, ribs), *((s[own], line) for own, line in zip(chosen, inner, strict=True)), (s, margin)]
+        starts = np.cumsum([0, *(len(line) for _, line in lines)])
+        strips = [_strip(lines[i][0], lines[i + 1][0], starts[i], starts[i + 1]) for i in range(len(lines) - 1)]
+        places, faces = np.concatenate([line for _, line in lines]), np.concatenate(strips)
+        wrong = side * _signed(places[faces]) < -1e-12
+        if not wrong.any() or key.all() or not len(columns):
+            break
+        # Where a face is turned over, rays lead on from its corners at the margin; from all of them if that is not it.
+        used = np.zeros(len(places), bool)
+        used[faces[wrong]] = True
+        bad = np.zeros(len(s), bool)
+        bad[rays[-1][used[starts[-2] : starts[-1]]]] = True
+        if (bad & ~last).any():
+            last = last | bad
+        else:
+            for own, start in zip(chosen, starts[1:], strict=False):
+                bad[own[used[start : start + len(own)]]] = True
+            bad |= np.roll(bad, 1) | np.roll(bad, -1)
+            last = last | bad if (bad & ~last).any() else np.ones_like(last)
+            key = key | (bad & last) if (bad & ~key).any() else last
+    return places, faces if side > 0 else faces[:, ::-1]
+
+
+def _strip(inner: NDArray[np.float64], outer: NDArray[np.float64], first: int, second: int) -> NDArray[np.int64]:
+    """Faces (f, 4) between two lines of vertices from numbers on, with parameters (a,) and (b,)."""
+    if len(inner) == len(outer) and (inner == outer).all():
+        i = np.arange(len(inner) - 1)
+        return np.stack([first + i, second + i, second + i + 1, first + i + 1], axis=1)
+    middle = np.concatenate([(inner[1:] + inner[:-1]) / 2, (outer[1:] + outer[:-1]) / 2])
+    inside = np.arange(len(middle)) < len(inner) - 1
+    order = np.argsort(middle, kind="stable")
+    inside = inside[order]
+    a, b = np.cumsum(inside) - inside, np.cumsum(~inside) - ~inside  # links of either line that are done
+    a, b = first + a, second + b
+    return np.stack([a, b, np.where(inside, a + 1, b + 1), np.where(inside, a + 1, b + 1)], axis=1)
+
+
+def _signed(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Signed areas (f,) of flat quads (f, 4, 2)."""
+    one, two = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
+    return (one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]) / 2.0
+
+
+def bend(blade: Blade, flat: NDArray[np.float64], amount: float = 1.0) -> NDArray[np.float64]:
+    """Points (k, v, 3) of the variants of a blade whose flat places are given (v, 2), in lengths of the blade.
+
+    One half is larger than the other; the blade leans, folds along its midrib, curls, waves and twists.
+    """
+    x, y = flat[:, 0], flat[:, 1]
+    # Of each variant (k, 1), from -1 to 1.
+    lean, larger, folded, curled, waved, phase, turned, cupped = (amount * drawn(i)[:, None] for i in range(8))
+    half = max(blade.width / 2.0, 1e-6)
+    across = np.abs(x) / half
+    wide = x * (1.0 + 0.06 * larger * np.sign(x) * 4.0 * np.clip(y * (1.0 - y), 0.0, 1.0))
+    wide = wide + 0.035 * lean * y**2 + 0.012 * turned * np.sin(2.0 * np.pi * y)
+    high = y + 0.015 * lean * across * x
+    z = blade.fold * (1.0 + 0.5 * folded) * (np.sqrt(x**2 + _ROUND**2 * half) - _ROUND * np.sqrt(half))
+    z = z - (blade.curl + 0.04 * curled) * y**2 + 0.08 * cupped * x**2 / half
+    waves = np.sin(2.0 * np.pi * (blade.waves * y + phase / 2.0) + np.where(x < 0, 1.7, 0.0))
+    z = z + blade.wave * (1.0 + 0.5 * waved) * np.minimum(across, 1.3) ** 2 * waves
+    turn = (np.radians(blade.twist) + 0.2 * turned) * y
+    cos, sin = np.cos(turn), np.sin(turn)
+    bow = -blade.curl * y**2  # the midrib itself does not turn
+    return np.stack(
+        [wide * cos + (z - bow) * sin, np.broadcast_to(high, z.shape), bow + (z - bow) * cos - wide * sin], 2
+    )
+
+
+def _petiole(blade: Blade, rows: int) -> LeafSurface:
+    """The petiole: a tube from the twig to the blade, a little bent; its texture lies below that of the blade."""
+    rings = 4 if rows > 8 else 2
+    along = np.linspace(0.0, 1.0, rings)
+    points = np.zeros((len(drawn(0)), rings, 3))
+    points[..., 1] = blade.petiole * along
+    points[..., 2] = -0.1 * blade.petiole * np.sin(np.pi * along) * (1.0 + 0.5 * drawn(9)[:, None])
+    points[..., 0] = 0.06 * blade.petiole * np.sin(np.pi * along) * drawn(10)[:, None]
+    radius = _PETIOLE * (1.0 - blade.petiole) * np.linspace(1.25, 0.8, rings) * min(1.0, 3.0 * blade.width)
+    made = tube(points, radius, 5 if rows > 8 else 3)
+    made.uv[:] = np.stack([made.uv[:, 0], (made.uv[:, 1] - 1.0) * blade.petiole], axis=1)
+    return made

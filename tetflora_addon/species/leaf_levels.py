@@ -1,0 +1,189 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Finer forms of a leaf for those that are near: the same area, and an error that says from which size they are needed.
+
+The model of a species is the coarsest level and stays as it is. Each finer level knows how far it is from the shape it
+stands for, in lengths of the leaf, and is drawn where the one before it would be off by more than a part of a pixel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .leaf_blades import blade_surface
+from .leaf_compounds import Compound, compound_surface
+from .leaf_models import LeafModel
+from .leaf_needles import Needles, needle_surface
+from .leaf_outlines import Blade, distance_to_links
+from .leaf_surfaces import LeafSurface
+
+#: Tolerances of levels, in lengths of the leaf.
+TOLERANCES = (0.03, 0.012, 0.004, 0.0015, 0.0005, 0.0002)
+#: Polygons of a leaf that no level has more of.
+MOST_POLYGONS = 20_000
+#: A level is worth while where its error is at most this fraction of that of the level before,
+_FINER = 0.75
+#: and takes its place where it has no more than so many times its polygons.
+_DEARER = 1.35
+#: Faces with less than this as texture coordinate v, negative, are stems; their tints, of petioles and of shoots.
+_STEM, _TINTS = 1e-6, ((1.25, 1.1, 0.9), (1.7, 0.75, 0.6))
+_FITS, _THICKER = 12, 1.5
+#: Points on each edge of a coarse model at which its distance from the shape is measured.
+_ON_EDGE = 9
+
+Shape = Blade | Needles | Compound
+
+
+@dataclass(frozen=True, eq=False)
+class LeafLevel:
+    """A leaf within an error.
+
+    Attributes
+    ----------
+    model : LeafModel
+        Faces and texture; the vertices of the first variant.
+    shapes : (k, v, 3) float32
+        Vertices of each variant, in units of the leaf's size.
+    error : float
+        Largest distance of the margin from that of the shape, in lengths of the leaf.
+    tint : (f, 3) float32
+        What the colour of a leaf is times that of each face: shoots are brown, petioles pale.
+    """
+
+    model: LeafModel
+    shapes: NDArray[np.float32]
+    error: float
+    tint: NDArray[np.float32]
+
+
+def surface_of(shape: Shape, tolerance: float, amount: float = 1.0, factor: float = 1.0) -> LeafSurface:
+    """Polygons of a shape within a tolerance, before they have the area of a model and are turned.
+
+    ``amount`` says how much variants differ, 0 to 1; ``factor`` makes needles thicker and leaflets wider.
+    """
+    if isinstance(shape, Needles):
+        return needle_surface(shape, tolerance, factor)
+    if isinstance(shape, Compound):
+        return compound_surface(shape, tolerance, amount, factor)
+    return blade_surface(shape, tolerance / (1.0 - shape.petiole), amount)
+
+
+def fitted(shape: Shape, tolerance: float, area: float, reach: float = np.inf, amount: float = 1.0) -> LeafSurface:
+    """Polygons of a shape within a tolerance, all variants of which have a one-sided area.
+
+    None reaches farther than the model. Blades and leaflets become wider or narrower for the area, needles thicker.
+    """
+    made = surface_of(shape, tolerance, amount)
+    smaller = min(reach / float(np.linalg.norm(made.positions, axis=2).max()), 1.0)
+    if not isinstance(shape, Blade):  # the surface grows with the thickness or width almost evenly
+        mean, thick = made.areas().mean(), surface_of(shape, tolerance, amount, _THICKER).areas().mean()
+        factor = 1.0 + (_THICKER - 1.0) * (area / smaller**2 - mean) / (thick - mean)
+        made = surface_of(shape, tolerance, amount, float(np.clip(factor, 0.2, 5.0)))
+    made = replace(made, positions=made.positions * smaller, error=made.error * smaller)
+    for _ in range(_FITS):
+        ratio = area / made.areas()
+        if np.abs(ratio - 1.0).max() < 1e-7:
+            break
+        wide = np.stack([ratio, np.ones_like(ratio), np.ones_like(ratio)], axis=1)
+        made = replace(made, positions=made.positions * wide[:, None])
+    turn = np.radians(shape.turn)
+    frame = np.array([[np.cos(turn), 0.0, np.sin(turn)], [0.0, 1.0, 0.0], [-np.sin(turn), 0.0, np.cos(turn)]])
+    return made.moved(frame, np.zeros(3)) if shape.turn else made
+
+
+@lru_cache(maxsize=128)
+def leaf_levels(model: LeafModel) -> tuple[LeafLevel, ...]:
+    """Finer levels of a model, the coarsest of them first; none without a shape."""
+    if model.shape is None:
+        return ()
+    found: list[LeafLevel] = []
+    error = coarse_error(model)
+    for tolerance in TOLERANCES:
+        made = fitted(model.shape, tolerance, model.area, model.reach)
+        if made.error > _FINER * error:
+            continue
+        if made.polygons > MOST_POLYGONS:
+            break
+        stem = made.uv[made.face_offsets[:-1] + 1, 1] < -_STEM
+        stem |= made.uv[made.face_offsets[:-1], 1] < -_STEM
+        tint = np.where(stem[:, None], _TINTS[isinstance(model.shape, Needles)], 1.0).astype(np.float32)
+        level = LeafLevel(_model_of(made), made.positions.astype(np.float32), made.error, tint)
+        if found and level.model.polygons <= _DEARER * found[-1].model.polygons:
+            found[-1] = level
+        else:
+            found.append(level)
+        error = made.error
+    return tuple(found)
+
+
+@lru_cache(maxsize=128)
+def level_errors(model: LeafModel) -> NDArray[np.float64]:
+    """Errors (levels + 1,) of a model and its finer levels, in lengths of the leaf; 0 that of the last one."""
+    errors = [coarse_error(model), *(level.error for level in leaf_levels(model))]
+    return np.array([*errors[:-1], 0.0])
+
+
+def level_polygons(model: LeafModel) -> NDArray[np.float64]:
+    """Polygons (levels + 1,) of a model and its finer levels."""
+    return np.array([model.polygons, *(level.model.polygons for level in leaf_levels(model))], float)
+
+
+def chosen_level(model: LeafModel, pixels: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Level (n,) of leaves, 0 the model itself, whose lengths are so many times the tolerated error in the image.
+
+    The coarsest one whose error is within it.
+    """
+    if pixels.max(initial=0.0) * coarse_error(model) <= 1.0:  # far away: nobody needs to make them
+        return np.zeros(len(pixels), np.int64)
+    errors = level_errors(model)
+    return np.searchsorted(-errors, -1.0 / np.maximum(pixels, 1e-300), side="left").clip(0, len(errors) - 1)
+
+
+@lru_cache(maxsize=128)
+def coarse_error(model: LeafModel) -> float:
+    """Largest distance between the margins of a model and of its shape, in lengths of the leaf; 0 without a shape.
+
+    Of the shape as it is meant; single leaves differ from it by more, as leaves do. Needles cannot be told apart from
+    what stands for them until the gaps between them can be seen.
+    """
+    if model.shape is None:
+        return 0.0
+    if isinstance(model.shape, Needles):
+        return max(4.0 * model.shape.gap, 0.02)
+    made = fitted(model.shape, TOLERANCES[2], model.area, model.reach, amount=0.0)
+    fine, coarse = _margin(_model_of(made), not isinstance(model.shape, Compound)), _margin(model, stems=True)
+    return max(_farthest(fine, coarse), _farthest(coarse, fine))
+
+
+def _margin(model: LeafModel, stems: bool) -> NDArray[np.float64]:
+    """Edges (e, 2, 3) that belong to one face only; all of closed models. Without stems, whose v is negative, if so."""
+    edges, of_corner = model.edges
+    if not stems:
+        stem = np.zeros(len(edges), bool)
+        stem[of_corner[model.uv[:, 1] < -_STEM]] = True
+        edges, of_corner = edges[~stem], (np.cumsum(~stem) - 1)[of_corner[~stem[of_corner]]]
+    single = edges[np.bincount(of_corner, minlength=len(edges)) == 1]
+    return model.positions[single if len(single) else edges]
+
+
+def _farthest(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    """Largest distance of points on edges (e, 2, 3) from others."""
+    place = np.linspace(0.0, 1.0, _ON_EDGE)[:, None, None]
+    points = (one[:, 0] + place * (one[:, 1] - one[:, 0])).reshape(-1, 3)
+    off = [
+        distance_to_links(part[:, None], other[None, :, 0], other[None, :, 1]).min(axis=1) for part in _parts(points)
+    ]
+    return float(np.concatenate(off).max())
+
+
+def _parts(points: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    return np.array_split(points, len(points) // 256 + 1)
+
+
+def _model_of(made: LeafSurface) -> LeafModel:
+    """A model of the first variant of a surface."""
+    return LeafModel(made.positions[0], made.corner_verts, made.face_offsets, made.uv.astype(np.float32))

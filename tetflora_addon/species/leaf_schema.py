@@ -1,0 +1,160 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reading leaves from a species file: polygons, models and outlines, which are checked field by field."""
+
+from __future__ import annotations
+
+from dataclasses import Field, fields, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..errors import SpeciesError, shown
+from .leaf_blades import check_outline
+from .leaf_compounds import Compound
+from .leaf_levels import TOLERANCES, fitted, surface_of
+from .leaf_models import LEAF_MODELS, LeafModel, leaf_model
+from .leaf_needles import Needles
+from .leaf_outlines import Blade
+
+#: Most forms of a leaf.
+MAX_FORMS = 8
+LEAF_KEYS = ("model", "object", "vertices", "faces", "uv", "outline")
+#: Kinds of outlines by their name in species files; the first is meant where none is given.
+OUTLINES: dict[str, type] = {"blade": Blade, "needles": Needles, "compound": Compound}
+
+
+class Reader(Protocol):
+    """What checks values and refuses them with the place where they stand; see `schema`."""
+
+    def keys(self, value: Any, key: str, allowed: Any) -> None:
+        """Refuse what is no object, or has other keys."""
+
+    def number(self, value: Any, key: str, low: float, high: float) -> float:
+        """A number within limits."""
+
+    def text(self, value: Any, key: str, least: int = 1) -> str:
+        """A text."""
+
+    def choice(self, value: Any, key: str, allowed: tuple[str, ...]) -> str:
+        """One of some names."""
+
+    def fail(self, key: str, problem: str) -> SpeciesError:
+        """The error that names the source and the key."""
+
+
+def read_forms(reader: Reader, data: Any, key: str) -> tuple[LeafModel | str, ...]:
+    """A leaf, or a list of forms among which each leaf has one by chance.
+
+    Raises
+    ------
+    SpeciesError
+        Names the field and what it may be.
+    """
+    if not isinstance(data, list):
+        return (_read_leaf(reader, data, key),)
+    if not 1 <= len(data) <= MAX_FORMS:
+        raise reader.fail(key, f"must have 1 to {MAX_FORMS} forms, has {len(data)}")
+    return tuple(_read_leaf(reader, one, f"{key}[{i}]") for i, one in enumerate(data))
+
+
+def _read_leaf(reader: Reader, data: Any, where: str) -> LeafModel | str:
+    reader.keys(data, where, LEAF_KEYS)
+    forms = [k for k in ("model", "object", "vertices") if k in data]
+    if len(forms) != 1 and not (not forms and "outline" in data):
+        raise reader.fail(
+            where,
+            "must have exactly one of model (built-in), object (Blender mesh) or vertices with faces, or an outline",
+        )
+    if "outline" in data:
+        if "object" in data:
+            raise reader.fail(
+                f"{where}.outline", "must be left out where the leaf is an object, which is drawn as it is"
+            )
+        shape = read_outline(reader, data["outline"], f"{where}.outline")
+        rest = {key: value for key, value in data.items() if key != "outline"}
+        if not forms:
+            reader.keys(rest, where, ())
+            return outlined_model(shape)
+        return replace(_read_leaf(reader, rest, where), shape=shape)
+    if "model" in data:
+        if not isinstance(data["model"], str) or data["model"] not in LEAF_MODELS:
+            raise reader.fail(f"{where}.model", f"must be one of {', '.join(LEAF_MODELS)}, not {shown(data['model'])}")
+        return LEAF_MODELS[data["model"]]
+    if "object" in data:
+        return reader.text(data["object"], f"{where}.object")
+    faces = data.get("faces")
+    if not isinstance(faces, list) or not all(
+        isinstance(f, list) and all(isinstance(v, int) and not isinstance(v, bool) for v in f) for f in faces
+    ):
+        raise reader.fail(f"{where}.faces", "must be a list of faces, each a list of vertex indices")
+    for key, form in (("vertices", "[x, y, z]"), ("uv", "[u, v]")):
+        if key in data and not _is_list_of_points(data[key], form.count(",") + 1):
+            raise reader.fail(f"{where}.{key}", f"must be a list of {form} numbers")
+    try:
+        return leaf_model(data["vertices"], faces, data.get("uv"))
+    except SpeciesError as error:
+        raise reader.fail(where, str(error)) from None
+
+
+def _is_list_of_points(value: Any, size: int) -> bool:
+    # numpy would take texts and truths for numbers, and stumble over integers that no float can hold.
+    return isinstance(value, list) and all(
+        isinstance(point, list)
+        and len(point) == size
+        and all(isinstance(x, int | float) and not isinstance(x, bool) and not abs(x) > 1e300 for x in point)
+        for point in value
+    )
+
+
+def read_outline(reader: Reader, data: Any, where: str) -> Blade | Needles | Compound:
+    """An outline from what a species file has for it.
+
+    Raises
+    ------
+    SpeciesError
+        Names the field and what it may be.
+    """
+    kind = "blade"
+    if isinstance(data, dict) and "kind" in data:
+        kind = reader.choice(data["kind"], f"{where}.kind", tuple(OUTLINES))
+    shape = OUTLINES[kind]
+    reader.keys(data, where, ("kind", *(f.name for f in fields(shape))))
+    read = {f.name: _field(reader, data[f.name], f"{where}.{f.name}", f) for f in fields(shape) if f.name in data}
+    made = shape(**read)
+    if isinstance(made, Blade):
+        if made.palmate and 0 < made.lobes < 3:
+            raise reader.fail(f"{where}.lobes", f"must be 0, or 3 to 12 with palmate lobes, not {made.lobes}")
+        try:
+            check_outline(made)
+        except SpeciesError as error:
+            raise reader.fail(where, str(error)) from None
+    if isinstance(made, Compound) and not (made.pairs or made.around or made.terminal):
+        raise reader.fail(f"{where}.pairs", "must be at least 1 where there are no leaflets around and no terminal one")
+    return made
+
+
+def _field(reader: Reader, value: Any, where: str, field: Field) -> Any:
+    if field.name == "leaflet":
+        made = read_outline(reader, value, where)
+        if not isinstance(made, Blade):
+            raise reader.fail(f"{where}.kind", "must be blade, because leaflets are simple")
+        return made
+    if "names" in field.metadata:
+        return reader.choice(value, where, field.metadata["names"])
+    number = reader.number(value, where, field.metadata["low"], field.metadata["high"])
+    if not isinstance(field.default, int):
+        return number
+    if number != int(number):
+        raise reader.fail(where, f"must be a whole number, not {number:g}")
+    return int(number)
+
+
+def outlined_model(shape: Blade | Needles | Compound) -> LeafModel:
+    """The coarsest level of an outline that has no other: few faces, with the outline's own area."""
+    tolerance = TOLERANCES[0]
+    area = float(surface_of(shape, TOLERANCES[2], 0.0).areas().mean())
+    made = fitted(shape, tolerance, area, amount=0.0)
+    return LeafModel(
+        np.round(made.positions[0], 6), made.corner_verts, made.face_offsets, made.uv.astype(np.float32), shape=shape
+    )

@@ -1,0 +1,139 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Polygons of a leaf in several variants that share their faces: what blades, needles and leaflets are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Leaves of a form that are bent, folded and grown in different ways.
+VARIANTS = 6
+_GOLDEN = 0.6180339887498949
+
+
+def drawn(number: int, count: int = VARIANTS) -> NDArray[np.float64]:
+    """Even numbers (count,) from -1 to 1, one for each variant; others for each number that they are drawn by."""
+    step = (_GOLDEN * (number + 1) ** 2 + 0.31 * number) % 1.0
+    return 2.0 * ((np.arange(count) * (_GOLDEN + 0.4 * step) + step) % 1.0) - 1.0
+
+
+@dataclass(frozen=True)
+class LeafSurface:
+    """Faces of a leaf.
+
+    Attributes
+    ----------
+    positions : (k, v, 3) float64
+        Vertices of each variant, in units of the leaf's size.
+    corner_verts : (c,) int32
+    face_offsets : (f + 1,) int32
+    uv : (c, 2) float64
+    solid : (f,) bool
+        Faces of closed bodies, as needles: half of their surface counts as one-sided area.
+    error : float
+        Largest distance from the shape that it stands for.
+    """
+
+    positions: NDArray[np.float64]
+    corner_verts: NDArray[np.int32]
+    face_offsets: NDArray[np.int32]
+    uv: NDArray[np.float64]
+    solid: NDArray[np.bool_]
+    error: float = 0.0
+
+    @property
+    def polygons(self) -> int:
+        """Number of faces."""
+        return len(self.solid)
+
+    def areas(self) -> NDArray[np.float64]:
+        """One-sided areas (k,) of the variants."""
+        following = np.arange(1, len(self.corner_verts) + 1)
+        following[self.face_offsets[1:] - 1] = self.face_offsets[:-1]
+        points = self.positions[:, self.corner_verts]
+        origin = np.repeat(points[:, self.face_offsets[:-1]], np.diff(self.face_offsets), axis=1)
+        vectors = np.add.reduceat(
+            np.cross(points - origin, points[:, following] - origin), self.face_offsets[:-1], axis=1
+        )
+        return (np.linalg.norm(vectors, axis=2) * np.where(self.solid, 0.25, 0.5)).sum(axis=1)
+
+    def moved(self, matrix: NDArray[np.float64], place: NDArray[np.float64]) -> LeafSurface:
+        """The surface with its points times a matrix (3, 3) or (k, 3, 3), whose columns are its axes, at a place."""
+        points = self.positions @ np.swapaxes(matrix, -1, -2) + np.reshape(place, (-1, 1, 3))
+        return replace(self, positions=points)
+
+
+def surface(
+    positions: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    uv: NDArray[np.float64],
+    solid: bool = False,
+    error: float = 0.0,
+) -> LeafSurface:
+    """A surface of triangles and quads.
+
+    Parameters
+    ----------
+    positions : (k, v, 3) float64
+    faces : (f, 4) int
+        Vertices; of triangles one is named twice in a row, or the last is -1. Less than three different ones are none.
+    uv : (v, 2) float64
+    solid, error
+        As of `LeafSurface`.
+    """
+    faces = np.where(faces < 0, faces[:, :1], faces)
+    kept = faces != np.roll(faces, -1, axis=1)
+    whole = kept.sum(axis=1) >= 3
+    faces, kept = faces[whole], kept[whole]
+    corners = faces[kept]
+    used, corners = np.unique(corners, return_inverse=True)
+    corners = corners.reshape(-1)
+    offsets = np.concatenate([[0], np.cumsum(kept.sum(axis=1))]).astype(np.int32)
+    return LeafSurface(
+        positions[:, used], corners.astype(np.int32), offsets, uv[used][corners], np.full(len(faces), solid), error
+    )
+
+
+def joined(parts: Sequence[LeafSurface]) -> LeafSurface:
+    """Several surfaces with equal numbers of variants as one."""
+    vertices = np.cumsum([0, *(part.positions.shape[1] for part in parts)])
+    corners = np.cumsum([0, *(len(part.corner_verts) for part in parts)])
+    return LeafSurface(
+        np.concatenate([part.positions for part in parts], axis=1),
+        np.concatenate([p.corner_verts + v for p, v in zip(parts, vertices, strict=False)]).astype(np.int32),
+        np.concatenate([[0], *(p.face_offsets[1:] + c for p, c in zip(parts, corners, strict=False))]).astype(np.int32),
+        np.concatenate([part.uv for part in parts]),
+        np.concatenate([part.solid for part in parts]),
+        max(part.error for part in parts),
+    )
+
+
+def tube(
+    points: NDArray[np.float64], radius: NDArray[np.float64], sides: int, across: NDArray[np.float64] | None = None
+) -> LeafSurface:
+    """A tube along points (k, n, 3) with radii (n,), ended by a point where the last of them is 0.
+
+    Its texture runs once around in u, and along in v; ``across`` (3,) is a direction that it does not lead along.
+    """
+    variants, rings, _ = points.shape
+    along = np.gradient(points, axis=1)
+    along /= np.maximum(np.linalg.norm(along, axis=2, keepdims=True), 1e-12)
+    side = np.cross(along, np.array([0.0, 0.0, 1.0]) if across is None else across)
+    side /= np.maximum(np.linalg.norm(side, axis=2, keepdims=True), 1e-12)
+    up = np.cross(side, along)
+    turn = 2 * np.pi * np.arange(sides) / sides
+    ring = np.cos(turn)[:, None] * side[:, :, None] + np.sin(turn)[:, None] * up[:, :, None]
+    places = (points[:, :, None] + radius[:, None, None] * ring).reshape(variants, rings * sides, 3)
+    i, j = np.meshgrid(np.arange(rings - 1), np.arange(sides), indexing="ij")
+    after = (j + 1) % sides
+    quads = np.stack([i * sides + j, i * sides + after, (i + 1) * sides + after, (i + 1) * sides + j], axis=-1)
+    quads = quads.reshape(-1, 4)
+    if radius[-1] == 0.0:
+        quads = np.where(quads >= (rings - 1) * sides, (rings - 1) * sides, quads)
+    u = np.tile(0.5 + 0.5 * np.cos(turn), rings)
+    v = np.repeat(np.linspace(0.0, 1.0, rings), sides)
+    return surface(places, quads, np.stack([u, v], axis=1), solid=True)

@@ -1,0 +1,304 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What lies under a species: patches of its fallen leaves, its broken branches and its logs, as species of their own.
+
+Each is a page of a species file, made from that of the living plant: the same leaf, bark and way of branching. Stems
+are a centimeter or two high, so that what grows on them sideways lies on the ground.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from math import cos, pi, sin, sqrt
+from typing import Any
+
+from .leaf_models import LeafModel
+from .leaf_outlines import Blade
+from .leaf_schema import MAX_FORMS
+from .schema import FORMAT
+from .species import LEAF_KINDS, Species
+
+#: Leaves that let less light through than this are needles and scales, whose plants bear cones.
+NEEDLES = 0.2
+#: Leaves of a patch, and what fraction of its circle they cover, counted singly.
+_LEAVES, _COVERED = (16, 44), 0.62
+_RADIUS = (0.12, 0.45)  # meters, of a patch
+#: How blades bend as they dry.
+_BENT = (
+    {"fold": 0.12, "curl": 0.12, "wave": 0.02},
+    {"fold": 0.38, "curl": -0.2, "wave": 0.03},
+    {"fold": -0.25, "curl": 0.25, "wave": 0.03},
+)
+#: Linear RGB of dead leaves and needles, of wood without bark, and of cones: mean and variation.
+_BROWN = ((0.175, 0.092, 0.036), (0.115, 0.064, 0.024))
+_NEEDLE_BROWN = ((0.135, 0.068, 0.031), (0.06, 0.032, 0.014))
+_TWIG = [[0.075, 0.052, 0.034], [0.02, 0.014, 0.01]]
+_CONE = [[0.075, 0.043, 0.023], [0.02, 0.012, 0.007]]
+_CUT = [[0.17, 0.115, 0.07], [0.03, 0.02, 0.014]]
+_WEATHERED = (0.088, 0.074, 0.058)
+_STEM = 0.03  # meters, of the stem in the middle of a patch
+_TREE = 3.0  # meters: what is lower has no branches that are dead wood
+_KEPT = {
+    *("length", "thickness", "taper", "sides", "angle", "angle_tip", "branches", "branch_start"),
+    *("crown", "whorl", "count_by_length", "branch_colour"),
+}
+#: Meters across which a handful of needles is strewn, their number, and the width of each.
+_STREWN, _HANDFUL, _NEEDLE = 0.13, 22, 0.0018
+_BURIED = 0.12  # meters, of the lower end of a log
+_CONES = 0.45  # of a patch, on average
+
+
+def litter_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The page of a patch of fallen leaves, or of needles, twigs and cones; None of a species without leaves.
+
+    Parameters
+    ----------
+    species : Species
+    page : mapping
+        What its species file holds.
+    """
+    bearing = [order for order in species.orders if order.leaves.mean > 0 and order.leaf_kind == LEAF_KINDS[0]]
+    if not bearing:
+        return None
+    size = max(order.leaf_size.mean for order in bearing)
+    needles = species.leaf_transmission < NEEDLES
+    areas = [form.area for form in species.leaf if isinstance(form, LeafModel)]
+    area = size**2 * (sum(areas) / len(areas) if areas else 0.4)
+    # Shoots fall apart: on the ground lie single needles, a handful to a leaf of the patch.
+    needle = min(max(0.12 * size, 0.016), 0.045)
+    if needles:
+        size, area = _STREWN, _HANDFUL * needle * _NEEDLE
+    number = min(max(_COVERED * pi * _RADIUS[1] ** 2 / area, _LEAVES[0]), _LEAVES[1])
+    radius = min(max(sqrt(number * area / (_COVERED * pi)), _RADIUS[0], 1.3 * size), _RADIUS[1])
+    if needles:
+        number, radius = _LEAVES[1], 0.3
+    twigs = 6 if needles else 7
+    colour, variation = _NEEDLE_BROWN if needles else _BROWN
+    around = {
+        "length": _pair(radius / _STEM, 0.3 * radius / _STEM),
+        "thickness": [0.9, 0.1],
+        "taper": 0.3,
+        "segments": 3,
+        "sides": 3,
+        "curvature": [0, 30],
+        "angle": [87, 3],
+        "azimuth": [137.5, 40],
+        "leaves": _pair(number / twigs, 0.3 * number / twigs),
+        "leaf_start": 0.22,
+        "leaf_size": _pair(0.95 * size, 0.15 * size),
+        "leaf_angle": [75, 70],
+        "leaf_azimuth": [137.5, 120],
+        "leaf_light": [0.97, 0.03] if needles else [0.92, 0.07],
+        "branch_colour": _TWIG,
+        "leaf_colour": [list(colour), list(variation)],
+        "leaf_colour_tip": [round(1.12 * c, 3) for c in colour],
+    }
+    middle = {
+        "length": [_STEM, 0.004],
+        "thickness": [0.05 if needles else 0.02, 0.004],
+        "sides": 3,
+        "branches": [twigs, 1],
+        "branch_start": 0,
+        "branch_colour": _TWIG,
+    }
+    own_forms = page["leaf"] if isinstance(page["leaf"], list) else [page["leaf"]]
+    dried = [one for form, own in zip(species.leaf, own_forms, strict=True) for one in _dried(form, own)]
+    made = {
+        "format": FORMAT,
+        "name": f"{species.name} litter"[:1000],
+        "description": f"Fallen {'needles, twigs and cones' if needles else 'leaves'} of {species.name}, a patch of "
+        f"{200 * radius:.0f} cm"[:1000],
+        "bark": species.bark,
+        "leaf": _strewn(needle) if needles else dried[:MAX_FORMS],
+        "leaf_transmission": round(0.4 * species.leaf_transmission, 3),
+        "orders": [middle, around],
+    }
+    if needles:
+        made["blossom"], made["blossom_transmission"] = _cone(), 0
+        made["spur"] = {
+            "length": [0.01, 0],
+            "thickness": 0.1,
+            "angle": [88, 2],
+            "leaf_kind": "blossom",
+            "leaves": [1, 0],
+            "leaf_start": 0.9,
+            "leaf_size": _pair(0.07, 0.02),
+            "leaf_angle": [20, 15],
+            "leaf_light": 1,
+            "leaf_colour": _CONE,
+            "branch_colour": _TWIG,
+        }
+        around["spurs"], around["spur_start"] = _pair(_CONES / twigs, _CONES / twigs), 0.3
+    return made
+
+
+def branch_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The page of a broken branch that lies on the ground; None of a species that is too low to have any."""
+    if species.orders[0].length.mean < _TREE or len(species.orders) < 3:
+        return None
+    length = min(max(0.22 * species.orders[0].length.mean * min(species.orders[1].length.mean, 1.0), 0.7), 2.2)
+    orders = [_bare(order) for order in page["orders"][1:4]]
+    for order in orders:
+        # Twigs of a branch that fell spread over the ground, and many are gone.
+        order |= {"spray": 0.92, "azimuth": [180, 25], "attraction": 0, "segments": 4, "curvature": [0, 26]}
+        order["branches"] = _pair(*_fewer(order.get("branches", 0), 6))
+        order["branch_colour"] = _weathered(order.get("branch_colour"), 0.4)
+    orders[-1]["branches"] = 0
+    orders[0] |= {
+        "length": _pair(length, 0.4 * length),
+        "thickness": [0.0095, 0.002],
+        "taper": 0.3,
+        "segments": 7,
+        "sides": 7,
+        "angle": [88.5, 1],
+        "branch_start": 0.2,
+    }
+    orders[0].pop("angle_tip", None)
+    return _wood(species, page, orders, "branch", f"A fallen branch of {species.name}, about {length:.1f} m long")
+
+
+def log_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The page of a log with stubs of branches, half sunk into the ground; None of a species that is too low."""
+    trunk = species.orders[0]
+    if trunk.length.mean < _TREE or len(species.orders) < 2:
+        return None
+    length = min(max(0.25 * trunk.length.mean, 1.2), 1.84)
+    radius = min(max(0.8 * trunk.length.mean * trunk.thickness.mean, 0.04), _BURIED)
+    colour = page["orders"][0].get("branch_colour")
+    # A stem that leads down, so that the log begins in the ground and comes out of it on its way.
+    stem = {
+        "length": [_BURIED, 0],
+        "thickness": [1, 0],
+        "taper": 1,
+        "sides": 3,
+        "angle": [180, 0],
+        "branches": [1, 0],
+        "branch_start": 0.98,
+        "branch_colour": _weathered(colour, 0.65),
+    }
+    log = {
+        "length": _pair(length / _BURIED, 0.3 * length / _BURIED),
+        "thickness": _pair(radius / _BURIED, 0),
+        "taper": 0.8,
+        "segments": 8,
+        "sides": 16,
+        "curvature": [0, 8],
+        "angle": [96, 1],
+        "branches": [6, 3],
+        "branch_start": 0.2,
+        "branch_colour": _weathered(colour, 0.65),
+        "leaf_kind": "blossom",
+        "leaves": [1, 0],
+        "leaf_start": 0.99,
+        "leaf_size": _pair(2.04 * 0.8 * radius, 0),
+        "leaf_angle": [90, 0],
+        "leaf_light": 0,
+        "leaf_colour": _CUT,
+    }
+    stub = {
+        "length": [0.06, 0.045],
+        "thickness": [0.26, 0.1],
+        "taper": 0.12,
+        "segments": 2,
+        "sides": 6,
+        "angle": [66, 16],
+        "azimuth": [137.5, 40],
+        "branch_colour": _weathered(colour, 0.7),
+    }
+    made = _wood(species, page, [stem, log, stub], "log", f"A fallen log of {species.name}, about {length:.1f} m long")
+    return made | {"blossom": _disc(), "blossom_transmission": 0}
+
+
+#: Pages by the ending of the identifier that the fallen parts of a species have.
+FALLEN: dict[str, Callable[[Species, Mapping[str, Any]], dict[str, Any] | None]] = {
+    "litter": litter_page,
+    "branch": branch_page,
+    "log": log_page,
+}
+
+
+def _dried(form: LeafModel | str, own: dict[str, Any]) -> list[dict[str, Any]]:
+    """A leaf as it dries: flat, cupped and rolled back, where its blade is known; else as the page has it."""
+    if not isinstance(form, LeafModel) or not isinstance(form.shape, Blade):
+        return [own]
+    blade = {f.name: getattr(form.shape, f.name) for f in fields(Blade) if getattr(form.shape, f.name) != f.default}
+    return [{"outline": {"kind": "blade", **blade, **bent}} for bent in _BENT]
+
+
+def _wood(
+    species: Species, page: Mapping[str, Any], orders: list[dict[str, Any]], kind: str, description: str
+) -> dict[str, Any]:
+    return {
+        "format": FORMAT,
+        "name": f"{species.name} {kind}"[:1000],
+        "description": description[:1000],
+        "bark": species.bark,
+        "leaf": page["leaf"],
+        "leaf_transmission": species.leaf_transmission,
+        "orders": orders,
+    }
+
+
+def _bare(order: Mapping[str, Any]) -> dict[str, Any]:
+    """An order of a page without leaves, short shoots, forks and whatever else grows on it but branches."""
+    return {key: value for key, value in order.items() if key in _KEPT}
+
+
+def _fewer(value: Any, most: float) -> tuple[float, float]:
+    mean, variation = value if isinstance(value, list) else (value, 0.0)
+    factor = min(most / mean, 1.0) if mean > 0 else 1.0
+    return mean * factor, min(variation * factor + 1.0, mean * factor)
+
+
+def _weathered(colour: Any, how: float) -> list[list[float]]:
+    """A color of bark and its variation, turned to that of dead wood as far as asked."""
+    mean, variation = colour or [[0.16, 0.11, 0.07], [0.04, 0.03, 0.02]]
+    return [[round((1 - how) * c + how * w, 4) for c, w in zip(mean, _WEATHERED, strict=True)], variation]
+
+
+def _pair(mean: float, variation: float) -> list[float]:
+    return [round(mean, 4), round(min(variation, mean), 4)]
+
+
+def _strewn(needle: float) -> dict[str, Any]:
+    """A handful of needles of a length in meters, strewn by the golden angle, each turned otherwise."""
+    vertices, faces = [], []
+    length, half = needle / _STREWN, 0.5 * _NEEDLE / _STREWN
+    for k in range(_HANDFUL):
+        away, turn, along = 0.5 * sqrt((k + 0.5) / _HANDFUL), 2.39996 * k, 5.1 * k + 0.7 * k * k
+        x, y, z = away * cos(turn), 0.5 + away * sin(turn), 0.01 * (k % 5)
+        ax, ay = cos(along) * length / 2, sin(along) * length / 2
+        bx, by = -sin(along) * half, cos(along) * half
+        ends = ((-ax - bx, -ay - by), (ax - bx, ay - by), (ax + bx, ay + by), (-ax + bx, -ay + by))
+        vertices += [[round(x + u, 4), round(y + v, 4), round(z, 3)] for u, v in ends]
+        faces.append([4 * k + i for i in range(4)])
+    return {"vertices": vertices, "faces": faces}
+
+
+def _disc() -> dict[str, Any]:
+    """The end of a log, one unit across, that looks along it."""
+    number = 16
+    turns = [2 * pi * k / number for k in range(number)]
+    return {
+        "vertices": [[round(0.5 * cos(t), 4), round(0.5 * sin(t), 4), 0.0] for t in turns],
+        "faces": [list(range(number))],
+    }
+
+
+def _cone() -> dict[str, Any]:
+    """A cone that lies on its side, one unit long: rings of scales that stand off."""
+    rings, sides = ((0.0, 0.05), (0.1, 0.2), (0.3, 0.25), (0.5, 0.23), (0.7, 0.18), (0.88, 0.11), (1.0, 0.03)), 7
+    corners = {0: (0.1951, 0.0), 1: (0.1216, 0.1525), 2: (-0.0434, 0.1901), 3: (-0.1757, 0.0846)}
+    around = [corners[k] if k < 4 else (corners[7 - k][0], -corners[7 - k][1]) for k in range(sides)]
+    vertices = [
+        [round(x / 0.195 * r * (1.25 if (k + i) % 2 else 0.85), 3), y, round(0.2 + z / 0.195 * r, 3)]
+        for i, (y, r) in enumerate(rings)
+        for k, (x, z) in enumerate(around)
+    ]
+    faces = [
+        [i * sides + k, i * sides + (k + 1) % sides, (i + 1) * sides + (k + 1) % sides, (i + 1) * sides + k]
+        for i in range(len(rings) - 1)
+        for k in range(sides)
+    ]
+    return {"vertices": vertices, "faces": faces}
