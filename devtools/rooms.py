@@ -25,9 +25,9 @@ ADDON = "tetflora_addon"
 PRODUCT = (ADDON, "operators", "panels")
 
 #: Limits of the product: source files, their lines together, lines of one room, levels of imports in ``blender``.
-MAX_FILES = 200
-MAX_LINES = 40_000
-MAX_ROOM_LINES = 3_500
+MAX_FILES = 240
+MAX_LINES = 48_000
+MAX_ROOM_LINES = 4_000
 MAX_LEVELS = 9
 
 _LOW = "blender blender/materials blender/species blender/scene"
