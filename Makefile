@@ -46,18 +46,22 @@ results: environment
 # The second also runs when the first has failed.
 ENGINE_TESTS = tests/engine tests/attack/engine
 
+BLENDER_TESTS = tests/blender tests/attack/blender tests/packaging tests/examples
+
 test: environment
 	@code=0; \
 	$(PY) -m pytest -q -n 2 $(ENGINE_TESTS) || code=1; \
-	$(PY) -m pytest -q -n 2 --dist loadfile tests/blender tests/attack/blender tests/packaging tests/examples || code=1; \
+	$(PY) -m pytest -q -n 2 --dist loadfile $(BLENDER_TESTS) || code=1; \
 	exit $$code
 
 # The engine never meets Blender, whatever its version: of its tests, those of what must come out the same on every
-# Python and numpy, plants and what is made of them.
+# Python and numpy, plants and what is made of them. Attacks and examples meet nothing that the add-on's tests do not.
 LTS_ENGINE_TESTS = tests/engine/growth tests/engine/subplants tests/engine/emission
+LTS_BLENDER_TESTS = tests/blender tests/packaging
 
 test-lts:
-	@$(MAKE) --no-print-directory test VENV='$(LTS_VENV)' VERSIONS='$(LTS_VERSIONS)' ENGINE_TESTS='$(LTS_ENGINE_TESTS)'
+	@$(MAKE) --no-print-directory test VENV='$(LTS_VENV)' VERSIONS='$(LTS_VERSIONS)' ENGINE_TESTS='$(LTS_ENGINE_TESTS)' \
+		BLENDER_TESTS='$(LTS_BLENDER_TESTS)'
 
 lint: environment
 	@code=0; \

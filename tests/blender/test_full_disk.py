@@ -122,8 +122,11 @@ def test_a_compressed_file_that_blender_takes_for_saved(tmp_path, capfd):
     bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True)
     _refined()
     before = path.read_bytes()
+    # Blender overlooks what fails while the last block of a compressed file is written.
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "whole.blend"), compress=True, copy=True)
+    size = (tmp_path / "whole.blend").stat().st_size
     assert "error" not in capfd.readouterr().err
-    with full_disk(50_000):
+    with full_disk(size - 5_000):
         assert bpy.ops.wm.save_mainfile(compress=True) == {'FINISHED'}
     said = capfd.readouterr().err
     assert f"TetFlora: error: {path} is incomplete" in said

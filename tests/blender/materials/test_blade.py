@@ -59,14 +59,14 @@ def seen(model, material, sides, below, engine="CYCLES", size=60, rows=ROWS):
 
 
 def means(kind, engine="CYCLES"):
-    """Reflected and transmitted light (2, 3) of leaves and of proxies in their place, the mean of both sides."""
+    """Reflected and transmitted light (2, 3) of leaves and, by Cycles, of proxies in their place; mean of both sides."""
     model = LEAF_MODELS[MODELS.get(kind, "ovate")]
     flat = replace(model, positions=model.positions * [1, 1, 0])
     share = flat.area * 0.8**2
-    made = materials.leaf_material("Oak", kind), materials.proxy_material()
+    made = (materials.leaf_material("Oak", kind), engine), (materials.proxy_material(), "CYCLES")
     return [
-        np.array([seen(flat, one, (1, -1), below, engine).mean(axis=(0, 1)) for below in (0, 1)]) / share
-        for one in made
+        np.array([seen(flat, one, (1, -1), below, by).mean(axis=(0, 1)) for below in (0, 1)]) / share
+        for one, by in made
     ]
 
 

@@ -44,14 +44,14 @@ class Mixture:
 def empty_means(settings: bpy.types.PropertyGroup) -> str:
     """The species of a population or brush that names none: what the catalogue offers first.
 
-    In older files it is the first by name, which was offered then.
+    In older files it is bamboo, the first by name of those days.
 
     Raises
     ------
     SpeciesError
         The catalogue is empty.
     """
-    return default_species(by_name=settings.distance_from == 'UNSET' and not follows_species(settings))
+    return default_species(before=settings.distance_from == 'UNSET' and not follows_species(settings))
 
 
 def weights_of(population: bpy.types.PropertyGroup) -> dict[str, float]:
