@@ -59,7 +59,7 @@ def seen(model, material, sides, below, engine="CYCLES", size=60, rows=ROWS):
 
 
 def means(kind, engine="CYCLES"):
-    """Reflected and transmitted light (2, 3) of leaves and, by Cycles, of proxies in their place; mean of both sides."""
+    """Reflected and transmitted light (2, 3), mean of both sides, of leaves and of proxies in their place by Cycles."""
     model = LEAF_MODELS[MODELS.get(kind, "ovate")]
     flat = replace(model, positions=model.positions * [1, 1, 0])
     share = flat.area * 0.8**2
