@@ -39,6 +39,8 @@ class Crown:
         Expected one-sided area of the leaves and surface of the branches, m².
     colour : tuple of float
         Mean linear RGB of both, weighted by how much of them is seen from above.
+    leaf : float
+        Mean width of a leaf, or of a trunk without leaves, meters.
     """
 
     radius: float
@@ -48,6 +50,7 @@ class Crown:
     leaves: float = 0.0
     wood: float = 0.0
     colour: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    leaf: float = 0.02
 
     @property
     def seen(self) -> float:
@@ -81,4 +84,6 @@ def crown_of(species: Species) -> Crown:
     colours = np.stack([flora.leaf_colours(trunk).mean(axis=0), flora.wood_colour[row]])
     colour = tuple((areas @ colours / areas.sum()).tolist())
     polygons = expected_polygons(flora.species[0])
-    return Crown(radius, height, polygons, max(base, 0.0), float(leaves.mean()), float(wood.mean()), colour)
+    leaf = float(flora.leaf_width[row]) if flora.leaf_count[row] > 0 else 2.0 * float(trunk.radius.mean())
+    base = max(base, 0.0)
+    return Crown(radius, height, polygons, base, float(leaves.mean()), float(wood.mean()), colour, leaf)

