@@ -22,6 +22,7 @@ from ..buffers import MeshBuffers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.hashing import uniform
+from ..parallel import blocks, on_all_cores
 from ..proxies.facet_sizes import FacetPixels, polygon_facet_sizes
 from ..proxies.facet_weights import facet_weights
 from ..refinement.contents import LARGE
@@ -53,8 +54,10 @@ _TWIGS = 0.15
 _DRAWN, _SOME, _ROUGH = 3000, 300.0, (0.4, 2.5)
 #: Draw of this module: which parts. That of the transition would choose those whose wood is real.
 _SAMPLE = 224
-_STEPS = 12  # of bisection on the logarithm of factors, between 1 and:
+_STEPS = 10  # of bisection on the logarithm of factors, between 1 and:
 _LARGEST = 256.0
+#: Parts that are looked at together; sums of these are summed up in their order.
+_TOGETHER = 50_000
 #: Largest factor on hidden facets that the image alone may ask for.
 _LARGEST_HIDDEN = 96.0
 #: Fraction of what is allowed that finer levels of near leaves may always have, and tolerances that are tried.
@@ -245,7 +248,8 @@ class _Facets:
         self.sizes = sizes_of(flora, self.portions, self.sight.shadows)
         self.faces_coarse = _real_faces(flora, self.portions, Transition(flora, camera, 1.0, np.inf))
         self.tolerance = TOLERANCE
-        self.unseen_sizes = sizes_of(flora, portions.take(np.flatnonzero(~some)), self.sight.shadows)
+        unseen = sizes_of(flora, portions.take(np.flatnonzero(~some)), self.sight.shadows)
+        self.unseen_sizes = [unseen.take(block) for block in blocks(len(unseen), _TOGETHER)]
         self.result, held, hidden = result, result.holdings.polygons, result.chosen(Decision.HIDDEN)
         self.cell = held.cell
         self.hidden = hidden[held.cell] | ~result.in_view[held.cell]
@@ -284,7 +288,8 @@ class _Facets:
 
     def unseen(self, pixels: FacetPixels, safe: bool = False) -> float:
         """Facets of all plants that are not seen; safe as for `seen`."""
-        return float(max(self.found[1], float(safe))) * float(self.unseen_sizes.counts(pixels).sum())
+        found = on_all_cores(lambda sizes: float(sizes.counts(pixels).sum()), self.unseen_sizes)
+        return float(max(self.found[1], float(safe))) * sum(found)
 
     def calibrate(self, pixels: FacetPixels, limit: float) -> None:
         """Draw some of the plants, and expect of all what was found of these."""

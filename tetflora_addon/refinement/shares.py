@@ -28,6 +28,7 @@ from ..growth.foliage import leaf_start
 from ..growth.growth import radius_at, trunks
 from ..growth.hashing import uniform
 from ..growth.seeds import Seeds
+from ..parallel import blocks, each_on_all_cores
 from ..subplants.pieces import Pieces, open_branches
 from ..tetrahedra.tree import TetrahedralTree
 from .contents import Held, Totals, piece_totals, subplant_totals, sums
@@ -44,7 +45,7 @@ _PLACES = np.linspace(0.0, 1.0, 9)
 #: How many times as many points there are where proxies fill their tetrahedra.
 FILLED = 4
 #: Sub-plants that are opened, and points that are lowered, at a time; bounds what that takes to some hundred megabytes.
-OPENED_AT_ONCE, LOWERED_AT_ONCE = 40_000, 1_000_000
+OPENED_AT_ONCE, LOWERED_AT_ONCE = 40_000, 200_000
 #: Draw of this module: where a part's run of samples starts.
 _START = 221
 
@@ -206,13 +207,18 @@ def opened(flora: Flora, parts: PlantParts) -> Iterator[tuple[PlantParts, NDArra
                 yield PlantParts.of_subplants(flora, grown), chosen[body[parent]], None
 
 
-def lowered(tree: TetrahedralTree, points: SharePoints) -> NDArray[np.int32]:
-    """Terminal nodes (m,) that points are in, below those that they are known to be in."""
-    cell, children = points.cell.copy(), tree.children.reshape(-1)
+def lowered(tree: TetrahedralTree, points: SharePoints, some: NDArray[np.intp] | None = None) -> NDArray[np.int32]:
+    """Terminal nodes (m,) that points are in, below those that they are known to be in.
+
+    some: indices (k,) of points, by default all, of which alone they are wanted (k,).
+    """
+    cell, children = points.cell if some is None else points.cell[some], tree.children.reshape(-1)
     every = np.flatnonzero(np.take(children, 2 * cell) >= 0)
-    for start in range(0, len(every), LOWERED_AT_ONCE):
-        moving = every[start : start + LOWERED_AT_ONCE]
-        place = np.take(points.position, moving, axis=0).astype(np.float64)
+    cell = cell.copy()
+
+    def lower(block: slice) -> None:
+        moving = every[block]
+        place = np.take(points.position, moving if some is None else some[moving], axis=0).astype(np.float64)
         while len(moving):
             at = np.take(cell, moving)
             plane = tree.planes(at)
@@ -222,6 +228,8 @@ def lowered(tree: TetrahedralTree, points: SharePoints) -> NDArray[np.int32]:
             left = np.flatnonzero(np.take(children, 2 * at) >= 0)
             if len(left) < len(moving):
                 moving, place = moving[left], np.take(place, left, axis=0)
+
+    each_on_all_cores(lower, blocks(len(every), LOWERED_AT_ONCE))
     return cell
 
 
@@ -289,19 +297,25 @@ class SharedPlants:
         """
         points = self.points
         changed = dividing.copy()
-        inside = np.flatnonzero(dividing[points.cell])
+        inside = np.flatnonzero(np.take(dividing, points.cell))
+        cell = points.cell[inside]
         part = points.part[inside]
-        large = self.parts.extent[part] > LARGE * edge[points.cell[inside]]
+        large = self.parts.extent[part] > LARGE * edge[cell]
         opening = np.zeros(len(self.parts), bool)
         opening[part[large]] = True
         opening &= self.parts.can_open(self.flora)
+        # Handed on in place: millions of points that stay where they are are not looked at.
+        points.cell[inside] = lowered(tree, points, inside)
+        changed[points.cell[inside]] = True
         if opening.any():
-            gone = opening[points.part]
+            gone = np.take(opening, points.part)
             changed[points.cell[gone]] = True
-            self._open(opening, points.take(np.flatnonzero(~gone)))
-        cell = lowered(tree, self.points)
-        changed[cell[cell != self.points.cell]] = True
-        self.points = replace(self.points, cell=cell)
+            stay = np.flatnonzero(~gone)
+            self._open(opening, points.take(stay))
+            new = np.arange(len(stay), len(self.points))
+            cell = lowered(tree, self.points, new)
+            self.points.cell[new] = cell
+            changed[cell] = True
         return changed
 
     def _open(self, opening: NDArray[np.bool_], kept_points: SharePoints) -> None:

@@ -1,0 +1,68 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Work in blocks on several cores: numpy lets go of the interpreter's lock while it computes, so threads suffice.
+
+What a block gives must not depend on other blocks, and blocks must not depend on the number of cores: then neither do
+results, to the bit.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from typing import TypeVar
+
+#: More threads than this gain little, as memory is what they wait for; and each has a block of its own in memory.
+MOST_THREADS = 8
+
+_Item = TypeVar("_Item")
+_Result = TypeVar("_Result")
+_here = threading.local()  # "at_work" in threads of the pool, which must not wait for each other
+
+
+@cache
+def threads() -> int:
+    """Threads that work at the same time: the cores that this process may use, up to `MOST_THREADS`."""
+    allowed = getattr(os, "sched_getaffinity", None)  # not on every system
+    return min(len(allowed(0)) if allowed else os.cpu_count() or 1, MOST_THREADS)
+
+
+def blocks(number: int, size: int) -> list[slice]:
+    """Slices of at most ``size`` rows that make up ``number`` rows."""
+    return [slice(start, min(start + size, number)) for start in range(0, number, size)]
+
+
+def on_all_cores(function: Callable[[_Item], _Result], items: Iterable[_Item]) -> Iterator[_Result]:
+    """Results of a function for items, in their order.
+
+    No more are made ahead than there are threads. An error is raised where its result would come; what is not asked
+    for any more is not begun.
+    """
+    if threads() < 2 or getattr(_here, "at_work", False):
+        yield from map(function, items)
+        return
+    pending = deque()
+    try:
+        for item in items:
+            pending.append(_pool().submit(function, item))
+            if len(pending) >= threads():
+                yield pending.popleft().result()
+        while pending:
+            yield pending.popleft().result()
+    finally:
+        for future in pending:
+            future.cancel()
+
+
+def each_on_all_cores(function: Callable[[_Item], object], items: Iterable[_Item]) -> None:
+    """Call a function with each item, for what it writes."""
+    deque(on_all_cores(function, items), maxlen=0)
+
+
+@cache
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(threads(), "tetflora", lambda: setattr(_here, "at_work", True))
