@@ -1,0 +1,250 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Close-ups of species as an artist would frame them: leaf, twig, bark, foot, and the crown against the sun.
+
+    python -m examples.close_ups                          # docs/images/close_ups.jpg, eight species
+    python -m examples.close_ups --out out/looks oak ash  # one picture for each view of these species
+
+Every plant stands among others of its kind on covered ground, and every picture is refined for its own camera.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Callable
+from math import tau
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Vector
+from numpy.typing import NDArray
+
+from devtools import session
+from devtools.formats import set_format
+
+ROOT = Path(__file__).resolve().parent.parent
+SPECIES = ("oak", "scots_pine", "birch", "willow", "ash", "aspen", "beech", "spruce")
+SIZE, SAMPLES = (480, 360), 48
+#: Sun, degrees: above the horizon, and from north to the east; cameras look north.
+ELEVATION, AZIMUTH = 42.0, 235.0
+#: Other plants around the first one, and the side of the ground, metres.
+_AROUND, _SIDE = 26, 60.0
+#: Direction from leaves to the camera: from the south, where the sun is, a little from above.
+_TOWARDS = np.array([-0.25, -0.94, 0.12]) / np.linalg.norm([0.25, 0.94, 0.12])
+#: Height of the breast, metres, where foresters measure girth.
+_BREAST = 1.3
+
+
+class Subject:
+    """One species, planted in an empty scene; each view moves the camera.
+
+    Parameters
+    ----------
+    identifier : str
+        Of the species.
+    """
+
+    def __init__(self, identifier: str) -> None:
+        from tetflora_addon.compiled.crowns import crown_of
+        from tetflora_addon.species import catalogue
+
+        self.identifier = identifier
+        self.crown = crown_of(catalogue.load_species(identifier))
+        self.positions = self._parts()
+        self.leaf = self._outer_leaf()
+        self._plant()
+
+    def leaf_view(self) -> None:
+        """A leaf that fills a third of the picture."""
+        self._aim(self.leaf, self.leaf + _TOWARDS * max(9.0 * self.crown.leaf, 0.22), 55.0, blur=8.0)
+
+    def twig_view(self) -> None:
+        """A twig with its leaves."""
+        away = float(np.clip(22.0 * self.crown.leaf, 0.7, 1.6))
+        self._aim(self.leaf - 0.1 * away * _TOWARDS, self.leaf + _TOWARDS * away, 50.0, blur=8.0)
+
+    def bark_view(self) -> None:
+        """The trunk at the height of the breast; its bark fills most of the picture."""
+        middle, radius = self._trunk(_BREAST)
+        away = np.array([-0.35, -0.94, 0.0])
+        self._aim(middle, middle + away * (radius + max(3.6 * radius, 0.3)), 60.0)
+
+    def foot_view(self) -> None:
+        """Where the trunk enters the ground."""
+        middle, radius = self._trunk(0.35)
+        away = np.array([-0.6, -0.8, 0.0]) * max(9.0 * radius, 1.3)
+        self._aim(middle, middle + away + [0.0, 0.0, 0.35 + 2.0 * radius], 45.0)
+
+    def crown_view(self) -> None:
+        """The crown against the sun, from below."""
+        angle = np.radians([ELEVATION, AZIMUTH])
+        sun = np.array([np.sin(angle[1]) * np.cos(angle[0]), np.cos(angle[1]) * np.cos(angle[0]), np.sin(angle[0])])
+        target = np.array([0.0, 0.0, 0.5 * (self.crown.base + self.crown.height)])
+        away = (target[2] - 1.6) / sun[2]
+        self._aim(target, target - sun * max(away, 1.0), 30.0)
+
+    @property
+    def views(self) -> dict[str, Callable[[], None]]:
+        """The views by name."""
+        return {name: getattr(self, f"{name}_view") for name in ("leaf", "twig", "bark", "foot", "crown")}
+
+    def _parts(self) -> dict[str, NDArray[np.float64]]:
+        """Vertices (n, 3) of the plant's leaves and wood, as its model has them."""
+        from tetflora_addon.blender.job.plant_mesh import single_seed
+        from tetflora_addon.compiled.flora import compile_species
+        from tetflora_addon.emission.plants import expanded_blocks
+        from tetflora_addon.species import catalogue
+
+        found: dict[str, list[NDArray]] = {"leaf": [np.zeros((0, 3))], "bark": [np.zeros((0, 3))]}
+        flora = compile_species([catalogue.load_species(self.identifier)])
+        for block in expanded_blocks(flora, single_seed(self.identifier, 1)):
+            if block.kind in found:
+                found[block.kind].append(block.buffers.positions.astype(np.float64))
+        return {kind: np.concatenate(parts) for kind, parts in found.items()}
+
+    def _outer_leaf(self) -> NDArray[np.float64]:
+        """Place (3,) of a leaf on the outside of the lower crown, toward the camera."""
+        points = self.positions["leaf"]
+        low = points[points[:, 2] < np.quantile(points[:, 2], 0.35)]
+        return low[(low @ (_TOWARDS * [1.0, 1.0, 0.0])).argmax()]
+
+    def _trunk(self, height: float) -> tuple[NDArray[np.float64], float]:
+        """Middle (3,) and radius of the trunk at a height, metres."""
+        points = self.positions["bark"]
+        near = points[np.abs(points[:, 2] - height) < 0.35]
+        if not len(near):
+            return np.array([0.0, 0.0, height]), 0.1
+        away = np.hypot(near[:, 0], near[:, 1])
+        ring = near[away < 3.0 * np.quantile(away, 0.3) + 0.05]
+        middle = ring.mean(axis=0)
+        return np.array([middle[0], middle[1], height]), float(np.median(np.hypot(*(ring - middle)[:, :2].T)))
+
+    def _plant(self) -> None:
+        from tetflora_addon.blender.placing import first_forest
+        from tetflora_addon.blender.placing.cover import cover_steps
+        from tetflora_addon.blender.worker import at_once
+
+        from .row80 import add_daylight
+
+        scene = bpy.context.scene
+        number = np.arange(_AROUND + 1)
+        step = max(2.4 * self.crown.radius, 1.0)
+        away, turn = step * np.sqrt(number), 2.399963 * number
+        for i, (x, y) in enumerate(zip(away * np.cos(turn), away * np.sin(turn), strict=True)):
+            if i and y < 0.0 and abs(x) < 1.2 * step:
+                continue  # leaves room for the camera and the sun
+            empty = bpy.data.objects.new(f"{self.identifier} {i}", None)
+            empty.location, empty.rotation_euler.z = (x, y, 0.0), (turn[i] % tau) if i else 0.0
+            empty.tetflora.is_plant, empty.tetflora.species, empty.tetflora.seed = True, self.identifier, 1 + i
+            scene.collection.objects.link(empty)
+        bpy.ops.mesh.primitive_grid_add(x_subdivisions=60, y_subdivisions=60, size=_SIDE)
+        ground = bpy.context.object
+        camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+        camera.data.clip_start, camera.data.clip_end = 0.01, 1000.0
+        scene.collection.objects.link(camera)
+        scene.camera = camera
+        add_daylight(scene, elevation=ELEVATION, azimuth=AZIMUTH)
+        scene.world = first_forest.sky("Close-up sky")
+        bpy.context.view_layer.update()
+        steps = cover_steps(scene, bpy.context.evaluated_depsgraph_get(), scene.tetflora.populate, grounds=[ground])
+        at_once(steps)
+
+    def _aim(
+        self, target: NDArray[np.float64], eye: NDArray[np.float64], lens: float, blur: float | None = None
+    ) -> None:
+        """Look from one place to another; ``blur`` is the aperture of a lens that is focused on the target."""
+        camera = bpy.context.scene.camera
+        camera.location = eye
+        camera.rotation_euler = Vector(target - eye).to_track_quat('-Z', 'Y').to_euler()
+        camera.data.lens = lens
+        camera.data.dof.use_dof = blur is not None
+        camera.data.dof.focus_distance = float(np.linalg.norm(np.asarray(target) - eye))
+        if blur is not None:
+            camera.data.dof.aperture_fstop = blur
+        bpy.context.view_layer.update()
+
+
+def render(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES) -> None:
+    """Refine for the camera and render."""
+    from tetflora_addon.blender.job import refine
+
+    scene = bpy.context.scene
+    scene.tetflora.refine_at_render = False
+    refine.refine(scene, bpy.context.evaluated_depsgraph_get())
+    scene.render.engine = 'CYCLES'
+    scene.cycles.samples, scene.cycles.use_denoising = samples, True
+    scene.render.resolution_x, scene.render.resolution_y = size
+    scene.render.resolution_percentage = 100
+    scene.view_settings.exposure = 0.3
+    scene.view_settings.look = 'AgX - Medium High Contrast'
+    set_format(scene.render.image_settings, 'PNG')
+    scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+
+
+def render_views(
+    identifier: str,
+    folder: Path,
+    size: tuple[int, int] = SIZE,
+    samples: int = SAMPLES,
+    only: tuple[str, ...] | None = None,
+) -> list[Path]:
+    """Render a species in all its views; the pictures."""
+    session.clean_file()
+    scene = bpy.context.scene
+    scene.render.resolution_x, scene.render.resolution_y = size
+    scene.render.resolution_percentage = 100
+    made = []
+    for name, aim in Subject(identifier).views.items():
+        if only is None or name in only:
+            aim()
+            made.append(folder / f"{identifier}-{name}.png")
+            render(made[-1], size, samples)
+    return made
+
+
+def render_sheet(path: Path) -> None:
+    """The views of eight species, a row each, as one picture."""
+    from PIL import Image
+
+    from .paper.pictures import save_jpeg
+
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        for identifier in SPECIES:
+            rows.append([Image.open(one).convert("RGB") for one in render_views(identifier, Path(folder))])
+    width, height = rows[0][0].size
+    sheet = Image.new("RGB", (width * len(rows[0]), height * len(rows)))
+    for j, row in enumerate(rows):
+        for i, one in enumerate(row):
+            sheet.paste(one, (i * width, j * height))
+    save_jpeg(sheet, path)
+
+
+def main() -> int:
+    """Render the sheet of the documentation, or single pictures."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("species", nargs="*")
+    parser.add_argument("--out", type=Path, default=ROOT / "out" / "looks")
+    parser.add_argument("--views", nargs="+", help="only these")
+    parser.add_argument("--width", type=int, default=SIZE[0])
+    parser.add_argument("--samples", type=int, default=SAMPLES)
+    arguments = parser.parse_args()
+    session.start()
+    if not arguments.species:
+        render_sheet(ROOT / "docs" / "images" / "close_ups.jpg")
+        return 0
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    size = (arguments.width, round(0.75 * arguments.width))
+    only = tuple(arguments.views) if arguments.views else None
+    for identifier in arguments.species:
+        for path in render_views(identifier, arguments.out, size, arguments.samples, only):
+            print(path)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
