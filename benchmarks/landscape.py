@@ -27,7 +27,7 @@ SHARE = 10
 TARGETS: Targets = {
     "plants": {"min": landscape.PLANTS, "max": landscape.PLANTS},
     "species": {"min": 8},
-    "polygons_full": {"min": 0.9 * 78.2e6, "max": 1.1 * 78.2e6},
+    "polygons_full": {"min": 0.9 * 117e6, "max": 1.1 * 117e6},
     "refine_emit_s": {"max": 15.0},
     "polygons_meshed": {"max": 9.4e6},
     "peak_mb": {"max": 6000.0},

@@ -25,7 +25,7 @@ from ..proxies.facet_sizes import HIDDEN_LEAVES, FacetPixels, FacetSizes, piece_
 from ..proxies.facet_weights import FacetWeights, facet_weights
 from ..proxies.microsurfaces import Facets, concatenate_facets, kept_out_of_view, piece_facets, subplant_facets
 from ..proxies.thrown_shadows import ThrownShadows
-from ..refinement.contents import piece_totals
+from ..refinement.contents import bounding_cylinders, piece_totals
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 from ..subplants.pieces import whole_pieces
@@ -37,6 +37,9 @@ from .portions import MIXED, Portions, Sight, in_chunks
 FACETS_AT_ONCE = 200_000
 #: Pixels, and facets, down to which visible sub-plants are opened for the places of their facets.
 DETAIL, FEW = 4.0, 8.0
+#: Extent over the metres that their shadows fall, from which on sub-plants beside the view are opened: such a shadow
+#: shows trunk and limbs where they are.
+THROWN = 0.25
 #: Minimum fraction of a facet's area that its sphere covers, where the facet is seen from its edge.
 LEAST_COVER = 0.1
 #: Mean of |cos| over all directions.
@@ -169,7 +172,8 @@ class _Maker:
             if transition is not None:
                 real = np.where(portions.real & seen, transition.of_branches(parts.branches, portions.visibility), 0.0)
                 thick = np.where(seen, transition.of_thickness(parts.branches, portions.visibility), 0.0)
-            open_here = parts.can_open(flora) & (mixed | ((detail | (thick > 0)) & (real < 1.0)))
+            thrown = self._throws(portions) & (sizes.counts(self.pixels) > FEW)
+            open_here = parts.can_open(flora) & (mixed | thrown | ((detail | (thick > 0)) & (real < 1.0)))
             bodies.append(portions.take(np.flatnonzero(parts.alone)))
             for group in (seen, ~seen & ~portions.beside, portions.beside & ~seen):
                 some = np.flatnonzero(group & ~open_here & ~parts.alone & (real < 1.0))
@@ -189,6 +193,16 @@ class _Maker:
                 made = self._of_bodies(some)
                 beside = bool(some.beside[0] and some.visibility[0] <= 0)
                 yield self._beside(made, beside), not beside
+
+    def _throws(self, portions: Portions) -> NDArray[np.bool_]:
+        """Portions (n,) beside the view with shadows in it that show trunk and limbs."""
+        parts, sight = portions.parts, self.sight
+        out = portions.beside & (portions.visibility <= 0)
+        some = np.flatnonzero(out)
+        centre, radius, half = bounding_cylinders(sight.flora, parts.branches.take(some))
+        fallen = sight.shadows.distance(centre, sight.camera.clearance(centre), np.hypot(radius, half))
+        out[some] = parts.extent[some] > THROWN * fallen
+        return out
 
     def _beside(self, facets: Facets, beside: bool) -> Facets:
         """Facets beside the view must not reach into the image."""

@@ -43,22 +43,26 @@ class ThrownShadows:
     lights: Sequence[Light] = ()
     floor: float = -np.inf
 
-    def distance(self, points: NDArray[np.float64], clearance: NDArray[np.float64]) -> NDArray[np.float64]:
+    def distance(
+        self, points: NDArray[np.float64], clearance: NDArray[np.float64], reach: NDArray[np.float64] | float = 0.0
+    ) -> NDArray[np.float64]:
         """Metres (n,) that shadows of points (n, 3) fall before they are in view; infinite where they never are.
 
         ``clearance`` (n,) is that of the points from the view, metres; a shadow falls at least so far, and within the
         view it falls no metre. Where no light is known, as under an image of the sky, it is a multiple of that.
+        ``reach`` (n,) is how far what casts the shadow extends around each point.
         """
+        reach = np.broadcast_to(reach, len(points))
         if not any(light.shadow for light in self.lights):
             return _UNKNOWN * np.maximum(clearance, 0.0)
         found = np.where(clearance > 0.0, np.inf, 0.0)
         beside = np.flatnonzero(clearance > 0.0)
         for light in self.lights:
             if len(beside) and light.shadow:
-                found[beside] = np.minimum(found[beside], self._of(light, points[beside]))
+                found[beside] = np.minimum(found[beside], self._of(light, points[beside], reach[beside]))
         return np.maximum(found, np.maximum(clearance, 0.0))
 
-    def _of(self, light: Light, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _of(self, light: Light, points: NDArray[np.float64], reach: NDArray[np.float64]) -> NDArray[np.float64]:
         if light.kind == "SUN":
             ray = np.broadcast_to(light.direction, points.shape)
         else:
@@ -66,13 +70,13 @@ class ThrownShadows:
             ray = ray / np.maximum(np.linalg.norm(ray, axis=1, keepdims=True), 1e-12)
         # Nothing is seen below the floor.
         with np.errstate(divide="ignore", invalid="ignore"):
-            down = np.where(ray[:, 2] < 0.0, (self.floor - points[:, 2]) / ray[:, 2], np.inf)
+            down = np.where(ray[:, 2] < 0.0, (self.floor - points[:, 2] - reach) / ray[:, 2], np.inf)
         longest = np.clip(down, _FIRST, _LONGEST)
         found, before = np.full(len(points), np.inf), np.zeros(len(points))
         for step in range(1, _STEPS + 1):
             fallen = _FIRST * (longest / _FIRST) ** (step / _STEPS)
             # A place stands for the way from the one before.
-            near = self.camera.clearance(points + fallen[:, None] * ray) <= (fallen - before) / 2.0
+            near = self.camera.clearance(points + fallen[:, None] * ray) <= (fallen - before) / 2.0 + reach
             found = np.where(near, np.minimum(found, fallen), found)
             before = fallen
         return found
