@@ -27,13 +27,19 @@ from devtools.formats import set_format
 
 ROOT = Path(__file__).resolve().parent.parent
 SPECIES = ("oak", "scots_pine", "birch", "willow", "ash", "aspen", "beech", "spruce")
-SIZE, SAMPLES = (480, 360), 48
-#: Sun, degrees: above the horizon, and from north to the east; cameras look north.
-ELEVATION, AZIMUTH = 42.0, 235.0
+SIZE, SAMPLES = (320, 240), 16
+#: Where the sun stands, degrees: above the horizon, and from north to the east; cameras look north.
+ELEVATION, AZIMUTH = 42.0, 222.0
 #: Other plants around the first one, and the side of the ground, metres.
-_AROUND, _SIDE = 26, 60.0
-#: Direction from leaves to the camera: from the south, where the sun is, a little from above.
-_TOWARDS = np.array([-0.25, -0.94, 0.12]) / np.linalg.norm([0.25, 0.94, 0.12])
+_AROUND, _SIDE = 14, 50.0
+#: Direction from leaves to the camera: from the south, where the sun is, and from above, as leaves face up.
+_TOWARDS = np.array([-0.25, -0.86, 0.44]) / np.linalg.norm([0.25, 0.86, 0.44])
+#: Pixels to which shadows of hidden crowns are refined where trunks are seen.
+_SHADOWS = 10.0
+#: Mean of a picture that is well exposed, of its display values.
+_GREY = 0.4
+#: Strength of the sky: bright haze, which opens the shade under crowns.
+_SKY = 1.1
 #: Height of the breast, metres, where foresters measure girth.
 _BREAST = 1.3
 
@@ -48,22 +54,29 @@ class Subject:
     """
 
     def __init__(self, identifier: str) -> None:
+        from tetflora_addon.blender.job.plant_mesh import single_seed
         from tetflora_addon.compiled.crowns import crown_of
+        from tetflora_addon.compiled.flora import compile_species
+        from tetflora_addon.growth.axes import axes
+        from tetflora_addon.growth.growth import WholeBranches, trunks
         from tetflora_addon.species import catalogue
 
-        self.identifier = identifier
-        self.crown = crown_of(catalogue.load_species(identifier))
-        self.positions = self._parts()
+        species = catalogue.load_species(identifier)
+        self.identifier, self.crown = identifier, crown_of(species)
+        flora = compile_species([species])
+        stem = trunks(flora.rows, single_seed(identifier, 1))
+        self.stem = WholeBranches(stem, axes(flora.rows, stem)), flora
+        self.size = max(o.leaf_size.mean for o in species.orders if o.leaves.mean > 0)
         self.leaf = self._outer_leaf()
         self._plant()
 
     def leaf_view(self) -> None:
         """A leaf that fills a third of the picture."""
-        self._aim(self.leaf, self.leaf + _TOWARDS * max(9.0 * self.crown.leaf, 0.22), 55.0, blur=8.0)
+        self._aim(self.leaf, self.leaf + _TOWARDS * max(4.6 * self.size, 0.2), 55.0, blur=11.0)
 
     def twig_view(self) -> None:
         """A twig with its leaves."""
-        away = float(np.clip(22.0 * self.crown.leaf, 0.7, 1.6))
+        away = float(np.clip(11.0 * self.size, 0.7, 1.6))
         self._aim(self.leaf - 0.1 * away * _TOWARDS, self.leaf + _TOWARDS * away, 50.0, blur=8.0)
 
     def bark_view(self) -> None:
@@ -91,36 +104,31 @@ class Subject:
         """The views by name."""
         return {name: getattr(self, f"{name}_view") for name in ("leaf", "twig", "bark", "foot", "crown")}
 
-    def _parts(self) -> dict[str, NDArray[np.float64]]:
-        """Vertices (n, 3) of the plant's leaves and wood, as its model has them."""
+    def _leaves(self) -> NDArray[np.float64]:
+        """Vertices (n, 3) of the plant's leaves, as its model has them."""
         from tetflora_addon.blender.job.plant_mesh import single_seed
-        from tetflora_addon.compiled.flora import compile_species
         from tetflora_addon.emission.plants import expanded_blocks
-        from tetflora_addon.species import catalogue
 
-        found: dict[str, list[NDArray]] = {"leaf": [np.zeros((0, 3))], "bark": [np.zeros((0, 3))]}
-        flora = compile_species([catalogue.load_species(self.identifier)])
-        for block in expanded_blocks(flora, single_seed(self.identifier, 1)):
-            if block.kind in found:
-                found[block.kind].append(block.buffers.positions.astype(np.float64))
-        return {kind: np.concatenate(parts) for kind, parts in found.items()}
+        blocks = expanded_blocks(self.stem[1], single_seed(self.identifier, 1))
+        found = [block.buffers.positions for block in blocks if block.kind == "leaf"]
+        return np.concatenate([np.zeros((0, 3)), *found]).astype(np.float64)
 
     def _outer_leaf(self) -> NDArray[np.float64]:
         """Place (3,) of a leaf on the outside of the lower crown, toward the camera."""
-        points = self.positions["leaf"]
+        points = self._leaves()
         low = points[points[:, 2] < np.quantile(points[:, 2], 0.35)]
-        return low[(low @ (_TOWARDS * [1.0, 1.0, 0.0])).argmax()]
+        outer = low[(low @ (_TOWARDS * [1.0, 1.0, 0.0])).argmax()]
+        return low[np.linalg.norm(low - outer, axis=1) < 0.6 * self.size].mean(axis=0)
 
     def _trunk(self, height: float) -> tuple[NDArray[np.float64], float]:
         """Middle (3,) and radius of the trunk at a height, metres."""
-        points = self.positions["bark"]
-        near = points[np.abs(points[:, 2] - height) < 0.35]
-        if not len(near):
-            return np.array([0.0, 0.0, height]), 0.1
-        away = np.hypot(near[:, 0], near[:, 1])
-        ring = near[away < 3.0 * np.quantile(away, 0.3) + 0.05]
-        middle = ring.mean(axis=0)
-        return np.array([middle[0], middle[1], height]), float(np.median(np.hypot(*(ring - middle)[:, :2].T)))
+        from tetflora_addon.growth.growth import radius_at
+
+        whole, flora = self.stem
+        # A twig may leave its place where a bush has no trunk so high.
+        t = np.clip([height / whole.branches.length[0]], 0.0, 1.0)
+        middle, _ = whole.lines.at(np.zeros(1, int), t)
+        return middle[0], float(radius_at(flora.rows, whole.branches, t)[0])
 
     def _plant(self) -> None:
         from tetflora_addon.blender.placing import first_forest
@@ -146,8 +154,10 @@ class Subject:
         camera.data.clip_start, camera.data.clip_end = 0.01, 1000.0
         scene.collection.objects.link(camera)
         scene.camera = camera
-        add_daylight(scene, elevation=ELEVATION, azimuth=AZIMUTH)
+        add_daylight(scene, elevation=ELEVATION, azimuth=AZIMUTH - 180.0)
         scene.world = first_forest.sky("Close-up sky")
+        background = next(n for n in scene.world.node_tree.nodes if n.type == 'BACKGROUND')
+        background.inputs["Strength"].default_value = _SKY
         bpy.context.view_layer.update()
         steps = cover_steps(scene, bpy.context.evaluated_depsgraph_get(), scene.tetflora.populate, grounds=[ground])
         at_once(steps)
@@ -178,11 +188,21 @@ def render(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES) -> 
     scene.cycles.samples, scene.cycles.use_denoising = samples, True
     scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
-    scene.view_settings.exposure = 0.3
-    scene.view_settings.look = 'AgX - Medium High Contrast'
+    scene.view_settings.exposure = 0.55
+    scene.view_settings.look = 'AgX - Base Contrast'
     set_format(scene.render.image_settings, 'PNG')
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
+    scene.view_settings.exposure += _metered(path)
+    bpy.data.images["Render Result"].save_render(str(path), scene=scene)
+
+
+def _metered(path: Path) -> float:
+    """Stops by which a picture is too dark, as a camera meters: views in shade are longer exposed than in the sun."""
+    from PIL import Image
+
+    mean = np.asarray(Image.open(path).convert("L")).mean() / 255.0
+    return float(np.clip(2.0 * np.log2(_GREY / max(mean, 1e-3)), -0.7, 2.0))
 
 
 def render_views(
@@ -201,6 +221,8 @@ def render_views(
     for name, aim in Subject(identifier).views.items():
         if only is None or name in only:
             aim()
+            # Trunks stand in the shade of crowns that the camera does not see.
+            scene.tetflora.shadow_cutoff = _SHADOWS if name in ("bark", "foot") else 0.0
             made.append(folder / f"{identifier}-{name}.png")
             render(made[-1], size, samples)
     return made
@@ -208,19 +230,21 @@ def render_views(
 
 def render_sheet(path: Path) -> None:
     """The views of eight species, a row each, as one picture."""
+    with tempfile.TemporaryDirectory() as folder:
+        store_sheet([render_views(identifier, Path(folder)) for identifier in SPECIES], path)
+
+
+def store_sheet(rows: list[list[Path]], path: Path) -> None:
+    """Store pictures of equal size, row by row, as one."""
     from PIL import Image
 
     from .paper.pictures import save_jpeg
 
-    rows = []
-    with tempfile.TemporaryDirectory() as folder:
-        for identifier in SPECIES:
-            rows.append([Image.open(one).convert("RGB") for one in render_views(identifier, Path(folder))])
-    width, height = rows[0][0].size
+    width, height = Image.open(rows[0][0]).size
     sheet = Image.new("RGB", (width * len(rows[0]), height * len(rows)))
     for j, row in enumerate(rows):
         for i, one in enumerate(row):
-            sheet.paste(one, (i * width, j * height))
+            sheet.paste(Image.open(one).convert("RGB"), (i * width, j * height))
     save_jpeg(sheet, path)
 
 

@@ -67,7 +67,7 @@ def build(scene: bpy.types.Scene, count: int = COUNT, species: str = "broadleaf_
 
 
 def add_daylight(scene: bpy.types.Scene, elevation: float, azimuth: float) -> None:
-    """Sun, and a sky that is blue above and pale at the horizon; angles in degrees, azimuth from north to the east."""
+    """Sun, and a sky that is blue above and pale at the horizon; angles in degrees; light goes to the azimuth."""
     sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", 'SUN'))
     sun.data.energy, sun.data.angle, sun.data.color = 5.0, math.radians(0.6), (1.0, 0.94, 0.85)
     sun.rotation_euler = (math.radians(90 - elevation), 0, math.radians(-azimuth))

@@ -14,12 +14,13 @@ from math import cos, pi, sin, sqrt
 from typing import Any
 
 from .leaf_models import LeafModel
+from .leaf_needles import Needles
 from .leaf_outlines import Blade
 from .leaf_schema import MAX_FORMS
 from .schema import FORMAT
 from .species import LEAF_KINDS, Species
 
-#: Leaves that let less light through than this are needles and scales, whose plants bear cones.
+#: Leaves without outline that let less light through than this are needles and scales, whose plants bear cones.
 NEEDLES = 0.2
 #: Leaves of a patch, and what fraction of its circle they cover, counted singly.
 _LEAVES, _COVERED = (16, 44), 0.62
@@ -49,6 +50,14 @@ _BURIED = 0.12  # meters, of the lower end of a log
 _CONES = 0.45  # of a patch, on average
 
 
+def bears_needles(species: Species) -> bool:
+    """Whether leaves are needles or scales: by their outline, without one by how little light they let through."""
+    outlines = [form.shape for form in species.leaf if isinstance(form, LeafModel) and form.shape is not None]
+    if outlines:
+        return any(isinstance(outline, Needles) for outline in outlines)
+    return species.leaf_transmission < NEEDLES
+
+
 def litter_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | None:
     """The page of a patch of fallen leaves, or of needles, twigs and cones; None of a species without leaves.
 
@@ -62,7 +71,7 @@ def litter_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | N
     if not bearing:
         return None
     size = max(order.leaf_size.mean for order in bearing)
-    needles = species.leaf_transmission < NEEDLES
+    needles = bears_needles(species)
     areas = [form.area for form in species.leaf if isinstance(form, LeafModel)]
     area = size**2 * (sum(areas) / len(areas) if areas else 0.4)
     # Shoots fall apart: on the ground lie single needles, a handful to a leaf of the patch.

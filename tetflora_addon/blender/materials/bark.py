@@ -25,7 +25,7 @@ from .nodes import Graph, shader_group, smooth_step
 PLACE = "TetFlora Bark Place"
 
 # Raise this when nodes of a group change; `bark_version` then makes new materials as well.
-_VERSION = 3
+_VERSION = 4
 
 # A perimeter of this length tilts the Bump node's normal by 45 degrees: the middle of the range that matters, metres.
 _REFERENCE = 0.25
@@ -225,16 +225,16 @@ def _bark(character: str) -> Bark:
 
 
 _CHARACTERS: dict[str, Bark] = {
-    "ridged": Bark(patterns.ridged, 12.0, 8.0, (0.345, 0.313, 0.27), 1.0, 0.26, 0.22, 0.8, 1.0, 0.6),
+    "ridged": Bark(patterns.ridged, 12.0, 8.0, (0.345, 0.313, 0.27), 0.75, 0.26, 0.22, 0.8, 1.0, 0.6),
     "plated": Bark(patterns.plated, 4.4, 2.6, (0.416, 0.279, 0.217), 1.0, 0.18, 0.25, 0.8, 0.3, 0.4),
     "smooth": Bark(patterns.smooth, 6.0, 0.3, (0.537, 0.546, 0.515), 1.0, 0.02, 0.12, 0.4, 0.8, 0.9),
     "banded": Bark(patterns.banded, 7.0, 0.2, (0.636, 0.614, 0.595), 1.0, 0.05, 0.1, 0.3, 0.4, 0.5),
     "ringed": Bark(patterns.ringed, 2.2, 1.2, (0.519, 0.519, 0.519), 0.7, 0.07, 0.2, 0.6, power=0.0),
     "fibrous": Bark(patterns.fibrous, 9.0, 14.0, (0.543, 0.481, 0.429), 1.0, 0.3, 0.16, 0.5, 0.5, 0.3),
     "jointed": Bark(patterns.jointed, 3.0, 8.0, (0.443, 0.443, 0.443), 0.32, 0.03, 0.02, 0.08, power=0.0),
-    "netted": Bark(patterns.netted, 9.0, 5.5, (0.57, 0.512, 0.442), 1.0, 0.26, 0.22, 0.8, 0.7, 0.6),
+    "netted": Bark(patterns.netted, 9.0, 5.5, (0.57, 0.512, 0.442), 0.7, 0.26, 0.22, 0.8, 0.7, 0.6),
     "peeling": Bark(patterns.peeling, 14.0, 0.22, (0.762, 0.752, 0.737), 1.0, 0.1, 0.12, 0.4, 0.4, 0.3),
-    "scaly": Bark(patterns.scaly, 7.0, 1.2, (0.678, 0.603, 0.545), 1.0, 0.18, 0.2, 0.6, 0.4, 0.5),
+    "scaly": Bark(patterns.scaly, 10.0, 1.2, (0.678, 0.603, 0.545), 1.0, 0.18, 0.2, 0.6, 0.4, 0.5),
 }
 
 #: Characters of bark, as species name them.
