@@ -27,7 +27,7 @@ from devtools.formats import set_format
 
 ROOT = Path(__file__).resolve().parent.parent
 SPECIES = ("oak", "scots_pine", "birch", "willow", "ash", "aspen", "beech", "spruce")
-SIZE, SAMPLES = (320, 240), 16
+SIZE, SAMPLES = (400, 300), 24
 #: Where the sun stands, degrees: above the horizon, and from north to the east; cameras look north.
 ELEVATION, AZIMUTH = 42.0, 222.0
 #: Other plants around the first one, and the side of the ground, metres.
@@ -37,9 +37,9 @@ _TOWARDS = np.array([-0.25, -0.86, 0.44]) / np.linalg.norm([0.25, 0.86, 0.44])
 #: Pixels to which shadows of hidden crowns are refined where trunks are seen.
 _SHADOWS = 10.0
 #: Mean of a picture that is well exposed, of its display values.
-_GREY = 0.4
+_GREY = 0.34
 #: Strength of the sky: bright haze, which opens the shade under crowns.
-_SKY = 1.1
+_SKY = 0.9
 #: Height of the breast, metres, where foresters measure girth.
 _BREAST = 1.3
 
@@ -189,7 +189,7 @@ def render(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES) -> 
     scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
     scene.view_settings.exposure = 0.55
-    scene.view_settings.look = 'AgX - Base Contrast'
+    scene.view_settings.look = 'AgX - Medium High Contrast'
     set_format(scene.render.image_settings, 'PNG')
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)

@@ -28,6 +28,7 @@ def store(source: Path, target: Path) -> None:
 def main() -> int:
     """Render all; exit code 1 if an image is larger than the repository wants."""
     session.start()
+    from .close_ups import render_sheet as render_close_ups
     from .demo import run
     from .landscape import render_landscape
     from .million import render_million
@@ -44,6 +45,7 @@ def main() -> int:
         render_million(out / "million.png", memory=6.0)
         store(out / "million.png", IMAGES / "million.jpg")
     render_sheet(IMAGES / "species.jpg")
+    render_close_ups(IMAGES / "close_ups.jpg")
     render_opening(IMAGES / "orders.jpg")
     session.stop()
     large = [p.name for p in IMAGES.iterdir() if p.stat().st_size > LARGEST]
