@@ -135,7 +135,7 @@ class TETFLORA_MT_object(bpy.types.Menu):
             Button(TETFLORA_OT_remove_plants, 'TRASH', "Remove All Plants", {"which": 'ALL'}),
             None,
             Button(TETFLORA_OT_refine, 'MOD_DECIM', "Refine Plants"),
-            Button(TETFLORA_OT_clear, 'TRASH', "Clear Refined Plants"),
+            Button(TETFLORA_OT_clear, 'TRASH', "Clear Results"),
         )
 
 

@@ -141,6 +141,16 @@ def test_new_tools_are_in_menus_so_that_search_finds_them():
     assert all(hasattr(bpy.types, menu) for menu in menus)
 
 
+def test_the_search_for_refine_plants_has_one_answer():
+    """Blender lists what cannot be clicked too: above Refine Plants, Return would do nothing."""
+    path = build.ROOT / "panels" / "menus.py"
+    texts = {n.value for n in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(n, ast.Constant)}
+    found = [text for text in texts if isinstance(text, str) and len(text) < 60]
+    assert [text for text in found if {"refin", "plant"} <= {word[:5] for word in text.lower().split()}] == [
+        "Refine Plants"
+    ]
+
+
 def _texts():
     """All texts that the interface shows, as far as they are registered or written out in panels."""
     found = set()
