@@ -124,7 +124,10 @@ class FacetSizes(Arrays):
         side = fading * pixels.seen * self.extent
         coarse = np.minimum(self.coarse * pixels.seen, max(_JUST_HIDDEN * pixels.seen, _WIDEST)) * self.extent
         blurred = np.minimum(_SOFT * np.maximum(self.clearance, 0.0), np.sqrt(self.totals.optical_area / _FEWEST))
-        unseen = np.maximum(np.maximum(coarse, blurred), np.sqrt(HIDDEN_LEAVES * self.one_leaf))
+        # Near the camera, some leaves together are large in the image, and what is hidden shows between others.
+        several = np.sqrt(HIDDEN_LEAVES * self.one_leaf)
+        leaves = np.where(self.clearance > 0.0, several, np.minimum(several, _BLOT * self.extent))
+        unseen = np.maximum(np.maximum(coarse, blurred), leaves)
         # What is only just hidden shows between crowns after all, and would be blots.
         deep = np.clip((self.coarse - COARSE) / _DEEP, 0.0, 1.0)
         beside = self.clearance > 0.0
@@ -142,7 +145,7 @@ class FacetSizes(Arrays):
         side = np.where(self.hidden, unseen, side)
         # Hidden wood is cut into no more facets than it has faces. Elsewhere it is cut as fine as the side requires, or
         # thin twigs would become blots.
-        least = np.where(beside, self.least_wood, np.minimum(self.least_wood, most))
+        least = np.where(beside, self.least_wood, np.minimum(self.least_wood, np.maximum(most, several)))
         wood = np.where(self.hidden, np.maximum(side, least), wood)
         return np.maximum(side, np.sqrt(self.one_leaf)), wood
 

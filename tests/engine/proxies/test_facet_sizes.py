@@ -105,6 +105,13 @@ def test_no_budget_makes_blots_of_what_is_deeply_hidden() -> None:
         assert (deep >= one).all()
 
 
+@pytest.mark.parametrize("extent", [1e-4, 1e-3])
+def test_what_is_hidden_beside_the_camera_is_no_blot(extent: float) -> None:
+    """A facet stands for several leaves only where these are small in the image."""
+    hidden = sizes(-1.0, COARSE, extent=extent)[0]
+    assert (hidden.sides(PIXELS)[0] <= np.maximum(np.sqrt(hidden.one_leaf), 12.0 * extent) * (1 + 1e-9)).all()
+
+
 @pytest.mark.parametrize("clearance", [3.0, 30.0, 300.0, 1e6])
 def test_shadows_from_beside_the_view_keep_their_area(clearance: float) -> None:
     """However far a plant is, some facets of it are left, and they cover what it covers."""
