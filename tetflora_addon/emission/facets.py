@@ -167,12 +167,13 @@ class _Maker:
             sizes = sizes_of(flora, portions, sight.shadows)
             extent = sight.pixels(portions)
             mixed = seen & portions.mixed & (extent > MIXED)
-            detail = seen & (extent > DETAIL) & (sizes.counts(self.pixels) > FEW)
+            many = sizes.counts(self.pixels) > FEW
+            detail = seen & (extent > DETAIL) & many
             real, thick = np.zeros((2, len(parts)))
             if transition is not None:
                 real = np.where(portions.real & seen, transition.of_branches(parts.branches, portions.visibility), 0.0)
                 thick = np.where(seen, transition.of_thickness(parts.branches, portions.visibility), 0.0)
-            thrown = self._throws(portions) & (sizes.counts(self.pixels) > FEW)
+            thrown = self._throws(portions) & many
             open_here = parts.can_open(flora) & (mixed | thrown | ((detail | (thick > 0)) & (real < 1.0)))
             bodies.append(portions.take(np.flatnonzero(parts.alone)))
             for group in (seen, ~seen & ~portions.beside, portions.beside & ~seen):

@@ -5,7 +5,7 @@
 Blocks are runs of tetrahedra in front-to-back order: each is one region of space, and only one block's buffers are in
 memory at a time. Proxies are in `facets` and `shells`.
 
-A leaf whose width in pixels is below the limit is a facet, one that is wider by `BAND` is real, and in between
+A leaf whose width in pixels is below the limit is a facet, one that is wider by `decisions.BAND` is real; in between
 a fraction of them is real that grows with the width. Real leaves and facets are thinned out by hashes of their own
 keys: what has become real stays real as the camera comes closer, nothing pops, and the area is the same on average.
 Real leaves are single triangles first, and have their faces from a few pixels of width on, one after another; where
@@ -29,6 +29,7 @@ from ..growth.branches import Branches
 from ..growth.growth import WholeBranches, trunks
 from ..growth.hashing import Draw, uniform
 from ..growth.seeds import Seeds
+from ..refinement.decisions import real_fraction
 from ..refinement.loop import Refinement
 from ..species.species import LEAF_KINDS
 from ..subplants.leaf_meshes import leaf_meshes
@@ -38,8 +39,6 @@ from ..subplants.twigs import twig_buffers
 from .leaf_detail import FADING, TOLERANCE, LeafDetail
 from .portions import MIXED, Portions, Sight, in_chunks
 
-#: Width from which on all leaves are real over the width up to which none is.
-BAND = 2.5
 #: Fraction of leaves that counts at least: opening sub-plants for a few real leaves is work as well.
 _LEAST_REAL = 0.1
 #: Width in pixels up to which real leaves are triangles.
@@ -78,9 +77,7 @@ class Transition:
     ) -> NDArray[np.float64]:
         """Real fraction (n,) of things of a width (n,) in metres at places (n, 3): a smooth step in the logarithm."""
         pixels = width / np.maximum(self.camera.extent_around(position), 1e-300) * visibility**FADING
-        place = np.log(np.maximum(pixels, 1e-300) / self.limit) / np.log(BAND)
-        place = np.clip(place, 0.0, 1.0)
-        return place * place * (3.0 - 2.0 * place)
+        return real_fraction(pixels, self.limit)
 
     def of_triangles(self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0) -> NDArray[np.float64]:
         """Fraction (n,) of the real leaves of branches that are single triangles."""

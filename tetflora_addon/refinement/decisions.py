@@ -28,6 +28,17 @@ UNKNOWN = 4.0
 DEEP = 1.5
 #: Side of tetrahedra that facets stand for, over that of those of real leaves.
 FACET_BLOCK = 0.5
+#: Width from which on all leaves are real over the width up to which none is.
+BAND = 2.5
+
+
+def real_fraction(pixels: NDArray[np.float64], limit: float) -> NDArray[np.float64]:
+    """Fraction (n,) of leaves that are real by their width (n,) in pixels: a smooth step in its logarithm.
+
+    It is 0 up to a limit in pixels and 1 from `BAND` times that on (beyond the paper, which switches at once).
+    """
+    place = np.clip(np.log(np.maximum(pixels, 1e-300) / limit) / np.log(BAND), 0.0, 1.0)
+    return place * place * (3.0 - 2.0 * place)
 
 
 class Decision(IntEnum):

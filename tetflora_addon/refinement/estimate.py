@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..camera.camera import Camera
+from .decisions import real_fraction
 from .settings import RefinementSettings
 
 #: Seconds of any refinement, of each plant, and of each polygon or facet.
@@ -30,8 +31,6 @@ SECONDS_PER_PRIMITIVE = 3.3e-6
 FACETS_PER_PIXEL = 1.7
 #: Polygons of a plant whose leaves are all real over all that it has: far leaves are triangles, and some are hidden.
 REAL = 0.2
-#: Width of leaves that are all real over the width in pixels up to which none is, as in `emission.plants`.
-BAND = 2.5
 #: Of what is seen, for plants that are out of view or hidden.
 UNSEEN = 0.5
 #: Bytes of each plant, and of each polygon or facet in Blender and the renderer together.
@@ -131,13 +130,11 @@ def estimate(
 
 def _primitives(stand: Stand, camera: Camera, settings: RefinementSettings) -> float:
     """Polygons and facets that a picture needs without limits."""
-    inside, pixel, across = _seen(stand, camera)
-    place = np.log(np.maximum(stand.leaf / pixel, 1e-300) / settings.leaf_limit) / np.log(BAND)
-    place = np.clip(place, 0.0, 1.0)
-    real = place * place * (3.0 - 2.0 * place)
+    inside, pixel, each = _seen(stand, camera)
+    real = real_fraction(stand.leaf / pixel, settings.leaf_limit)
     dense = FACETS_PER_PIXEL / settings.facet**2
     picture = camera.width * camera.height
-    pixels = (1.0 - real) * np.minimum(inside * np.pi * (across / pixel) ** 2, picture)
+    pixels = (1.0 - real) * each
     covered = -picture * np.expm1(-stand.weight * pixels.sum() / picture)
     facets = min(stand.weight * np.minimum((1.0 - real) * stand.polygons, dense * pixels).sum(), dense * covered)
     made = REAL * stand.weight * (inside * real * stand.polygons).sum()
@@ -146,12 +143,11 @@ def _primitives(stand: Stand, camera: Camera, settings: RefinementSettings) -> f
 
 def covered_pixels(stand: Stand, camera: Camera) -> NDArray[np.float64]:
     """Pixels (k,) of the picture that each known plant covers by itself."""
-    inside, pixel, across = _seen(stand, camera)
-    return np.minimum(inside * np.pi * (across / pixel) ** 2, camera.width * camera.height)
+    return _seen(stand, camera)[2]
 
 
 def _seen(stand: Stand, camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Fraction (k,) of each known plant in the picture, side (k,) of a pixel there, radius (k,) of its disc, metres."""
+    """Fraction (k,) of each known plant in the picture, metres (k,) that a pixel spans there, pixels (k,) it covers."""
     middle = stand.foot + stand.height[:, None] * np.array([0.0, 0.0, 0.5])
     across = np.sqrt(stand.radius * np.maximum(stand.height / 2.0, stand.radius))  # of the disc of equal area
     depth = camera.to_camera_space(middle)[:, 2]
@@ -163,4 +159,4 @@ def _seen(stand: Stand, camera: Camera) -> tuple[NDArray[np.float64], NDArray[np
     if camera.kind != "PANO":
         inside[(depth + across < camera.near) | (depth - across > camera.far)] = 0.0
     pixel = camera.pixel_size * (away if camera.kind == "ORTHO" else np.maximum(away, across))
-    return inside, pixel, across
+    return inside, pixel, np.minimum(inside * np.pi * (across / pixel) ** 2, camera.width * camera.height)

@@ -12,12 +12,12 @@ from tests.engine.emission.test_emission import unweighted, with_decision
 from tests.engine.refinement.test_loop import run
 from tetflora_addon.buffers import concatenate_buffers
 from tetflora_addon.emission.facets import facet_parts
-from tetflora_addon.emission.plants import BAND, FADING, Transition, explicit_blocks
+from tetflora_addon.emission.plants import FADING, Transition, explicit_blocks
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.proxies.facet_sizes import FacetPixels
 from tetflora_addon.proxies.microsurfaces import Facets, concatenate_facets
 from tetflora_addon.refinement import shares
-from tetflora_addon.refinement.decisions import Decision
+from tetflora_addon.refinement.decisions import BAND, Decision
 
 
 def scene(**options):
