@@ -271,7 +271,7 @@ class _Facets:
         """Polygons of near leaves beyond those of their models."""
         branches = self.portions.parts.branches
         fraction = Transition(self.flora, self.camera, limit).of_branches(branches, self.portions.visibility)
-        return float((np.where(self.portions.real, fraction, 0.0) * self.faces_finer).sum())
+        return float((np.where(self.portions.real, fraction, 0.0) * self.portions.within * self.faces_finer).sum())
 
     def seen(self, pixels: float, limit: float, weight: float, safe: bool = False) -> float:
         """Polygons, and facets counted with a weight, of all plants that are seen.
@@ -284,7 +284,7 @@ class _Facets:
         found = np.maximum(self.found, float(safe))
         facets = found[1] * weight * self.sizes.counts(FacetPixels(pixels))
         faces = found[0] * (self.faces_coarse + self.faces_finer)
-        return float((real * faces + (1.0 - real) * facets).sum())
+        return float((self.portions.within * (real * faces + (1.0 - real) * facets)).sum())
 
     def unseen(self, pixels: FacetPixels, safe: bool = False) -> float:
         """Facets of all plants that are not seen; safe as for `seen`."""
@@ -302,8 +302,8 @@ class _Facets:
         sizes, fraction = sizes_of(self.flora, some, self.sight.shadows), np.where(some.real, 1.0, 0.0)
         fraction *= np.where(some.visibility > 0, transition.of_branches(some.parts.branches, some.visibility), 0.0)
         faces = _real_faces(self.flora, some, transition) + transition.detail.more(some.parts, some.visibility)
-        expected = (fraction * faces).sum()
-        left = ((1.0 - fraction) * sizes.counts(pixels)).sum()
+        expected = (some.within * fraction * faces).sum()
+        left = (some.within * (1.0 - fraction) * sizes.counts(pixels)).sum()
         self.found = np.clip((np.array([real, facets]) + _SOME) / (np.array([expected, left]) + _SOME), *_ROUGH)
 
     def polygons(self, pixels: float, limit: float, weight: float, every: bool) -> float:

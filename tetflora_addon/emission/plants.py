@@ -37,7 +37,7 @@ from ..subplants.pieces import chunks, expand
 from ..subplants.tubes import tube_buffers
 from ..subplants.twigs import twig_buffers
 from .leaf_detail import FADING, TOLERANCE, LeafDetail
-from .portions import MIXED, Portions, Sight, in_chunks
+from .portions import MIXED, Portions, Sight, feature_width, in_chunks
 
 #: Fraction of leaves that counts at least: opening sub-plants for a few real leaves is work as well.
 _LEAST_REAL = 0.1
@@ -82,11 +82,11 @@ class Transition:
     def of_triangles(self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0) -> NDArray[np.float64]:
         """Fraction (n,) of the real leaves of branches that are single triangles."""
         small = self.limit / TRIANGLES
-        return 1.0 - self.fraction(self._width(branches) * small, branches.position, visibility)
+        return 1.0 - self.fraction(feature_width(self.flora, branches) * small, branches.position, visibility)
 
     def of_branches(self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0) -> NDArray[np.float64]:
         """Real fraction (n,) of the leaves and the wood of sub-plants; of leafless ones by the base of their branch."""
-        return self.fraction(self._width(branches), branches.position, visibility)
+        return self.fraction(feature_width(self.flora, branches), branches.position, visibility)
 
     def of_thickness(self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0) -> NDArray[np.float64]:
         """Fraction (n,) of branches like these that are tubes."""
@@ -102,14 +102,11 @@ class Transition:
         """Branches (n,) that are tubes, if their leaves may be real, and (n,) that are triangles then."""
         number = uniform(branches.key, Draw.TRANSITION)
         own, leaves = 2.0 * branches.radius, self.of_branches(branches, visibility)
-        among = self.fraction(np.minimum(TWIGS * own, self._width(branches)), branches.position, visibility)
+        among = self.fraction(
+            np.minimum(TWIGS * own, feature_width(self.flora, branches)), branches.position, visibility
+        )
         tubes = number < np.maximum(among, self.of_thickness(branches, visibility))
         return tubes, ~tubes & (number < leaves)
-
-    def _width(self, branches: Branches) -> NDArray[np.float64]:
-        row = branches.row
-        leafy = self.flora.leaf_count[row] > 0
-        return np.where(leafy, self.flora.leaf_width[row] * branches.scale, 2.0 * branches.radius)
 
 
 @dataclass(frozen=True)
@@ -164,7 +161,7 @@ def portion_blocks(
     expected = portions.parts.totals.polygons + detail.more(
         portions.parts, np.where(portions.best > 0, portions.best, 1.0)
     )
-    expected *= np.maximum(_real_leaves(portions, transition), _LEAST_REAL)
+    expected *= portions.within * np.maximum(_real_leaves(portions, transition), _LEAST_REAL)
     done, whole = np.cumsum(expected), max(float(expected.sum()), 1.0)
     for number, run in enumerate(in_chunks(expected, BLOCK_POLYGONS)):
         fraction = float(done[run[-1]]) / whole if len(run) else 1.0

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ..arrays import Arrays, column, nested
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
+from ..growth.branches import Branches
 from ..proxies.facet_sizes import coarseness
 from ..proxies.thrown_shadows import ThrownShadows
 from ..refinement.decisions import Decision
@@ -28,6 +29,10 @@ from ..refinement.shares import PlantParts, SharePoints, lowered, opened, share_
 
 #: Pixels from which on a part that is seen only here and there is opened.
 MIXED = 24.0
+#: Pixels from which on leaves are real although they are hidden, at a limit of a pixel.
+CLOSE = 16.0
+#: How far from its middle a part reaches, over its extent.
+_REACH = 0.6
 #: Points on the leaves of such a part, at most, that tell where it is seen.
 POINTS = 12
 #: Fraction of its area from which on a part counts as seen here and there.
@@ -55,6 +60,8 @@ class Portions(Arrays):
         How much larger its facets are where it is hidden, see `facet_sizes.coarseness`.
     rank : (n,) int32
         Front-to-back order of the tetrahedra that they begin in.
+    within : (n,) float64
+        Fraction of their polygons and facets that are expected within the view; less than 1 only where no point tells.
     """
 
     parts: PlantParts = field(metadata=nested(PlantParts))
@@ -65,6 +72,7 @@ class Portions(Arrays):
     beside: NDArray[np.bool_] = field(metadata=column(dtype=bool))
     coarse: NDArray[np.float64]
     rank: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
+    within: NDArray[np.float64]
 
 
 class Sight:
@@ -92,6 +100,11 @@ class Sight:
         self._explicit = result.chosen(Decision.EXPLICIT)
         self._inside = result.in_view | self._explicit
         self._coarse = coarseness(result)
+        # Hidden, within the view, and near enough at least in places.
+        self._close = np.zeros(size, bool)
+        if facets:
+            self._close[nodes] = (result.decision == Decision.HIDDEN) & (result.cells.feature >= CLOSE)
+            self._close &= result.in_view
         lowest = result.plants.parts.branches.position[:, 2].min(initial=np.inf)
         self.shadows = ThrownShadows(camera, result.lights, float(lowest))
 
@@ -111,23 +124,55 @@ class Sight:
         def mean(values: NDArray) -> NDArray[np.float64]:
             return np.bincount(points.part, area * values, count) / total
 
-        visibility = self._visibility[cell]
+        visibility, explicit = self._visibility[cell], self._explicit[cell]
+        close = self._close_points(parts, points)
+        visibility[close], explicit[close] = CLOSE**-2.0, True
         seen = mean(visibility > 0)
         unseen = np.maximum(1.0 - seen, 1e-12)
         first = np.full(count, -1, np.int64)
         first[points.part[::-1]] = np.arange(len(points))[::-1]
         best = np.zeros(count)
         np.maximum.at(best, points.part, visibility)
-        return Portions(
+        made = Portions(
             parts,
             np.where(seen > SOME, mean(visibility), 0.0),
             np.where(seen > SOME, best, 0.0),
-            mean(self._explicit[cell]) > 0,
+            mean(explicit) > 0,
             (seen > SOME) & (seen < 1.0 - SOME),
             mean(self._inside[cell]) <= 0.0,
             np.where(seen < 1.0, mean(self._coarse[cell] * (visibility <= 0)) / unseen, 1.0),
             np.where(first >= 0, self._rank[cell[first]], 0).astype(np.int32),
+            np.ones(count),
         )
+        self._let_in(made, np.bincount(points.part, minlength=count))
+        return made
+
+    def _close_points(self, parts: PlantParts, points: SharePoints) -> NDArray[np.intp]:
+        """Points of what is hidden and large in the image.
+
+        Visibility is that of an even fog. Between leaves of so many pixels one sees farther than that, and a facet or
+        a sphere as large as a leaf is known for what it is. Leaves take their place, as if just enough of their light
+        arrived that those of `CLOSE` pixels count as wide as a limit of one.
+        """
+        at = np.flatnonzero(self._close[points.cell])
+        width = feature_width(self.flora, parts.branches.take(points.part[at]))
+        return at[width >= CLOSE * self.camera.extent_around(points.position[at].astype(np.float64))]
+
+    def _let_in(self, portions: Portions, points: NDArray[np.int64]) -> None:
+        """Have opened, in place, what is seen at none of its points (n,), reaches into the view and is large there.
+
+        Points are a few places of very many; beside the camera the rest may cross the image.
+        """
+        at = np.flatnonzero(portions.visibility <= 0.0)
+        parts = portions.parts.take(at)
+        some, reach = parts.branches, _REACH * parts.extent
+        middle = some.position + 0.5 * some.length[:, None] * some.frame[:, :, 2]
+        slope = self.camera.pixel_size if self.camera.kind == "PERSP" else 0.0
+        nearest = self.camera.extent_around(middle) - slope * reach
+        at = at[(feature_width(self.flora, some) >= CLOSE * nearest) & (self.camera.clearance(middle) < reach)]
+        portions.visibility[at] = portions.best[at] = CLOSE**-2.0
+        portions.real[at] = portions.mixed[at] = True
+        portions.beside[at], portions.within[at] = False, 1.0 / (1.0 + points[at])
 
     def opened(self, portions: Portions) -> Portions:
         """Open sub-plants (n,); where their visibility differs from place to place, that of the new parts is found."""
@@ -156,7 +201,13 @@ class Sight:
         return self.plants.pixels(portions.parts)
 
 
-_INHERITED = ("visibility", "best", "real", "mixed", "beside", "coarse", "rank")
+def feature_width(flora: Flora, branches: Branches) -> NDArray[np.float64]:
+    """Width (n,) of what sub-plants are known by, metres: that of their leaves, or of their branch without any."""
+    row = branches.row
+    return np.where(flora.leaf_count[row] > 0, flora.leaf_width[row] * branches.scale, 2.0 * branches.radius)
+
+
+_INHERITED = ("visibility", "best", "real", "mixed", "beside", "coarse", "rank", "within")
 
 
 def _rest(points: SharePoints) -> tuple[NDArray, NDArray, NDArray, NDArray]:

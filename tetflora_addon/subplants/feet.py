@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where wood begins: collars of branches, buttresses of trunks, and roots that lead from these into the ground.
+"""Where wood begins: collars, the joints of forks, buttresses of trunks, and roots from these into the ground.
 
 All of it is for near wood only, and grows with its size in the image. Buttresses take as much at some angles as they
 give at others, so that a trunk is as thick on average as from afar.
@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from ..arrays import spread
 from ..compiled.flora import Flora
 from ..growth.branches import Branches
+from ..growth.growth import branch_counts
 from ..growth.hashing import Draw, child_key, uniform
-from ..growth.rows import ranged
+from ..growth.rows import FORK, ranged
 
 #: Buttresses of a trunk, at least and at most.
 LEAST, MOST = 4, 7
@@ -30,8 +31,12 @@ _LEAST_RADIUS = 0.55
 _FALL = 8 * np.log(100.0)  # as of the flare
 #: Child index below which random numbers of roots are drawn.
 _ROOTS = 1 << 28
+#: Fraction of a branch from which on it widens toward a fork.
+_WIDENS = 0.65
 #: Places along a root, and how deep the stump of a trunk is in the ground, in its radii.
 PLACES, SUNK = 14, 0.6
+#: Rings of the ball in which a stem begins beyond a fork, and the angle of the last one below its equator.
+_BALL, _ROUND = 4, np.radians(72.0)
 
 
 def collars(rows: NDArray[np.void], branches: Branches) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -51,6 +56,49 @@ def has_foot(rows: NDArray[np.void], branches: Branches) -> NDArray[np.bool_]:
     """Branches (n,) with buttresses and roots: flared trunks."""
     row = branches.row
     return (rows["order"][row] == 0) & (rows["flare"][row] > 0) & ~rows["continues"][row] & ~rows["phantom"][row]
+
+
+def below_base(rows: NDArray[np.void], branches: Branches) -> NDArray[np.int64]:
+    """Rings (n,) below the base of near branches: of trunks in the ground, of stems beyond a fork within their parent.
+
+    The end of what forks and the base of such a stem are circles around one place, as wide as each other. At an angle
+    they leave a wedge open. A ball around both fills it, of which either has a half.
+    """
+    row = branches.row
+    ball = rows["continues"][row] & ~rows["phantom"][row] & ~rows["drawn"][row]
+    return np.where(has_foot(rows, branches), 1, np.where(ball, _BALL, 0))
+
+
+def beyond_tip(rows: NDArray[np.void], branches: Branches) -> NDArray[np.int64]:
+    """Rings (n,) beyond the end of near branches: the half of a ball where they fork."""
+    return np.where(rows["next"][branches.row, FORK] >= 0, _BALL, 0)
+
+
+def depths(footed: NDArray[np.bool_], number: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """How far rings (n,), numbered from 1, lie beyond an end, and how wide they are, in radii there.
+
+    Those of the ``footed`` are in the ground, others on a ball.
+    """
+    angle = _ROUND * number / _BALL
+    return np.where(footed, SUNK, np.sin(angle)), np.where(footed, 1.0, np.cos(angle))
+
+
+def below_forks(rows: NDArray[np.void], branches: Branches) -> NDArray[np.float64]:
+    """How much wider branches (n,) are where they fork, over their radius there: as wide as the stems beyond begin.
+
+    Stems share the cross-section of what forks, and flare at their base by what the expected number of them takes.
+    Where there are fewer, they would begin wider than what they come from.
+    """
+    beyond = rows["next"][branches.row, FORK]
+    number = np.maximum(branch_counts(rows, branches, FORK), 1)
+    wider = (1.0 + rows["flare"][beyond]) * number ** (-1.0 / np.maximum(rows["fork_power"][branches.row], 1e-9))
+    return np.where(beyond >= 0, wider, 1.0)
+
+
+def widening(wider: NDArray[np.float64], t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Factor (n,) of the radius at fractions t (n,) of branches that are so much wider (n,) at their end."""
+    x = np.clip((t - _WIDENS) / (1.0 - _WIDENS), 0.0, 1.0)
+    return 1.0 + (wider - 1.0) * x * x * (3.0 - 2.0 * x)
 
 
 def root_number(key: NDArray[np.uint64]) -> NDArray[np.int64]:

@@ -15,7 +15,19 @@ from ..compiled.flora import Flora
 from ..growth.axes import Axes
 from ..growth.branches import Branches
 from ..growth.growth import WholeBranches, radius_at
-from .feet import PLACES, SUNK, collars, has_foot, root_number, roots, swelling
+from .feet import (
+    PLACES,
+    below_base,
+    below_forks,
+    beyond_tip,
+    collars,
+    depths,
+    has_foot,
+    root_number,
+    roots,
+    swelling,
+    widening,
+)
 from .wood_detail import Curve, Fineness, Pixels, curve, parts, unit_of
 
 _AT_JOINT = 1e-6  # fractions of a segment closer to a joint than this are at it
@@ -76,7 +88,8 @@ def fine_numbers(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Rings of each branch (n,), and of its roots, of which each has `PLACES`."""
     footed = has_foot(flora.rows, whole.branches)
-    return counts.sum(axis=1) + 1 + footed, np.where(footed, PLACES * root_number(whole.branches.key), 0)
+    rings = counts.sum(axis=1) + 1 + below_base(flora.rows, whole.branches) + beyond_tip(flora.rows, whole.branches)
+    return rings, np.where(footed, PLACES * root_number(whole.branches.key), 0)
 
 
 def fine_counts(flora: Flora, whole: WholeBranches, fine: Fineness, pixels: Pixels) -> NDArray[np.int64]:
@@ -100,14 +113,14 @@ def fine_rings(flora: Flora, whole: WholeBranches, fine: Fineness, counts: NDArr
     rows, branches, segments = flora.rows, whole.branches, whole.lines.segments
     n, most = counts.shape
     own = counts.copy()
-    own[np.arange(n), segments - 1] += 1  # the last ring
-    footed = has_foot(rows, branches)
-    own[:, 0] += footed  # a ring in the ground
+    own[np.arange(n), segments - 1] += 1 + beyond_tip(rows, branches)
+    sunk = below_base(rows, branches)
+    own[:, 0] += sunk
     flat, index = spread(own.ravel())
     owner, segment = flat // most, flat % most
-    index = np.where(segment == 0, index - footed[owner], index)
-    below = index < 0
-    x = np.maximum(index, 0) / counts[owner, segment]
+    index = np.where(segment == 0, index - sunk[owner], index)
+    below, above = index < 0, np.flatnonzero(index > counts[owner, segment])
+    x = np.clip(index, 0, counts[owner, segment]) / counts[owner, segment]
     ahead = segment == 0
     x[ahead] = _stretched(x[ahead], _falls(rows, branches, segments)[owner[ahead]])
     t = (segment + x) / segments[owner]
@@ -116,6 +129,8 @@ def fine_rings(flora: Flora, whole: WholeBranches, fine: Fineness, counts: NDArr
     # As round as it is, the tube has the surface that its species' coarse one has.
     sparse = tube_perimeter(rows["sides"][branches.row]) / tube_perimeter(np.array([sides]))
     radius = radius_at(rows, some, t) * sparse[owner]
+    wider = 1.0 + fine.weight * (below_forks(rows, branches) - 1.0)
+    radius *= widening(wider[owner], t)
     more, length = collars(rows, branches)
     radius += (fine.weight * more * branches.radius)[owner] * np.exp(
         -((t * branches.length[owner] / length[owner]) ** 2)
@@ -123,13 +138,24 @@ def fine_rings(flora: Flora, whole: WholeBranches, fine: Fineness, counts: NDArr
     allowed = np.maximum(flora.widest[branches.row][owner] * branches.radius[owner] - radius, 0.0)
     light = radius.astype(np.float32)
     swollen = swelling(rows, branches, fine.weight, owner, t, radius, sides)
-    t[below] = -(SUNK * fine.weight * branches.radius / branches.length)[owner[below]]
+    base, footed = owner[below], has_foot(rows, branches)
+    deep, narrow = depths(footed[base], -index[below])
+    deep *= fine.weight[base] * np.where(footed[base], branches.radius[base], radius[below])
+    t[below] = -deep / branches.length[base]
+    light[below] *= narrow.astype(np.float32)
     down = (below * t * branches.length[owner])[:, None] * branches.frame[owner, :, 2]
+    last = owner[above]
+    high, narrow = depths(np.zeros(len(above), bool), index[above] - counts[last, segment[above]])
+    high *= fine.weight[last] * radius[above]
+    t[above] += high / branches.length[last]
+    light[above] *= narrow.astype(np.float32)
 
     def placed(lines: Axes) -> tuple[NDArray, NDArray]:
         bent = _curve(flora, replace(whole, lines=lines), fine.weight)
         centre, across = bent.at(owner, segment, x, allowed)
-        return centre + down, light * across.astype(np.float32)
+        centre += down
+        centre[above] += high[:, None] * lines.frames[last, segments[last] - 1, :, 2]
+        return centre, light * across.astype(np.float32)
 
     centre, reach = placed(whole.lines)
     later = None if whole.lines.later is None else placed(whole.lines.later)

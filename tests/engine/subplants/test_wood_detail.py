@@ -170,3 +170,25 @@ def test_the_budget_expects_what_near_wood_has() -> None:
                 coarse = rows["sides"] * (rows["segments"] + rows["rings"])
                 expected = (coarse * finer(flora, some.branches, np.ones(len(some), bool), even(pixel))).sum()
                 assert 0.4 < made / expected < 2.5
+
+
+@pytest.mark.parametrize("forks", [1, 2, 4])
+def test_stems_leave_a_fork_without_a_gap(forks: int) -> None:
+    """From every side the place of a fork is covered, by what forks or by a stem, and both are as wide there."""
+    flora = support.compiled(
+        support.small(
+            order0={"forks": [forks, 0], "fork_at": 0.4, "fork_angle": [40, 5], "branches": [0, 0], "sides": 9}
+        )
+    )
+    stems = grown(flora, seed=4)
+    trunk = next(some for some in stems if not flora.rows["continues"][some.branches.row].any())
+    place, radius = trunk.lines.at(np.zeros(1, int), np.ones(1))[0][0], float(trunk.branches.radius[0])
+    near = tube_buffers(flora, stems, even(0.0004))
+    beyond = near.positions - place.astype(np.float32)
+    away = np.linalg.norm(beyond, axis=1)
+    directions = np.random.default_rng(1).normal(size=(400, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    # The ball around the place of the fork is wood: no direction is farther from a vertex of it than a few degrees.
+    ball = beyond[(away > 0.4 * radius) & (away < 1.5 * radius)]
+    ball /= np.linalg.norm(ball, axis=1)[:, None]
+    assert np.degrees(np.arccos(np.clip((directions @ ball.T).max(axis=1), -1.0, 1.0))).max() < 30.0
