@@ -32,7 +32,7 @@ _BENT = (
     {"fold": -0.25, "curl": 0.25, "wave": 0.03},
 )
 #: Linear RGB of dead leaves and needles, of wood without bark, and of cones: mean and variation.
-_BROWN = ((0.175, 0.092, 0.036), (0.115, 0.064, 0.024))
+_BROWN = ((0.16, 0.1, 0.05), (0.1, 0.062, 0.031))
 _NEEDLE_BROWN = ((0.135, 0.068, 0.031), (0.06, 0.032, 0.014))
 _TWIG = [[0.075, 0.052, 0.034], [0.02, 0.014, 0.01]]
 _CONE = [[0.075, 0.043, 0.023], [0.02, 0.012, 0.007]]

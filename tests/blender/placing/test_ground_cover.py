@@ -240,6 +240,29 @@ def test_soil_is_browner_under_trees_and_greener_in_the_light():
     assert [s.default_value for s in nodes["Soil Size"].inputs][:2] == pytest.approx([30.0, 30.0])
 
 
+def _green(ground):
+    """Mean fraction of a ground that its soil shows as green."""
+    image = next(n.image for n in ground.material_slots[0].material.node_tree.nodes if n.type == 'TEX_IMAGE')
+    pixels = np.zeros(4 * image.size[0] * image.size[1], np.float32)
+    image.pixels.foreach_get(pixels)
+    return pixels[3::4].mean()
+
+
+def test_soil_of_large_ground_is_as_green_as_if_all_were_planted(monkeypatch):
+    """What a limit leaves out is missing far away; there the ground shows its color."""
+    ground = _wood(size=15.0)
+    _cover()
+    whole = _green(ground)
+    populations.remove_population(bpy.context.scene, list(_group().populations).index(_covers()[0]))
+    monkeypatch.setattr("tetflora_addon.blender.placing.cover.MOST", 400)
+    cover = _cover()
+    assert cover.made <= 400
+    assert _green(ground) == pytest.approx(whole, abs=0.02)
+    cover.density /= 4.0  # less by the artist's own wish is less green
+    _cover()
+    assert _green(ground) < whole - 0.03
+
+
 def test_a_material_of_the_artist_stays_and_soil_is_there_for_use():
     ground = _wood()
     own = bpy.data.materials.new("mine")

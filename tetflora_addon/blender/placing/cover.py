@@ -151,7 +151,7 @@ def cover_steps(
         if number is not None:
             remove_population(scene, number)
         raise
-    bare = _lay_soil(scene, found, grounds, floor, above) if soil else []
+    bare = _lay_soil(scene, found, grounds, floor, above, ground.map_area) if soil else []
     return Covered(made, bare)
 
 
@@ -231,7 +231,12 @@ def _mix(cover: bpy.types.PropertyGroup, parts: list[_Part], area: float) -> Non
     if before and cover.density:
         cover.density *= whole / before
     else:
-        cover.density = whole * HECTARE * min(1.0, MOST / max(whole * area, 1e-9))
+        cover.density = whole * HECTARE * _affordable(whole, area)
+
+
+def _affordable(density: float, area: float) -> float:
+    """Fraction of so many plants on each of so many square meters that are planted."""
+    return min(1.0, MOST / max(density * area, 1e-9))
 
 
 def _lay_soil(
@@ -240,11 +245,12 @@ def _lay_soil(
     grounds: list[bpy.types.Object],
     floor: Floor,
     above: tuple[str, ...],
+    area: float,
 ) -> list[str]:
     """Give the ground a soil in the colors of its cover; names of the grounds that keep a material of the artist's."""
     fits = [obj for obj in grounds if _may_have_soil(obj)]
     before = next((slot.material for obj in fits for slot in obj.material_slots if is_soil(slot.material)), None)
-    lying, growing = _strata(scene, cover, floor, above)
+    lying, growing = _strata(scene, cover, floor, above, area)
     sheet = floor.sheet
     shape, cells = (sheet.rows, sheet.columns), len(floor.light)
     green = covered(growing, cells)
@@ -280,11 +286,12 @@ def _may_have_soil(obj: bpy.types.Object) -> bool:
 
 
 def _strata(
-    scene: bpy.types.Scene, cover: bpy.types.PropertyGroup, floor: Floor, above: tuple[str, ...]
+    scene: bpy.types.Scene, cover: bpy.types.PropertyGroup, floor: Floor, above: tuple[str, ...], area: float
 ) -> tuple[list[Stratum], list[Stratum]]:
-    """What lies on the ground, and what grows on it."""
+    """What lies on the ground, and what grows on it: in numbers as if large ground had room for all that it should."""
     weights = sum(entry.weight for entry in cover.mix) or 1.0
     thin = cover.density / HECTARE / weights
+    thin = max(thin, min(thin / _affordable(weights, area), 1.0))
     lying: list[Stratum] = []
     growing: list[Stratum] = []
     for entry in cover.mix:

@@ -1,0 +1,195 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A mixed wood at the edge of a meadow, on covered ground: from 400 m to one leaf of an oak, and from its inside.
+
+    python -m examples.wood            # docs/images/dolly.jpg and interior.jpg
+    python -m examples.wood --out out/wood --pictures interior --width 640
+
+Every picture is refined for its own camera, from one and the same scene.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Vector
+from numpy.typing import NDArray
+from PIL import Image
+
+from devtools import session
+
+from .close_ups import render, store_sheet
+
+ROOT = Path(__file__).resolve().parent.parent
+#: Distances of the eight pictures from the leaf, metres.
+DISTANCES = tuple(np.geomspace(400.0, 0.15, 8).tolist())
+#: Relative numbers of the species, and how far from each other they stand at least (m), and how many on a hectare.
+TREES = {"beech": 0.3, "oak": 0.2, "birch": 0.2, "hornbeam": 0.12, "spruce": 0.1, "rowan": 0.08}
+_APART, _DENSITY = 4.0, 420.0
+#: Side of the land, and of the part around the oak and the eye of which every blade is planted, metres.
+LAND, NEAR = 800.0, 150.0
+#: Where the camera stands in the wood, and where it looks.
+_EYE, _AHEAD = (24.0, 22.0, 1.65), (38.0, 52.0, 3.6)
+#: Direction from the leaf to the camera.
+_TOWARDS = np.array([0.16, -0.98, 0.12]) / np.linalg.norm([0.16, 0.98, 0.12])
+_ELEVATION, _AZIMUTH = 38.0, 236.0
+_MASK = "wood"
+
+
+def height(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Of the land, metres: a meadow that waves a little, and a hill behind the wood."""
+    waves = 0.9 * np.sin(0.021 * x + 0.4) * np.cos(0.027 * y + 0.3) + 0.16 * np.sin(0.11 * x - 0.09 * y)
+    hill = 46.0 * np.clip((y - 40.0) / 340.0, 0.0, 1.0) ** 1.5 * (1.0 + 0.3 * np.sin(0.012 * x + 1.2))
+    return waves * np.clip(np.hypot(x, y) / 30.0, 0.15, 1.0) + hill
+
+
+def wooded(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Where the wood is, 0 to 1: its edge waves behind the oak."""
+    edge = 13.0 + 7.0 * np.sin(0.043 * x + 0.8) + 3.0 * np.sin(0.13 * x)
+    return np.clip((y - edge) / 5.0, 0.0, 1.0)
+
+
+def build(scene: bpy.types.Scene) -> None:
+    """Fill an empty scene with land, wood, meadow, an oak of its own at the origin, sun and sky."""
+    from tetflora_addon.blender.placing import first_forest
+
+    from .row80 import add_daylight
+
+    oak = bpy.data.objects.new("The oak", None)
+    oak.location = (0.0, 0.0, float(height(np.zeros(1), np.zeros(1))[0]))
+    oak.tetflora.is_plant, oak.tetflora.species, oak.tetflora.seed = True, "oak", 1
+    scene.collection.objects.link(oak)
+    for name, side, step, hole in (("Near", NEAR, 2.5, 0.0), ("Far", LAND, 5.0, NEAR)):
+        ground = _ground(name, side, step, hole)
+        scene.collection.objects.link(ground)
+        _plant(scene, ground)
+    add_daylight(scene, elevation=_ELEVATION, azimuth=_AZIMUTH - 180.0)
+    scene.world = first_forest.sky("Sky over the wood")
+    background = next(node for node in scene.world.node_tree.nodes if node.type == 'BACKGROUND')
+    background.inputs["Strength"].default_value = 0.9
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.clip_start, camera.data.clip_end = 0.01, 2000.0
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    scene.view_settings.look = 'AgX - Medium High Contrast'
+    scene.tetflora.refine_at_render = False
+
+
+def _ground(name: str, side: float, step: float, hole: float) -> bpy.types.Object:
+    """A grid of a side in metres, without a hole in its middle; where the wood is becomes an attribute."""
+    from tetflora_addon.blender.attributes import write
+
+    number = round(side / step) + 1
+    along = np.linspace(-side / 2, side / 2, number)
+    x, y = (values.reshape(-1) for values in np.meshgrid(along, along))
+    first = (np.arange(number - 1)[:, None] * number + np.arange(number - 1)).reshape(-1)
+    faces = np.stack([first, first + 1, first + number + 1, first + number], axis=1)
+    middle = np.maximum(np.abs(x[faces].mean(axis=1)), np.abs(y[faces].mean(axis=1)))
+    mesh = bpy.data.meshes.new(name)
+    points = np.stack([x, y, height(x, y)], axis=1)
+    mesh.from_pydata(points.tolist(), [], faces[middle > hole / 2].tolist(), shade_flat=False)
+    write(mesh, _MASK, wooded(x, y).astype(np.float32))
+    return bpy.data.objects.new(name, mesh)
+
+
+def _plant(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
+    """Plant the wood on a ground, and cover all of it."""
+    from tetflora_addon.blender.placing import cover, populations
+    from tetflora_addon.blender.worker import at_once
+
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    wood = populations.add_population(scene, [ground], name=f"{ground.name} wood")
+    for species, weight in TREES.items():
+        entry = wood.mix.add()
+        entry.species, entry.weight = species, weight
+    wood.vertex_group, wood.min_distance = _MASK, _APART
+    wood.by_density, wood.density = True, _DENSITY
+    wood.scale_min, wood.scale_max, wood.seed = 0.6, 1.15, 3
+    populations.make_plants(scene, depsgraph, wood)
+    bpy.context.view_layer.update()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    at_once(cover.cover_steps(scene, depsgraph, wood, masks={"vertex_group": ""}))
+
+
+def aim(scene: bpy.types.Scene, target: Vector, eye: Vector, lens: float) -> None:
+    """Look from one place to another."""
+    camera = scene.camera
+    camera.location, camera.data.lens = eye, lens
+    camera.rotation_euler = (target - eye).to_track_quat('-Z', 'Y').to_euler()
+    bpy.context.view_layer.update()
+
+
+def leaf_of_the_oak(scene: bpy.types.Scene) -> Vector:
+    """Place of a leaf of the oak that stands out toward the camera."""
+    from tetflora_addon.blender.job.plant_mesh import single_seed
+    from tetflora_addon.compiled.flora import compile_species
+    from tetflora_addon.emission.plants import expanded_blocks
+    from tetflora_addon.species import catalogue
+
+    flora = compile_species([catalogue.load_species("oak")])
+    blocks = expanded_blocks(flora, single_seed("oak", 1))
+    points = np.concatenate([block.buffers.positions for block in blocks if block.kind == "leaf"]).astype(np.float64)
+    low = points[points[:, 2] < np.quantile(points[:, 2], 0.3)]
+    outer = low[(low @ (_TOWARDS * [1.0, 1.0, 0.0])).argmax()]
+    return Vector(low[np.linalg.norm(low - outer, axis=1) < 0.05].mean(axis=0)) + scene.objects["The oak"].location
+
+
+def render_dolly(path: Path, size: tuple[int, int] = (480, 270), samples: int = 32) -> None:
+    """Eight pictures from 400 m to the leaf, as a sheet of two rows."""
+    scene = bpy.context.scene
+    leaf = leaf_of_the_oak(scene)
+    with tempfile.TemporaryDirectory() as folder:
+        made = []
+        for number, distance in enumerate(DISTANCES):
+            # A lens that shows the whole oak at 16 m, and a leaf at a hand's width.
+            aim(scene, leaf, leaf + Vector(_TOWARDS * distance), 40.0)
+            made.append(Path(folder) / f"{number}.png")
+            render(made[-1], size, samples)
+        store_sheet([made[:4], made[4:]], path)
+
+
+def render_interior(path: Path, size: tuple[int, int] = (1280, 720), samples: int = 64) -> None:
+    """The wood at the height of the eye."""
+    from .paper.pictures import save_jpeg
+
+    scene = bpy.context.scene
+    eye, ahead = (
+        Vector(p) + Vector((0.0, 0.0, float(height(np.float64(p[0]), np.float64(p[1]))))) for p in (_EYE, _AHEAD)
+    )
+    aim(scene, ahead, eye, 28.0)
+    with tempfile.TemporaryDirectory() as folder:
+        render(Path(folder) / "interior.png", size, samples)
+        save_jpeg(Image.open(Path(folder) / "interior.png").convert("RGB"), path)
+
+
+def main() -> int:
+    """Render the pictures of the documentation, or smaller ones."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=ROOT / "docs" / "images")
+    parser.add_argument("--pictures", nargs="+", choices=sorted(PICTURES), default=sorted(PICTURES))
+    parser.add_argument("--width", type=int, help="of each picture, pixels")
+    parser.add_argument("--samples", type=int)
+    arguments = parser.parse_args()
+    session.start()
+    session.clean_file()
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    build(bpy.context.scene)
+    given = {}
+    if arguments.width:
+        given["size"] = arguments.width, round(arguments.width * 9 / 16)
+    if arguments.samples:
+        given["samples"] = arguments.samples
+    for name in arguments.pictures:
+        PICTURES[name](arguments.out / f"{name}.jpg", **given)
+    return 0
+
+
+PICTURES = {"dolly": render_dolly, "interior": render_interior}
+
+if __name__ == "__main__":
+    sys.exit(main())
