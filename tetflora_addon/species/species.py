@@ -21,6 +21,7 @@ from .skeletons import Skeleton
 LEAF_KINDS = ("leaf", "blossom")
 BARKS = (
     "ridged", "plated", "smooth", "banded", "ringed", "fibrous", "jointed", "netted", "peeling", "scaly",
+    "interlaced", "pitted", "papery",
 )  # fmt: skip
 """Characters of bark that materials know."""
 

@@ -10,11 +10,14 @@ from devtools import session
 from tests.blender.renders import picture, small_scene
 from tetflora_addon import buffers, errors
 from tetflora_addon.blender import compat
-from tetflora_addon.blender.materials import bark, materials, microsphere, nodes, shell
+from tetflora_addon.blender.materials import bark, bark_tools, materials, microsphere, nodes, shell
 from tetflora_addon.blender.results import meshes
 from tetflora_addon.species import species
 
 pytestmark = pytest.mark.usefixtures("clean_file")
+
+#: How light linear red, green and blue are.
+LIGHT = np.array([0.2126, 0.7152, 0.0722])
 
 
 def tube(radius, colour, material, turns=0, start=2):
@@ -130,10 +133,13 @@ def test_needles_have_no_veins():
     ("character", "engine"), [*((character, "CYCLES") for character in species.BARKS), ("ridged", "EEVEE")]
 )
 def test_bark_keeps_the_mean_colour(character, engine):
-    """Proxies have the flat colour; 4 % is what eyes pass over."""
-    colour = (0.2, 0.15, 0.1)  # as light as bark is
+    """Proxies have the flat colour; 4 % is what eyes pass over. High up a pine is orange, but as light."""
+    colour = np.array((0.2, 0.15, 0.1))  # as light as bark is
     seen = bark_seen(character, 0.05 if character == "jointed" else 0.4, engine, colour=colour)
-    np.testing.assert_allclose(seen.mean(axis=(0, 1)), colour, rtol=0.04)
+    if character == "papery":
+        np.testing.assert_allclose(seen.mean(axis=(0, 1)) @ LIGHT, colour @ LIGHT, rtol=0.04)
+    else:
+        np.testing.assert_allclose(seen.mean(axis=(0, 1)), colour, rtol=0.04)
     assert seen.std(axis=(0, 1))[0] > 0.005, "no pattern"
 
 
@@ -155,13 +161,42 @@ def flat_bark(character, **inputs):
 def test_mean_albedo_of_bark_is_the_colour_of_its_proxies(character, radius):
     """Moss too is as light as what it covers: within .01, at the foot, but for black ones of birches, and above it."""
     wanted = np.array([0.3, 0.24, 0.18])
-    light = np.array([0.2126, 0.7152, 0.0722])
-    for start in (2,) if character == "peeling" else (-1, 2):
+    for start in (2,) if character in ("peeling", "pitted") else (-1, 2):
         seen = bark_seen(character, radius, colour=wanted, start=start, material=lambda: flat_bark(character))
         mean = seen.mean(axis=(0, 1))
-        assert mean @ light == pytest.approx(wanted @ light, abs=0.01)
-        if start > 0:
+        assert mean @ LIGHT == pytest.approx(wanted @ LIGHT, abs=0.01)
+        if start > 0 and character != "papery":
             np.testing.assert_allclose(mean, wanted, atol=0.01)
+
+
+def test_papery_bark_is_orange_high_up_and_on_limbs_as_their_colour_says():
+    def red(radius, start):
+        seen = bark_seen("papery", radius, start=start, material=lambda: flat_bark("papery")).mean(axis=(0, 1))
+        return seen[0] / seen[1]
+
+    assert red(0.4, 5) > 1.3 * red(0.4, -4)
+    assert red(0.05, -4) == pytest.approx(4 / 3, rel=0.03)
+
+
+def knots():
+    """A material that shines with 1 in the eyes of large knots, with .25 where ridges give way to them."""
+
+    def build(graph, _material):
+        place = graph.node("ShaderNodeGroup", node_tree=bark.place_group()).outputs["Place"]
+        where = bark_tools.Place(place, None, None, None, None, None, None)
+        eye = bark_tools.knot(graph, where, 0.8, (0.5, 0.5, 0.5))
+        moved = graph.vector('LENGTH', bark_tools.aside(graph, eye, 1.0))
+        seen = graph.math('ADD', bark_tools.lips(graph, eye)[1], graph.math('MULTIPLY', moved, 0.25))
+        graph.node("ShaderNodeOutputMaterial", {"Surface": graph.node("ShaderNodeEmission", {"Color": seen})})
+
+    return nodes.surface_material("knots", 1, build)
+
+
+def test_knots_are_sparse_and_ridges_give_way_around_them():
+    seen = np.stack([bark_seen("ridged", 0.4, colour=(c, 0.3, 0.2), material=knots)[..., 0] for c in (0.1, 0.2, 0.3)])
+    eyes, around = seen > 0.6, (seen > 0.05) & (seen < 0.6)
+    assert 0.002 < eyes.mean() < 0.1
+    assert 2 * eyes.mean() < around.mean() < 0.9
 
 
 def test_moss_grows_low_on_thick_wood_and_not_on_thin():

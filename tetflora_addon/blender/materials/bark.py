@@ -19,13 +19,14 @@ import bpy
 
 from ...errors import SpeciesError
 from . import bark_patterns as patterns
-from .bark_patterns import Place, Socket
+from . import bark_skins as skins
+from .bark_tools import Place, Socket
 from .nodes import Graph, shader_group, smooth_step
 
 PLACE = "TetFlora Bark Place"
 
 # Raise this when nodes of a group change; `bark_version` then makes new materials as well.
-_VERSION = 4
+_VERSION = 5
 
 # A perimeter of this length tilts the Bump node's normal by 45 degrees: the middle of the range that matters, metres.
 _REFERENCE = 0.25
@@ -43,8 +44,10 @@ _MOSSY, _MOSS_GIRTH = 3.0, (0.3, 0.9)
 _PATCHES = 5.0
 # Where light and rain come from: moss faces north and up.
 _SHADY = (0.0, 0.76, 0.65)
-# Colours of moss and lichen over the lightness of the bark under them.
-_MOSS, _LICHEN = (0.95, 1.07, 0.42), (1.15, 1.2, 1.0)
+# Up to this height rain splashes from the ground, metres.
+_SPLASH = 0.7
+# Colours of moss, algae and lichen over the lightness of the bark under them.
+_MOSS, _ALGAE, _LICHEN = (0.95, 1.07, 0.3), (0.93, 1.05, 0.62), (1.15, 1.2, 1.0)
 
 
 @dataclass(frozen=True)
@@ -160,7 +163,7 @@ def bark_group(character: str) -> bpy.types.NodeTree:
         along = graph.math('DIVIDE', scale, given["Stretch"])
         by = graph.node("ShaderNodeCombineXYZ", {"X": scale, "Y": scale, "Z": along})
         cells = graph.vector('MULTIPLY', where["Place"], by)
-        place = Place(where["Place"], cells, where["Turn"], where["Along"], scale, given["Stretch"])
+        place = Place(where["Place"], cells, where["Turn"], where["Along"], scale, given["Stretch"], girth)
         tone, height = bark.pattern(graph, place)
         age = smooth_step(graph, where["Perimeter"], given["Smooth Under"], given["Full Over"])
         around_one = graph.vector('SUBTRACT', graph.vector('DIVIDE', tone, bark.mean), (1.0, 1.0, 1.0))
@@ -198,16 +201,21 @@ def _overgrown(graph: Graph, given: Any, at: tuple[Place, Socket, Socket], colou
     noise = graph.noise(metres, 4.0, 0.65)[0]
     normal = graph.node("ShaderNodeNewGeometry").outputs["Normal"]
     damp = smooth_step(graph, graph.vector('DOT_PRODUCT', normal, _SHADY), -0.3, 0.9)
-    low = smooth_step(graph, graph.math('MULTIPLY', place.along, radii), _MOSSY, 0.0)
+    height = graph.math('MULTIPLY', place.along, radii)
+    low = smooth_step(graph, height, _MOSSY, 0.0)
     # What does not say how thick it is may be no wood.
     thick = smooth_step(graph, graph.attribute("tf_girth", "Fac"), *_MOSS_GIRTH)
-    damp = graph.math('MULTIPLY', graph.math('MULTIPLY', damp, low), thick)
+    # The foot is damp all around.
+    damp = graph.math('MULTIPLY_ADD', smooth_step(graph, height, _SPLASH, 0.0), 0.6, graph.math('MULTIPLY', damp, low))
+    damp = graph.math('MULTIPLY', damp, thick)
     # Moss settles in what lies deep first.
     there = graph.math('MULTIPLY_ADD', graph.math('MULTIPLY', damp, given["Moss"]), 0.45, noise)
     moss = graph.math('MULTIPLY', smooth_step(graph, there, 0.72, 0.92), age)
+    algae = graph.math('MULTIPLY', smooth_step(graph, damp, 0.0, 0.8), graph.math('MULTIPLY', given["Moss"], age))
+    algae = graph.math('MULTIPLY', smooth_step(graph, there, 0.45, 0.85), graph.math('MULTIPLY', algae, 0.6))
     lichen = graph.math('MULTIPLY', smooth_step(graph, noise, 0.37, 0.34), graph.math('MULTIPLY', given["Lichen"], age))
     light = graph.node("ShaderNodeRGBToBW", {"Color": colour}).outputs[0]
-    for tint, amount in ((_LICHEN, lichen), (_MOSS, moss)):
+    for tint, amount in ((_LICHEN, lichen), (_ALGAE, algae), (_MOSS, moss)):
         colour = graph.mixed(amount, colour, graph.vector('SCALE', tint, light))
     return colour
 
@@ -225,16 +233,19 @@ def _bark(character: str) -> Bark:
 
 
 _CHARACTERS: dict[str, Bark] = {
-    "ridged": Bark(patterns.ridged, 12.0, 8.0, (0.345, 0.313, 0.27), 0.75, 0.26, 0.22, 0.8, 1.0, 0.6),
-    "plated": Bark(patterns.plated, 4.4, 2.6, (0.416, 0.279, 0.217), 1.0, 0.18, 0.25, 0.8, 0.3, 0.4),
-    "smooth": Bark(patterns.smooth, 6.0, 0.3, (0.537, 0.546, 0.515), 1.0, 0.02, 0.12, 0.4, 0.8, 0.9),
-    "banded": Bark(patterns.banded, 7.0, 0.2, (0.636, 0.614, 0.595), 1.0, 0.05, 0.1, 0.3, 0.4, 0.5),
-    "ringed": Bark(patterns.ringed, 2.2, 1.2, (0.519, 0.519, 0.519), 0.7, 0.07, 0.2, 0.6, power=0.0),
+    "ridged": Bark(patterns.ridged, 11.0, 6.0, (0.427, 0.388, 0.326), 0.75, 0.26, 0.22, 0.8, 1.0, 0.6),
+    "plated": Bark(patterns.plated, 6.0, 2.8, (0.33, 0.245, 0.203), 1.0, 0.18, 0.25, 0.8, 0.3, 0.4),
+    "smooth": Bark(skins.smooth, 6.0, 0.3, (0.445, 0.449, 0.422), 1.0, 0.02, 0.12, 0.4, 0.8, 0.9),
+    "banded": Bark(skins.banded, 7.0, 0.2, (0.636, 0.614, 0.595), 1.0, 0.05, 0.1, 0.3, 0.4, 0.5),
+    "ringed": Bark(skins.ringed, 2.2, 1.2, (0.519, 0.519, 0.519), 0.7, 0.07, 0.2, 0.6, power=0.0),
     "fibrous": Bark(patterns.fibrous, 9.0, 14.0, (0.543, 0.481, 0.429), 1.0, 0.3, 0.16, 0.5, 0.5, 0.3),
-    "jointed": Bark(patterns.jointed, 3.0, 8.0, (0.443, 0.443, 0.443), 0.32, 0.03, 0.02, 0.08, power=0.0),
-    "netted": Bark(patterns.netted, 9.0, 5.5, (0.57, 0.512, 0.442), 0.7, 0.26, 0.22, 0.8, 0.7, 0.6),
-    "peeling": Bark(patterns.peeling, 14.0, 0.22, (0.762, 0.752, 0.737), 1.0, 0.1, 0.12, 0.4, 0.4, 0.3),
-    "scaly": Bark(patterns.scaly, 10.0, 1.2, (0.678, 0.603, 0.545), 1.0, 0.18, 0.2, 0.6, 0.4, 0.5),
+    "jointed": Bark(skins.jointed, 3.0, 8.0, (0.443, 0.443, 0.443), 0.32, 0.03, 0.02, 0.08, power=0.0),
+    "netted": Bark(patterns.netted, 11.0, 5.5, (0.478, 0.453, 0.397), 0.7, 0.26, 0.22, 0.8, 0.7, 0.6),
+    "peeling": Bark(skins.peeling, 14.0, 0.22, (0.843, 0.833, 0.819), 1.0, 0.1, 0.12, 0.4, 0.4, 0.3),
+    "scaly": Bark(patterns.scaly, 18.0, 1.2, (0.563, 0.477, 0.425), 1.0, 0.18, 0.2, 0.6, 0.4, 0.5),
+    "interlaced": Bark(patterns.interlaced, 17.0, 6.0, (0.439, 0.376, 0.32), 0.8, 0.2, 0.22, 0.8, 0.5, 0.5),
+    "pitted": Bark(skins.pitted, 9.0, 0.8, (0.679, 0.691, 0.642), 1.0, 0.1, 0.12, 0.4, 0.4, 0.6),
+    "papery": Bark(patterns.papery, 6.0, 2.8, (0.331, 0.247, 0.206), 1.0, 0.18, 0.25, 0.8, 0.3, 0.4),
 }
 
 #: Characters of bark, as species name them.

@@ -95,9 +95,12 @@ def bark_material(species_name: str, character: str = "ridged") -> bpy.types.Mat
         dull = {"Transmission": 0.0, "Gloss": 0.0}
         normal = graph.node("ShaderNodeNewGeometry").outputs["Normal"]
         young = _scattered(graph, {**dull, "Colour": colour, "Normal": normal})
+        # Light that was scattered before meets the plain bark: nobody sees a pattern in it.
+        first = graph.math('SUBTRACT', 1.0, graph.node("ShaderNodeLightPath").outputs["Is Diffuse Ray"])
+        shown = graph.math('MULTIPLY', bark["Shown"], first)
         for engine, tone in (('CYCLES', graph.scaled(bark["Colour"], bark["Gain"])), ('EEVEE', bark["Colour"])):
             old = _scattered(graph, {**dull, "Colour": tone, "Normal": bark["Normal"]})
-            _lead_out(graph, graph.mix(bark["Shown"], young, old), engine=engine)
+            _lead_out(graph, graph.mix(shown, young, old), engine=engine)
         # The correction takes up to a tenth of the light away from what is rough, unlike for proxies.
         disable_bump_correction(material)
         material.diffuse_color = (0.18, 0.12, 0.08, 1.0)
