@@ -47,7 +47,7 @@ _SHADY = (0.0, 0.76, 0.65)
 # Up to this height rain splashes from the ground, metres.
 _SPLASH = 0.7
 # Colours of moss, algae and lichen over the lightness of the bark under them.
-_MOSS, _ALGAE, _LICHEN = (0.95, 1.07, 0.3), (0.93, 1.05, 0.62), (1.15, 1.2, 1.0)
+_MOSS, _ALGAE, _LICHEN = (0.78, 0.9, 0.36), (0.93, 1.05, 0.68), (1.15, 1.2, 1.0)
 
 
 @dataclass(frozen=True)
@@ -233,18 +233,18 @@ def _bark(character: str) -> Bark:
 
 
 _CHARACTERS: dict[str, Bark] = {
-    "ridged": Bark(patterns.ridged, 11.0, 6.0, (0.427, 0.388, 0.326), 0.75, 0.26, 0.22, 0.8, 1.0, 0.6),
+    "ridged": Bark(patterns.ridged, 11.0, 6.0, (0.427, 0.394, 0.335), 0.95, 0.3, 0.22, 0.8, 1.0, 0.6),
     "plated": Bark(patterns.plated, 6.0, 2.8, (0.33, 0.245, 0.203), 1.0, 0.18, 0.25, 0.8, 0.3, 0.4),
     "smooth": Bark(skins.smooth, 6.0, 0.3, (0.445, 0.449, 0.422), 1.0, 0.02, 0.12, 0.4, 0.8, 0.9),
     "banded": Bark(skins.banded, 7.0, 0.2, (0.636, 0.614, 0.595), 1.0, 0.05, 0.1, 0.3, 0.4, 0.5),
     "ringed": Bark(skins.ringed, 2.2, 1.2, (0.519, 0.519, 0.519), 0.7, 0.07, 0.2, 0.6, power=0.0),
     "fibrous": Bark(patterns.fibrous, 9.0, 14.0, (0.543, 0.481, 0.429), 1.0, 0.3, 0.16, 0.5, 0.5, 0.3),
     "jointed": Bark(skins.jointed, 3.0, 8.0, (0.443, 0.443, 0.443), 0.32, 0.03, 0.02, 0.08, power=0.0),
-    "netted": Bark(patterns.netted, 11.0, 5.5, (0.478, 0.453, 0.397), 0.7, 0.26, 0.22, 0.8, 0.7, 0.6),
+    "netted": Bark(patterns.netted, 11.0, 5.5, (0.438, 0.413, 0.361), 0.9, 0.34, 0.22, 0.8, 0.7, 0.6),
     "peeling": Bark(skins.peeling, 14.0, 0.22, (0.843, 0.833, 0.819), 1.0, 0.1, 0.12, 0.4, 0.4, 0.3),
     "scaly": Bark(patterns.scaly, 18.0, 1.2, (0.563, 0.477, 0.425), 1.0, 0.18, 0.2, 0.6, 0.4, 0.5),
     "interlaced": Bark(patterns.interlaced, 17.0, 6.0, (0.439, 0.376, 0.32), 0.8, 0.2, 0.22, 0.8, 0.5, 0.5),
-    "pitted": Bark(skins.pitted, 9.0, 0.8, (0.679, 0.691, 0.642), 1.0, 0.1, 0.12, 0.4, 0.4, 0.6),
+    "pitted": Bark(skins.pitted, 9.0, 0.8, (0.687, 0.701, 0.637), 1.0, 0.1, 0.12, 0.4, 0.4, 0.6),
     "papery": Bark(patterns.papery, 6.0, 2.8, (0.331, 0.247, 0.206), 1.0, 0.18, 0.25, 0.8, 0.3, 0.4),
 }
 

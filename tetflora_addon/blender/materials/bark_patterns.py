@@ -21,7 +21,7 @@ _RED: Tones = (
 )  # fmt: skip
 _BLACK = (0.05, 0.04, 0.035)
 _OAK: Tones = (
-    (0.1, (0.07, 0.056, 0.043)), (0.45, (0.33, 0.285, 0.225)), (0.75, (0.6, 0.56, 0.48)), (1.0, (0.86, 0.84, 0.77)),
+    (0.1, (0.06, 0.053, 0.043)), (0.45, (0.33, 0.295, 0.24)), (0.75, (0.6, 0.56, 0.48)), (1.0, (0.86, 0.84, 0.77)),
 )  # fmt: skip
 _ASH: Tones = (
     (0.1, (0.085, 0.075, 0.06)), (0.45, (0.33, 0.3, 0.25)), (0.75, (0.6, 0.57, 0.5)), (1.0, (0.86, 0.84, 0.77)),
@@ -37,7 +37,7 @@ def ridged(graph: Graph, place: Place) -> tuple[Socket, Socket]:
     eye = knot(graph, place, _EYE, wave)
     where = bent(graph, around(graph, place, eye, _EYE), wave, 2.0, 0.45)
     strip = cell(graph, where)
-    grain = graph.noise(times(graph, where, 2.4, 8.0), 3.0, 0.7)[0]
+    grain = graph.noise(times(graph, bent(graph, place.cells, wave, 1.2), 2.6, 9.0), 3.0, 0.7)[0]
     # Fissures are wide in some places and close in others.
     distance = graph.math('MULTIPLY_ADD', parts(graph, wave)[2], 0.22, strip.border)
     distance = graph.math('MULTIPLY_ADD', grain, 0.2, distance)
@@ -63,7 +63,7 @@ def interlaced(graph: Graph, place: Place) -> tuple[Socket, Socket]:
     eye = knot(graph, place, _EYE, wave)
     where = bent(graph, around(graph, place, eye, _EYE), wave, 2.2, 0.4)
     strip = cell(graph, where)
-    grain = graph.noise(times(graph, where, 1.7, 5.0), 3.0, 0.7)[0]
+    grain = graph.noise(times(graph, bent(graph, place.cells, wave, 1.2), 1.9, 6.0), 3.0, 0.7)[0]
     distance = graph.math('MULTIPLY_ADD', grain, 0.22, strip.border)
     lath = graph.step(distance, 0.1, 0.22)
     ring, hollow = lips(graph, eye)
@@ -99,9 +99,9 @@ def netted(graph: Graph, place: Place) -> tuple[Socket, Socket]:
     net = graph.math('MULTIPLY_ADD', grain, -0.55, graph.math('MINIMUM', *waves))
     ridge = graph.step(net, 0.5, 0.05)
     ring, hollow = lips(graph, eye)
-    height = graph.math('MULTIPLY_ADD', grain, 0.8, ridge)
+    height = graph.math('MULTIPLY_ADD', net, -0.5, graph.math('MULTIPLY_ADD', grain, 0.6, ridge))
     height = graph.math('MULTIPLY_ADD', ring, 1.6, graph.math('MULTIPLY_ADD', hollow, -2.0, height))
-    tone = graph.math('MULTIPLY_ADD', ridge, 0.55, graph.math('MULTIPLY_ADD', grain, 0.85, -0.16))
+    tone = graph.math('MULTIPLY_ADD', ridge, 0.6, graph.math('MULTIPLY_ADD', grain, 0.85, -0.24))
     return graph.mixed(hollow, tones(graph, tone, _ASH), _BLACK), height
 
 

@@ -77,9 +77,9 @@ def pitted(graph: Graph, place: Place) -> tuple[Socket, Socket]:
     cork = graph.math('MAXIMUM', pit, graph.math('MAXIMUM', hollow, graph.math('MULTIPLY', brow, 0.8)))
     cork = graph.math('MAXIMUM', cork, foot(graph, place, noise, 16.0, 4.5))
     tone = graph.math('MULTIPLY_ADD', ring, -0.05, noise)
-    stops = (0.25, (0.44, 0.45, 0.4)), (0.5, (0.7, 0.715, 0.66)), (0.72, (0.9, 0.9, 0.88))
+    stops = (0.3, (0.46, 0.5, 0.4)), (0.5, (0.7, 0.715, 0.65)), (0.66, (0.92, 0.91, 0.88))
     dark = tones(graph, rough, ((0.3, (0.05, 0.048, 0.042)), (0.75, (0.34, 0.325, 0.285))))
-    height = graph.math('MULTIPLY_ADD', cork, graph.math('MULTIPLY', rough, 2.2), graph.math('MULTIPLY', noise, 0.8))
+    height = graph.math('MULTIPLY_ADD', cork, graph.math('MULTIPLY', rough, 1.3), graph.math('MULTIPLY', noise, 0.8))
     height = graph.math('MULTIPLY_ADD', ring, 1.2, graph.math('MULTIPLY_ADD', hollow, -1.5, height))
     return graph.mixed(cork, tones(graph, tone, stops), dark), height
 
