@@ -3,7 +3,7 @@
 """Images of the catalogue's species for menus: ``python -m examples.thumbnails [IDENTIFIER ...]``.
 
 One plant of each species in daylight, rendered by Cycles in front of a light grey, 128 × 128 pixels, into
-``tetflora_addon/catalogue/thumbnails``. An image is stored with as many colours as fit into 30 kB.
+``tetflora_addon/catalogue/thumbnails``. Images are stored with palettes, because all of them are in the extension.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ import math
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any
 
 from devtools import session
 from devtools.formats import set_format
 
 FOLDER = session.ROOT / "tetflora_addon" / "catalogue" / "thumbnails"
 SIDE, SAMPLES, SEED = 128, 96, 11
-LARGEST = 30_000  # bytes
-BACKDROP = (0.78, 0.82, 0.84)  # display values; conifers would not be seen on the dark grey of menus
+COLOURS = 128  # of a palette
+LARGEST = 12_000  # bytes
+BACKDROP = (199, 209, 214)  # display values of 255; conifers would not be seen on the dark grey of menus
 
 
 def render_thumbnail(identifier: str, path: Path) -> None:
@@ -70,30 +70,14 @@ def render_thumbnail(identifier: str, path: Path) -> None:
 
 
 def _shrink(source: Path, target: Path) -> None:
-    """Store an image in front of the backdrop, with fewer steps of colour until it is small enough."""
-    import bpy
-    import numpy as np
+    """Store an image in front of the backdrop, with a palette."""
+    from PIL import Image
 
-    image = bpy.data.images.load(str(source))
-    image.colorspace_settings.name = "Non-Color"
-    image.alpha_mode = 'CHANNEL_PACKED'
-    pixels = np.zeros(len(image.pixels), np.float32)
-    image.pixels.foreach_get(pixels)
-    rgba = pixels.reshape(-1, 4)
-    rgba[:, :3] = rgba[:, :3] * rgba[:, 3:] + np.array(BACKDROP) * (1 - rgba[:, 3:])
-    rgba[:, 3] = 1.0
-    for steps in (255, 63, 47, 31, 23, 15):
-        coarse = np.round(pixels * steps) / steps
-        stored: Any = bpy.data.images.new("thumbnail", SIDE, SIDE, alpha=True)
-        stored.colorspace_settings.name = "Non-Color"
-        stored.alpha_mode = 'CHANNEL_PACKED'
-        stored.pixels.foreach_set(coarse)
-        stored.file_format, stored.filepath_raw = 'PNG', str(target)
-        stored.save()
-        bpy.data.images.remove(stored)
-        if target.stat().st_size <= LARGEST:
-            break
-    bpy.data.images.remove(image)
+    rendered = Image.open(source).convert("RGBA")
+    whole = Image.new("RGBA", rendered.size, BACKDROP)
+    whole.alpha_composite(rendered)
+    few = whole.convert("RGB").quantize(COLOURS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    few.save(target, "PNG", optimize=True)
 
 
 def main(wanted: list[str]) -> int:
