@@ -162,7 +162,7 @@ def test_roots_lead_into_the_ground() -> None:
 
 def test_the_budget_expects_what_near_wood_has() -> None:
     flora = support.flora()
-    for species in (0, 3):
+    for species in (support.SPECIES.index("ash"), support.SPECIES.index("beech")):
         for some in grown(flora, species)[:2]:
             for pixel in (0.004, 0.001):
                 made = tube_buffers(flora, [some], even(pixel)).polygons
