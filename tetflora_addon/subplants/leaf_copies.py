@@ -100,6 +100,7 @@ class LeafCopies:
                 **materials,
                 **motion,
             },
+            smooth=model.closed and not model.textured,  # fruit and fleshy leaves are round
         )
 
     def _texture(self) -> NDArray[np.float32]:

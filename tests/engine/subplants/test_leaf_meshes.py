@@ -4,12 +4,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.engine import support
 from tetflora_addon.buffers import MeshBuffers, concatenate_buffers
 from tetflora_addon.growth.growth import radius_at
+from tetflora_addon.species.leaf_models import LEAF_MODELS
+from tetflora_addon.subplants.leaf_copies import LeafCopies
 from tetflora_addon.subplants.leaf_meshes import LeafMesh, leaf_meshes
 from tetflora_addon.subplants.pieces import Pieces, wood_areas
 from tetflora_addon.subplants.tubes import tube_buffers
@@ -269,3 +273,11 @@ def test_no_mesh_without_contents() -> None:
     assert support.leaf_mesh(flora, pieces.take(pieces.branches.row == 0), 0) is None
     tubes, leaves = support.meshes(flora, Pieces.empty())
     assert tubes == leaves == []
+
+
+def test_closed_bodies_are_shaded_smooth_and_meshes_of_the_artist_as_they_are() -> None:
+    """Fruit and fleshy leaves are round; blades are flat from afar, and an object keeps its edges."""
+    fruit, blade = support.described().forms[support.SPECIES.index("agave")][0][0], LEAF_MODELS["ovate"]
+    assert fruit.closed and not blade.closed
+    shaded = [LeafCopies(model, 2, 0.0).buffers().smooth for model in (fruit, blade, replace(fruit, textured=True))]
+    assert shaded == [True, False, False]
