@@ -28,11 +28,15 @@ def store(source: Path, target: Path) -> None:
 def main() -> int:
     """Render all; exit code 1 if an image is larger than the repository wants."""
     session.start()
+    import bpy
+
     from .close_ups import render_sheet as render_close_ups
     from .demo import run
     from .landscape import render_landscape
     from .million import render_million
     from .species_sheet import render_opening, render_sheet
+    from .wood import build as build_wood
+    from .wood import render_dolly, render_interior
 
     IMAGES.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
@@ -47,6 +51,10 @@ def main() -> int:
     render_sheet(IMAGES / "species.jpg")
     render_close_ups(IMAGES / "close_ups.jpg")
     render_opening(IMAGES / "orders.jpg")
+    session.clean_file()
+    build_wood(bpy.context.scene)
+    render_dolly(IMAGES / "dolly.jpg")
+    render_interior(IMAGES / "interior.jpg")
     session.stop()
     large = [p.name for p in IMAGES.iterdir() if p.stat().st_size > LARGEST]
     if large:

@@ -30,7 +30,11 @@ ROOT = Path(__file__).resolve().parent.parent
 DISTANCES = tuple(np.geomspace(400.0, 0.15, 8).tolist())
 #: Relative numbers of the species, and how far from each other they stand at least (m), and how many on a hectare.
 TREES = {"beech": 0.3, "oak": 0.2, "birch": 0.2, "hornbeam": 0.12, "spruce": 0.1, "rowan": 0.08}
-_APART, _DENSITY = 4.0, 420.0
+_APART, _DENSITY = 3.6, 480.0
+#: How much the trees have grown as between others.
+_HABIT = 0.75
+#: Brightness of the sky to the camera over that of its light: on film it is not as bright as its light on leaves.
+_SEEN = 0.62
 #: Side of the land, and of the part around the oak and the eye of which every blade is planted, metres.
 LAND, NEAR = 800.0, 150.0
 #: Where the camera stands in the wood, and where it looks.
@@ -38,6 +42,7 @@ _EYE, _AHEAD = (24.0, 22.0, 1.65), (38.0, 52.0, 3.6)
 #: Direction from the leaf to the camera.
 _TOWARDS = np.array([0.16, -0.98, 0.12]) / np.linalg.norm([0.16, 0.98, 0.12])
 _ELEVATION, _AZIMUTH = 38.0, 236.0
+_SKY = 0.9
 _MASK = "wood"
 
 
@@ -71,7 +76,11 @@ def build(scene: bpy.types.Scene) -> None:
     add_daylight(scene, elevation=_ELEVATION, azimuth=_AZIMUTH - 180.0)
     scene.world = first_forest.sky("Sky over the wood")
     background = next(node for node in scene.world.node_tree.nodes if node.type == 'BACKGROUND')
-    background.inputs["Strength"].default_value = 0.9
+    links, nodes = scene.world.node_tree.links, scene.world.node_tree.nodes
+    path, seen = nodes.new("ShaderNodeLightPath"), nodes.new("ShaderNodeMapRange")
+    seen.inputs["To Min"].default_value, seen.inputs["To Max"].default_value = _SKY, _SKY * _SEEN
+    links.new(path.outputs["Is Camera Ray"], seen.inputs["Value"])
+    links.new(seen.outputs[0], background.inputs["Strength"])
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.data.clip_start, camera.data.clip_end = 0.01, 2000.0
     scene.collection.objects.link(camera)
@@ -106,7 +115,7 @@ def _plant(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
     wood = populations.add_population(scene, [ground], name=f"{ground.name} wood")
     for species, weight in TREES.items():
         entry = wood.mix.add()
-        entry.species, entry.weight = species, weight
+        entry.species, entry.weight = _among_others(scene, species), weight
     wood.vertex_group, wood.min_distance = _MASK, _APART
     wood.by_density, wood.density = True, _DENSITY
     wood.scale_min, wood.scale_max, wood.seed = 0.6, 1.15, 3
@@ -114,6 +123,17 @@ def _plant(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
     bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     at_once(cover.cover_steps(scene, depsgraph, wood, masks={"vertex_group": ""}))
+
+
+def _among_others(scene: bpy.types.Scene, species: str) -> str:
+    """Identifier of the same species as it grows in a wood, which the file then has."""
+    from tetflora_addon.blender.species.edits import find_edit, species_data, store_species
+
+    name = f"{species}_in_wood"
+    if find_edit(scene, name) is None:
+        page = species_data(scene, species)
+        store_species(scene, name, {**page, "name": f"{page['name']} in a Wood", "habit": _HABIT})
+    return name
 
 
 def aim(scene: bpy.types.Scene, target: Vector, eye: Vector, lens: float) -> None:
@@ -125,18 +145,25 @@ def aim(scene: bpy.types.Scene, target: Vector, eye: Vector, lens: float) -> Non
 
 
 def leaf_of_the_oak(scene: bpy.types.Scene) -> Vector:
-    """Place of a leaf of the oak that stands out toward the camera."""
+    """Middle of a leaf of the oak that stands out toward the camera and faces it and the sun."""
     from tetflora_addon.blender.job.plant_mesh import single_seed
     from tetflora_addon.compiled.flora import compile_species
     from tetflora_addon.emission.plants import expanded_blocks
     from tetflora_addon.species import catalogue
 
     flora = compile_species([catalogue.load_species("oak")])
-    blocks = expanded_blocks(flora, single_seed("oak", 1))
-    points = np.concatenate([block.buffers.positions for block in blocks if block.kind == "leaf"]).astype(np.float64)
-    low = points[points[:, 2] < np.quantile(points[:, 2], 0.3)]
-    outer = low[(low @ (_TOWARDS * [1.0, 1.0, 0.0])).argmax()]
-    return Vector(low[np.linalg.norm(low - outer, axis=1) < 0.05].mean(axis=0)) + scene.objects["The oak"].location
+    (block,) = [block for block in expanded_blocks(flora, single_seed("oak", 1)) if block.kind == "leaf"]
+    corners = len(flora.forms[0][0][0].positions)
+    leaves = block.buffers.positions.astype(np.float64).reshape(-1, corners, 3)
+    middle = leaves.mean(axis=1)
+    # The blade is thinnest along its normal.
+    normal = np.linalg.svd(leaves - middle[:, None])[2][:, 2]
+    normal *= np.sign(normal[:, 2:])
+    facing = normal @ (_TOWARDS + [0.0, 0.0, 0.35])
+    out = middle @ (_TOWARDS * [1.0, 1.0, 0.0])
+    low = (middle[:, 2] > 1.2) & (middle[:, 2] < np.quantile(middle[:, 2], 0.4))
+    best = np.where(low, out + 1.2 * facing, -np.inf).argmax()
+    return Vector(middle[best]) + scene.objects["The oak"].location
 
 
 def render_dolly(path: Path, size: tuple[int, int] = (480, 270), samples: int = 32) -> None:
