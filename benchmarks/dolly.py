@@ -28,9 +28,9 @@ from tetflora_addon.blender.job.plant_mesh import single_seed
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.growth.hashing import Draw, uniform
+from tetflora_addon.leaves.levels import leaf_levels
+from tetflora_addon.leaves.outlines import distance_to_links
 from tetflora_addon.species import catalogue
-from tetflora_addon.species.leaf_levels import leaf_levels
-from tetflora_addon.species.leaf_outlines import distance_to_links
 from tetflora_addon.subplants.leaf_copies import LevelCopies
 
 from .compare import flip_map, read_picture, render

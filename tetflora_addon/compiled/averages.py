@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..growth.axes import profile, profile_integral
 from ..growth.rows import FORK, LATERAL, SPUR
-from ..species.leaf_models import LeafModel
+from ..leaves.models import LeafModel
 from ..species.members import expected_forks
 from ..species.species import Range, crown_ratio
 

@@ -28,7 +28,7 @@ from ..growth.branches import Branches
 from ..growth.growth import trunks
 from ..growth.hashing import key_of_seed, mix, uniform
 from ..growth.seeds import Seeds
-from ..species.leaf_models import LeafModel
+from ..leaves.models import LeafModel
 from ..species.species import fingerprint
 from ..storage import remembered
 from .rays import WIDEST, Things, basis, cell_numbers, covered, opened, path_lengths, things_of

@@ -20,8 +20,8 @@ from ..growth.branches import Branches
 from ..growth.growth import fullness
 from ..growth.rows import LATERAL, build_rows
 from ..growth.wind import Wind, is_windy, widest_sway, windy_rows
+from ..leaves.models import LeafModel
 from ..species.habit import with_habit
-from ..species.leaf_models import LeafModel
 from ..species.quality import with_quality
 from ..species.species import LEAF_KINDS, Species
 from .averages import Averages, RowLeaves, average, quadratic, row_leaves

@@ -25,7 +25,7 @@ from ..growth.foliage import leaf_frames, leaf_keys, leaf_places, outwardness, s
 from ..growth.growth import branch_counts, chosen_children, drawn_children, fullness, leaf_counts, radius_at
 from ..growth.hashing import Draw, key_of_seed, mix, thinned, uniform
 from ..growth.rows import FORK, LATERAL, SPUR, ranged
-from ..species.leaf_models import LeafModel
+from ..leaves.models import LeafModel
 
 _PIECE = 128
 _BRANCHES = 2048  # of each row that are looked at, each with the sky elsewhere

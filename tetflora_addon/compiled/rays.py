@@ -20,7 +20,7 @@ from ..growth.axes import Axes, axes
 from ..growth.branches import Branches
 from ..growth.foliage import leaf_forms, leaf_keys, leaf_places, place_leaves, settled
 from ..growth.growth import children, drawn_children, leaf_counts, radius_at
-from ..species.leaf_models import LeafModel
+from ..leaves.models import LeafModel
 from .averages import tube_perimeter
 
 #: Planes between the tetrahedra, as whole values of these sums.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How finely near leaves are drawn: lengths in the image, from which `species.leaf_levels` says the level.
+"""How finely near leaves are drawn: lengths in the image, from which `leaves.levels` says the level.
 
 The coarsest level whose margin is within a tolerance of the leaf's own is enough. What counts is how long leaves of a
 branch are in the image where it comes nearest: nothing depends on the order of branches or on earlier images.
@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.growth import WholeBranches
+from ..leaves.levels import chosen_level, coarse_error, level_polygons
 from ..refinement.shares import PlantParts
-from ..species.leaf_levels import chosen_level, coarse_error, level_polygons
 from ..species.species import LEAF_KINDS
 from ..subplants.wood_detail import Pixels
 

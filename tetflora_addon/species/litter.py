@@ -13,10 +13,10 @@ from dataclasses import fields
 from math import cos, pi, sin, sqrt
 from typing import Any
 
-from .leaf_models import LeafModel
-from .leaf_needles import Needles
-from .leaf_outlines import Blade
-from .leaf_schema import MAX_FORMS
+from ..leaves.models import LeafModel
+from ..leaves.needles import Needles
+from ..leaves.outlines import Blade
+from ..leaves.schema import MAX_FORMS
 from .schema import FORMAT
 from .species import LEAF_KINDS, Species
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .leaf_models import LeafModel
+from ..leaves.models import LeafModel
 from .species import CROWN_SHAPES, LEAF_KINDS, Order, Range, Species, crown_ratio, fork_cuts
 
 _FRACTIONS = (np.arange(256) + 0.5) / 256

@@ -19,7 +19,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..errors import SpeciesError
-from .leaf_models import LeafModel
+from ..leaves.models import LeafModel
 from .members import Members, expected_members, expected_polygons
 from .schema import MAX_POLYGONS, ORDER_KEYS, QUALITY_LIMITS
 from .species import LEAF_KINDS, Order, Range, Species

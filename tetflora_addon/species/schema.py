@@ -16,7 +16,7 @@ from typing import Any
 
 from ..errors import NAME, SpeciesError, readable, shown
 from ..files import json_of, read_whole
-from .leaf_schema import read_forms
+from ..leaves.schema import read_forms
 from .members import expected_polygons
 from .skeletons import MAX_ORDERS
 from .species import BARKS, CROWN_SHAPES, LEAF_KINDS, Colour, Order, Range, Species

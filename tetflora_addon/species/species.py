@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .leaf_models import LeafModel
+from ..leaves.models import LeafModel
 from .skeletons import Skeleton
 
 LEAF_KINDS = ("leaf", "blossom")

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from ..buffers import MeshBuffers
 from ..growth.hashing import Draw, uniform
-from ..species.leaf_levels import LeafLevel
-from ..species.leaf_models import LeafModel
-from ..species.leaf_triangles import TRIANGLE, LeafTriangles
+from ..leaves.levels import LeafLevel
+from ..leaves.models import LeafModel
+from ..leaves.triangles import TRIANGLE, LeafTriangles
 
 _ROWS_AT_ONCE = 4096
 

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Leaves as polygons: copies of the species' leaf models, written straight into the arrays of their mesh.
 
-See section 5 of the paper. What is small in the image may be a triangle, see `species.leaf_triangles`; what is large
-has finer levels, see `species.leaf_levels`.
+See section 5 of the paper. What is small in the image may be a triangle, see `leaves.triangles`; what is large
+has finer levels, see `leaves.levels`.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ from ..growth.foliage import (
 from ..growth.growth import WholeBranches, leaf_counts
 from ..growth.hashing import Draw, uniform
 from ..growth.wind import moment
-from ..species.leaf_levels import chosen_level, leaf_levels
-from ..species.leaf_models import LeafModel
-from ..species.leaf_triangles import leaf_triangles
+from ..leaves.levels import chosen_level, leaf_levels
+from ..leaves.models import LeafModel
+from ..leaves.triangles import leaf_triangles
 from .leaf_copies import LeafCopies, LevelCopies, TriangleCopies
 from .pieces import chunks
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tetflora_addon.blender.results import leaf_blades
-from tetflora_addon.species import catalogue, leaf_compounds, leaf_models, leaf_outlines
+from tetflora_addon.leaves import compounds, models, outlines
+from tetflora_addon.species import catalogue
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -45,13 +46,13 @@ def test_outlines_and_far_polygons_agree(identifier):
 
 
 def test_compound_leaves_have_the_blade_of_their_leaflets():
-    shape = leaf_compounds.Compound(leaflet=leaf_outlines.Blade(width=0.4))
+    shape = compounds.Compound(leaflet=outlines.Blade(width=0.4))
     model = replace(catalogue.load_species("rowan").leaf[0], shape=shape)
     assert leaf_blades.blade_kind(model, 0.4) == "pinnate"
 
 
 def test_blossoms_have_petals_and_fruit_is_plain():
-    open_flower = leaf_models.LEAF_MODELS["blossom"]
+    open_flower = models.LEAF_MODELS["blossom"]
     assert leaf_blades.blade_kind(open_flower, 0.4, "blossom") == "petal"
     assert leaf_blades.blade_kind(open_flower, 0.1, "blossom") == "plain"
 
@@ -61,7 +62,7 @@ def test_a_finely_toothed_leaf_is_not_lobed():
     turn = 2 * np.pi * np.arange(80) / 80
     far = 0.5 + 0.012 * (np.arange(80) % 2)
     toothed = np.stack([0.6 * far * np.sin(turn), 0.5 + far * np.cos(turn), 0 * turn], axis=1)
-    model = leaf_models.leaf_model(toothed, [list(range(80))])
+    model = models.leaf_model(toothed, [list(range(80))])
     assert leaf_blades.blade_kind(model, 0.4) == "pinnate"
 
 

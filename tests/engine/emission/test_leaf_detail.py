@@ -18,8 +18,8 @@ from tetflora_addon.emission.budget import _Facets, afford
 from tetflora_addon.emission.leaf_detail import LeafDetail
 from tetflora_addon.emission.plants import Transition, expanded_blocks, explicit_blocks
 from tetflora_addon.growth.growth import WholeBranches
+from tetflora_addon.leaves.levels import leaf_levels
 from tetflora_addon.refinement.settings import RefinementSettings
-from tetflora_addon.species.leaf_levels import leaf_levels
 from tetflora_addon.subplants.leaf_meshes import leaf_meshes
 
 

@@ -13,7 +13,7 @@ import pytest
 from tests.engine import support
 from tests.engine.species.test_species import refusal
 from tetflora_addon.errors import SpeciesError
-from tetflora_addon.species.leaf_models import MAX_FACE_CORNERS, leaf_model
+from tetflora_addon.leaves.models import MAX_FACE_CORNERS, leaf_model
 from tetflora_addon.species.schema import read_species
 
 

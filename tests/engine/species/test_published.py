@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from devtools import forms, species_docs
 from tests.engine import support
 from tetflora_addon.growth.growth import leaf_counts
-from tetflora_addon.species.leaf_models import LeafModel
+from tetflora_addon.leaves.models import LeafModel
 
 PUBLISHED: dict[str, Any] = forms.published()
 TABLES = PUBLISHED["weber_penn"]["species"]

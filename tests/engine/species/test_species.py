@@ -22,8 +22,8 @@ from tests.engine import support
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.compiled.orientation import leaf_moments
 from tetflora_addon.errors import SpeciesError
+from tetflora_addon.leaves.models import LEAF_MODELS, MAX_LEAF_POLYGONS, leaf_model
 from tetflora_addon.species.catalogue import list_species, load_species
-from tetflora_addon.species.leaf_models import LEAF_MODELS, MAX_LEAF_POLYGONS, leaf_model
 from tetflora_addon.species.schema import MAX_FILE_BYTES, ORDER_KEYS, read_species, species_from_dict
 from tetflora_addon.species.skeletons import MAX_ORDERS
 from tetflora_addon.species.species import CROWN_SHAPES, crown_ratio

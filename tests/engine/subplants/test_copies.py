@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tetflora_addon.growth.foliage import face_light
-from tetflora_addon.species.leaf_models import LEAF_MODELS
-from tetflora_addon.species.leaf_triangles import leaf_triangles
+from tetflora_addon.leaves.models import LEAF_MODELS
+from tetflora_addon.leaves.triangles import leaf_triangles
 from tetflora_addon.subplants.leaf_copies import LeafCopies, TriangleCopies
 
 

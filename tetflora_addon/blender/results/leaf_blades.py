@@ -10,10 +10,10 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...species.leaf_compounds import Compound
-from ...species.leaf_models import LeafModel
-from ...species.leaf_needles import Needles
-from ...species.leaf_outlines import Blade
+from ...leaves.compounds import Compound
+from ...leaves.models import LeafModel
+from ...leaves.needles import Needles
+from ...leaves.outlines import Blade
 from ...species.species import LEAF_KINDS, Species
 from ..materials.materials import leaf_material
 

@@ -10,7 +10,7 @@ from itertools import pairwise
 import bpy
 
 from ...errors import SpeciesError
-from ...species.leaf_models import LeafModel, leaf_model
+from ...leaves.models import LeafModel, leaf_model
 from ...species.species import LEAF_KINDS, Species
 from ..attributes import evaluated_mesh
 from ..materials.materials import bark_material

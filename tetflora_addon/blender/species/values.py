@@ -9,7 +9,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ...errors import SpeciesError, readable
-from ...species.leaf_models import LEAF_MODELS
+from ...leaves.models import LEAF_MODELS
 from ...species.schema import ORDER_KEYS, QUALITY_LIMITS
 from ...species.skeletons import MAX_ORDERS
 from ...species.species import BARKS

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tetflora_addon.species.leaf_blades import blade_surface, crossings, outline
-from tetflora_addon.species.leaf_outlines import Blade, distance_to_links, simplified, traced
-from tetflora_addon.species.leaf_shapes import LEAF_SHAPES
+from tetflora_addon.leaves.blades import blade_surface, crossings, outline
+from tetflora_addon.leaves.outlines import Blade, distance_to_links, simplified, traced
+from tetflora_addon.leaves.shapes import LEAF_SHAPES
 
 BLADES = {name: shape for name, shape in LEAF_SHAPES.items() if isinstance(shape, Blade)}
 

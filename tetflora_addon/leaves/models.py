@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SpeciesError
-from .leaf_compounds import Compound
-from .leaf_needles import Needles
-from .leaf_outlines import Blade
-from .leaf_shapes import LEAF_SHAPES
+from .compounds import Compound
+from .needles import Needles
+from .outlines import Blade
+from .shapes import LEAF_SHAPES
 
 MAX_LEAF_POLYGONS = 2000
 MAX_LEAF_CORNERS = 4 * MAX_LEAF_POLYGONS  # of all faces; and vertices
@@ -45,7 +45,7 @@ class LeafModel:
     textured : bool
         Drawn as it is at any size: a texture may cut it out.
     shape : Blade, Needles or Compound, optional
-        What it stands for, which leaves are drawn as that are near; see `leaf_levels`.
+        What it stands for, which leaves are drawn as that are near; see `levels`.
     """
 
     positions: NDArray[np.float64]

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tetflora_addon.species.leaf_levels import (
+from tetflora_addon.leaves.levels import (
     LeafLevel,
     chosen_level,
     fitted,
@@ -20,9 +20,9 @@ from tetflora_addon.species.leaf_levels import (
     level_polygons,
     surface_of,
 )
-from tetflora_addon.species.leaf_models import _COARSE, LEAF_MODELS, LeafModel
-from tetflora_addon.species.leaf_needles import Needles
-from tetflora_addon.species.leaf_outlines import distance_to_links
+from tetflora_addon.leaves.models import _COARSE, LEAF_MODELS, LeafModel
+from tetflora_addon.leaves.needles import Needles
+from tetflora_addon.leaves.outlines import distance_to_links
 
 #: Polygons that no level has.
 MOST = 4000

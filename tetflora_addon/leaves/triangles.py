@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from .leaf_models import LeafModel, leaf_model
+from .models import LeafModel, leaf_model
 
 #: The topology of all of them.
 TRIANGLE = leaf_model([[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0, 1, 2]])

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .leaf_outlines import limited
-from .leaf_surfaces import VARIANTS, LeafSurface, drawn, joined, surface, tube
+from .outlines import limited
+from .surfaces import VARIANTS, LeafSurface, drawn, joined, surface, tube
 
 _GOLDEN_ANGLE = np.radians(137.508)
 #: What is not seen of the gaps between needles, of their distance along the shoot.

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SpeciesError
-from .leaf_outlines import Blade, simplified, traced
-from .leaf_surfaces import LeafSurface, drawn, joined, surface, tube
+from .outlines import Blade, simplified, traced
+from .surfaces import LeafSurface, drawn, joined, surface, tube
 
 #: Tolerance of the outline that all others are taken from.
 FINEST = 2e-4

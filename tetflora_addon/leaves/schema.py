@@ -10,12 +10,12 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..errors import SpeciesError, shown
-from .leaf_blades import check_outline
-from .leaf_compounds import Compound
-from .leaf_levels import TOLERANCES, fitted, surface_of
-from .leaf_models import LEAF_MODELS, LeafModel, leaf_model
-from .leaf_needles import Needles
-from .leaf_outlines import Blade
+from .blades import check_outline
+from .compounds import Compound
+from .levels import TOLERANCES, fitted, surface_of
+from .models import LEAF_MODELS, LeafModel, leaf_model
+from .needles import Needles
+from .outlines import Blade
 
 #: Most forms of a leaf.
 MAX_FORMS = 8

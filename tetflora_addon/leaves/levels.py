@@ -14,12 +14,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from .leaf_blades import blade_surface
-from .leaf_compounds import Compound, compound_surface
-from .leaf_models import LeafModel
-from .leaf_needles import Needles, needle_surface
-from .leaf_outlines import Blade, distance_to_links
-from .leaf_surfaces import LeafSurface
+from .blades import blade_surface
+from .compounds import Compound, compound_surface
+from .models import LeafModel
+from .needles import Needles, needle_surface
+from .outlines import Blade, distance_to_links
+from .surfaces import LeafSurface
 
 #: Tolerances of levels, in lengths of the leaf.
 TOLERANCES = (0.03, 0.012, 0.004, 0.0015, 0.0005, 0.0002)

@@ -4,9 +4,9 @@
 
 from __future__ import annotations
 
-from .leaf_compounds import Compound
-from .leaf_needles import Needles
-from .leaf_outlines import Blade
+from .compounds import Compound
+from .needles import Needles
+from .outlines import Blade
 
 LEAF_SHAPES: dict[str, Blade | Needles | Compound] = {
     # A silver birch: rhombic, drawn out to a tip, doubly serrate.

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .leaf_blades import blade_surface
-from .leaf_outlines import Blade, limited
-from .leaf_surfaces import VARIANTS, LeafSurface, drawn, joined, tube
+from .blades import blade_surface
+from .outlines import Blade, limited
+from .surfaces import VARIANTS, LeafSurface, drawn, joined, tube
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tetflora_addon.species.leaf_models import LEAF_MODELS, LeafModel, leaf_model
-from tetflora_addon.species.leaf_triangles import LeafTriangles, leaf_triangles
+from tetflora_addon.leaves.models import LEAF_MODELS, LeafModel, leaf_model
+from tetflora_addon.leaves.triangles import LeafTriangles, leaf_triangles
 
 #: Faces of a cube, all outward.
 _CUBE = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
