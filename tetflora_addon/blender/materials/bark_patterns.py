@@ -115,10 +115,10 @@ def papery(graph: Graph, place: Place) -> tuple[Socket, Socket]:
     colour, height, part, fine = _plates(graph, place)
     up = graph.step(place.along, 20.0, 38.0)
     high = graph.math('MAXIMUM', up, graph.step(place.girth, 0.75, 0.45))
-    tone = graph.math('MULTIPLY_ADD', fine, 1.1, graph.math('MULTIPLY_ADD', part, 0.35, -0.22))
+    tone = graph.math('MULTIPLY_ADD', fine, 1.7, graph.math('MULTIPLY_ADD', part, -0.5, -0.115))
     skin = tones(graph, tone, ((0.2, _PAPER[0]), (0.5, _PAPER[1]), (0.85, _PAPER[2])))
     colour = graph.vector('MULTIPLY', graph.mixed(high, colour, skin), graph.mixed(up, (1.0, 1.0, 1.0), _ORANGE))
-    return colour, graph.math('MULTIPLY', height, graph.math('MULTIPLY_ADD', high, -0.75, 1.0))
+    return colour, graph.math('MULTIPLY', height, graph.math('MULTIPLY_ADD', high, -0.6, 1.0))
 
 
 def _plates(graph: Graph, place: Place) -> tuple[Socket, Socket, Socket, Socket]:

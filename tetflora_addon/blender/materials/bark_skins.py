@@ -50,7 +50,9 @@ def smooth(graph: Graph, place: Place) -> tuple[Socket, Socket]:
     tone = graph.math('MULTIPLY_ADD', graph.step(noise, 0.56, 0.6), 0.08, tone)
     tone = graph.math('MULTIPLY_ADD', graph.step(noise, 0.4, 0.375), -0.06, tone)
     tone = graph.math('MULTIPLY_ADD', wrinkle, -0.08, graph.math('MULTIPLY_ADD', marks, -0.3, tone))
-    height = graph.math('MULTIPLY_ADD', wrinkle, -0.5, graph.math('MULTIPLY_ADD', noise, 1.4, lines))
+    height = graph.math(
+        'MULTIPLY_ADD', wrinkle, -0.5, graph.math('MULTIPLY_ADD', noise, 1.4, graph.math('MULTIPLY', lines, 0.4))
+    )
     height = graph.math('MULTIPLY_ADD', ring, 4.0, graph.math('MULTIPLY_ADD', brow, -2.5, height))
     height = graph.math('MULTIPLY_ADD', hollow, -4.0, height)
     stops = (
@@ -73,7 +75,7 @@ def pitted(graph: Graph, place: Place) -> tuple[Socket, Socket]:
     eye = knot(graph, place, _EYE, wave)
     ring, hollow = lips(graph, eye)
     brow = _brows(graph, eye)
-    rough = furrows(graph, place)
+    rough = furrows(graph, place, 7.0, 2.4)
     cork = graph.math('MAXIMUM', pit, graph.math('MAXIMUM', hollow, graph.math('MULTIPLY', brow, 0.8)))
     cork = graph.math('MAXIMUM', cork, foot(graph, place, noise, 16.0, 4.5))
     tone = graph.math('MULTIPLY_ADD', ring, -0.05, noise)
@@ -84,9 +86,9 @@ def pitted(graph: Graph, place: Place) -> tuple[Socket, Socket]:
     return graph.mixed(cork, tones(graph, tone, stops), dark), height
 
 
-def furrows(graph: Graph, place: Place) -> Socket:
-    """Cork that has cracked along the branch, from 0 in its furrows to 1."""
-    rough = graph.noise(times(graph, place.round, 7.0, 2.4), 3.0, 0.66)[0]
+def furrows(graph: Graph, place: Place, x: float, z: float) -> Socket:
+    """Cork that has cracked along the branch, from 0 in its furrows to 1; `x` and `z` of them to a radius."""
+    rough = graph.noise(times(graph, place.round, x, z), 4.0, 0.7)[0]
     crack = graph.math('ABSOLUTE', graph.math('SUBTRACT', rough, 0.5))
     return graph.math('MULTIPLY_ADD', graph.step(crack, 0.0, 0.12), 0.55, graph.math('MULTIPLY', rough, 0.6))
 
@@ -94,7 +96,7 @@ def furrows(graph: Graph, place: Place) -> Socket:
 def foot(graph: Graph, place: Place, noise: Socket, uneven: float, start: float) -> Socket:
     """1 at the foot of an old stem, higher up in some places than in others; `uneven` and `start` in radii."""
     low = graph.math('MULTIPLY_ADD', noise, uneven, graph.math('MULTIPLY', place.along, -1.0))
-    return graph.step(low, start, start + 2.5)
+    return graph.step(low, start, start + 1.0)
 
 
 def _dashes(graph: Graph, place: Place, noise: Socket) -> Socket:
@@ -140,7 +142,7 @@ def peeling(graph: Graph, place: Place) -> tuple[Socket, Socket]:
     white = tones(graph, skin, ((0.1, (0.32, 0.3, 0.28)), (0.6, (0.86, 0.85, 0.83)), (0.85, (1.0, 1.0, 1.0))))
     under = tones(graph, skin, ((0.1, (0.3, 0.25, 0.22)), (0.6, (0.7, 0.66, 0.62)), (0.85, (0.85, 0.79, 0.73))))
     colour = graph.mixed(graph.math('MULTIPLY', edge, 0.6), graph.mixed(torn, white, under), (0.2, 0.17, 0.15))
-    rough = graph.noise(times(graph, place.round, 8.0, 4.0), 4.0, 0.72)[0]
+    rough = furrows(graph, place, 8.0, 3.4)
     black = tones(graph, rough, ((0.3, (0.03, 0.03, 0.028)), (0.85, (0.24, 0.215, 0.19))))
     height = graph.math('MULTIPLY_ADD', scar, graph.math('MULTIPLY', rough, 2.4), graph.math('MULTIPLY', skin, 0.35))
     height = graph.math('MULTIPLY_ADD', torn, -0.35, height)
