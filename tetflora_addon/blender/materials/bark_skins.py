@@ -68,7 +68,7 @@ def pitted(graph: Graph, place: Place) -> tuple[Socket, Socket]:
     """Pale skin with dark diamonds of cork in rows, eyes where branches were, and a dark, furrowed foot."""
     noise, wave = graph.noise(times(graph, place.round, 1.4, 1.6), 5.0, 0.62)
     row = graph.step(graph.noise(times(graph, place.round, 0.9, 3.2), 1.0, 0.5)[0], 0.4, 0.62)
-    size = graph.math('MULTIPLY_ADD', row, 0.3, 0.14)
+    size = graph.math('MULTIPLY_ADD', row, 0.36, 0.17)
     spots = points(graph, bent(graph, times(graph, place.cells, 1.0, 1.0), wave, 0.5), 'MANHATTAN')
     size = graph.math('MULTIPLY', size, graph.math('MULTIPLY_ADD', parts(graph, spots["Color"])[0], 0.9, 0.5))
     pit = graph.step(spots["Distance"], size, graph.math('MULTIPLY', size, 0.55))
@@ -79,7 +79,7 @@ def pitted(graph: Graph, place: Place) -> tuple[Socket, Socket]:
     cork = graph.math('MAXIMUM', pit, graph.math('MAXIMUM', hollow, graph.math('MULTIPLY', brow, 0.8)))
     cork = graph.math('MAXIMUM', cork, foot(graph, place, noise, 16.0, 4.5))
     tone = graph.math('MULTIPLY_ADD', ring, -0.05, noise)
-    stops = (0.3, (0.46, 0.5, 0.4)), (0.5, (0.7, 0.715, 0.65)), (0.66, (0.92, 0.91, 0.88))
+    stops = (0.3, (0.42, 0.46, 0.35)), (0.5, (0.68, 0.7, 0.62)), (0.66, (0.96, 0.94, 0.88))
     dark = tones(graph, rough, ((0.3, (0.05, 0.048, 0.042)), (0.75, (0.34, 0.325, 0.285))))
     height = graph.math('MULTIPLY_ADD', cork, graph.math('MULTIPLY', rough, 1.3), graph.math('MULTIPLY', noise, 0.8))
     height = graph.math('MULTIPLY_ADD', ring, 1.2, graph.math('MULTIPLY_ADD', hollow, -1.5, height))
@@ -99,11 +99,12 @@ def foot(graph: Graph, place: Place, noise: Socket, uneven: float, start: float)
     return graph.step(low, start, start + 1.0)
 
 
-def _dashes(graph: Graph, place: Place, noise: Socket) -> Socket:
+def _dashes(graph: Graph, place: Place, noise: Socket, wave: Socket) -> Socket:
     """1 in thin dark lines across, some long and many short."""
-    spots = points(graph, bent(graph, times(graph, place.round, 1.3, 8.0), noise, 0.4))
+    spots = points(graph, bent(graph, times(graph, place.round, 1.3, 8.0), wave, 0.4))
     size = graph.math('MULTIPLY_ADD', graph.math('POWER', parts(graph, spots["Color"])[0], 2.0), 0.36, 0.1)
-    return graph.step(spots["Distance"], size, graph.math('MULTIPLY', size, 0.65))
+    far = graph.math('MULTIPLY_ADD', noise, 0.4, graph.math('SUBTRACT', spots["Distance"], 0.2))
+    return graph.step(far, size, graph.math('MULTIPLY', size, 0.75))
 
 
 def banded(graph: Graph, place: Place) -> tuple[Socket, Socket]:
@@ -128,7 +129,7 @@ def peeling(graph: Graph, place: Place) -> tuple[Socket, Socket]:
     edge = graph.math('MULTIPLY', torn, graph.step(sheet, 0.625, 0.6))
     dots = points(graph, bent(graph, place.cells, wave, 0.3))["Distance"]
     dots = graph.step(dots, 0.3, 0.2)
-    dashes = _dashes(graph, place, wave)
+    dashes = _dashes(graph, place, noise, wave)
     eye = knot(graph, place, _EYE, wave, apart=0.85)
     # A scar is a black diamond, wider than high, and its brows hang from it.
     flat = graph.vector('DOT_PRODUCT', graph.vector('ABSOLUTE', eye.off), (0.45, 0.45, 1.5))
@@ -143,7 +144,7 @@ def peeling(graph: Graph, place: Place) -> tuple[Socket, Socket]:
     under = tones(graph, skin, ((0.1, (0.3, 0.25, 0.22)), (0.6, (0.7, 0.66, 0.62)), (0.85, (0.85, 0.79, 0.73))))
     colour = graph.mixed(graph.math('MULTIPLY', edge, 0.6), graph.mixed(torn, white, under), (0.2, 0.17, 0.15))
     rough = furrows(graph, place, 8.0, 3.4)
-    black = tones(graph, rough, ((0.3, (0.03, 0.03, 0.028)), (0.85, (0.24, 0.215, 0.19))))
+    black = tones(graph, rough, ((0.3, (0.03, 0.03, 0.028)), (0.85, (0.2, 0.18, 0.155))))
     height = graph.math('MULTIPLY_ADD', scar, graph.math('MULTIPLY', rough, 2.4), graph.math('MULTIPLY', skin, 0.35))
     height = graph.math('MULTIPLY_ADD', torn, -0.35, height)
     return graph.mixed(scar, colour, black), height
