@@ -44,8 +44,8 @@ _MOSSY, _MOSS_GIRTH = 3.0, (0.3, 0.9)
 _PATCHES = 5.0
 # Where light and rain come from: moss faces north and up.
 _SHADY = (0.0, 0.76, 0.65)
-# Over and under so many radii along a branch, nothing and all has the age of its base.
-_ROOTS = (2.0, 1.0)
+# What lies so many radii below the base of a branch is an old root.
+_ROOTS = -0.5
 # Up to this height rain splashes from the ground, metres.
 _SPLASH = 0.7
 # Colours of moss, algae and lichen over the lightness of the bark under them.
@@ -168,10 +168,8 @@ def bark_group(character: str) -> bpy.types.NodeTree:
         place = Place(where["Place"], cells, where["Turn"], where["Along"], scale, given["Stretch"], girth)
         tone, height = bark.pattern(graph, place)
         age = smooth_step(graph, where["Perimeter"], given["Smooth Under"], given["Full Over"])
-        # Roots are thin but as old as the trunk.
-        old = smooth_step(graph, girth, given["Smooth Under"], given["Full Over"])
-        old = graph.math('MULTIPLY', old, smooth_step(graph, where["Along"], *_ROOTS))
-        age = graph.math('MAXIMUM', age, old)
+        # Roots, below the base, are thin but as old as the trunk.
+        age = graph.math('MAXIMUM', age, smooth_step(graph, where["Along"], 0.0, _ROOTS))
         around_one = graph.vector('SUBTRACT', graph.vector('DIVIDE', tone, bark.mean), (1.0, 1.0, 1.0))
         change = graph.vector('SCALE', around_one, graph.math('MULTIPLY', given["Contrast"], age))
         colour = graph.tinted(given["Colour"], graph.vector('ADD', change, (1.0, 1.0, 1.0)))
@@ -247,7 +245,7 @@ _CHARACTERS: dict[str, Bark] = {
     "fibrous": Bark(patterns.fibrous, 9.0, 14.0, (0.543, 0.481, 0.429), 1.0, 0.3, 0.16, 0.5, 0.5, 0.3),
     "jointed": Bark(skins.jointed, 3.0, 8.0, (0.443, 0.443, 0.443), 0.32, 0.03, 0.02, 0.08, power=0.0),
     "netted": Bark(patterns.netted, 11.0, 5.5, (0.438, 0.413, 0.361), 0.9, 0.34, 0.22, 0.8, 0.7, 0.6),
-    "peeling": Bark(skins.peeling, 14.0, 0.22, (0.836, 0.827, 0.812), 1.0, 0.1, 0.12, 0.4, 0.4, 0.3),
+    "peeling": Bark(skins.peeling, 14.0, 0.22, (0.835, 0.826, 0.811), 1.0, 0.1, 0.12, 0.4, 0.4, 0.3),
     "scaly": Bark(patterns.scaly, 18.0, 1.2, (0.563, 0.477, 0.425), 1.0, 0.18, 0.2, 0.6, 0.4, 0.5),
     "interlaced": Bark(patterns.interlaced, 17.0, 6.0, (0.439, 0.376, 0.32), 0.8, 0.2, 0.22, 0.8, 0.5, 0.5),
     "pitted": Bark(skins.pitted, 9.0, 0.8, (0.666, 0.681, 0.602), 1.0, 0.1, 0.12, 0.4, 0.4, 0.6),

@@ -144,7 +144,7 @@ def peeling(graph: Graph, place: Place) -> tuple[Socket, Socket]:
     under = tones(graph, skin, ((0.1, (0.3, 0.25, 0.22)), (0.6, (0.7, 0.66, 0.62)), (0.85, (0.85, 0.79, 0.73))))
     colour = graph.mixed(graph.math('MULTIPLY', edge, 0.6), graph.mixed(torn, white, under), (0.2, 0.17, 0.15))
     rough = furrows(graph, place, 8.0, 3.4)
-    black = tones(graph, rough, ((0.3, (0.03, 0.03, 0.028)), (0.85, (0.2, 0.18, 0.155))))
+    black = tones(graph, rough, ((0.3, (0.026, 0.026, 0.024)), (0.9, (0.15, 0.135, 0.115))))
     height = graph.math('MULTIPLY_ADD', scar, graph.math('MULTIPLY', rough, 2.4), graph.math('MULTIPLY', skin, 0.35))
     height = graph.math('MULTIPLY_ADD', torn, -0.35, height)
     return graph.mixed(scar, colour, black), height
