@@ -244,7 +244,7 @@ _CHARACTERS: dict[str, Bark] = {
     "ringed": Bark(skins.ringed, 2.2, 1.2, (0.519, 0.519, 0.519), 0.7, 0.07, 0.2, 0.6, power=0.0),
     "fibrous": Bark(patterns.fibrous, 9.0, 14.0, (0.543, 0.481, 0.429), 1.0, 0.3, 0.16, 0.5, 0.5, 0.3),
     "jointed": Bark(skins.jointed, 3.0, 8.0, (0.443, 0.443, 0.443), 0.32, 0.03, 0.02, 0.08, power=0.0),
-    "netted": Bark(patterns.netted, 11.0, 5.5, (0.438, 0.413, 0.361), 0.9, 0.34, 0.22, 0.8, 0.7, 0.6),
+    "netted": Bark(patterns.netted, 12.5, 5.5, (0.438, 0.413, 0.361), 0.62, 0.3, 0.22, 0.8, 0.7, 0.6),
     "peeling": Bark(skins.peeling, 14.0, 0.22, (0.835, 0.826, 0.811), 1.0, 0.1, 0.12, 0.4, 0.4, 0.3),
     "scaly": Bark(patterns.scaly, 18.0, 1.2, (0.563, 0.477, 0.425), 1.0, 0.18, 0.2, 0.6, 0.4, 0.5),
     "interlaced": Bark(patterns.interlaced, 17.0, 6.0, (0.439, 0.376, 0.32), 0.8, 0.2, 0.22, 0.8, 0.5, 0.5),
