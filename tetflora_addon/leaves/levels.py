@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .blades import blade_surface
+from .bodies import closed_parts, rounded
 from .compounds import Compound, compound_surface
 from .models import LeafModel
 from .needles import Needles, needle_surface
@@ -32,6 +33,8 @@ _DEARER = 1.35
 #: Faces with less than this as texture coordinate v, negative, are stems; their tints, of petioles and of shoots.
 _STEM, _TINTS = 1e-6, ((1.25, 1.1, 0.9), (1.7, 0.75, 0.6))
 _FITS, _THICKER = 12, 1.5
+#: Divisions of closed parts, one more than at most.
+_ROUNDEST = 5
 #: Points on each edge of a coarse model at which its distance from the shape is measured.
 _ON_EDGE = 9
 
@@ -97,9 +100,9 @@ def fitted(shape: Shape, tolerance: float, area: float, reach: float = np.inf, a
 
 @lru_cache(maxsize=128)
 def leaf_levels(model: LeafModel) -> tuple[LeafLevel, ...]:
-    """Finer levels of a model, the coarsest of them first; none without a shape."""
+    """Finer levels of a model, the coarsest of them first; none of a model that is flat and has no shape."""
     if model.shape is None:
-        return ()
+        return _round_levels(model)
     found: list[LeafLevel] = []
     error = coarse_error(model)
     for tolerance in TOLERANCES:
@@ -145,18 +148,35 @@ def chosen_level(model: LeafModel, pixels: NDArray[np.float64]) -> NDArray[np.in
 
 @lru_cache(maxsize=128)
 def coarse_error(model: LeafModel) -> float:
-    """Largest distance between the margins of a model and of its shape, in lengths of the leaf; 0 without a shape.
+    """Largest distance between the margins of a model and of its shape, in lengths of the leaf; 0 without any.
 
     Of the shape as it is meant; single leaves differ from it by more, as leaves do. Needles cannot be told apart from
     what stands for them until the gaps between them can be seen.
     """
     if model.shape is None:
-        return 0.0
+        return rounded(model, 0)[1] if _is_round(model) else 0.0
     if isinstance(model.shape, Needles):
         return max(4.0 * model.shape.gap, 0.02)
     made = fitted(model.shape, TOLERANCES[2], model.area, model.reach, amount=0.0)
     fine, coarse = _margin(_model_of(made), not isinstance(model.shape, Compound)), _margin(model, stems=True)
     return max(_farthest(fine, coarse), _farthest(coarse, fine))
+
+
+def _round_levels(model: LeafModel) -> tuple[LeafLevel, ...]:
+    """Levels of a model with closed parts, which become rounder."""
+    found: list[LeafLevel] = []
+    for times in range(1, _ROUNDEST if _is_round(model) else 1):
+        made, error = rounded(model, times)
+        if made.polygons > MOST_POLYGONS:
+            break
+        tint = np.ones((made.polygons, 3), np.float32)
+        found.append(LeafLevel(made, made.positions[None].astype(np.float32), error, tint))
+    return tuple(found)
+
+
+def _is_round(model: LeafModel) -> bool:
+    """Whether parts of a model are closed, which is not one of the artist's own objects."""
+    return not model.textured and model.material_index is None and bool((closed_parts(model) >= 0).any())
 
 
 def _margin(model: LeafModel, stems: bool) -> NDArray[np.float64]:

@@ -1,0 +1,169 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Closed parts of models, such as berries and fleshy leaves, made round: the surface that their corners suggest.
+
+Faces are divided as by Loop ("Smooth subdivision surfaces based on triangles", 1987). Points of spines and leaves stay
+where they are, and each part keeps its area. What is open, such as stalks, stays as it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .models import LeafModel
+
+#: Angle of all faces around a vertex below which it is a point, and stays: a full turn on flat ground, 4/3 π on an
+#: octahedron.
+_POINTED = np.pi
+
+
+def closed_parts(model: LeafModel) -> NDArray[np.int64]:
+    """Which closed part each face (f,) belongs to, by the number of one of its faces; -1 for what is open.
+
+    A part is closed where each edge has two faces; it may share a vertex with a stalk.
+    """
+    of_corner = model.edges[1]
+    face = np.repeat(np.arange(model.polygons), np.diff(model.face_offsets))
+    order = np.argsort(of_corner, kind="stable")
+    paired = np.bincount(of_corner) == 2
+    pairs = face[order][paired[of_corner[order]]].reshape(-1, 2)
+    part = _connected(pairs, model.polygons)
+    return np.where(np.isin(part, part[face[~paired[of_corner]]]), -1, part)
+
+
+def rounded(model: LeafModel, times: int) -> tuple[LeafModel, float]:
+    """A model whose closed parts are divided so many times, each with the area that it had.
+
+    Parameters
+    ----------
+    model : LeafModel
+    times : int
+        Each makes four faces of a triangle.
+
+    Returns
+    -------
+    LeafModel
+        Triangles where parts are closed, and the faces of all others.
+    error : float
+        How far the middles of its edges are from the round surface, about, in units of the leaf's size.
+    """
+    of_face = closed_parts(model)
+    chosen = np.flatnonzero(of_face >= 0)
+    corners, uv, owner = _triangles(model, chosen)
+    points, part = model.positions, np.full(len(model.positions), -1)
+    part[corners] = of_face[chosen][owner, None]
+    fixed = _turns(points, corners) < _POINTED
+    area, middle = _areas(points, corners, part), _middles(points, part)
+
+    def scaled(points: NDArray, corners: NDArray, part: NDArray) -> NDArray[np.float64]:
+        larger = np.sqrt(area / np.maximum(_areas(points, corners, part, len(area)), 1e-300))
+        out = np.where((part >= 0)[:, None], middle[part] + larger[part, None] * (points - middle[part]), points)
+        return out * np.minimum(model.reach / np.maximum(np.linalg.norm(out, axis=1), 1e-300), 1.0)[:, None]
+
+    for _ in range(times):
+        points, corners, uv, part, fixed, _ = _divided(points, corners, uv, part, fixed)
+    finer, fine_corners, _, fine_part, _, edges = _divided(points, corners, uv, part, fixed)
+    now, then = scaled(points, corners, part), scaled(finer, fine_corners, fine_part)
+    off = np.linalg.norm(then[len(points) :] - now[edges].mean(axis=1), axis=1).max(initial=0.0)
+    # Each division leaves a quarter of the distance.
+    return _with_faces(model, now, corners, uv, np.flatnonzero(of_face < 0)), float(off * 4.0 / 3.0)
+
+
+def _divided(
+    points: NDArray, corners: NDArray, uv: NDArray, part: NDArray, fixed: NDArray
+) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray, NDArray]:
+    """Triangles (t, 3) with texture (t, 3, 2) divided once, with vertices, their parts, and whether they stay.
+
+    The last ones of the vertices are those of the edges (e, 2), which come as well.
+    """
+    count = len(points)
+    pairs = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2)
+    edges, of_side = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True)
+    of_side = of_side.reshape(-1, 3)
+    across = np.zeros_like(points, shape=(len(edges), 3))
+    np.add.at(across, of_side, points[np.roll(corners, 1, axis=1)])
+    new = 0.375 * points[edges].sum(axis=1) + 0.125 * across
+    number = np.bincount(edges.ravel(), minlength=count)
+    around = np.zeros_like(points)
+    np.add.at(around, edges, points[edges[:, ::-1]])
+    weight = 0.625 - (0.375 + 0.25 * np.cos(2.0 * np.pi / np.maximum(number, 1))) ** 2
+    moved = (1.0 - weight)[:, None] * points + (weight / np.maximum(number, 1))[:, None] * around
+    points = np.where(((part >= 0) & ~fixed)[:, None], moved, points)
+    a, b, c = corners.T
+    ab, bc, ca = (count + of_side).T
+    texture = np.stack([uv, 0.5 * (uv + np.roll(uv, -1, axis=1))], axis=1)  # (t, corner or middle, 3, 2)
+    (ta, tb, tc), (tab, tbc, tca) = (texture[:, i].transpose(1, 0, 2) for i in range(2))
+    faces = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+    textures = [(ta, tab, tca), (tab, tb, tbc), (tca, tbc, tc), (tab, tbc, tca)]
+    return (
+        np.concatenate([points, new]),
+        np.concatenate([np.stack(face, axis=1) for face in faces]),
+        np.concatenate([np.stack(one, axis=1) for one in textures]),
+        np.append(part, part[edges[:, 0]]),
+        np.append(fixed, np.zeros(len(edges), bool)),
+        edges,
+    )
+
+
+def _triangles(
+    model: LeafModel, faces: NDArray[np.intp]
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices (t, 3), texture (t, 3, 2) and owners (t,) of the triangles of faces: fans around their first corners."""
+    first, size = model.face_offsets[:-1][faces], np.diff(model.face_offsets)[faces]
+    owner = np.repeat(np.arange(len(faces)), size - 2)
+    step = np.arange(len(owner)) - np.repeat(np.cumsum(size - 2) - (size - 2), size - 2)
+    corner = np.stack([first[owner], first[owner] + step + 1, first[owner] + step + 2], axis=1)
+    return model.corner_verts[corner].astype(np.int64), model.uv[corner].astype(np.float64), owner
+
+
+def _with_faces(
+    model: LeafModel, points: NDArray, corners: NDArray, uv: NDArray, others: NDArray[np.intp]
+) -> LeafModel:
+    """A model of triangles and of some faces of another one."""
+    size = np.diff(model.face_offsets)[others]
+    kept = np.repeat(model.face_offsets[:-1][others] - np.cumsum(size) + size, size) + np.arange(size.sum())
+    return replace(
+        model,
+        positions=points,
+        corner_verts=np.append(corners.ravel(), model.corner_verts[kept]).astype(np.int32),
+        face_offsets=np.cumsum(np.concatenate([[0], np.full(len(corners), 3), size])).astype(np.int32),
+        uv=np.concatenate([uv.reshape(-1, 2), model.uv[kept]]).astype(np.float32),
+    )
+
+
+def _connected(pairs: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """Least number of all that each of so many things is connected with by pairs (p, 2)."""
+    part = np.arange(count)
+    while True:
+        least = part.copy()
+        np.minimum.at(least, pairs, part[pairs[:, ::-1]])
+        least = least[least]
+        if (least == part).all():
+            return part
+        part = least
+
+
+def _turns(points: NDArray[np.float64], corners: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Angle (v,) of all triangles (t, 3) around vertices, radians."""
+    place = points[corners]
+    ahead, behind = np.roll(place, -1, axis=1) - place, np.roll(place, 1, axis=1) - place
+    cosine = (ahead * behind).sum(axis=2)
+    sine = np.linalg.norm(np.cross(ahead, behind), axis=2)
+    return np.bincount(corners.ravel(), np.arctan2(sine, cosine).ravel(), len(points))
+
+
+def _areas(points: NDArray, corners: NDArray, part: NDArray, count: int | None = None) -> NDArray[np.float64]:
+    """Area (count,) of the triangles of each closed part, by its number."""
+    a, b, c = points[corners].transpose(1, 0, 2)
+    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    return np.bincount(part[corners[:, 0]], area, part.max(initial=0) + 1 if count is None else count)
+
+
+def _middles(points: NDArray[np.float64], part: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Mean place (count, 3) of the vertices of each closed part, by its number."""
+    own = np.flatnonzero(part >= 0)
+    number = np.maximum(np.bincount(part[own]), 1)
+    return np.stack([np.bincount(part[own], axis[own]) for axis in points.T], axis=1) / number[:, None]
