@@ -45,7 +45,7 @@ _PATCHES = 5.0
 # Where light and rain come from: moss faces north and up.
 _SHADY = (0.0, 0.76, 0.65)
 # What lies so many radii below the base of a branch is an old root.
-_ROOTS = -0.5
+_ROOTS = -0.1
 # Up to this height rain splashes from the ground, metres.
 _SPLASH = 0.7
 # Colours of moss, algae and lichen over the lightness of the bark under them.
@@ -181,6 +181,7 @@ def bark_group(character: str) -> bpy.types.NodeTree:
         bump = graph.node("ShaderNodeBump", {"Strength": 1.0, "Distance": depth, "Height": height})
         # Only trunks flare, and these are thick.
         shown = graph.math('GREATER_THAN', girth, given["Smooth Under"])
+        shown = graph.math('MAXIMUM', shown, graph.math('LESS_THAN', where["Along"], 0.0))
         tilt = graph.vector('DOT_PRODUCT', bump, graph.node("ShaderNodeNewGeometry").outputs["Normal"])
         gain = graph.math('DIVIDE', 2.0, graph.math('ADD', 1.0, graph.math('MAXIMUM', tilt, 0.0)))
         # Tilted normals explain most of the loss; the rest is measured.
