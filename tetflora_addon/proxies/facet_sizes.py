@@ -45,8 +45,8 @@ _LOOSE = 16.0
 #: Largest side of facets beside the view over their distance from it; metres that count least, and from which on it
 #: grows faster.
 _BESIDE = 0.1, 8.0, 15.0
-#: The same of those that throw shadows into the view, over the metres that these fall.
-_THROWN = 0.02
+#: The same of those that throw shadows into the view, over the metres that these fall, and the metres that count least.
+_THROWN, _SHARP = 0.02, 1.0
 #: Power of the visibility by which facets are larger where they are seen in part, and the visibility that counts least.
 FADING, LEAST_VISIBILITY = 0.5, 0.08
 #: Sides of facets of wood, however little is seen of it, over those that are seen well.
@@ -124,16 +124,16 @@ class FacetSizes(Arrays):
         side = fading * pixels.seen * self.extent
         coarse = np.minimum(self.coarse * pixels.seen, max(_JUST_HIDDEN * pixels.seen, _WIDEST)) * self.extent
         blurred = np.minimum(_SOFT * np.maximum(self.clearance, 0.0), np.sqrt(self.totals.optical_area / _FEWEST))
-        # Near the camera, some leaves together are large in the image, and what is hidden shows between others.
-        several = np.sqrt(HIDDEN_LEAVES * self.one_leaf)
-        leaves = np.where(self.clearance > 0.0, several, np.minimum(several, _BLOT * self.extent))
+        # Near the camera, some leaves together are large in the image, and what is hidden shows between others; beside
+        # the view the shape of their shadow does.
+        several, thrown = np.sqrt(HIDDEN_LEAVES * self.one_leaf), _THROWN * np.maximum(self.shadow, _SHARP)
+        leaves = np.minimum(several, np.where(self.clearance > 0.0, thrown, _BLOT * self.extent))
         unseen = np.maximum(np.maximum(coarse, blurred), leaves)
         # What is only just hidden shows between crowns after all, and would be blots.
         deep = np.clip((self.coarse - COARSE) / _DEEP, 0.0, 1.0)
         beside = self.clearance > 0.0
         near, nearest, far = _BESIDE
         away = np.maximum(self.clearance, nearest)
-        thrown = _THROWN * np.maximum(self.shadow, nearest)
         most = np.where(beside, np.minimum(near * away * (1.0 + (away / far) ** 2), thrown), 0.0)
         blot = np.minimum((np.maximum(self.coarse, COARSE) / COARSE) ** 1.5 * max(_WIDEST, pixels.seen), _BLOT)
         # Where a forest has too many even so, these limits give way.
@@ -145,7 +145,7 @@ class FacetSizes(Arrays):
         side = np.where(self.hidden, unseen, side)
         # Hidden wood is cut into no more facets than it has faces. Elsewhere it is cut as fine as the side requires, or
         # thin twigs would become blots.
-        least = np.where(beside, self.least_wood, np.minimum(self.least_wood, np.maximum(most, several)))
+        least = np.minimum(self.least_wood, np.where(beside, thrown, np.maximum(most, several)))
         wood = np.where(self.hidden, np.maximum(side, least), wood)
         return np.maximum(side, np.sqrt(self.one_leaf)), wood
 
