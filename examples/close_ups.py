@@ -177,32 +177,32 @@ class Subject:
         bpy.context.view_layer.update()
 
 
-def render(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES) -> None:
-    """Refine for the camera and render."""
+def render(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES, grey: float = _GREY) -> None:
+    """Refine for the camera and render; ``grey`` is the mean that the exposure aims at."""
     from tetflora_addon.blender.job import refine
 
     scene = bpy.context.scene
     scene.tetflora.refine_at_render = False
-    refine.refine(scene, bpy.context.evaluated_depsgraph_get())
     scene.render.engine = 'CYCLES'
-    scene.cycles.samples, scene.cycles.use_denoising = samples, True
     scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
+    refine.refine(scene, bpy.context.evaluated_depsgraph_get())
+    scene.cycles.samples, scene.cycles.use_denoising = samples, True
     scene.view_settings.exposure = 0.55
     scene.view_settings.look = 'AgX - Medium High Contrast'
     set_format(scene.render.image_settings, 'PNG')
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
-    scene.view_settings.exposure += _metered(path)
+    scene.view_settings.exposure += _metered(path, grey)
     bpy.data.images["Render Result"].save_render(str(path), scene=scene)
 
 
-def _metered(path: Path) -> float:
+def _metered(path: Path, grey: float) -> float:
     """Stops by which a picture is too dark, as a camera meters: views in shade are longer exposed than in the sun."""
     from PIL import Image
 
     mean = np.asarray(Image.open(path).convert("L")).mean() / 255.0
-    return float(np.clip(2.0 * np.log2(_GREY / max(mean, 1e-3)), -0.7, 2.0))
+    return float(np.clip(2.0 * np.log2(grey / max(mean, 1e-3)), -0.7, 2.0))
 
 
 def render_views(

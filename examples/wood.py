@@ -29,10 +29,10 @@ ROOT = Path(__file__).resolve().parent.parent
 #: Distances of the eight pictures from the leaf, metres.
 DISTANCES = tuple(np.geomspace(400.0, 0.15, 8).tolist())
 #: Relative numbers of the species, and how far from each other they stand at least (m), and how many on a hectare.
-TREES = {"beech": 0.3, "oak": 0.2, "birch": 0.2, "hornbeam": 0.12, "spruce": 0.1, "rowan": 0.08}
-_APART, _DENSITY = 3.6, 480.0
+TREES = {"beech": 0.32, "oak": 0.2, "birch": 0.14, "hornbeam": 0.12, "hazel": 0.12, "spruce": 0.06, "rowan": 0.04}
+_APART, _DENSITY = 3.4, 520.0
 #: How much the trees have grown as between others.
-_HABIT = 0.75
+_HABIT = 0.6
 #: Brightness of the sky to the camera over that of its light: on film it is not as bright as its light on leaves.
 _SEEN = 0.62
 #: Side of the land, and of the part around the oak and the eye of which every blade is planted, metres.
@@ -43,6 +43,8 @@ _EYE, _AHEAD = (24.0, 22.0, 1.65), (38.0, 52.0, 3.6)
 _TOWARDS = np.array([0.16, -0.98, 0.12]) / np.linalg.norm([0.16, 0.98, 0.12])
 _ELEVATION, _AZIMUTH = 38.0, 236.0
 _SKY = 0.9
+#: Mean of the picture from inside, where sunlit boles would else be white.
+_SHADE = 0.27
 _MASK = "wood"
 
 
@@ -190,7 +192,7 @@ def render_interior(path: Path, size: tuple[int, int] = (1280, 720), samples: in
     )
     aim(scene, ahead, eye, 28.0)
     with tempfile.TemporaryDirectory() as folder:
-        render(Path(folder) / "interior.png", size, samples)
+        render(Path(folder) / "interior.png", size, samples, grey=_SHADE)
         save_jpeg(Image.open(Path(folder) / "interior.png").convert("RGB"), path)
 
 
