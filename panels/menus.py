@@ -11,6 +11,7 @@ from ..operators.add import (
     TETFLORA_OT_use_as_form,
 )
 from ..operators.brush import TETFLORA_OT_paint_plants
+from ..operators.ground_cover import TETFLORA_OT_ground_cover
 from ..operators.ground_tools import TETFLORA_OT_place_plant
 from ..operators.marks import (
     TETFLORA_OT_make_field,
@@ -26,7 +27,14 @@ from ..operators.plants import (
     TETFLORA_OT_reseed,
     TETFLORA_OT_select_species,
 )
-from ..operators.refine import TETFLORA_OT_clear, TETFLORA_OT_make_plant_mesh, TETFLORA_OT_refine
+from ..operators.populations import TETFLORA_OT_export_populations, TETFLORA_OT_import_populations
+from ..operators.preview import TETFLORA_OT_preview_levels
+from ..operators.refine import (
+    TETFLORA_OT_clear,
+    TETFLORA_OT_keep_results,
+    TETFLORA_OT_make_plant_mesh,
+    TETFLORA_OT_refine,
+)
 from ..tetflora_addon.blender.runtime import open_menu
 from ..tetflora_addon.blender.species.edits import catalogue
 from ..tetflora_addon.species.catalogue import FIRST
@@ -125,7 +133,14 @@ class TETFLORA_MT_object(bpy.types.Menu):
             _PAINT,
         )
         draw_place_menu(layout)
-        draw_buttons(layout, _DROP, None)
+        draw_buttons(
+            layout,
+            _DROP,
+            Button(TETFLORA_OT_ground_cover, 'OUTLINER_OB_CURVES'),
+            Button(TETFLORA_OT_import_populations, 'IMPORT', "Import Populations..."),
+            Button(TETFLORA_OT_export_populations, 'EXPORT', "Export Populations..."),
+            None,
+        )
         draw_species_menu(layout)
         draw_buttons(
             layout,
@@ -134,7 +149,9 @@ class TETFLORA_MT_object(bpy.types.Menu):
             Button(TETFLORA_OT_remove_plants, 'X', "Remove Selected Plants", {"which": 'SELECTED'}),
             Button(TETFLORA_OT_remove_plants, 'TRASH', "Remove All Plants", {"which": 'ALL'}),
             None,
+            Button(TETFLORA_OT_preview_levels, 'MOD_REMESH'),
             Button(TETFLORA_OT_refine, 'MOD_DECIM', "Refine Plants"),
+            Button(TETFLORA_OT_keep_results, 'MESH_DATA'),
             Button(TETFLORA_OT_clear, 'TRASH', "Clear Results"),
         )
 
