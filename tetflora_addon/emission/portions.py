@@ -101,7 +101,7 @@ class Sight:
         self._inside = result.in_view | self._explicit
         self._coarse = coarseness(result)
         # Hidden, within the view, and near enough at least in places.
-        self._close = np.zeros(size, bool)
+        self._close, self._facets = np.zeros(size, bool), facets
         if facets:
             self._close[nodes] = (result.decision == Decision.HIDDEN) & (result.cells.feature >= CLOSE)
             self._close &= result.in_view
@@ -144,7 +144,8 @@ class Sight:
             np.where(first >= 0, self._rank[cell[first]], 0).astype(np.int32),
             np.ones(count),
         )
-        self._let_in(made, np.bincount(points.part, minlength=count))
+        if self._facets:
+            self._let_in(made, np.bincount(points.part, minlength=count))
         return made
 
     def _close_points(self, parts: PlantParts, points: SharePoints) -> NDArray[np.intp]:
