@@ -38,6 +38,8 @@ _TOWARDS = np.array([-0.25, -0.86, 0.44]) / np.linalg.norm([0.25, 0.86, 0.44])
 _SHADOWS = 10.0
 #: Mean of a picture that is well exposed, of its display values.
 _GREY = 0.34
+#: Pixels of a sheet at most: what fits into the size of a picture of the documentation.
+_LARGEST_SHEET = (1500, 1800)
 #: Strength of the sky: bright haze, which opens the shade under crowns.
 _SKY = 0.9
 #: Height of the breast, metres, where foresters measure girth.
@@ -245,6 +247,7 @@ def store_sheet(rows: list[list[Path]], path: Path) -> None:
     for j, row in enumerate(rows):
         for i, one in enumerate(row):
             sheet.paste(Image.open(one).convert("RGB"), (i * width, j * height))
+    sheet.thumbnail(_LARGEST_SHEET)
     save_jpeg(sheet, path)
 
 
