@@ -58,6 +58,8 @@ _STEPS = 10  # of bisection on the logarithm of factors, between 1 and:
 _LARGEST = 256.0
 #: Parts that are looked at together; sums of these are summed up in their order.
 _TOGETHER = 50_000
+#: Fraction of a limit up to which what is expected certainly fits.
+_SURE = 0.6
 #: Largest factor on hidden facets that the image alone may ask for.
 _LARGEST_HIDDEN = 96.0
 #: Fraction of what is allowed that finer levels of near leaves may always have, and tolerances that are tried.
@@ -133,7 +135,7 @@ def afford(
         count.calibrate(FacetPixels(settings.facet), settings.leaf_limit)
         count.tolerance = _tolerance(count, settings, limits)
     factor, hidden = _affordable(count, settings, limits)
-    if factor > 1.0 or hidden > 1.0:
+    if factor > 1.0 or hidden > 1.0 or (np.isfinite(hard) and count.all(settings) > _SURE * hard):
         # What is expected of parts that will be opened is rough; some of them tell by how much.
         count.calibrate(FacetPixels(_side(factor, settings), hidden), _limit(factor, settings))
         factor, hidden = _affordable(count, settings, limits)
@@ -290,6 +292,12 @@ class _Facets:
         """Facets of all plants that are not seen; safe as for `seen`."""
         found = on_all_cores(lambda sizes: float(sizes.counts(pixels).sum()), self.unseen_sizes)
         return float(max(self.found[1], float(safe))) * sum(found)
+
+    def all(self, settings: RefinementSettings) -> float:
+        """Polygons and facets together, at the details of the settings."""
+        pixels, limit = settings.facet, settings.leaf_limit
+        of_meshes = self.polygons(pixels, limit, 1.0, True)
+        return self.seen(pixels, limit, 1.0, True) + of_meshes + self.unseen(FacetPixels(pixels), True)
 
     def calibrate(self, pixels: FacetPixels, limit: float) -> None:
         """Draw some of the plants, and expect of all what was found of these."""
