@@ -28,7 +28,7 @@ from .close_ups import render, store_sheet
 ROOT = Path(__file__).resolve().parent.parent
 #: Distances of the eight pictures from the leaf, metres.
 DISTANCES = tuple(np.geomspace(400.0, 0.15, 8).tolist())
-#: Relative numbers of the species, and how far from each other they stand at least (m), and how many on a hectare.
+#: Relative numbers of the species; how far from each other they stand at least, metres, and how many on a hectare.
 TREES = {"beech": 0.32, "oak": 0.2, "birch": 0.14, "hornbeam": 0.12, "hazel": 0.12, "spruce": 0.06, "rowan": 0.04}
 _APART, _DENSITY = 3.4, 520.0
 #: How much the trees have grown as between others.
@@ -92,7 +92,7 @@ def build(scene: bpy.types.Scene) -> None:
 
 
 def _ground(name: str, side: float, step: float, hole: float) -> bpy.types.Object:
-    """A grid of a side in metres, without a hole in its middle; where the wood is becomes an attribute."""
+    """A grid with a square hole in its middle, of sides in metres; where the wood is becomes an attribute."""
     from tetflora_addon.blender.attributes import write
 
     number = round(side / step) + 1
