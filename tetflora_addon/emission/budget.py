@@ -135,7 +135,7 @@ def afford(
         count.calibrate(FacetPixels(settings.facet), settings.leaf_limit)
         count.tolerance = _tolerance(count, settings, limits)
     factor, hidden = _affordable(count, settings, limits)
-    if factor > 1.0 or hidden > 1.0 or (np.isfinite(hard) and count.all(settings) > _SURE * hard):
+    if factor > 1.0 or hidden > 1.0 or (np.isfinite(hard) and count.together(settings) > _SURE * hard):
         # What is expected of parts that will be opened is rough; some of them tell by how much.
         count.calibrate(FacetPixels(_side(factor, settings), hidden), _limit(factor, settings))
         factor, hidden = _affordable(count, settings, limits)
@@ -293,8 +293,8 @@ class _Facets:
         found = on_all_cores(lambda sizes: float(sizes.counts(pixels).sum()), self.unseen_sizes)
         return float(max(self.found[1], float(safe))) * sum(found)
 
-    def all(self, settings: RefinementSettings) -> float:
-        """Polygons and facets together, at the details of the settings."""
+    def together(self, settings: RefinementSettings) -> float:
+        """Expected polygons and facets of all, seen or not, at the details of the settings."""
         pixels, limit = settings.facet, settings.leaf_limit
         of_meshes = self.polygons(pixels, limit, 1.0, True)
         return self.seen(pixels, limit, 1.0, True) + of_meshes + self.unseen(FacetPixels(pixels), True)

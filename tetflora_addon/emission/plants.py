@@ -29,6 +29,7 @@ from ..growth.branches import Branches
 from ..growth.growth import WholeBranches, trunks
 from ..growth.hashing import Draw, uniform
 from ..growth.seeds import Seeds
+from ..refinement.contents import feature_width
 from ..refinement.decisions import real_fraction
 from ..refinement.loop import Refinement
 from ..species.species import LEAF_KINDS
@@ -37,7 +38,7 @@ from ..subplants.pieces import chunks, expand
 from ..subplants.tubes import tube_buffers
 from ..subplants.twigs import twig_buffers
 from .leaf_detail import FADING, TOLERANCE, LeafDetail
-from .portions import MIXED, Portions, Sight, feature_width, in_chunks
+from .portions import MIXED, Portions, Sight, in_chunks
 
 #: Fraction of leaves that counts at least: opening sub-plants for a few real leaves is work as well.
 _LEAST_REAL = 0.1

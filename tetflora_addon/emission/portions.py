@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from ..arrays import Arrays, column, nested
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
-from ..growth.branches import Branches
 from ..proxies.facet_sizes import coarseness
 from ..proxies.thrown_shadows import ThrownShadows
+from ..refinement.contents import feature_width
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 from ..refinement.shares import PlantParts, SharePoints, lowered, opened, share_points
@@ -168,7 +168,7 @@ class Sight:
         parts = portions.parts.take(at)
         some, reach = parts.branches, _REACH * parts.extent
         middle = some.position + 0.5 * some.length[:, None] * some.frame[:, :, 2]
-        slope = self.camera.pixel_size if self.camera.kind == "PERSP" else 0.0
+        slope = 0.0 if self.camera.kind == "ORTHO" else self.camera.pixel_size
         nearest = self.camera.extent_around(middle) - slope * reach
         at = at[(feature_width(self.flora, some) >= CLOSE * nearest) & (self.camera.clearance(middle) < reach)]
         portions.visibility[at] = portions.best[at] = CLOSE**-2.0
@@ -200,12 +200,6 @@ class Sight:
     def pixels(self, portions: Portions) -> NDArray[np.float64]:
         """Extent (n,) of parts in the image."""
         return self.plants.pixels(portions.parts)
-
-
-def feature_width(flora: Flora, branches: Branches) -> NDArray[np.float64]:
-    """Width (n,) of what sub-plants are known by, metres: that of their leaves, or of their branch without any."""
-    row = branches.row
-    return np.where(flora.leaf_count[row] > 0, flora.leaf_width[row] * branches.scale, 2.0 * branches.radius)
 
 
 _INHERITED = ("visibility", "best", "real", "mixed", "beside", "coarse", "rank", "within")

@@ -66,14 +66,18 @@ class Totals(Arrays):
 
 def subplant_totals(flora: Flora, subplants: Branches) -> Totals:
     """Compiled means for sub-plants."""
-    row = subplants.row
-    leafy = flora.leaf_count[row] > 0
     return Totals(
         flora.leaf_areas(subplants),
         flora.wood_areas(subplants),
         flora.face_counts(subplants),
-        np.where(leafy, flora.leaf_width[row] * subplants.scale, 2 * subplants.radius),
+        feature_width(flora, subplants),
     )
+
+
+def feature_width(flora: Flora, subplants: Branches) -> NDArray[np.float64]:
+    """Width (n,) of the features of sub-plants, metres: that of their leaves, or of their branch without any."""
+    row = subplants.row
+    return np.where(flora.leaf_count[row] > 0, flora.leaf_width[row] * subplants.scale, 2.0 * subplants.radius)
 
 
 def piece_totals(flora: Flora, pieces: Pieces) -> Totals:
