@@ -22,6 +22,7 @@ from ..species.species import Range, crown_ratio
 
 NODES = np.array([0.0, 0.5, 1.0])
 _FRACTIONS = (np.arange(256) + 0.5) / 256
+_GAUSS, _WEIGHTS = (np.polynomial.legendre.leggauss(5)[0] + 1) / 2, np.polynomial.legendre.leggauss(5)[1] / 2
 
 
 @dataclass(frozen=True)
@@ -104,9 +105,29 @@ def row_leaves(
 
 
 def own_leaf_integrals(
-    size_tip: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Means of (size at a place)² / (size inside)², and of that times the place, over places low to high (n,)."""
+    size_tip: NDArray[np.float64],
+    size_young: NDArray[np.float64],
+    outward: tuple[NDArray[np.float64], NDArray[np.float64]],
+    along: tuple[NDArray[np.float64], NDArray[np.float64]] | None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Means over leaves that sit evenly between two places.
+
+    Parameters
+    ----------
+    size_tip, size_young : (n,) float64
+        Factors on the size of leaves outside, and of young ones.
+    outward : pair of (n,) float64
+        Where the two places lie between inside and outside of the crown,
+    along : pair of (n,) float64, optional
+        and along the branch of the order; None where no leaves are young.
+
+    Returns
+    -------
+    (n,) float64, three times
+        Means of (size)² / (size of old leaves inside)²; of that times the place between inside and outside; and of that
+        times the youth of leaves (`growth.foliage.youth`).
+    """
+    low, high = outward
     k = size_tip - 1
 
     def moment(power: int) -> NDArray[np.float64]:  # mean of o^power over the interval, exact where it is a point
@@ -114,7 +135,19 @@ def own_leaf_integrals(
         return sum(terms) / (power + 1)
 
     first = 1 + 2 * k * moment(1) + k * k * moment(2)
-    return first, moment(1) + 2 * k * moment(2) + k * k * moment(3)
+    second = moment(1) + 2 * k * moment(2) + k * k * moment(3)
+    if along is None:
+        return first, second, np.zeros_like(first)
+    # With young leaves, polynomials of degree 8 at most: five nodes of Gauss integrate them exactly.
+    o, q = (ends[0][..., None] + (ends[1] - ends[0])[..., None] * _GAUSS for ends in (outward, along))
+    young = q * q
+    area = ((1 + k[:, None] * o) * (1 + (size_young - 1)[:, None] * young)) ** 2
+    alike = size_young == 1
+    return (
+        np.where(alike, first, area @ _WEIGHTS),
+        np.where(alike, second, (area * o) @ _WEIGHTS),
+        (area * young) @ _WEIGHTS,
+    )
 
 
 def average(rows: NDArray[np.void], leaf: RowLeaves) -> Averages:
@@ -137,10 +170,13 @@ def average(rows: NDArray[np.void], leaf: RowLeaves) -> Averages:
     for n, place in enumerate(NODES):
         low = np.where(rows["outward"], first + (last - first) * start, place)
         high = np.where(rows["outward"], last, place)
-        area, area_outward = own_leaf_integrals(rows["leaf_size_tip"], low, high)
+        sizes = rows["leaf_size_tip"], rows["leaf_size_young"]
+        area, area_outward, area_young = own_leaf_integrals(*sizes, (low, high), (first + (last - first) * start, last))
         leaf_area[every, n, every] = one_area * area
-        inside, tip = rows["leaf_colour"][:, 0], rows["leaf_colour_tip"]
-        leaf_colour[:, n] = one_area[:, None] * (area[:, None] * inside + area_outward[:, None] * (tip - inside))
+        inside, tip, young = rows["leaf_colour"][:, 0], rows["leaf_colour_tip"], rows["leaf_colour_young"]
+        leaf_colour[:, n] = one_area[:, None] * (
+            area[:, None] * inside + area_outward[:, None] * (tip - inside) + area_young[:, None] * (young - inside)
+        )
     whole = profile_integral(exact, every, no_key, np.ones(r))
     real = ~rows["phantom"]
     fixed_wood = eye * (tube_perimeter(np.maximum(rows["sides"], 3)) * whole * real)

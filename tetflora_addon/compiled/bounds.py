@@ -77,7 +77,8 @@ def widest_radii(rows: NDArray[np.void]) -> NDArray[np.float64]:
 
 def own_leaf_reaches(rows: NDArray[np.void], model_reach: NDArray[np.float64]) -> NDArray[np.float64]:
     """How far leaves stick out beyond the axes that bear them (r,), at plant scale 1, metres; see `leaf_reaches`."""
-    largest = rows["leaf_size"].sum(axis=1) * np.maximum(rows["leaf_size_tip"], 1)
+    factor = np.maximum(rows["leaf_size_tip"], 1) * np.maximum(rows["leaf_size_young"], 1)
+    largest = rows["leaf_size"].sum(axis=1) * factor
     return np.where(rows["leaves"].sum(axis=1) > 0, largest * model_reach, 0.0)
 
 

@@ -119,6 +119,12 @@ class Flora:
         return replace(windy, rows=rows)
 
     @cached_property
+    def has_young(self) -> bool:
+        """Whether any leaves at the ends of branches differ from others."""
+        coloured = (self.rows["leaf_colour_young"] != self.rows["leaf_colour"][:, 0]).any()
+        return bool(coloured or (self.rows["leaf_size_young"] != 1).any())
+
+    @cached_property
     def samples(self) -> Samples:
         """Points on the leaves and wood of sub-plants; drawn when first asked for, as only proxies need them."""
         if self.calm is not None:
@@ -218,7 +224,9 @@ def _compiled(species: tuple[Species, ...]) -> Flora:
     leaves, area = totals.leaves, totals.leaf_area[:, 1]
     wood = _wood_totals(totals)
     leaf_count, leaf_area = leaves.sum(axis=1), area.sum(axis=1)
-    size = rows["leaf_size"][:, 0] * (1 + rows["leaf_size_tip"]) / 2
+    bare = rows["leaf_start"][:, 0]
+    smaller = 1 + (rows["leaf_size_young"] - 1) * (1 + bare + bare * bare) / 3  # mean over the leaves of a branch
+    size = rows["leaf_size"][:, 0] * (1 + rows["leaf_size_tip"]) / 2 * smaller
     fixed, full = totals.fixed_faces.sum(axis=1), totals.full_faces.sum(axis=1)
     polygons = fixed + full + leaves @ leaf.polygons
     return Flora(

@@ -21,11 +21,12 @@ from numpy.typing import NDArray
 from ..arrays import GOLDEN_ANGLE, columns, cross, perpendicular, spiral
 from ..growth.axes import Axes, axes
 from ..growth.branches import Branches
-from ..growth.foliage import leaf_frames, leaf_keys, leaf_places, outwardness, settled
+from ..growth.foliage import leaf_frames, leaf_keys, leaf_lights, leaf_places, leaf_sizes, outwardness, settled
 from ..growth.growth import branch_counts, chosen_children, drawn_children, fullness, leaf_counts, radius_at
 from ..growth.hashing import Draw, key_of_seed, mix, thinned, uniform
 from ..growth.rows import FORK, LATERAL, SPUR, ranged
 from ..leaves.models import LeafModel
+from .averages import NODES, quadratic
 
 _PIECE = 128
 _BRANCHES = 2048  # of each row that are looked at, each with the sky elsewhere
@@ -47,9 +48,12 @@ class Orientation:
 
     Attributes
     ----------
-    leaves, own_leaves, wood : (r, 33, 6) float64
-        Coefficients of xx, yy, zz, xy, xz, yz of the mean of n nᵀ: over all leaves of the sub-plant, over those of its
-        branch itself where that is straight, and over its wood.
+    leaves, own_leaves : (r, 3, 33, 6) float64
+        Coefficients of xx, yy, zz, xy, xz, yz of the mean of n nᵀ: over all leaves of the sub-plant, and over those of
+        its branch itself where that is straight; at `averages.NODES` between inside and outside of the crown, or
+        (r, 1, 33, 6) where no leaves turn to the sky otherwise outside than inside.
+    wood : (r, 1, 33, 6) float64
+        The same over its wood.
     """
 
     leaves: NDArray[np.float64]
@@ -59,30 +63,47 @@ class Orientation:
 
 def leaf_moments(orientation: Orientation, subplants: Branches) -> NDArray[np.float64]:
     """Mean of n nᵀ over the leaves of sub-plants, (n, 3, 3) float64 of trace 1 (0 for rows without leaves)."""
-    return _evaluated(orientation.leaves, subplants.row, subplants.frame)
+    return _evaluated(orientation.leaves, subplants.row, subplants.frame, subplants.outward)
 
 
 def own_leaf_moments(
-    orientation: Orientation, row: NDArray[np.integer], axis: NDArray[np.float64]
+    orientation: Orientation,
+    row: NDArray[np.integer],
+    axis: NDArray[np.float64],
+    outward: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """The same (n, 3, 3) over the leaves that straight pieces of branches bear, given by row (n,) and axis (n, 3)."""
-    return _evaluated(orientation.own_leaves, row, _frames_along(axis))
+    """The same (n, 3, 3) over the leaves that straight pieces of branches bear.
+
+    They are given by row (n,), axis (n, 3), and place (n,) between inside and outside of the crown.
+    """
+    return _evaluated(orientation.own_leaves, row, _frames_along(axis), outward)
 
 
 def wood_moments(orientation: Orientation, subplants: Branches) -> NDArray[np.float64]:
     """Mean of n nᵀ over the branches of sub-plants, (n, 3, 3) float64 of trace 1."""
-    return _evaluated(orientation.wood, subplants.row, subplants.frame)
+    return _evaluated(orientation.wood, subplants.row, subplants.frame, subplants.outward)
 
 
 def _evaluated(
-    coefficients: NDArray[np.float64], row: NDArray[np.integer], frame: NDArray[np.float64]
+    coefficients: NDArray[np.float64],
+    row: NDArray[np.integer],
+    frame: NDArray[np.float64],
+    outward: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Moments (n, 3, 3) in the world, by polynomials (r, 33, 6) of rows (n,), for branches with frames (n, 3, 3)."""
+    """Moments (n, 3, 3) in the world for branches with frames (n, 3, 3), so far outside in the crown (n,).
+
+    By polynomials (r, 1, 33, 6) of rows (n,), or (r, 3, 33, 6) at `NODES`.
+    """
     basis = _basis(frame[:, 2, :])
     local = np.zeros((len(row), 6))
     for r in np.unique(row):
         chosen = slice(None) if (row == r).all() else np.flatnonzero(row == r)
-        local[chosen] = _product(basis[chosen], coefficients[r])
+        nodes = coefficients[r]
+        if (nodes == nodes[0]).all():
+            local[chosen] = _product(basis[chosen], nodes[0])
+            continue
+        for weight, node in zip(quadratic(outward[chosen]).T, nodes, strict=True):
+            local[chosen] += weight[:, None] * _product(basis[chosen], node)
     trace = local[:, :3].sum(axis=1, keepdims=True)
     return _turned(local / np.where(trace > 0, trace, 1), frame)
 
@@ -153,7 +174,8 @@ def orientation_of(
     length : (r,) float64
         Typical length of a branch at plant scale 1, metres.
     """
-    out = Orientation(*np.zeros((3, len(rows), _TERMS, 6)))
+    nodes = NODES if rows["sunlit"].any() else NODES[:1]
+    out = Orientation(*np.zeros((2, len(rows), len(nodes), _TERMS, 6)), np.zeros((len(rows), 1, _TERMS, 6)))
     turn = _model_moments(rows, forms)
     leaf_area, wood_area = leaf.sum(axis=1), wood.sum(axis=1)
     skies = _skies_met(rows, length)
@@ -164,19 +186,22 @@ def orientation_of(
         row, scale = children.row, branches.scale[0]
         basis = _basis(branches.frame[:, 2, :])
         # What grows on the children is turned as they are; own leaves and the own branch are looked at one by one.
-        if leaf_area[i] > 0:
+        beyond = rows["order"][i] > 1  # the limbs: all that grows here is as far outside as the branch
+        for node, place in enumerate(nodes if leaf_area[i] > 0 else ()):
+            outward = np.full(len(row), place) if beyond else children.outward
             weight = stands * fullness(rows, children) * leaf_area[row] * scale**2
-            leaves = _Sums.of(len(branches), owner, _evaluated(out.leaves, row, children.frame), weight)
+            leaves = _Sums.of(len(branches), owner, _evaluated(out.leaves, row, children.frame, outward), weight)
             if leaf[i, i] > 0:
-                leaves = _own_leaves(rows, branches, lines, turn[i]).mixed(leaves, leaf[i, i] / leaf_area[i])
-                straight = _own_leaves(rows, branches, _straight(branches), turn[i])
-                out.own_leaves[i] = straight.fitted(branches, basis)
-            out.leaves[i] = leaves.fitted(branches, basis)
+                own = _own_leaves(rows, branches, lines, turn[i], place if beyond else None)
+                leaves = own.mixed(leaves, leaf[i, i] / leaf_area[i])
+                straight = _own_leaves(rows, branches, _straight(branches), turn[i], place)
+                out.own_leaves[i, node] = straight.fitted(branches, basis)
+            out.leaves[i, node] = leaves.fitted(branches, basis)
         weight = stands * children.length * children.radius * wood_area[row]
-        bark = _Sums.of(len(branches), owner, _evaluated(out.wood, row, children.frame), weight)
+        bark = _Sums.of(len(branches), owner, _evaluated(out.wood, row, children.frame, children.outward), weight)
         if not rows["phantom"][i]:
             bark = _own_wood(rows, branches, lines).mixed(bark, wood[i, i] / wood_area[i])
-        out.wood[i] = bark.fitted(branches, basis)
+        out.wood[i, 0] = bark.fitted(branches, basis)
     return out
 
 
@@ -300,8 +325,10 @@ def _straight(branches: Branches) -> Axes:
     return Axes(knots, branches.frame[:, None], np.ones(len(branches), np.int64))
 
 
-def _own_leaves(rows: NDArray[np.void], branches: Branches, lines: Axes, turn: NDArray[np.float64]) -> _Sums:
-    """Some leaves of each branch."""
+def _own_leaves(
+    rows: NDArray[np.void], branches: Branches, lines: Axes, turn: NDArray[np.float64], place: float | None
+) -> _Sums:
+    """Some leaves of each branch, all turned to the sky as leaves in one place between inside and outside, if so."""
     counts = leaf_counts(rows, branches)
     if not counts.any():
         counts = np.ones_like(counts)
@@ -321,10 +348,10 @@ def _own_leaves(rows: NDArray[np.void], branches: Branches, lines: Axes, turn: N
         roll, index = roll + each / _LEAVES, np.zeros_like(index)
     _, along = lines.at(owner, t)
     frame = leaf_frames(rows, row, along.astype(np.float32), roll, index, key)
-    light = ranged(rows, "leaf_light", row, key, Draw.LEAF_LIGHT)
+    outward = outwardness(rows, branches, owner, t)
+    light = leaf_lights(rows, row, key, outward if place is None else np.full(len(t), place))
     frame = settled(rows, row, frame, light, _UP)
-    size = ranged(rows, "leaf_size", row, key, Draw.LEAF_SIZE)
-    size = size * (1 + (rows["leaf_size_tip"][row] - 1) * outwardness(rows, branches, owner, t))
+    size = leaf_sizes(rows, row, key, outward, t)
     weight = number * (size * branches.scale[owner]) ** 2
     # F T Fᵀ, summed over the leaves of each branch: their frames side by side.
     left = _product(frame.reshape(-1, 3).astype(np.float64), turn).reshape(-1, 3, 3) * weight[:, None, None]

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..arrays import Arrays, dot, gathered
 from ..growth.axes import Axes, axes
 from ..growth.branches import Branches
-from ..growth.foliage import leaf_keys, leaf_places, outwardness, place_leaves
+from ..growth.foliage import leaf_keys, leaf_places, outwardness, place_leaves, youth
 from ..growth.growth import branch_counts, chosen_children, chosen_drawn, leaf_counts, radius_at
 from ..growth.hashing import child_key, evenly, key_of_seed, mix, systematic, thinned
 from ..growth.rows import FORK, LATERAL, SPUR, SPUR_ORDER
@@ -58,6 +58,8 @@ class Points:
         Place between the inside and the outside of the crown.
     light : (k,) float32
         How far a leaf turns to the sky.
+    young : (k,) float32
+        How young it is, see `growth.foliage.youth`.
     """
 
     first: NDArray[np.int64]
@@ -67,6 +69,7 @@ class Points:
     row: NDArray[np.int32]
     outward: NDArray[np.float32]
     light: NDArray[np.float32]
+    young: NDArray[np.float32]
 
     def runs(self, subplants: Branches) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """First sample and number of samples (n,), (n,) that stand for sub-plants as they are turned to the sky."""
@@ -143,6 +146,7 @@ class _Points(Arrays):
     row: NDArray[np.int32]
     outward: NDArray[np.float64]
     light: NDArray[np.float64]
+    young: NDArray[np.float64]
     area: NDArray[np.float64]
 
     @classmethod
@@ -324,7 +328,7 @@ def _wood_points(rows: NDArray[np.void], one: _Arrived, lines: Axes) -> _Points:
     position, frame = lines.at(every, along)
     area = one.weight * branches.length * radius_at(rows, branches, along)
     none = np.zeros(len(every))
-    return _Points.on(rows, one, every, position, frame, outwardness(rows, branches, every, along), none, area)
+    return _Points.on(rows, one, every, position, frame, outwardness(rows, branches, every, along), none, none, area)
 
 
 def _leaf_points(rows: NDArray[np.void], one: _Arrived, lines: Axes) -> _Points:
@@ -341,7 +345,8 @@ def _leaf_points(rows: NDArray[np.void], one: _Arrived, lines: Axes) -> _Points:
     outward = outwardness(rows, branches, picked, t)
     area = (one.weight * counts)[picked] * leaves.size**2
     light = np.broadcast_to(leaves.light, len(leaves))  # may be one number for all
-    return _Points.on(rows, one, picked, leaves.position, leaves.frame, outward, light, area)
+    young = youth(rows, branches.row[:1], t)
+    return _Points.on(rows, one, picked, leaves.position, leaves.frame, outward, light, young, area)
 
 
 def _drawn_child(rows: NDArray[np.void], one: _Arrived, number: int, places: int) -> _Arrived:
@@ -380,5 +385,5 @@ class _Collector:
         def whole(name: str, shape: tuple[int, ...], kind: type = np.float32) -> NDArray:
             return np.concatenate([np.zeros((0, *shape)), *(getattr(p, name) for p in self.parts)]).astype(kind, "C")
 
-        vectors, numbers = whole("position", (3,)), (whole(name, ()) for name in ("outward", "light"))
+        vectors, numbers = whole("position", (3,)), (whole(name, ()) for name in ("outward", "light", "young"))
         return Points(self.first, self.number, vectors, whole("frame", (3, 3)), whole("row", (), np.int32), *numbers)

@@ -66,7 +66,8 @@ class LeafDetail:
         out = np.zeros(len(branches))
         most = 1.0 / np.maximum(self._errors()[self.flora.rows["species"][branches.row]], 1e-300)
         size = self.flora.rows["leaf_size"][branches.row].sum(axis=1) * branches.scale
-        size = size * np.maximum(self.flora.rows["leaf_size_tip"][branches.row], 1.0)
+        for factor in ("leaf_size_tip", "leaf_size_young"):
+            size = size * np.maximum(self.flora.rows[factor][branches.row], 1.0)
         # The base tells of most branches that they are too far away.
         around = camera.extent_around(branches.position)
         pixels = size / self._nearest(around, branches.length + size) / self.tolerance * visibility

@@ -90,6 +90,45 @@ def outwardness(
     return np.where(rows["outward"][row], first + (last - first) * t, np.take(branches.outward, owner))
 
 
+def youth(rows: NDArray[np.void], row: NDArray[np.integer], t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How young leaves (m,) of rows (m,) or (1,) are, at fractions t (m,) of branches: 0 old to 1 at the very end.
+
+    The square of the place along the branch of the order, so that what is seen as young are a few at the end.
+    """
+    first, last = rows["part"][row].T
+    return (first + (last - first) * t) ** 2
+
+
+def leaf_sizes(
+    rows: NDArray[np.void],
+    row: NDArray[np.integer],
+    key: NDArray[np.uint64],
+    outward: NDArray[np.float64],
+    t: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Metres (m,) by which models of leaves are scaled at plant scale 1; (1,) where all are alike.
+
+    They are on rows (m,) or (1,), at places (m,) between inside and outside, and fractions t (m,) of branches.
+    """
+    size = ranged(rows, "leaf_size", row, key, Draw.LEAF_SIZE)
+    tip, young = rows["leaf_size_tip"][row], rows["leaf_size_young"][row]
+    if (tip != 1).any():
+        size = size * (1 + (tip - 1) * outward)
+    if (young != 1).any():
+        size = size * (1 + (young - 1) * youth(rows, row, t))
+    return size
+
+
+def leaf_lights(
+    rows: NDArray[np.void], row: NDArray[np.integer], key: NDArray[np.uint64], outward: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """How far leaves at places (m,) between inside and outside turn to the sky; (1,) where all are alike."""
+    light = ranged(rows, "leaf_light", row, key, Draw.LEAF_LIGHT)
+    if not rows["sunlit"][row].any():
+        return light
+    return np.clip(light + (rows["leaf_light_tip"][row] - rows["leaf_light"][row, 0]) * outward, 0, 1)
+
+
 def _rows_of(branches: Branches, owner: NDArray[np.int64]) -> NDArray[np.int32]:
     """Row (m,) of each branch's parameters, or the only one (1,), which is as good and need not be gathered."""
     row = branches.row
@@ -125,11 +164,10 @@ def place_leaves(
     position, frame = light.at(owner, t)
     sky = light.sky_at(owner, t)
     frame = leaf_frames(rows, row, frame, np.take(uniform(branches.key, Draw.ROLL), owner), index, key, sky)
-    size = np.take(branches.scale, owner) * ranged(rows, "leaf_size", row, key, Draw.LEAF_SIZE)
-    tip = rows["leaf_size_tip"][row]
-    if (tip != 1).any():
-        size *= 1 + (tip - 1) * outwardness(rows, branches, owner, t)
-    light = ranged(rows, "leaf_light", row, key, Draw.LEAF_LIGHT)
+    alike = not (rows["gradient"][row].any() or rows["sunlit"][row].any())
+    outward = np.zeros(1) if alike else outwardness(rows, branches, owner, t)
+    size = np.take(branches.scale, owner) * leaf_sizes(rows, row, key, outward, t)
+    light = leaf_lights(rows, row, key, outward)
     return Leaves(owner, key, position, frame, size, light, _SKY if sky is None else sky)
 
 
@@ -309,20 +347,31 @@ def leaf_colours(
     row: NDArray[np.integer],
     key: NDArray[np.uint64],
     outward: NDArray[np.float64] | None = None,
+    young: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
-    """Linear RGB (n, 3) of leaves of the rows (n,), or all of one row (1,); ``outward`` (n,) is 0 inside the crown."""
+    """Linear RGB (n, 3) of leaves of the rows (n,), or all of one row (1,).
+
+    ``outward`` (n,) is 0 inside the crown, ``young`` (n,) is `youth`; both or neither are given.
+    """
     deviation = signed(key, Draw.LEAF_COLOUR)
     if outward is None:
         return _colours(rows["leaf_colour"][row], deviation)
-    return np.clip(mean_leaf_colours(rows, row, outward) + rows["leaf_colour"][row, 1] * deviation[:, None], 0, 1)
+    mean = mean_leaf_colours(rows, row, outward, young)
+    return np.clip(mean + rows["leaf_colour"][row, 1] * deviation[:, None], 0, 1)
 
 
 def mean_leaf_colours(
-    rows: NDArray[np.void], row: NDArray[np.integer], outward: NDArray[np.float64]
+    rows: NDArray[np.void], row: NDArray[np.integer], outward: NDArray[np.float64], young: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Mean linear RGB (n, 3) of leaves of rows (n,) at places between inside (0) and outside (1) of the crown."""
-    inside, tip = rows["leaf_colour"][row, 0], rows["leaf_colour_tip"][row]
-    return inside + (tip - inside) * outward[:, None]
+    """Mean linear RGB (n, 3) of leaves of rows (n,) at places between inside (0) and outside (1) of the crown.
+
+    ``young`` (n,) is their `youth`.
+    """
+    inside, tip, new = rows["leaf_colour"][row, 0], rows["leaf_colour_tip"][row], rows["leaf_colour_young"][row]
+    mean = inside + (tip - inside) * outward[:, None]
+    if (new != inside).any():
+        mean += (new - inside) * young[:, None]
+    return mean
 
 
 def leaf_forms(number: int, key: NDArray[np.uint64]) -> NDArray[np.int64]:

@@ -117,7 +117,7 @@ _RANGES = (
 _DEGREES = {"curvature", "curvature_tip", "attraction", "angle", "angle_tip", "azimuth", "leaf_angle", "leaf_azimuth"}
 _NUMBERS = (
     "curvature_tip", "count_by_length", "angle_tip", "spray", "flare", "pipe",
-    "leaf_spray", "leaf_droop", "leaf_size_tip",
+    "leaf_spray", "leaf_droop", "leaf_size_tip", "leaf_size_young", "leaf_light_tip",
 )  # fmt: skip
 _INTEGERS = ("segments", "sides", "whorl", "leaf_whorl")
 #: Where a flared base gets rings of its own, fractions of the length; as far as they lie on the first segment.
@@ -129,13 +129,14 @@ ROW_DTYPE = np.dtype(
     [(name, np.float64, (2,)) for name in _RANGES]
     + [(name, np.float64) for name in _NUMBERS]
     + [(name, np.float64, (2, 3)) for name in ("branch_colour", "leaf_colour")]
-    + [("leaf_colour_tip", np.float64, (3,))]
+    + [(name, np.float64, (3,)) for name in ("leaf_colour_tip", "leaf_colour_young")]
     + [(name, np.int64) for name in _INTEGERS]
     + [(name, np.int64) for name in ("crown", "leaf_kind", "species", "order", "rings")]
     + [("next", np.int32, (3,)), ("count", np.float64, (3, 2)), ("start", np.float64, (3, 2))]
     + [("fraction", np.float64, (3, 2)), ("part", np.float64, (2,))]
     + [("nominal", np.float64), ("pipe_radius", np.float64), ("fork_power", np.float64)]
     + [("continues", np.bool_), ("outward", np.bool_), ("tropic", np.bool_), ("gradient", np.bool_)]
+    + [("sunlit", np.bool_)]
     + [("exact", np.bool_), ("phantom", np.bool_), ("drawn", np.bool_), ("drawn_rows", np.int32, (2,))]
     + [("knots", np.float64, (MAX_SEGMENTS + 1, 3)), ("radii", np.float64, (MAX_SEGMENTS + 1,))]
     + [("frames", np.float64, (MAX_SEGMENTS, 3, 3)), ("size", np.float64, (4,))]
@@ -148,7 +149,8 @@ the part that stays bare, ``fraction`` where these begin and end among all child
 ends of this row on the order's branch and ``nominal`` the length of that in lengths of this; ``pipe_radius`` the radius
 of a lateral by the pipe model in radii of this; ``continues`` marks stems beyond a fork; ``outward`` branches whose own
 axis leads from the inside of the crown to the outside; ``tropic`` sub-plants whose shape depends on how they stand to
-the sky; ``gradient`` leaves that differ between inside and outside; ``exact`` plants that are all the same.
+the sky; ``gradient`` leaves whose size or colour differs between inside and outside, or old and young; ``sunlit``
+leaves that turn to the sky otherwise outside than inside; ``exact`` plants that are all the same.
 
 A plant whose form is drawn by hand begins with a ``phantom`` row: a branch without wood, whose children are the
 ``drawn`` rows from the first to before the last of ``drawn_rows``. Each of these is one branch with ``knots`` (metres,
@@ -223,7 +225,7 @@ def _drawn_rows(
     whole["next"], whole["species"], whole["segments"], whole["sides"], whole["whorl"] = -1, number, 1, 3, 1
     whole["phantom"], whole["length"], whole["part"], whole["nominal"] = True, (height, 0), (0, 1), 1
     whole["thickness"], whole["taper"], whole["leaf_whorl"] = (drawn.radius.max() / height, 0), (1, 0), 1
-    whole["leaf_size_tip"] = 1
+    whole["leaf_size_tip"] = whole["leaf_size_young"] = 1
     whole["drawn_rows"] = first + 1, first + 1 + len(drawn.order)
     out = [whole]
     highest = int(drawn.order.max())
@@ -253,8 +255,10 @@ def _row(order: Order, species: int, number: int) -> np.void:
         value = np.asarray(getattr(order, name), dtype=np.float64)
         row[name] = np.radians(value) if name in _DEGREES else value
     row["branch_colour"], row["leaf_colour"] = order.branch_colour, order.leaf_colour
-    row["leaf_colour_tip"] = order.leaf_colour_tip
-    row["gradient"] = order.leaf_size_tip != 1 or order.leaf_colour_tip != order.leaf_colour.mean
+    row["leaf_colour_tip"], row["leaf_colour_young"] = order.leaf_colour_tip, order.leaf_colour_young
+    sizes, colours = {order.leaf_size_tip, order.leaf_size_young}, {order.leaf_colour_tip, order.leaf_colour_young}
+    row["gradient"] = sizes != {1.0} or colours != {order.leaf_colour.mean}
+    row["sunlit"] = order.leaf_light_tip != order.leaf_light.mean
     row["crown"], row["leaf_kind"] = CROWN_SHAPES.index(order.crown), LEAF_KINDS.index(order.leaf_kind)
     row["species"], row["order"], row["outward"] = species, number, number <= 1
     row["count"] = order.branches, (0, 0), order.spurs

@@ -20,7 +20,7 @@ from ..compiled.flora import Flora
 from ..compiled.samples import Points
 from ..growth.axes import axes
 from ..growth.branches import Branches
-from ..growth.foliage import leaf_start, mean_leaf_colours, outwardness, place_leaves, settled
+from ..growth.foliage import leaf_start, mean_leaf_colours, outwardness, place_leaves, settled, youth
 from ..growth.hashing import Draw, child_key, mix, signed, uniform
 from ..growth.wind import moment
 from ..refinement.contents import Totals, piece_totals, subplant_totals
@@ -189,10 +189,12 @@ def _numbers(
     return owner[kept], index[kept], own[kept], one[owner[kept]]
 
 
-def _facet_colours(flora: Flora, row: NDArray, key: NDArray, leaves: NDArray, outward: NDArray) -> NDArray[np.float64]:
+def _facet_colours(
+    flora: Flora, row: NDArray, key: NDArray, leaves: NDArray, outward: NDArray, young: NDArray
+) -> NDArray[np.float64]:
     """Colours of facets that stand for several leaves (n,) each: a mean varies less than the colour of one leaf."""
     deviation = signed(key, Draw.LEAF_COLOUR) / np.sqrt(np.maximum(leaves, 1))
-    mean = mean_leaf_colours(flora.rows, row, outward)
+    mean = mean_leaf_colours(flora.rows, row, outward, young)
     return np.clip(mean + flora.rows["leaf_colour"][row, 1] * deviation[:, None], 0, 1)
 
 
@@ -240,12 +242,13 @@ def _leaves_of_subplants(
     centre = place + half_leaf[:, None] * frame[:, :, 1]
     # Sub-plants beyond the limbs know how far outside they are, which holds for all that grows on them.
     outward = np.where(rows["outward"][subplants.row[owner]], points.outward[pick], subplants.outward[owner])
+    colour = _facet_colours(flora, leaf_row, key, area / one.clip(1e-300)[owner], outward, points.young[pick])
     return Facets(
         centre,
         frame[:, :, 0],
         frame[:, :, 1],
         np.sqrt(area * weight[owner]),
-        _trapped(_facet_colours(flora, leaf_row, key, area / one.clip(1e-300)[owner], outward), weight[owner]),
+        _trapped(colour, weight[owner]),
         flora.leaf.transmission[leaf_row],
         _carried(flora, subplants, owner, centre),
     )
@@ -267,8 +270,8 @@ def _leaves_of_pieces(
     leaves = place_leaves(rows, own, lines, np.searchsorted(bearers, owner), index, key, t)
     frame = settled(rows, row[owner], leaves.frame, leaves.light, leaves.sky)
     centre = leaves.position + 0.5 * leaves.size[:, None] * frame[:, :, 1]
-    outward = outwardness(rows, branches, owner, t)
-    colour = _facet_colours(flora, row[owner], key, area / one.clip(1e-300)[owner], outward)
+    places = outwardness(rows, branches, owner, t), youth(rows, row[owner], t)
+    colour = _facet_colours(flora, row[owner], key, area / one.clip(1e-300)[owner], *places)
     colour = _trapped(colour, weight[owner])
     transmission = flora.leaf.transmission[row[owner]]
     velocity = None

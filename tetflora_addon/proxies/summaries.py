@@ -15,7 +15,7 @@ from ..compiled.flora import Flora
 from ..compiled.orientation import leaf_moments, own_leaf_moments, wood_moments
 from ..refinement.contents import Contents
 from ..refinement.polygons import MEASURED_AT_ONCE
-from ..subplants.pieces import Pieces, chunks, piece_leaf_colours
+from ..subplants.pieces import Pieces, chunks, outward_ends, piece_leaf_colours
 
 #: κ along an axis is ⟨|n·e|⟩, the moment gives ⟨(n·e)²⟩. The power of the second that is the first at 0, ⅓ (all ways:
 #: ½) and 1; at ½ (normals around a circle) it gives .646 for 2/π = .637.
@@ -84,7 +84,8 @@ def summarise(flora: Flora, contents: Contents, index: NDArray[np.integer], coun
         else:
             axis = unit(own.end - own.start)
             leaf_colour, wood_colour = piece_leaf_colours(flora, own), flora.rows["branch_colour"][row, 0]
-            leaf_moment = own_leaf_moments(flora.orientation, row, axis)
+            outward = np.mean(outward_ends(flora, own), axis=0)
+            leaf_moment = own_leaf_moments(flora.orientation, row, axis, outward)
             wood_moment = (np.eye(3) - axis[:, :, None] * axis[:, None, :]) / 2
             transmission = flora.leaf.transmission[row]
             clumped = clumping.coefficients(branches, clumping.own)

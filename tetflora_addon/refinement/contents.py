@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 
 from ..arrays import Arrays
 from ..camera.camera import Camera
-from ..compiled.averages import own_leaf_integrals
 from ..compiled.flora import Flora
 from ..growth.branches import Branches
 from ..growth.growth import fullness
-from ..subplants.pieces import Pieces, leaf_fraction, outward_ends, wood_areas
+from ..subplants.pieces import Pieces, leaf_fraction, piece_leaf_integrals, wood_areas
 from .polygons import Polygons
 
 #: Side in pixels from which on a polygon is large: more than facets have, hidden ones included.
@@ -105,11 +104,10 @@ def polygon_totals(polygons: Polygons, width: NDArray[np.float64] | None = None)
 
 
 def _size_factors(flora: Flora, pieces: Pieces) -> NDArray[np.float64] | float:
-    """Mean factor (n,) on the area of leaves of pieces, by their distance from the middle of the crown."""
+    """Mean factor (n,) on the area of leaves of pieces, by their place in the crown and on the branch."""
     if not flora.rows["gradient"].any():
         return 1.0
-    low, high = outward_ends(flora, pieces)
-    return own_leaf_integrals(flora.rows["leaf_size_tip"][pieces.branches.row], low, high)[0]
+    return piece_leaf_integrals(flora, pieces)[0]
 
 
 def sums(totals: Totals, cells: NDArray[np.integer], number: int) -> Totals:

@@ -108,9 +108,20 @@ ORDER_KEYS: dict[str, Key] = {
     "leaf_start": Key("range", 0, 0.99, [0.1, 0], "fraction of the length", "part at the base without leaves"),
     "leaf_size": Key("range", 0.0005, 20, [0.08, 0.02], "m", "length of a leaf"),
     "leaf_size_tip": Key("number", 0.05, 5, 1.0, "fraction of leaf_size", "size of leaves at the outside of the crown"),
+    "leaf_size_young": Key(
+        "number", 0.05, 5, 1.0, "fraction of the size", "size of young leaves, those at the ends of the branches"
+    ),
     "leaf_angle": Key("range", 0, 180, [50, 15], "degrees", "angle between branch and leaf"),
     "leaf_azimuth": Key("range", -360, 360, [137.5, 20], "degrees", "rotation around the branch between leaves"),
     "leaf_light": Key("range", 0, 1, [0.5, 0], "", "how strongly leaves turn towards the sky"),
+    "leaf_light_tip": Key(
+        "number",
+        0,
+        1,
+        math.nan,
+        "",
+        "how strongly leaves turn towards the sky at the outside of the crown (default: same as leaf_light)",
+    ),
     "leaf_spray": Key("number", 0, 1, 0.0, "", "how strongly leaves spread horizontally to both sides of their branch"),
     "leaf_droop": Key("number", 0, 1, 0.0, "", "how strongly leaves hang down"),
     "branch_colour": Key("colour", 0, 1, [[0.16, 0.11, 0.07], [0.04, 0.03, 0.02]], "linear RGB", "color of the bark"),
@@ -123,6 +134,15 @@ ORDER_KEYS: dict[str, Key] = {
         "linear RGB",
         "color of leaves at the outside of the crown (default: same as leaf_colour)",
     ),
+    "leaf_colour_young": Key(
+        "rgb",
+        0,
+        1,
+        None,
+        "linear RGB",
+        "color of young leaves, at the ends of the branches, inside the crown; those outside differ from it as other "
+        "leaves do (default: same as leaf_colour)",
+    ),
 }
 
 SPECIES_KEYS = (
@@ -133,7 +153,13 @@ QUALITY_LIMITS = (0.001, 1000.0)
 #: The short shoot of a species that asks for some and describes none.
 DEFAULT_SPUR = {"length": [0.05, 0.02], "thickness": [0.03, 0.005], "angle": [50, 15], "leaves": [4, 1]}
 #: Defaults that another key of the same order gives.
-FOLLOWS = {"curvature_tip": "curvature", "angle_tip": "angle", "leaf_colour_tip": "leaf_colour"}
+FOLLOWS = {
+    "curvature_tip": "curvature",
+    "angle_tip": "angle",
+    "leaf_light_tip": "leaf_light",
+    "leaf_colour_tip": "leaf_colour",
+    "leaf_colour_young": "leaf_colour",
+}
 #: What a key of a kind may be, where that is one of a few names.
 CHOICES = {"shape": CROWN_SHAPES, "kind": LEAF_KINDS}
 

@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -120,16 +120,22 @@ class Order:
         Degrees around the branch from one leaf to the next.
     leaf_light : Range
         0: a leaf's upper side faces the tip of its branch; 1: it faces the sky.
+    leaf_light_tip : float
+        The same of leaves at the outside of the crown.
     leaf_spray : float
         How far leaves stand level to the left and right of their branch, instead of all around.
     leaf_droop : float
         0: a leaf keeps its direction; 1: it hangs down.
     leaf_size_tip : float
         Size of leaves at the outside of the crown, as a factor on that of those inside.
+    leaf_size_young : float
+        Size of leaves at the end of a branch, as a factor on what it would be elsewhere.
     branch_colour, leaf_colour : Colour
         Linear RGB; of leaves, inside the crown.
     leaf_colour_tip : tuple of float
         Mean colour of leaves at the outside of the crown.
+    leaf_colour_young : tuple of float
+        Mean colour of leaves at the end of a branch, inside the crown.
     """
 
     length: Range
@@ -163,14 +169,17 @@ class Order:
     leaf_start: Range
     leaf_size: Range
     leaf_size_tip: float
+    leaf_size_young: float
     leaf_angle: Range
     leaf_azimuth: Range
     leaf_light: Range
+    leaf_light_tip: float
     leaf_spray: float
     leaf_droop: float
     branch_colour: Colour
     leaf_colour: Colour
     leaf_colour_tip: tuple[float, float, float]
+    leaf_colour_young: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -278,8 +287,14 @@ def crown_ratio(shape: NDArray[np.integer], r: NDArray[np.float64]) -> NDArray[n
     )
 
 
-#: Fields that depend on what other species there are.
-_PLACES = {"species", "next", "drawn_rows"}
+#: Fields that depend on what other species there are, and one that others give.
+_PLACES = {"species", "next", "drawn_rows", "sunlit"}
+#: Fields that came later, with the values that change nothing: species without them keep their fingerprint.
+_LATER: dict[str, Callable[[NDArray[np.void]], NDArray[np.float64] | float]] = {
+    "leaf_light_tip": lambda rows: rows["leaf_light"][:, 0],
+    "leaf_size_young": lambda _: 1.0,
+    "leaf_colour_young": lambda rows: rows["leaf_colour"][:, 0],
+}
 
 
 def fingerprint(rows: NDArray[np.void], forms: Sequence[Sequence[LeafModel]], method: int) -> str:
@@ -295,7 +310,8 @@ def fingerprint(rows: NDArray[np.void], forms: Sequence[Sequence[LeafModel]], me
         Counts the ways in which results were found so far.
     """
     content = hashlib.sha256(f"{method}".encode())
-    for name in sorted(set(rows.dtype.names) - _PLACES):
+    unused = {name for name, neutral in _LATER.items() if (rows[name] == neutral(rows)).all()}
+    for name in sorted(set(rows.dtype.names) - _PLACES - unused):
         # Rounded, because versions of numpy may differ in the last digit.
         value = np.round(rows[name].astype(np.float64), 6) + 0.0
         content.update(name.encode() + np.ascontiguousarray(value).tobytes())

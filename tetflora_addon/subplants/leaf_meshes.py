@@ -28,6 +28,7 @@ from ..growth.foliage import (
     outwardness,
     place_leaves,
     settled,
+    youth,
 )
 from ..growth.growth import WholeBranches, leaf_counts
 from ..growth.hashing import Draw, uniform
@@ -206,7 +207,7 @@ class _Bearers:
                 rows, bearers.branches, leaves, settled(rows, self.row, leaves.frame, leaves.light, leaves.sky)
             )
             gradient = rows["gradient"][self.row[0]]
-            outward = outwardness(rows, bearers.branches, owner, t) if gradient else None
+            places = (outwardness(rows, bearers.branches, owner, t), youth(rows, self.row, t)) if gradient else ()
             motion = None
             if bearers.lines.later is not None:
                 branches, seconds = bearers.branches.moved(), moment(rows)
@@ -214,7 +215,7 @@ class _Bearers:
                 turned = settled(rows, self.row, again.frame, again.light, again.sky)
                 turned = in_wind(rows, branches, again, turned, seconds)
                 motion = (again.position - leaves.position) / seconds, (turned - frame) / np.float32(seconds)
-            colours = leaf_colours(rows, self.row, key, outward)
+            colours = leaf_colours(rows, self.row, key, *places)
             copies.add(key, leaves.position, frame, leaves.size, colours, motion)
 
     def _chunks(self, vertices: int) -> Iterator[slice]:

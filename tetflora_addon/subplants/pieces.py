@@ -66,6 +66,19 @@ def outward_ends(flora: Flora, pieces: Pieces) -> tuple[NDArray[np.float64], NDA
     return tuple(outwardness(rows, branches, every, np.maximum(t, start)) for t in (pieces.t0, pieces.t1))
 
 
+def piece_leaf_integrals(
+    flora: Flora, pieces: Pieces
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """`own_leaf_integrals` (n,) of the leaves that branches themselves bear on pieces."""
+    rows, row = flora.rows, pieces.branches.row
+    along = None
+    if flora.has_young:
+        start, (first, last) = leaf_start(rows, pieces.branches), rows["part"][row].T
+        along = tuple(first + (last - first) * np.maximum(t, start) for t in (pieces.t0, pieces.t1))
+    sizes = rows["leaf_size_tip"][row], rows["leaf_size_young"][row]
+    return own_leaf_integrals(*sizes, outward_ends(flora, pieces), along)
+
+
 def piece_leaf_colours(flora: Flora, pieces: Pieces) -> NDArray[np.float64]:
     """Mean linear RGB (n, 3) of the leaves that branches themselves bear on pieces, weighted by area."""
     row = pieces.branches.row
@@ -73,8 +86,9 @@ def piece_leaf_colours(flora: Flora, pieces: Pieces) -> NDArray[np.float64]:
     inside = rows["leaf_colour"][row, 0]
     if not rows["gradient"].any():
         return inside
-    area, area_outward = own_leaf_integrals(rows["leaf_size_tip"][row], *outward_ends(flora, pieces))
-    return inside + (rows["leaf_colour_tip"][row] - inside) * (area_outward / area)[:, None]
+    area, area_outward, area_young = piece_leaf_integrals(flora, pieces)
+    older = inside + (rows["leaf_colour_tip"][row] - inside) * (area_outward / area)[:, None]
+    return older + (rows["leaf_colour_young"][row] - inside) * (area_young / area)[:, None]
 
 
 def wood_areas(flora: Flora, pieces: Pieces) -> NDArray[np.float64]:

@@ -91,6 +91,7 @@ SHAPES = st.fixed_dictionaries(
         "leaf_droop": st.sampled_from([0.0, 0.6, 1.0]),
         "leaf_spray": st.sampled_from([0.0, 1.0]),
         "leaf_size_tip": st.sampled_from([1.0, 0.3, 3.0]),
+        "leaf_size_young": st.sampled_from([1.0, 1.0, 0.3, 2.0]),
         "leaf_whorl": st.integers(1, 3),
         "leaf_start": ranges(0, 0.99, 0.2),
     }
@@ -118,6 +119,7 @@ def any_species(first: dict, second: dict, leans: list[dict]) -> Flora:
         "segments",
         "leaf_droop",
         "leaf_size_tip",
+        "leaf_size_young",
         "leaf_whorl",
         "flare",
     )
