@@ -45,8 +45,9 @@ ENOUGH_A_PIXEL, NEVER_TOO_MANY = 1.95, 1_500_000.0
 _HIDDEN, _FEW_HIDDEN = 0.3, 300_000.0
 #: Facets grow to so many times their size before real leaves become fewer.
 FACETS_FIRST = 6.0
-#: Reserved fraction of a budget that somebody has set, since expected numbers are means.
-_RESERVE = 0.06
+#: Reserved fraction of a budget that somebody has set, since expected numbers are means; and how many deviations of a
+#: number that is drawn at random, which is most for small budgets.
+_RESERVE, _DEVIATIONS = 0.06, 2.0
 #: Fraction of the faces of twigs that are made where leaves are real.
 _TWIGS = 0.15
 #: Parts of plants that are drawn to find out what to expect; polygons that are too few to tell; and how far
@@ -119,15 +120,15 @@ def afford(
     memory = settings.max_memory * 1e9 / BYTES_PER_POLYGON or np.inf
     most = settings.max_polygons or np.inf
     if faces is not None:
-        allowed = (1 - _RESERVE) * min(memory, most)
+        allowed = _unreserved(min(memory, most))
         if not np.isfinite(allowed):
             return detail
         return replace(detail, refinement=_fitted_shells(result, allowed, faces), tolerance=np.inf)
     count = _Facets(flora, result, camera)
     # A sphere is a whole polygon for the limit on polygons, but only a part of one for memory: a budget for each.
     # What other meshes have out of sight takes from what somebody allows, not from what the image shows.
-    limits = [(enough(camera), 1.0, False), ((1 - _RESERVE) * most, 1.0, True)]
-    limits += [((1 - _RESERVE) * memory, primitive_bytes / BYTES_PER_POLYGON, True)]
+    limits = [(enough(camera), 1.0, False), (_unreserved(most), 1.0, True)]
+    limits += [(_unreserved(memory), primitive_bytes / BYTES_PER_POLYGON, True)]
     count.tolerance = _tolerance(count, settings, limits)
     hard = min(allowed for allowed, _, every in limits if every)
     if np.isfinite(hard) and count.finer(settings.leaf_limit) > _RESERVE * hard:
@@ -144,6 +145,11 @@ def afford(
     if small.any():
         result = replace(result, decision=np.where(small, Decision.PROXY, result.decision).astype(np.int8))
     return Detail(result, FacetPixels(_side(factor, settings), hidden), limit, count.tolerance)
+
+
+def _unreserved(budget: float) -> float:
+    """What may be expected where no more than a budget may be made."""
+    return max((1 - _RESERVE) * budget - _DEVIATIONS * budget**0.5, 0.0) if np.isfinite(budget) else budget
 
 
 def _tolerance(count: _Facets, settings: RefinementSettings, limits: list[tuple[float, float, bool]]) -> float:
@@ -286,7 +292,8 @@ class _Facets:
         found = np.maximum(self.found, float(safe))
         facets = found[1] * weight * self.sizes.counts(FacetPixels(pixels))
         faces = found[0] * (self.faces_coarse + self.faces_finer)
-        return float((self.portions.within * (real * faces + (1.0 - real) * facets)).sum())
+        tubes = found[0] * float(_tubes(self.flora, self.portions, transition, real).sum())
+        return float((self.portions.within * (real * faces + (1.0 - real) * facets)).sum()) + tubes
 
     def unseen(self, pixels: FacetPixels, safe: bool = False) -> float:
         """Facets of all plants that are not seen; safe as for `seen`."""
@@ -310,7 +317,7 @@ class _Facets:
         sizes, fraction = sizes_of(self.flora, some, self.sight.shadows), np.where(some.real, 1.0, 0.0)
         fraction *= np.where(some.visibility > 0, transition.of_branches(some.parts.branches, some.visibility), 0.0)
         faces = _real_faces(self.flora, some, transition) + transition.detail.more(some.parts, some.visibility)
-        expected = (some.within * fraction * faces).sum()
+        expected = (some.within * fraction * faces).sum() + _tubes(self.flora, some, transition, fraction).sum()
         left = (some.within * (1.0 - fraction) * sizes.counts(pixels)).sum()
         self.found = np.clip((np.array([real, facets]) + _SOME) / (np.array([expected, left]) + _SOME), *_ROUGH)
 
@@ -334,6 +341,15 @@ class _Facets:
 def _cost(mesh: MeshBuffers) -> float:
     """Polygons of a mesh; those of more than two triangles count by these."""
     return float(np.maximum((np.diff(mesh.face_offsets) - 2) / 2.0, 1.0).sum())
+
+
+def _tubes(
+    flora: Flora, portions: Portions, transition: Transition, real: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Expected polygons (n,) of thick wood of portions of whose leaves a fraction (n,) is real."""
+    branches, rows = portions.parts.branches, flora.rows[portions.parts.branches.row]
+    own = rows["sides"] * (rows["segments"] + rows["rings"]).astype(np.float64)
+    return transition.of_thickness(branches, portions.best) * own * ~rows["phantom"] * (1.0 - real)
 
 
 def _real_faces(flora: Flora, portions: Portions, transition: Transition) -> NDArray[np.float64]:

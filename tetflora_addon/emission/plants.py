@@ -46,6 +46,9 @@ _LEAST_REAL = 0.1
 TRIANGLES = 2.0
 #: Among real leaves, wood counts as so many times as wide: a triangle is thrice as wide at its base as the wood.
 TWIGS = 4.0
+#: Width in pixels from which wood is tubes however little is seen of it: its facets would be a row of shards. A budget
+#: that makes leaves facets at more than so many pixels takes tubes in the same proportion.
+SHARDS, _GIVES_WAY = 1.4, 2.2
 
 
 @dataclass(frozen=True)
@@ -91,7 +94,10 @@ class Transition:
 
     def of_thickness(self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0) -> NDArray[np.float64]:
         """Fraction (n,) of branches like these that are tubes."""
-        return self.fraction(2.0 * branches.radius, branches.position, visibility)
+        width = 2.0 * branches.radius
+        pixels = width / np.maximum(self.camera.extent_around(branches.position), 1e-300)
+        whole = real_fraction(pixels, SHARDS * max(1.0, self.limit / _GIVES_WAY)) * (np.asarray(visibility) > 0.0)
+        return np.maximum(self.fraction(width, branches.position, visibility), whole)
 
     def of_bare_wood(self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0) -> NDArray[np.bool_]:
         """Branches (n,) that are tubes although none of their leaves is real."""

@@ -31,6 +31,8 @@ from ..refinement.shares import PlantParts, SharePoints, lowered, opened, share_
 MIXED = 24.0
 #: Pixels from which on leaves are real although they are hidden, at a limit of a pixel.
 CLOSE = 16.0
+#: Pixels from which on wood is looked for where no point of it is seen, and the fraction of it that is expected to be.
+CLOSE_WOOD, _OF_WOOD = 4.0, 0.05
 #: How far from its middle a part reaches, over its extent.
 _REACH = 0.6
 #: Points on the leaves of such a part, at most, that tell where it is seen.
@@ -170,10 +172,16 @@ class Sight:
         middle = some.position + 0.5 * some.length[:, None] * some.frame[:, :, 2]
         slope = 0.0 if self.camera.kind == "ORTHO" else self.camera.pixel_size
         nearest = self.camera.extent_around(middle) - slope * reach
-        at = at[(feature_width(self.flora, some) >= CLOSE * nearest) & (self.camera.clearance(middle) < reach)]
+        inside = self.camera.clearance(middle) < reach
+        leafy = inside & (feature_width(self.flora, some) >= CLOSE * nearest)
+        wooden = at[inside & ~leafy & (2.0 * some.radius >= CLOSE_WOOD * nearest)]
+        at = at[leafy]
         portions.visibility[at] = portions.best[at] = CLOSE**-2.0
         portions.real[at] = portions.mixed[at] = True
         portions.beside[at], portions.within[at] = False, 1.0 / (1.0 + points[at])
+        # Only their wood is drawn: light between leaves as even as a fog shows the trunk behind them here and there.
+        portions.visibility[wooden] = portions.best[wooden] = CLOSE_WOOD**-4.0
+        portions.mixed[wooden], portions.beside[wooden], portions.within[wooden] = True, False, _OF_WOOD
 
     def opened(self, portions: Portions) -> Portions:
         """Open sub-plants (n,); where their visibility differs from place to place, that of the new parts is found."""
