@@ -343,9 +343,7 @@ def _cost(mesh: MeshBuffers) -> float:
     return float(np.maximum((np.diff(mesh.face_offsets) - 2) / 2.0, 1.0).sum())
 
 
-def _tubes(
-    flora: Flora, portions: Portions, transition: Transition, real: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _tubes(flora: Flora, portions: Portions, transition: Transition, real: NDArray[np.float64]) -> NDArray[np.float64]:
     """Expected polygons (n,) of thick wood of portions of whose leaves a fraction (n,) is real."""
     branches, rows = portions.parts.branches, flora.rows[portions.parts.branches.row]
     own = rows["sides"] * (rows["segments"] + rows["rings"]).astype(np.float64)
