@@ -21,6 +21,7 @@ NAMES = (
     "bounds",
     "averages",
     "forms_published",
+    "cover_published",
     "extinction",
     "looks",
     "leaf_looks",

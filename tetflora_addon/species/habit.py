@@ -4,7 +4,7 @@
 
 Between neighbors a tree loses its lower limbs, keeps the others short, and puts on less girth for its height. Limbs
 bear twigs of the same size, as densely; so leaf area falls with the crown's projection, and with the crown's volume
-the number of limbs and twigs.
+the number of limbs and twigs. What asks for light, as birches do, has fewer leaves on its twigs as well.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from .species import Order, Range, Species
 BARE = 0.5
 NARROWER = 0.52
 SLIMMER = 0.57
+#: Limbs, being shorter too, lose so much of that, as a power.
+_LIMBS = 0.75
 
 
 def with_habit(species: Species, habit: float) -> Species:
@@ -52,8 +54,16 @@ def with_habit(species: Species, habit: float) -> Species:
         **starts,
     )
     limb = replace(_thinned(limb, shorter), length=_scaled(limb.length, shorter, ORDER_KEYS["length"].low))
-    rest = [_same_size(order, 1 / shorter) if i == 0 else order for i, order in enumerate(rest)]
-    return replace(species, orders=(trunk, limb, *rest))
+    # Limbs are as slim as the trunk; what they bear is not.
+    rest = [
+        _same_size(order, 1 / shorter, (1 - habit * SLIMMER) ** -_LIMBS) if i == 0 else order
+        for i, order in enumerate(rest)
+    ]
+    leafy = 1 - habit * (1 - species.stand_leaves)
+    orders = (trunk, limb, *rest)
+    if leafy < 1:
+        orders = tuple(replace(order, leaves=_scaled(order.leaves, leafy)) for order in orders)
+    return replace(species, orders=orders)
 
 
 def _thinned(order: Order, factor: float) -> Order:
@@ -61,10 +71,11 @@ def _thinned(order: Order, factor: float) -> Order:
     return replace(order, **{name: _scaled(getattr(order, name), factor) for name in ("branches", "leaves", "spurs")})
 
 
-def _same_size(order: Order, factor: float) -> Order:
-    """Branches as long and as thick in metres as they were, of parents whose length is divided by the factor."""
-    length = min(factor, LENGTH_HIGH / order.length.high)
-    return replace(order, length=_scaled(order.length, length))
+def _same_size(order: Order, longer: float, thicker: float) -> Order:
+    """Branches as long and as thick in metres as they were, of parents whose length and girth are divided by factors."""
+    length = min(longer, LENGTH_HIGH / order.length.high)
+    thickness = max(min(thicker, ORDER_KEYS["thickness"].high / order.thickness.high), 1.0)
+    return replace(order, length=_scaled(order.length, length), thickness=_scaled(order.thickness, thickness))
 
 
 def _scaled(value: Range, factor: float, low: float = 0.0) -> Range:

@@ -146,8 +146,8 @@ ORDER_KEYS: dict[str, Key] = {
 }
 
 SPECIES_KEYS = (
-    "format", "name", "description", "orders", "bark", "quality", "habit", "exact", "leaf", "leaf_transmission",
-    "blossom", "blossom_transmission", "spur",
+    "format", "name", "description", "orders", "bark", "quality", "habit", "stand_leaves", "exact", "leaf",
+    "leaf_transmission", "blossom", "blossom_transmission", "spur",
 )  # fmt: skip
 QUALITY_LIMITS = (0.001, 1000.0)
 #: The short shoot of a species that asks for some and describes none.
@@ -325,6 +325,7 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
         bark=reader.choice(data.get("bark", BARKS[0]), "bark", BARKS),
         quality=reader.number(data.get("quality", 1.0), "quality", *QUALITY_LIMITS),
         habit=reader.number(data.get("habit", 0.0), "habit", 0, 1),
+        stand_leaves=reader.number(data.get("stand_leaves", 1.0), "stand_leaves", 0.05, 1),
         exact=reader.truth(data.get("exact", False), "exact"),
     )
     polygons = expected_polygons(species) * species.quality

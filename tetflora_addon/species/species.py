@@ -205,6 +205,8 @@ class Species:
         Polygons of a plant, of those that the description gives; compiling applies it.
     habit : float
         How far trees, which stand free as described, are those of a dense stand, 0 to 1; compiling applies it.
+    stand_leaves : float
+        Fraction of the leaves on a twig that are left in a dense stand, 0.05 to 1.
     exact : bool
         Every plant is the same: ranges have their means, and seeds do not matter.
     form : Skeleton or None
@@ -223,6 +225,7 @@ class Species:
     bark: str = "ridged"
     quality: float = 1.0
     habit: float = 0.0
+    stand_leaves: float = 1.0
     exact: bool = False
     form: Skeleton | None = None
 

@@ -77,3 +77,13 @@ def test_a_habit_in_a_file_is_applied_when_it_is_compiled() -> None:
 def test_a_habit_out_of_range_is_named(habit: object) -> None:
     with pytest.raises(SpeciesError, match=r"oak\.json: habit: must be .*0 to 1"):
         species_from_dict(support.small(habit=habit), "oak", "oak.json")
+
+
+def test_what_asks_for_light_has_fewer_leaves_in_a_stand() -> None:
+    data = support.shipped("birch")
+    stand = support.compiled(data | {"habit": 1})
+    dense = support.compiled(data | {"habit": 1, "stand_leaves": 1})
+    assert stand.leaf_count[0] == pytest.approx(data["stand_leaves"] * dense.leaf_count[0], rel=0.05)
+    assert support.compiled(data).leaf_count[0] == support.compiled(data | {"stand_leaves": 1}).leaf_count[0]
+    with pytest.raises(SpeciesError, match=r"oak\.json: stand_leaves: must be .*0\.05 to 1"):
+        species_from_dict(support.small(stand_leaves=0), "oak", "oak.json")
