@@ -107,6 +107,8 @@ RICH: dict[str, Any] = small(
         "length": [0.12, 0.04], "thickness": [0.05, 0.01], "sides": 3, "angle": [40, 20], "leaf_kind": "blossom",
         "leaves": [4, 0], "leaf_whorl": 4, "leaf_size": [0.06, 0.01], "leaf_colour": [[0.8, 0.5, 0.5], [0.1, 0.1, 0.1]],
     },
+    bud={"length": 0.008, "lateral": 0.5},
+    dead={"number": [5, 2], "into": 0.5, "on_limbs": [2, 1]},
 )  # fmt: skip
 
 

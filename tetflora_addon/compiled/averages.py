@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..growth.axes import profile, profile_integral
-from ..growth.rows import FORK, LATERAL, SPUR
+from ..growth.rows import DEAD, FORK, LATERAL, SPUR
 from ..leaves.models import LeafModel
-from ..species.members import expected_forks
+from ..species.members import dead_vigour, expected_forks
 from ..species.species import Range, crown_ratio
 
 NODES = np.array([0.0, 0.5, 1.0])
@@ -258,17 +258,21 @@ def _sums(rows: NDArray[np.void], i: int, sort: int) -> _Sums:
     if sort == FORK:
         return _fork_sums(rows, i)
     start, (low, high) = row["start"][sort, 0], row["fraction"][sort]
-    t = start + (1 - start) * _FRACTIONS
+    end = row["start"][sort, 1] if sort == DEAD else 1.0
+    t, fraction = start + (end - start) * _FRACTIONS, low + (high - low) * _FRACTIONS
     vigour = np.ones_like(t)
     if sort == LATERAL:
-        vigour = crown_ratio(np.full(t.shape, row["crown"]), 1 - (low + (high - low) * _FRACTIONS))
+        vigour = crown_ratio(np.full(t.shape, row["crown"]), 1 - fraction)
+    elif sort == DEAD:
+        vigour = dead_vigour(fraction)
     full = 1 - child["count_by_length"] * (1 - vigour)
     if sort == SPUR:
         mean, variation = child["length"]
         size, radius = np.full(t.shape, (mean**2 + variation**2 / 3) * thickness), thickness
     else:
         here = np.full(t.shape, i)
-        thick = row["pipe_radius"] * vigour if row["pipe"] > 0 else profile(rows, here, np.zeros(len(t), np.uint64), t)
+        piped = sort == LATERAL and row["pipe"] > 0
+        thick = row["pipe_radius"] * vigour if piped else profile(rows, here, np.zeros(len(t), np.uint64), t)
         size, radius = vigour * row["nominal"] * child["length"][0] * thick * thickness, float(thick.mean() * thickness)
     nodes = number * full.mean() * np.eye(3)
     if row["order"] == 1:

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..growth.rows import FORK, LATERAL, SPUR
+from ..growth.rows import DEAD, FORK, LATERAL, SPUR
 from ..growth.wind import widest_sway
 from ..species.species import crown_ratio
 from .samples import Points
@@ -64,7 +64,7 @@ def widest_radii(rows: NDArray[np.void]) -> NDArray[np.float64]:
     """Greatest distance (r,) of the wood of sub-plants from their axes, in radii of the base; without short shoots."""
     out = np.maximum(1 + rows["flare"], np.where(rows["drawn"], np.sqrt(2.0), ring_stretch(rows)))
     for index in range(len(rows) - 1, -1, -1):
-        for sort in (LATERAL, FORK):
+        for sort in (LATERAL, FORK, DEAD):
             child = rows["next"][index, sort]
             if child >= 0:  # no thicker than its parent, but it may flare more
                 out[index] = max(out[index], rows["thickness"][child].sum() * out[child])
@@ -152,13 +152,15 @@ def _unit_bound(rows: NDArray[np.void], index: int, bounds: NDArray[np.float64])
     radius, low, high, turn = _axis_envelope(row)
     bound = np.array([radius.max(), min(low.min(), 0.0), max(high.max(), 0.0)])
     knot_t = np.linspace(0, 1, len(radius))
-    for sort in (LATERAL, FORK):
+    for sort in (LATERAL, FORK, DEAD):
         if row["next"][sort] < 0:
             continue
         child = rows[row["next"][sort]]
         fraction = np.linspace(0, 1, _SLABS + 1)
-        start = max(row["start"][sort, 0] - row["start"][sort, 1], 0.0)
-        t = start + (1 - start) * fraction
+        start, end = max(row["start"][sort, 0] - row["start"][sort, 1], 0.0), 1.0
+        if sort == DEAD:
+            start, end = row["start"][sort]
+        t = start + (end - start) * fraction
         fraction = row["fraction"][sort, 0] + np.ptp(row["fraction"][sort]) * fraction
         r, lo, hi = (np.interp(t, knot_t, v) for v in (radius, low, high))
         first = np.minimum((t[:-1] * row["segments"]).astype(int), len(turn) - 1)
@@ -172,6 +174,8 @@ def _unit_bound(rows: NDArray[np.void], index: int, bounds: NDArray[np.float64])
         if sort == FORK:
             longest[:] = child["length"].sum()
             least[:] = 0.0  # a single stem goes straight on
+        elif sort == DEAD:
+            pass  # no crown's shape makes them shorter
         elif row["start"][sort, 1] > 0:
             longest *= _crown_most(row, np.zeros(1), np.ones(1))[0]  # where children sit is not known
         else:

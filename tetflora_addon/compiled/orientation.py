@@ -24,7 +24,7 @@ from ..growth.branches import Branches
 from ..growth.foliage import leaf_frames, leaf_keys, leaf_lights, leaf_places, leaf_sizes, outwardness, settled
 from ..growth.growth import branch_counts, chosen_children, drawn_children, fullness, leaf_counts, radius_at
 from ..growth.hashing import Draw, key_of_seed, mix, thinned, uniform
-from ..growth.rows import FORK, LATERAL, SPUR, ranged
+from ..growth.rows import DEAD, FORK, LATERAL, SPUR, ranged
 from ..leaves.models import LeafModel
 from .averages import NODES, quadratic
 
@@ -32,7 +32,7 @@ _PIECE = 128
 _BRANCHES = 2048  # of each row that are looked at, each with the sky elsewhere
 _MET = 256  # of each row that are grown upwards from the trunk, to see how they stand
 _LEAVES = 4  # on each of them
-_SORTS = (LATERAL, FORK, SPUR)
+_SORTS = (LATERAL, FORK, SPUR, DEAD)
 _ALONG, _CHILD = 111, 112  # draws of this module, beyond those of growth
 _UP = np.array([0.0, 0.0, 1.0])
 # Exponents of x, y, z: all polynomials of degree 4 on the sphere are sums of these.

@@ -21,7 +21,7 @@ from ..growth.branches import Branches
 from ..growth.foliage import leaf_keys, leaf_places, outwardness, place_leaves, youth
 from ..growth.growth import branch_counts, chosen_children, chosen_drawn, leaf_counts, radius_at
 from ..growth.hashing import child_key, evenly, key_of_seed, mix, systematic, thinned
-from ..growth.rows import FORK, LATERAL, SPUR, SPUR_ORDER
+from ..growth.rows import DEAD, FORK, LATERAL, SPUR, SPUR_ORDER
 
 SAMPLES = 1024
 _PATHS = 1536  # branches of each row that are followed
@@ -208,7 +208,7 @@ class _Walk:
             wood.append(_wood_points(rows, one, lines))
             if leaf_area[row, row] > 0:
                 leaves.append(_leaf_points(rows, one, lines))
-            for sort in (LATERAL, FORK, SPUR):
+            for sort in (LATERAL, FORK, SPUR, DEAD):
                 child = int(rows["next"][row, sort])
                 if child >= 0 and rows["count"][row, sort, 0] > 0:
                     arrived[child - first].append(_one_child_each(rows, one, lines, sort))

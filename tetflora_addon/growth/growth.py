@@ -14,21 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Arrays, by_component, columns, dot, spread
+from ..species.members import dead_vigour
 from ..species.species import crown_ratio
 from .axes import Axes, axes, profile
 from .branches import Branches, Pose
 from .hashing import Draw, child_key, key_of_seed, signed, uniform
-from .rows import FORK, LATERAL, SPUR, flare_rings, ranged, varied
+from .rows import DEAD, FORK, LATERAL, SPUR, flare_rings, ranged, varied
 from .seeds import Seeds
 from .wind import is_windy, moment
 
 _PLACE_JITTER = 0.5  # of the distance from one child to the next: together children lie evenly along the whole parent
 # Each sort of children has child indices of its own, below those of leaves.
-_PATHS = np.array([0, 1 << 30, 1 << 31])
+_PATHS = np.array([0, 1 << 30, 1 << 31, 3 << 30])
 _SKY = np.array([0.0, 0.0, 1.0])
 _DRAWN_PATH = 1 << 29
-_COUNT = (Draw.BRANCHES, Draw.FORKS, Draw.SPURS)
-_ROUND = (Draw.BRANCHES_ROUND, Draw.FORKS_ROUND, Draw.SPURS_ROUND)
+_COUNT = (Draw.BRANCHES, Draw.FORKS, Draw.SPURS, Draw.DEAD)
+_ROUND = (Draw.BRANCHES_ROUND, Draw.FORKS_ROUND, Draw.SPURS_ROUND, Draw.DEAD_ROUND)
 _START = (Draw.BRANCH_START, Draw.BRANCH_START, Draw.SPUR_START)
 
 
@@ -166,7 +167,7 @@ def chosen_children(
     counts : (n,) int
         Number of children of this sort of each parent.
     sort : int
-        ``rows.LATERAL``, ``rows.FORK`` or ``rows.SPUR``.
+        ``rows.LATERAL``, ``rows.FORK``, ``rows.SPUR`` or ``rows.DEAD``.
 
     Returns
     -------
@@ -185,8 +186,11 @@ def chosen_children(
         node, within = index // whorl, index % whorl
         place = signed(np.where(within > 0, child_key(parent.key, node * whorl + path), key), Draw.PLACE)
         fraction = (node + 0.5 + _PLACE_JITTER * place) / np.maximum(counts[owner] // whorl, 1)
-        start = varied(rows["start"][parent.row, sort], parent.key, _START[sort])
-        t = start + (1 - start) * fraction
+        if sort == DEAD:
+            start, end = rows["start"][parent.row, sort].T
+        else:
+            start, end = varied(rows["start"][parent.row, sort], parent.key, _START[sort]), 1.0
+        t = start + (end - start) * fraction
         low, high = rows["fraction"][parent.row, sort].T
         fraction = low + (high - low) * fraction
     position, frame = lines.at(owner, t)
@@ -213,6 +217,9 @@ def chosen_children(
         radius = np.where(
             rows["pipe"][parent.row] > 0, parent.radius * rows["pipe_radius"][parent.row] * vigour, radius
         )
+    elif sort == DEAD:
+        vigour = dead_vigour(fraction)
+        measure = parent.length * rows["nominal"][parent.row] * vigour
     elif sort == FORK:
         vigour, measure = parent.vigour, parent.length  # which follows the crown already
         radius = radius * np.maximum(whorl, 1) ** (-1 / rows["fork_power"][parent.row])
@@ -232,7 +239,7 @@ def chosen_children(
 
 def sorts_of(rows: NDArray[np.void], parents: Branches) -> list[int]:
     """Sorts of children that any of the branches has."""
-    return [sort for sort in (LATERAL, FORK, SPUR) if (rows["next"][parents.row, sort] >= 0).any()]
+    return [sort for sort in (LATERAL, FORK, SPUR, DEAD) if (rows["next"][parents.row, sort] >= 0).any()]
 
 
 def children(

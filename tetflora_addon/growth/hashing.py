@@ -60,6 +60,10 @@ class Draw(IntEnum):
     BEND = 32  # one for each segment and axis from here on
     LEAF_LEVEL = 226  # beyond those of all segments; 224 is that of `emission.budget`
     LEAF_VARIANT = 227
+    DEAD = 228
+    DEAD_ROUND = 229
+    BUD = 230
+    BROKEN = 231
 
 
 def mix(z: NDArray[np.uint64]) -> NDArray[np.uint64]:

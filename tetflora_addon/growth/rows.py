@@ -11,105 +11,22 @@ frames. Angles are in radians.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import perpendicular
-from ..errors import SpeciesError
+from ..species.extras import dead_part
 from ..species.members import expected_forks
-from ..species.skeletons import DrawnBranches, drawn_branches
-from ..species.species import CROWN_SHAPES, LEAF_KINDS, Order, Range, Species, crown_ratio, fork_cuts
+from ..species.skeletons import drawn_branches
+from ..species.species import CROWN_SHAPES, LEAF_KINDS, Dead, Order, Range, Species, crown_ratio, fork_cuts
+from .drawn_lines import MAX_SEGMENTS, DrawnLines, drawn_lines
 from .hashing import signed
 
-MAX_SEGMENTS = 24
-"""Straight pieces of a drawn branch at most; more are made even."""
-_FINER = 3  # segments for one that is drawn: even ones must not cut the corners of uneven ones
-MAX_DRAWN = 1000
-"""Drawn branches of a plant at most: higher orders are for the computer."""
-
-
-@dataclass(frozen=True)
-class DrawnLines:
-    """Drawn branches as arrays of one width, metres in the plant's space; parents come before children.
-
-    Attributes
-    ----------
-    order : (b,) int64
-    segments : (b,) int64
-    knots : (b, MAX_SEGMENTS + 1, 3) float64
-        Evenly spaced along the branch; beyond its segments the last one again.
-    radii : (b, MAX_SEGMENTS + 1) float64
-    frames : (b, MAX_SEGMENTS, 3, 3) float64
-        Columns are local axes; the third leads along the segment, the others are carried along without twist.
-    length, radius, outward : (b,) float64
-        Of the whole line; at its base; and where between inside and outside of the crown it leaves its limb.
-    """
-
-    order: NDArray[np.int64]
-    segments: NDArray[np.int64]
-    knots: NDArray[np.float64]
-    radii: NDArray[np.float64]
-    frames: NDArray[np.float64]
-    length: NDArray[np.float64]
-    radius: NDArray[np.float64]
-    outward: NDArray[np.float64]
-
-
-def drawn_lines(branches: DrawnBranches) -> DrawnLines:
-    """Drawn branches with even segments, as many as they have themselves, at most `MAX_SEGMENTS`.
-
-    Raises
-    ------
-    SpeciesError
-        More than `MAX_DRAWN` branches.
-    """
-    number = len(branches)
-    if number > MAX_DRAWN:
-        raise SpeciesError(
-            f"The form has {number:,} branches, the limit is {MAX_DRAWN:,}; "
-            "remove the thinnest ones, the species grows them"
-        )
-    segments = np.clip(_FINER * (np.diff(branches.first) - 1), 1, MAX_SEGMENTS)
-    # Fractions of the length at which knots lie, one row a branch; the last one is repeated.
-    wanted = np.minimum(np.arange(MAX_SEGMENTS + 1) / segments[:, None], 1.0)
-    # One rising scale for all branches: that of branch b runs from 2 b to 2 b + 1.
-    place = 2 * branches.owner + branches.arc / np.maximum(branches.length, 1e-300)[branches.owner]
-    at = (2 * np.arange(number)[:, None] + wanted).ravel()
-    values = [np.interp(at, place, v).reshape(number, -1) for v in (*branches.knots.T, branches.radius)]
-    knots, radii = np.stack(values[:3], axis=-1), np.maximum(values[3], 1e-6)
-    chords = np.linalg.norm(np.diff(knots, axis=1), axis=2).sum(axis=1)
-    return DrawnLines(
-        branches.order.astype(np.int64), segments, knots, radii, _frames(knots, segments), chords, radii[:, 0],
-        np.asarray(branches.outward, dtype=np.float64),
-    )  # fmt: skip
-
-
-def _frames(knots: NDArray[np.float64], segments: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Frames along lines, each turned from the one before by the least rotation (Bishop, 1975)."""
-    step = np.diff(knots, axis=1)
-    size = np.linalg.norm(step, axis=2, keepdims=True)
-    last = np.minimum(np.arange(step.shape[1]), segments[:, None] - 1)[..., None]
-    direction = np.take_along_axis(step / np.maximum(size, 1e-12), last, axis=1)
-    z = np.where(np.linalg.norm(direction[:, 0], axis=1, keepdims=True) > 0.5, direction[:, 0], [0.0, 0.0, 1.0])
-    x = perpendicular(z)
-    out = np.empty((*direction.shape, 3))
-    for s in range(direction.shape[1]):
-        ahead = direction[:, s]
-        z = np.where(np.linalg.norm(ahead, axis=1, keepdims=True) > 0.5, ahead, z)
-        x = x - (x * z).sum(axis=1, keepdims=True) * z
-        lost = np.linalg.norm(x, axis=1) < 1e-6  # a line that turns back upon itself
-        x[lost] = np.cross(z[lost], [0.3, 0.5, 0.8])
-        x /= np.linalg.norm(x, axis=1, keepdims=True)
-        out[:, s] = np.stack([x, np.cross(z, x), z], axis=2)
-    return out
-
-
-LATERAL, FORK, SPUR = range(3)
+LATERAL, FORK, SPUR, DEAD = range(4)
 """Sorts of children, the axis of ``next``, ``count``, ``start`` and ``fraction``."""
 
-SPUR_ORDER = 100
+SPUR_ORDER, DEAD_ORDER = 100, 101
 _RANGES = (
     "length", "thickness", "taper", "curvature", "attraction", "angle", "azimuth",
     "leaves", "leaf_start", "leaf_size", "leaf_angle", "leaf_azimuth", "leaf_light",
@@ -132,12 +49,13 @@ ROW_DTYPE = np.dtype(
     + [(name, np.float64, (3,)) for name in ("leaf_colour_tip", "leaf_colour_young")]
     + [(name, np.int64) for name in _INTEGERS]
     + [(name, np.int64) for name in ("crown", "leaf_kind", "species", "order", "rings")]
-    + [("next", np.int32, (3,)), ("count", np.float64, (3, 2)), ("start", np.float64, (3, 2))]
-    + [("fraction", np.float64, (3, 2)), ("part", np.float64, (2,))]
+    + [("next", np.int32, (4,)), ("count", np.float64, (4, 2)), ("start", np.float64, (4, 2))]
+    + [("fraction", np.float64, (4, 2)), ("part", np.float64, (2,))]
     + [("nominal", np.float64), ("pipe_radius", np.float64), ("fork_power", np.float64)]
     + [("continues", np.bool_), ("outward", np.bool_), ("tropic", np.bool_), ("gradient", np.bool_)]
     + [("sunlit", np.bool_)]
-    + [("exact", np.bool_), ("phantom", np.bool_), ("drawn", np.bool_), ("drawn_rows", np.int32, (2,))]
+    + [("exact", np.bool_), ("phantom", np.bool_), ("dead", np.bool_), ("drawn", np.bool_)]
+    + [("drawn_rows", np.int32, (2,))]
     + [("knots", np.float64, (MAX_SEGMENTS + 1, 3)), ("radii", np.float64, (MAX_SEGMENTS + 1,))]
     + [("frames", np.float64, (MAX_SEGMENTS, 3, 3)), ("size", np.float64, (4,))]
 )
@@ -145,12 +63,13 @@ ROW_DTYPE = np.dtype(
 
 Ranges are (mean, variation), colours ((r, g, b), variation of each). Beyond the keys of an order: ``rings`` are those
 that a flared base gets besides its joints; ``next`` the rows of children, -1 for none, ``count`` how many, ``start``
-the part that stays bare, ``fraction`` where these begin and end among all children of the order's branch; ``part`` the
-ends of this row on the order's branch and ``nominal`` the length of that in lengths of this; ``pipe_radius`` the radius
-of a lateral by the pipe model in radii of this; ``continues`` marks stems beyond a fork; ``outward`` branches whose own
-axis leads from the inside of the crown to the outside; ``tropic`` sub-plants whose shape depends on how they stand to
-the sky; ``gradient`` leaves whose size or colour differs between inside and outside, or old and young; ``sunlit``
-leaves that turn to the sky otherwise outside than inside; ``exact`` plants that are all the same.
+the part that stays bare, or of dead ones where they begin and end, ``fraction`` where these begin and end among all
+children of the order's branch; ``part`` the ends of this row on the order's branch and ``nominal`` the length of that
+in lengths of this; ``pipe_radius`` the radius of a lateral by the pipe model in radii of this; ``continues`` marks
+stems beyond a fork; ``outward`` branches whose own axis leads from the inside of the crown to the outside; ``tropic``
+sub-plants whose shape depends on how they stand to the sky; ``gradient`` leaves whose size or colour differs between
+inside and outside, or old and young; ``sunlit`` leaves that turn to the sky otherwise outside than inside; ``exact``
+plants that are all the same; ``dead`` branches that are broken off or bare.
 
 A plant whose form is drawn by hand begins with a ``phantom`` row: a branch without wood, whose children are the
 ``drawn`` rows from the first to before the last of ``drawn_rows``. Each of these is one branch with ``knots`` (metres,
@@ -190,6 +109,7 @@ def _rows_of_species(one: Species, number: int, first: int) -> list[np.void]:
     ahead = 0 if drawn is None else 1 + len(drawn.order)
     begin = first + ahead + np.concatenate([[0], np.cumsum([len(c) - 1 for c in cuts])])
     spur = int(begin[-1])
+    dead = spur + (one.spur is not None and any(order.spurs.high > 0 for order in one.orders))
     out = [] if drawn is None else _drawn_rows(one, drawn, number, first, begin, spur)
     for o, order in enumerate(one.orders):
         whole = _row(order, number, o)
@@ -204,6 +124,8 @@ def _rows_of_species(one: Species, number: int, first: int) -> list[np.void]:
                 row["start"][FORK] = 1.0, 0.0
             if order.spurs.high > 0 and one.spur is not None:
                 row["next"][SPUR] = spur
+            if one.dead is not None and drawn is None and o <= 1:
+                _bear_dead(row, one.dead, order, o, dead)
             out.append(_part(row, order, low, high, cuts[o][p - 1] if p else 0.0))
             if row["next"][LATERAL] >= 0 and row["pipe"] > 0:
                 row["pipe_radius"] = _pipe_radius(row, one.orders[o + 1].thickness.high)
@@ -211,9 +133,32 @@ def _rows_of_species(one: Species, number: int, first: int) -> list[np.void]:
         row = _row(one.spur, number, SPUR_ORDER)
         row["next"] = -1
         out.append(row)
+    if one.dead is not None and drawn is None:
+        out += _dead_rows(one.dead, number, first + len(out))
     for row in out:
         row["exact"] = one.exact
     return out
+
+
+def _dead_rows(dead: Dead, species: int, first: int) -> list[np.void]:
+    """Rows of dead branches, and of the twigs on them; ``first`` is the index of the first one."""
+    out = []
+    for o, order in enumerate(dead.orders):
+        row = _row(order, species, DEAD_ORDER + o)
+        row["next"], row["dead"] = -1, True
+        if o + 1 < len(dead.orders) and order.branches.high > 0:
+            row["next"][LATERAL] = first + o + 1
+        out.append(row)
+    return out
+
+
+def _bear_dead(row: np.void, dead: Dead, order: Order, o: int, first: int) -> None:
+    """Dead branches on the trunk or on limbs, orders 0 and 1: of the row ``first``."""
+    number = dead.on_limbs if o else dead.number
+    if number.high > 0:
+        row["next"][DEAD] = first
+        row["count"][DEAD] = number
+        row["start"][DEAD] = dead_part(dead, order.branch_start.mean)
 
 
 def _drawn_rows(
@@ -261,8 +206,8 @@ def _row(order: Order, species: int, number: int) -> np.void:
     row["sunlit"] = order.leaf_light_tip != order.leaf_light.mean
     row["crown"], row["leaf_kind"] = CROWN_SHAPES.index(order.crown), LEAF_KINDS.index(order.leaf_kind)
     row["species"], row["order"], row["outward"] = species, number, number <= 1
-    row["count"] = order.branches, (0, 0), order.spurs
-    row["start"] = order.branch_start, (0, 0), order.spur_start
+    row["count"] = order.branches, (0, 0), order.spurs, (0, 0)
+    row["start"] = order.branch_start, (0, 0), order.spur_start, (0, 0)
     row["fraction"], row["part"], row["nominal"] = (0, 1), (0, 1), 1
     if order.pipe > 0:
         row["pipe"] = max(order.pipe, 1.0)
@@ -292,6 +237,11 @@ def _part(row: np.void, order: Order, low: float, high: float, before: float) ->
         row["fraction"][sort] = fraction
         row["count"][sort] *= fraction[1] - fraction[0]
         row["start"][sort] = _local_start(start, low, high)
+    if row["next"][DEAD] >= 0:
+        ends = row["start"][DEAD].copy()
+        row["fraction"][DEAD] = np.clip((np.array([low, high]) - ends[0]) / np.ptp(ends), 0, 1)
+        row["count"][DEAD] *= np.ptp(row["fraction"][DEAD])
+        row["start"][DEAD] = np.clip((ends - low) / length, 0, 1)
     leaf_fraction = np.clip((np.array([low, high]) - order.leaf_start.mean) / (1 - order.leaf_start.mean), 0, 1)
     row["leaves"] *= leaf_fraction[1] - leaf_fraction[0]
     row["leaf_start"] = _local_start(order.leaf_start, low, high)
@@ -349,13 +299,15 @@ def _pipe_radius(row: np.void, thickest: float) -> float:
 
 def without_variation(species: Species) -> Species:
     """The exact plant of a species: every range has its mean."""
-    orders = tuple(_exact(order) for order in species.orders)
-    return replace(species, orders=orders, spur=None if species.spur is None else _exact(species.spur))
+    orders, dead = tuple(_exact(order) for order in species.orders), species.dead
+    if dead is not None:
+        dead = replace(_exact(dead), orders=tuple(_exact(order) for order in dead.orders))
+    return replace(species, orders=orders, spur=None if species.spur is None else _exact(species.spur), dead=dead)
 
 
-def _exact(order: Order) -> Order:
-    still = {name: Range(value.mean) for name, value in vars(order).items() if isinstance(value, Range)}
-    return replace(order, **still)
+def _exact(some: Order | Dead) -> Order | Dead:
+    still = {name: Range(value.mean) for name, value in vars(some).items() if isinstance(value, Range)}
+    return replace(some, **still)
 
 
 def ranged(rows: NDArray[np.void], name: str, row: NDArray[np.integer], key: NDArray[np.uint64], draw: int) -> NDArray:

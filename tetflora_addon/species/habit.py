@@ -21,6 +21,8 @@ NARROWER = 0.52
 SLIMMER = 0.57
 #: Limbs, being shorter too, lose so much of that, as a power.
 _LIMBS = 0.75
+#: Dead branches of a stand over those of a free tree at most: the lowest have fallen.
+_MORE_DEAD = 4.0
 
 
 def with_habit(species: Species, habit: float) -> Species:
@@ -44,6 +46,7 @@ def with_habit(species: Species, habit: float) -> Species:
     trunk, limb, *rest = species.orders
     bare, shorter = habit * BARE, 1 - habit * NARROWER
     starts = {name: _raised(getattr(trunk, name), bare, name) for name in ("branch_start", "spur_start")}
+    before = trunk
     left = (1 - starts["branch_start"].mean) / (1 - trunk.branch_start.mean)
     trunk = replace(
         trunk,
@@ -53,6 +56,10 @@ def with_habit(species: Species, habit: float) -> Species:
         fork_at=min(trunk.fork_at + bare * (1 - trunk.fork_at), ORDER_KEYS["fork_at"].high),
         **starts,
     )
+    dead = species.dead
+    if dead is not None:  # as close together on a bole that is bare for longer
+        longer = starts["branch_start"].mean / max(before.branch_start.mean, 1e-6)
+        dead = replace(dead, number=_scaled(dead.number, min(longer, _MORE_DEAD)))
     limb = replace(_thinned(limb, shorter), length=_scaled(limb.length, shorter, ORDER_KEYS["length"].low))
     # Limbs are as slim as the trunk; what they bear is not.
     rest = [
@@ -63,7 +70,7 @@ def with_habit(species: Species, habit: float) -> Species:
     orders = (trunk, limb, *rest)
     if leafy < 1:
         orders = tuple(replace(order, leaves=_scaled(order.leaves, leafy)) for order in orders)
-    return replace(species, orders=orders)
+    return replace(species, orders=orders, dead=dead)
 
 
 def _thinned(order: Order, factor: float) -> Order:

@@ -11,9 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..leaves.models import LeafModel
-from .species import CROWN_SHAPES, LEAF_KINDS, Order, Range, Species, crown_ratio, fork_cuts
+from .extras import dead_part
+from .species import CROWN_SHAPES, LEAF_KINDS, Dead, Order, Range, Species, crown_ratio, fork_cuts
 
 _FRACTIONS = (np.arange(256) + 0.5) / 256
 
@@ -33,6 +35,8 @@ class Members:
     leaves : list of float
     spurs, spur_leaves : float
         Short shoots of all orders, and their leaves.
+    dead : tuple of float
+        Dead branches by their order.
     """
 
     branches: list[float]
@@ -41,11 +45,12 @@ class Members:
     leaves: list[float]
     spurs: float
     spur_leaves: float
+    dead: tuple[float, float] = (0.0, 0.0)
 
 
 def expected_members(species: Species) -> Members:
     """Expected numbers; linear in the numbers that each order asks for."""
-    branches, stems, segments, leaves, spurs = [], [], [], [], 0.0
+    branches, stems, segments, leaves, spurs, dead = [], [], [], [], 0.0, np.zeros(2)
     number = full = 1.0  # branches of the order, and the sum of the factors on what they bear
     for i, order in enumerate(species.orders):
         cuts = fork_cuts(order)
@@ -55,6 +60,8 @@ def expected_members(species: Species) -> Members:
         segments.append(number * float(fold @ part_segments(order)))
         leaves.append(full * order.leaves.mean * _fold(cuts, fold, order.leaf_start))
         spurs += full * order.spurs.mean * _fold(cuts, fold, order.spur_start)
+        if species.dead is not None and species.form is None and i <= 1:
+            dead += full * _dead_on(species.dead, order, i, cuts, fold)
         if i + 1 < len(species.orders):
             start = order.branch_start.mean
             stems_there = fold[np.searchsorted(cuts[1:-1], start + (1 - start) * _FRACTIONS, side="right")]
@@ -63,7 +70,7 @@ def expected_members(species: Species) -> Members:
             number = full * order.branches.mean * float(stems_there.mean())
             full = full * order.branches.mean * float((stems_there * follow).mean())
     on_spur = species.spur.leaves.mean if species.spur is not None else 0.0
-    return Members(branches, stems, segments, leaves, spurs, spurs * on_spur)
+    return Members(branches, stems, segments, leaves, spurs, spurs * on_spur, tuple(dead))
 
 
 def expected_forks(forks: Range, power: float = 1.0) -> float:
@@ -98,7 +105,25 @@ def expected_polygons(species: Species) -> float:
     if species.spur is not None:
         polygons += members.spurs * species.spur.sides * species.spur.segments
         bearers.append((species.spur, members.spur_leaves))
+    if species.dead is not None:
+        for order, number in zip(species.dead.orders, members.dead, strict=False):
+            polygons += number * order.sides * order.segments
     return polygons + sum(number * leaf_polygons(species, order) for order, number in bearers)
+
+
+def _dead_on(dead: Dead, order: Order, i: int, cuts: list[float], fold: np.ndarray) -> np.ndarray:
+    """Expected dead branches (2,) by their order on one trunk, or on one limb."""
+    low, high = dead_part(dead, order.branch_start.mean)
+    wanted = (dead.on_limbs if i else dead.number).mean
+    at = low + (high - low) * _FRACTIONS
+    stems = fold[np.searchsorted(cuts[1:-1], at, side="right")]
+    full = 1 - dead.orders[0].count_by_length * (1 - dead_vigour(_FRACTIONS))
+    return wanted * np.array([stems.mean(), dead.orders[0].branches.mean * (full * stems).mean()])
+
+
+def dead_vigour(fraction: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Length ratio (n,) of dead branches from the lowest, of which half is left, to the highest."""
+    return crown_ratio(np.full(fraction.shape, CROWN_SHAPES.index("tapered")), fraction)
 
 
 def leaf_polygons(species: Species, order: Order) -> float:

@@ -79,7 +79,10 @@ def with_quality(species: Species, quality: float) -> Species:
             f"{species.identifier}: at quality {quality:g} one plant would have {target:.3g} polygons, "
             f"the limit is {MAX_POLYGONS:.0g}; lower the quality"
         )
-
+    if species.dead is not None and quality < 1:  # too few to be thinned out in the end
+        dead = species.dead
+        number, on_limbs = (_times(some, quality) for some in (dead.number, dead.on_limbs))
+        species = replace(species, dead=replace(dead, number=number, on_limbs=on_limbs))
     # Sides and segments as real numbers make the count continuous; once they are whole, members make up for it.
     detail = _bisected(lambda d: expected_polygons(_thinned(_shaped(species, _shapes(species, d)), d)), target)
     shaped = _shaped(species, [(round(k), round(s)) for k, s in _shapes(species, detail)])

@@ -17,6 +17,7 @@ from typing import Any
 from ..errors import NAME, SpeciesError, readable, shown
 from ..files import json_of, read_whole
 from ..leaves.schema import read_forms
+from .extras import read_bud, read_dead
 from .members import expected_polygons
 from .skeletons import MAX_ORDERS
 from .species import BARKS, CROWN_SHAPES, LEAF_KINDS, Colour, Order, Range, Species
@@ -147,7 +148,7 @@ ORDER_KEYS: dict[str, Key] = {
 
 SPECIES_KEYS = (
     "format", "name", "description", "orders", "bark", "quality", "habit", "stand_leaves", "exact", "leaf",
-    "leaf_transmission", "blossom", "blossom_transmission", "spur",
+    "leaf_transmission", "blossom", "blossom_transmission", "spur", "bud", "dead",
 )  # fmt: skip
 QUALITY_LIMITS = (0.001, 1000.0)
 #: The short shoot of a species that asks for some and describes none.
@@ -322,6 +323,8 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
         blossom=read_forms(reader, data["blossom"], "blossom") if "blossom" in data else (),
         blossom_transmission=reader.number(data.get("blossom_transmission", 0.4), "blossom_transmission", 0, 1),
         spur=spur,
+        bud=read_bud(reader, data.get("bud")),
+        dead=read_dead(reader, data.get("dead"), lambda order, at, last: _read_order(reader, order, at, False, last)),
         bark=reader.choice(data.get("bark", BARKS[0]), "bark", BARKS),
         quality=reader.number(data.get("quality", 1.0), "quality", *QUALITY_LIMITS),
         habit=reader.number(data.get("habit", 0.0), "habit", 0, 1),

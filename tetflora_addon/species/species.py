@@ -183,6 +183,51 @@ class Order:
 
 
 @dataclass(frozen=True)
+class Bud:
+    """The buds of shoots with leaves: one at the end of each, others in the axils of its leaves.
+
+    Attributes
+    ----------
+    length : float
+        Metres.
+    width : float
+        Fraction of the length.
+    lateral : float
+        Fraction of the leaves with a bud in their axil.
+    colour : tuple of float
+        Linear RGB.
+    """
+
+    length: float
+    width: float
+    lateral: float
+    colour: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Dead:
+    """Dead branches of a trunk below and in the lower crown: broken off or bare.
+
+    Attributes
+    ----------
+    number : Range
+        On the trunk.
+    low, high : float
+        Where they begin, as a fraction of the part that is bare of branches, and end, as a fraction of the rest.
+    on_limbs : Range
+        On each limb (branch of order 1), likewise.
+    orders : tuple of Order
+        The dead branches; then, if any, the twigs on these.
+    """
+
+    number: Range
+    low: float
+    high: float
+    on_limbs: Range
+    orders: tuple[Order, ...]
+
+
+@dataclass(frozen=True)
 class Species:
     """A species as read from its file.
 
@@ -199,6 +244,8 @@ class Species:
         Fraction of the light scattered by a leaf or blossom that goes through it, 0 to 1.
     spur : Order or None
         A short shoot; its length is in metres and its thickness a fraction of that, as for a trunk.
+    bud : Bud or None
+    dead : Dead or None
     bark : str
         One of `BARKS`.
     quality : float
@@ -222,6 +269,8 @@ class Species:
     blossom: tuple[LeafModel | str, ...] = ()
     blossom_transmission: float = 0.4
     spur: Order | None = None
+    bud: Bud | None = None
+    dead: Dead | None = None
     bark: str = "ridged"
     quality: float = 1.0
     habit: float = 0.0
@@ -290,14 +339,16 @@ def crown_ratio(shape: NDArray[np.integer], r: NDArray[np.float64]) -> NDArray[n
     )
 
 
-#: Fields that depend on what other species there are, and one that others give.
-_PLACES = {"species", "next", "drawn_rows", "sunlit"}
+#: Fields that depend on what other species there are, one that others give, and one that changes no area.
+_PLACES = {"species", "next", "drawn_rows", "sunlit", "dead"}
 #: Fields that came later, with the values that change nothing: species without them keep their fingerprint.
 _LATER: dict[str, Callable[[NDArray[np.void]], NDArray[np.float64] | float]] = {
     "leaf_light_tip": lambda rows: rows["leaf_light"][:, 0],
     "leaf_size_young": lambda _: 1.0,
     "leaf_colour_young": lambda rows: rows["leaf_colour"][:, 0],
 }
+#: Sorts of children in the first tables that were kept; others count where a species has them.
+_FIRST_SORTS = 3
 
 
 def fingerprint(rows: NDArray[np.void], forms: Sequence[Sequence[LeafModel]], method: int) -> str:
@@ -317,6 +368,8 @@ def fingerprint(rows: NDArray[np.void], forms: Sequence[Sequence[LeafModel]], me
     for name in sorted(set(rows.dtype.names) - _PLACES - unused):
         # Rounded, because versions of numpy may differ in the last digit.
         value = np.round(rows[name].astype(np.float64), 6) + 0.0
+        if name in ("count", "start", "fraction") and not (rows["next"][:, _FIRST_SORTS:] >= 0).any():
+            value = value[:, :_FIRST_SORTS]
         content.update(name.encode() + np.ascontiguousarray(value).tobytes())
     for form in (model for models in forms for model in models):
         content.update(np.ascontiguousarray(form.positions).tobytes())

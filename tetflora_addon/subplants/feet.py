@@ -37,6 +37,8 @@ _WIDENS = 0.65
 PLACES, SUNK = 14, 0.6
 #: Rings of the ball in which a stem begins beyond a fork, and the angle of the last one below its equator.
 _BALL, _ROUND = 4, np.radians(72.0)
+#: Rings that close an end, and how oblique a break is at most, in radii to a radius.
+_CAP, _SPLINTERS = 3, 1.6
 
 
 def collars(rows: NDArray[np.void], branches: Branches) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -70,8 +72,26 @@ def below_base(rows: NDArray[np.void], branches: Branches) -> NDArray[np.int64]:
 
 
 def beyond_tip(rows: NDArray[np.void], branches: Branches) -> NDArray[np.int64]:
-    """Rings (n,) beyond the end of near branches: the half of a ball where they fork."""
-    return np.where(rows["next"][branches.row, FORK] >= 0, _BALL, 0)
+    """Rings (n,) beyond the end of near branches: the half of a ball where they fork, a cap where they end."""
+    return np.where(rows["next"][branches.row, FORK] >= 0, _BALL, _CAP)
+
+
+def beyond(
+    rows: NDArray[np.void], branches: Branches, branch: NDArray[np.int64], number: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """How far rings (m,) of branches, numbered from 1, lie beyond the end, how wide and how oblique they are.
+
+    All in radii there. Ends are round; dead ones are broken off, with a hollow in the oblique break.
+    """
+    row = branches.row[branch]
+    ball, dead = rows["next"][row, FORK] >= 0, rows["dead"][row]
+    deep, narrow = depths(np.zeros(len(row), bool), number)
+    angle = np.pi / 2 * number / _CAP
+    deep, narrow = np.where(ball, deep, np.sin(angle)), np.where(ball, narrow, np.maximum(np.cos(angle), 0.0))
+    slant = np.where(dead, _SPLINTERS * (0.25 + 0.75 * uniform(branches.key[branch], Draw.BROKEN)), 0.0)
+    at = np.minimum(number, _CAP) - 1
+    deep = np.where(dead, slant * np.array([1.0, 0.85, 0.5])[at], deep)
+    return deep, np.where(dead, np.array([0.96, 0.6, 0.0])[at], narrow), slant
 
 
 def depths(footed: NDArray[np.bool_], number: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -19,6 +19,7 @@ from .feet import (
     PLACES,
     below_base,
     below_forks,
+    beyond,
     beyond_tip,
     collars,
     depths,
@@ -53,6 +54,8 @@ class Rings:
         Centre and reach a moment later, where it is asked how plants move.
     swelling : (sides, r) float32 or None
         What multiplies the reach at each vertex.
+    colour : (k, 3) float64 or None
+        Of what has not that of its branch.
     """
 
     branches: Branches
@@ -63,6 +66,7 @@ class Rings:
     goes_on: NDArray[np.bool_]
     later: tuple[NDArray, NDArray] | None = None
     swelling: NDArray[np.float32] | None = None
+    colour: NDArray[np.float64] | None = None
 
 
 def ring_counts(flora: Flora, branches: Branches, segments: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -145,8 +149,9 @@ def fine_rings(flora: Flora, whole: WholeBranches, fine: Fineness, counts: NDArr
     light[below] *= narrow.astype(np.float32)
     down = (below * t * branches.length[owner])[:, None] * branches.frame[owner, :, 2]
     last = owner[above]
-    high, narrow = depths(np.zeros(len(above), bool), index[above] - counts[last, segment[above]])
+    high, narrow, slant = beyond(rows, branches, last, index[above] - counts[last, segment[above]])
     high *= fine.weight[last] * radius[above]
+    slant *= fine.weight[last] * radius[above] * narrow
     t[above] += high / branches.length[last]
     light[above] *= narrow.astype(np.float32)
 
@@ -154,8 +159,11 @@ def fine_rings(flora: Flora, whole: WholeBranches, fine: Fineness, counts: NDArr
         bent = _curve(flora, replace(whole, lines=lines), fine.weight)
         centre, across = bent.at(owner, segment, x, allowed)
         centre += down
-        centre[above] += high[:, None] * lines.frames[last, segments[last] - 1, :, 2]
-        return centre, light * across.astype(np.float32)
+        tip = lines.frames[last, segments[last] - 1, :, 2]
+        centre[above] += high[:, None] * tip
+        reach = light * across.astype(np.float32)
+        reach[0][:, above] += (slant[:, None] * tip).T.astype(np.float32)
+        return centre, reach
 
     centre, reach = placed(whole.lines)
     later = None if whole.lines.later is None else placed(whole.lines.later)

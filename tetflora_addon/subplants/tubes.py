@@ -16,6 +16,7 @@ from ..growth.branches import Branches
 from ..growth.foliage import branch_colours
 from ..growth.growth import WholeBranches
 from ..growth.wind import moment
+from .buds import BUD_RINGS, bud_numbers, bud_rings, bud_sides
 from .feet import PLACES, keep_inside, root_sides
 from .pieces import chunks
 from .rings import Rings, fine_counts, fine_numbers, fine_rings, foot_rings, ring_counts, rings_of
@@ -61,6 +62,8 @@ class _Sort:
     sides : int
     rings, beside : (n,) int64
         Rings of tubes, and those of roots, of which there are `PLACES` to each.
+    buds : (n,) int64 or None
+        Rings of buds, `BUD_RINGS` to each.
     fine : Fineness of n, or None
         Where branches are more than coarse tubes.
     counts : (n, S) int64 or None
@@ -73,14 +76,18 @@ class _Sort:
     beside: NDArray[np.int64] | None = None
     fine: Fineness | None = None
     counts: NDArray[np.int64] | None = None
+    buds: NDArray[np.int64] | None = None
 
     def numbers(self) -> tuple[int, int]:
         """Vertices and faces."""
         vertices, faces = self.sides * int(self.rings.sum()), self.sides * int((self.rings - 1).sum())
         if self.beside is None:
             return vertices, faces
-        rings, sides = int(self.beside.sum()), root_sides(self.sides)
-        return vertices + sides * rings, faces + sides * (rings - rings // PLACES)
+        kinds = (self.beside, root_sides(self.sides), PLACES), (self.buds, bud_sides(self.sides), BUD_RINGS)
+        for number, sides, each in kinds:
+            rings = int(number.sum())
+            vertices, faces = vertices + sides * rings, faces + sides * (rings - rings // each)
+        return vertices, faces
 
     def made(self, flora: Flora) -> Iterator[tuple[Rings, int, WholeBranches | None]]:
         """Rings, how many vertices they have, and branches within whose bounds they have to stay."""
@@ -93,6 +100,8 @@ class _Sort:
             yield fine_rings(flora, whole, fine, self.counts[some]), self.sides, whole
             if (foot := foot_rings(flora, whole, fine)) is not None:
                 yield foot[0], root_sides(self.sides), whole.take(foot[1])
+            if (buds := bud_rings(flora, whole, fine)) is not None:
+                yield buds[0], bud_sides(self.sides), whole.take(buds[1])
 
 
 def _sorts(flora: Flora, whole: WholeBranches, pixels: Pixels | None) -> Iterator[_Sort]:
@@ -114,7 +123,7 @@ def _sorts(flora: Flora, whole: WholeBranches, pixels: Pixels | None) -> Iterato
         own = near[fine.sides[near] == k]
         some, how = whole.take(own), fine.take(own)
         counts = fine_counts(flora, some, how, pixels)
-        yield _Sort(some, int(k), *fine_numbers(flora, some, counts), how, counts)
+        yield _Sort(some, int(k), *fine_numbers(flora, some, counts), how, counts, bud_numbers(flora, some))
 
 
 class _Tubes:
@@ -175,7 +184,8 @@ class _Tubes:
         # v counts lengths of the perimeter at the branch's base, so that a texture is as wide as it is high.
         girth = base_girth(branches)
         v = rings.t * np.take(branches.length / np.maximum(girth, 1e-9), rings.branch)
-        colour = branch_colours(flora.rows, branches.row, branches.key).astype(np.float32)
+        colour = branch_colours(flora.rows, branches.row, branches.key) if rings.colour is None else rings.colour
+        colour = colour.astype(np.float32)
         colour = np.ascontiguousarray(colour)[np.take(rings.branch, lower)]
         self._add_looks(v[lower], v[lower + 1], colour, sides)
         every = slice(self.faces, self.faces + len(lower) * sides)

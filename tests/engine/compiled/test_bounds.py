@@ -107,11 +107,12 @@ SPUR: dict[str, Any] = {
     "length": [0.3, 0.2], "thickness": [0.05, 0.02], "flare": 2.0, "segments": 3, "curvature": [90, 60],
     "angle": [60, 40], "leaves": [4, 2], "leaf_size": [0.15, 0.05], "leaf_droop": 0.5,
 }  # fmt: skip
+DEAD = {"number": [3, 1], "from": 0.0, "into": 0.9, "on_limbs": [2, 1]}
 
 
 def any_species(first: dict, second: dict, leans: list[dict]) -> Flora:
     """Branches that curl, fork, hang, flare and lean back: the extremes of the keys, not of the shipped species."""
-    data = support.small(order0=first, order1={**second, **leans[0]}, order2=leans[1], spur=SPUR)
+    data = support.small(order0=first, order1={**second, **leans[0]}, order2=leans[1], spur=SPUR, dead=DEAD)
     keys = (
         "curvature",
         "curvature_tip",

@@ -22,7 +22,7 @@ from tetflora_addon.growth.axes import axes
 from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.foliage import leaf_keys, leaf_places, outwardness, place_leaves, settled
 from tetflora_addon.growth.growth import branch_counts, children, leaf_counts, radius_at
-from tetflora_addon.growth.rows import FORK, LATERAL, SPUR, without_variation
+from tetflora_addon.growth.rows import DEAD, FORK, LATERAL, SPUR, SPUR_ORDER, without_variation
 from tetflora_addon.refinement.contents import piece_totals, subplant_totals
 from tetflora_addon.species.members import expected_members, expected_polygons
 from tetflora_addon.subplants.pieces import Pieces, open_subplants, wood_areas
@@ -285,7 +285,7 @@ def test_spurs_and_blossoms_are_as_many_as_described() -> None:
 def test_spurs_do_not_depend_on_the_length_of_their_branch() -> None:
     flora = rich()
     pieces = support.grown(flora, support.plants(np.arange(5)))[1]
-    spurs = pieces.take((pieces.branches.row == len(flora.rows) - 1) & (pieces.t0 == 0)).branches
+    spurs = pieces.take((flora.rows["order"][pieces.branches.row] == SPUR_ORDER) & (pieces.t0 == 0)).branches
     assert len(spurs) > 50
     assert spurs.length.min() >= 0.08
     assert spurs.length.max() <= 0.16
@@ -314,6 +314,7 @@ def test_an_exact_plant_is_the_mean_of_its_ranges() -> None:
     for order in (*exact.orders, exact.spur):
         assert order.length.variation == order.branches.variation == order.taper.variation == 0
     assert exact.orders[1].attraction.mean == 60
+    assert exact.dead.number.variation == exact.dead.orders[0].length.variation == 0
 
 
 def test_children_of_each_sort_have_keys_of_their_own() -> None:
@@ -321,7 +322,7 @@ def test_children_of_each_sort_have_keys_of_their_own() -> None:
     trunk = support.trunks(flora.rows, support.plants(np.arange(50)))
     grown, owner = children(flora.rows, trunk)
     assert len(np.unique(grown.key)) == len(grown)
-    number = sum(branch_counts(flora.rows, trunk, sort) for sort in (LATERAL, FORK, SPUR))
+    number = sum(branch_counts(flora.rows, trunk, sort) for sort in (LATERAL, FORK, SPUR, DEAD))
     assert (np.bincount(owner, minlength=50) == number).all()
 
 

@@ -25,7 +25,7 @@ from tetflora_addon.growth.axes import axes
 from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.foliage import face_light, leaf_keys, leaf_places, place_leaves
 from tetflora_addon.growth.growth import branch_counts, children, chosen_children, leaf_counts, trunks
-from tetflora_addon.growth.rows import FORK, SPUR
+from tetflora_addon.growth.rows import DEAD, FORK, SPUR
 from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.subplants.pieces import Pieces, chunks, open_subplants
 
@@ -192,7 +192,7 @@ def test_children_sit_on_their_parents() -> None:
     lines = axes(flora.rows, trunk)
     grown, owner = children(flora.rows, trunk, lines)
     counts = branch_counts(flora.rows, trunk)
-    others = sum(branch_counts(flora.rows, trunk, sort) for sort in (FORK, SPUR))
+    others = sum(branch_counts(flora.rows, trunk, sort) for sort in (FORK, SPUR, DEAD))
     assert (np.bincount(owner, minlength=len(trunk)) == counts + others).all()
     whorl = np.maximum(flora.rows["whorl"][flora.rows["next"][trunk.row, 0]], 1)
     most = flora.rows["count"][trunk.row, 0].sum(axis=1) + whorl
