@@ -79,7 +79,7 @@ def _thinned(order: Order, factor: float) -> Order:
 
 
 def _same_size(order: Order, longer: float, thicker: float) -> Order:
-    """Branches as long and as thick in metres as they were, of parents whose length and girth are divided by factors."""
+    """Branches as long and as thick in metres as before, of parents whose length and girth are divided by factors."""
     length = min(longer, LENGTH_HIGH / order.length.high)
     thickness = max(min(thicker, ORDER_KEYS["thickness"].high / order.thickness.high), 1.0)
     return replace(order, length=_scaled(order.length, length), thickness=_scaled(order.thickness, thickness))
