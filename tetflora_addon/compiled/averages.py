@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..growth.axes import profile, profile_integral
+from ..growth.foliage import YOUTH
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR
 from ..leaves.models import LeafModel
 from ..species.members import dead_vigour, expected_forks
@@ -22,7 +23,8 @@ from ..species.species import Range, crown_ratio
 
 NODES = np.array([0.0, 0.5, 1.0])
 _FRACTIONS = (np.arange(256) + 0.5) / 256
-_GAUSS, _WEIGHTS = (np.polynomial.legendre.leggauss(5)[0] + 1) / 2, np.polynomial.legendre.leggauss(5)[1] / 2
+_GAUSS, _WEIGHTS = (part / 2 for part in np.polynomial.legendre.leggauss(8))
+_GAUSS = _GAUSS + 0.5
 
 
 @dataclass(frozen=True)
@@ -138,9 +140,9 @@ def own_leaf_integrals(
     second = moment(1) + 2 * k * moment(2) + k * k * moment(3)
     if along is None:
         return first, second, np.zeros_like(first)
-    # With young leaves, polynomials of degree 8 at most: five nodes of Gauss integrate them exactly.
+    # With young leaves, polynomials of degree 14 at most: eight nodes of Gauss integrate them exactly.
     o, q = (ends[0][..., None] + (ends[1] - ends[0])[..., None] * _GAUSS for ends in (outward, along))
-    young = q * q
+    young = q**YOUTH
     area = ((1 + k[:, None] * o) * (1 + (size_young - 1)[:, None] * young)) ** 2
     alike = size_young == 1
     return (

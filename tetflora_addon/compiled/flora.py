@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..errors import SpeciesError
 from ..growth.branches import Branches
+from ..growth.foliage import YOUTH
 from ..growth.growth import fullness
 from ..growth.rows import LATERAL, build_rows
 from ..growth.wind import Wind, is_windy, widest_sway, windy_rows
@@ -225,7 +226,8 @@ def _compiled(species: tuple[Species, ...]) -> Flora:
     wood = _wood_totals(totals)
     leaf_count, leaf_area = leaves.sum(axis=1), area.sum(axis=1)
     bare = rows["leaf_start"][:, 0]
-    smaller = 1 + (rows["leaf_size_young"] - 1) * (1 + bare + bare * bare) / 3  # mean over the leaves of a branch
+    young = (1 - bare ** (YOUTH + 1)) / (1 - bare) / (YOUTH + 1)  # mean over the leaves of a branch
+    smaller = 1 + (rows["leaf_size_young"] - 1) * young
     size = rows["leaf_size"][:, 0] * (1 + rows["leaf_size_tip"]) / 2 * smaller
     fixed, full = totals.fixed_faces.sum(axis=1), totals.full_faces.sum(axis=1)
     polygons = fixed + full + leaves @ leaf.polygons

@@ -19,6 +19,8 @@ from .wind import fluttered, gusts, is_windy
 
 _LEAF_PATH = 1 << 32  # child indices of leaves start here, so that they never meet those of branches
 _SKY = np.array([0.0, 0.0, 1.0])
+YOUTH = 4
+"""Power of the place along a branch by which leaves are young."""
 _PLACE_JITTER = 0.4  # below a half, so that leaves keep their order along the branch
 
 
@@ -93,10 +95,10 @@ def outwardness(
 def youth(rows: NDArray[np.void], row: NDArray[np.integer], t: NDArray[np.float64]) -> NDArray[np.float64]:
     """How young leaves (m,) of rows (m,) or (1,) are, at fractions t (m,) of branches: 0 old to 1 at the very end.
 
-    The square of the place along the branch of the order, so that what is seen as young are a few at the end.
+    A power of the place along the branch of the order, so that what is seen as young are a few at the end.
     """
     first, last = rows["part"][row].T
-    return (first + (last - first) * t) ** 2
+    return (first + (last - first) * t) ** YOUTH
 
 
 def leaf_sizes(

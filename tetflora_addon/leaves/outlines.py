@@ -23,12 +23,18 @@ BASES = {
     "truncate": (4.0, 0.5),
     "cordate": (3.0, 0.5),
 }
-APEXES = {"rounded": (2.4, 0.5), "obtuse": (2.0, 0.7), "acute": (1.8, 1.0), "acuminate": (2.2, 1.75)}
+APEXES = {
+    "rounded": (2.4, 0.5),
+    "obtuse": (2.0, 0.7),
+    "acute": (1.8, 1.0),
+    "acuminate": (2.2, 1.75),
+    "emarginate": (2.6, 0.5),
+}
 LOBINGS = ("pinnate", "palmate")
 TEETH = ("serrate", "doubly serrate", "crenate", "sinuate")
 
-#: How far a cordate base reaches behind the petiole, in half widths.
-_CORDATE = 0.5
+#: How far a cordate base reaches behind the petiole, and both sides of an emarginate tip beyond it, in half widths.
+_CORDATE, _EMARGINATE = 0.5, 0.7
 #: How far feet of rays lie below their points of the margin, at most a quarter of it in lengths.
 _OBLIQUE = 0.45
 #: Fraction of a tooth that rises, and teeth on a tooth of a doubly serrate margin, and their size.
@@ -154,6 +160,9 @@ class Blade:
         if self.base == "cordate":
             near = np.clip(1.0 - y / self.widest, 0.0, 1.0)
             height = y - _CORDATE * wide * near**2
+        if self.apex == "emarginate":
+            near = np.clip((y - self.widest) / (1.0 - self.widest), 0.0, 1.0)
+            height = height + _EMARGINATE * wide * near
         ray = np.stack([wide, height - foot], axis=1)
         length = np.linalg.norm(ray, axis=1)
         ray /= np.maximum(length, 1e-12)[:, None]

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from tests.engine import support
 from tetflora_addon.compiled.averages import own_leaf_integrals
 from tetflora_addon.compiled.orientation import leaf_moments
-from tetflora_addon.growth.foliage import leaf_lights, leaf_sizes, youth
+from tetflora_addon.growth.foliage import YOUTH, leaf_lights, leaf_sizes, youth
 from tetflora_addon.proxies.microsurfaces import subplant_facets
 from tetflora_addon.refinement.contents import piece_totals, subplant_totals
 from tetflora_addon.species.species import fingerprint
@@ -42,10 +42,10 @@ def test_integrals_over_a_branch(tip: float, young: float, low: float, high: flo
     """Closed form against many leaves, evenly spaced."""
     u = (np.arange(20_000) + 0.5) / 20_000
     outward, along = low + (high - low) * u, first + (last - first) * u
-    area = ((1 + (tip - 1) * outward) * (1 + (young - 1) * along**2)) ** 2
+    area = ((1 + (tip - 1) * outward) * (1 + (young - 1) * along**YOUTH)) ** 2
     ends = [np.array([v]) for v in (tip, young, low, high, first, last)]
     found = own_leaf_integrals(ends[0], ends[1], tuple(ends[2:4]), tuple(ends[4:6]))
-    expected = area.mean(), (area * outward).mean(), (area * along**2).mean()
+    expected = area.mean(), (area * outward).mean(), (area * along**YOUTH).mean()
     np.testing.assert_allclose(np.ravel(found), expected, rtol=1e-6, atol=1e-8)
 
 
