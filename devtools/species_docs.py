@@ -14,6 +14,7 @@ from dataclasses import fields
 
 from tetflora_addon.leaves.models import LEAF_MODELS
 from tetflora_addon.leaves.schema import OUTLINES
+from tetflora_addon.leaves.spines import Spines
 from tetflora_addon.species.catalogue import load_species
 from tetflora_addon.species.schema import FOLLOWS, LENGTH_HIGH, ORDER_KEYS, Key
 from tetflora_addon.species.species import CROWN_SHAPES, LEAF_KINDS
@@ -73,9 +74,9 @@ def leaf_table() -> str:
 
 
 def outline_tables() -> str:
-    """Markdown tables of the fields of outlines, by kind."""
+    """Markdown tables of the fields of outlines, by kind, and of spines."""
     blocks = []
-    for kind, shape in OUTLINES.items():
+    for kind, shape in {**OUTLINES, "spines": Spines}.items():
         lines = [f"| `{kind}` | limits | default | meaning |", "|---|---|---|---|"]
         for f in fields(shape):
             names = f.metadata.get("names")

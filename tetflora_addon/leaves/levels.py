@@ -14,6 +14,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from .areoles import spined
 from .blades import blade_surface
 from .bodies import closed_parts, rounded
 from .compounds import Compound, compound_surface
@@ -171,6 +172,9 @@ def _round_levels(model: LeafModel) -> tuple[LeafLevel, ...]:
             break
         tint = np.ones((made.polygons, 3), np.float32)
         found.append(LeafLevel(made, made.positions[None].astype(np.float32), error, tint))
+    if found and model.spines is not None:  # only up close: before, they are much thinner than pixels
+        made, tint = spined(found[-1].model, model.spines, closed_parts(found[-1].model))
+        found[-1] = replace(found[-1], model=made, shapes=made.positions[None].astype(np.float32), tint=tint)
     return tuple(found)
 
 

@@ -18,6 +18,7 @@ from .compounds import Compound
 from .needles import Needles
 from .outlines import Blade
 from .shapes import LEAF_SHAPES
+from .spines import Spines
 
 MAX_LEAF_POLYGONS = 2000
 MAX_LEAF_CORNERS = 4 * MAX_LEAF_POLYGONS  # of all faces; and vertices
@@ -46,6 +47,8 @@ class LeafModel:
         Drawn as it is at any size: a texture may cut it out.
     shape : Blade, Needles or Compound, optional
         What it stands for, which leaves are drawn as that are near; see `levels`.
+    spines : Spines, optional
+        What grows on its closed parts up close.
     """
 
     positions: NDArray[np.float64]
@@ -55,6 +58,7 @@ class LeafModel:
     material_index: NDArray[np.int32] | None = None
     textured: bool = False
     shape: Blade | Needles | Compound | None = None
+    spines: Spines | None = None
 
     @property
     def polygons(self) -> int:
@@ -68,10 +72,14 @@ class LeafModel:
         return b"".join(a.tobytes() for a in arrays if a is not None) + (b"textured" if self.textured else b"")
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, LeafModel) and (self.content, self.shape) == (other.content, other.shape)
+        return isinstance(other, LeafModel) and self._identity == other._identity
 
     def __hash__(self) -> int:
-        return hash((self.content, self.shape))
+        return hash(self._identity)
+
+    @property
+    def _identity(self) -> tuple[bytes, Blade | Needles | Compound | None, Spines | None]:
+        return self.content, self.shape, self.spines
 
     @cached_property
     def next_corner(self) -> NDArray[np.int32]:

@@ -11,15 +11,17 @@ import numpy as np
 
 from ..errors import SpeciesError, shown
 from .blades import check_outline
+from .bodies import closed_parts
 from .compounds import Compound
 from .levels import TOLERANCES, fitted, surface_of
 from .models import LEAF_MODELS, LeafModel, leaf_model
 from .needles import Needles
 from .outlines import Blade
+from .spines import Spines
 
 #: Most forms of a leaf.
 MAX_FORMS = 8
-LEAF_KEYS = ("model", "object", "vertices", "faces", "uv", "outline")
+LEAF_KEYS = ("model", "object", "vertices", "faces", "uv", "outline", "spines")
 #: Kinds of outlines by their name in species files; the first is meant where none is given.
 OUTLINES: dict[str, type] = {"blade": Blade, "needles": Needles, "compound": Compound}
 
@@ -61,6 +63,8 @@ def read_forms(reader: Reader, data: Any, key: str) -> tuple[LeafModel | str, ..
 def _read_leaf(reader: Reader, data: Any, where: str) -> LeafModel | str:
     reader.keys(data, where, LEAF_KEYS)
     forms = [k for k in ("model", "object", "vertices") if k in data]
+    if "spines" in data and "vertices" not in data:
+        raise reader.fail(f"{where}.spines", "must be left out where there are no vertices with faces")
     if len(forms) != 1 and not (not forms and "outline" in data):
         raise reader.fail(
             where,
@@ -92,9 +96,17 @@ def _read_leaf(reader: Reader, data: Any, where: str) -> LeafModel | str:
         if key in data and not _is_list_of_points(data[key], form.count(",") + 1):
             raise reader.fail(f"{where}.{key}", f"must be a list of {form} numbers")
     try:
-        return leaf_model(data["vertices"], faces, data.get("uv"))
+        made = leaf_model(data["vertices"], faces, data.get("uv"))
     except SpeciesError as error:
         raise reader.fail(where, str(error)) from None
+    return _with_spines(reader, made, data["spines"], f"{where}.spines") if "spines" in data else made
+
+
+def _with_spines(reader: Reader, model: LeafModel, data: Any, where: str) -> LeafModel:
+    if not (closed_parts(model) >= 0).any():
+        raise reader.fail(where, "must be left out, because the polygons have no closed part to stand on")
+    reader.keys(data, where, tuple(f.name for f in fields(Spines)))
+    return replace(model, spines=Spines(**_fields(reader, data, where, Spines)))
 
 
 def _is_list_of_points(value: Any, size: int) -> bool:
@@ -120,8 +132,7 @@ def read_outline(reader: Reader, data: Any, where: str) -> Blade | Needles | Com
         kind = reader.choice(data["kind"], f"{where}.kind", tuple(OUTLINES))
     shape = OUTLINES[kind]
     reader.keys(data, where, ("kind", *(f.name for f in fields(shape))))
-    read = {f.name: _field(reader, data[f.name], f"{where}.{f.name}", f) for f in fields(shape) if f.name in data}
-    made = shape(**read)
+    made = shape(**_fields(reader, data, where, shape))
     if isinstance(made, Blade):
         if made.palmate and 0 < made.lobes < 3:
             raise reader.fail(f"{where}.lobes", f"must be 0, or 3 to 12 with palmate lobes, not {made.lobes}")
@@ -132,6 +143,11 @@ def read_outline(reader: Reader, data: Any, where: str) -> Blade | Needles | Com
     if isinstance(made, Compound) and not (made.pairs or made.around or made.terminal):
         raise reader.fail(f"{where}.pairs", "must be at least 1 where there are no leaflets around and no terminal one")
     return made
+
+
+def _fields(reader: Reader, data: dict[str, Any], where: str, kind: type) -> dict[str, Any]:
+    """The fields of an outline, or of spines, that are given."""
+    return {f.name: _field(reader, data[f.name], f"{where}.{f.name}", f) for f in fields(kind) if f.name in data}
 
 
 def _field(reader: Reader, value: Any, where: str, field: Field) -> Any:
