@@ -36,6 +36,7 @@ _HIGH = "blender/results blender/placing blender/job"
 #: for the files beside these folders, and ``blender`` alone for the files at the top of that folder.
 _TABLE = {
     ".": "",
+    "processes": ".",
     "leaves": ".",
     "species": ". leaves",
     "growth": ". species",
@@ -48,15 +49,15 @@ _TABLE = {
     "planting": ". growth",
     "proxies": ". species growth compiled subplants camera refinement",
     "light": ". compiled tetrahedra camera refinement proxies",
-    "emission": ". leaves species growth compiled subplants tetrahedra camera refinement proxies light",
-    "blender": ". growth camera refinement",
+    "emission": ". processes leaves species growth compiled subplants tetrahedra camera refinement proxies light",
+    "blender": ". processes growth camera refinement",
     "blender/materials": ". light emission blender",
     "blender/species": ". leaves species blender",
     "blender/scene": ". species growth camera refinement planting light emission "
     "blender blender/materials blender/species",
     "blender/results": f". leaves species refinement emission {_LOW}",
     "blender/placing": f". species growth compiled planting {_LOW}",
-    "blender/job": f". species growth compiled camera refinement proxies emission {_LOW} blender/results",
+    "blender/job": f". processes species growth compiled camera refinement proxies emission {_LOW} blender/results",
     "blender/viewport": f". species growth compiled tetrahedra camera refinement preview {_LOW} {_HIGH}",
     "blender/cli": ". blender blender/scene blender/job",
     "operators": ". species camera refinement preview planting blender blender/species blender/scene "

@@ -81,6 +81,7 @@ def _draw(self: TetFloraPreferences, context: bpy.types.Context) -> None:
         layout.label(text="This folder does not exist", icon='ERROR')
     for text in skipped_files()[:_MOST_TOLD]:
         layout.label(text=text, icon='ERROR')
+    layout.prop(self, "threads")
     layout.prop(self, "new_quality")
     layout.prop(self, "new_memory")
     _draw_cache(layout.column(), self)

@@ -17,18 +17,30 @@ from functools import cache
 from typing import TypeVar
 
 #: More threads than this gain little, as memory is what they wait for; and each has a block of its own in memory.
-MOST_THREADS = 8
+MOST_THREADS = 16
 
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
+_wanted = 0  # threads, see `use`
 _here = threading.local()  # "at_work" in threads of the pool, which must not wait for each other
 
 
 @cache
-def threads() -> int:
-    """Threads that work at the same time: the cores that this process may use, up to `MOST_THREADS`."""
+def cores() -> int:
+    """Cores that this process may use."""
     allowed = getattr(os, "sched_getaffinity", None)  # not on every system
-    return min(len(allowed(0)) if allowed else os.cpu_count() or 1, MOST_THREADS)
+    return len(allowed(0)) if allowed else os.cpu_count() or 1
+
+
+def threads() -> int:
+    """Threads that work at the same time: as many as `use` was told, or all cores; up to `MOST_THREADS`."""
+    return min(_wanted or cores(), MOST_THREADS)
+
+
+def use(number: int) -> None:
+    """Work with so many threads from now on; 0 is all cores."""
+    global _wanted
+    _wanted = number
 
 
 def blocks(number: int, size: int) -> list[slice]:
@@ -42,7 +54,7 @@ def on_all_cores(function: Callable[[_Item], _Result], items: Iterable[_Item]) -
     No more are made ahead than there are threads. An error is raised where its result would come; what is not asked
     for any more is not begun.
     """
-    if threads() < 2 or getattr(_here, "at_work", False):
+    if threads() < 2 or within():
         yield from map(function, items)
         return
     pending = deque()
@@ -63,6 +75,21 @@ def each_on_all_cores(function: Callable[[_Item], object], items: Iterable[_Item
     deque(on_all_cores(function, items), maxlen=0)
 
 
-@cache
+def within() -> bool:
+    """Whether this thread is one of those that work at the same time; they must not wait for each other."""
+    return getattr(_here, "at_work", False)
+
+
+def in_each_thread(function: Callable[[], object]) -> None:
+    """Call a function in as many threads as work at the same time, and do not wait for it."""
+    for _ in range(threads()):
+        _pool().submit(function)
+
+
 def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(threads(), "tetflora", lambda: setattr(_here, "at_work", True))
+    return _pool_of(threads())
+
+
+@cache
+def _pool_of(number: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(number, "tetflora", lambda: setattr(_here, "at_work", True))

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from .. import storage
 from ..errors import SpeciesError
@@ -59,6 +59,17 @@ class TetFloraPreferences(bpy.types.AddonPreferences):
         soft_max=64.0,
         precision=1,
     )
+    threads: IntProperty(
+        name="Threads",
+        description=(
+            "Number of processor cores that refine plants. 0 follows the scene's render settings: Threads in the "
+            "Performance panel. Results are the same with any number; each core takes some memory of its own"
+        ),
+        default=0,
+        min=0,
+        soft_max=16,
+        max=64,
+    )
     use_cache: BoolProperty(
         name="Cache Species Analysis",
         description=(
@@ -109,6 +120,14 @@ def own_species_folder() -> Path:
     if folder is None:
         raise SpeciesError("No folder for your own species; set a Species Folder in the TetFlora preferences")
     return folder
+
+
+def wanted_threads(scene: bpy.types.Scene) -> int:
+    """Cores to work with: the user's choice, or the scene's; 0 is all."""
+    own = preferences()
+    if own is not None and own.threads:
+        return own.threads
+    return scene.render.threads if scene.render.threads_mode == 'FIXED' else 0
 
 
 def _cache_folder() -> Path | None:

@@ -19,6 +19,7 @@ from contextlib import closing
 from typing import Any, TypeVar
 from weakref import WeakSet
 
+from ..processes import pool
 from ..refinement.statistics import Progress
 from ..refinement.statistics import at_once as run
 
@@ -221,13 +222,14 @@ _workers: WeakSet[_Worker] = WeakSet()
 
 
 def stop_all() -> None:
-    """Stop all work, and wait a moment for it."""
+    """Stop all work, and wait a moment for it; end other processes."""
     end = time.monotonic() + _PARTING
     running = list(_workers)
     for worker in running:
         worker.stop()
     for worker in running:
         worker.rests(max(0.0, end - time.monotonic()))
+    pool.stop()
 
 
 def register() -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,6 +82,9 @@ class Flora:
     calm : Flora or None
         The same without the wind that this one is in.
     """
+
+    #: Other processes keep it, and what it has computed for itself, see `processes.pool`.
+    sent_once: ClassVar[bool] = True
 
     species: tuple[Species, ...]
     forms: tuple[tuple[tuple[LeafModel, ...], ...], ...]

@@ -21,6 +21,7 @@ from ..compiled.flora import Flora
 from ..growth.axes import axes
 from ..growth.branches import Branches
 from ..growth.growth import WholeBranches
+from ..processes.pool import WORTH_PROCESSES, in_processes
 from ..proxies.facet_sizes import HIDDEN_LEAVES, FacetPixels, FacetSizes, piece_facet_sizes, subplant_facet_sizes
 from ..proxies.facet_weights import FacetWeights, facet_weights
 from ..proxies.microsurfaces import Facets, concatenate_facets, kept_out_of_view, piece_facets, subplant_facets
@@ -130,12 +131,23 @@ def portion_facets(
     """Facets of some portions (n,), species by species; weights do not change how many there are."""
     flora, maker = sight.flora, _Maker(sight, weights, pixels, transition)
     of_species = flora.rows["species"][portions.parts.branches.row]
-    for species in range(len(flora.species)):
-        own = portions.take(np.flatnonzero(of_species == species))
-        expected = sizes_of(flora, own, sight.shadows).counts(pixels) + 1
-        for run in in_chunks(expected, FACETS_AT_ONCE):
-            for facets, seen in maker.facets(own.take(run)):
-                yield species, facets, seen
+    expected = sizes_of(flora, portions, sight.shadows).counts(pixels) + 1
+
+    def runs() -> Iterator[tuple[int, Portions]]:
+        for species in range(len(flora.species)):
+            own = np.flatnonzero(of_species == species)
+            for run in in_chunks(expected[own], FACETS_AT_ONCE):
+                yield species, portions.take(own[run])
+
+    for made in in_processes(_facets_of_run, maker, runs(), float(expected.sum()) > WORTH_PROCESSES):
+        while made:
+            yield made.pop(0)
+
+
+def _facets_of_run(maker: _Maker, run: tuple[int, Portions]) -> list[tuple[int, Facets, bool]]:
+    """Facets of one run of portions, all of one species."""
+    species, portions = run
+    return [(species, facets, seen) for facets, seen in maker.facets(portions)]
 
 
 def sizes_of(flora: Flora, portions: Portions, shadows: ThrownShadows) -> FacetSizes:

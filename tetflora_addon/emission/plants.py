@@ -29,6 +29,7 @@ from ..growth.branches import Branches
 from ..growth.growth import WholeBranches, trunks
 from ..growth.hashing import Draw, uniform
 from ..growth.seeds import Seeds
+from ..processes.pool import WORTH_PROCESSES, in_processes
 from ..refinement.contents import feature_width
 from ..refinement.decisions import real_fraction
 from ..refinement.loop import Refinement
@@ -170,10 +171,31 @@ def portion_blocks(
     )
     expected *= portions.within * np.maximum(_real_leaves(portions, transition), _LEAST_REAL)
     done, whole = np.cumsum(expected), max(float(expected.sum()), 1.0)
-    for number, run in enumerate(in_chunks(expected, BLOCK_POLYGONS)):
-        fraction = float(done[run[-1]]) / whole if len(run) else 1.0
-        parts = _real_parts(sight, portions.take(run), transition)
-        yield from _block(flora, *parts, number, fraction, detail, transition)
+    runs = (
+        (number, float(done[run[-1]]) / whole if len(run) else 1.0, portions.take(run))
+        for number, run in enumerate(in_chunks(expected, BLOCK_POLYGONS))
+    )
+    made_of = _MadeOf(sight, transition, detail)
+    for made in in_processes(_blocks_of_run, made_of, runs, float(expected.sum()) > WORTH_PROCESSES):
+        while made:
+            yield made.pop(0)
+
+
+@dataclass(frozen=True)
+class _MadeOf:
+    """What all blocks are made of."""
+
+    sight: Sight
+    transition: Transition | None
+    detail: LeafDetail
+
+
+def _blocks_of_run(made_of: _MadeOf, run: tuple[int, float, Portions]) -> list[Block]:
+    """The meshes of one run of portions: its number, the fraction that is done with it, and the portions."""
+    number, fraction, portions = run
+    sight, transition = made_of.sight, made_of.transition
+    parts = _real_parts(sight, portions, transition)
+    return list(_block(sight.flora, *parts, number, fraction, made_of.detail, transition))
 
 
 def _may_be_real(portions: Portions, transition: Transition | None) -> NDArray[np.bool_]:

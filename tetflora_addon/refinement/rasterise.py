@@ -18,12 +18,15 @@ from numpy.typing import NDArray
 from ..arrays import Arrays, column
 from ..camera.camera import Camera
 from ..camera.silhouette import silhouette_area, window_bounds
+from ..parallel import blocks, on_all_cores
 from ..tetrahedra.geometry import face_area_vectors, projected_area, volume
 
 #: Pairs of a primitive and a pixel of its bounding box that are tested together; some 100 bytes each.
 PAIRS_AT_ONCE = 1 << 19
 #: Primitives whose bounding boxes are computed together.
 PRIMITIVES_AT_ONCE = 1 << 17
+#: Tetrahedra that one thread draws at a time.
+TETRAHEDRA_AT_ONCE = 1 << 11
 #: Shift of the sample from the pixel's centre, in pixels. The view pyramid's own planes run exactly through centres of
 #: pixels; shifted by next to nothing, each ray is on one side of every such plane.
 SHIFT = (1.7e-6, 2.9e-6)
@@ -96,11 +99,12 @@ def tetrahedron_fragments(vertices: NDArray[np.float64], camera: Camera, width: 
     A tetrahedron of few pixels (`SMALL`) has its silhouette's area as coverage, divided among its fragments, and its
     mean chord V / A as thickness: Σ coverage · thickness over all pixels is its volume, per area of a pixel.
     """
-    parts = []
-    for start in range(0, len(vertices), PRIMITIVES_AT_ONCE):
-        part = _fragments(vertices[start : start + PRIMITIVES_AT_ONCE], camera, width, height)
-        parts.append(replace(part, cell=part.cell + np.int32(start)))
-    return Fragments.concatenate(parts)
+
+    def drawn(block: slice) -> Fragments:
+        part = _fragments(vertices[block], camera, width, height)
+        return replace(part, cell=part.cell + np.int32(block.start))
+
+    return Fragments.concatenate(list(on_all_cores(drawn, blocks(len(vertices), TETRAHEDRA_AT_ONCE))))
 
 
 def occluder_depth(triangles: NDArray[np.float64], camera: Camera, width: int, height: int) -> NDArray[np.float64]:

@@ -16,7 +16,7 @@ from typing import TypeVar
 import bpy
 import numpy as np
 
-from ... import memory
+from ... import memory, parallel
 from ...buffers import MeshBuffers
 from ...camera.camera import Camera, origin_near
 from ...compiled.flora import Flora, compile_species
@@ -25,6 +25,7 @@ from ...emission.facets import drawn_species
 from ...emission.forms import EmissionForm, Refined
 from ...emission.plants import Block, Transition, expanded_blocks, explicit_blocks
 from ...emission.polygons import PolygonBlock, polygon_blocks
+from ...processes import pool
 from ...proxies.facet_weights import measuring, unmeasured
 from ...refinement import loop
 from ...refinement.decisions import Decision
@@ -33,6 +34,7 @@ from ...refinement.settings import RefinementSettings
 from ...refinement.statistics import Progress, Statistics, Stopwatch
 from ..compat import drawn_disc
 from ..materials.materials import baked_material
+from ..preferences import wanted_threads
 from ..results.collection import Results
 from ..results.forms import form_of
 from ..results.hiding import hide_originals, remove_results
@@ -48,6 +50,9 @@ from .contents import Given, compile_for, in_wind, load_for, memory_left, read_s
 
 #: Fraction of the progress bar that the loop takes; the rest is for writing meshes.
 _LOOP_FRACTION = 0.6
+
+#: Polygons, were all plants expanded, from which on other processes are started at once.
+_MANY = 1e6
 
 _Block = TypeVar("_Block")
 
@@ -111,6 +116,7 @@ def _refine_steps(
     given: Given | None,
 ) -> Generator[Progress, bool | None, Statistics]:
     clock, scene = Stopwatch(), results.scene
+    parallel.use(wanted_threads(scene))
     yield Progress(0.0, "Reading the scene")
     if camera is None or given is None:
         depsgraph.update()  # reading what was deleted since the last step would crash Blender
@@ -130,6 +136,8 @@ def _refine_steps(
     flora = in_wind(scene, flora, camera)
     clock.lap("compile")
     full = yield from call_in_thread(progress, given.polygons_full, flora)
+    if full > _MANY:
+        pool.start()
     statistics = Statistics(plants=len(given.seeds), polygons_full=full, seconds=clock.seconds)
     originals = []
     for earlier in result_collections(scene, 'VIEW'):

@@ -1,0 +1,95 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What runs in each of the other Pythons: it calls functions of the engine that it is told to call.
+
+It is started as a file, outside the package: ``python child.py PACKAGE``, where the package has the name that it has
+in Blender, whatever that is. Paths for imports come in the first message. It ends with the one that started it, or
+when there has been nothing to do for a while.
+"""
+
+import importlib
+import importlib.machinery
+import importlib.util
+import os
+import signal
+import sys
+import threading
+import time
+import traceback
+from pathlib import Path
+from types import ModuleType
+
+#: Seconds without work after which it ends.
+IDLE = 60.0
+
+
+def engine(package: str) -> None:
+    """Import the package that this file is in by a name; the packages around it, Blender's, stay empty."""
+    *around, _ = package.split(".")
+    for depth in range(len(around)):
+        name = ".".join(around[: depth + 1])
+        module = ModuleType(name)
+        module.__path__ = []
+        sys.modules[name] = module
+    folder = Path(__file__).resolve().parent.parent
+    spec = importlib.util.spec_from_file_location(
+        package, folder / "__init__.py", submodule_search_locations=[str(folder)]
+    )
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[package] = module
+    spec.loader.exec_module(module)
+
+
+class _Clock:
+    """Ends the process when it has waited for too long."""
+
+    def __init__(self) -> None:
+        self.since = time.monotonic()
+        self.busy = False
+        threading.Thread(target=self._watch, daemon=True).start()
+
+    def _watch(self) -> None:
+        while self.busy or time.monotonic() - self.since < IDLE:
+            time.sleep(1.0)
+        os._exit(0)
+
+
+def main() -> None:
+    """Answer messages until there are none."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is for the one who started this
+    # What prints goes to the error stream: the other one is for messages.
+    given, made = os.fdopen(os.dup(0), "rb", 1 << 16), os.fdopen(os.dup(1), "wb", 1 << 16)
+    os.dup2(2, 1)
+    paths = sys.stdin.buffer  # stays open, unused
+    del paths
+    package = sys.argv[1]
+    sys.path[:] = sys.argv[2].split(os.pathsep)
+    engine(package)
+    messages = importlib.import_module(f"{package}.processes.messages")
+    shared: dict[int, object] = {}
+    clock = _Clock()
+    while True:
+        try:
+            (kind, *rest) = messages.receive(given, shared)
+        except messages.Closed:
+            return
+        clock.busy = True
+        if kind == "share":
+            number, thing = rest
+            shared[number] = thing
+        elif kind == "forget":
+            shared.pop(rest[0], None)
+        else:
+            function, number, item = rest
+            try:
+                answer = messages.Packed(("made", function(shared[number], item)))
+            except BaseException as error:
+                answer = messages.Packed(("failed", error, traceback.format_exc()))
+            messages.send(made, answer)
+            del function, item, answer
+        del rest
+        clock.since, clock.busy = time.monotonic(), False
+
+
+if __name__ == "__main__":
+    main()

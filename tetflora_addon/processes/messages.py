@@ -1,0 +1,137 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Messages between processes: any object of the engine, its arrays as they lie in memory (pickle protocol 5, PEP 574).
+
+Both ends are this very code in the same installation, so pickles are never read from anybody else.
+"""
+
+from __future__ import annotations
+
+import io
+import pickle
+import struct
+from collections.abc import Callable, Mapping, Sequence
+from typing import BinaryIO
+
+#: Bytes up to which arrays go within the pickle.
+_SMALL = 4096
+_NUMBER = struct.Struct("<Q")
+
+
+class Closed(EOFError):
+    """The other process has ended."""
+
+
+class _Pickler(pickle.Pickler):
+    """Leaves out what the receiver has already."""
+
+    def __init__(self, *given: object, known: Callable[[object], int | None], **named: object) -> None:
+        super().__init__(*given, **named)
+        self._known = known
+
+    def persistent_id(self, thing: object) -> int | None:
+        """Number of a thing that is sent apart; None for others."""
+        return self._known(thing)
+
+
+class _Unpickler(pickle.Unpickler):
+    """Puts in what is there already."""
+
+    def __init__(self, *given: object, things: Mapping[int, object], **named: object) -> None:
+        super().__init__(*given, **named)
+        self._things = things
+
+    def persistent_load(self, number: int) -> object:
+        """The thing of a number."""
+        return self._things[number]
+
+
+class Packed:
+    """An object as the bytes that are sent, so that they are made once for several receivers.
+
+    Parameters
+    ----------
+    thing : object
+    known : callable, optional
+        Number of an object within it that is sent apart; None for all others.
+    """
+
+    def __init__(self, thing: object, known: Callable[[object], int | None] | None = None) -> None:
+        arrays: list[memoryview] = []
+
+        def apart(buffer: pickle.PickleBuffer) -> bool:
+            raw = buffer.raw()
+            if raw.nbytes <= _SMALL:
+                return True  # in the pickle
+            arrays.append(raw)
+            return False
+
+        if known is None:
+            data: bytes | memoryview = pickle.dumps(thing, protocol=5, buffer_callback=apart)
+        else:
+            stream = io.BytesIO()
+            _Pickler(stream, known=known, protocol=5, buffer_callback=apart).dump(thing)
+            data = stream.getvalue()
+        self.parts: Sequence[bytes | memoryview] = (data, *arrays)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the message."""
+        return sum(memoryview(part).nbytes for part in self.parts)
+
+
+def send(stream: BinaryIO, *things: object) -> None:
+    """Write objects, or what is packed already, as one message.
+
+    Raises
+    ------
+    OSError
+        The receiver has ended.
+    """
+    packed = [thing if isinstance(thing, Packed) else Packed(thing) for thing in things]
+    parts = [part for one in packed for part in one.parts]
+    counts = [len(packed), *(len(one.parts) for one in packed), *(memoryview(part).nbytes for part in parts)]
+    stream.write(b"".join(_NUMBER.pack(n) for n in counts))
+    for part in parts:
+        stream.write(part)
+    stream.flush()
+
+
+def receive(stream: BinaryIO, things: Mapping[int, object] | None = None) -> list[object]:
+    """Objects of the next message; their arrays can be written to.
+
+    Parameters
+    ----------
+    stream : file
+    things : mapping of int to object, optional
+        What was sent apart, by number.
+
+    Raises
+    ------
+    Closed
+        The sender has ended.
+    """
+    (number,) = _numbers(stream, 1)
+    counts = _numbers(stream, number)
+    sizes = _numbers(stream, sum(counts))
+    parts = iter([_read(stream, size) for size in sizes])
+    found = []
+    for count in counts:
+        data, *arrays = (next(parts) for _ in range(count))
+        found.append(_Unpickler(io.BytesIO(data), things=things or {}, buffers=arrays).load())
+    return found
+
+
+def _numbers(stream: BinaryIO, count: int) -> list[int]:
+    return [n for (n,) in _NUMBER.iter_unpack(_read(stream, count * _NUMBER.size))]
+
+
+def _read(stream: BinaryIO, size: int) -> bytearray:
+    data = bytearray(size)
+    view, done = memoryview(data), 0
+    while done < size:
+        got = stream.readinto(view[done:])
+        if not got:
+            raise Closed
+        done += got
+    return data
