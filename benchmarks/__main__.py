@@ -27,6 +27,7 @@ NAMES = (
     "leaf_looks",
     "tetrahedra",
     "landscape",
+    "scaling",
     "growth",
     "budget",
     "stages",

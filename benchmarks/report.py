@@ -13,15 +13,17 @@ from pathlib import Path
 
 import bpy
 
+from tetflora_addon.processes import pool
+
 ROOT = Path(__file__).resolve().parent.parent
 CLEAR_PEAK = Path("/proc/self/clear_refs")
 Targets = dict[str, dict[str, float]]
 
 
 def peak_mb() -> float:
-    """Largest resident memory of this process so far, megabytes."""
+    """Largest resident memory so far of this process and of those that work for it, megabytes."""
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak / (1e6 if sys.platform == "darwin" else 1e3)
+    return peak / (1e6 if sys.platform == "darwin" else 1e3) + pool.peak() / 1e6
 
 
 def forget_peak() -> None:

@@ -19,6 +19,11 @@ import traceback
 from pathlib import Path
 from types import ModuleType
 
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None
+
 #: Seconds without work after which it ends.
 IDLE = 60.0
 
@@ -38,6 +43,14 @@ def engine(package: str) -> None:
     module = importlib.util.module_from_spec(spec)
     sys.modules[package] = module
     spec.loader.exec_module(module)
+
+
+def peak() -> int:
+    """Bytes that this process has held at most; 0 where the system does not tell."""
+    if resource is None:
+        return 0
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return most if sys.platform == "darwin" else most * 1024
 
 
 class _Clock:
@@ -60,11 +73,10 @@ def main() -> None:
     # What prints goes to the error stream: the other one is for messages.
     given, made = os.fdopen(os.dup(0), "rb", 1 << 16), os.fdopen(os.dup(1), "wb", 1 << 16)
     os.dup2(2, 1)
-    paths = sys.stdin.buffer  # stays open, unused
-    del paths
     package = sys.argv[1]
     sys.path[:] = sys.argv[2].split(os.pathsep)
     engine(package)
+    memory = importlib.import_module(f"{package}.memory")
     messages = importlib.import_module(f"{package}.processes.messages")
     shared: dict[int, object] = {}
     clock = _Clock()
@@ -79,12 +91,13 @@ def main() -> None:
             shared[number] = thing
         elif kind == "forget":
             shared.pop(rest[0], None)
+            memory.give_back()
         else:
             function, number, item = rest
             try:
-                answer = messages.Packed(("made", function(shared[number], item)))
+                answer = messages.Packed(("made", function(shared[number], item), "", peak()))
             except BaseException as error:
-                answer = messages.Packed(("failed", error, traceback.format_exc()))
+                answer = messages.Packed(("failed", error, traceback.format_exc(), peak()))
             messages.send(made, answer)
             del function, item, answer
         del rest

@@ -68,12 +68,18 @@ def in_processes(
         yield from parallel.on_all_cores(lambda item: _call(function, own, item), items)
     finally:
         own.forgotten = True
+        parallel.in_each_thread(_tidied)
 
 
 def start(package: str = _PACKAGE) -> None:
     """Begin to start the processes, for work that is about to come; returns at once."""
     if parallel.threads() > 1 and not _broken.is_set() and _python():
         parallel.in_each_thread(_child_of_this_thread)
+
+
+def peak() -> int:
+    """Bytes that all processes together have held at most; 0 where there are none or the system does not tell."""
+    return sum(one.peak for one in list(_children))
 
 
 def stop() -> None:
@@ -168,6 +174,7 @@ class _Child:
             **hidden,
         )
         self._known: dict[int, _Given] = {}
+        self.peak = 0
         _children.add(self)
 
     def call(self, function: Callable, shared: _Given, item: object) -> object:
@@ -181,17 +188,27 @@ class _Child:
             What the function raises.
         """
         there = self._process.stdin
-        for number in [number for number, given in self._known.items() if given.forgotten]:
-            del self._known[number]
-            send(there, "forget", number)
+        self.forget()
         if shared.number not in self._known:
             self._share(shared)
         send(there, "call", function, shared.number, item)
-        ((kind, result, *told),) = receive(self._process.stdout)
+        ((kind, result, told, self.peak),) = receive(self._process.stdout)
         if kind == "failed":
-            result.add_note("".join(told))
+            result.add_note(told)
             raise result
         return result
+
+    def forget(self) -> None:
+        """Let go of what no call will need again.
+
+        Raises
+        ------
+        OSError
+            The process has ended.
+        """
+        for number in [number for number, given in self._known.items() if given.forgotten]:
+            del self._known[number]
+            send(self._process.stdin, "forget", number)
 
     def _share(self, given: _Given) -> None:
         packed = given.packed()
@@ -221,6 +238,14 @@ def _call(function: Callable[[_Shared, _Item], _Result], shared: _Given, item: _
             own.end()
             _here.child = None
     return function(shared.thing, item)
+
+
+def _tidied() -> None:
+    """Let the process of this thread give memory back."""
+    own = getattr(_here, "child", None)
+    with suppress(OSError):
+        if own is not None:
+            own.forget()
 
 
 def _child_of_this_thread() -> _Child | None:
