@@ -160,7 +160,11 @@ def coarse_error(model: LeafModel) -> float:
         return max(4.0 * model.shape.gap, 0.02)
     made = fitted(model.shape, TOLERANCES[2], model.area, model.reach, amount=0.0)
     fine, coarse = _margin(_model_of(made), not isinstance(model.shape, Compound)), _margin(model, stems=True)
-    return max(_farthest(fine, coarse), _farthest(coarse, fine))
+    inside = _farthest(fine, coarse)
+    if isinstance(model.shape, Compound) and model.shape.pairs > 1:
+        # Leaflets that close up are one surface until the gaps between them can be seen, however deep these are.
+        inside = min(inside, (model.shape.last - model.shape.first) / (model.shape.pairs - 1))
+    return max(inside, _farthest(coarse, fine))
 
 
 def _round_levels(model: LeafModel) -> tuple[LeafLevel, ...]:

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from tetflora_addon.leaves.levels import (
     LeafLevel,
     chosen_level,
+    coarse_error,
     fitted,
     leaf_levels,
     level_errors,
@@ -23,6 +24,7 @@ from tetflora_addon.leaves.levels import (
 from tetflora_addon.leaves.models import _COARSE, LEAF_MODELS, LeafModel
 from tetflora_addon.leaves.needles import Needles
 from tetflora_addon.leaves.outlines import distance_to_links
+from tetflora_addon.species import catalogue
 
 #: Polygons that no level has.
 MOST = 4000
@@ -122,3 +124,10 @@ def test_needles_are_as_many_as_they_should_be() -> None:
         made = surface_of(shape, tolerance)
         tips = np.isclose(made.uv[:, 1], 1.0) & np.isclose(made.uv[:, 0], 0.5)
         assert tips.sum() // sides >= shape.needles // shape.bundle
+
+
+def test_leaflets_that_close_up_are_one_surface_from_afar() -> None:
+    """A frond of moss is its outline until gaps between leaflets can be seen, though they are deeper than wide."""
+    model = catalogue.load_species("moss").leaf[0]
+    gap = (model.shape.last - model.shape.first) / (model.shape.pairs - 1)
+    assert coarse_error(model) < 1.3 * gap
