@@ -24,6 +24,8 @@ from .wood_detail import Fineness, Pixels, fineness
 
 #: Rings that are worked on at a time: some ten megabytes.
 _RINGS_AT_ONCE = 48_000
+#: How high stems beyond a fork begin, for materials, metres.
+_ABOVE = 4.0
 
 
 def tube_buffers(flora: Flora, whole: Sequence[WholeBranches], pixels: Pixels | None = None) -> MeshBuffers | None:
@@ -183,7 +185,9 @@ class _Tubes:
         self._add_topology(lower.astype(np.int32), number, sides)
         # v counts lengths of the perimeter at the branch's base, so that a texture is as wide as it is high.
         girth = base_girth(branches)
-        v = rings.t * np.take(branches.length / np.maximum(girth, 1e-9), rings.branch)
+        # Stems beyond a fork do not begin at the ground, where materials have moss.
+        above = np.where(flora.rows["continues"][branches.row], _ABOVE, 0.0) / np.maximum(girth, 1e-9)
+        v = rings.t * np.take(branches.length / np.maximum(girth, 1e-9), rings.branch) + above[rings.branch]
         colour = branch_colours(flora.rows, branches.row, branches.key) if rings.colour is None else rings.colour
         colour = colour.astype(np.float32)
         colour = np.ascontiguousarray(colour)[np.take(rings.branch, lower)]
