@@ -14,8 +14,10 @@ import argparse
 import sys
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from math import tau
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
@@ -24,6 +26,9 @@ from numpy.typing import NDArray
 
 from devtools import session
 from devtools.formats import set_format
+
+if TYPE_CHECKING:
+    from tetflora_addon.compiled.flora import Flora
 
 ROOT = Path(__file__).resolve().parent.parent
 SPECIES = ("oak", "scots_pine", "birch", "willow", "ash", "aspen", "beech", "spruce")
@@ -44,6 +49,10 @@ _LARGEST_SHEET = (1500, 1800)
 _SKY = 0.9
 #: Height of the breast, metres, where foresters measure girth.
 _BREAST = 1.3
+#: Species that stand among others, and how much so: the boughs of a spruce that stands free hide its foot.
+_AMONG_OTHERS = {"spruce": 0.7}
+#: Weight of how much a leaf faces the camera and the sky, in metres that it stands out.
+_FACING = 1.2
 
 
 class Subject:
@@ -62,14 +71,17 @@ class Subject:
         from tetflora_addon.growth.axes import axes
         from tetflora_addon.growth.growth import WholeBranches, trunks
         from tetflora_addon.species import catalogue
+        from tetflora_addon.species.habit import with_habit
 
-        species = catalogue.load_species(identifier)
-        self.identifier, self.crown = identifier, crown_of(species)
+        habit = _AMONG_OTHERS.get(identifier, 0.0)
+        species = replace(catalogue.load_species(identifier), habit=habit)
+        self.planted = among_others(bpy.context.scene, identifier, habit) if habit else identifier
+        self.identifier, self.crown = identifier, crown_of(with_habit(species, habit))
         flora = compile_species([species])
         stem = trunks(flora.rows, single_seed(identifier, 1))
         self.stem = WholeBranches(stem, axes(flora.rows, stem)), flora
         self.size = max(o.leaf_size.mean for o in species.orders if o.leaves.mean > 0)
-        self.leaf = self._outer_leaf()
+        self.leaf = face_on_leaf(flora, identifier, _TOWARDS, highest=0.35)
         self._plant()
 
     def leaf_view(self) -> None:
@@ -106,22 +118,6 @@ class Subject:
         """The views by name."""
         return {name: getattr(self, f"{name}_view") for name in ("leaf", "twig", "bark", "foot", "crown")}
 
-    def _leaves(self) -> NDArray[np.float64]:
-        """Vertices (n, 3) of the plant's leaves, as its model has them."""
-        from tetflora_addon.blender.job.plant_mesh import single_seed
-        from tetflora_addon.emission.plants import expanded_blocks
-
-        blocks = expanded_blocks(self.stem[1], single_seed(self.identifier, 1))
-        found = [block.buffers.positions for block in blocks if block.kind == "leaf"]
-        return np.concatenate([np.zeros((0, 3)), *found]).astype(np.float64)
-
-    def _outer_leaf(self) -> NDArray[np.float64]:
-        """Place (3,) of a leaf on the outside of the lower crown, toward the camera."""
-        points = self._leaves()
-        low = points[points[:, 2] < np.quantile(points[:, 2], 0.35)]
-        outer = low[(low @ (_TOWARDS * [1.0, 1.0, 0.0])).argmax()]
-        return low[np.linalg.norm(low - outer, axis=1) < 0.6 * self.size].mean(axis=0)
-
     def _trunk(self, height: float) -> tuple[NDArray[np.float64], float]:
         """Middle (3,) and radius of the trunk at a height, metres."""
         from tetflora_addon.growth.growth import radius_at
@@ -148,7 +144,7 @@ class Subject:
                 continue  # leaves room for the camera and the sun
             empty = bpy.data.objects.new(f"{self.identifier} {i}", None)
             empty.location, empty.rotation_euler.z = (x, y, 0.0), (turn[i] % tau) if i else 0.0
-            empty.tetflora.is_plant, empty.tetflora.species, empty.tetflora.seed = True, self.identifier, 1 + i
+            empty.tetflora.is_plant, empty.tetflora.species, empty.tetflora.seed = True, self.planted, 1 + i
             scene.collection.objects.link(empty)
         bpy.ops.mesh.primitive_grid_add(x_subdivisions=60, y_subdivisions=60, size=_SIDE)
         ground = bpy.context.object
@@ -177,6 +173,55 @@ class Subject:
         if blur is not None:
             camera.data.dof.aperture_fstop = blur
         bpy.context.view_layer.update()
+
+
+def face_on_leaf(
+    flora: Flora, identifier: str, towards: NDArray[np.float64], lowest: float = 0.0, highest: float = 0.4
+) -> NDArray[np.float64]:
+    """Middle (3,) of a leaf of the plant of seed 1 that stands out toward the camera and faces it and the sky.
+
+    Parameters
+    ----------
+    flora : Flora
+        Of that species alone.
+    identifier : str
+    towards : (3,) float64
+        Direction from the leaf to the camera.
+    lowest : float
+        Metres above the ground at least.
+    highest : float
+        Fraction of all leaves among which it is, from below.
+    """
+    from tetflora_addon.blender.job.plant_mesh import single_seed
+    from tetflora_addon.emission.plants import expanded_blocks
+
+    middles, facings = [], []
+    for block in expanded_blocks(flora, single_seed(identifier, 1)):
+        if block.kind == "leaf":
+            corners = len(flora.forms[0][0][block.form].positions)
+            leaves = block.buffers.positions.astype(np.float64).reshape(-1, corners, 3)
+            middle = leaves.mean(axis=1)
+            # The blade is thinnest along its normal.
+            off = leaves - middle[:, None]
+            normal = np.linalg.eigh(np.einsum("nci,ncj->nij", off, off))[1][:, :, 0]
+            normal *= np.sign(normal[:, 2:])
+            middles.append(middle)
+            facings.append(normal @ (towards + [0.0, 0.0, 0.35]))
+    middle, facing = np.concatenate(middles), np.concatenate(facings)
+    out = middle @ (towards * [1.0, 1.0, 0.0])
+    low = (middle[:, 2] > lowest) & (middle[:, 2] < np.quantile(middle[:, 2], highest))
+    return middle[np.where(low, out + _FACING * facing, -np.inf).argmax()]
+
+
+def among_others(scene: bpy.types.Scene, species: str, habit: float) -> str:
+    """Identifier of the same species as it grows in a wood, which the file then has."""
+    from tetflora_addon.blender.species.edits import find_edit, species_data, store_species
+
+    name = f"{species}_in_wood"
+    if find_edit(scene, name) is None:
+        page = species_data(scene, species)
+        store_species(scene, name, {**page, "name": f"{page['name']} in a Wood", "habit": habit})
+    return name
 
 
 def render(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES, grey: float = _GREY) -> None:

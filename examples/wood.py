@@ -23,7 +23,7 @@ from PIL import Image
 
 from devtools import session
 
-from .close_ups import render, store_sheet
+from .close_ups import among_others, face_on_leaf, render, store_sheet
 
 ROOT = Path(__file__).resolve().parent.parent
 #: Distances of the eight pictures from the leaf, metres.
@@ -45,6 +45,8 @@ _ELEVATION, _AZIMUTH = 38.0, 236.0
 _SKY = 0.9
 #: Mean of the picture from inside, where sunlit boles would else be white.
 _SHADE = 0.27
+#: The same of what is seen from afar, which lies in the sun, and from nearer.
+_WIDE, _CLOSER = 0.4, 0.34
 _MASK = "wood"
 
 
@@ -117,7 +119,7 @@ def _plant(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
     wood = populations.add_population(scene, [ground], name=f"{ground.name} wood")
     for species, weight in TREES.items():
         entry = wood.mix.add()
-        entry.species, entry.weight = _among_others(scene, species), weight
+        entry.species, entry.weight = among_others(scene, species, _HABIT), weight
     wood.vertex_group, wood.min_distance = _MASK, _APART
     wood.by_density, wood.density = True, _DENSITY
     wood.scale_min, wood.scale_max, wood.seed = 0.6, 1.15, 3
@@ -125,17 +127,6 @@ def _plant(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
     bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     at_once(cover.cover_steps(scene, depsgraph, wood, masks={"vertex_group": ""}))
-
-
-def _among_others(scene: bpy.types.Scene, species: str) -> str:
-    """Identifier of the same species as it grows in a wood, which the file then has."""
-    from tetflora_addon.blender.species.edits import find_edit, species_data, store_species
-
-    name = f"{species}_in_wood"
-    if find_edit(scene, name) is None:
-        page = species_data(scene, species)
-        store_species(scene, name, {**page, "name": f"{page['name']} in a Wood", "habit": _HABIT})
-    return name
 
 
 def aim(scene: bpy.types.Scene, target: Vector, eye: Vector, lens: float) -> None:
@@ -148,24 +139,11 @@ def aim(scene: bpy.types.Scene, target: Vector, eye: Vector, lens: float) -> Non
 
 def leaf_of_the_oak(scene: bpy.types.Scene) -> Vector:
     """Middle of a leaf of the oak that stands out toward the camera and faces it and the sun."""
-    from tetflora_addon.blender.job.plant_mesh import single_seed
     from tetflora_addon.compiled.flora import compile_species
-    from tetflora_addon.emission.plants import expanded_blocks
     from tetflora_addon.species import catalogue
 
     flora = compile_species([catalogue.load_species("oak")])
-    (block,) = [block for block in expanded_blocks(flora, single_seed("oak", 1)) if block.kind == "leaf"]
-    corners = len(flora.forms[0][0][0].positions)
-    leaves = block.buffers.positions.astype(np.float64).reshape(-1, corners, 3)
-    middle = leaves.mean(axis=1)
-    # The blade is thinnest along its normal.
-    normal = np.linalg.svd(leaves - middle[:, None])[2][:, 2]
-    normal *= np.sign(normal[:, 2:])
-    facing = normal @ (_TOWARDS + [0.0, 0.0, 0.35])
-    out = middle @ (_TOWARDS * [1.0, 1.0, 0.0])
-    low = (middle[:, 2] > 1.2) & (middle[:, 2] < np.quantile(middle[:, 2], 0.4))
-    best = np.where(low, out + 1.2 * facing, -np.inf).argmax()
-    return Vector(middle[best]) + scene.objects["The oak"].location
+    return Vector(face_on_leaf(flora, "oak", _TOWARDS, lowest=1.2)) + scene.objects["The oak"].location
 
 
 def render_dolly(path: Path, size: tuple[int, int] = (480, 270), samples: int = 32) -> None:
@@ -178,7 +156,7 @@ def render_dolly(path: Path, size: tuple[int, int] = (480, 270), samples: int = 
             # A lens that shows the whole oak at 16 m, and a leaf at a hand's width.
             aim(scene, leaf, leaf + Vector(_TOWARDS * distance), 40.0)
             made.append(Path(folder) / f"{number}.png")
-            render(made[-1], size, samples)
+            render(made[-1], size, samples, grey=_WIDE if distance > NEAR else _CLOSER)
         store_sheet([made[:4], made[4:]], path)
 
 

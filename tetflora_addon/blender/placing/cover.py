@@ -50,6 +50,8 @@ _SHEDS = 1.2
 _ANYBODY = "plants"
 #: Soil without anything on it, linear RGB.
 HUMUS = np.array([0.036, 0.025, 0.016])
+#: How bright low plants are together, of how bright one blade is.
+_SHADED = 0.72
 
 
 @dataclass(frozen=True)
@@ -256,7 +258,8 @@ def _lay_soil(
     green = covered(growing, cells)
     areas = np.array([one.number * one.area * one.suits.mean() for one in growing] or [0.0])
     colours = np.stack([one.colour for one in growing] or [HUMUS])
-    tint = areas @ colours / max(areas.sum(), 1e-12)
+    # Seen from above, a meadow is darker than its blades, which shade each other.
+    tint = _SHADED * (areas @ colours / max(areas.sum(), 1e-12))
     material = soil_material(
         f"{cover.name} soil",
         tinted(lying, HUMUS, cells).reshape(*shape, 3),
