@@ -70,6 +70,7 @@ class Subject:
         from tetflora_addon.compiled.flora import compile_species
         from tetflora_addon.growth.axes import axes
         from tetflora_addon.growth.growth import WholeBranches, trunks
+        from tetflora_addon.leaves.needles import Needles
         from tetflora_addon.species import catalogue
         from tetflora_addon.species.habit import with_habit
 
@@ -80,7 +81,9 @@ class Subject:
         flora = compile_species([species])
         stem = trunks(flora.rows, single_seed(identifier, 1))
         self.stem = WholeBranches(stem, axes(flora.rows, stem)), flora
-        self.size = max(o.leaf_size.mean for o in species.orders if o.leaves.mean > 0)
+        # Of a shoot full of needles, some of these are looked at.
+        part = 0.5 if isinstance(flora.forms[0][0][0].shape, Needles) else 1.0
+        self.size = part * max(o.leaf_size.mean for o in species.orders if o.leaves.mean > 0)
         self.leaf = face_on_leaf(flora, identifier, _TOWARDS, highest=0.35)
         self._plant()
 

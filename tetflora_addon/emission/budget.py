@@ -63,6 +63,8 @@ _TOGETHER = 50_000
 _SURE = 0.6
 #: Largest factor on hidden facets that the image alone may ask for.
 _LARGEST_HIDDEN = 96.0
+#: Polygons of finer levels of near leaves that come on top of what an image can show: needles have several a pixel.
+_ON_TOP = 1_500_000.0
 #: Fraction of what is allowed that finer levels of near leaves may always have, and tolerances that are tried.
 _FINE, _TOLERANCES = 0.25, (*(TOLERANCE * 2.0**k for k in range(9)), np.inf)
 
@@ -127,7 +129,8 @@ def afford(
     count = _Facets(flora, result, camera)
     # A sphere is a whole polygon for the limit on polygons, but only a part of one for memory: a budget for each.
     # What other meshes have out of sight takes from what somebody allows, not from what the image shows.
-    limits = [(enough(camera), 1.0, False), (_unreserved(most), 1.0, True)]
+    on_top = min(count.finer(settings.leaf_limit), _ON_TOP)
+    limits = [(enough(camera) + on_top, 1.0, False), (_unreserved(most), 1.0, True)]
     limits += [(_unreserved(memory), primitive_bytes / BYTES_PER_POLYGON, True)]
     count.tolerance = _tolerance(count, settings, limits)
     hard = min(allowed for allowed, _, every in limits if every)
@@ -157,7 +160,7 @@ def _tolerance(count: _Facets, settings: RefinementSettings, limits: list[tuple[
 
     How wide leaves are that are real is that of a budget that suffices.
     """
-    allowed = _FINE * min(limit for limit, *_ in limits)
+    allowed = min(_FINE * limit if every else max(_FINE * limit, _ON_TOP) for limit, _, every in limits)
     for tolerance in _TOLERANCES:
         count.tolerance = tolerance
         more = count.finer(_limit(1.0, settings))

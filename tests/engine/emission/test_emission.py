@@ -129,7 +129,7 @@ def test_explicit_polygons_are_about_as_many_as_expected() -> None:
     flora, _, camera, result = scene()
     made = sum(b.buffers.polygons for b in explicit_blocks(flora, result, camera))
     expected = result.totals.polygons[result.decision == Decision.EXPLICIT].sum()
-    assert made == pytest.approx(expected, rel=0.1)
+    assert made == pytest.approx(expected, rel=0.15)
 
 
 def test_facets_have_the_area_of_what_is_not_explicit(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -146,7 +146,7 @@ def test_facets_have_the_area_of_what_is_not_explicit(monkeypatch: pytest.Monkey
     leaves = support.face_areas(rest)[rest.attributes["tf_transmission"][1] > 0].sum()
     proxies = np.isin(result.decision, (Decision.PROXY, Decision.HIDDEN))
     # A part that reaches into an explicit tetrahedron may be real as a whole.
-    assert leaves == pytest.approx(result.totals.leaf_area[proxies].sum(), rel=0.1)
+    assert leaves == pytest.approx(result.totals.leaf_area[proxies].sum(), rel=0.15)
 
 
 def test_facets_are_as_large_as_asked_for_and_larger_where_hidden() -> None:
