@@ -82,7 +82,11 @@ def test_manifest_says_what_the_project_promises(extension_zip: Path) -> None:
 
 
 def test_nothing_needs_a_permission_that_the_manifest_lacks() -> None:
-    """No network, camera, microphone or clipboard; and no other programs, which could do anything."""
+    """No network, camera, microphone or clipboard; and no other programs, which could do anything.
+
+    Only `processes.pool` starts any: the Python that runs it, with the engine's own code.
+    """
+    own = rooms.ROOT / "tetflora_addon" / "processes" / "pool.py"
     banned = {
         "socket",
         "ssl",
@@ -99,11 +103,12 @@ def test_nothing_needs_a_permission_that_the_manifest_lacks() -> None:
     for path in rooms.sources().values():
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Import):
-                assert not {alias.name.split(".")[0] for alias in node.names} & banned, path
+                found = {alias.name.split(".")[0] for alias in node.names} & banned
+                assert found <= ({"subprocess"} if path == own else set()), path
             elif isinstance(node, ast.ImportFrom) and not node.level:
                 assert (node.module or "").split(".")[0] not in banned, path
             elif isinstance(node, ast.Attribute):
-                assert node.attr not in words, path
+                assert node.attr.lower() not in words or path == own, path
 
 
 def test_the_version_has_its_section_in_the_changelog() -> None:

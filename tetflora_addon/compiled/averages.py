@@ -146,10 +146,18 @@ def own_leaf_integrals(
     area = ((1 + k[:, None] * o) * (1 + (size_young - 1)[:, None] * young)) ** 2
     alike = size_young == 1
     return (
-        np.where(alike, first, area @ _WEIGHTS),
-        np.where(alike, second, (area * o) @ _WEIGHTS),
-        (area * young) @ _WEIGHTS,
+        np.where(alike, first, _integral(area)),
+        np.where(alike, second, _integral(area * o)),
+        _integral(area * young),
     )
+
+
+def _integral(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Integral (n,) of values (n, nodes) over the interval.
+
+    Not a product of matrices: the last bit of those depends on which rows there are beside.
+    """
+    return sum(values[:, node] * weight for node, weight in enumerate(_WEIGHTS))
 
 
 def average(rows: NDArray[np.void], leaf: RowLeaves) -> Averages:

@@ -85,9 +85,11 @@ def send(stream: BinaryIO, *things: object) -> None:
 
     Raises
     ------
-    OSError
+    Closed, OSError
         The receiver has ended.
     """
+    if stream.closed:
+        raise Closed
     packed = [thing if isinstance(thing, Packed) else Packed(thing) for thing in things]
     parts = [part for one in packed for part in one.parts]
     counts = [len(packed), *(len(one.parts) for one in packed), *(memoryview(part).nbytes for part in parts)]

@@ -243,7 +243,7 @@ def _call(function: Callable[[_Shared, _Item], _Result], shared: _Given, item: _
 def _tidied() -> None:
     """Let the process of this thread give memory back."""
     own = getattr(_here, "child", None)
-    with suppress(OSError):
+    with suppress(Closed, OSError):
         if own is not None:
             own.forget()
 

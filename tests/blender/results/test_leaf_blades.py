@@ -80,7 +80,8 @@ def test_leaflets_have_their_own_length():
     rowan = catalogue.load_species("rowan")
     made = leaf_blades.species_leaf_material(rowan, "leaf")
     group = next(n for n in made.node_tree.nodes if n.type == 'GROUP' and "Leaf Length" in n.inputs)
-    assert group.inputs["Leaf Length"].default_value == pytest.approx(0.17 * rowan.leaf[0].shape.length, rel=0.2)
+    # Rowan leaves, pinnate, are 10 to 22 cm long, and most of a species' are in the sun.
+    assert group.inputs["Leaf Length"].default_value == pytest.approx(0.2 * rowan.leaf[0].shape.length, rel=0.2)
 
 
 @pytest.mark.parametrize("identifier", ["fern", "rowan"])

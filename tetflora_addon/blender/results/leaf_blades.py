@@ -140,5 +140,6 @@ def _filled(model: LeafModel) -> float:
 def _length(species: Species, kind: str) -> float:
     """Mean length of leaves of a kind, metres."""
     every = [*species.orders, *([] if species.spur is None else [species.spur])]
-    sizes = [order.leaf_size.mean for order in every if order.leaf_kind == kind and order.leaves.mean > 0]
+    bearing = [order for order in every if order.leaf_kind == kind and order.leaves.mean > 0]
+    sizes = [order.leaf_size.mean * (1.0 + order.leaf_size_tip) / 2.0 for order in bearing]
     return float(np.mean(sizes)) if sizes else 0.1
