@@ -21,6 +21,10 @@ settings.register_profile(
 )
 settings.load_profile("untimed")
 
+# Tests that run beside others have a core each, and start no other processes unless they are about these.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ.setdefault("TETFLORA_THREADS", "1")
+
 
 @pytest.fixture(scope="session")
 def blender() -> Iterator[ModuleType]:

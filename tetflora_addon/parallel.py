@@ -19,6 +19,9 @@ from typing import TypeVar
 #: More threads than this gain little, as memory is what they wait for; and each has a block of its own in memory.
 MOST_THREADS = 16
 
+#: Environment variable with the number of threads where nobody has chosen one, for farms and tests.
+VARIABLE = "TETFLORA_THREADS"
+
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
 _wanted = 0  # threads, see `use`
@@ -33,8 +36,9 @@ def cores() -> int:
 
 
 def threads() -> int:
-    """Threads that work at the same time: as many as `use` was told, or all cores; up to `MOST_THREADS`."""
-    return min(_wanted or cores(), MOST_THREADS)
+    """Threads that work at the same time: as many as `use` or `VARIABLE` says, or all cores; up to `MOST_THREADS`."""
+    told = os.environ.get(VARIABLE, "")
+    return min(_wanted or (int(told) if told.isdigit() else 0) or cores(), MOST_THREADS)
 
 
 def use(number: int) -> None:

@@ -61,3 +61,12 @@ def test_no_more_is_made_ahead_than_there_are_threads(threads: int) -> None:
     assert len(begun) <= threads + 1
     results.close()
     assert len(begun) <= threads + 1
+
+
+def test_the_environment_says_how_many_where_nobody_else_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(parallel, "_wanted", 0)
+    for told, number in (("3", 3), ("0", None), ("many", None), ("", None)):
+        monkeypatch.setenv(parallel.VARIABLE, told)
+        assert parallel.threads() == (number or min(parallel.cores(), parallel.MOST_THREADS))
+    monkeypatch.setattr(parallel, "_wanted", 2)
+    assert parallel.threads() == 2
