@@ -38,7 +38,7 @@ def cores() -> int:
 def threads() -> int:
     """Threads that work at the same time: as many as `use` or `VARIABLE` says, or all cores; up to `MOST_THREADS`."""
     told = os.environ.get(VARIABLE, "")
-    return min(_wanted or (int(told) if told.isdigit() else 0) or cores(), MOST_THREADS)
+    return min(_wanted or (int(told) if told.isdecimal() else 0) or cores(), MOST_THREADS)
 
 
 def use(number: int) -> None:

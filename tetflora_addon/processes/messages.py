@@ -113,6 +113,8 @@ def receive(stream: BinaryIO, things: Mapping[int, object] | None = None) -> lis
     Closed
         The sender has ended.
     """
+    if stream.closed:
+        raise Closed
     (number,) = _numbers(stream, 1)
     counts = _numbers(stream, number)
     sizes = _numbers(stream, sum(counts))

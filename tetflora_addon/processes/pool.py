@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Functions called in other processes, one for each thread of `parallel`, with what all calls share sent once.
 
-numpy lets go of the interpreter's lock while it computes, but what calls it does not: of the engine's blocks, two
-threads gain a tenth, two processes nearly all. Where no other Python can be started, or one ends, the work is done
-here instead: results are the same.
+numpy lets go of the interpreter's lock while it computes, but what calls it does not: with the engine's blocks, two
+threads gain about a tenth. ``python -m benchmarks scaling`` tells what processes gain. Where no other Python can be
+started, or one ends, the work is done here instead: results are the same.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def in_processes(
         parallel.in_each_thread(_tidied)
 
 
-def start(package: str = _PACKAGE) -> None:
+def start() -> None:
     """Begin to start the processes, for work that is about to come; returns at once."""
     if parallel.threads() > 1 and not _broken.is_set() and _python():
         parallel.in_each_thread(_child_of_this_thread)
