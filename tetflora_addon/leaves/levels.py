@@ -19,7 +19,7 @@ from .blades import blade_surface
 from .bodies import closed_parts, rounded
 from .compounds import Compound, compound_surface
 from .models import LeafModel
-from .needles import Needles, needle_surface
+from .needles import SPARSE, Needles, needle_surface
 from .outlines import Blade, distance_to_links
 from .surfaces import LeafSurface
 
@@ -86,7 +86,7 @@ def fitted(shape: Shape, tolerance: float, area: float, reach: float = np.inf, a
     if not isinstance(shape, Blade):  # the surface grows with the thickness or width almost evenly
         mean, thick = made.areas().mean(), surface_of(shape, tolerance, amount, _THICKER).areas().mean()
         factor = 1.0 + (_THICKER - 1.0) * (area / smaller**2 - mean) / (thick - mean)
-        made = surface_of(shape, tolerance, amount, float(np.clip(factor, 0.2, 5.0)))
+        made = surface_of(shape, tolerance, amount, float(np.clip(factor, 0.2, 8.0)))
     made = replace(made, positions=made.positions * smaller, error=made.error * smaller)
     for _ in range(_FITS):
         ratio = area / made.areas()
@@ -106,7 +106,7 @@ def leaf_levels(model: LeafModel) -> tuple[LeafLevel, ...]:
         return _round_levels(model)
     found: list[LeafLevel] = []
     error = coarse_error(model)
-    for tolerance in TOLERANCES:
+    for tolerance in (2.0 * SPARSE, *TOLERANCES) if isinstance(model.shape, Needles) else TOLERANCES:
         made = fitted(model.shape, tolerance, model.area, model.reach)
         if made.error > _FINER * error:
             continue
@@ -157,7 +157,7 @@ def coarse_error(model: LeafModel) -> float:
     if model.shape is None:
         return rounded(model, 0)[1] if _is_round(model) else 0.0
     if isinstance(model.shape, Needles):
-        return max(4.0 * model.shape.gap, 0.02)
+        return max(6.0 * model.shape.gap, 0.03)
     made = fitted(model.shape, TOLERANCES[2], model.area, model.reach, amount=0.0)
     fine, coarse = _margin(_model_of(made), not isinstance(model.shape, Compound)), _margin(model, stems=True)
     inside = _farthest(fine, coarse)

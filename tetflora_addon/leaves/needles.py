@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Needles on a shoot: brushes, flat sprays, bundles of two to five; flat from afar, prisms with a bend up close."""
+"""Needles on a shoot: brushes, flat sprays, bundles of two to five.
+
+Fewer and broader ones from afar, then all of them, flat, and prisms with a bend up close.
+"""
 
 from __future__ import annotations
 
@@ -15,10 +18,19 @@ from .surfaces import VARIANTS, LeafSurface, drawn, joined, surface, tube
 _GOLDEN_ANGLE = np.radians(137.508)
 #: What is not seen of the gaps between needles, of their distance along the shoot.
 _GAP = 0.6
-#: Error from which on needles are flat, and from which on prisms have three sides.
-_FLAT, _THREE = 0.004, 0.0012
+#: Error from which on there are fewer needles, needles are flat, and prisms have three sides.
+SPARSE, _FLAT, _THREE = 0.05, 0.004, 0.0012
+#: One of so many needles stands for them all where there are fewer; what is not seen of the gaps then.
+_OF, _SPARSE_GAP = 3, 2.4
 #: Radius of shoots over that of needles, and of both at their ends.
 _TAPER = 0.55
+#: Places along a needle and its widths there, for errors above the first number.
+_PROFILES = (
+    (SPARSE, (0.0, 1.0), (1.0, 0.0)),
+    (_FLAT, (0.0, 0.35, 1.0), (0.55, 1.0, 0.0)),
+    (_THREE, (0.0, 0.45, 0.88, 1.0), (0.5, 1.0, 0.8, 0.0)),
+    (0.0, (0.0, 0.3, 0.6, 0.88, 1.0), (0.5, 0.95, 1.0, 0.7, 0.0)),
+)
 
 
 @dataclass(frozen=True)
@@ -59,7 +71,8 @@ def needle_surface(needles: Needles, tolerance: float, factor: float = 1.0) -> L
         across = np.array([np.cos(turn), -np.sin(turn), 0.0])
         frame = np.stack([across, along, np.cross(across, along)], axis=1)
         parts.append(_shoot(needles, i, tolerance, factor).moved(frame, np.zeros(3)))
-    error = needles.gap if tolerance > _FLAT else min(tolerance, needles.gap)
+    error = needles.gap * (_SPARSE_GAP if tolerance > SPARSE else 1.0)
+    error = error if tolerance > _FLAT else min(tolerance, error)
     made = joined(parts)
     return LeafSurface(made.positions, made.corner_verts, made.face_offsets, made.uv, made.solid, error)
 
@@ -67,9 +80,9 @@ def needle_surface(needles: Needles, tolerance: float, factor: float = 1.0) -> L
 def _shoot(needles: Needles, number: int, tolerance: float, factor: float) -> LeafSurface:
     """One shoot along y with its needles."""
     count = max(needles.needles // needles.shoots, needles.bundle)
-    i = np.arange(count)
+    i = np.arange(0, count, _OF if tolerance > SPARSE else 1)
     node, within = i // needles.bundle, i % needles.bundle
-    last = max(node[-1], 1)
+    last = max((count - 1) // needles.bundle, 1)
     place = (node + 0.5 + 0.4 * np.stack([np.sin(i * 7.1 + 3.0 * k + number) for k in range(VARIANTS)])) / (last + 1)
     angle = np.radians(needles.angle + (needles.angle_tip - needles.angle) * place)
     angle = angle * (1.0 + 0.18 * np.sin(5.3 * i + 1.7 * np.arange(VARIANTS)[:, None]))
@@ -112,10 +125,7 @@ def _needles(
 ) -> LeafSurface:
     """Needles from starts (k, n, 3) in directions, of lengths (k, n), bent towards vectors (k, n, 3)."""
     flat, three = tolerance > _FLAT, tolerance > _THREE
-    along = (
-        np.array([0.0, 0.35, 1.0]) if flat else np.array([0.0, 0.45, 0.88, 1.0] if three else [0, 0.3, 0.6, 0.88, 1])
-    )
-    wide = np.array([0.55, 1.0, 0.0]) if flat else np.array([0.5, 1, 0.8, 0] if three else [0.5, 0.95, 1, 0.7, 0])
+    along, wide = next((np.array(along), np.array(wide)) for error, along, wide in _PROFILES if tolerance > error)
     rings, (variants, count) = len(along), length.shape
     reach = length[..., None, None]
     axis = start[:, :, None] + reach * (
