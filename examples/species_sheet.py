@@ -15,6 +15,7 @@ from tetflora_addon.blender.materials import materials
 from tetflora_addon.blender.results import leaf_objects, meshes
 from tetflora_addon.growth import growth
 from tetflora_addon.proxies import microsurfaces
+from tetflora_addon.proxies.drawn import facet_mesh
 from tetflora_addon.refinement.statistics import at_once
 from tetflora_addon.species import catalogue
 from tetflora_addon.subplants import leaf_meshes, tubes
@@ -69,7 +70,7 @@ def opened_cell(identifier: str, orders: int) -> Callable[[], tuple[np.ndarray, 
         points = []
         if len(closed):
             facets = microsurfaces.subplant_facets(flora, closed, np.full(len(closed), FACET))
-            parts.append(("proxy", 0, microsurfaces.facet_mesh(facets)))
+            parts.append(("proxy", 0, facet_mesh(facets)))
         for number, (kind, form, buffers) in enumerate(p for p in parts if p[2] is not None):
             proxy = materials.proxy_material
             own = [proxy()] if kind == "proxy" else leaf_objects.materials_of(scene, flora.species[0], kind, form)

@@ -10,7 +10,7 @@ it; the functions below do.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from functools import cache
 from typing import Any, Self
 
@@ -21,12 +21,40 @@ from numpy.typing import DTypeLike, NDArray
 GOLDEN_TURN, GOLDEN_ANGLE = 1.0 + np.sqrt(5.0), 3.0 - np.sqrt(5.0)
 
 
+@dataclass(frozen=True)
+class _Components:
+    """An array (n, ...) as its components, each of all n."""
+
+    components: NDArray
+
+    @classmethod
+    def of(cls, value: Any) -> Any:
+        """Such an array with more than two dimensions; everything else stays what it is."""
+        if not isinstance(value, np.ndarray) or value.ndim < 3:
+            return value
+        turned = np.moveaxis(value, 0, -1)
+        return cls(turned) if turned.flags.c_contiguous else value
+
+    def array(self) -> NDArray:
+        """The array."""
+        return np.moveaxis(self.components, -1, 0)
+
+
 class Arrays:
     """Base of dataclasses whose fields are columns: one row for each of n things.
 
     A column is an array, or another `Arrays` of the same length. One whose default is None may be absent. All other
     fields belong to the whole and are kept as they are.
     """
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All there is, with arrays of matrices as they lie in memory: pickles would put one matrix after the other."""
+        return {name: _Components.of(value) for name, value in vars(self).items()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """The same again."""
+        own = {n: value.array() if isinstance(value, _Components) else value for n, value in state.items()}
+        vars(self).update(own)
 
     def __len__(self) -> int:
         return next(len(c) for c in vars(self).values() if isinstance(c, np.ndarray | Arrays))

@@ -18,13 +18,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..buffers import MeshBuffers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.hashing import uniform
 from ..parallel import blocks, on_all_cores
 from ..proxies.facet_sizes import FacetPixels, polygon_facet_sizes
 from ..proxies.facet_weights import facet_weights
+from ..proxies.microsurfaces import Facets
 from ..refinement.contents import LARGE
 from ..refinement.decisions import Decision, contributions
 from ..refinement.loop import Refinement
@@ -32,7 +32,7 @@ from ..refinement.settings import RefinementSettings
 from ..subplants.wood_detail import finer
 from .facets import portion_facets, sizes_of
 from .leaf_detail import TOLERANCE, LeafDetail
-from .plants import Transition, portion_blocks
+from .plants import Block, Transition, portion_blocks
 from .portions import Portions, Sight
 
 #: Approximate bytes of a polygon in Blender (110) and in a renderer (500) together.
@@ -315,8 +315,8 @@ class _Facets:
         some = self.every.take(np.flatnonzero(chosen))
         transition = Transition(self.flora, self.camera, limit, self.tolerance)
         weights = facet_weights(self.flora, ())
-        real = sum(_cost(block.buffers) for block in portion_blocks(self.sight, some, transition))
-        facets = sum(len(made) for _, made, _ in portion_facets(self.sight, some, weights, pixels, transition))
+        real = sum(portion_blocks(self.sight, some, transition, form=_cost))
+        facets = sum(made for _, made, _ in portion_facets(self.sight, some, weights, pixels, transition, _count))
         sizes, fraction = sizes_of(self.flora, some, self.sight.shadows), np.where(some.real, 1.0, 0.0)
         fraction *= np.where(some.visibility > 0, transition.of_branches(some.parts.branches, some.visibility), 0.0)
         faces = _real_faces(self.flora, some, transition) + transition.detail.more(some.parts, some.visibility)
@@ -341,9 +341,13 @@ class _Facets:
         return held[cells.nodes] & (self.result.decision == Decision.EXPLICIT) & (feature < limit)
 
 
-def _cost(mesh: MeshBuffers) -> float:
-    """Polygons of a mesh; those of more than two triangles count by these."""
-    return float(np.maximum((np.diff(mesh.face_offsets) - 2) / 2.0, 1.0).sum())
+def _cost(block: Block) -> float:
+    """Polygons of a block; those of more than two triangles count by these."""
+    return float(np.maximum((np.diff(block.buffers.face_offsets) - 2) / 2.0, 1.0).sum())
+
+
+def _count(facets: Facets, _seen: bool) -> int:
+    return len(facets)
 
 
 def _tubes(flora: Flora, portions: Portions, transition: Transition, real: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,30 +1,30 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From decisions to the facets of proxies, block by block, and to microspheres in their place; `forms` makes buffers.
+"""From decisions to the facets of proxies, or to what is drawn in their place, block by block.
 
-Microspheres are opaque spheres, the particles of the paper's volumes (section 7). A facet covers the more the more it
-faces the eye; a sphere covers the same from everywhere. A sphere can therefore cover what its facet covers for the
-camera, but not for all lights as well.
+`proxies.drawn` says what that may be, and `forms` makes buffers of it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..buffers import BLOCK_POLYGONS, PointBuffers
+from ..buffers import BLOCK_POLYGONS
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.axes import axes
 from ..growth.branches import Branches
 from ..growth.growth import WholeBranches
 from ..processes.pool import WORTH_PROCESSES, in_processes
+from ..proxies.drawn import Drawn
 from ..proxies.facet_sizes import HIDDEN_LEAVES, FacetPixels, FacetSizes, piece_facet_sizes, subplant_facet_sizes
 from ..proxies.facet_weights import FacetWeights, facet_weights
-from ..proxies.microsurfaces import Facets, concatenate_facets, kept_out_of_view, piece_facets, subplant_facets
+from ..proxies.microsurfaces import Facets, kept_out_of_view, piece_facets, subplant_facets
 from ..proxies.thrown_shadows import ThrownShadows
 from ..refinement.contents import bounding_cylinders, piece_totals
 from ..refinement.decisions import Decision
@@ -41,13 +41,11 @@ DETAIL, FEW = 4.0, 8.0
 #: Extent over the metres that their shadows fall, from which on sub-plants beside the view are opened: such a shadow
 #: shows trunk and limbs where they are.
 THROWN = 0.25
-#: Minimum fraction of a facet's area that its sphere covers, where the facet is seen from its edge.
-LEAST_COVER = 0.1
-#: Mean of |cos| over all directions.
-MEAN_COVER = 0.5
 
-#: Some facets, and whether the camera sees them: neither hidden nor beside the view.
-Part = tuple[Facets, bool]
+#: Some facets or what is drawn for them, and whether the camera sees them: neither hidden nor beside the view.
+Part = tuple[Drawn, bool]
+#: What is made of some facets, which the camera sees or not. Another process may call it.
+Form = Callable[[Facets, bool], Any]
 
 
 @dataclass(frozen=True)
@@ -62,7 +60,12 @@ class Parts:
 
 
 def facet_parts(
-    flora: Flora, result: Refinement, camera: Camera, pixels: FacetPixels, transition: Transition | None = None
+    flora: Flora,
+    result: Refinement,
+    camera: Camera,
+    pixels: FacetPixels,
+    transition: Transition | None = None,
+    form: Form | None = None,
 ) -> Iterator[Parts]:
     """Facets of all that is not drawn as it is; no block is empty.
 
@@ -79,10 +82,12 @@ def facet_parts(
     transition : Transition, optional
         `plants.explicit_blocks` with the same transition makes the rest: wide leaves of explicit tetrahedra, and thick
         wood of all that is seen. Without, all of every plant gets facets.
+    form : callable, optional
+        What becomes of facets where they are made; without, they stay what they are.
     """
     parts: list[Part] = []
     current = None
-    for species, *made in _facets(flora, result, camera, pixels, transition):
+    for species, *made in _facets(flora, result, camera, pixels, transition, form):
         full = sum(len(facets) for facets, _ in parts) >= BLOCK_POLYGONS
         if parts and (full or species != current):
             yield Parts(current, tuple(parts))
@@ -95,19 +100,24 @@ def facet_parts(
 
 
 def _facets(
-    flora: Flora, result: Refinement, camera: Camera, pixels: FacetPixels, transition: Transition | None
-) -> Iterator[tuple[int | None, Facets, bool]]:
+    flora: Flora,
+    result: Refinement,
+    camera: Camera,
+    pixels: FacetPixels,
+    transition: Transition | None,
+    form: Form | None,
+) -> Iterator[tuple[int | None, Any, bool]]:
     """Facets in runs of about `FACETS_AT_ONCE`, species by species."""
     sight = Sight(flora, result, camera)
     portions = sight.portions()
     weights = facet_weights(flora, _drawn(flora, portions, transition))
-    yield from portion_facets(sight, portions, weights, pixels, transition)
+    yield from portion_facets(sight, portions, weights, pixels, transition, form)
     explicit = result.chosen(Decision.EXPLICIT) if transition else np.zeros(len(result.tree), bool)
     held = result.holdings.polygons
     proxies = held.take((result.chosen(Decision.PROXY, Decision.HIDDEN) & ~explicit)[held.cell])
     if len(proxies):
         for facets, seen in polygon_facets(proxies, result, camera, pixels.seen, FACETS_AT_ONCE):
-            yield None, facets, seen
+            yield None, facets if form is None else form(facets, seen), seen
 
 
 def drawn_species(flora: Flora, result: Refinement, camera: Camera, transition: Transition | None) -> list[int]:
@@ -126,10 +136,15 @@ def _drawn(flora: Flora, portions: Portions, transition: Transition | None) -> l
 
 
 def portion_facets(
-    sight: Sight, portions: Portions, weights: FacetWeights, pixels: FacetPixels, transition: Transition | None
-) -> Iterator[tuple[int, Facets, bool]]:
+    sight: Sight,
+    portions: Portions,
+    weights: FacetWeights,
+    pixels: FacetPixels,
+    transition: Transition | None,
+    form: Form | None = None,
+) -> Iterator[tuple[int, Any, bool]]:
     """Facets of some portions (n,), species by species; weights do not change how many there are."""
-    flora, maker = sight.flora, _Maker(sight, weights, pixels, transition)
+    flora, maker = sight.flora, _Maker(sight, weights, pixels, transition, form)
     of_species = flora.rows["species"][portions.parts.branches.row]
     expected = sizes_of(flora, portions, sight.shadows).counts(pixels) + 1
 
@@ -144,10 +159,10 @@ def portion_facets(
             yield made.pop(0)
 
 
-def _facets_of_run(maker: _Maker, run: tuple[int, Portions]) -> list[tuple[int, Facets, bool]]:
+def _facets_of_run(maker: _Maker, run: tuple[int, Portions]) -> list[tuple[int, Any, bool]]:
     """Facets of one run of portions, all of one species."""
-    species, portions = run
-    return [(species, facets, seen) for facets, seen in maker.facets(portions)]
+    (species, portions), form = run, maker.form
+    return [(species, facets if form is None else form(facets, seen), seen) for facets, seen in maker.facets(portions)]
 
 
 def sizes_of(flora: Flora, portions: Portions, shadows: ThrownShadows) -> FacetSizes:
@@ -169,8 +184,9 @@ class _Maker:
     weights: FacetWeights
     pixels: FacetPixels
     transition: Transition | None
+    form: Form | None = None
 
-    def facets(self, portions: Portions) -> Iterator[Part]:
+    def facets(self, portions: Portions) -> Iterator[tuple[Facets, bool]]:
         """Facets of portions, which are opened as far as their places show."""
         flora, sight, transition = self.sight.flora, self.sight, self.transition
         bodies = [Portions.empty()]
@@ -243,43 +259,3 @@ class _Maker:
             tubes = (seen & np.where(real > 0, tubes | twigs, bare))[owner]
             real = real[owner]
         return piece_facets(flora, pieces, leaf, wood, weight, real, tubes)
-
-
-def spheres(parts: Sequence[tuple[Facets, bool]], camera: Camera, disc: float = np.pi) -> PointBuffers:
-    """Spheres in the place of facets, one each, with their colours, transmission and velocity.
-
-    Parameters
-    ----------
-    parts : sequence of (Facets, bool)
-        Facets, and whether the camera sees them. Spheres of those cover what the facets cover for the camera; others,
-        which only cast shadows and light up others, cover the mean of their facets over all directions.
-    camera : Camera
-    disc : float
-        Area that a renderer draws for a sphere of radius 1; some draw fewer pixels than a circle has.
-    """
-    cover = np.concatenate([cover_of(facets, camera if seen else None) for facets, seen in parts])
-    facets = concatenate_facets([facets for facets, _ in parts])
-    return PointBuffers(
-        positions=facets.centre.astype(np.float32),
-        radius=(facets.side * np.sqrt(cover / disc)).astype(np.float32),
-        attributes={
-            "tf_colour": facets.colour.astype(np.float32),
-            "tf_transmission": facets.transmission.astype(np.float32),
-            **({} if facets.velocity is None else {"velocity": facets.velocity.astype(np.float32)}),
-        },
-    )
-
-
-def cover_of(facets: Facets, camera: Camera | None) -> NDArray[np.float64]:
-    """Fraction (n,) of a facet's area that its sphere covers; without a camera, the mean over all directions."""
-    if camera is None:
-        return np.full(len(facets), MEAN_COVER)
-    return np.maximum(facing(facets, camera), LEAST_COVER)
-
-
-def facing(facets: Facets, camera: Camera) -> NDArray[np.float64]:
-    """Fraction (n,) of its area that each facet shows to the camera, 0 to 1."""
-    if camera.kind == "ORTHO":
-        return np.abs(facets.normal @ camera.frame[:, 2])
-    ray = facets.centre - camera.eye
-    return np.abs(np.einsum("ni,ni->n", facets.normal, ray)) / np.maximum(np.linalg.norm(ray, axis=1), 1e-300)

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +15,22 @@ from numpy.typing import NDArray
 from ..buffers import MeshBuffers, PointBuffers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
+from ..proxies.drawn import (
+    Drawn,
+    Spheres,
+    Triangles,
+    facet_mesh,
+    joined,
+    sphere_points,
+    spheres_of,
+    triangle_mesh,
+    triangles_of,
+)
 from ..proxies.facet_sizes import FacetPixels
-from ..proxies.microsurfaces import Facets, concatenate_facets, facet_mesh
+from ..proxies.microsurfaces import Facets
 from ..refinement.loop import Refinement
 from .budget import BYTES_PER_POLYGON, BYTES_PER_SPHERE
-from .facets import Parts, facet_parts, spheres
+from .facets import Form, Parts, facet_parts
 from .leaf_detail import TOLERANCE
 from .light import BakedLight, baked_attributes
 from .plants import Transition
@@ -59,9 +71,9 @@ class Refined:
         """Side in pixels of facets that are seen; None in forms that have none."""
         return None if self.pixels is None else self.pixels.seen
 
-    def facet_parts(self) -> Iterator[Parts]:
-        """Facets of the proxies, block by block."""
-        return facet_parts(self.flora, self.refinement, self.camera, self.pixels, self.transition)
+    def facet_parts(self, form: Form | None = None) -> Iterator[Parts]:
+        """Facets of the proxies, or what a form makes of them, block by block."""
+        return facet_parts(self.flora, self.refinement, self.camera, self.pixels, self.transition, form)
 
 
 @dataclass(frozen=True)
@@ -96,30 +108,53 @@ class EmissionForm:
         return self.faces is None
 
 
-def facet_blocks(refined: Refined) -> Iterator[MeshBuffers]:
-    """Proxies as microsurfaces."""
-    for parts in refined.facet_parts():
-        yield replace(facet_mesh(concatenate_facets([facets for facets, _ in parts])), species=parts.species)
+def as_triangles(facets: Facets, _seen: bool) -> Drawn:
+    """The form of *Microsurfaces*."""
+    return triangles_of(facets)
 
 
-def sphere_blocks(refined: Refined) -> Iterator[PointBuffers]:
-    """Proxies as microspheres, one for each facet of `facet_blocks`."""
-    for parts in refined.facet_parts():
-        yield replace(spheres(parts, refined.camera, refined.disc), species=parts.species)
-
-
-def mixed_blocks(refined: Refined) -> Iterator[Buffers]:
-    """Proxies in the form that suits each: facets where they are seen, spheres where they are not.
+@dataclass(frozen=True)
+class AsSpheres:
+    """The form of *Microspheres*, and of *Automatic*, where ``seen_too`` is False and what is seen becomes triangles.
 
     In the fidelity benchmark facets come closer to the plants wherever they are seen. Hidden proxies only cast shadows
     and light other plants; spheres do that as well with a third of the memory.
     """
-    for parts in refined.facet_parts():
-        facets, hidden = [some for some, seen in parts if seen], [part for part in parts if not part[1]]
-        if facets:
-            yield replace(facet_mesh(concatenate_facets(facets)), species=parts.species)
-        if hidden:
-            yield replace(spheres(hidden, refined.camera, refined.disc), species=parts.species)
+
+    camera: Camera
+    disc: float
+    seen_too: bool
+
+    def __call__(self, facets: Facets, seen: bool) -> Drawn:
+        """Spheres or triangles."""
+        if seen and not self.seen_too:
+            return triangles_of(facets)
+        return spheres_of(facets, self.camera if seen else None, self.disc)
+
+
+def facet_blocks(refined: Refined) -> Iterator[MeshBuffers]:
+    """Proxies as microsurfaces."""
+    return _blocks(refined, as_triangles)
+
+
+def sphere_blocks(refined: Refined) -> Iterator[PointBuffers]:
+    """Proxies as microspheres, one for each facet of `facet_blocks`."""
+    return _blocks(refined, AsSpheres(refined.camera, refined.disc, seen_too=True))
+
+
+def mixed_blocks(refined: Refined) -> Iterator[Buffers]:
+    """Proxies in the form that suits each: facets where they are seen, spheres where they are not."""
+    return _blocks(refined, AsSpheres(refined.camera, refined.disc, seen_too=False))
+
+
+def _blocks(refined: Refined, form: Form) -> Iterator[Any]:
+    for parts in refined.facet_parts(form):
+        triangles = [some for some, _ in parts if isinstance(some, Triangles)]
+        spheres = [some for some, _ in parts if isinstance(some, Spheres)]
+        if triangles:
+            yield replace(triangle_mesh(joined(triangles)), species=parts.species)
+        if spheres:
+            yield replace(sphere_points(joined(spheres)), species=parts.species)
 
 
 def shell_blocks(refined: Refined, light: BakedLight | None = None, _first_sheet: int = 0) -> Iterator[MeshBuffers]:
@@ -132,7 +167,7 @@ def shell_blocks(refined: Refined, light: BakedLight | None = None, _first_sheet
 def _numbered(refined: Refined, first_sheet: int) -> Iterator[tuple[Parts, Facets, NDArray[np.int64]]]:
     """Blocks of facets, each as parts and as one, with the sheets (n,) that they are in baked light."""
     for parts in refined.facet_parts():
-        facets = concatenate_facets([some for some, _ in parts])
+        facets = joined([some for some, _ in parts])
         yield parts, facets, np.arange(first_sheet, first_sheet + len(facets))
         first_sheet += len(facets)
 
@@ -145,7 +180,9 @@ def _baked_facets(refined: Refined, light: BakedLight, first_sheet: int) -> Iter
 
 def _baked_spheres(refined: Refined, light: BakedLight, first_sheet: int) -> Iterator[PointBuffers]:
     for parts, facets, sheets in _numbered(refined, first_sheet):
-        made, values = spheres(parts, refined.camera, refined.disc), light.of_spheres(facets, sheets)
+        camera = refined.camera
+        drawn = [spheres_of(some, camera if seen else None, refined.disc) for some, seen in parts]
+        made, values = sphere_points(joined(drawn)), light.of_spheres(facets, sheets)
         baked = {name: array for name, (_, array) in baked_attributes('POINT', values).items()}
         yield replace(made, attributes={**made.attributes, **baked}, species=parts.species)
 

@@ -15,8 +15,9 @@ Wood goes by its own width or that of its leaves, whichever is larger: a trunk i
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -160,9 +161,13 @@ def explicit_blocks(
 
 
 def portion_blocks(
-    sight: Sight, portions: Portions, transition: Transition | None = None, tolerance: float = np.inf
-) -> Iterator[Block]:
-    """The polygons of `explicit_blocks` of some portions (n,)."""
+    sight: Sight,
+    portions: Portions,
+    transition: Transition | None = None,
+    tolerance: float = np.inf,
+    form: Callable[[Block], Any] | None = None,
+) -> Iterator[Any]:
+    """The polygons of `explicit_blocks` of some portions (n,), or what a form makes of each block where it is made."""
     flora = sight.flora
     detail = LeafDetail(flora, sight.camera, tolerance) if transition is None else transition.detail
     portions = portions.take(np.flatnonzero(_may_be_real(portions, transition)))
@@ -175,7 +180,7 @@ def portion_blocks(
         (number, float(done[run[-1]]) / whole if len(run) else 1.0, portions.take(run))
         for number, run in enumerate(in_chunks(expected, BLOCK_POLYGONS))
     )
-    made_of = _MadeOf(sight, transition, detail)
+    made_of = _MadeOf(sight, transition, detail, form)
     for made in in_processes(_blocks_of_run, made_of, runs, float(expected.sum()) > WORTH_PROCESSES):
         while made:
             yield made.pop(0)
@@ -188,14 +193,16 @@ class _MadeOf:
     sight: Sight
     transition: Transition | None
     detail: LeafDetail
+    form: Callable[[Block], Any] | None
 
 
-def _blocks_of_run(made_of: _MadeOf, run: tuple[int, float, Portions]) -> list[Block]:
+def _blocks_of_run(made_of: _MadeOf, run: tuple[int, float, Portions]) -> list[Any]:
     """The meshes of one run of portions: its number, the fraction that is done with it, and the portions."""
     number, fraction, portions = run
     sight, transition = made_of.sight, made_of.transition
     parts = _real_parts(sight, portions, transition)
-    return list(_block(sight.flora, *parts, number, fraction, made_of.detail, transition))
+    blocks = _block(sight.flora, *parts, number, fraction, made_of.detail, transition)
+    return list(blocks if made_of.form is None else map(made_of.form, blocks))
 
 
 def _may_be_real(portions: Portions, transition: Transition | None) -> NDArray[np.bool_]:

@@ -110,6 +110,10 @@ class Sight:
         lowest = result.plants.parts.branches.position[:, 2].min(initial=np.inf)
         self.shadows = ThrownShadows(camera, result.lights, float(lowest))
 
+    def __getstate__(self) -> dict[str, object]:
+        """What other processes need to open portions: all but the plants themselves."""
+        return {**vars(self), "plants": self.plants.without_parts()}
+
     def portions(self) -> Portions:
         """All parts, front to back."""
         made = self._portions(self.plants.parts, self.plants.points)

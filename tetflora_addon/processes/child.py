@@ -16,6 +16,7 @@ import sys
 import threading
 import time
 import traceback
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
@@ -24,8 +25,8 @@ try:
 except ImportError:  # Windows
     resource = None
 
-#: Seconds without work after which it ends.
-IDLE = 60.0
+#: Seconds without work after which it gives memory back, and after which it ends.
+PAUSE, IDLE = 1.0, 60.0
 
 
 def engine(package: str) -> None:
@@ -54,16 +55,23 @@ def peak() -> int:
 
 
 class _Clock:
-    """Ends the process when it has waited for too long."""
+    """Gives memory back when there is a pause, and ends the process when it has waited for too long.
 
-    def __init__(self) -> None:
+    Memory that the system has taken back has to be cleared before it is used again.
+    """
+
+    def __init__(self, give_back: Callable[[], None]) -> None:
         self.since = time.monotonic()
-        self.busy = False
+        self.busy = self.kept = False
+        self._give_back = give_back
         threading.Thread(target=self._watch, daemon=True).start()
 
     def _watch(self) -> None:
         while self.busy or time.monotonic() - self.since < IDLE:
-            time.sleep(1.0)
+            time.sleep(PAUSE / 2.0)
+            if self.kept and not self.busy and time.monotonic() - self.since > PAUSE:
+                self.kept = False
+                self._give_back()
         os._exit(0)
 
 
@@ -79,7 +87,7 @@ def main() -> None:
     memory = importlib.import_module(f"{package}.memory")
     messages = importlib.import_module(f"{package}.processes.messages")
     shared: dict[int, object] = {}
-    clock = _Clock()
+    clock = _Clock(memory.give_back)
     while True:
         try:
             (kind, *rest) = messages.receive(given, shared)
@@ -91,7 +99,7 @@ def main() -> None:
             shared[number] = thing
         elif kind == "forget":
             shared.pop(rest[0], None)
-            memory.give_back()
+            clock.kept = True
         else:
             function, number, item = rest
             try:

@@ -25,6 +25,11 @@ from .. import parallel
 from . import child as child_module
 from .messages import Closed, Packed, receive, send
 
+with suppress(ImportError):  # Windows has none
+    import fcntl
+
+#: Bytes of a pipe; more takes more than users without privileges may have by default.
+_PIPE = 1 << 20
 #: Polygons or facets from which on making them is work enough for other processes.
 WORTH_PROCESSES = 150_000
 
@@ -173,6 +178,7 @@ class _Child:
             env=environment,
             **hidden,
         )
+        _widened(self._process)
         self._known: dict[int, _Given] = {}
         self.peak = 0
         _children.add(self)
@@ -255,6 +261,14 @@ def _child_of_this_thread() -> _Child | None:
         except OSError:
             _broken.set()
     return getattr(_here, "child", None)
+
+
+def _widened(process: subprocess.Popen) -> None:
+    """Let its pipes hold more, where the system can: a thread waits for the interpreter's lock after each filling."""
+    if sys.platform == "linux":
+        for stream in (process.stdin, process.stdout):
+            with suppress(OSError):  # more than this user may have
+                fcntl.fcntl(stream.fileno(), fcntl.F_SETPIPE_SZ, _PIPE)
 
 
 def _python() -> str:

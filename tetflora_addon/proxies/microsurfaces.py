@@ -8,14 +8,13 @@ sub-plant. Facets are about as large as a pixel; on average they keep the area a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Arrays, perpendicular, spread
-from ..buffers import MeshBuffers
 from ..compiled.flora import Flora
 from ..compiled.samples import Points
 from ..growth.axes import axes
@@ -73,15 +72,6 @@ class Facets(Arrays):
         return np.cross(self.across, self.along)
 
 
-def concatenate_facets(parts: Sequence[Facets]) -> Facets:
-    """Facets of one or more parts, in their order."""
-    if len(parts) == 1:
-        return parts[0]
-    if any(part.velocity is not None for part in parts):  # meshes from elsewhere stand still beside plants that move
-        parts = [replace(p, velocity=np.zeros((len(p), 3))) if p.velocity is None else p for p in parts]
-    return Facets.concatenate(parts)
-
-
 def subplant_facets(
     flora: Flora,
     subplants: Branches,
@@ -107,7 +97,7 @@ def subplant_facets(
     totals = subplant_totals(flora, subplants)
     part = np.ones(len(subplants)) if weight is None else weight
     wood_side = leaf_side if wood_side is None else wood_side
-    return concatenate_facets(
+    return Facets.concatenate(
         [
             _leaves_of_subplants(flora, subplants, totals, leaf_side, part, real),
             _wood_of_subplants(flora, subplants, totals, wood_side, part, real),
@@ -132,7 +122,7 @@ def piece_facets(
     if real_wood is not None:
         totals = replace(totals, wood_area=np.where(real_wood, 0.0, totals.wood_area))
     part = np.ones(len(pieces)) if weight is None else weight
-    return concatenate_facets(
+    return Facets.concatenate(
         [
             _leaves_of_pieces(flora, pieces, totals, leaf_side, part, real),
             _wood_of_pieces(flora, pieces, totals, leaf_side if wood_side is None else wood_side, part),
@@ -359,30 +349,3 @@ def _across(axis: NDArray[np.float64], key: NDArray[np.uint64]) -> NDArray[np.fl
     a = perpendicular(axis)
     turn = 2 * np.pi * uniform(key, _TURN)[:, None]
     return np.cos(turn) * a + np.sin(turn) * np.cross(axis, a)
-
-
-def facet_mesh(facets: Facets) -> MeshBuffers:
-    """Facets as a mesh of equilateral triangles, with the attributes that the material of proxies reads.
-
-    Triangles take half of a renderer's memory and time for squares of the same area.
-    """
-    n = len(facets.side)
-    reach = CIRCUMRADIUS * facets.side[:, None]
-    a, b = reach * facets.across, reach * facets.along
-    corners = np.stack([facets.centre + b, facets.centre - SIN_60 * a - b / 2, facets.centre + SIN_60 * a - b / 2], 1)
-    every = np.arange(3 * n, dtype=np.int32).reshape(n, 3)
-    motion = {}
-    if facets.velocity is not None:
-        motion["velocity"] = "POINT", np.repeat(facets.velocity.astype(np.float32), 3, axis=0)
-    return MeshBuffers(
-        positions=corners.reshape(-1, 3).astype(np.float32),
-        edge_verts=np.stack([every, np.roll(every, -1, axis=1)], axis=2).reshape(-1, 2),
-        corner_verts=every.ravel(),
-        corner_edges=every.ravel().copy(),
-        face_offsets=np.arange(n + 1, dtype=np.int32) * np.int32(3),
-        attributes={
-            "tf_colour": ("FACE", facets.colour.astype(np.float32)),
-            "tf_transmission": ("FACE", facets.transmission.astype(np.float32)),
-            **motion,
-        },
-    )

@@ -13,6 +13,7 @@ points follows the size in the image, so that the work is bounded by what the im
 from __future__ import annotations
 
 from collections.abc import Iterator
+from copy import copy
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -261,6 +262,12 @@ class SharedPlants:
     def nbytes(self) -> int:
         """Bytes of all arrays."""
         return self.parts.nbytes + self.points.nbytes
+
+    def without_parts(self) -> SharedPlants:
+        """The same with no plants, for what asks only how large other parts are."""
+        made = copy(self)
+        made.parts, made.points = PlantParts.empty(), SharePoints.empty()
+        return made
 
     def pixels(self, parts: PlantParts) -> NDArray[np.float64]:
         """Extent (n,) of parts in the image."""

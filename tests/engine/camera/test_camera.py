@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tetflora_addon.camera.camera import Camera
-from tetflora_addon.proxies.microsurfaces import Facets, facet_mesh, kept_out_of_view
+from tetflora_addon.proxies.drawn import facet_mesh
+from tetflora_addon.proxies.microsurfaces import Facets, kept_out_of_view
 
 KINDS = ("PERSP", "ORTHO")
 

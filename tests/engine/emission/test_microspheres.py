@@ -15,10 +15,10 @@ from tests.engine.emission.test_emission import scene
 from tetflora_addon.arrays import unit
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.emission import facets as subject
-from tetflora_addon.emission.facets import LEAST_COVER, facing, spheres
 from tetflora_addon.emission.forms import Refined, facet_blocks, sphere_blocks
+from tetflora_addon.proxies.drawn import LEAST_COVER, facet_mesh, facing, joined, sphere_points, spheres_of
 from tetflora_addon.proxies.facet_sizes import FacetPixels
-from tetflora_addon.proxies.microsurfaces import Facets, facet_mesh
+from tetflora_addon.proxies.microsurfaces import Facets
 
 EYE = np.array([2.0, -30.0, 4.0])
 
@@ -44,7 +44,7 @@ def discs(radius: np.ndarray) -> np.ndarray:
 def test_what_a_facet_covers_for_the_camera_its_sphere_covers(kind: str) -> None:
     """By the corners of the facets themselves, projected; but for those that are seen from their edge."""
     facets, view = squares(), camera(kind)
-    made = spheres([(facets, True)], view)
+    made = sphere_points(spheres_of(facets, view))
     vectors = support.face_vectors(facet_mesh(facets))
     sight = np.array([0.0, 1.0, 0.0]) if kind == "ORTHO" else unit(facets.centre - EYE)
     shown = np.abs((vectors * sight).sum(axis=1))
@@ -56,7 +56,7 @@ def test_what_a_facet_covers_for_the_camera_its_sphere_covers(kind: str) -> None
 
 def test_what_nobody_sees_casts_the_same_shadow_on_average_over_all_lights() -> None:
     facets = squares()
-    made = spheres([(facets, False)], camera())
+    made = sphere_points(spheres_of(facets, None))
     vectors = support.face_vectors(facet_mesh(facets))
     lights = unit(np.random.default_rng(5).normal(size=(400, 3)))
     shadow = np.abs(vectors[:300] @ lights.T).mean(axis=1)
@@ -66,7 +66,7 @@ def test_what_nobody_sees_casts_the_same_shadow_on_average_over_all_lights() -> 
 
 def test_places_and_looks_are_those_of_the_facets() -> None:
     some, others = squares(50), squares(30)
-    made = spheres([(some, True), (others, False)], camera())
+    made = sphere_points(joined([spheres_of(some, camera()), spheres_of(others, None)]))
     assert made.polygons == 80
     for values, name in ((made.positions, "centre"), *((v, k.removeprefix("tf_")) for k, v in made.attributes.items())):
         expected = np.concatenate([getattr(part, name) for part in (some, others)])

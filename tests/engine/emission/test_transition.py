@@ -15,7 +15,7 @@ from tetflora_addon.emission.facets import facet_parts
 from tetflora_addon.emission.plants import FADING, Transition, explicit_blocks
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.proxies.facet_sizes import FacetPixels
-from tetflora_addon.proxies.microsurfaces import Facets, concatenate_facets
+from tetflora_addon.proxies.microsurfaces import Facets
 from tetflora_addon.refinement import shares
 from tetflora_addon.refinement.decisions import BAND, Decision
 
@@ -59,7 +59,7 @@ def wood_area(blocks) -> float:
 
 
 def all_facets(flora, result, camera, transition, pixels: float = 0.3) -> Facets:
-    return concatenate_facets(
+    return Facets.concatenate(
         [f for block in facet_parts(flora, result, camera, FacetPixels(pixels), transition) for f, _ in block]
     )
 

@@ -18,15 +18,15 @@ from tests.engine.growth.test_drawn import flora as drawn_flora
 from tetflora_addon.arrays import spread
 from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.compiled.flora import Flora
-from tetflora_addon.emission.facets import spheres
 from tetflora_addon.errors import TetFloraError
 from tetflora_addon.growth.axes import axes
 from tetflora_addon.growth.foliage import leaf_keys, leaf_places, place_leaves, settled
 from tetflora_addon.growth.growth import WholeBranches, leaf_counts
 from tetflora_addon.growth.rows import ROW_DTYPE
 from tetflora_addon.growth.wind import Wind, gusts, leant, sway, widest_sway
+from tetflora_addon.proxies.drawn import facet_mesh, joined, sphere_points, spheres_of
 from tetflora_addon.proxies.facet_weights import facet_weights
-from tetflora_addon.proxies.microsurfaces import Facets, concatenate_facets, facet_mesh, piece_facets, subplant_facets
+from tetflora_addon.proxies.microsurfaces import Facets, piece_facets, subplant_facets
 from tetflora_addon.subplants.pieces import expand, open_subplants
 
 _FLOAT32 = 1e-6
@@ -308,10 +308,10 @@ def test_facets_move_with_what_bears_them(kind: str) -> None:
         assert np.linalg.norm(now.velocity, axis=1).max() > 0.01
         mesh = facet_mesh(now)
         np.testing.assert_array_equal(mesh.attributes["velocity"][1][::3], now.velocity.astype(np.float32))
-        points = spheres([(now, False)], support.camera((0, -10, 1), (0, 0, 1)))
+        points = sphere_points(spheres_of(now, None))
         np.testing.assert_array_equal(points.attributes["velocity"], now.velocity.astype(np.float32))
-        joined = concatenate_facets([low, now])
-        np.testing.assert_array_equal(joined.velocity, np.concatenate([0 * now.velocity[: len(low)], now.velocity]))
+        both = joined([low, now])
+        np.testing.assert_array_equal(both.velocity, np.concatenate([0 * now.velocity[: len(low)], now.velocity]))
 
 
 @pytest.mark.parametrize("height", [0.0, 2.0, 9.0])

@@ -17,6 +17,7 @@ from tests.engine import support
 from tests.engine.emission.test_emission import scene
 from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.growth import trunks
+from tetflora_addon.proxies.drawn import facet_mesh
 from tetflora_addon.proxies.facet_sizes import (
     COARSE,
     COARSEST,
@@ -25,7 +26,7 @@ from tetflora_addon.proxies.facet_sizes import (
     coarseness,
     subplant_facet_sizes,
 )
-from tetflora_addon.proxies.microsurfaces import facet_mesh, subplant_facets
+from tetflora_addon.proxies.microsurfaces import subplant_facets
 from tetflora_addon.proxies.thrown_shadows import ThrownShadows
 from tetflora_addon.refinement.contents import subplant_totals
 from tetflora_addon.refinement.decisions import Decision

@@ -16,7 +16,8 @@ from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.proxies import facet_weights as subject
 from tetflora_addon.proxies import sights
-from tetflora_addon.proxies.microsurfaces import CIRCUMRADIUS, facet_mesh, piece_facets, subplant_facets
+from tetflora_addon.proxies.drawn import facet_mesh
+from tetflora_addon.proxies.microsurfaces import CIRCUMRADIUS, piece_facets, subplant_facets
 from tetflora_addon.refinement.contents import piece_totals, subplant_totals
 from tetflora_addon.refinement.rasterise import occluder_depth
 from tetflora_addon.refinement.statistics import at_once

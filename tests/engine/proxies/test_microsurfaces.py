@@ -17,8 +17,9 @@ from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.growth import trunks
+from tetflora_addon.proxies.drawn import facet_mesh
 from tetflora_addon.proxies.facet_sizes import COARSE, FacetPixels, piece_facet_sizes, subplant_facet_sizes
-from tetflora_addon.proxies.microsurfaces import facet_mesh, piece_facets, subplant_facets
+from tetflora_addon.proxies.microsurfaces import piece_facets, subplant_facets
 from tetflora_addon.proxies.thrown_shadows import ThrownShadows
 from tetflora_addon.refinement.contents import bounding_cylinders, piece_totals, subplant_totals
 

@@ -1,0 +1,172 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What renderers draw for facets: triangles or spheres, in the precision in which meshes and point clouds keep them.
+
+They take half of the memory of facets, or less, which matters where another process has made them.
+
+Microspheres are opaque spheres, the particles of the paper's volumes (section 7). A facet covers the more the more it
+faces the eye; a sphere covers the same from everywhere. A sphere can therefore cover what its facet covers for the
+camera, but not for all lights as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Arrays
+from ..buffers import MeshBuffers, PointBuffers
+from ..camera.camera import Camera
+from .microsurfaces import CIRCUMRADIUS, SIN_60, Facets
+
+#: Minimum fraction of a facet's area that its sphere covers, where the facet is seen from its edge.
+LEAST_COVER = 0.1
+#: Mean of |cos| over all directions.
+MEAN_COVER = 0.5
+
+
+@dataclass(frozen=True)
+class Triangles(Arrays):
+    """Equilateral triangles.
+
+    Attributes
+    ----------
+    corners : (n, 3, 3) float32
+        World space, metres.
+    colour : (n, 3) float32
+    transmission : (n,) float32
+    velocity : (n, 3) float32 or None
+        Metres a second; None for plants at rest.
+    """
+
+    corners: NDArray[np.float32]
+    colour: NDArray[np.float32]
+    transmission: NDArray[np.float32]
+    velocity: NDArray[np.float32] | None = None
+
+
+@dataclass(frozen=True)
+class Spheres(Arrays):
+    """Spheres.
+
+    Attributes
+    ----------
+    centre : (n, 3) float32
+        World space, metres.
+    radius : (n,) float32
+    colour : (n, 3) float32
+    transmission : (n,) float32
+    velocity : (n, 3) float32 or None
+        As of triangles.
+    """
+
+    centre: NDArray[np.float32]
+    radius: NDArray[np.float32]
+    colour: NDArray[np.float32]
+    transmission: NDArray[np.float32]
+    velocity: NDArray[np.float32] | None = None
+
+
+#: Facets, or what is drawn in their place.
+Drawn = Facets | Triangles | Spheres
+_Drawn = TypeVar("_Drawn", Facets, Triangles, Spheres)
+
+
+def triangles_of(facets: Facets) -> Triangles:
+    """A triangle for each facet.
+
+    Triangles take half of a renderer's memory and time for squares of the same area.
+    """
+    reach = CIRCUMRADIUS * facets.side[:, None]
+    a, b = reach * facets.across, reach * facets.along
+    corners = [facets.centre + b, facets.centre - SIN_60 * a - b / 2, facets.centre + SIN_60 * a - b / 2]
+    return Triangles(np.stack([c.astype(np.float32) for c in corners], 1), *_shaded(facets))
+
+
+def spheres_of(facets: Facets, camera: Camera | None, disc: float = np.pi) -> Spheres:
+    """A sphere for each facet.
+
+    Parameters
+    ----------
+    facets : Facets of n
+    camera : Camera or None
+        That for which each sphere covers what its facet covers. Without, it covers the mean of that over all
+        directions: for facets that only cast shadows and light up others.
+    disc : float
+        Area that a renderer draws for a sphere of radius 1; some draw fewer pixels than a circle has.
+    """
+    radius = facets.side * np.sqrt(cover_of(facets, camera) / disc)
+    return Spheres(facets.centre.astype(np.float32), radius.astype(np.float32), *_shaded(facets))
+
+
+def joined(parts: Sequence[_Drawn]) -> _Drawn:
+    """One or more parts of one kind as one, in their order."""
+    if len(parts) == 1:
+        return parts[0]
+    if any(part.velocity is not None for part in parts):  # meshes from elsewhere stand still beside plants that move
+        still = [np.zeros((len(part), 3), part.colour.dtype) for part in parts]
+        parts = [replace(p, velocity=zero) if p.velocity is None else p for p, zero in zip(parts, still, strict=True)]
+    return type(parts[0]).concatenate(parts)
+
+
+def triangle_mesh(triangles: Triangles) -> MeshBuffers:
+    """Triangles as a mesh with the attributes that the material of proxies reads."""
+    n = len(triangles)
+    every = np.arange(3 * n, dtype=np.int32).reshape(n, 3)
+    motion = {}
+    if triangles.velocity is not None:
+        motion["velocity"] = "POINT", np.repeat(triangles.velocity, 3, axis=0)
+    return MeshBuffers(
+        positions=triangles.corners.reshape(-1, 3),
+        edge_verts=np.stack([every, np.roll(every, -1, axis=1)], axis=2).reshape(-1, 2),
+        corner_verts=every.ravel(),
+        corner_edges=every.ravel().copy(),
+        face_offsets=np.arange(n + 1, dtype=np.int32) * np.int32(3),
+        attributes={
+            "tf_colour": ("FACE", triangles.colour),
+            "tf_transmission": ("FACE", triangles.transmission),
+            **motion,
+        },
+    )
+
+
+def sphere_points(spheres: Spheres) -> PointBuffers:
+    """Spheres as points with the attributes that the material of proxies reads."""
+    return PointBuffers(
+        positions=spheres.centre,
+        radius=spheres.radius,
+        attributes={
+            "tf_colour": spheres.colour,
+            "tf_transmission": spheres.transmission,
+            **({} if spheres.velocity is None else {"velocity": spheres.velocity}),
+        },
+    )
+
+
+def facet_mesh(facets: Facets) -> MeshBuffers:
+    """Facets as a mesh of triangles."""
+    return triangle_mesh(triangles_of(facets))
+
+
+def cover_of(facets: Facets, camera: Camera | None) -> NDArray[np.float64]:
+    """Fraction (n,) of a facet's area that its sphere covers; without a camera, the mean over all directions."""
+    if camera is None:
+        return np.full(len(facets), MEAN_COVER)
+    return np.maximum(facing(facets, camera), LEAST_COVER)
+
+
+def facing(facets: Facets, camera: Camera) -> NDArray[np.float64]:
+    """Fraction (n,) of its area that each facet shows to the camera, 0 to 1."""
+    if camera.kind == "ORTHO":
+        return np.abs(facets.normal @ camera.frame[:, 2])
+    ray = facets.centre - camera.eye
+    return np.abs(np.einsum("ni,ni->n", facets.normal, ray)) / np.maximum(np.linalg.norm(ray, axis=1), 1e-300)
+
+
+def _shaded(facets: Facets) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32] | None]:
+    velocity = None if facets.velocity is None else facets.velocity.astype(np.float32)
+    return facets.colour.astype(np.float32), facets.transmission.astype(np.float32), velocity
