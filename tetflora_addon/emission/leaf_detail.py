@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.growth import WholeBranches
-from ..leaves.levels import chosen_level, coarse_error, level_polygons
+from ..leaves.levels import chosen_polygons, coarse_error
 from ..refinement.shares import PlantParts
 from ..species.species import LEAF_KINDS
 from ..subplants.wood_detail import Pixels
@@ -94,7 +94,7 @@ class LeafDetail:
             own = np.flatnonzero((species == s) & (leaves > 0))
             if len(own):
                 forms = self.flora.forms[s][0]
-                more = [level_polygons(f)[chosen_level(f, width[own] / f.width)] - f.polygons for f in forms]
+                more = [chosen_polygons(f, width[own] / f.width) - f.polygons for f in forms]
                 out[own] = np.mean(more, axis=0)
         return out * leaves
 

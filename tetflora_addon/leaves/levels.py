@@ -8,8 +8,10 @@ stands for, in lengths of the leaf, and is drawn where the one before it would b
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +35,7 @@ _FINER = 0.75
 _DEARER = 1.35
 #: Faces with less than this as texture coordinate v, negative, are stems; their tints, of petioles and of shoots.
 _STEM, _TINTS = 1e-6, ((1.25, 1.1, 0.9), (1.7, 0.75, 0.6))
-_FITS, _THICKER = 12, 1.5
+_THICKER = 1.5
 #: Divisions of closed parts, one more than at most.
 _ROUNDEST = 5
 #: Points on each edge of a coarse model at which its distance from the shape is measured.
@@ -88,52 +90,88 @@ def fitted(shape: Shape, tolerance: float, area: float, reach: float = np.inf, a
         factor = 1.0 + (_THICKER - 1.0) * (area / smaller**2 - mean) / (thick - mean)
         made = surface_of(shape, tolerance, amount, float(np.clip(factor, 0.2, 8.0)))
     made = replace(made, positions=made.positions * smaller, error=made.error * smaller)
-    for _ in range(_FITS):
-        ratio = area / made.areas()
-        if np.abs(ratio - 1.0).max() < 1e-7:
-            break
-        wide = np.stack([ratio, np.ones_like(ratio), np.ones_like(ratio)], axis=1)
-        made = replace(made, positions=made.positions * wide[:, None])
+    made = made.widened_to(area)
     turn = np.radians(shape.turn)
     frame = np.array([[np.cos(turn), 0.0, np.sin(turn)], [0.0, 1.0, 0.0], [-np.sin(turn), 0.0, np.cos(turn)]])
     return made.moved(frame, np.zeros(3)) if shape.turn else made
 
 
+class _Finer:
+    """Finer levels of a model, made as they are asked for: the last ones take as long as all others."""
+
+    def __init__(self, model: LeafModel) -> None:
+        self._lock, self._found = Lock(), []
+        if model.shape is None:
+            self._next = iter([])
+            self._found += _round_levels(model)
+        else:
+            self._next = _each_level(model, model.shape)
+        self._complete = model.shape is None
+
+    def until(self, error: float = 0.0, number: int = 1 << 10) -> tuple[list[LeafLevel], bool]:
+        """Levels, the coarsest first, up to one within an error or up to a number; and whether these are all."""
+        with self._lock:
+            # The last one may still give way to the next.
+            while not self._complete and len(self._found) <= number:
+                if any(level.error <= error for level in self._found[:-1]):
+                    break
+                self._add(next(self._next, None))
+            return (self._found if self._complete else self._found[:-1]), self._complete
+
+    def _add(self, level: LeafLevel | None) -> None:
+        if level is None:
+            self._complete = True
+        elif self._found and level.model.polygons <= _DEARER * self._found[-1].model.polygons:
+            self._found[-1] = level
+        else:
+            self._found.append(level)
+
+
 @lru_cache(maxsize=128)
-def leaf_levels(model: LeafModel) -> tuple[LeafLevel, ...]:
-    """Finer levels of a model, the coarsest of them first; none of a model that is flat and has no shape."""
-    if model.shape is None:
-        return _round_levels(model)
-    found: list[LeafLevel] = []
+def _finer(model: LeafModel) -> _Finer:
+    return _Finer(model)
+
+
+def _each_level(model: LeafModel, shape: Shape) -> Iterator[LeafLevel]:
+    """Levels of a model that has a shape, each worth while for its error."""
     error = coarse_error(model)
-    for tolerance in (2.0 * SPARSE, *TOLERANCES) if isinstance(model.shape, Needles) else TOLERANCES:
-        made = fitted(model.shape, tolerance, model.area, model.reach)
+    for tolerance in (2.0 * SPARSE, *TOLERANCES) if isinstance(shape, Needles) else TOLERANCES:
+        made = fitted(shape, tolerance, model.area, model.reach)
         if made.error > _FINER * error:
             continue
         if made.polygons > MOST_POLYGONS:
             break
         stem = made.uv[made.face_offsets[:-1] + 1, 1] < -_STEM
         stem |= made.uv[made.face_offsets[:-1], 1] < -_STEM
-        tint = np.where(stem[:, None], _TINTS[isinstance(model.shape, Needles)], 1.0).astype(np.float32)
-        level = LeafLevel(_model_of(made), made.positions.astype(np.float32), made.error, tint)
-        if found and level.model.polygons <= _DEARER * found[-1].model.polygons:
-            found[-1] = level
-        else:
-            found.append(level)
+        tint = np.where(stem[:, None], _TINTS[isinstance(shape, Needles)], 1.0).astype(np.float32)
+        yield LeafLevel(_model_of(made), made.positions.astype(np.float32), made.error, tint)
         error = made.error
-    return tuple(found)
 
 
-@lru_cache(maxsize=128)
-def level_errors(model: LeafModel) -> NDArray[np.float64]:
-    """Errors (levels + 1,) of a model and its finer levels, in lengths of the leaf; 0 that of the last one."""
-    errors = [coarse_error(model), *(level.error for level in leaf_levels(model))]
-    return np.array([*errors[:-1], 0.0])
+def leaf_levels(model: LeafModel) -> tuple[LeafLevel, ...]:
+    """Finer levels of a model, the coarsest of them first; none of a model that is flat and has no shape."""
+    return tuple(_finer(model).until()[0])
 
 
-def level_polygons(model: LeafModel) -> NDArray[np.float64]:
-    """Polygons (levels + 1,) of a model and its finer levels."""
-    return np.array([model.polygons, *(level.model.polygons for level in leaf_levels(model))], float)
+def leaf_level(model: LeafModel, number: int) -> LeafLevel:
+    """One of the finer levels of a model, from 1 on; coarser ones are made, finer ones are not."""
+    return _finer(model).until(number=number)[0][number - 1]
+
+
+def level_errors(model: LeafModel, finest: float = 0.0) -> NDArray[np.float64]:
+    """Errors (levels + 1,) of a model and its finer levels, in lengths of the leaf; 0 that of the last one.
+
+    None is finer than needed for the finest error that is asked for.
+    """
+    levels, every = _finer(model).until(finest)
+    errors = np.array([coarse_error(model), *(level.error for level in levels)])
+    errors[-1] = 0.0 if every else errors[-1]
+    return errors
+
+
+def level_polygons(model: LeafModel, finest: float = 0.0) -> NDArray[np.float64]:
+    """Polygons (levels + 1,) of a model and its finer levels; down to an error, as above."""
+    return np.array([model.polygons, *(level.model.polygons for level in _finer(model).until(finest)[0])], float)
 
 
 def chosen_level(model: LeafModel, pixels: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -141,10 +179,19 @@ def chosen_level(model: LeafModel, pixels: NDArray[np.float64]) -> NDArray[np.in
 
     The coarsest one whose error is within it.
     """
-    if pixels.max(initial=0.0) * coarse_error(model) <= 1.0:  # far away: nobody needs to make them
+    most = pixels.max(initial=0.0)
+    if most * coarse_error(model) <= 1.0:  # far away: nobody needs to make them
         return np.zeros(len(pixels), np.int64)
-    errors = level_errors(model)
+    errors = level_errors(model, 1.0 / most)
     return np.searchsorted(-errors, -1.0 / np.maximum(pixels, 1e-300), side="left").clip(0, len(errors) - 1)
+
+
+def chosen_polygons(model: LeafModel, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Polygons (n,) of leaves at the levels that `chosen_level` gives them."""
+    level = chosen_level(model, pixels)
+    return (
+        level_polygons(model, 1.0 / pixels.max())[level] if level.any() else np.full(len(level), model.polygons, float)
+    )
 
 
 @lru_cache(maxsize=128)

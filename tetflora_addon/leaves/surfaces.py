@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 #: Leaves of a form that are bent, folded and grown in different ways.
 VARIANTS = 6
+#: Steps towards an area at most, and the relative difference from which on it is reached.
+_FITS, _FITTED = 12, 1e-7
 _GOLDEN = 0.6180339887498949
 
 
@@ -52,19 +54,41 @@ class LeafSurface:
 
     def areas(self) -> NDArray[np.float64]:
         """One-sided areas (k,) of the variants."""
+        return self._areas_of(self._area_vectors())
+
+    def widened_to(self, area: float) -> LeafSurface:
+        """The surface with its variants wider or narrower along x, until each has a one-sided area.
+
+        Of a face's area vector, x does not depend on widths, and y and z are in proportion to them.
+        """
+        vectors, wide = self._area_vectors(), np.ones(len(self.positions))
+        for _ in range(_FITS):
+            ratio = area / self._areas_of(vectors * _along(1.0, wide, wide))
+            if np.abs(ratio - 1.0).max() < _FITTED:
+                break
+            wide = wide * ratio
+        return replace(self, positions=self.positions * _along(wide, 1.0, 1.0))
+
+    def _area_vectors(self) -> NDArray[np.float64]:
+        """Twice the area vectors (k, f, 3) of all faces."""
         following = np.arange(1, len(self.corner_verts) + 1)
         following[self.face_offsets[1:] - 1] = self.face_offsets[:-1]
         points = self.positions[:, self.corner_verts]
         origin = np.repeat(points[:, self.face_offsets[:-1]], np.diff(self.face_offsets), axis=1)
-        vectors = np.add.reduceat(
-            np.cross(points - origin, points[:, following] - origin), self.face_offsets[:-1], axis=1
-        )
+        return np.add.reduceat(np.cross(points - origin, points[:, following] - origin), self.face_offsets[:-1], axis=1)
+
+    def _areas_of(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         return (np.linalg.norm(vectors, axis=2) * np.where(self.solid, 0.25, 0.5)).sum(axis=1)
 
     def moved(self, matrix: NDArray[np.float64], place: NDArray[np.float64]) -> LeafSurface:
         """The surface with its points times a matrix (3, 3) or (k, 3, 3), whose columns are its axes, at a place."""
         points = self.positions @ np.swapaxes(matrix, -1, -2) + np.reshape(place, (-1, 1, 3))
         return replace(self, positions=points)
+
+
+def _along(*factors: float | NDArray[np.float64]) -> NDArray[np.float64]:
+    """Factors of the axes, each one number or one of each variant (k,), for vectors (k, n, 3)."""
+    return np.stack(np.broadcast_arrays(*factors), axis=-1)[..., None, :]
 
 
 def surface(

@@ -33,7 +33,7 @@ from ..growth.foliage import (
 from ..growth.growth import WholeBranches, leaf_counts
 from ..growth.hashing import Draw, uniform
 from ..growth.wind import moment
-from ..leaves.levels import chosen_level, leaf_levels
+from ..leaves.levels import chosen_level, leaf_level
 from ..leaves.models import LeafModel
 from ..leaves.triangles import leaf_triangles
 from .leaf_copies import LeafCopies, LevelCopies, TriangleCopies
@@ -107,7 +107,7 @@ def leaf_meshes(
 def _copies(model: LeafModel, step: int, number: int, transmission: float, moving: bool) -> LeafCopies:
     """Room for a number of leaves of one step."""
     if step > 0:
-        return LevelCopies(leaf_levels(model)[step - 1], number, transmission, moving)
+        return LevelCopies(leaf_level(model, step), number, transmission, moving)
     if step == _TRIANGLE and not model.textured:
         return TriangleCopies(leaf_triangles(model), number, transmission, moving)
     return LeafCopies(model, number, transmission, moving)

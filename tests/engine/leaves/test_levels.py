@@ -12,7 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tetflora_addon.leaves.levels import (
+    TOLERANCES,
     LeafLevel,
+    _finer,
     chosen_level,
     coarse_error,
     fitted,
@@ -22,7 +24,7 @@ from tetflora_addon.leaves.levels import (
     surface_of,
 )
 from tetflora_addon.leaves.models import _COARSE, LEAF_MODELS, LeafModel
-from tetflora_addon.leaves.needles import Needles
+from tetflora_addon.leaves.needles import SPARSE, Needles
 from tetflora_addon.leaves.outlines import distance_to_links
 from tetflora_addon.species import catalogue
 
@@ -118,12 +120,37 @@ def test_stems_have_a_tint(name: str) -> None:
 
 
 def test_needles_are_as_many_as_they_should_be() -> None:
-    """From the first finer level on each stands for itself: a prism with its own texture up close."""
+    """From the second finer level on each stands for itself: a prism with its own texture up close."""
     shape = LEAF_MODELS["needles"].shape
     for tolerance, sides in ((0.012, 1), (0.0015, 3), (0.0002, 4)):
         made = surface_of(shape, tolerance)
         tips = np.isclose(made.uv[:, 1], 1.0) & np.isclose(made.uv[:, 0], 0.5)
         assert tips.sum() // sides >= shape.needles // shape.bundle
+
+
+def test_before_all_needles_there_are_some() -> None:
+    """Each is broader for several; their tips are those of some of them."""
+    shape = LEAF_MODELS["needles"].shape
+    few, every = surface_of(shape, 2.0 * SPARSE), surface_of(shape, TOLERANCES[0])
+    assert few.polygons < every.polygons / 4
+    level = leaf_levels(LEAF_MODELS["needles"])[0]
+    assert level.model.polygons == few.polygons and level.error > shape.gap
+    tips = [made.positions[0][np.unique(made.corner_verts[np.isclose(made.uv[:, 1], 1.0)])] for made in (few, every)]
+    away = np.linalg.norm(tips[0][:, None] - tips[1], axis=2).min(axis=1)
+    assert 10 < len(tips[0]) < len(tips[1]) / 2 and away.max() < 1e-9
+
+
+@pytest.mark.parametrize("name", [name for name, model in LEAF_MODELS.items() if model.shape is not None])
+def test_levels_are_made_as_far_as_they_are_asked_for(name: str) -> None:
+    """Which one is chosen does not depend on which ones there were before."""
+    model = LEAF_MODELS[name]
+    every = level_errors(model)
+    _finer.cache_clear()
+    for pixels in (20.0, 60.0, 400.0, 5000.0):
+        chosen = int(chosen_level(model, np.array([pixels]))[0])
+        assert chosen == int(np.searchsorted(-every, -1.0 / pixels))
+        known = level_errors(model, 1.0 / pixels)
+        np.testing.assert_array_equal(known, every[: len(known)])
 
 
 def test_leaflets_that_close_up_are_one_surface_from_afar() -> None:
