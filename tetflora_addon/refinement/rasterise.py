@@ -9,13 +9,13 @@ along it. Nothing nearer than the near plane or beyond the far plane is seen.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, column
+from ..arrays import Arrays, column, spread
 from ..camera.camera import Camera
 from ..camera.silhouette import silhouette_area, window_bounds
 from ..parallel import blocks, on_all_cores
@@ -33,6 +33,8 @@ SHIFT = (1.7e-6, 2.9e-6)
 #: Up to this many pixels of silhouette, a tetrahedron counts by its area and mean thickness instead of by samples:
 #: then the optical depth that it brings into the image is exact, however the pixels' centres fall.
 SMALL = 4.0
+#: What planes through the eye, or parallel to all rays, are off it by: far less than any that are not.
+_PARALLEL = 1e-150
 
 
 @dataclass(frozen=True)
@@ -121,7 +123,11 @@ def occluder_depth(triangles: NDArray[np.float64], camera: Camera, width: int, h
 
 
 def _fragments(vertices: NDArray[np.float64], camera: Camera, width: int, height: int) -> Fragments:
-    """Fragments of as many tetrahedra as fit into memory."""
+    """Fragments of as many tetrahedra as fit into memory.
+
+    A face bounds the depth of a parallel ray by a linear function of where the ray crosses the window, and that of a
+    ray from the eye by the reciprocal of one. On which side it does is the same for all rays.
+    """
     local = camera.to_camera_space(vertices)
     low, high, middle = window_bounds(local, camera)
     box = _pixel_box(low, high, camera, width, height)
@@ -129,34 +135,87 @@ def _fragments(vertices: NDArray[np.float64], camera: Camera, width: int, height
     inward = face_area_vectors(local)
     on_face = local[:, [1, 0, 0, 0]]
     offset = -np.sum(inward * on_face, axis=2)
+    # Inside where offset + x · normal_x + y · normal_y + depth · normal_z >= 0, or all but offset times depth.
+    parallel = camera.kind == "ORTHO"
+    divisor, constant = (inward[..., 2], offset) if parallel else (offset, inward[..., 2])
+    divisor = np.where(np.abs(divisor) < _PARALLEL, np.copysign(_PARALLEL, divisor), divisor)
+    least = divisor > 0.0
+    order = np.argsort(~least, axis=1, kind="stable")
+    planes = [np.take_along_axis(-c / divisor, order, 1) for c in (constant, inward[..., 0], inward[..., 1])]
+    ends = (camera.near, camera.far) if parallel else (1.0 / camera.far, 1.0 / max(camera.near, _PARALLEL))
     x, y = _centres(camera, width, height)
-    parts = [Fragments.empty()]
-    for cell, col, row in _pairs(box):
-        px, py = x[col], y[row]
-        enter, leave = np.full(len(cell), camera.near), np.full(len(cell), camera.far)
-        for face in range(4):
-            nx, ny, nz = (inward[:, face, i][cell] for i in range(3))
-            # Inside where constant + depth · slope >= 0.
-            across = nx * px + ny * py
-            constant, slope = offset[:, face][cell], nz
-            if camera.kind == "ORTHO":
-                constant = constant + across
-            else:
-                slope = slope + across
-            with np.errstate(divide="ignore", invalid="ignore"):
-                crossing = -constant / slope
-            enter = np.maximum(enter, np.where(slope > 0.0, crossing, -np.inf))
-            leave = np.minimum(leave, np.where(slope < 0.0, crossing, np.inf))
-            leave = np.where((slope == 0.0) & (constant < 0.0), -np.inf, leave)
-        hit = np.flatnonzero(leave > enter)
-        metres = _ray_metres(camera, px[hit], py[hit])
-        # Half the memory of intp; a heavy scene has millions of fragments.
-        which, pixel = cell[hit].astype(np.int32), (row[hit] * width + col[hit]).astype(np.int32)
-        parts.append(
-            Fragments(which, pixel, enter[hit] * metres, (leave[hit] - enter[hit]) * metres, np.ones(len(hit)))
-        )
+    parts, below = [Fragments.empty()], least.sum(axis=1)
+    for count in range(5):
+        for rows in _rows(box, np.flatnonzero(below == count)):
+            hit, bounds = _within(planes, count, ends, rows, x, y)
+            cell, row, column = rows.cell[hit.row], rows.number[hit.row], hit.column
+            enter, leave = bounds if parallel else (1.0 / bounds[1], 1.0 / bounds[0])
+            metres = _ray_metres(camera, x[column], y[row])
+            # Half the memory of intp; a heavy scene has millions of fragments.
+            which, pixel = cell.astype(np.int32), (row * width + column).astype(np.int32)
+            parts.append(Fragments(which, pixel, enter * metres, (leave - enter) * metres, np.ones(len(which))))
     found = Fragments.concatenate(parts)
     return _with_small_ones(vertices, local, camera, (width, height), (low, high, middle), found)
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """Rows of boxes (r,): whose they are, which rows of the image, their first pixels and how many they have."""
+
+    cell: NDArray[np.int64]
+    number: NDArray[np.int64]
+    first: NDArray[np.int64]
+    wide: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class _Hits:
+    """Pixels (h,) that are hit: in which of the rows, and their columns in the image."""
+
+    row: NDArray[np.int64]
+    column: NDArray[np.int64]
+
+
+def _within(
+    planes: Sequence[NDArray[np.float64]],
+    count: int,
+    ends: tuple[float, float],
+    rows: _Rows,
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+) -> tuple[_Hits, tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Pixels of rows whose rays pass through tetrahedra, and the bounds (h,) of their depths or reciprocals.
+
+    The first ``count`` of four planes (n, 4), each a constant and slopes along x and y, are lower bounds.
+    """
+    before = np.cumsum(rows.wide) - rows.wide
+    column = np.arange(int(rows.wide.sum())) + np.repeat(rows.first - before, rows.wide)
+    px, py = x[column], y[rows.number]
+    least, most = (np.full(len(column), end) for end in ends)
+    for face in range(4):
+        constant, along, up = (np.take(plane[:, face], rows.cell) for plane in planes)
+        value = np.repeat(along, rows.wide)
+        value *= px
+        value += np.repeat(constant + up * py, rows.wide)
+        if face < count:
+            np.maximum(least, value, out=least)
+        else:
+            np.minimum(most, value, out=most)
+    hit = np.flatnonzero(most > least)
+    row = np.repeat(np.arange(len(rows.wide)), rows.wide)[hit]
+    return _Hits(row, column[hit]), (least[hit], most[hit])
+
+
+def _rows(box: NDArray[np.int64], which: NDArray[np.intp]) -> Iterator[_Rows]:
+    """Rows of some of the boxes, about `PAIRS_AT_ONCE` pixels at a time."""
+    wide, high = (np.maximum(box[which, i + 1] - box[which, i] + 1, 0) for i in (0, 2))
+    kept = np.flatnonzero(wide * high)
+    which, wide, high = which[kept], wide[kept], high[kept]
+    for run in np.split(np.arange(len(which)), np.flatnonzero(np.diff(np.cumsum(wide * high) // PAIRS_AT_ONCE)) + 1):
+        owner, number = spread(high[run])
+        cell = which[run][owner]
+        if len(cell):
+            yield _Rows(cell, box[cell, 2] + number, box[cell, 0], wide[run][owner])
 
 
 def _with_small_ones(
