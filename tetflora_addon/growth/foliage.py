@@ -369,7 +369,10 @@ def mean_leaf_colours(
 
     ``young`` (n,) is their `youth`.
     """
-    inside, tip, new = rows["leaf_colour"][row, 0], rows["leaf_colour_tip"][row], rows["leaf_colour_young"][row]
+    inside, tip, new = (
+        gathered(colours, row)
+        for colours in (rows["leaf_colour"][:, 0], rows["leaf_colour_tip"], rows["leaf_colour_young"])
+    )
     mean = inside + (tip - inside) * outward[:, None]
     if (new != inside).any():
         mean += (new - inside) * young[:, None]

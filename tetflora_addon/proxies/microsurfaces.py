@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, perpendicular, spread
+from ..arrays import Arrays, gathered, perpendicular, products, spread
 from ..compiled.flora import Flora
 from ..compiled.samples import Points
 from ..growth.axes import axes
@@ -185,7 +185,7 @@ def _facet_colours(
     """Colours of facets that stand for several leaves (n,) each: a mean varies less than the colour of one leaf."""
     deviation = signed(key, Draw.LEAF_COLOUR) / np.sqrt(np.maximum(leaves, 1))
     mean = mean_leaf_colours(flora.rows, row, outward, young)
-    return np.clip(mean + flora.rows["leaf_colour"][row, 1] * deviation[:, None], 0, 1)
+    return np.clip(mean + gathered(flora.rows["leaf_colour"][:, 1], row) * deviation[:, None], 0, 1)
 
 
 def _picked(
@@ -200,21 +200,25 @@ def _picked(
     first, number = points.runs(subplants)
     start = (uniform(subplants.key, _START) * number).astype(np.int64)
     pick = first[owner] + (start[owner] + index) % number[owner]
-    rows, row = flora.rows, subplants.row[owner]
-    place = points.position[pick].astype(np.float64)
-    base = subplants.frame[owner]
+    place = gathered(points.position, pick).astype(np.float64)
+    base = gathered(subplants.frame, owner)
     again = index // number[owner]
-    turned = np.flatnonzero((again > 0) & (rows["order"][row] == 0) & ~rows["phantom"][row])
-    if len(turned):
-        angle = again[turned] * _GOLDEN_ANGLE
-        c, s = np.cos(angle), np.sin(angle)
-        x, y = base[turned, :, 0], base[turned, :, 1]
-        base[turned, :, 0], base[turned, :, 1] = c[:, None] * x + s[:, None] * y, c[:, None] * y - s[:, None] * x
-    moved = np.flatnonzero((again > 0) & ((rows["order"][row] > 0) | rows["phantom"][row]))
-    if len(moved):
+    if again.any():
+        whole = (flora.rows["order"] == 0) & ~flora.rows["phantom"]
+        _turned(base, again, np.flatnonzero((again > 0) & whole[subplants.row[owner]]))
+        moved = np.flatnonzero((again > 0) & ~whole[subplants.row[owner]])
         place[moved] += _MOVED * np.stack([signed(key[moved], _MOVE + axis) for axis in range(3)], axis=1)
-    place = subplants.position[owner] + subplants.length[owner, None] * np.einsum("nij,nj->ni", base, place)
+    along = sum(base[:, :, k] * place[:, k, None] for k in range(3))
+    place = gathered(subplants.position, owner) + subplants.length[owner, None] * along
     return pick, place, base
+
+
+def _turned(base: NDArray[np.float64], again: NDArray[np.int64], some: NDArray[np.intp]) -> None:
+    """Turn some of rotations (m, 3, 3) about their third axes, in place, by as many golden angles as numbers (m,)."""
+    angle = again[some] * _GOLDEN_ANGLE
+    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    x, y = base[some, :, 0], base[some, :, 1]
+    base[some, :, 0], base[some, :, 1] = c * x + s * y, c * y - s * x
 
 
 def _leaves_of_subplants(
@@ -226,7 +230,7 @@ def _leaves_of_subplants(
     owner, index, key, area = _numbers(subplants.key, totals.leaf_area, facet, _FACET_PATH, _LEAF_COUNT, real)
     pick, place, base = _picked(flora, points, subplants, owner, index, key)
     leaf_row = points.row[pick]
-    frame = base @ points.frame[pick].astype(np.float64)
+    frame = products(base, gathered(points.frame, pick).astype(np.float64))
     frame = settled(rows, leaf_row, frame, points.light[pick].astype(np.float64), _SKY)
     half_leaf = 0.5 * rows["leaf_size"][leaf_row, 0] * subplants.scale[owner]
     centre = place + half_leaf[:, None] * frame[:, :, 1]
