@@ -28,6 +28,7 @@ NAMES = (
     "tetrahedra",
     "landscape",
     "scaling",
+    "instances",
     "growth",
     "budget",
     "stages",

@@ -20,13 +20,16 @@ VARIANTS = 8
 _NAME = "Variants"
 
 
-def build(scene: bpy.types.Scene) -> dict[str, float]:
-    """Put variants at the places of all plants of a scene; seconds, and polygons of the variants."""
+def build(scene: bpy.types.Scene, of_each: int = 0) -> dict[str, float]:
+    """Put variants at the places of all plants of a scene; seconds, and polygons of the variants.
+
+    So many of each species, or `VARIANTS` in all.
+    """
     start = time.perf_counter()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     seeds = read_scene(scene, depsgraph, depsgraph.view_layer).seeds
     variants = bpy.data.collections.new(_NAME)  # of no scene: only the instances are rendered
-    polygons, each = 0, -(-VARIANTS // len(seeds.identifiers))
+    polygons, each = 0, of_each or -(-VARIANTS // len(seeds.identifiers))
     for number, kind in enumerate(seeds.identifiers):
         flora = compile_for((kind,), scene, depsgraph)
         for one in range(each):

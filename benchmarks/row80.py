@@ -37,10 +37,10 @@ def timed_refine(scene: bpy.types.Scene, **settings: object) -> tuple[object, fl
     return statistics, time.perf_counter() - start
 
 
-def timed_render(scene: bpy.types.Scene, path: Path, samples: int, seed: int = 0) -> float:
+def timed_render(scene: bpy.types.Scene, path: Path, samples: int, seed: int = 0, engine: str = 'CYCLES') -> float:
     """Render what the scene holds; returns seconds."""
     start = time.perf_counter()
-    render(scene, path, samples, seed)
+    render(scene, path, samples, seed, engine)
     return time.perf_counter() - start
 
 

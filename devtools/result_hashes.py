@@ -83,10 +83,9 @@ def scenes() -> Iterator[tuple[str, dict[str, object]]]:
     yield "landscape", refined()
     session.clean_file()
     row80.build(bpy.context.scene, _SMALL_ROW)
-    eevee = 'BLENDER_EEVEE_NEXT' if bpy.app.version < (5, 0) else 'BLENDER_EEVEE'
     for form in FORMS:
         for lighting in LIGHTINGS:
-            for engine in ('CYCLES', eevee):
+            for engine in ('CYCLES', session.eevee()):
                 bpy.context.scene.render.engine = engine
                 yield f"{form} {lighting} {engine}", refined(proxy_form=form, baked_light=lighting)
     yield "expanded", refined(expand_everything=True)

@@ -107,3 +107,10 @@ def stop() -> None:
     shutil.rmtree(home, ignore_errors=True)
     for name in [n for n in sys.modules if n == PACKAGE or n.startswith(PACKAGE + ".")]:
         del sys.modules[name]
+
+
+def eevee() -> str:
+    """Identifier of EEVEE in this version of Blender."""
+    import bpy
+
+    return 'BLENDER_EEVEE_NEXT' if bpy.app.version < (5, 0) else 'BLENDER_EEVEE'
