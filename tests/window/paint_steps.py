@@ -29,6 +29,9 @@ def steps(ui):
     yield from press_button(ui, "tetflora.refine")
     yield from ui.until(lambda: bpy.context.scene.tetflora.statistics != "" and not running(ui), 120, "refinement")
     yield from ui.picture("refined")
+    # The Outliner takes its time for these, and must not be drawn while the render's thread changes what it lists.
+    for number in range(4000):
+        bpy.context.scene.collection.objects.link(bpy.data.objects.new(f"Other {number}", None))
     ui.values["green"] = yield from render(ui, "first_render")
     yield from press_key(ui, 'ESC')
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Everything below the operators that uses bpy: properties, reading scenes, writing results, rendering."""
 
-from . import preferences, properties, runtime, saved_files, translations, worker
+from . import main_thread, preferences, properties, runtime, saved_files, translations, worker
 from .cli import command
 from .job import forecast, render
 from .placing import assets
@@ -12,6 +12,7 @@ from .viewport import species as species_preview  # or the room of that name cou
 
 # Handlers and commands read properties, so those come first.
 _PARTS = (
+    main_thread,
     worker,
     runtime,
     preferences,

@@ -12,12 +12,14 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any, TypeVar
 
 import bpy
 from bpy.app.handlers import persistent
 
 from ..errors import SceneError, readable
+from .main_thread import in_main_thread
 
 #: Errors of the last render: a text for each frame that was rendered without its plants.
 failed_frames: list[str] = []
@@ -191,7 +193,7 @@ _STOPPING = Handlers(
     undo_pre=lambda *_: stop_jobs("Undo changed what it works on"),
     redo_pre=lambda *_: stop_jobs("Redo changed what it works on"),
     load_pre=lambda *_: stop_jobs("another file was opened"),
-    render_init=lambda *_: stop_jobs("a render began"),
+    render_init=lambda *_: in_main_thread(partial(stop_jobs, "a render began")),
 )
 register, unregister = _STOPPING.register, _STOPPING.unregister
 

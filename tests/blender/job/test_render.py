@@ -68,6 +68,7 @@ class _Stub:
         for datablock in (mesh, made, black):
             nodes.tag(datablock)
         results.collection.objects.link(made)
+        results.finish()
         return refine.Statistics()
 
 

@@ -11,6 +11,7 @@ import json
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing
 from dataclasses import replace
+from functools import partial
 from typing import TypeVar
 
 import bpy
@@ -33,6 +34,7 @@ from ...refinement.loop import Refinement, step_of
 from ...refinement.settings import RefinementSettings
 from ...refinement.statistics import Progress, Statistics, Stopwatch
 from ..compat import drawn_disc
+from ..main_thread import in_main_thread
 from ..materials.materials import baked_material
 from ..preferences import wanted_threads
 from ..results.collection import Results
@@ -144,7 +146,7 @@ def _refine_steps(
         adopt_materials(scene, earlier)
     try:
         if scene.tetflora.expand_everything:
-            results.open()
+            in_main_thread(results.open)
             # Explicit objects stay visible themselves.
             yield from _write_blocks(results, flora, expanded_blocks(flora, given.seeds, camera), statistics, 0.05)
         else:
@@ -153,16 +155,21 @@ def _refine_steps(
         clock.lap("emit")
         data.check()
     except BaseException:  # an error, Esc (GeneratorExit) or Ctrl+C
-        results.discard()
+        in_main_thread(results.discard)
         raise
-    remove_results(scene, results.purpose, keep=(results.collection, *beside))
-    release_materials()
-    hide_originals(scene, results.purpose, originals)
-    results.finish()
+    in_main_thread(partial(_replace, results, beside, originals))
     memory.give_back()
     statistics.seconds = dict(clock.seconds)
     scene.tetflora.statistics = json.dumps(statistics.as_dict())
     return statistics
+
+
+def _replace(results: Results, beside: Sequence[bpy.types.Collection], originals: Sequence[bpy.types.Object]) -> None:
+    """Let new results take the place of earlier ones and of what they show."""
+    remove_results(results.scene, results.purpose, keep=(results.collection, *beside))
+    release_materials()
+    hide_originals(results.scene, results.purpose, originals)
+    results.finish()
 
 
 def refine(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, **options: object) -> Statistics:
@@ -265,7 +272,7 @@ def _write_refined(
     disc = drawn_disc(scene.render.engine)
     work = _refined(flora, given, camera, settings, form.emission, disc, statistics, clock)
     refined = yield from steps_in_thread(work, Progress(0.05, "Refining, pass 1"))
-    results.open()
+    in_main_thread(results.open)
     baking = None
     if given.sources is not None:
         baking = Baking(given.sources, leaves=scene.tetflora.baked_light == 'ALL')

@@ -9,15 +9,18 @@ Their order has these reasons (tried on 4.5 and 5.2):
 - 5.2 crashes if objects that were rendered are deleted in ``render_post`` or ``render_write``, while the renderer still
   holds them. They are deleted in the next ``render_pre``, and in ``render_complete`` or ``render_cancel`` at the end.
 - Results of a render are marked as runtime data, which Blender never writes into a file.
+- With a window, handlers run in the thread of the render: what links, hides or removes goes to the main thread.
 """
 
 import sys
 import traceback
 from dataclasses import dataclass, field
+from functools import partial
 
 import bpy
 
 from ...errors import TetFloraError
+from ..main_thread import in_main_thread
 from ..results.collection import has_results, leave_out_of_file, result_collections
 from ..results.forms import raise_bounces
 from ..results.hiding import (
@@ -101,7 +104,7 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
         _complain(scene, f"unexpected error, please report it as a bug: {error!r}")
     finally:
         if not made:
-            _take_back(scene)
+            in_main_thread(partial(_take_back, scene))
         _rendering.busy = False
 
 
@@ -117,7 +120,7 @@ def on_render_end(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     try:
         for other in bpy.data.scenes:
             if other.name in rendered and other.library is None:
-                _take_back(other)
+                in_main_thread(partial(_take_back, other))
     finally:
         _rendering.busy, _rendering.outer = False, ""
         _rendering.scenes.clear()
@@ -166,22 +169,19 @@ def on_load_post(_path: object, _other: object = None) -> None:
 
 def _make(scene: bpy.types.Scene) -> None:
     """Make results for the frame to be rendered, and hide the artist's own results."""
+    in_main_thread()  # before the view layers are evaluated here
     # Also where nothing is animated: the renderer does so next, and only this gives a depsgraph of the frame.
     scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
-    for earlier in result_collections(scene, 'VIEW'):
-        adopt_materials(scene, earlier)  # before all else, or the next frame would count as changed
-    with originals_shown(scene):  # the previous frame has hidden some
-        groups = view_layer_groups(scene)
     wanted = []
-    for layers in groups:
+    for layers in in_main_thread(partial(_layers_of, scene)):
         layers[0].update()  # going to the frame updates only the active layer's depsgraph
         depsgraph = layers[0].depsgraph
         given = read_scene(scene, depsgraph, layers[0])
         read = frame_cache.shared_camera(scene, depsgraph, given), given
         wanted.append((frame_cache.key_of(scene, depsgraph, layers, *read), layers, read))
-    frame_cache.stow(scene, [key for key, *_ in wanted])
+    in_main_thread(partial(frame_cache.stow, scene, [key for key, *_ in wanted]))
     for key, layers, (camera, given) in wanted:
-        layer, there = layers[0], frame_cache.recall(scene, key)
+        layer, there = layers[0], in_main_thread(partial(frame_cache.recall, scene, key))
         new = [] if there is None else [there]
         if there is None:
             options = {"view_layer": layer, "for_render": True, "camera": camera, "given": given, "mark": key[:8]}
@@ -191,15 +191,27 @@ def _make(scene: bpy.types.Scene) -> None:
                 _warn(statistics.left_out, " ".join(sorted(statistics.strays)))
             new = [c for c in result_collections(scene, 'RENDER') if c not in before]
             for collection in new:
-                frame_cache.store(scene, key, collection, statistics.memory_mb)
-        show_in(scene, new, layers)
-    frame_cache.hide_for(scene, [key for key, *_ in wanted])
+                in_main_thread(partial(frame_cache.store, scene, key, collection, statistics.memory_mb))
+        in_main_thread(partial(show_in, scene, new, layers))
+    in_main_thread(partial(_hide, scene, [key for key, *_ in wanted]))
     if len(scene.view_layers) > 1 or _rendering.outer != scene.name:
         # Otherwise Blender crashes when it renders new objects in a layer that is not the window's, or for a sequencer.
         for layer in scene.view_layers:
             layer.update()
     _rendering.bounces.setdefault(scene.name, {}).update(raise_bounces(scene))
-    # Hidden only now: if refinement fails, earlier results are better than none.
+
+
+def _layers_of(scene: bpy.types.Scene) -> list[list[bpy.types.ViewLayer]]:
+    """View layers with the same plants, at the scene's frame."""
+    for earlier in result_collections(scene, 'VIEW'):
+        adopt_materials(scene, earlier)  # before all else, or the next frame would count as changed
+    with originals_shown(scene):  # the previous frame has hidden some
+        return view_layer_groups(scene)
+
+
+def _hide(scene: bpy.types.Scene, keys: list[str]) -> None:
+    """Hide what results of a render replace, and the artist's own: not before they are made, or there might be none."""
+    frame_cache.hide_for(scene, keys)
     _rendering.hidden += [c.name for c in result_collections(scene, 'VIEW') if not c.hide_render]
     for collection in _named(_rendering.hidden):
         collection.hide_render = True

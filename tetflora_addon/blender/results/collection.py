@@ -36,8 +36,8 @@ NAMES = {'VIEW': "TetFlora", 'RENDER': "TetFlora render"}
 class Results:
     """A result collection under construction.
 
-    It is linked to the scene at once, so that an object reaches the render as soon as it is made; `discard` removes
-    everything.
+    The artist's is linked to the scene at once, so that an object is seen as soon as it is made. That of a render is
+    filled and linked when it is finished: see `main_thread`. `discard` removes everything.
 
     Parameters
     ----------
@@ -63,9 +63,10 @@ class Results:
         self.collection: bpy.types.Collection | None = None
         self._made: list[bpy.types.ID] = []
         self._names: list[tuple[bpy.types.ID, str]] = []
+        self._waiting: list[tuple[bpy.types.Object, Species | None]] = []
 
     def open(self) -> None:
-        """Make the collection and link it to the scene."""
+        """Make the collection."""
         name = NAMES[self.purpose] + self.mark
         self.collection = bpy.data.collections.new(name)
         self._names.append((self.collection, name))
@@ -74,7 +75,8 @@ class Results:
         tag(self.collection)
         if self.data is not None:
             self.data.add("the result", self.collection)
-        self.scene.collection.children.link(self.collection)
+        if self.purpose == 'VIEW':
+            self.scene.collection.children.link(self.collection)
 
     def add(
         self,
@@ -117,22 +119,32 @@ class Results:
         if self.data is not None:
             self.data.add("a part of the result", made, made.data)
         tag(made.data)
+        made.location = self.origin
+        made[KIND] = kind
+        tag(made)
+        if self.purpose == 'VIEW':
+            self._show(made, species)
+        else:
+            self._waiting.append((made, species))
+        return made
+
+    def _show(self, made: bpy.types.Object, species: Species | None) -> None:
+        """Add an object to the collection, as the settings have it; Blender then lists all objects anew."""
         if species is not None:
             made.parent = parent_of(self.collection, species.identifier, species.name)
             self._made.append(made.parent)
-        made.location = self.origin
-        made[KIND] = kind
         made.hide_select = True  # artists select and edit plants, not millions of polygons
-        tag(made)
         dress(self.scene, made, "" if species is None else species.identifier)
         self.collection.objects.link(made)
-        return made
 
     def finish(self) -> None:
         """Everything is made and earlier results are gone, whose names these take.
 
         The output settings decide about the artist's results; files never hold a render's.
         """
+        for made, species in self._waiting:
+            self._show(made, species)
+        self._waiting.clear()
         del self.collection[UNFINISHED]
         for made, name in self._names:
             if made.name != name and is_own(made):
@@ -141,6 +153,7 @@ class Results:
         if self.purpose == 'VIEW':
             dress_collection(self.scene, self.collection)
         else:
+            self.scene.collection.children.link(self.collection)
             mark_runtime(self.collection, True)
 
     def discard(self) -> None:
@@ -149,7 +162,7 @@ class Results:
             remove_collection(self.scene if is_there(self.scene) else None, self.collection)
         self.collection = None
         remove_made(self._made)
-        self._made = []
+        self._made, self._waiting = [], []
 
 
 def dress_results(scene: bpy.types.Scene) -> None:

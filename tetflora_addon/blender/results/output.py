@@ -57,7 +57,8 @@ def dress(scene: bpy.types.Scene, made: bpy.types.Object, identifier: str) -> No
     """Apply a scene's output settings to a result object; ``identifier`` is empty where species are mixed."""
     output, entry = scene.tetflora.output, entry_of(scene, identifier)
     for name in SWITCHES:
-        setattr(made, f"visible_{name}", getattr(output, name))
+        if getattr(made, f"visible_{name}") != getattr(output, name):  # after each, Blender lists all objects anew
+            setattr(made, f"visible_{name}", getattr(output, name))
     made.pass_index = output.pass_index if entry is None else entry.pass_index
     made.lightgroup = (entry.light_group if entry is not None else "") or output.light_group
     made[SPECIES] = identifier

@@ -21,6 +21,7 @@ from ...errors import TetFloraError
 from ...refinement.statistics import Progress
 from ..job import refine
 from ..job.frame_cache import choices, scene_digest
+from ..main_thread import in_main_thread
 from ..materials.nodes import is_ours, is_own
 from ..placing.plant_objects import prepare_scene
 from ..properties import auto_refine_switched
@@ -259,7 +260,7 @@ _HANDLERS = Handlers(
     redo_pre=before_undo,
     undo_post=after_undo,
     redo_post=after_undo,
-    render_init=on_interruption,
+    render_init=lambda *_: in_main_thread(on_interruption),
     load_pre=(on_interruption, on_load),
 )
 

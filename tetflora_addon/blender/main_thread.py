@@ -1,0 +1,115 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Changes of a scene's contents that must not happen while the window is drawn.
+
+Blender calls the handlers of a render that the window shows in the thread of the render. *Lock Interface* keeps 3D
+views and properties from drawing meanwhile, but not the Outliner (source of 5.2: its region has no lock). That looks
+up every object of every collection in the view layer, and Blender crashes if the other thread is just linking or
+removing one, or is at the view layer's list of objects, which it makes anew after each change when somebody needs it.
+So such changes are handed to the main thread, which makes them between two redraws, and the lists at once.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+import bpy
+
+#: Seconds after which the caller makes the change itself: the main thread then waits for the render, to quit or to
+#: open a file, and draws nothing.
+_PATIENCE = 3.0
+#: Seconds between two looks, and looks without a change after which the timer ends. It goes on for a while because
+#: adding timers from another thread is better done rarely.
+_LOOK, _LOOKS = 0.005, 400
+
+_Result = TypeVar("_Result")
+
+
+class _Change(Generic[_Result]):
+    """A function that is called once, by whoever comes first."""
+
+    def __init__(self, function: Callable[[], _Result]) -> None:
+        self._function = function
+        self._mine = threading.Lock()
+        self.done = threading.Event()
+        self.error: BaseException | None = None
+        self.result: _Result | None = None
+
+    def make(self) -> None:
+        """Call the function unless somebody has begun to."""
+        if not self._mine.acquire(blocking=False):
+            return
+        try:
+            self.result = self._function()
+            sync_view_layers()
+        except BaseException as error:  # raised again where it was asked for
+            self.error = error
+        finally:
+            self.done.set()
+
+
+_asked: deque[_Change] = deque()
+_idle = 0
+
+
+def sync_view_layers() -> None:
+    """Let all view layers list their objects now, before another thread asks for it."""
+    for scene in bpy.data.scenes:
+        for layer in scene.view_layers:
+            layer.objects.active  # noqa: B018  (reading it does so)
+
+
+def in_main_thread(function: Callable[[], _Result] = sync_view_layers) -> _Result:
+    """Call a function in Blender's main thread, and wait for its result.
+
+    At once in the main thread itself, and without a window. Errors of the function are raised here.
+
+    Parameters
+    ----------
+    function : callable
+        By default `sync_view_layers`: what the main thread was doing is done then.
+    """
+    if bpy.app.background or threading.current_thread() is threading.main_thread():
+        return function()
+    return _handed_over(function)
+
+
+def _handed_over(function: Callable[[], _Result]) -> _Result:
+    change = _Change(function)
+    _asked.append(change)
+    if not bpy.app.timers.is_registered(make_changes):
+        bpy.app.timers.register(make_changes)
+    if not change.done.wait(_PATIENCE):
+        change.make()
+        change.done.wait()
+    if change.error is not None:
+        try:
+            raise change.error
+        finally:
+            change.error = None  # else it would hold itself by its traceback
+    return change.result
+
+
+def make_changes() -> float | None:
+    """Make what other threads have asked for; seconds until the next look, None after many in vain."""
+    global _idle
+    _idle = 0 if _asked else _idle + 1
+    while _asked:
+        _asked.popleft().make()
+    if _idle <= _LOOKS:
+        return _LOOK
+    _idle = 0
+    return None
+
+
+def register() -> None:
+    """Nothing yet: the timer runs when something is asked for."""
+
+
+def unregister() -> None:
+    """Look no more."""
+    if bpy.app.timers.is_registered(make_changes):
+        bpy.app.timers.unregister(make_changes)
