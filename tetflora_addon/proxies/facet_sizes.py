@@ -141,12 +141,14 @@ class FacetSizes(Arrays):
         # Beside the view they must not reach into it, or they would lose area.
         unseen = np.clip(pixels.hidden ** np.where(beside, 1.0, deep) * unseen, unseen, np.maximum(unseen, most))
         # Wood is lighter or darker than leaves: where it shows after all, a large facet of it is a shard.
-        wood = np.minimum(side, _SHARD * max(pixels.seen, 1.0) * self.extent)
+        shard = _SHARD * max(pixels.seen, 1.0) * self.extent
+        wood = np.minimum(side, shard)
         side = np.where(self.hidden, unseen, side)
         # Hidden wood is cut into no more facets than it has faces. Elsewhere it is cut as fine as the side requires, or
         # thin twigs would become blots.
         least = np.minimum(self.least_wood, np.where(beside, thrown, np.maximum(most, several)))
-        wood = np.where(self.hidden, np.maximum(side, least), wood)
+        finest = np.where(beside, side, np.minimum(side, shard))
+        wood = np.where(self.hidden, np.maximum(finest, least), wood)
         return np.maximum(side, np.sqrt(self.one_leaf)), wood
 
     def counts(self, pixels: FacetPixels) -> NDArray[np.float64]:
