@@ -366,10 +366,10 @@ def _real_faces(flora: Flora, portions: Portions, transition: Transition) -> NDA
     wood = np.maximum(parts.totals.polygons - leaves * each, 0.0)
     if (pixels := transition.detail.wood) is not None:
         wood = wood * finer(flora, parts.branches, parts.alone, pixels)
-    triangles = transition.of_triangles(parts.branches, portions.visibility)
+    kites = transition.of_kites(parts.branches, portions.visibility)
     full = each * _weights(flora)[flora.rows["species"][row]]
     # Among real leaves, hardly any twig is wide enough to be real.
-    return leaves * (full + triangles * (1.0 - full)) + np.where(leafy & ~parts.alone, _TWIGS, 1.0) * wood
+    return leaves * (full + kites * (1.0 - full)) + np.where(leafy & ~parts.alone, _TWIGS, 1.0) * wood
 
 
 def _weights(flora: Flora) -> NDArray[np.float64]:

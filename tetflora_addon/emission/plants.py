@@ -8,7 +8,7 @@ memory at a time. Proxies are in `facets` and `shells`.
 A leaf whose width in pixels is below the limit is a facet, one that is wider by `decisions.BAND` is real; in between
 a fraction of them is real that grows with the width. Real leaves and facets are thinned out by hashes of their own
 keys: what has become real stays real as the camera comes closer, nothing pops, and the area is the same on average.
-Real leaves are single triangles first, and have their faces from a few pixels of width on, one after another; where
+Real leaves are single kites first, and have their faces from a few pixels of width on, one after another; where
 these can be told from what they stand for, finer ones, see `leaf_detail`.
 Wood goes by its own width or that of its leaves, whichever is larger: a trunk is a tube even among invisible leaves.
 """
@@ -44,8 +44,8 @@ from .portions import MIXED, Portions, Sight, in_chunks
 
 #: Fraction of leaves that counts at least: opening sub-plants for a few real leaves is work as well.
 _LEAST_REAL = 0.1
-#: Width in pixels up to which real leaves are triangles.
-TRIANGLES = 2.0
+#: Width in pixels up to which real leaves are kites.
+KITES = 2.0
 #: Among real leaves, wood counts as so many times as wide: a triangle is thrice as wide at its base as the wood.
 TWIGS = 4.0
 #: Width in pixels from which wood is tubes however little is seen of it: its facets would be a row of shards. A budget
@@ -85,9 +85,9 @@ class Transition:
         pixels = width / np.maximum(self.camera.extent_around(position), 1e-300) * visibility**FADING
         return real_fraction(pixels, self.limit)
 
-    def of_triangles(self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0) -> NDArray[np.float64]:
-        """Fraction (n,) of the real leaves of branches that are single triangles."""
-        small = self.limit / TRIANGLES
+    def of_kites(self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0) -> NDArray[np.float64]:
+        """Fraction (n,) of the real leaves of branches that are single kites."""
+        small = self.limit / KITES
         return 1.0 - self.fraction(feature_width(self.flora, branches) * small, branches.position, visibility)
 
     def of_branches(self, branches: Branches, visibility: NDArray[np.float64] | float = 1.0) -> NDArray[np.float64]:
@@ -289,7 +289,7 @@ def _block(
 
     def fractions_of(some: Branches) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         seen = visibility[some.plant]
-        return transition.of_branches(some, seen), transition.of_triangles(some, seen)
+        return transition.of_branches(some, seen), transition.of_kites(some, seen)
 
     def lengths_of(some: WholeBranches) -> NDArray[np.float64]:
         return detail.lengths(some, visibility[some.branches.plant] if len(visibility) else 1.0)

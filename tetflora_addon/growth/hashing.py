@@ -54,7 +54,7 @@ class Draw(IntEnum):
     SWAY_ALONG = 26
     SWAY_ACROSS = 27
     SWAY_UP = 28
-    LEAF_TRIANGLE = 29
+    LEAF_KITE = 29
     LEAF_PLANE = 30
     TWIG_TURN = 31
     BEND = 32  # one for each segment and axis from here on

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from ..buffers import MeshBuffers
 from ..growth.hashing import Draw, uniform
+from ..leaves.kites import KITE, LeafKites
 from ..leaves.levels import LeafLevel
 from ..leaves.models import LeafModel
-from ..leaves.triangles import TRIANGLE, LeafTriangles
 
 _ROWS_AT_ONCE = 4096
 
@@ -113,30 +113,30 @@ class LeafCopies:
         return None if model.material_index is None else _stepped(model.material_index, 0, len(self.positions))
 
 
-class TriangleCopies(LeafCopies):
-    """Copies of a leaf model as one triangle each, in planes that their keys choose.
+class KiteCopies(LeafCopies):
+    """Copies of a leaf model as one kite each, in planes that their keys choose.
 
     Parameters
     ----------
-    triangles : LeafTriangles
+    kites : LeafKites
     number, transmission, moving
         As of `LeafCopies`.
     """
 
-    def __init__(self, triangles: LeafTriangles, number: int, transmission: float, moving: bool = False) -> None:
-        super().__init__(TRIANGLE, number, transmission, moving)
-        self.triangles = triangles
+    def __init__(self, kites: LeafKites, number: int, transmission: float, moving: bool = False) -> None:
+        super().__init__(KITE, number, transmission, moving)
+        self.kites = kites
         self.plane = np.zeros(number, np.int8)
 
     def _shapes(self, key: NDArray[np.uint64], new: slice) -> NDArray[np.float32]:
-        self.plane[new] = self.triangles.chosen(uniform(key, Draw.LEAF_PLANE))
-        return self.triangles.positions.astype(np.float32).transpose(1, 2, 0)[:, :, self.plane[new]]
+        self.plane[new] = self.kites.chosen(uniform(key, Draw.LEAF_PLANE))
+        return self.kites.positions.astype(np.float32).transpose(1, 2, 0)[:, :, self.plane[new]]
 
     def _texture(self) -> NDArray[np.float32]:
-        return self.triangles.uv[self.plane].reshape(-1, 2)
+        return self.kites.uv[self.plane].reshape(-1, 2)
 
     def _materials(self) -> NDArray[np.int32] | None:
-        index = self.triangles.material_index
+        index = self.kites.material_index
         return None if index is None else index[self.plane]
 
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Leaves as polygons: copies of the species' leaf models, written straight into the arrays of their mesh.
 
-See section 5 of the paper. What is small in the image may be a triangle, see `leaves.triangles`; what is large
+See section 5 of the paper. What is small in the image may be a kite, see `leaves.kites`; what is large
 has finer levels, see `leaves.levels`.
 """
 
@@ -33,16 +33,16 @@ from ..growth.foliage import (
 from ..growth.growth import WholeBranches, leaf_counts
 from ..growth.hashing import Draw, uniform
 from ..growth.wind import moment
+from ..leaves.kites import leaf_kites
 from ..leaves.levels import chosen_level, leaf_level
 from ..leaves.models import LeafModel
-from ..leaves.triangles import leaf_triangles
-from .leaf_copies import LeafCopies, LevelCopies, TriangleCopies
+from .leaf_copies import KiteCopies, LeafCopies, LevelCopies
 from .pieces import chunks
 
 #: Vertices of leaves that are worked on at a time: some ten megabytes.
 _VERTICES_AT_ONCE = 120_000
-#: The step of leaves that are triangles; that of others is their level, 0 for the model of the species.
-_TRIANGLE = -1
+#: The step of leaves that are kites; that of others is their level, 0 for the model of the species.
+_KITE = -1
 #: Leaves change their level at lengths from this fraction of that of the first ones on, each by its own number.
 _EARLIEST = 0.7
 
@@ -82,7 +82,7 @@ def leaf_meshes(
         Index into the flora's species.
     whole : sequence of WholeBranches
     fractions_of : callable, optional
-        Fractions (n,), (n,) of the leaves of branches that are wanted, and of these that are triangles; the leaves' own
+        Fractions (n,), (n,) of the leaves of branches that are wanted, and of these that are kites; the leaves' own
         random numbers decide which.
     lengths_of : callable, optional
         Lengths (n,) of the leaves of branches in the image, in errors that do not show; those of long ones are finer.
@@ -108,8 +108,8 @@ def _copies(model: LeafModel, step: int, number: int, transmission: float, movin
     """Room for a number of leaves of one step."""
     if step > 0:
         return LevelCopies(leaf_level(model, step), number, transmission, moving)
-    if step == _TRIANGLE and not model.textured:
-        return TriangleCopies(leaf_triangles(model), number, transmission, moving)
+    if step == _KITE and not model.textured:
+        return KiteCopies(leaf_kites(model), number, transmission, moving)
     return LeafCopies(model, number, transmission, moving)
 
 
@@ -138,9 +138,9 @@ class _Bearers:
     row : int
     whole : WholeBranches of n
     step : int
-        The leaves that are wanted here: -1 triangles, 0 models of the species, from 1 on their levels.
-    fraction, triangles : (n,) float64, optional
-        Fraction of the leaves that is wanted at all, and of these as triangles.
+        The leaves that are wanted here: -1 kites, 0 models of the species, from 1 on their levels.
+    fraction, kites : (n,) float64, optional
+        Fraction of the leaves that is wanted at all, and of these as kites.
     lengths : (n,) float64, optional
         Of leaves, as of `leaf_meshes`; where it is given, only those of the step are wanted.
     """
@@ -152,26 +152,26 @@ class _Bearers:
         whole: WholeBranches,
         step: int = 0,
         fraction: NDArray[np.float64] | None = None,
-        triangles: NDArray[np.float64] | None = None,
+        kites: NDArray[np.float64] | None = None,
         lengths: NDArray[np.float64] | None = None,
     ) -> None:
         self.flora, self.whole, self.counts = flora, whole, leaf_counts(flora.rows, whole.branches)
-        self.step, self.fraction, self.triangles, self.lengths = step, fraction, triangles, lengths
+        self.step, self.fraction, self.kites, self.lengths = step, fraction, kites, lengths
         self.row = np.array([row])
         self.kind = int(flora.rows["leaf_kind"][row])
         self.forms = flora.forms[int(flora.rows["species"][row])][self.kind]
 
-    def parts(self, fraction: NDArray[np.float64], triangles: NDArray[np.float64]) -> Iterator[_Bearers]:
-        """The branches some of whose leaves are wanted as they are, and those with leaves as triangles."""
-        for step, share in ((0, 1.0 - triangles), (_TRIANGLE, triangles)):
+    def parts(self, fraction: NDArray[np.float64], kites: NDArray[np.float64]) -> Iterator[_Bearers]:
+        """The branches some of whose leaves are wanted as they are, and those with leaves as kites."""
+        for step, share in ((0, 1.0 - kites), (_KITE, kites)):
             own = np.flatnonzero((fraction > 0.0) & (share > 0.0))
             if len(own):
-                given = fraction[own], triangles[own]
+                given = fraction[own], kites[own]
                 yield _Bearers(self.flora, int(self.row[0]), self.whole.take(own), step, *given)
 
     def levels(self, lengths: NDArray[np.float64]) -> Iterator[_Bearers]:
-        """The branches by the levels that some of their leaves have; triangles stay what they are."""
-        if self.step == _TRIANGLE:
+        """The branches by the levels that some of their leaves have; kites stay what they are."""
+        if self.step == _KITE:
             yield self
             return
         ends = [[chosen_level(form, lengths * share) for form in self.forms] for share in (_EARLIEST, 1.0)]
@@ -179,7 +179,7 @@ class _Bearers:
         for step in range(int(high.max(initial=0)) + 1):
             own = np.flatnonzero((low <= step) & (step <= high))
             if len(own):
-                given = (None if of is None else of[own] for of in (self.fraction, self.triangles))
+                given = (None if of is None else of[own] for of in (self.fraction, self.kites))
                 mixed = lengths[own] if (low[own] < high[own]).any() else None
                 yield _Bearers(self.flora, int(self.row[0]), self.whole.take(own), step, *given, mixed)
 
@@ -230,11 +230,11 @@ class _Bearers:
         key = leaf_keys(self.whole.branches.take(part), owner, index)
         kept = np.ones(len(key), bool)
         if self.fraction is not None:
-            wanted, triangles, small = self.fraction[part], self.triangles[part], self.step == _TRIANGLE
+            wanted, kites, small = self.fraction[part], self.kites[part], self.step == _KITE
             if (wanted < 1.0).any():
                 kept &= uniform(key, Draw.TRANSITION) < wanted[owner]
-            if (triangles < 1.0).any() if small else (triangles > 0.0).any():
-                kept &= (uniform(key, Draw.LEAF_TRIANGLE) < triangles[owner]) == small
+            if (kites < 1.0).any() if small else (kites > 0.0).any():
+                kept &= (uniform(key, Draw.LEAF_KITE) < kites[owner]) == small
         form = leaf_forms(len(self.forms), key) if len(self.forms) > 1 else np.zeros(len(key), np.int64)
         if self.lengths is not None:
             length = self.lengths[part][owner] * (_EARLIEST + (1.0 - _EARLIEST) * uniform(key, Draw.LEAF_LEVEL))

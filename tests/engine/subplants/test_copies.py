@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tetflora_addon.growth.foliage import face_light
+from tetflora_addon.leaves.kites import leaf_kites
 from tetflora_addon.leaves.models import LEAF_MODELS
-from tetflora_addon.leaves.triangles import leaf_triangles
-from tetflora_addon.subplants.leaf_copies import LeafCopies, TriangleCopies
+from tetflora_addon.subplants.leaf_copies import KiteCopies, LeafCopies
 
 
 def frames(number: int, seed: int = 0) -> np.ndarray:
@@ -50,24 +50,24 @@ def test_each_copy_is_the_model(name: str, parts: list[int]) -> None:
     assert (mesh.attributes["tf_transmission"][1] == np.float32(0.25)).all()
 
 
-def test_triangles_lie_where_their_keys_say() -> None:
-    """However many are placed at a time, a copy is one of the model's triangles, turned, scaled and moved."""
-    triangles, number = leaf_triangles(LEAF_MODELS["needles"]), 4000
+def test_kites_lie_where_their_keys_say() -> None:
+    """However many are placed at a time, a copy is one of the model's kites, turned, scaled and moved."""
+    kites, number = leaf_kites(LEAF_MODELS["needles"]), 4000
     rng = np.random.default_rng(2)
     frame, size, position = frames(number), rng.uniform(0.01, 0.3, number), rng.normal(size=(number, 3))
     key, colour = rng.integers(0, 2**63, number).astype(np.uint64), rng.random((number, 3))
     meshes = []
     for parts in ([number], [1500, 2500]):
-        copies = TriangleCopies(triangles, number, 0.25)
+        copies = KiteCopies(kites, number, 0.25)
         for part in np.split(np.arange(number), np.cumsum(parts)[:-1]):
             copies.add(key[part], position[part], frame[part].astype(np.float32), size[part], colour[part])
         meshes.append(copies.buffers())
     assert (meshes[0].positions == meshes[1].positions).all()
-    placed = np.einsum("nij,kvj->nkvi", frame * size[:, None, None], triangles.positions) + position[:, None, None]
-    off = np.abs(meshes[0].positions.reshape(number, 1, 3, 3) - placed).max(axis=(2, 3))
+    placed = np.einsum("nij,kvj->nkvi", frame * size[:, None, None], kites.positions) + position[:, None, None]
+    off = np.abs(meshes[0].positions.reshape(number, 1, 4, 3) - placed).max(axis=(2, 3))
     assert off.min(axis=1).max() < 1e-5
-    taken = np.bincount(off.argmin(axis=1), minlength=len(triangles.share)) / number
-    np.testing.assert_allclose(taken, np.diff(triangles.share, prepend=0.0), atol=0.04)
+    taken = np.bincount(off.argmin(axis=1), minlength=len(kites.share)) / number
+    np.testing.assert_allclose(taken, np.diff(kites.share, prepend=0.0), atol=0.04)
 
 
 @given(st.integers(0, 2**31), st.floats(0, 1), st.sampled_from([0.0, 1e-7, 1e-5, 1e-3, 0.1, 2.0]))

@@ -1,0 +1,198 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A leaf of a pixel or two as one kite: a quadrilateral with the leaf's area, centroid, spread and widest place.
+
+A kite is folded along the midrib as the leaf is. A bunch of needles shows many planes: each copy takes one of them at
+random, in proportion to their areas, and has the area of the whole there: over many leaves, the area that is seen from
+any direction is kept. Of closed models, as fruit, that is half of the surface. A kite stays what it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .models import LeafModel, leaf_model
+
+#: The topology of all of them.
+KITE = leaf_model([[0.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, 1.0, 0.0], [-0.5, 0.5, 0.0]], [[0, 1, 2, 3]])
+#: Planes that stand for the faces of one material.
+_PLANES = 4
+#: Normals within so many radians of each other are one plane.
+_FLAT = 0.01
+#: Mean square of the difference of normals up to which a leaf is a sheet that is folded once.
+_FOLDED_ONCE = 0.006
+_MOVES = 64
+#: Widest places of kites along their length, from where they begin, and the skewness of their area along it (that of a
+#: triangular distribution; Johnson, Kotz and Balakrishnan, Continuous Univariate Distributions, vol. 2, 1995).
+_WIDEST = np.linspace(1.0, 0.0, 65)
+_SKEWNESS = np.sqrt(2.0) * (1.0 - 2.0 * _WIDEST) * (2.0 - _WIDEST) * (1.0 + _WIDEST)
+_SKEWNESS /= 5.0 * (1.0 - _WIDEST * (1.0 - _WIDEST)) ** 1.5
+
+
+@dataclass(frozen=True)
+class LeafKites:
+    """Kites (k) that stand for a leaf model.
+
+    Attributes
+    ----------
+    positions : (k, 4, 3) float64
+        Their vertices, in units of the leaf's size; each kite has the area of the model, or half of a closed one's.
+    uv : (k, 4, 2) float32
+    share : (k,) float64
+        Up to which random number, from 0 to 1, each is taken; the last is 1.
+    material_index : (k,) int32, optional
+        As of the model.
+    """
+
+    positions: NDArray[np.float64]
+    uv: NDArray[np.float32]
+    share: NDArray[np.float64]
+    material_index: NDArray[np.int32] | None = None
+
+    def chosen(self, number: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Which kite (n,) copies with random numbers (n,) take."""
+        return np.minimum(np.searchsorted(self.share, number, side="right"), len(self.share) - 1)
+
+
+@lru_cache(maxsize=256)
+def leaf_kites(model: LeafModel) -> LeafKites:
+    """The kites of a leaf model."""
+    vectors = model.face_vectors
+    areas = np.linalg.norm(vectors, axis=1)
+    normals = vectors / np.maximum(areas, 1e-300)[:, None]
+    materials = np.zeros(len(areas), np.int32) if model.material_index is None else model.material_index
+    fan = _fan(model, normals)
+    found = []
+    for material in np.unique(materials):
+        own = np.flatnonzero((materials == material) & (areas > 0))
+        normal, fold, off = _sheet(*fan)
+        if off < _FOLDED_ONCE and len(own) == len(areas):
+            found.append((_kite(model, normal, fan, fold), areas.sum(), material))
+            break
+        for plane in _planes(normals[own], areas[own]):
+            normal = _mean_direction(normals[own][plane], areas[own][plane])
+            found.append((_kite(model, normal, fan), areas[own][plane].sum(), material))
+    positions = np.array([corners for corners, _, _ in found])
+    share = np.cumsum([area for _, area, _ in found])
+    return LeafKites(
+        positions,
+        _texture(model, positions),
+        share / share[-1],
+        None if model.material_index is None else np.array([material for *_, material in found], np.int32),
+    )
+
+
+def _planes(normals: NDArray[np.float64], areas: NDArray[np.float64]) -> list[NDArray[np.int64]]:
+    """Faces in groups of about equal area, by how they are tilted across the direction that varies most."""
+    values, axes = np.linalg.eigh(np.einsum("f,fi,fj->ij", areas, normals, normals) / areas.sum())
+    if values[1] < _FLAT**2:
+        return [np.arange(len(areas))]
+    facing = np.where(normals @ axes[:, 2] < 0.0, -1.0, 1.0)
+    order = np.argsort(facing * (normals @ axes[:, 1]), kind="stable")
+    planes = min(_PLANES, len(areas))
+    done = np.cumsum(areas[order]) - areas[order] / 2
+    group = np.minimum((planes * done / areas.sum()).astype(int), planes - 1)
+    return [order[group == one] for one in np.unique(group)]
+
+
+def _mean_direction(normals: NDArray[np.float64], areas: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean axis of normals, with the sign of most of them."""
+    axis = np.linalg.eigh(np.einsum("f,fi,fj->ij", areas, normals, normals))[1][:, 2]
+    return axis if (areas * (normals @ axis)).sum() >= 0.0 else -axis
+
+
+def _fan(model: LeafModel, normals: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Corners (t, 3, 3) and areas (t,) of triangles that fan out over the faces, about the centroid of the model."""
+    first = model.corner_verts[model.face_offsets[:-1]]
+    face = np.repeat(np.arange(model.polygons), np.diff(model.face_offsets))
+    corners = np.stack([first[face], model.corner_verts, model.corner_verts[model.next_corner]], axis=1)
+    points = model.positions[corners]
+    # Negative where a face is concave; triangles at the ends of a fan have none.
+    vectors = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]) / 2
+    area = np.copysign(np.linalg.norm(vectors, axis=1), np.einsum("ti,ti->t", vectors, normals[face]))
+    return points, area
+
+
+def _longer_axis(points: NDArray[np.float64], weight: NDArray[np.float64], normal: NDArray[np.float64]) -> NDArray:
+    """The direction (3,) in a plane along which triangles (t, 3, 3) about their centroid spread most, and how much."""
+    sums = points.sum(axis=1)
+    second = np.einsum("tki,tkj->tij", points, points) + sums[:, :, None] * sums[:, None]
+    spread = np.einsum("t,tij->ij", weight, second) / 12
+    flat = np.eye(3) - np.outer(normal, normal)
+    along = np.linalg.eigh(flat @ spread @ flat)[1][:, 2]
+    along -= (along @ normal) * normal
+    return along / np.linalg.norm(along)
+
+
+def _sheet(points: NDArray[np.float64], area: NDArray[np.float64]) -> tuple[NDArray[np.float64], float, float]:
+    """Triangles as a sheet that is folded along its longer axis: its normal (3,), the sine by which both halves rise,
+    and the mean square by which normals are off.
+    """
+    vectors = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]) / 2
+    size = np.abs(area)
+    whole, mean = size.sum(), vectors.sum(axis=0)
+    if np.linalg.norm(mean) < whole / 2 or (area < 0.0).any():
+        return np.array([0.0, 0.0, 1.0]), 0.0, np.inf
+    normal, weight = mean / np.linalg.norm(mean), size / whole
+    centred = points - (weight[:, None] * points.mean(axis=1)).sum(axis=0)
+    across = np.cross(_longer_axis(centred, weight, normal), normal)
+    side = np.sign(centred.mean(axis=1) @ across)
+    normals = vectors / np.maximum(size, 1e-300)[:, None]
+    fold = float(np.clip(-(weight * side * (normals @ across)).sum(), -0.9, 0.9))
+    expected = np.sqrt(1.0 - fold**2) * normal - (fold * side)[:, None] * across
+    return normal, fold, float((weight * ((normals - expected) ** 2).sum(axis=1)).sum())
+
+
+def _kite(
+    model: LeafModel,
+    normal: NDArray[np.float64],
+    fan: tuple[NDArray[np.float64], NDArray[np.float64]],
+    fold: float = 0.0,
+) -> NDArray[np.float64]:
+    """Vertices (4, 3) of a kite with a normal, along the model's longer axis across it; both halves rise by a fold."""
+    points, weight = fan[0], fan[1] / fan[1].sum()
+    middle = (weight[:, None] * points.mean(axis=1)).sum(axis=0)
+    points = points - middle
+    along = _longer_axis(points, weight, normal)
+    x = points @ along
+    # Moments of a triangle are complete homogeneous polynomials of its corners.
+    variance = max((weight * ((x**2).sum(1) + x.sum(1) ** 2)).sum() / 12, 1e-300)
+    third = (x**3).sum(1) + x.prod(1) + (x**2 * (x.sum(1)[:, None] - x)).sum(1)
+    skewness = (weight * third).sum() / 10 / variance**1.5
+    widest = float(np.interp(skewness, _SKEWNESS, _WIDEST))
+    # A face that is not flat counts as it is drawn, if all are alike.
+    area = (np.abs(fan[1]).sum() if fold else model.area) * (0.5 if model.closed else 1.0)
+    length = np.sqrt(18.0 * variance / (1.0 - widest * (1.0 - widest)))
+    tip = (2.0 - widest) / 3.0
+    # No longer than the model, or bounds would not hold it; and no needle where it is seen along its longer axis.
+    ends = (model.positions - middle) @ along
+    length = min(length, ends.max() / tip, -ends.min() / (1.0 - tip))
+    length = max(length, np.sqrt(2.0 * area))
+    half, rise = area / length, area / length * fold
+    base = (tip - 1.0) * length * along - rise / 3.0 * normal
+    side, across = base + widest * length * along + rise * normal, np.sqrt(half**2 - rise**2) * np.cross(along, normal)
+    # From base to tip, so that renderers divide it along the fold.
+    return _within(middle + np.array([base, side + across, base + length * along, side - across]), model.reach)
+
+
+def _within(corners: NDArray[np.float64], reach: float) -> NDArray[np.float64]:
+    """A kite (4, 3), moved until bounds hold it, which count on the farthest vertex of the model."""
+    for _ in range(_MOVES):
+        away = np.linalg.norm(corners, axis=1)
+        farthest = int(away.argmax())
+        if away[farthest] <= reach:
+            break
+        corners = corners - (1.0 - reach / away[farthest]) * corners[farthest]
+    return corners
+
+
+def _texture(model: LeafModel, positions: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Texture coordinates (k, 4, 2): those of the model, as far as a linear function follows them."""
+    corners = model.positions[model.corner_verts]
+    fitted = np.linalg.lstsq(np.column_stack([corners, np.ones(len(corners))]), model.uv, rcond=None)[0]
+    uv = positions @ fitted[:3] + fitted[3]
+    return np.clip(uv, model.uv.min(axis=0), model.uv.max(axis=0)).astype(np.float32)
