@@ -11,7 +11,7 @@ lines lie in darker surroundings and the other way round.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import radians, tan
+from math import cos, radians, sin, tan
 from typing import Any
 
 import bpy
@@ -43,8 +43,8 @@ _VEIN_MEAN = 0.06 / 0.5
 _BEND = 0.9
 #: Half widths at the base of the midrib and of what is darker beside it: all, and none; leaf lengths.
 _RIB, _HALO = (0.003, 0.009), (0.009, 0.03)
-#: Angles of the main veins of palmate blades of five lobes beside the midrib, degrees.
-_PALM = (44.0, 88.0)
+#: Angle between the main veins of palmate blades of five lobes, degrees.
+_PALM = 44.0
 #: Cells of the net to a vein of second order, and the mean of its lines, measured.
 _NET, _NET_MEAN = 4.5, 0.257
 #: Height of the blade's undulation, leaf lengths.
@@ -235,14 +235,18 @@ def _venation(
 
 def _nearest_rib(graph: Graph, aside: Socket, along: Socket) -> tuple[Socket, Socket]:
     """Places across and along the nearest of five main veins that leave the base at angles of 0, 44 and 88 degrees."""
-    angle = graph.math('ARCTAN2', aside, along)
-    length = graph.math('SQRT', graph.math('MULTIPLY_ADD', aside, aside, graph.math('MULTIPLY', along, along)))
-    main = graph.math('MULTIPLY', graph.math('GREATER_THAN', angle, radians(_PALM[0] / 2)), radians(_PALM[0]))
-    outer = graph.math('GREATER_THAN', angle, radians(sum(_PALM) / 2))
-    main = graph.math('MULTIPLY_ADD', outer, radians(_PALM[1] - _PALM[0]), main)
-    off = graph.math('SUBTRACT', angle, main)
-    across = graph.math('ABSOLUTE', graph.math('MULTIPLY', length, graph.math('SINE', off)))
-    return across, graph.math('MULTIPLY', length, graph.math('COSINE', off))
+    place = graph.node("ShaderNodeCombineXYZ", {"X": aside, "Y": along}).outputs["Vector"]
+    half = radians(_PALM / 2)
+    # Mirrored at the line halfway between two ribs, as often as there are others: no angles, which cost twice as much.
+    across = (cos(half), -sin(half), 0.0)
+    for last in (False, True):
+        beyond = graph.math('MAXIMUM', graph.vector('DOT_PRODUCT', place, across), 0.0)
+        away = graph.vector('SCALE', tuple(-2.0 * value for value in across), beyond)
+        place = graph.vector('ADD', place, away)
+        if not last:
+            place = graph.vector('ABSOLUTE', place)
+    folded = graph.node("ShaderNodeSeparateXYZ", {"Vector": place}).outputs
+    return graph.math('ABSOLUTE', folded["X"]), folded["Y"]
 
 
 def _varied(graph: Graph, mottled: Socket, tone: Socket, hue: tuple[float, float, float]) -> Socket:
