@@ -50,9 +50,9 @@ FACETS_FIRST = 6.0
 _RESERVE, _DEVIATIONS = 0.06, 2.0
 #: Fraction of the faces of twigs that are made where leaves are real.
 _TWIGS = 0.15
-#: Parts of plants that are drawn to find out what to expect; polygons that are too few to tell; and how far
-#: expectations may be corrected.
-_DRAWN, _SOME, _ROUGH = 3000, 300.0, (0.4, 2.5)
+#: Parts of plants that are drawn to find out what to expect: where only the image limits them, and where a limit that
+#: must hold is near; polygons that are too few to tell; and how far expectations may be corrected.
+_DRAWN, _SOME, _ROUGH = (800, 3000), 300.0, (0.4, 2.5)
 #: Draw of this module: which parts. That of the transition would choose those whose wood is real.
 _SAMPLE = 224
 _STEPS = 10  # of bisection on the logarithm of factors, between 1 and:
@@ -136,12 +136,13 @@ def afford(
     hard = min(allowed for allowed, _, every in limits if every)
     if np.isfinite(hard) and count.finer(settings.leaf_limit) > _RESERVE * hard:
         # A limit that somebody has set holds, however roughly near leaves can be counted.
-        count.calibrate(FacetPixels(settings.facet), settings.leaf_limit)
+        count.calibrate(FacetPixels(settings.facet), settings.leaf_limit, True)
         count.tolerance = _tolerance(count, settings, limits)
     factor, hidden = _affordable(count, settings, limits)
-    if factor > 1.0 or hidden > 1.0 or (np.isfinite(hard) and count.together(settings) > _SURE * hard):
+    near = np.isfinite(hard) and count.together(settings) > _SURE * hard
+    if factor > 1.0 or hidden > 1.0 or near:
         # What is expected of parts that will be opened is rough; some of them tell by how much.
-        count.calibrate(FacetPixels(_side(factor, settings), hidden), _limit(factor, settings))
+        count.calibrate(FacetPixels(_side(factor, settings), hidden), _limit(factor, settings), near)
         factor, hidden = _affordable(count, settings, limits)
     limit = _limit(factor, settings)
     small = count.too_small(limit) if factor > 1.0 else np.zeros(0, bool)
@@ -309,9 +310,10 @@ class _Facets:
         of_meshes = self.polygons(pixels, limit, 1.0, True)
         return self.seen(pixels, limit, 1.0, True) + of_meshes + self.unseen(FacetPixels(pixels), True)
 
-    def calibrate(self, pixels: FacetPixels, limit: float) -> None:
-        """Draw some of the plants, and expect of all what was found of these."""
-        chosen = uniform(self.every.parts.branches.key, _SAMPLE) < min(_DRAWN / max(len(self.every), 1), 1.0)
+    def calibrate(self, pixels: FacetPixels, limit: float, exactly: bool) -> None:
+        """Draw some of the plants, or more of them, and expect of all what was found of these."""
+        share = _DRAWN[int(exactly)] / max(len(self.every), 1)
+        chosen = uniform(self.every.parts.branches.key, _SAMPLE) < min(share, 1.0)
         some = self.every.take(np.flatnonzero(chosen))
         transition = Transition(self.flora, self.camera, limit, self.tolerance)
         weights = facet_weights(self.flora, ())
