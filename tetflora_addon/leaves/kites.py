@@ -71,11 +71,12 @@ def leaf_kites(model: LeafModel) -> LeafKites:
         own = np.flatnonzero((materials == material) & (areas > 0))
         normal, fold, off = _sheet(*fan)
         if off < _FOLDED_ONCE and len(own) == len(areas):
-            found.append((_kite(model, normal, fan, fold), areas.sum(), material))
+            # A face that is not flat counts as it is drawn.
+            found.append((_kite(model, float(fan[1].sum()), normal, fan, fold), areas.sum(), material))
             break
         for plane in _planes(normals[own], areas[own]):
             normal = _mean_direction(normals[own][plane], areas[own][plane])
-            found.append((_kite(model, normal, fan), areas[own][plane].sum(), material))
+            found.append((_kite(model, model.area, normal, fan), areas[own][plane].sum(), material))
     positions = np.array([corners for corners, _, _ in found])
     share = np.cumsum([area for _, area, _ in found])
     return LeafKites(
@@ -106,7 +107,7 @@ def _mean_direction(normals: NDArray[np.float64], areas: NDArray[np.float64]) ->
 
 
 def _fan(model: LeafModel, normals: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Corners (t, 3, 3) and areas (t,) of triangles that fan out over the faces, about the centroid of the model."""
+    """Corners (t, 3, 3) and areas (t,) of triangles that fan out over the faces."""
     first = model.corner_verts[model.face_offsets[:-1]]
     face = np.repeat(np.arange(model.polygons), np.diff(model.face_offsets))
     corners = np.stack([first[face], model.corner_verts, model.corner_verts[model.next_corner]], axis=1)
@@ -133,15 +134,14 @@ def _sheet(points: NDArray[np.float64], area: NDArray[np.float64]) -> tuple[NDAr
     and the mean square by which normals are off.
     """
     vectors = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]) / 2
-    size = np.abs(area)
-    whole, mean = size.sum(), vectors.sum(axis=0)
-    if np.linalg.norm(mean) < whole / 2 or (area < 0.0).any():
+    whole, mean = area.sum(), vectors.sum(axis=0)
+    if np.linalg.norm(mean) < whole / 2:
         return np.array([0.0, 0.0, 1.0]), 0.0, np.inf
-    normal, weight = mean / np.linalg.norm(mean), size / whole
+    normal, weight = mean / np.linalg.norm(mean), area / whole
     centred = points - (weight[:, None] * points.mean(axis=1)).sum(axis=0)
     across = np.cross(_longer_axis(centred, weight, normal), normal)
     side = np.sign(centred.mean(axis=1) @ across)
-    normals = vectors / np.maximum(size, 1e-300)[:, None]
+    normals = vectors / np.where(area == 0.0, 1.0, area)[:, None]
     fold = float(np.clip(-(weight * side * (normals @ across)).sum(), -0.9, 0.9))
     expected = np.sqrt(1.0 - fold**2) * normal - (fold * side)[:, None] * across
     return normal, fold, float((weight * ((normals - expected) ** 2).sum(axis=1)).sum())
@@ -149,11 +149,14 @@ def _sheet(points: NDArray[np.float64], area: NDArray[np.float64]) -> tuple[NDAr
 
 def _kite(
     model: LeafModel,
+    area: float,
     normal: NDArray[np.float64],
     fan: tuple[NDArray[np.float64], NDArray[np.float64]],
     fold: float = 0.0,
 ) -> NDArray[np.float64]:
-    """Vertices (4, 3) of a kite with a normal, along the model's longer axis across it; both halves rise by a fold."""
+    """Vertices (4, 3) of a kite with an area and a normal, along the model's longer axis across that; both halves rise
+    by a fold.
+    """
     points, weight = fan[0], fan[1] / fan[1].sum()
     middle = (weight[:, None] * points.mean(axis=1)).sum(axis=0)
     points = points - middle
@@ -164,8 +167,7 @@ def _kite(
     third = (x**3).sum(1) + x.prod(1) + (x**2 * (x.sum(1)[:, None] - x)).sum(1)
     skewness = (weight * third).sum() / 10 / variance**1.5
     widest = float(np.interp(skewness, _SKEWNESS, _WIDEST))
-    # A face that is not flat counts as it is drawn, if all are alike.
-    area = (np.abs(fan[1]).sum() if fold else model.area) * (0.5 if model.closed else 1.0)
+    area = area * (0.5 if model.closed else 1.0)
     length = np.sqrt(18.0 * variance / (1.0 - widest * (1.0 - widest)))
     tip = (2.0 - widest) / 3.0
     # No longer than the model, or bounds would not hold it; and no needle where it is seen along its longer axis.
