@@ -38,7 +38,7 @@ from .report import Targets, forget_peak, peak_mb
 
 FRAMES, QUICK_FRAMES = 60, 6
 FAR, NEAR = 400.0, 0.15
-SIZE, QUICK_SIZE = (960, 540), (320, 180)
+SIZE, QUICK_SIZE = (640, 360), (320, 180)
 SAMPLES, QUICK_SAMPLES = 16, 4
 #: The tree of the leaf, and what stands behind it.
 TREE, BEHIND, NUMBER = "oak", ("oak", "beech", "birch", "spruce", "maple"), 14
