@@ -59,6 +59,7 @@ def steps(ui: Any) -> Iterator[float | None]:
     yield from ui.show_sidebar("TetFlora")
     with ui.override():
         bpy.ops.tetflora.populate('INVOKE_DEFAULT')
+    yield from ui.until(lambda: not ui.window.modal_operators, 20, "plants")
     yield from ui.picture("populated")
     with ui.override():
         bpy.ops.wm.call_menu(name="VIEW3D_MT_add")

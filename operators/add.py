@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Add plants: a single one, one grown on a drawn form, a first forest, or a population on a terrain."""
 
+from collections.abc import Generator
+
 import bpy
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 
@@ -9,7 +11,7 @@ from ..tetflora_addon.blender.attributes import world_matrix
 from ..tetflora_addon.blender.placing.distances import distance_of, follows_species
 from ..tetflora_addon.blender.placing.first_forest import build
 from ..tetflora_addon.blender.placing.plant_objects import add_plant, next_seed
-from ..tetflora_addon.blender.placing.populations import add_population, make_plants, remove_population
+from ..tetflora_addon.blender.placing.populations import Made, add_population, forget_population, make_plants_steps
 from ..tetflora_addon.blender.placing.properties import MOST_EMPTIES, STORAGE_ITEMS
 from ..tetflora_addon.blender.placing.rules import copy_companion
 from ..tetflora_addon.blender.scene.skeletons import FORM_TYPES, read_skeleton, upright_turn
@@ -17,9 +19,10 @@ from ..tetflora_addon.blender.settings import properties_of
 from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, default_species, operator_items
 from ..tetflora_addon.blender.species.edits import catalogue
 from ..tetflora_addon.blender.species.values import present_species
-from ..tetflora_addon.errors import SceneError, TetFloraError
+from ..tetflora_addon.errors import SceneError
 from ..tetflora_addon.planting.rules import Rules
-from .base import Reporting, counted, in_object_mode, need, select_only, selected_plants
+from ..tetflora_addon.refinement.statistics import Progress
+from .base import ModalJob, Reporting, counted, in_object_mode, need, select_only, selected_plants
 from .populations import ground_selected, report_made, selected_grounds
 
 
@@ -154,7 +157,7 @@ _RULES = properties_of(Rules, options={'SKIP_SAVE'})
 _SHARED = ("count", "as_field", "seed", "slope_limit", "min_distance", "scale_min", "scale_max")
 
 
-class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
+class TETFLORA_OT_populate(ModalJob, bpy.types.Operator):
     """Scatter plants over the selected meshes as a new population, which can be changed later.
 
     Each plant is an empty, or a vertex of one mesh if there are many.
@@ -189,8 +192,9 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
         options={'SKIP_SAVE', 'HIDDEN'},
     )
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, Made]:
         scene = context.scene
+        yield Progress(0.0, "Reading the ground")
         self._complete_from(scene)
         weights = _parse_weights(self.species)
         if self.as_field == 'EMPTIES' and self.count > MOST_EMPTIES:
@@ -198,17 +202,21 @@ class TETFLORA_OT_populate(Reporting, bpy.types.Operator):
                 f"{self.count:,} plants exceed the limit of {MOST_EMPTIES:,} empties; "
                 "set Create As to Field, or use fewer plants"
             )
-        grounds = selected_grounds(context)
-        population = self._population(scene, grounds, weights)
+        active = scene.tetflora.populations_index
+        population = self._population(scene, selected_grounds(context), weights)
+        uid = population.uid
         try:
-            made = make_plants(scene, context.evaluated_depsgraph_get(), population)
-        except TetFloraError:
-            remove_population(scene, scene.tetflora.populations_index)
+            return (yield from make_plants_steps(scene, context.evaluated_depsgraph_get(), population))
+        except BaseException:  # an error, or Esc
+            forget_population(scene, uid, active)
             raise
-        select_only(context, [*made.objects, *grounds])
+
+    def finish(self, context: bpy.types.Context, result: Made) -> set[str]:
+        grounds = selected_grounds(context)
+        select_only(context, [*result.objects, *grounds])
         # The terrain stays selected and active, so that Populate can follow Populate.
         context.view_layer.objects.active = grounds[0]
-        return report_made(self, made)
+        return report_made(self, result)
 
     def _population(
         self, scene: bpy.types.Scene, grounds: list[bpy.types.Object], weights: dict[str, float]

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Add, change and remove populations of plants; write them to files and read them."""
 
+from collections.abc import Generator
 from pathlib import Path
 
 import bpy
@@ -12,16 +13,17 @@ from ..tetflora_addon.blender.placing.population_files import ENDING, read_popul
 from ..tetflora_addon.blender.placing.populations import (
     Made,
     add_population,
-    make_plants,
+    make_plants_steps,
     own_objects,
     remove_population,
-    reroll,
+    reroll_steps,
     set_grounds,
 )
 from ..tetflora_addon.blender.placing.rules import active_population, copy_settings
 from ..tetflora_addon.blender.viewport import points
 from ..tetflora_addon.errors import readable
-from .base import Reporting, Tool, counted, in_object_mode, need, select_only
+from ..tetflora_addon.refinement.statistics import Progress
+from .base import ModalJob, Reporting, Tool, counted, in_object_mode, need, select_only
 
 
 def selected_grounds(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -73,7 +75,14 @@ class TETFLORA_OT_add_population(Reporting, bpy.types.Operator):
         return {'FINISHED'}
 
 
-class TETFLORA_OT_update_population(Reporting, bpy.types.Operator):
+class _Placing(ModalJob):
+    """Mix-in for operators that place the plants of the active population."""
+
+    def finish(self, _context: bpy.types.Context, result: Made) -> set[str]:
+        return report_made(self, result)
+
+
+class TETFLORA_OT_update_population(_Placing, bpy.types.Operator):
     """Place the plants of the active population again according to its settings.
 
     Plants that you moved, changed or deleted are replaced too, except where you erased with the brush; other plants
@@ -84,21 +93,21 @@ class TETFLORA_OT_update_population(Reporting, bpy.types.Operator):
     bl_label = "Update Population"
     needs = _REPLACING
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, Made]:
         depsgraph = context.evaluated_depsgraph_get()
-        return report_made(self, make_plants(context.scene, depsgraph, active_population(context.scene)))
+        return make_plants_steps(context.scene, depsgraph, active_population(context.scene))
 
 
-class TETFLORA_OT_reroll_population(Reporting, bpy.types.Operator):
+class TETFLORA_OT_reroll_population(_Placing, bpy.types.Operator):
     """Place the plants of the active population with a new seed, for a different arrangement."""
 
     bl_idname = "tetflora.reroll_population"
     bl_label = "Re-roll Population"
     needs = _REPLACING
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, Made]:
         depsgraph = context.evaluated_depsgraph_get()
-        return report_made(self, reroll(context.scene, depsgraph, active_population(context.scene)))
+        return reroll_steps(context.scene, depsgraph, active_population(context.scene))
 
 
 class TETFLORA_OT_freeze_population(Reporting, bpy.types.Operator):

@@ -19,7 +19,7 @@ def steps(ui):
     ui.values["bare"] = state()
 
     yield from press_button(ui, "tetflora.populate")
-    yield from ui.until(lambda: len(plants()) > 0, 10, "plants")
+    yield from ui.until(lambda: len(plants()) > 0 and not running(ui), 10, "plants")
     ui.values["populated"] = state()
     ui.values["locked"] = scene.render.use_lock_interface
     yield from ui.picture("populated")
@@ -180,8 +180,9 @@ def render(ui, name):
 
 
 def running(ui):
-    """Whether Refine runs as a modal job."""
-    return any(operator.bl_idname == "TETFLORA_OT_refine" for operator in ui.window.modal_operators)
+    """Whether Refine or Populate runs as a modal job."""
+    jobs = {"TETFLORA_OT_refine", "TETFLORA_OT_populate"}
+    return any(operator.bl_idname in jobs for operator in ui.window.modal_operators)
 
 
 def plants():

@@ -7,7 +7,7 @@ Populations that cover the ground of others are left out: they stand under the c
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import fields
 from hashlib import blake2b
 
@@ -99,24 +99,29 @@ def floor_steps(canopy: Canopy, triangles: NDArray[np.float64], kinds: int) -> G
     return _kept[key]
 
 
-def suits_of(
+def read_suits(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     population: bpy.types.PropertyGroup,
     triangles: NDArray[np.float64],
     species: tuple[str, ...],
-) -> dict[int, Suits]:
-    """How suitable the ground (t, 3, 3) is for those species of a population that do not grow anywhere."""
+) -> Callable[[], dict[int, Suits]]:
+    """What finds, without Blender, how suitable the ground (t, 3, 3) is for those species that do not grow anywhere."""
     wanted = {e.species: e for e in population.mix if e.habitat != 'ANYWHERE' and e.species in species}
     if not wanted:
-        return {}
+        return dict
     canopy, above = canopy_of(scene, depsgraph)
-    floor = at_once(floor_steps(canopy, triangles, len(above)))
-    return {
-        number: floor.suits(Habitat[wanted[name].habitat], shedder_of(wanted[name], above), population.seed + number)
+    asked = {
+        number: (Habitat[wanted[name].habitat], shedder_of(wanted[name], above), population.seed + number)
         for number, name in enumerate(species)
         if name in wanted
     }
+
+    def suits() -> dict[int, Suits]:
+        floor = at_once(floor_steps(canopy, triangles, len(above)))
+        return {number: floor.suits(*one) for number, one in asked.items()}
+
+    return suits
 
 
 def shedder_of(entry: bpy.types.PropertyGroup, above: tuple[str, ...]) -> int | None:

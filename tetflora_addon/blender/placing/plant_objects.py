@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Plants as objects of a scene: making, finding and removing the empties and fields that stand for them."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from functools import lru_cache
+from typing import Any
 
 import bpy
 import numpy as np
@@ -11,6 +12,7 @@ from mathutils import Matrix, Quaternion
 
 from ...errors import SceneError
 from ...planting.places import Placement, new_seeds
+from ...refinement.statistics import at_once
 from .. import settings
 from ..attributes import world_matrix
 from ..saved_files import VERSION
@@ -27,6 +29,7 @@ EMPTIES_UNASKED = 10_000
 POPULATION_MARK = "tetflora_population"  # on the collection of a population's plants
 _FIELD_MARK = "tetflora_field"  # on the objects of fields that TetFlora made and may remove
 _MARK = "tetflora_plants"  # on the collection, so that it may be renamed
+_AT_ONCE = 300  # empties of one step, ten milliseconds
 _FEW = 1000  # plants that may get their names the way Blender does it
 
 
@@ -93,17 +96,32 @@ def add_plants(
     list of bpy.types.Object
         In the placement's order.
     """
+    return at_once(add_plants_steps(scene, placement, species, collection))
+
+
+def add_plants_steps(
+    scene: bpy.types.Scene,
+    placement: Placement,
+    species: Sequence[str],
+    collection: bpy.types.Collection | None = None,
+) -> Generator[list[bpy.types.Object], object, list[bpy.types.Object]]:
+    """As `add_plants`; yields those that are made so far, which the caller removes if it goes no further."""
     rows = (placement.position, _eulers(placement), placement.scale, placement.species, placement.seed)
-    return _empties(scene, rows, species, [None] * len(species), collection)
+    return _empties_steps(scene, rows, species, [None] * len(species), collection)
 
 
-def _empties(
+def _empties(*given: Any) -> list[bpy.types.Object]:
+    """As `_empties_steps`, at once."""
+    return at_once(_empties_steps(*given))
+
+
+def _empties_steps(
     scene: bpy.types.Scene,
     rows: Sequence[np.ndarray],
     species: Sequence[str],
     forms: Sequence[bpy.types.Object | None],
     collection: bpy.types.Collection | None = None,
-) -> list[bpy.types.Object]:
+) -> Generator[list[bpy.types.Object], object, list[bpy.types.Object]]:
     """One empty for each row of places, XYZ Euler angles, scales, numbers of kinds and seeds."""
     known = catalogue()
     names = _numbered([known[s].name if s in known else s for s in species], rows[3])
@@ -112,13 +130,15 @@ def _empties(
     made: list = [None] * len(names)
     kinds, seeds = rows[3].tolist(), rows[4].tolist()
     # Blender keeps objects sorted by name, and is fast where one comes after the one before.
-    for number in sorted(range(len(names)), key=names.__getitem__):
+    for count, number in enumerate(sorted(range(len(names)), key=names.__getitem__), 1):
         made[number] = obj = new(names[number], None)
         kind, group = kinds[number], obj.tetflora
         group.version, group.is_plant, group.species, group.seed = VERSION, True, species[kind], seeds[number]
         if forms[kind] is not None:
             group.form = forms[kind]
         target.link(obj)
+        if not count % _AT_ONCE:
+            yield [obj for obj in made if obj is not None]
     _set_at_once(made, rows, np.array([display_height(s) for s in species], dtype=np.float32))
     prepare_scene(scene)
     return made

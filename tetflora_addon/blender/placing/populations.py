@@ -10,7 +10,7 @@ the artist's.
 from __future__ import annotations
 
 import uuid
-from collections.abc import Iterable
+from collections.abc import Generator, Iterable
 from dataclasses import dataclass
 
 import bpy
@@ -18,18 +18,23 @@ import numpy as np
 
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed, uniform
+from ...planting.places import Placement
+from ...refinement.statistics import Progress
+from ..runtime import JobData, guarded, is_there
 from ..scene.fields import fields_of, stored_size
+from ..worker import at_once, call_in_thread
 from .plant_objects import (
     POPULATION_MARK,
     add_field,
     add_plants,
+    add_plants_steps,
     plant_collection,
     plants_of,
     remove_empty_collections,
     remove_fields,
 )
 from .properties import MOST_EMPTIES, TetFloraPopulation
-from .rules import copy_settings, fingerprint, makes_field, place_population
+from .rules import copy_settings, fingerprint, makes_field, read_search
 
 NAME = "Population"
 
@@ -112,29 +117,57 @@ def own_number(objects: Iterable[bpy.types.Object]) -> int:
 
 
 def make_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraPopulation) -> Made:
+    """Place a population's plants at once; as `make_plants_steps`."""
+    return at_once(make_plants_steps(scene, depsgraph, population))
+
+
+def make_plants_steps(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraPopulation
+) -> Generator[Progress, object, Made]:
     """Place a population's plants by its settings, in place of those that it has.
+
+    Closing the steps, or an error, leaves the scene as it was.
 
     Raises
     ------
     SceneError
-        It is frozen, or no plants can be placed by its settings, as the message says; nothing is changed.
+        It is frozen, or no plants can be placed by its settings, as the message says; or it was deleted meanwhile.
     """
+    return guarded(data := JobData("Placing plants", scene), _make_plants_steps(data, scene, depsgraph, population))
+
+
+def _make_plants_steps(
+    data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraPopulation
+) -> Generator[Progress, object, Made]:
+    yield Progress(0.0, "Reading the ground")
     refuse_frozen(population)
-    own, copies = _sorted_out(scene, population)
-    placement, species = place_population(scene, depsgraph, population, set(own))
+    search = read_search(scene, depsgraph, population, set(_sorted_out(scene, population)[0]))
+    progress = Progress(0.1, "Looking for places")
+    yield progress
+    uid = population.uid
+    placement = yield from call_in_thread(progress, search.placement)
+    population = next((p for p in scene.tetflora.populations if p.uid == uid), None)
+    if population is None:
+        data.stop("its population was deleted")
+        data.check()
     if population.as_field == 'EMPTIES' and len(placement) > MOST_EMPTIES:
         raise SceneError(
             f"{len(placement):,} plants exceed the limit of {MOST_EMPTIES:,} empties; "
             "set Create As to Field, or use fewer plants"
         )
+    own, copies = _sorted_out(scene, population)
     returned = max(population.made - own_number(own), 0)
+    field = makes_field(population, len(placement)) and len(placement)
+    made: list[bpy.types.Object] = []
+    if not own and not field:  # otherwise they go first, or their successors could not have their names
+        made = yield from _new_plants(scene, placement, search.species, collection_of(scene, population))
     _release(copies)
     _remove(own)
     collection = collection_of(scene, population)
-    if makes_field(population, len(placement)) and len(placement):
-        made = [add_field(scene, placement, species, collection)]
-    else:
-        made = add_plants(scene, placement, species, collection)
+    if field:
+        made = [add_field(scene, placement, search.species, collection)]
+    elif own:
+        made = add_plants(scene, placement, search.species, collection)
     for number, obj in enumerate(made):
         group = obj.tetflora
         group.population, group.population_number = population.uid, number
@@ -146,21 +179,44 @@ def make_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, populati
     return Made(made, len(placement), placement.wanted, placement.reason, returned, placement.erased)
 
 
-def reroll(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraPopulation) -> Made:
+def _new_plants(
+    scene: bpy.types.Scene, placement: Placement, species: tuple[str, ...], collection: bpy.types.Collection
+) -> Generator[Progress, object, list[bpy.types.Object]]:
+    """Plants where none have to go before."""
+    steps, made = add_plants_steps(scene, placement, species, collection), []
+    try:
+        while True:
+            made = next(steps)
+            yield Progress(0.4 + 0.6 * len(made) / len(placement), f"Creating plants: {len(made):,}")
+    except StopIteration as stop:
+        return stop.value
+    except BaseException:
+        bpy.data.batch_remove([obj for obj in made if is_there(obj)])
+        remove_empty_collections()
+        raise
+
+
+def reroll_steps(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraPopulation
+) -> Generator[Progress, object, Made]:
     """Place a population anew with another seed, which follows from the one that it has.
+
+    Closing the steps, or an error, leaves the seed as it was as well.
 
     Raises
     ------
     SceneError
-        As `make_plants`; the seed stays as well.
+        As `make_plants_steps`.
     """
-    old = population.seed
+    old, uid = population.seed, population.uid
     # A hash and not the next number: populations with neighbouring seeds would follow each other's arrangements.
     population.seed = int(uniform(child_key(key_of_seed(old), 1), 0) * 2**31)
     try:
-        return make_plants(scene, depsgraph, population)
-    except SceneError:
-        population.seed = old
+        return (yield from make_plants_steps(scene, depsgraph, population))
+    except BaseException:  # an error, or Esc
+        for found in scene.tetflora.populations if is_there(scene) else ():
+            if found.uid == uid:
+                found.seed = old
         raise
 
 
@@ -182,6 +238,15 @@ def remove_population(scene: bpy.types.Scene, index: int, keep_plants: bool = Fa
     group.populations_index = max(min(group.populations_index, len(group.populations) - 1), 0)
     remove_empty_collections()
     return number
+
+
+def forget_population(scene: bpy.types.Scene, uid: str, active: int) -> None:
+    """Remove a population that has got no plants, if it is still there; another one becomes active again."""
+    group = scene.tetflora if is_there(scene) else None
+    number = next((i for i, p in enumerate(group.populations) if p.uid == uid), None) if group is not None else None
+    if number is not None:
+        remove_population(scene, number)
+        group.populations_index = active
 
 
 def refuse_frozen(population: TetFloraPopulation) -> None:

@@ -9,8 +9,8 @@ a radius and the x and y of the centers of its circles.
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from hashlib import blake2b
 from math import inf
@@ -22,16 +22,17 @@ from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...files import json_of
+from ...planting.cover import Suits
 from ...planting.places import Placement, place, without
 from ...planting.rules import Companion, Rules
-from ...planting.terrain import Path
+from ...planting.terrain import Path, Terrain
 from ..attributes import world_matrix
 from ..scene.fields import fields_of, read_field
 from ..scene.objects import objects_within
 from ..scene.skeletons import species_of
 from ..settings import check_limits
 from ..species.edits import catalogue
-from .canopy import not_of_covers, suits_of
+from .canopy import not_of_covers, read_suits
 from .distances import HECTARE, distance_of, empty_means, weights_of
 from .plant_objects import EMPTIES_UNASKED, plants_of
 from .terrain import MASKS, read_ground
@@ -213,7 +214,55 @@ def place_population(
     grounds: Sequence[bpy.types.Object] | None = None,
     most: int | None = None,
 ) -> tuple[Placement, tuple[str, ...]]:
-    """Find places for the plants of a population.
+    """Find places for the plants of a population, which count through species; parameters as of `read_search`.
+
+    Raises
+    ------
+    SceneError
+        As `read_search`, or settings that leave no place.
+    """
+    search = read_search(scene, depsgraph, population, own, grounds, most)
+    return search.placement(), search.species
+
+
+@dataclass(frozen=True)
+class Search:
+    """All that the places of a population's plants depend on, as it was read from Blender.
+
+    Attributes
+    ----------
+    species : tuple of str
+        Identifiers that placements count through.
+    """
+
+    ground: Terrain
+    rules: Rules
+    present: tuple[NDArray[np.float64], NDArray[np.int32]]
+    suits: Callable[[], Mapping[int, Suits]]
+    erased: tuple[Path, ...]
+    species: tuple[str, ...]
+
+    def placement(self) -> Placement:
+        """Find the places; no Blender in it.
+
+        Raises
+        ------
+        SceneError
+            Settings that leave no place.
+        """
+        found = place(self.ground, self.rules, *self.present, suits=self.suits())
+        return without(found, self.erased)
+
+
+def read_search(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    population: bpy.types.PropertyGroup,
+    own: Collection[bpy.types.Object],
+    grounds: Sequence[bpy.types.Object] | None = None,
+    most: int | None = None,
+) -> Search:
+    """Read what the places of a population's plants depend on.
 
     Parameters
     ----------
@@ -224,16 +273,10 @@ def place_population(
     most : int, optional
         Upper limit of plants, for a preview.
 
-    Returns
-    -------
-    placement : Placement
-    species : tuple of str
-        Identifiers that the placement counts through.
-
     Raises
     ------
     SceneError
-        No ground, a species that the catalogue does not have, or settings that leave no place.
+        No ground, or a species that the catalogue does not have.
     """
     unknown = unknown_species(population)
     if unknown:
@@ -252,9 +295,9 @@ def place_population(
         rules = replace(rules, count=min(rules.count, most))
     masks = {name: getattr(population, name) for name in MASKS}
     ground = read_ground(grounds, depsgraph, **masks)
-    suits = suits_of(scene, depsgraph, population, ground.triangles, species)
-    found = place(ground, rules, *standing(scene, depsgraph, own, species), suits=suits)
-    return without(found, erased_places(population)), species
+    suits = read_suits(scene, depsgraph, population, ground.triangles, species)
+    present = standing(scene, depsgraph, own, species)
+    return Search(ground, rules, present, suits, erased_places(population), species)
 
 
 def standing(
