@@ -40,6 +40,7 @@ NAMES = (
     "fidelity",
     "populate",
     "viewport",
+    "blocks",
     "animation",
     "wind",
     "dolly",
