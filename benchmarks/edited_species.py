@@ -23,8 +23,8 @@ from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.species import edits
 from tetflora_addon.compiled import flora as compiled
 from tetflora_addon.compiled.flora import Flora, compile_species
+from tetflora_addon.jobs import at_once
 from tetflora_addon.proxies import facet_weights
-from tetflora_addon.refinement.statistics import at_once
 from tetflora_addon.species.catalogue import list_species
 
 from .report import Targets

@@ -18,9 +18,10 @@ from tetflora_addon import memory
 from tetflora_addon.blender import worker
 from tetflora_addon.blender.job import refine
 from tetflora_addon.emission.budget import Detail
+from tetflora_addon.jobs import Progress
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.loop import Refinement
-from tetflora_addon.refinement.statistics import Progress, Statistics
+from tetflora_addon.refinement.statistics import Statistics
 
 from .report import forget_peak, peak_mb
 from .row80 import timed_render

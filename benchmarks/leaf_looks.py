@@ -23,7 +23,7 @@ from devtools.formats import set_format
 from tetflora_addon.blender.attributes import members
 from tetflora_addon.blender.job import plant_mesh
 from tetflora_addon.blender.materials import materials
-from tetflora_addon.refinement.statistics import at_once
+from tetflora_addon.jobs import at_once
 
 from .looks import plain_material
 from .report import Targets

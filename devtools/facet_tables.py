@@ -12,8 +12,8 @@ import json
 from concurrent.futures import ProcessPoolExecutor, as_completed
 
 from tetflora_addon.compiled.flora import compile_species
+from tetflora_addon.jobs import at_once
 from tetflora_addon.proxies import facet_weights
-from tetflora_addon.refinement.statistics import at_once
 from tetflora_addon.species.catalogue import list_species, load_species
 
 

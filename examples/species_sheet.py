@@ -14,9 +14,9 @@ from tetflora_addon.blender.job import contents, plant_mesh
 from tetflora_addon.blender.materials import materials
 from tetflora_addon.blender.results import leaf_objects, meshes
 from tetflora_addon.growth import growth
+from tetflora_addon.jobs import at_once
 from tetflora_addon.proxies import microsurfaces
 from tetflora_addon.proxies.drawn import facet_mesh
-from tetflora_addon.refinement.statistics import at_once
 from tetflora_addon.species import catalogue
 from tetflora_addon.subplants import leaf_meshes, tubes
 from tetflora_addon.subplants.pieces import open_branches

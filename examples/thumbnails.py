@@ -30,7 +30,7 @@ def render_thumbnail(identifier: str, path: Path) -> None:
     from mathutils import Vector
 
     from tetflora_addon.blender.job import plant_mesh
-    from tetflora_addon.refinement.statistics import at_once
+    from tetflora_addon.jobs import at_once
 
     from .row80 import add_daylight
 

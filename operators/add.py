@@ -20,8 +20,8 @@ from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, default_speci
 from ..tetflora_addon.blender.species.edits import catalogue
 from ..tetflora_addon.blender.species.values import present_species
 from ..tetflora_addon.errors import SceneError
+from ..tetflora_addon.jobs import Progress
 from ..tetflora_addon.planting.rules import Rules
-from ..tetflora_addon.refinement.statistics import Progress
 from .base import ModalJob, Reporting, counted, in_object_mode, need, select_only, selected_plants
 from .populations import ground_selected, report_made, selected_grounds
 

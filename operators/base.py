@@ -11,7 +11,7 @@ import bpy
 from ..tetflora_addon.blender.placing.plant_objects import plants_of
 from ..tetflora_addon.blender.worker import at_once
 from ..tetflora_addon.errors import TetFloraError, readable
-from ..tetflora_addon.refinement.statistics import Progress
+from ..tetflora_addon.jobs import Progress
 
 LINKED = (
     "The plants are linked from another file; use Object > Relations > Make Local, or Object > Library Override > Make"

@@ -10,7 +10,7 @@ from bpy.props import BoolProperty
 from ..tetflora_addon.blender.placing.cover import Covered, cover_steps, covered_population
 from ..tetflora_addon.blender.placing.rules import active_population
 from ..tetflora_addon.blender.viewport import points
-from ..tetflora_addon.refinement.statistics import Progress
+from ..tetflora_addon.jobs import Progress
 from .base import ModalJob, counted, in_object_mode, need
 
 

@@ -22,7 +22,7 @@ from ..tetflora_addon.blender.placing.populations import (
 from ..tetflora_addon.blender.placing.rules import active_population, copy_settings
 from ..tetflora_addon.blender.viewport import points
 from ..tetflora_addon.errors import readable
-from ..tetflora_addon.refinement.statistics import Progress
+from ..tetflora_addon.jobs import Progress
 from .base import ModalJob, Reporting, Tool, counted, in_object_mode, need, select_only
 
 

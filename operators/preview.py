@@ -10,8 +10,8 @@ from mathutils import Matrix
 from ..tetflora_addon.blender.viewport import state
 from ..tetflora_addon.blender.viewport.levels import level_steps
 from ..tetflora_addon.camera.camera import Camera
+from ..tetflora_addon.jobs import Progress
 from ..tetflora_addon.preview.levels import Levels
-from ..tetflora_addon.refinement.statistics import Progress
 from .base import NO_CAMERA, ModalJob, Reporting, counted, need
 
 #: Extent of a viewport's longer side at distance 1, times its focal length in millimetres.

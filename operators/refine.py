@@ -19,7 +19,8 @@ from ..tetflora_addon.blender.runtime import redraw, stop_jobs
 from ..tetflora_addon.blender.scene.lights import read_world
 from ..tetflora_addon.blender.viewport import auto
 from ..tetflora_addon.errors import TetFloraError
-from ..tetflora_addon.refinement.statistics import Progress, Statistics
+from ..tetflora_addon.jobs import Progress
+from ..tetflora_addon.refinement.statistics import Statistics
 from .base import (
     NO_CAMERA,
     ModalJob,

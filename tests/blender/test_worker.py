@@ -20,7 +20,7 @@ import bpy
 import pytest
 
 from tetflora_addon.blender import worker
-from tetflora_addon.refinement.statistics import Progress
+from tetflora_addon.jobs import Progress
 
 PATIENCE = 30.0
 ROOT = Path(__file__).resolve().parents[2]

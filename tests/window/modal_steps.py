@@ -19,7 +19,7 @@ from tests.window.slow import slowly  # noqa: E402
 from tetflora_addon.blender.job import refine  # noqa: E402
 from tetflora_addon.blender.results.collection import has_results  # noqa: E402
 from tetflora_addon.errors import SpeciesError  # noqa: E402
-from tetflora_addon.refinement.statistics import Progress  # noqa: E402
+from tetflora_addon.jobs import Progress  # noqa: E402
 
 
 def steps(ui):

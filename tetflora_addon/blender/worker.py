@@ -19,9 +19,9 @@ from contextlib import closing
 from typing import Any, TypeVar
 from weakref import WeakSet
 
+from ..jobs import Progress
+from ..jobs import at_once as run
 from ..processes import pool
-from ..refinement.statistics import Progress
-from ..refinement.statistics import at_once as run
 
 #: Seconds after which a step ends at the latest although there is nothing new.
 LOOK = 0.02

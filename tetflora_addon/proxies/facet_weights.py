@@ -33,7 +33,7 @@ from ..growth.branches import Branches
 from ..growth.growth import trunks
 from ..growth.hashing import mix
 from ..growth.seeds import Seeds
-from ..refinement.statistics import at_once
+from ..jobs import at_once
 from ..species.species import fingerprint
 from ..storage import remembered
 from ..subplants.pieces import open_subplants

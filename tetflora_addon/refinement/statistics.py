@@ -1,15 +1,12 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Statistics of a refinement, for the panel, the command line and the benchmarks; progress and time of jobs."""
+"""Statistics of a refinement, for the panel, the command line and the benchmarks; time of jobs."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Generator
-from dataclasses import asdict, dataclass, field, replace
-from typing import TypeVar
+from dataclasses import asdict, dataclass, field
 
-_Result = TypeVar("_Result")
 _NAMED = 3  # objects that a message names before it only counts
 
 
@@ -106,39 +103,6 @@ class Statistics:
     def as_dict(self) -> dict:
         """Plain dictionary, ready for JSON."""
         return {"levels" if name == "passes" else name: value for name, value in asdict(self).items()}
-
-
-@dataclass(frozen=True)
-class Progress:
-    """One step of a job.
-
-    Attributes
-    ----------
-    fraction : float
-        0 to 1, an estimate.
-    message : str
-        For the status bar.
-    waiting : bool
-        Whether nothing is new: the next step waits as well.
-    """
-
-    fraction: float
-    message: str
-    waiting: bool = False
-
-    @property
-    def again(self) -> Progress:
-        """The same, while nothing is new."""
-        return replace(self, waiting=True)
-
-
-def at_once(steps: Generator[object, object, _Result]) -> _Result:
-    """Run a job to its end; returns what the job returns."""
-    while True:
-        try:
-            next(steps)
-        except StopIteration as stop:
-            return stop.value
 
 
 class Stopwatch:

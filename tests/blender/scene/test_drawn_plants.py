@@ -12,7 +12,7 @@ from tests.blender.scenes import add_camera, add_plant, depsgraph
 from tetflora_addon import errors
 from tetflora_addon.blender.job import plant_mesh, refine
 from tetflora_addon.blender.scene import plants
-from tetflora_addon.refinement.statistics import at_once
+from tetflora_addon.jobs import at_once
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 

@@ -14,7 +14,7 @@ from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.results import collection
 from tetflora_addon.blender.viewport import auto
-from tetflora_addon.refinement.statistics import Progress
+from tetflora_addon.jobs import Progress
 
 
 @pytest.fixture

@@ -10,11 +10,11 @@ import pytest
 from tests.engine import support
 from tetflora_addon.compiled.crowns import crown_of
 from tetflora_addon.emission.facets import facet_parts
+from tetflora_addon.jobs import at_once
 from tetflora_addon.proxies.facet_sizes import FacetPixels
 from tetflora_addon.refinement.lights import Light
 from tetflora_addon.refinement.loop import refine
 from tetflora_addon.refinement.settings import RefinementSettings
-from tetflora_addon.refinement.statistics import at_once
 
 #: Looks north; the tree stands behind it, and beside it another one that is seen.
 CAMERA = support.camera([0.0, 0.0, 1.7], [0.0, 10.0, 1.7])

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tetflora_addon.jobs import at_once
 from tetflora_addon.planting.canopy import CLUSTERED, DIRECTIONS, FACING, Canopy, Sheet, fallen_on, light_on
 from tetflora_addon.planting.cover import Floor, Habitat, Stratum, covered, mapping, tinted
 from tetflora_addon.planting.places import place
 from tetflora_addon.planting.rules import Rules
 from tetflora_addon.planting.terrain import Path, Terrain
-from tetflora_addon.refinement.statistics import at_once
 
 SIDE = 40.0
 SQUARE = SIDE * np.array([[[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [1, 1, 0], [0, 1, 0]]], dtype=float)

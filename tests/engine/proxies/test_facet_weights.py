@@ -14,13 +14,13 @@ from tetflora_addon.camera.camera import Camera
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.growth.growth import trunks
+from tetflora_addon.jobs import at_once
 from tetflora_addon.proxies import facet_weights as subject
 from tetflora_addon.proxies import sights
 from tetflora_addon.proxies.drawn import facet_mesh
 from tetflora_addon.proxies.microsurfaces import CIRCUMRADIUS, piece_facets, subplant_facets
 from tetflora_addon.refinement.contents import piece_totals, subplant_totals
 from tetflora_addon.refinement.rasterise import occluder_depth
-from tetflora_addon.refinement.statistics import at_once
 from tetflora_addon.species.catalogue import list_species, load_species
 from tetflora_addon.subplants.pieces import open_subplants
 

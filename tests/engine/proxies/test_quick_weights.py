@@ -14,10 +14,10 @@ from tetflora_addon.camera.camera import Camera
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.emission import facets
 from tetflora_addon.emission.plants import Transition
+from tetflora_addon.jobs import at_once
 from tetflora_addon.proxies import facet_weights as subject
 from tetflora_addon.refinement import loop
 from tetflora_addon.refinement.settings import RefinementSettings
-from tetflora_addon.refinement.statistics import at_once
 from tetflora_addon.species.catalogue import load_species
 from tetflora_addon.species.species import Range, Species
 

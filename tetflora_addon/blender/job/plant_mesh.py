@@ -17,7 +17,7 @@ from ...compiled.flora import Flora
 from ...emission.plants import expanded_blocks
 from ...errors import SceneError
 from ...growth.seeds import Seeds
-from ...refinement.statistics import Progress
+from ...jobs import Progress
 from ...species.species import Species
 from ..attributes import frames_of, world_matrix, write
 from ..results.leaf_objects import leaf_objects, materials_of

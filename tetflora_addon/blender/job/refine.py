@@ -26,13 +26,14 @@ from ...emission.facets import drawn_species
 from ...emission.forms import EmissionForm, Refined
 from ...emission.plants import Block, Transition, expanded_blocks, explicit_blocks
 from ...emission.polygons import PolygonBlock, polygon_blocks
+from ...jobs import Progress
 from ...processes import pool
 from ...proxies.facet_weights import measuring, unmeasured
 from ...refinement import loop
 from ...refinement.decisions import Decision
 from ...refinement.loop import Refinement, step_of
 from ...refinement.settings import RefinementSettings
-from ...refinement.statistics import Progress, Statistics, Stopwatch
+from ...refinement.statistics import Statistics, Stopwatch
 from ..compat import drawn_disc
 from ..main_thread import in_main_thread
 from ..materials.materials import baked_material

@@ -11,8 +11,8 @@ import numpy as np
 from mathutils import Matrix, Quaternion
 
 from ...errors import SceneError
+from ...jobs import at_once
 from ...planting.places import Placement, new_seeds
-from ...refinement.statistics import at_once
 from .. import settings
 from ..attributes import world_matrix
 from ..saved_files import VERSION

@@ -18,8 +18,8 @@ import numpy as np
 
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed, uniform
+from ...jobs import Progress
 from ...planting.places import Placement
-from ...refinement.statistics import Progress
 from ..runtime import JobData, guarded, is_there
 from ..scene.fields import fields_of, stored_size
 from ..worker import at_once, call_in_thread

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import bpy
 
 from ...errors import TetFloraError
-from ...refinement.statistics import Progress
+from ...jobs import Progress
 from ..job import refine
 from ..job.frame_cache import choices, scene_digest
 from ..main_thread import in_main_thread

@@ -14,10 +14,10 @@ import bpy
 
 from ...compiled.flora import compile_species
 from ...errors import TetFloraError
+from ...jobs import Progress
 from ...preview.levels import Level, Levels, gather
 from ...preview.light_plants import Shapes, bounds_of_plants, light_plants
 from ...refinement.loop import refine as refine_loop
-from ...refinement.statistics import Progress
 from ..job.contents import compile_for, load_for, read_scene, refinement_settings
 from ..runtime import Handlers, JobData, call_off, call_soon, guarded, redraw
 from ..scene.camera import read_camera

@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Jobs: generators that yield their progress and return a result, so that a window can draw between two steps."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+_Result = TypeVar("_Result")
+
+
+@dataclass(frozen=True)
+class Progress:
+    """One step of a job.
+
+    Attributes
+    ----------
+    fraction : float
+        0 to 1, an estimate.
+    message : str
+        For the status bar.
+    waiting : bool
+        Whether nothing is new: the next step waits as well.
+    """
+
+    fraction: float
+    message: str
+    waiting: bool = False
+
+    @property
+    def again(self) -> Progress:
+        """The same, while nothing is new."""
+        return replace(self, waiting=True)
+
+
+def at_once(steps: Generator[object, object, _Result]) -> _Result:
+    """Run a job to its end; returns what the job returns."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as stop:
+            return stop.value
