@@ -77,10 +77,11 @@ def run(quick: bool) -> dict[str, float]:
     with tempfile.TemporaryDirectory() as folder:
         for distance in distances:
             place(scene, target, towards, float(distance))
-            refine.clear(scene)  # or what was expanded would count
+            refine.clear(scene)  # or what was expanded would count, and copies of it that the last render made
+            bpy.context.view_layer.update()
             memory.give_back()
             forget_peak()
-            with recording() as drawn:
+            with recording(scene) as drawn:
                 statistics = _made(scene, expand=False)
             peak = max(peak, peak_mb())
             polygons.append(statistics.polygons_meshed + statistics.polygons_proxy)
@@ -154,10 +155,11 @@ def _made(scene: bpy.types.Scene, expand: bool) -> object:
 
 
 @contextmanager
-def recording() -> Iterator[list[Drawn]]:
-    """While it lasts, leaves of finer levels are noted as they are written."""
+def recording(scene: bpy.types.Scene) -> Iterator[list[Drawn]]:
+    """While it lasts, leaves of finer levels are noted as they are written; by this process, not by others."""
     drawn: list[Drawn] = []
-    add = LevelCopies.add
+    add, threads = LevelCopies.add, (scene.render.threads_mode, scene.render.threads)
+    scene.render.threads_mode, scene.render.threads = 'FIXED', 1
 
     def noted(self: LevelCopies, key, position, frame, size, *rest: object) -> None:
         drawn.append(Drawn(self.shapes, self.model, key, position, frame, size))
@@ -168,6 +170,9 @@ def recording() -> Iterator[list[Drawn]]:
         yield drawn
     finally:
         LevelCopies.add = add
+        scene.render.threads_mode = threads[0]
+        if threads[0] == 'FIXED':
+            scene.render.threads = threads[1]
 
 
 def silhouette_pixels(scene: bpy.types.Scene, drawn: list[Drawn]) -> float:

@@ -20,20 +20,12 @@ from numpy.typing import NDArray
 
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
-from ..growth.hashing import uniform
-from ..parallel import blocks, on_all_cores
-from ..proxies.facet_sizes import FacetPixels, polygon_facet_sizes
-from ..proxies.facet_weights import facet_weights
-from ..proxies.microsurfaces import Facets
-from ..refinement.contents import LARGE
+from ..proxies.facet_sizes import FacetPixels
 from ..refinement.decisions import Decision, contributions
 from ..refinement.loop import Refinement
 from ..refinement.settings import RefinementSettings
-from ..subplants.wood_detail import finer
-from .facets import portion_facets, sizes_of
-from .leaf_detail import TOLERANCE, LeafDetail
-from .plants import Block, Transition, portion_blocks
-from .portions import Portions, Sight
+from .expected import Expected
+from .leaf_detail import TOLERANCE
 
 #: Approximate bytes of a polygon in Blender (110) and in a renderer (500) together.
 BYTES_PER_POLYGON = 610
@@ -48,17 +40,8 @@ FACETS_FIRST = 6.0
 #: Reserved fraction of a budget that somebody has set, since expected numbers are means; and how many deviations of a
 #: number that is drawn at random, which is most for small budgets.
 _RESERVE, _DEVIATIONS = 0.06, 2.0
-#: Fraction of the faces of twigs that are made where leaves are real.
-_TWIGS = 0.15
-#: Parts of plants that are drawn to find out what to expect: where only the image limits them, and where a limit that
-#: must hold is near; polygons that are too few to tell; and how far expectations may be corrected.
-_DRAWN, _SOME, _ROUGH = (800, 3000), 300.0, (0.4, 2.5)
-#: Draw of this module: which parts. That of the transition would choose those whose wood is real.
-_SAMPLE = 224
 _STEPS = 10  # of bisection on the logarithm of factors, between 1 and:
 _LARGEST = 256.0
-#: Parts that are looked at together; sums of these are summed up in their order.
-_TOGETHER = 50_000
 #: Fraction of a limit up to which what is expected certainly fits.
 _SURE = 0.6
 #: Largest factor on hidden facets that the image alone may ask for.
@@ -126,7 +109,7 @@ def afford(
         if not np.isfinite(allowed):
             return detail
         return replace(detail, refinement=_fitted_shells(result, allowed, faces), tolerance=np.inf)
-    count = _Facets(flora, result, camera)
+    count = Expected(flora, result, camera)
     # A sphere is a whole polygon for the limit on polygons, but only a part of one for memory: a budget for each.
     # What other meshes have out of sight takes from what somebody allows, not from what the image shows.
     on_top = min(count.finer(settings.leaf_limit), _ON_TOP)
@@ -156,7 +139,7 @@ def _unreserved(budget: float) -> float:
     return max((1 - _RESERVE) * budget - _DEVIATIONS * budget**0.5, 0.0) if np.isfinite(budget) else budget
 
 
-def _tolerance(count: _Facets, settings: RefinementSettings, limits: list[tuple[float, float, bool]]) -> float:
+def _tolerance(count: Expected, settings: RefinementSettings, limits: list[tuple[float, float, bool]]) -> float:
     """The smallest tolerance with which nothing else has to grow, or finer leaves are a small part of what is allowed.
 
     How wide leaves are that are real is that of a budget that suffices.
@@ -171,7 +154,7 @@ def _tolerance(count: _Facets, settings: RefinementSettings, limits: list[tuple[
 
 
 def _affordable(
-    count: _Facets, settings: RefinementSettings, limits: list[tuple[float, float, bool]]
+    count: Expected, settings: RefinementSettings, limits: list[tuple[float, float, bool]]
 ) -> tuple[float, float]:
     """Factors on all facets and on hidden ones with which none of the limits is passed: what is allowed, the weight of
     a facet, and whether other meshes count out of sight as well.
@@ -185,7 +168,7 @@ def _affordable(
 
 
 def _factors(
-    count: _Facets, settings: RefinementSettings, allowed: float, weight: float, every: bool, hidden: float
+    count: Expected, settings: RefinementSettings, allowed: float, weight: float, every: bool, hidden: float
 ) -> tuple[float, float]:
     """Factors on all facets and on hidden ones, beside ``hidden``, with which no more is made than allowed."""
 
@@ -246,140 +229,6 @@ def _large(result: Refinement) -> NDArray[np.float64]:
     held = result.holdings.polygons
     large = np.isinf(held.totals.width)
     return np.bincount(held.cell[large], minlength=len(result.tree))[result.nodes].astype(np.float64)
-
-
-class _Facets:
-    """Expected polygons and facets of a refinement."""
-
-    def __init__(self, flora: Flora, result: Refinement, camera: Camera) -> None:
-        self.sight = Sight(flora, result, camera)
-        self.every = portions = self.sight.portions()
-        self.found = np.ones(2)  # of polygons and of facets, what was found over what was expected
-        some = portions.visibility > 0
-        self.flora, self.camera, self.portions = flora, camera, portions.take(np.flatnonzero(some))
-        self.sizes = sizes_of(flora, self.portions, self.sight.shadows)
-        self.faces_coarse = _real_faces(flora, self.portions, Transition(flora, camera, 1.0, np.inf))
-        self.tolerance = TOLERANCE
-        unseen = sizes_of(flora, portions.take(np.flatnonzero(~some)), self.sight.shadows)
-        self.unseen_sizes = [unseen.take(block) for block in blocks(len(unseen), _TOGETHER)]
-        self.result, held, hidden = result, result.holdings.polygons, result.chosen(Decision.HIDDEN)
-        self.cell = held.cell
-        self.hidden = hidden[held.cell] | ~result.in_view[held.cell]
-        self.faces = polygon_facet_sizes(held, camera, hidden)
-
-    @property
-    def tolerance(self) -> float:
-        """Pixels by which the margins of near leaves may be off."""
-        return self._tolerance
-
-    @tolerance.setter
-    def tolerance(self, tolerance: float) -> None:
-        self._tolerance = tolerance
-        self.faces_finer = LeafDetail(self.flora, self.camera, tolerance).more(
-            self.portions.parts, self.portions.visibility
-        )
-
-    def finer(self, limit: float) -> float:
-        """Polygons of near leaves beyond those of their models."""
-        branches = self.portions.parts.branches
-        fraction = Transition(self.flora, self.camera, limit).of_branches(branches, self.portions.visibility)
-        return float((np.where(self.portions.real, fraction, 0.0) * self.portions.within * self.faces_finer).sum())
-
-    def seen(self, pixels: float, limit: float, weight: float, safe: bool = False) -> float:
-        """Polygons, and facets counted with a weight, of all plants that are seen.
-
-        safe: never fewer than were expected before `calibrate`; some plants do not tell exactly about all.
-        """
-        transition = Transition(self.flora, self.camera, limit)
-        branches = self.portions.parts.branches
-        real = np.where(self.portions.real, transition.of_branches(branches, self.portions.visibility), 0.0)
-        found = np.maximum(self.found, float(safe))
-        facets = found[1] * weight * self.sizes.counts(FacetPixels(pixels))
-        faces = found[0] * (self.faces_coarse + self.faces_finer)
-        tubes = found[0] * float(_tubes(self.flora, self.portions, transition, real).sum())
-        return float((self.portions.within * (real * faces + (1.0 - real) * facets)).sum()) + tubes
-
-    def unseen(self, pixels: FacetPixels, safe: bool = False) -> float:
-        """Facets of all plants that are not seen; safe as for `seen`."""
-        found = on_all_cores(lambda sizes: float(sizes.counts(pixels).sum()), self.unseen_sizes)
-        return float(max(self.found[1], float(safe))) * sum(found)
-
-    def together(self, settings: RefinementSettings) -> float:
-        """Expected polygons and facets of all, seen or not, at the details of the settings."""
-        pixels, limit = settings.facet, settings.leaf_limit
-        of_meshes = self.polygons(pixels, limit, 1.0, True)
-        return self.seen(pixels, limit, 1.0, True) + of_meshes + self.unseen(FacetPixels(pixels), True)
-
-    def calibrate(self, pixels: FacetPixels, limit: float, exactly: bool) -> None:
-        """Draw some of the plants, or more of them, and expect of all what was found of these."""
-        share = _DRAWN[int(exactly)] / max(len(self.every), 1)
-        chosen = uniform(self.every.parts.branches.key, _SAMPLE) < min(share, 1.0)
-        some = self.every.take(np.flatnonzero(chosen))
-        transition = Transition(self.flora, self.camera, limit, self.tolerance)
-        weights = facet_weights(self.flora, ())
-        real = sum(portion_blocks(self.sight, some, transition, form=_cost))
-        facets = sum(made for _, made, _ in portion_facets(self.sight, some, weights, pixels, transition, _count))
-        sizes, fraction = sizes_of(self.flora, some, self.sight.shadows), np.where(some.real, 1.0, 0.0)
-        fraction *= np.where(some.visibility > 0, transition.of_branches(some.parts.branches, some.visibility), 0.0)
-        faces = _real_faces(self.flora, some, transition) + transition.detail.more(some.parts, some.visibility)
-        expected = (some.within * fraction * faces).sum() + _tubes(self.flora, some, transition, fraction).sum()
-        left = (some.within * (1.0 - fraction) * sizes.counts(pixels)).sum()
-        self.found = np.clip((np.array([real, facets]) + _SOME) / (np.array([expected, left]) + _SOME), *_ROUGH)
-
-    def polygons(self, pixels: float, limit: float, weight: float, every: bool) -> float:
-        """Polygons of other meshes, and facets in their place; of what is seen, or of all."""
-        explicit = np.zeros(len(self.result.tree), bool)
-        explicit[self.result.nodes] = (self.result.decision == Decision.EXPLICIT) & ~self.too_small(limit)
-        kept = explicit[self.cell] | self.faces.kept(pixels)
-        counts = np.where(kept, 1.0, weight * self.faces.counts(pixels))
-        return float(counts[every | ~self.hidden].sum())
-
-    def too_small(self, limit: float) -> NDArray[np.bool_]:
-        """Explicit tetrahedra (cells,) with polygons of other meshes that are proxies under a larger limit."""
-        cells, held = self.result.cells, np.zeros(len(self.result.tree), bool)
-        held[self.cell] = True
-        # What is large there stays as it is as long as facets are smaller.
-        feature = np.where(np.isinf(cells.feature), LARGE, cells.feature)
-        return held[cells.nodes] & (self.result.decision == Decision.EXPLICIT) & (feature < limit)
-
-
-def _cost(block: Block) -> float:
-    """Polygons of a block; those of more than two triangles count by these."""
-    return float(np.maximum((np.diff(block.buffers.face_offsets) - 2) / 2.0, 1.0).sum())
-
-
-def _count(facets: Facets, _seen: bool) -> int:
-    return len(facets)
-
-
-def _tubes(flora: Flora, portions: Portions, transition: Transition, real: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Expected polygons (n,) of thick wood of portions of whose leaves a fraction (n,) is real."""
-    branches, rows = portions.parts.branches, flora.rows[portions.parts.branches.row]
-    own = rows["sides"] * (rows["segments"] + rows["rings"]).astype(np.float64)
-    return transition.of_thickness(branches, portions.best) * own * ~rows["phantom"] * (1.0 - real)
-
-
-def _real_faces(flora: Flora, portions: Portions, transition: Transition) -> NDArray[np.float64]:
-    """Expected polygons (n,) of portions, were all of their leaves real; large faces count by their triangles."""
-    parts, row = portions.parts, portions.parts.branches.row
-    leafy = flora.leaf_count[row] > 0
-    each = np.where(leafy, flora.leaf_faces[row] / np.maximum(flora.leaf_count[row], 1e-300), 0.0)
-    leaves = np.where(leafy, parts.totals.leaf_area / np.maximum(flora.one_leaf_area(parts.branches), 1e-300), 0.0)
-    wood = np.maximum(parts.totals.polygons - leaves * each, 0.0)
-    if (pixels := transition.detail.wood) is not None:
-        wood = wood * finer(flora, parts.branches, parts.alone, pixels)
-    kites = transition.of_kites(parts.branches, portions.visibility)
-    full = each * _weights(flora)[flora.rows["species"][row]]
-    # Among real leaves, hardly any twig is wide enough to be real.
-    return leaves * (full + kites * (1.0 - full)) + np.where(leafy & ~parts.alone, _TWIGS, 1.0) * wood
-
-
-def _weights(flora: Flora) -> NDArray[np.float64]:
-    """Triangles (species,) of a face of leaves over those of a quad: a spray of needles may be one face of many."""
-    forms = [[form for kind in kinds for form in kind] for kinds in flora.forms]
-    triangles = [sum(len(form.corner_verts) - 2 * form.polygons for form in own) for own in forms]
-    faces = [sum(form.polygons for form in own) for own in forms]
-    return np.maximum(np.array(triangles) / (2.0 * np.maximum(faces, 1)), 1.0)
 
 
 def _smallest(fits: Callable[[float], bool], largest: float = _LARGEST) -> float:

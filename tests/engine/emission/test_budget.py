@@ -21,6 +21,7 @@ from tetflora_addon.emission.budget import (
     afford,
     enough,
 )
+from tetflora_addon.emission.expected import Expected
 from tetflora_addon.emission.facets import facet_parts
 from tetflora_addon.emission.plants import Transition, explicit_blocks
 from tetflora_addon.proxies.facet_sizes import FacetPixels
@@ -125,7 +126,7 @@ def test_what_is_hidden_never_has_more_than_what_is_seen(monkeypatch: pytest.Mon
     """By default, wherever a picture shows fewer facets than a scene would have."""
     flora, _, camera, _ = scene()
     settings, result = replace(SETTINGS, facet=0.1), mostly_hidden()
-    count = budget._Facets(flora, result, camera)
+    count = Expected(flora, result, camera)
     assert count.unseen(FacetPixels(0.1)) + count.seen(0.1, SETTINGS.leaf_limit, 1.0) > allowed
     monkeypatch.setattr(budget, "NEVER_TOO_MANY", allowed)
     monkeypatch.setattr(budget, "ENOUGH_A_PIXEL", 0.0)

@@ -14,7 +14,8 @@ from tests.engine.refinement.test_loop import run
 from tests.engine.subplants.test_leaf_meshes import check_topology
 from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.camera.camera import Camera
-from tetflora_addon.emission.budget import _Facets, afford
+from tetflora_addon.emission.budget import afford
+from tetflora_addon.emission.expected import Expected
 from tetflora_addon.emission.leaf_detail import LeafDetail
 from tetflora_addon.emission.plants import Transition, expanded_blocks, explicit_blocks
 from tetflora_addon.growth.growth import WholeBranches
@@ -139,7 +140,7 @@ def test_budgets_expect_what_is_made() -> None:
     transition = Transition(flora, camera, settings.leaf_limit)
     coarse = Transition(flora, camera, settings.leaf_limit, np.inf)
     made = [polygons(leaves(explicit_blocks(flora, result, camera, one))) for one in (transition, coarse)]
-    count = _Facets(flora, result, camera)
+    count = Expected(flora, result, camera)
     assert made[0] > 1.2 * made[1]
     assert count.finer(settings.leaf_limit) == pytest.approx(made[0] - made[1], rel=0.5)
 
