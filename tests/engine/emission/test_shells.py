@@ -78,7 +78,9 @@ def test_exit_distance_from_the_attributes_is_the_true_one(seed, origin):
     system = np.concatenate([exact.transpose(0, 2, 1), np.ones((8, 1, 4))], axis=1)
     at_exit = np.concatenate([entry + exits[:, None] * direction, np.ones((8, 1))], axis=1)
     left = np.linalg.solve(system, at_exit[..., None])[..., 0]
-    assert np.abs(left.min(axis=1)).max() < 1e-4
+    # Gradients have 32 bits, and are large where a cell is nearly flat.
+    size = np.linalg.norm(vertices - vertices.mean(axis=1, keepdims=True), axis=2).max(axis=1)
+    assert (np.abs(left.min(axis=1)) < 1e-4 + 1e-6 * np.abs(gradients).max(axis=(1, 2)) * size).all()
     assert (exits > 0).all()
 
 
