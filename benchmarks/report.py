@@ -11,10 +11,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import bpy
-
-from tetflora_addon.processes import pool
-
 ROOT = Path(__file__).resolve().parent.parent
 CLEAR_PEAK = Path("/proc/self/clear_refs")
 Targets = dict[str, dict[str, float]]
@@ -22,6 +18,8 @@ Targets = dict[str, dict[str, float]]
 
 def peak_mb() -> float:
     """Largest resident memory so far of this process and of those that work for it, megabytes."""
+    from tetflora_addon.processes import pool  # as Blender has loaded it: not before `session.start`
+
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak / (1e6 if sys.platform == "darwin" else 1e3) + pool.peak() / 1e6
 
@@ -58,6 +56,8 @@ def _git(*words: str) -> str:
 
 def report(name: str, figures: dict[str, float], targets: Targets) -> dict:
     """The record of one benchmark as it is written to JSON."""
+    import bpy
+
     return {
         "name": name,
         "figures": figures,
