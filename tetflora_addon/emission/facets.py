@@ -37,7 +37,7 @@ from .portions import MIXED, Portions, Sight, in_chunks
 #: Approximate number of facets that are made at a time; thick wood close to the eye is cut into very many.
 FACETS_AT_ONCE = 200_000
 #: Pixels, and facets, down to which visible sub-plants are opened for the places of their facets.
-DETAIL, FEW = 4.0, 8.0
+DETAIL, FEW = 2.0, 8.0
 #: Extent over the metres that their shadows fall, from which on sub-plants beside the view are opened: such a shadow
 #: shows trunk and limbs where they are.
 THROWN = 0.25

@@ -41,10 +41,10 @@ class RefinementSettings:
         max=1000.0,
     )
     leaf_limit: float = setting(
-        0.4,
+        0.2,
         "Leaf Limit",
-        "Leaves narrower than this become proxies; up to 2.5 times this width, a growing fraction stays real. Larger "
-        "values save polygons; the loss is visible above about half a pixel",
+        "Leaves narrower than this become proxies; up to 2.5 times this width, a growing fraction stays real. Below "
+        "half the facet size, leaves cost more polygons than facets",
         subtype='PIXEL',
         min=0.05,
         soft_max=4.0,
@@ -153,7 +153,7 @@ class RefinementSettings:
 
 #: What the qualities of the panel stand for.
 QUALITIES: dict[str, dict[str, float]] = {
-    "DRAFT": {"cutoff": 6.0, "leaf_limit": 1.6, "facet": 1.2, "visibility_resolution": 128},
-    "PREVIEW": {"cutoff": 3.0, "leaf_limit": 0.8, "facet": 0.7, "visibility_resolution": 192},
-    "FINAL": {"cutoff": 2.0, "leaf_limit": 0.4, "facet": 0.33, "visibility_resolution": 256},
+    "DRAFT": {"cutoff": 6.0, "leaf_limit": 1.0, "facet": 1.2, "visibility_resolution": 128},
+    "PREVIEW": {"cutoff": 3.0, "leaf_limit": 0.5, "facet": 0.7, "visibility_resolution": 192},
+    "FINAL": {"cutoff": 2.0, "leaf_limit": 0.2, "facet": 0.33, "visibility_resolution": 256},
 }
