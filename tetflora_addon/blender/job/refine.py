@@ -8,24 +8,21 @@ The engine works in a thread beside Blender's (`worker`); only reading and writi
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import closing
+from collections.abc import Generator, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TypeVar
 
 import bpy
 import numpy as np
 
 from ... import memory, parallel
-from ...buffers import MeshBuffers
 from ...camera.camera import Camera, origin_near
 from ...compiled.flora import Flora, compile_species
 from ...emission.budget import afford
 from ...emission.facets import drawn_species
 from ...emission.forms import EmissionForm, Refined
-from ...emission.plants import Block, Transition, expanded_blocks, explicit_blocks
-from ...emission.polygons import PolygonBlock, polygon_blocks
+from ...emission.plants import Transition, expanded_blocks, explicit_blocks
+from ...emission.polygons import polygon_blocks
 from ...jobs import Progress
 from ...processes import pool
 from ...proxies.facet_weights import measuring, unmeasured
@@ -36,28 +33,25 @@ from ...refinement.settings import RefinementSettings
 from ...refinement.statistics import Statistics, Stopwatch
 from ..compat import drawn_disc
 from ..main_thread import in_main_thread
-from ..materials.materials import baked_material
 from ..preferences import wanted_threads
 from ..results.collection import Results
 from ..results.forms import form_of
 from ..results.hiding import hide_originals, remove_results
-from ..results.leaf_objects import leaf_objects, materials_of
+from ..results.leaf_objects import leaf_objects
 from ..results.output import adopt_materials, release_materials, result_collections
 from ..results.proxies import Baking, write_proxies
 from ..runtime import JobData, guarded
 from ..scene.camera import read_camera
-from ..scene.explicit import Explicit
 from ..scene.objects import taking_part
-from ..worker import at_once, call_in_thread, in_thread, steps_in_thread
+from ..worker import at_once, call_in_thread, steps_in_thread
 from .contents import Given, compile_for, in_wind, load_for, memory_left, read_scene, refinement_settings
+from .writing import bake_light, write_blocks, write_polygons
 
 #: Fraction of the progress bar that the loop takes; the rest is for writing meshes.
 _LOOP_FRACTION = 0.6
 
 #: Polygons, were all plants expanded, from which on other processes are started at once.
 _MANY = 1e6
-
-_Block = TypeVar("_Block")
 
 
 def refine_steps(
@@ -149,7 +143,7 @@ def _refine_steps(
         if scene.tetflora.expand_everything:
             in_main_thread(results.open)
             # Explicit objects stay visible themselves.
-            yield from _write_blocks(results, flora, expanded_blocks(flora, given.seeds, camera), statistics, 0.05)
+            yield from write_blocks(results, flora, expanded_blocks(flora, given.seeds, camera), statistics, 0.05)
         else:
             originals = given.explicit.originals if given.explicit is not None else []
             yield from _write_refined(results, flora, given, camera, statistics, clock)
@@ -278,13 +272,13 @@ def _write_refined(
     if given.sources is not None:
         baking = Baking(given.sources, leaves=scene.tetflora.baked_light == 'ALL')
     blocks = explicit_blocks(flora, refined.refinement, camera, refined.transition, refined.tolerance)
-    yield from _write_blocks(results, flora, blocks, statistics, _LOOP_FRACTION, baking)
+    yield from write_blocks(results, flora, blocks, statistics, _LOOP_FRACTION, baking)
     if given.explicit is not None:
         blocks = polygon_blocks(refined.refinement, camera, refined.facet_pixels)
-        yield from _write_polygons(results, given.explicit, blocks, statistics, baking)
+        yield from write_polygons(results, given.explicit, blocks, statistics, baking)
     if baking is not None:
         clock.lap("emit")
-        yield from _bake(baking, refined)
+        yield from bake_light(baking, refined)
         clock.lap("light")
     progress = Progress(0.95, "Making proxies")
     yield progress
@@ -300,78 +294,3 @@ def _count(statistics: Statistics, refinement: Refinement) -> None:
     statistics.tetrahedra_proxy = int(np.isin(refinement.decision, (Decision.PROXY, Decision.HIDDEN)).sum())
     statistics.passes = refinement.passes
     statistics.complete = refinement.complete
-
-
-def _write_blocks(
-    results: Results,
-    flora: Flora,
-    blocks: Iterator[Block],
-    statistics: Statistics,
-    start: float,
-    baking: Baking | None = None,
-) -> Generator[Progress, None, None]:
-    materials: dict[tuple[int, str, int], list[bpy.types.Material]] = {}
-
-    def write(block: Block) -> Progress:
-        species, what = flora.species[block.species], (block.species, block.kind, block.form)
-        if what not in materials:
-            baked = baking is not None and baking.leaves
-            made = [baked_material()] if baked else materials_of(results.scene, species, block.kind, block.form)
-            materials[what] = made
-        name = f"{species.name} {block.kind} {block.number:03d}"
-        obj = results.add(name, block.kind, block.buffers, materials[what], species)
-        _made(obj, block.buffers, statistics, baking, lit=True)
-        return Progress(start + (0.95 - start) * block.fraction, f"Making polygons: {statistics.polygons_meshed:,}")
-
-    yield from _written(blocks, write, Progress(start, "Making polygons"))
-
-
-def _write_polygons(
-    results: Results,
-    explicit: Explicit,
-    blocks: Iterator[PolygonBlock],
-    statistics: Statistics,
-    baking: Baking | None = None,
-) -> Generator[Progress, None, None]:
-    def write(block: PolygonBlock) -> Progress:
-        name = explicit.meshes.surfaces[block.surface].name
-        materials = explicit.materials[block.surface]
-        obj = results.add(f"{name} {block.number:03d}", "explicit", block.buffers, materials)
-        _made(obj, block.buffers, statistics, baking, lit=False)
-        return Progress(0.95, f"Keeping polygons: {statistics.polygons_meshed:,}")
-
-    yield from _written(blocks, write, Progress(0.95, "Keeping polygons"))
-
-
-def _written(
-    blocks: Iterator[_Block], write: Callable[[_Block], Progress], progress: Progress
-) -> Generator[Progress, None, None]:
-    """Write blocks one by one, while the next is computed."""
-    with closing(in_thread(blocks, ahead=1)) as made:
-        for block in made:
-            if block is not None:
-                progress = write(block)
-            yield progress.again if block is None else progress
-
-
-def _made(
-    obj: bpy.types.Object, buffers: MeshBuffers, statistics: Statistics, baking: Baking | None, lit: bool
-) -> None:
-    if baking is not None:
-        baking.add(obj, buffers, lit)
-    statistics.polygons_meshed += buffers.polygons
-    statistics.memory_mb += buffers.nbytes / 1e6
-
-
-def _bake(baking: Baking, refined: Refined) -> Generator[Progress, None, None]:
-    """Compute the light of everything, and write that of meshes."""
-    if refined.facet_pixels is not None:
-        facets = (Progress(0.9, f"Baking light: {count:,} facets") for count in baking.add_facets(refined))
-        yield from steps_in_thread(facets, Progress(0.9, "Baking light"))
-    shadows = (Progress(0.9 + 0.03 * done, f"Baking light: {done:.0%} of the shadows") for done in baking.look(refined))
-    yield from steps_in_thread(shadows, Progress(0.9, "Baking light"))
-    progress = Progress(0.93, "Baking light")
-    for done in baking.light_meshes():
-        if done is not None:
-            progress = Progress(0.93 + 0.02 * done, f"Baking light: {done:.0%} of the leaves")
-        yield progress.again if done is None else progress
