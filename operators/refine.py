@@ -15,7 +15,7 @@ from ..tetflora_addon.blender.results import hiding
 from ..tetflora_addon.blender.results.collection import has_results, result_collections
 from ..tetflora_addon.blender.results.forms import few_bounces
 from ..tetflora_addon.blender.results.hiding import keep_results
-from ..tetflora_addon.blender.runtime import redraw, stop_jobs
+from ..tetflora_addon.blender.runtime import is_there, redraw, stop_jobs
 from ..tetflora_addon.blender.scene.lights import read_world
 from ..tetflora_addon.blender.viewport import auto
 from ..tetflora_addon.errors import TetFloraError
@@ -47,9 +47,17 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
     keys = "Esc: Cancel   |   Return: Finish Early"
 
     def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, Statistics]:
+        scene, nothing = context.scene, not has_results(context.scene)
         with auto.paused():
             depsgraph = context.evaluated_depsgraph_get()
-            return (yield from refine.refine_steps(context.scene, depsgraph, view_layer=context.view_layer))
+            job = refine.refine_steps(scene, depsgraph, view_layer=context.view_layer, first_look=nothing)
+            try:
+                return (yield from job)
+            except BaseException:
+                job.close()
+                if nothing and is_there(scene):
+                    refine.clear(scene, for_render=False)
+                raise
 
     def finish(self, context: bpy.types.Context, statistics: Statistics) -> set[str]:
         prepare_scene(context.scene)

@@ -120,6 +120,10 @@ class JobData:
         for obj in objects:
             self.add(f'"{obj.name}"', obj)
 
+    def forget(self, datablock: bpy.types.ID) -> None:
+        """Hold a datablock no more; given as the very object that was added."""
+        self._known = [own for own in self._known if own[0] is not datablock]
+
     def stop(self, reason: str) -> None:
         """Let the next `check` fail, whatever is there."""
         self._reason = self._reason or reason

@@ -43,6 +43,11 @@ def at_once(steps: Generator[object, object, _Result]) -> _Result:
         _here.at_once = before
 
 
+def nobody_waits() -> bool:
+    """Whether what runs here is run to its end at once, so that nobody sees anything before."""
+    return getattr(_here, "at_once", False)
+
+
 def in_thread(work: Generator[_Item, Any, _Result], ahead: int = 0) -> Generator[_Item | None, object, _Result]:
     """Run a generator of the engine in a thread.
 
@@ -62,7 +67,7 @@ def in_thread(work: Generator[_Item, Any, _Result], ahead: int = 0) -> Generator
     object or None
         The items in their order; None whenever there was nothing new for `LOOK` seconds.
     """
-    if getattr(_here, "at_once", False):
+    if nobody_waits():
         return (yield from work)
     worker = _Worker(work, ahead)
     try:

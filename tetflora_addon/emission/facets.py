@@ -194,13 +194,15 @@ class _Maker:
             parts, seen = portions.parts, portions.visibility > 0
             sizes = sizes_of(flora, portions, sight.shadows)
             extent = sight.pixels(portions)
-            mixed = seen & portions.mixed & (extent > MIXED)
             many = sizes.counts(self.pixels) > FEW
             detail = seen & (extent > DETAIL) & many
             real, thick = np.zeros((2, len(parts)))
             if transition is not None:
                 real = np.where(portions.real & seen, transition.of_branches(parts.branches, portions.visibility), 0.0)
                 thick = np.where(seen, transition.of_thickness(parts.branches, portions.visibility), 0.0)
+            # A few large facets show no more where some of them are hidden; beside real leaves they must leave as many
+            # places free as those take.
+            mixed = seen & portions.mixed & (extent > MIXED) & (many | (real > 0))
             thrown = self._throws(portions) & many
             open_here = parts.can_open(flora) & (mixed | thrown | ((detail | (thick > 0)) & (real < 1.0)))
             bodies.append(portions.take(np.flatnonzero(parts.alone)))

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..setting import setting
 
@@ -150,7 +150,27 @@ class RefinementSettings:
         max=1000.0,
     )
 
+    def first_look(self) -> RefinementSettings:
+        """Settings of a result that is there within a second or so, of any scene, and shows where everything is.
 
+        Coarser than these settings in every respect; what depends on the form of proxies stays.
+        """
+        polygons, coarse = self.max_polygons or _FIRST_POLYGONS, QUALITIES["DRAFT"]
+        return replace(
+            self,
+            cutoff=max(2.0 * self.cutoff, 2.0 * coarse["cutoff"]),
+            leaf_limit=max(2.0 * self.leaf_limit, 2.0 * coarse["leaf_limit"]),
+            facet=max(2.0 * self.facet, 2.0 * coarse["facet"]),
+            block=max(2.0 * self.block, 64.0),
+            visibility_resolution=min(self.visibility_resolution, 96),
+            max_tetrahedra=min(self.max_tetrahedra, _FIRST_TETRAHEDRA),
+            max_polygons=min(polygons, _FIRST_POLYGONS),
+            shadow_cutoff=0.0,
+        )
+
+
+#: Limits of a first look.
+_FIRST_POLYGONS, _FIRST_TETRAHEDRA = 100_000, 4_000
 #: What the qualities of the panel stand for.
 QUALITIES: dict[str, dict[str, float]] = {
     "DRAFT": {"cutoff": 6.0, "leaf_limit": 1.0, "facet": 1.2, "visibility_resolution": 128},

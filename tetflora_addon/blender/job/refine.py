@@ -43,7 +43,7 @@ from ..results.proxies import Baking, write_proxies
 from ..runtime import JobData, guarded
 from ..scene.camera import read_camera
 from ..scene.objects import taking_part
-from ..worker import at_once, call_in_thread, steps_in_thread
+from ..worker import at_once, call_in_thread, nobody_waits, steps_in_thread
 from .contents import Given, compile_for, in_wind, load_for, memory_left, read_scene, refinement_settings
 from .writing import bake_light, write_blocks, write_polygons
 
@@ -64,6 +64,7 @@ def refine_steps(
     camera: Camera | None = None,
     given: Given | None = None,
     mark: str = "",
+    first_look: bool = False,
 ) -> Generator[Progress, bool | None, Statistics]:
     """Refine a scene step by step.
 
@@ -87,6 +88,9 @@ def refine_steps(
         From `read_scene` for the scene.
     mark : str
         Suffix of the names of results.
+    first_look : bool
+        Show a coarse result within a second or so, while the job goes on, where somebody looks and it takes longer.
+        That one replaces earlier results already, and stays when the job is closed.
 
     Raises
     ------
@@ -100,7 +104,7 @@ def refine_steps(
     data.add_objects(taking_part(scene))
     data.add_objects(leaf_objects(scene).values())
     results = Results(scene, 'RENDER' if for_render else 'VIEW', mark, data)
-    return guarded(data, _refine_steps(data, results, depsgraph, layer, beside, camera, given))
+    return guarded(data, _refine_steps(data, results, depsgraph, layer, beside, camera, given, first_look))
 
 
 def _refine_steps(
@@ -111,6 +115,7 @@ def _refine_steps(
     beside: Sequence[bpy.types.Collection],
     camera: Camera | None,
     given: Given | None,
+    first_look: bool,
 ) -> Generator[Progress, bool | None, Statistics]:
     clock, scene = Stopwatch(), results.scene
     parallel.use(wanted_threads(scene))
@@ -136,17 +141,20 @@ def _refine_steps(
     if full > _MANY:
         pool.start()
     statistics = Statistics(plants=len(given.seeds), polygons_full=full, seconds=clock.seconds)
-    originals = []
+    refined = not scene.tetflora.expand_everything
+    # Explicit objects stay visible themselves where everything is expanded.
+    originals = given.explicit.originals if given.explicit is not None and refined else []
     for earlier in result_collections(scene, 'VIEW'):
         adopt_materials(scene, earlier)
+    if first_look and refined and full > _MANY and not nobody_waits():
+        yield from _first_look(data, results, flora, given, camera, beside, originals)
+        clock.lap("first look")
     try:
-        if scene.tetflora.expand_everything:
+        if not refined:
             in_main_thread(results.open)
-            # Explicit objects stay visible themselves.
             yield from write_blocks(results, flora, expanded_blocks(flora, given.seeds, camera), statistics, 0.05)
         else:
-            originals = given.explicit.originals if given.explicit is not None else []
-            yield from _write_refined(results, flora, given, camera, statistics, clock)
+            yield from _write_refined(results, flora, given, camera, statistics, clock, refinement_settings(scene))
         clock.lap("emit")
         data.check()
     except BaseException:  # an error, Esc (GeneratorExit) or Ctrl+C
@@ -157,6 +165,30 @@ def _refine_steps(
     statistics.seconds = dict(clock.seconds)
     scene.tetflora.statistics = json.dumps(statistics.as_dict())
     return statistics
+
+
+def _first_look(
+    data: JobData,
+    results: Results,
+    flora: Flora,
+    given: Given,
+    camera: Camera,
+    beside: Sequence[bpy.types.Collection],
+    originals: Sequence[bpy.types.Object],
+) -> Generator[Progress, bool | None, None]:
+    """A coarse result in place of earlier ones, without baked light."""
+    first = Results(results.scene, results.purpose, "", data)
+    first.origin, given = results.origin, replace(given, sources=None)
+    settings = refinement_settings(results.scene).first_look()
+    try:
+        for progress in _write_refined(first, flora, given, camera, Statistics(), Stopwatch(), settings):
+            yield Progress(0.02 + 0.03 * progress.fraction, "First look", progress.waiting)
+        data.check()
+    except BaseException:
+        in_main_thread(first.discard)
+        raise
+    in_main_thread(partial(_replace, first, beside, originals))
+    data.forget(first.collection)
 
 
 def _replace(results: Results, beside: Sequence[bpy.types.Collection], originals: Sequence[bpy.types.Object]) -> None:
@@ -257,11 +289,17 @@ def _refined(
 
 
 def _write_refined(
-    results: Results, flora: Flora, given: Given, camera: Camera, statistics: Statistics, clock: Stopwatch
+    results: Results,
+    flora: Flora,
+    given: Given,
+    camera: Camera,
+    statistics: Statistics,
+    clock: Stopwatch,
+    settings: RefinementSettings,
 ) -> Generator[Progress, bool | None, None]:
     """Refine, and make meshes and proxies."""
     scene, form = results.scene, form_of(results.scene)
-    settings, left = refinement_settings(scene), memory_left(scene, camera)
+    left = memory_left(scene, camera)
     # What the process holds already and what the image takes count too.
     settings = replace(settings, max_memory=left / 1e9 if np.isfinite(left) else 0.0)
     disc = drawn_disc(scene.render.engine)

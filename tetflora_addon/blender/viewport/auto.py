@@ -148,7 +148,7 @@ def _begin(scene: bpy.types.Scene) -> bool:
         redraw()
         return False
     _state.digest, _state.again, _state.waiting = digest, False, False
-    _state.steps = refine.refine_steps(scene, layer.depsgraph, view_layer=layer)
+    _state.steps = refine.refine_steps(scene, layer.depsgraph, view_layer=layer, first_look=True)
     return True
 
 
