@@ -76,6 +76,9 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
         if active is not None and (can_be_explicit(active) or active.tetflora.is_explicit):
             layout.prop(active.tetflora, "is_explicit")
         draw_properties(layout, settings, "refine_at_render", "auto_refine")
+        row = layout.row()
+        row.active = settings.auto_refine
+        row.prop(settings, "follow_viewport")
 
 
 def _draw_memory(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:

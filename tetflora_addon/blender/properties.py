@@ -165,6 +165,16 @@ class TetFloraScene(RefinementProperties, AnimationProperties, bpy.types.Propert
         update=_notify_auto_refine,
         options=set(),
     )
+    follow_viewport: BoolProperty(
+        name="Follow Viewport",
+        description=(
+            "Refine for what the 3D viewport shows instead of the scene camera: for the viewport with Rendered shading "
+            "if there is one, else the largest. A viewport that looks through the camera shows what the camera sees"
+        ),
+        default=False,
+        update=_notify_auto_refine,
+        options=set(),
+    )
     expand_everything: BoolProperty(
         name="Expand Everything",
         description=(

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import bpy
 import pytest
@@ -13,6 +14,7 @@ from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.results import collection
+from tetflora_addon.blender.scene.camera import read_camera
 from tetflora_addon.blender.viewport import auto
 from tetflora_addon.jobs import Progress
 
@@ -45,6 +47,10 @@ def changed(scene):
     """Have Blender tell its handlers that the scene has changed, and no object in it."""
     scene.render.resolution_percentage = scene.render.resolution_percentage
     bpy.context.view_layer.update()
+
+
+def faces(scene):
+    return sum(len(o.data.polygons) for c in results(scene) for o in c.objects if o.type == 'MESH')
 
 
 def results(scene):
@@ -331,3 +337,34 @@ def test_undo_and_redo_meet_no_results_that_they_do_not_know(scene, monkeypatch)
         for handler in handlers:
             handler.pop()
     assert met == [0, 0, 0, 0]
+
+
+def test_it_follows_the_viewport(scene, monkeypatch):
+    """Without a camera in the scene, and anew whenever the view is turned."""
+    graph = bpy.context.evaluated_depsgraph_get()
+    near = read_camera(scene, graph)
+    views = [near]
+    monkeypatch.setattr(auto, "view_camera", lambda _: views[-1])
+    scene.camera = None
+    scene.tetflora.follow_viewport = scene.tetflora.auto_refine = True
+    auto.watch()
+    settle(monkeypatch)
+    assert auto.message() == ""
+    uid, made = results(scene)[0].session_uid, faces(scene)
+    auto.watch()
+    assert settle(monkeypatch) == 0
+    views.append(replace(near, position=near.position + 200.0 * near.frame[:, 2]))
+    auto.watch()
+    assert settle(monkeypatch) > 5
+    assert results(scene)[0].session_uid != uid
+    assert faces(scene) < made
+    views[-1] = None  # a viewport that looks through the camera
+    auto.watch()
+    settle(monkeypatch)
+    assert "camera" in auto.message()
+
+
+def test_without_refine_automatically_nobody_looks_at_the_viewport(scene, monkeypatch):
+    monkeypatch.setattr(auto, "view_camera", lambda _: pytest.fail("looked"))
+    scene.tetflora.follow_viewport = True
+    assert auto.watch() is None

@@ -32,7 +32,16 @@ from .contents import Given, read_scene, settings_from
 _MAX_SPECIES = 64
 _CHOICES = ("proxy_form", "baked_light", "expand_everything")
 #: Settings of a scene that results do not depend on.
-_IGNORED = {"statistics", "share_frames", "cell_length", "cell_turn", "kept_memory", "refine_at_render", "auto_refine"}
+_IGNORED = {
+    "statistics",
+    "share_frames",
+    "cell_length",
+    "cell_turn",
+    "kept_memory",
+    "refine_at_render",
+    "auto_refine",
+    "follow_viewport",
+}
 
 
 @dataclass

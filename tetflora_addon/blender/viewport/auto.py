@@ -5,7 +5,7 @@
 A change stops the work, which starts again after `QUIET` seconds without changes. Where the digest of everything that
 refinement depends on is the same as last time, nothing is done. Earlier results stay until there are new ones, but not
 through undo. Undo, loading, rendering, and operators that change results stop the work too, because it holds datablocks
-that they remove.
+that they remove. Blender tells nobody when a viewport is turned: where that is to be followed, it is looked at.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import bpy
 
+from ...camera.camera import Camera
 from ...errors import TetFloraError
 from ...jobs import Progress
 from ..job import refine
@@ -29,12 +30,14 @@ from ..results.collection import has_results
 from ..results.leaf_objects import leaf_objects
 from ..results.output import PURPOSE, remove_collection
 from ..runtime import GoneError, Handlers, call_off, call_soon, redraw
+from ..scene.view import view_camera
 from ..settings import wind_of
 from .state import camera_now
 
 #: Seconds without a change before it begins, and seconds of work between two redraws.
 QUIET, SLICE = 0.6, 0.03
 _BUSY = 0.5  # seconds until it looks again whether Blender has time
+_LOOK = 0.2  # seconds between two looks at the viewport
 _CHANGING = (bpy.types.Object, bpy.types.Camera, bpy.types.Light, bpy.types.Mesh, bpy.types.PointCloud, bpy.types.Curve)
 
 
@@ -51,6 +54,7 @@ class _State:
     waiting: bool = False  # for a thread that computes
     again: bool = False  # look once more when the job is done
     paused: int = 0  # others that refine
+    view: str = ""  # of the viewport when it was looked at last
 
 
 _state = _State()
@@ -68,6 +72,23 @@ def _switched(scene: bpy.types.Scene) -> None:
     _state.message = ""
     if scene.tetflora.auto_refine:
         schedule(scene)
+        _state.view = ""
+        watch()
+
+
+def watch() -> float | None:
+    """Refine anew when the viewport of the scene in the window is turned; seconds until the next look."""
+    scene = bpy.context.scene
+    if scene is None or not (scene.tetflora.auto_refine and scene.tetflora.follow_viewport):
+        return None
+    view = repr(view_camera(scene))
+    if view != _state.view:
+        before, _state.view = _state.view, view
+        if before:
+            schedule(scene)
+    if not bpy.app.background:
+        call_soon(watch, _LOOK)
+    return _LOOK
 
 
 def schedule(scene: bpy.types.Scene) -> None:
@@ -104,7 +125,7 @@ def refined(scene: bpy.types.Scene) -> None:
     if scene.tetflora.auto_refine:
         layer = _view_layer(scene)
         layer.update()
-        _done[scene.name] = scene_digest(scene, layer.depsgraph, layer)
+        _done[scene.name] = scene_digest(scene, layer.depsgraph, layer)  # for the scene's camera
 
 
 def tick() -> float | None:
@@ -142,13 +163,14 @@ def _begin(scene: bpy.types.Scene) -> bool:
     """Start the job if what it depends on has changed."""
     layer = _view_layer(scene)
     layer.update()
-    digest = scene_digest(scene, layer.depsgraph, layer)
+    camera = _view(scene)
+    digest = scene_digest(scene, layer.depsgraph, layer, camera)
     if _done.get(scene.name) == digest and has_results(scene):
         _state.message = ""
         redraw()
         return False
     _state.digest, _state.again, _state.waiting = digest, False, False
-    _state.steps = refine.refine_steps(scene, layer.depsgraph, view_layer=layer, first_look=True)
+    _state.steps = refine.refine_steps(scene, layer.depsgraph, view_layer=layer, camera=camera, first_look=True)
     return True
 
 
@@ -171,6 +193,11 @@ def _slice(scene: bpy.types.Scene) -> bool:
         _state.message = text
         redraw()
     return True
+
+
+def _view(scene: bpy.types.Scene) -> Camera | None:
+    """What to refine for if not for the scene's camera."""
+    return view_camera(scene) if scene.tetflora.follow_viewport else None
 
 
 def _view_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
@@ -249,8 +276,9 @@ def on_load(*_arguments: object) -> None:
     """Another file: its results are none of ours."""
     _done.clear()
     _seen.clear()
-    _state.message = ""
+    _state.message = _state.view = ""
     call_off(tick)
+    call_off(watch)
 
 
 _HANDLERS = Handlers(
@@ -262,6 +290,7 @@ _HANDLERS = Handlers(
     redo_post=after_undo,
     render_init=lambda *_: in_main_thread(on_interruption),
     load_pre=(on_interruption, on_load),
+    load_post=lambda *_: watch() and None,
 )
 
 

@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Views of viewports as cameras: matrices that draw alike give the camera that Blender's own one is read as."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.blender.scenes import add_camera
+from tetflora_addon.blender.scene.camera import read_camera
+from tetflora_addon.blender.scene.view import camera_of, view_camera, viewport_of
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+
+@given(
+    angles=st.tuples(*[st.floats(-3.0, 3.0)] * 3),
+    place=st.tuples(*[st.floats(-100.0, 100.0)] * 3),
+    lens=st.floats(10.0, 200.0),
+    shift=st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5)),
+    kind=st.sampled_from(["PERSP", "ORTHO"]),
+)
+def test_the_matrices_of_a_camera_give_that_camera(angles, place, lens, shift, kind):
+    camera = add_camera(location=place, rotation=angles)
+    data, scene = camera.data, bpy.context.scene
+    data.type, data.lens, data.ortho_scale = kind, lens, lens
+    data.shift_x, data.shift_y = shift
+    bpy.context.view_layer.update()
+    graph, size = bpy.context.evaluated_depsgraph_get(), (scene.render.resolution_x, scene.render.resolution_y)
+    projection = np.array(camera.calc_matrix_camera(graph, x=size[0], y=size[1]), np.float64)
+    view = np.array(camera.matrix_world.inverted(), np.float64)
+    made = camera_of(view, projection, (data.clip_start, data.clip_end), size)
+    expected = read_camera(scene, graph)
+    assert made.kind == expected.kind
+    assert (made.width, made.height) == (expected.width, expected.height)
+    np.testing.assert_allclose(made.window, expected.window, atol=2e-4 * max(1.0, *np.abs(expected.window)))
+    np.testing.assert_allclose(made.frame, expected.frame, atol=1e-5)
+    behind = made.position - expected.position
+    away = data.clip_end * expected.frame[:, 2] if kind == "ORTHO" else np.zeros(3)
+    np.testing.assert_allclose(behind, away, atol=1e-3)
+    assert 0.0 < made.near < made.far
+    bpy.data.objects.remove(camera)
+
+
+@pytest.fixture
+def region_3d():
+    """Of the only viewport; as it was afterwards."""
+    space, _ = viewport_of(bpy.context.scene)
+    own = space.region_3d
+    before = own.view_perspective
+    yield own
+    own.view_perspective = before
+
+
+def test_the_default_viewport_is_seen_along_its_axis(region_3d):
+    camera = view_camera(bpy.context.scene)
+    across, up, back = (np.array(region_3d.view_location) - camera.position) @ camera.frame
+    assert camera.kind == "PERSP"
+    assert max(abs(across), abs(up)) < 1e-3
+    assert camera.near < -back < camera.far
+    assert camera.pixel_size > 0.0
+
+
+def test_a_viewport_that_looks_through_the_camera_has_no_view_of_its_own(region_3d):
+    region_3d.view_perspective = 'CAMERA'
+    assert view_camera(bpy.context.scene) is None
