@@ -1,0 +1,85 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Refine Automatically follows a viewport that is turned; tests/window/test_follow.py judges what came of it."""
+
+import math
+import sys
+import time
+from pathlib import Path
+
+import bpy
+from mathutils import Euler, Vector
+
+sys.path.append(str(Path(__file__).resolve().parents[2]))
+
+from devtools.aliases import INSTALLED, alias
+
+alias(INSTALLED)
+from tetflora_addon.blender.results.collection import result_collections  # noqa: E402  (found only now)
+from tetflora_addon.blender.viewport import auto  # noqa: E402
+
+PLANTS, APART = 36, 9.0
+
+
+def steps(ui):
+    """See devtools/window_driver.py."""
+    scene = bpy.context.scene
+    bpy.ops.object.select_all(action='SELECT')
+    bpy.ops.object.delete()
+    side = math.isqrt(PLANTS)
+    for i in range(PLANTS):
+        plant = bpy.data.objects.new(f"plant {i}", None)
+        plant.location = APART * (i % side - side / 2), APART * (i // side - side / 2), 0.0
+        plant.tetflora.is_plant, plant.tetflora.species, plant.tetflora.seed = True, "oak", i
+        scene.collection.objects.link(plant)
+    space = ui.area().spaces.active
+    space.overlay.show_overlays = False
+    space.clip_end = 1000.0
+    ui.values["camera"] = scene.camera is not None
+    look(space, 20.0, 3.0)
+    scene.tetflora.quality = 'PREVIEW'
+    scene.tetflora.follow_viewport = True
+    begun = time.monotonic()
+    scene.tetflora.auto_refine = True
+    yield from ui.until(lambda: finished(scene), 20, "first look")
+    ui.values["first_look_s"] = time.monotonic() - begun
+    ui.values["first"] = polygons(scene)
+    yield from ui.picture("first")
+    yield from ui.until(lambda: quiet(scene), 120, "near view")
+    ui.values["near"] = polygons(scene)
+    yield from ui.picture("near")
+
+    uid = result_collections(scene, 'VIEW')[0].session_uid
+    look(space, 70.0, 400.0)
+    yield 0.5
+    yield from ui.until(lambda: quiet(scene) and result_collections(scene, 'VIEW')[0].session_uid != uid, 120, "far")
+    ui.values["far"] = polygons(scene)
+    yield from ui.picture("far")
+    ui.values["message"] = auto.message()
+    scene.tetflora.auto_refine = False
+
+
+def look(space, tilt, distance):
+    """Turn the viewport towards the middle of the plants."""
+    view = space.region_3d
+    view.view_perspective = 'PERSP'
+    view.view_location = Vector((0.0, 0.0, 5.0))
+    view.view_rotation = Euler((math.radians(90.0 - tilt), 0.0, 0.4)).to_quaternion()
+    view.view_distance = distance
+
+
+def finished(scene):
+    """Whether a result is shown that is not under construction."""
+    found = result_collections(scene, 'VIEW')
+    return bool(found) and all("tetflora_unfinished" not in c for c in found)
+
+
+def quiet(scene):
+    """Whether nothing is left to do."""
+    return finished(scene) and not auto.message()
+
+
+def polygons(scene):
+    """Those of all results."""
+    made = [o for c in result_collections(scene, 'VIEW') for o in c.objects if o.type == 'MESH']
+    return sum(len(o.data.polygons) for o in made)
