@@ -100,6 +100,13 @@ class Camera:
         shutter = tuple(other.counted_from(origin) for other in self.shutter)
         return replace(self, position=self.position - by, shutter=shutter, origin=origin)
 
+    def smaller(self, most: int) -> Camera:
+        """The same camera with an image of so many pixels at most on its longer side."""
+        size = min(most / max(self.width, self.height), 1.0)
+        width, height = max(round(size * self.width), 1), max(round(size * self.height), 1)
+        shutter = tuple(other.smaller(most) for other in self.shutter)
+        return replace(self, width=width, height=height, shutter=shutter)
+
     @property
     def eye(self) -> NDArray[np.float64]:
         """Where the image is seen from (3,), metres: before the position where the camera stands for several."""

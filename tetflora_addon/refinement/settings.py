@@ -151,26 +151,25 @@ class RefinementSettings:
     )
 
     def first_look(self) -> RefinementSettings:
-        """Settings of a result that is there within a second or so, of any scene, and shows where everything is.
+        """Settings of a result that is there within a second or so and shows where everything is.
 
-        Coarser than these settings in every respect; what depends on the form of proxies stays.
+        Meant for an image of `FIRST_LOOK` pixels; coarser than these settings in every respect. Limits stay.
         """
-        polygons, coarse = self.max_polygons or _FIRST_POLYGONS, QUALITIES["DRAFT"]
+        coarse = QUALITIES["DRAFT"]
         return replace(
             self,
-            cutoff=max(2.0 * self.cutoff, 2.0 * coarse["cutoff"]),
-            leaf_limit=max(2.0 * self.leaf_limit, 2.0 * coarse["leaf_limit"]),
-            facet=max(2.0 * self.facet, 2.0 * coarse["facet"]),
-            block=max(2.0 * self.block, 64.0),
-            visibility_resolution=min(self.visibility_resolution, 96),
+            cutoff=max(self.cutoff, coarse["cutoff"]),
+            leaf_limit=max(self.leaf_limit, coarse["leaf_limit"]),
+            facet=max(self.facet, 2.0 * coarse["facet"]),
+            visibility_resolution=min(self.visibility_resolution, _FIRST_RESOLUTION),
             max_tetrahedra=min(self.max_tetrahedra, _FIRST_TETRAHEDRA),
-            max_polygons=min(polygons, _FIRST_POLYGONS),
             shadow_cutoff=0.0,
         )
 
 
-#: Limits of a first look.
-_FIRST_POLYGONS, _FIRST_TETRAHEDRA = 100_000, 4_000
+#: Longest side of the image that a first look is made for, pixels; its tetrahedra, and its alpha buffer.
+FIRST_LOOK = 320
+_FIRST_TETRAHEDRA, _FIRST_RESOLUTION = 4_000, 96
 #: What the qualities of the panel stand for.
 QUALITIES: dict[str, dict[str, float]] = {
     "DRAFT": {"cutoff": 6.0, "leaf_limit": 1.0, "facet": 1.2, "visibility_resolution": 128},

@@ -4,8 +4,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.proxies.drawn import facet_mesh
@@ -70,3 +74,14 @@ def test_facets_beside_the_view_do_not_reach_into_it():
     assert camera.clearance(shrunk.positions.astype(float)).min() > -1e-4
     same = kept_out_of_view(facets, lambda points: np.full(len(points), np.inf), 0.0)
     assert (same.side == facets.side).all()
+
+
+@given(st.integers(1, 5000), st.integers(1, 5000), st.integers(1, 2000))
+def test_a_smaller_camera_sees_the_same(width, height, most):
+    camera = replace(_camera("PERSP"), width=width, height=height)
+    smaller = replace(camera, shutter=(camera,)).smaller(most)
+    assert max(smaller.width, smaller.height) <= max(most, 1)
+    assert smaller.window == camera.window
+    assert (smaller.width, smaller.height) == (smaller.shutter[0].width, smaller.shutter[0].height)
+    if max(width, height) <= most:
+        assert (smaller.width, smaller.height) == (width, height)

@@ -29,7 +29,7 @@ from ...proxies.facet_weights import measuring, unmeasured
 from ...refinement import loop
 from ...refinement.decisions import Decision
 from ...refinement.loop import Refinement, step_of
-from ...refinement.settings import RefinementSettings
+from ...refinement.settings import FIRST_LOOK, RefinementSettings
 from ...refinement.statistics import Statistics, Stopwatch
 from ..compat import drawn_disc
 from ..main_thread import in_main_thread
@@ -179,7 +179,7 @@ def _first_look(
     """A coarse result in place of earlier ones, without baked light."""
     first = Results(results.scene, results.purpose, "", data)
     first.origin, given = results.origin, replace(given, sources=None)
-    settings = refinement_settings(results.scene).first_look()
+    settings, camera = refinement_settings(results.scene).first_look(), camera.smaller(FIRST_LOOK)
     try:
         for progress in _write_refined(first, flora, given, camera, Statistics(), Stopwatch(), settings):
             yield Progress(0.02 + 0.03 * progress.fraction, "First look", progress.waiting)
