@@ -44,7 +44,8 @@ class Expected:
     def __init__(self, flora: Flora, result: Refinement, camera: Camera) -> None:
         self.sight = Sight(flora, result, camera)
         self.every = portions = self.sight.portions()
-        self.found = np.ones(2)  # of polygons and of facets, what was found over what was expected
+        # Of polygons, and of facets that are seen or not, what was found over what was expected.
+        self.found = np.ones(3)
         some = portions.visibility > 0
         self.flora, self.camera, self.portions = flora, camera, portions.take(np.flatnonzero(some))
         self.sizes = sizes_of(flora, self.portions, self.sight.shadows)
@@ -94,7 +95,7 @@ class Expected:
     def unseen(self, pixels: FacetPixels, safe: bool = False) -> float:
         """Facets of all plants that are not seen; safe as for `seen`."""
         found = on_all_cores(lambda sizes: float(sizes.counts(pixels).sum()), self.unseen_sizes)
-        return float(max(self.found[1], float(safe))) * sum(found)
+        return float(max(self.found[2], float(safe))) * sum(found)
 
     def together(self, settings: RefinementSettings) -> float:
         """Expected polygons and facets of all, seen or not, at the details of the settings."""
@@ -105,19 +106,23 @@ class Expected:
     def calibrate(self, pixels: FacetPixels, limit: float, exactly: bool) -> None:
         """Draw some of the plants, or more of them, and expect of all what was found of these."""
         share = _DRAWN[int(exactly)] / max(len(self.every), 1)
-        chosen = uniform(self.every.parts.branches.key, _SAMPLE) < min(share, 1.0)
+        # What no point tells about has almost nothing within the view, or very much: one of them would speak for all.
+        chosen = (uniform(self.every.parts.branches.key, _SAMPLE) < share) & (self.every.within >= 1.0) | (share >= 1.0)
         some = self.every.take(np.flatnonzero(chosen))
         transition = Transition(self.flora, self.camera, limit, self.tolerance)
         weights = facet_weights(self.flora, ())
         real = sum(portion_blocks(self.sight, some, transition, form=_cost))
-        facets = sum(made for _, made, _ in portion_facets(self.sight, some, weights, pixels, transition, _count))
+        seen = some.visibility > 0
+        groups = [some.take(np.flatnonzero(group)) for group in (seen, ~seen)]
+        made = [portion_facets(self.sight, group, weights, pixels, transition, _count) for group in groups]
+        facets = [sum(number for _, number, _ in of_group) for of_group in made]
         sizes, fraction = sizes_of(self.flora, some, self.sight.shadows), np.where(some.real, 1.0, 0.0)
-        fraction *= np.where(some.visibility > 0, transition.of_branches(some.parts.branches, some.visibility), 0.0)
+        fraction *= np.where(seen, transition.of_branches(some.parts.branches, some.visibility), 0.0)
         faces = _real_faces(self.flora, some, transition) + transition.detail.more(some.parts, some.visibility)
         faces += _bare(self.flora, some, self.camera, limit)
         expected = (some.within * fraction * faces).sum() + _tubes(self.flora, some, transition, fraction).sum()
-        left = (some.within * (1.0 - fraction) * sizes.counts(pixels)).sum()
-        self.found = np.clip((np.array([real, facets]) + _SOME) / (np.array([expected, left]) + _SOME), *_ROUGH)
+        left = np.bincount(~seen, some.within * (1.0 - fraction) * sizes.counts(pixels), minlength=2)
+        self.found = np.clip((np.array([real, *facets]) + _SOME) / (np.array([expected, *left]) + _SOME), *_ROUGH)
 
     def polygons(self, pixels: float, limit: float, weight: float, every: bool) -> float:
         """Polygons of other meshes, and facets in their place; of what is seen, or of all."""

@@ -173,7 +173,9 @@ def sizes_of(flora: Flora, portions: Portions, shadows: ThrownShadows) -> FacetS
     sizes = subplant_facet_sizes(flora, parts.branches, *given)
     sides = flora.rows["sides"][parts.branches.row] * flora.rows["segments"][parts.branches.row]
     alone = np.sqrt(parts.totals.wood_area / 2 / np.maximum(sides, 1))
-    return replace(sizes, least_wood=np.where(parts.alone, alone, sizes.least_wood))
+    # What is in the view in part gets facets that may be in the view.
+    clearance = np.where(portions.beside, sizes.clearance, np.minimum(sizes.clearance, 0.0))
+    return replace(sizes, least_wood=np.where(parts.alone, alone, sizes.least_wood), clearance=clearance)
 
 
 @dataclass(frozen=True)
@@ -209,10 +211,9 @@ class _Maker:
             for group in (seen, ~seen & ~portions.beside, portions.beside & ~seen):
                 some = np.flatnonzero(group & ~open_here & ~parts.alone & (real < 1.0))
                 if len(some):
-                    left_out = np.where(seen[some], real[some], 1.0 - sizes.enough[some])
+                    left_out = np.where(seen[some], real[some], 1.0 - sizes.enough(self.pixels)[some])
                     made = self._of_subplants(parts.branches.take(some), sizes.take(some), left_out)
-                    beside = bool(portions.beside[some[0]] and not seen[some[0]])
-                    yield self._beside(made, beside), not beside
+                    yield self._placed(made, bool(seen[some[0]]), bool(portions.beside[some[0]]))
             # What is opened for its detail alone keeps one visibility, as its real leaves do.
             portions = replace(portions, mixed=mixed).take(np.flatnonzero(open_here))
             portions = sight.opened(portions) if len(portions) else portions
@@ -222,8 +223,7 @@ class _Maker:
             some = every.take(np.flatnonzero(group))
             if len(some):
                 made = self._of_bodies(some)
-                beside = bool(some.beside[0] and some.visibility[0] <= 0)
-                yield self._beside(made, beside), not beside
+                yield self._placed(made, bool(some.visibility[0] > 0), bool(some.beside[0]))
 
     def _throws(self, portions: Portions) -> NDArray[np.bool_]:
         """Portions (n,) beside the view with shadows in it that show trunk and limbs."""
@@ -235,9 +235,14 @@ class _Maker:
         out[some] = parts.extent[some] > THROWN * fallen
         return out
 
-    def _beside(self, facets: Facets, beside: bool) -> Facets:
-        """Facets beside the view must not reach into the image."""
-        return kept_out_of_view(facets, self.sight.camera.clearance, HIDDEN_LEAVES**-0.5) if beside else facets
+    def _placed(self, facets: Facets, seen: bool, beside: bool) -> tuple[Facets, bool]:
+        """Facets, and whether they may be in the image; those beside the view must not reach into it.
+
+        Of what is hidden at the border of the image, some are beside it too.
+        """
+        if seen:
+            return facets, True
+        return kept_out_of_view(facets, self.sight.camera.clearance, HIDDEN_LEAVES**-0.5, not beside), not beside
 
     def _of_subplants(self, subplants: Branches, sizes: FacetSizes, real: NDArray[np.float64]) -> Facets:
         leaf, wood = sizes.sides(self.pixels)

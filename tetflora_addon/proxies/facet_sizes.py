@@ -35,20 +35,22 @@ _JUST_HIDDEN = 1.5
 #: How much larger than `COARSE` facets are from where on a budget may make them as large as it needs.
 _DEEP = 4.0
 #: Pixels that no facet within the view exceeds, however deep it is, for all that a budget asks.
-_BLOT = 12.0
+_BLOT = 8.0
 #: One-sided layers of leaves that are enough where nothing is seen, and how much of its box a crown fills.
 _LAYERS, _FILLED = 6.0, 0.6
 #: Optical depth from which on fewer facets are enough, as little light comes from there, and the least fraction.
 _DEEPEST, _LEAST_KEPT = 6.0, 0.15
-#: Factor on hidden facets beyond which these limits give way.
-_LOOSE = 16.0
+#: Factor on hidden facets beyond which these limits give way: within the view by no more than a factor, from which on
+#: facets of what is deeply hidden are left out, but no more of them than so many.
+_LOOSE, _GIVES_WAY, _LEFT = 16.0, 1.5, 0.2
 #: Largest side of facets beside the view over their distance from it; metres that count least, and from which on it
 #: grows faster.
 _BESIDE = 0.1, 8.0, 15.0
 #: The same of those that throw shadows into the view, over the metres that these fall, and the metres that count least.
 _THROWN, _SHARP = 0.02, 1.0
-#: Power of the visibility by which facets are larger where they are seen in part, and the visibility that counts least.
-FADING, LEAST_VISIBILITY = 0.5, 0.08
+#: Powers of the visibility by which facets are larger where they are seen in part: of those within a pixel each then
+#: draws as much of the image; of larger ones those that do show must not be blots. The visibility that counts least.
+FADING, LEAST_VISIBILITY = (0.5, 0.3), 0.08
 #: Sides of facets of wood, however little is seen of it, over those that are seen well.
 _SHARD = 1.7
 _HIDING_DEPTH = 4.0  # e^−4 = .02 is left
@@ -120,8 +122,7 @@ class FacetSizes(Arrays):
 
     def sides(self, pixels: FacetPixels) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Sides (n,), (n,) of facets of leaves and of wood, metres."""
-        fading = np.maximum(self.visibility, LEAST_VISIBILITY) ** -FADING
-        side = fading * pixels.seen * self.extent
+        side = _seen_pixels(self.visibility, pixels.seen) * self.extent
         coarse = np.minimum(self.coarse * pixels.seen, max(_JUST_HIDDEN * pixels.seen, _WIDEST)) * self.extent
         blurred = np.minimum(_SOFT * np.maximum(self.clearance, 0.0), np.sqrt(self.totals.optical_area / _FEWEST))
         # Near the camera, some leaves together are large in the image, and what is hidden shows between others; beside
@@ -130,18 +131,19 @@ class FacetSizes(Arrays):
         leaves = np.minimum(several, np.where(self.clearance > 0.0, thrown, _BLOT * self.extent))
         unseen = np.maximum(np.maximum(coarse, blurred), leaves)
         # What is only just hidden shows between crowns after all, and would be blots.
-        deep = np.clip((self.coarse - COARSE) / _DEEP, 0.0, 1.0)
+        deep = self._deep
         beside = self.clearance > 0.0
         near, nearest, far = _BESIDE
         away = np.maximum(self.clearance, nearest)
         most = np.where(beside, np.minimum(near * away * (1.0 + (away / far) ** 2), thrown), 0.0)
         blot = np.minimum((np.maximum(self.coarse, COARSE) / COARSE) ** 1.5 * max(_WIDEST, pixels.seen), _BLOT)
-        # Where a forest has too many even so, these limits give way.
-        most = max(pixels.hidden / _LOOSE, 1.0) * np.where(beside, most, blot * self.extent)
+        # Where a forest has too many even so, these limits give way; within the view not far, or there would be shards.
+        over = max(pixels.hidden / _LOOSE, 1.0)
+        most = np.where(beside, over * most, min(over, _GIVES_WAY) * blot * self.extent)
         # Beside the view they must not reach into it, or they would lose area.
         unseen = np.clip(pixels.hidden ** np.where(beside, 1.0, deep) * unseen, unseen, np.maximum(unseen, most))
         # Wood is lighter or darker than leaves: where it shows after all, a large facet of it is a shard.
-        shard = _SHARD * max(pixels.seen, 1.0) * self.extent
+        shard = _SHARD * max(pixels.seen, 1.0) * np.where(self.hidden, min(over, _GIVES_WAY), 1.0) * self.extent
         wood = np.minimum(side, shard)
         side = np.where(self.hidden, unseen, side)
         # Hidden wood is cut into no more facets than it has faces. Elsewhere it is cut as fine as the side requires, or
@@ -157,13 +159,19 @@ class FacetSizes(Arrays):
         # Branches are closed: half of their surface is never seen.
         leaves = self.totals.leaf_area / np.maximum(leaf, 1e-12) ** 2
         number = leaves + self.totals.wood_area / 2 / np.maximum(wood, 1e-12) ** 2
-        return np.where(self.hidden, self.enough, 1.0) * number
+        return np.where(self.hidden, self.enough(pixels), 1.0) * number
 
     @property
-    def enough(self) -> NDArray[np.float64]:
+    def _deep(self) -> NDArray[np.float64]:
+        """How surely (n,) nothing shows of what is hidden, 0 to 1."""
+        return np.clip((self.coarse - COARSE) / _DEEP, 0.0, 1.0)
+
+    def enough(self, pixels: FacetPixels) -> NDArray[np.float64]:
         """Fraction (n,) of the facets of what is not seen that are made."""
+        over = max(pixels.hidden / _LOOSE / _GIVES_WAY, 1.0)
+        left = np.where(self.clearance > 0.0, 1.0, max(over**-2.0, _LEFT) ** self._deep)
         depth = np.where(self.clearance > 0.0, COARSE, self.coarse) / COARSE * _HIDING_DEPTH
-        return self.kept * np.clip(_DEEPEST / np.maximum(depth, _HIDING_DEPTH), _LEAST_KEPT, 1.0)
+        return left * self.kept * np.clip(_DEEPEST / np.maximum(depth, _HIDING_DEPTH), _LEAST_KEPT, 1.0)
 
 
 @dataclass(frozen=True)
@@ -204,6 +212,12 @@ class PolygonFacetSizes:
     def counts(self, pixels: float) -> NDArray[np.float64]:
         """Expected number (n,) of faces."""
         return np.where(self.kept(pixels), 1.0, self.optical / np.maximum(self.sides(pixels), 1e-12) ** 2)
+
+
+def _seen_pixels(visibility: NDArray[np.float64], pixels: float) -> NDArray[np.float64]:
+    """Sides (n,) in pixels of facets of which a fraction (n,) is seen, where those that nothing hides have so many."""
+    small, large = (pixels * np.maximum(visibility, LEAST_VISIBILITY) ** -power for power in FADING)
+    return np.minimum(small, np.maximum(large, 1.0))
 
 
 def coarseness(result: Refinement) -> NDArray[np.float64]:

@@ -130,22 +130,27 @@ def piece_facets(
     )
 
 
-def kept_out_of_view(facets: Facets, clearance: Callable[[NDArray], NDArray], smallest: float) -> Facets:
+def kept_out_of_view(
+    facets: Facets, clearance: Callable[[NDArray], NDArray], smallest: float, within: bool = False
+) -> Facets:
     """Facets that are out of view, moved away from it where they would reach into it, so that they keep their area.
 
     Where there is no room beside it, they are shrunk, but to no less than a fraction of their side. ``clearance`` gives
-    the distance (n,) of points (n, 3) from the view in metres.
+    the distance (n,) of points (n, 3) from the view in metres. With ``within``, facets whose middle is in the view stay
+    as they are.
     """
     reach, centre = CIRCUMRADIUS * facets.side, facets.centre
-    short = reach - clearance(centre)
-    some = np.flatnonzero((short > 0.0) & (short < _MOST_MOVED * reach))
+    away = clearance(centre)
+    stay = (away <= 0.0) & within
+    short = reach - away
+    some = np.flatnonzero((short > 0.0) & (short < _MOST_MOVED * reach) & ~stay)
     if len(some):
         here, step = centre[some], 0.1 * reach[some, None]
         slope = np.stack([clearance(here + step * axis) - clearance(here) for axis in np.eye(3)], axis=1) / step
         steep = np.maximum(np.einsum("ni,ni->n", slope, slope), _LEAST_SLOPE)
         centre = centre.copy()
         centre[some] += (short[some] / steep)[:, None] * slope
-    fraction = np.clip(clearance(centre) / np.maximum(reach, 1e-12), smallest, 1.0)
+    fraction = np.where(stay, 1.0, np.clip(clearance(centre) / np.maximum(reach, 1e-12), smallest, 1.0))
     return replace(facets, centre=centre, side=facets.side * fraction)
 
 
