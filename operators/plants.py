@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Change, re-roll, select and remove plants, and drop them to the ground."""
 
+from collections.abc import Generator
+
 import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
+from ..tetflora_addon.blender.placing.dropping import Dropped, drop_steps
 from ..tetflora_addon.blender.placing.field_edits import assign_field_species, editable, reseed_field
-from ..tetflora_addon.blender.placing.ground import Ground, drop_field, drop_plants
 from ..tetflora_addon.blender.placing.plant_objects import (
     assign_species,
     plants_of,
@@ -17,7 +19,8 @@ from ..tetflora_addon.blender.placing.plant_objects import (
 from ..tetflora_addon.blender.placing.populations import recount
 from ..tetflora_addon.blender.scene.fields import fields_of, stored_size
 from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, operator_items
-from .base import LINKED, Reporting, counted, in_object_mode, plants_or_fields_selected, selected_plants
+from ..tetflora_addon.jobs import Progress
+from .base import LINKED, ModalJob, Reporting, counted, in_object_mode, plants_or_fields_selected, selected_plants
 
 
 class TETFLORA_OT_assign_species(Reporting, bpy.types.Operator):
@@ -136,7 +139,7 @@ class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
         return self.done(f"{counted(number, 'plant')} removed")
 
 
-class TETFLORA_OT_drop_to_ground(Reporting, bpy.types.Operator):
+class TETFLORA_OT_drop_to_ground(ModalJob, bpy.types.Operator):
     """Move the selected plants, and the plants of selected fields, vertically to the nearest visible mesh.
 
     Plants, results and refined meshes do not count as ground.
@@ -146,26 +149,18 @@ class TETFLORA_OT_drop_to_ground(Reporting, bpy.types.Operator):
     bl_label = "Drop Plants to Ground"
     needs = (in_object_mode, plants_or_fields_selected)
 
-    def run(self, context: bpy.types.Context) -> set[str]:
-        context.view_layer.update()
-        depsgraph = context.evaluated_depsgraph_get()
-        ground = Ground(context.view_layer, depsgraph)
-        if not len(ground):
-            return self.failed("No mesh is visible below or above the plants; add a ground mesh, or show it")
-        plants = selected_plants(context)
-        fields = fields_of(context.selected_objects)
-        moved, missed = drop_plants(plants, ground)
-        for field in fields:
-            if editable(field):
-                more, none = drop_field(field, ground)
-                moved, missed = moved + more, missed + none
-        left = [field.name for field in fields if not editable(field)]
-        notes = [f"{counted(missed, 'plant')} had no ground below or above"] if missed else []
+    def steps(self, context: bpy.types.Context) -> Generator[Progress, object, Dropped]:
+        fields = [field for field in fields_of(context.selected_objects) if editable(field)]
+        return drop_steps(context.scene, context.evaluated_depsgraph_get(), selected_plants(context), fields)
+
+    def finish(self, context: bpy.types.Context, result: Dropped) -> set[str]:
+        left = [field.name for field in fields_of(context.selected_objects) if not editable(field)]
+        notes = [f"{counted(result.missed, 'plant')} had no ground below or above"] if result.missed else []
         if left:
             notes.append(f'"{left[0]}" was not moved: it has modifiers, or was not created by TetFlora')
-        moves = f"{counted(moved, 'plant')} moved to the ground"
+        moves = f"{counted(result.moved, 'plant')} moved to the ground"
         self.report({'WARNING' if notes else 'INFO'}, "; ".join([moves, *notes]))
-        return {'FINISHED'} if moved else {'CANCELLED'}
+        return {'FINISHED'} if result.moved else {'CANCELLED'}
 
 
 CLASSES = (

@@ -10,8 +10,9 @@ import pytest
 
 from tests.blender.scenes import add_mesh, add_plant, depsgraph, select
 from tetflora_addon.blender import attributes
-from tetflora_addon.blender.placing import plant_objects
+from tetflora_addon.blender.placing import dropping, plant_objects
 from tetflora_addon.blender.scene import fields
+from tetflora_addon.errors import SceneError
 from tetflora_addon.planting import places
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -87,6 +88,32 @@ def test_without_ground_nothing_happens():
     select(add_plant("alone", location=(0.0, 0.0, 4.0)))
     with pytest.raises(RuntimeError, match="No mesh is visible below"):
         bpy.ops.tetflora.drop_to_ground()
+
+
+def _steps(number=1000):
+    """The steps for a field of many plants 4 m above the ground, and a plant that is an object."""
+    add_mesh("ground", size=20.0)
+    field, plant = _field([(0.0, 0.0, 4.0)] * number), add_plant("plant", location=(3.0, 0.0, 2.0))
+    return dropping.drop_steps(bpy.context.scene, depsgraph(), [plant], [field]), field, plant
+
+
+def test_nothing_has_moved_where_the_search_is_stopped():
+    steps, field, plant = _steps()
+    fractions = [next(steps).fraction for _ in range(4)]
+    assert fractions == sorted(fractions)
+    assert 0.0 < fractions[-1] < 1.0
+    steps.close()
+    assert plant.location.z == 2.0
+    assert np.allclose(_read(field).position[:, 2], 4.0)
+
+
+def test_a_plant_that_is_deleted_meanwhile_is_named():
+    steps, field, plant = _steps()
+    next(steps), next(steps)
+    bpy.data.objects.remove(plant)
+    with pytest.raises(SceneError, match='Dropping plants was stopped because "plant" was deleted'):
+        next(steps)
+    assert np.allclose(_read(field).position[:, 2], 4.0)
 
 
 def test_the_species_of_fields_changes_with_that_of_plants():

@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The ground under brush, cursor and plants: rays against visible meshes, and plants dropped onto them.
+"""The ground under brush, cursor and plants: rays against visible meshes.
 
 `Scene.ray_cast` would stop at the leaves of a refined forest, and cannot leave objects out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Generator, Iterable
 from math import inf
 
 import bpy
@@ -15,13 +15,11 @@ import numpy as np
 from mathutils import Vector
 from numpy.typing import NDArray
 
-from ..attributes import read, write
 from ..materials.nodes import is_ours
-from .field_edits import own_mesh
 
 _FEW = 8  # objects of which all are asked; of more only those whose boxes the ray meets
 _ABOVE = 1e-3  # metres above a plant's foot from which it falls, so that rounding does not let it through the ground
-_STAYS = 1e-6  # metres: a smaller gap counts as standing on the ground
+_AT_ONCE = 200  # places between two looks at the keyboard
 
 Hit = tuple[Vector, Vector]
 
@@ -104,11 +102,16 @@ class Ground:
                 out[i] = hit[0].z
         return out
 
-    def nearest_heights(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Height of the ground that is nearest along z, below or above, for places (n, 3); (n,), NaN where none is."""
+    def nearest_heights(self, places: NDArray[np.float64]) -> Generator[float, object, NDArray[np.float64]]:
+        """Find the height of the ground that is nearest along z, below or above, for places (n, 3).
+
+        Yields the fraction that is done, and returns (n,) float64, NaN where there is no ground.
+        """
         down, up = Vector((0.0, 0.0, -1.0)), Vector((0.0, 0.0, 1.0))
         out = np.full(len(places), np.nan)
         for i, (x, y, z) in enumerate(places.tolist()):
+            if i % _AT_ONCE == 0:
+                yield i / len(places)
             low = self.cast(Vector((x, y, z + _ABOVE)), down)
             high = self.cast(Vector((x, y, z)), up, abs(z - low[0].z) if low else inf)
             hit = high or low
@@ -132,45 +135,3 @@ def is_ground(obj: bpy.types.Object) -> bool:
     """Whether plants can stand on an object: visible, and neither a plant, nor a result, nor refined itself."""
     group = obj.tetflora
     return not (group.is_plant or group.is_field or group.is_explicit or is_ours(obj)) and obj.visible_get()
-
-
-def drop_plants(plants: Sequence[bpy.types.Object], ground: Ground) -> tuple[int, int]:
-    """Move plants that are objects; how many moved, and how many have no ground below or above.
-
-    Children move with their parents before they fall themselves.
-    """
-    places = np.array([o.matrix_world.translation for o in plants], dtype=np.float64).reshape(-1, 3)
-    heights = ground.nearest_heights(places)
-    gaps = heights - places[:, 2]
-    fall = np.flatnonzero(np.abs(gaps) > _STAYS)
-    chosen = set(plants)
-    for i in sorted(fall.tolist(), key=lambda i: _depth(plants[i])):
-        plant = plants[i]
-        moved = plant.matrix_world.copy()
-        moved.translation.z = heights[i]
-        plant.matrix_world = moved
-        if any(child in chosen for child in plant.children):
-            bpy.context.view_layer.update()
-    return len(fall), int(np.isnan(heights).sum())
-
-
-def _depth(obj: bpy.types.Object) -> int:
-    return 0 if obj.parent is None else 1 + _depth(obj.parent)
-
-
-def drop_field(field: bpy.types.Object, ground: Ground) -> tuple[int, int]:
-    """Move the points of an editable field; how many moved, and how many have no ground below or above."""
-    positions = read(field.data, "position")
-    world = np.array(field.matrix_world, dtype=np.float64)
-    places = positions.astype(np.float64) @ world[:3, :3].T + world[:3, 3]
-    heights = ground.nearest_heights(places)
-    # Positions are stored in single precision.
-    fall = np.abs(heights - places[:, 2]) > np.maximum(_STAYS, 1e-6 * np.abs(places).max(axis=1, initial=0.0))
-    if fall.any():
-        places[fall, 2] = heights[fall]
-        inverse = np.linalg.inv(world)
-        positions[fall] = places[fall] @ inverse[:3, :3].T + inverse[:3, 3]
-        mesh = own_mesh(field)
-        write(mesh, "position", positions)
-        mesh.update()
-    return int(fall.sum()), int(np.isnan(heights).sum())
