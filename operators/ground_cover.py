@@ -36,12 +36,7 @@ class TETFLORA_OT_ground_cover(ModalJob, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, Covered]:
         scene, depsgraph = context.scene, context.evaluated_depsgraph_get()
-        steps = cover_steps(scene, depsgraph, covered_population(scene), self.soil)
-        try:
-            while True:
-                yield Progress(next(steps), "Light and litter under the plants")
-        except StopIteration as stop:
-            return stop.value
+        return cover_steps(scene, depsgraph, covered_population(scene), self.soil)
 
     def finish(self, context: bpy.types.Context, result: Covered) -> set[str]:
         points.schedule()

@@ -203,18 +203,32 @@ def test_without_population_ground_or_plants_it_says_what_to_do():
     assert not _group().species_edits
 
 
-def test_closing_the_steps_leaves_everything_as_it_was():
+@pytest.mark.parametrize("until", ["Light and litter under the plants", "Planting", "Looking for places"])
+def test_closing_the_steps_leaves_everything_as_it_was(until):
     _wood()
     before = (len(_group().populations), len(bpy.data.objects), len(bpy.data.materials), len(bpy.data.images))
     steps = cover_steps(bpy.context.scene, depsgraph(), _group().populations[0])
-    for fraction in steps:
-        assert 0.0 <= fraction <= 1.0
-        if fraction >= 0.8:
+    for progress in steps:
+        assert 0.0 <= progress.fraction <= 1.0
+        if progress.message == until:
             break
     steps.close()
     after = (len(_group().populations), len(bpy.data.objects), len(bpy.data.materials), len(bpy.data.images))
     assert after == before
     assert not _group().species_edits
+
+
+def test_a_cover_that_is_there_is_kept_where_its_renewal_is_stopped():
+    _wood()
+    _cover()
+    (cover,) = _covers()
+    cover.mix.remove(0)  # what a renewal adds again
+    before = ([e.species for e in cover.mix], cover.density, cover.made, len(bpy.data.objects))
+    steps = cover_steps(bpy.context.scene, depsgraph(), _group().populations[0])
+    next(progress for progress in steps if progress.message == "Looking for places")
+    steps.close()
+    (cover,) = _covers()
+    assert ([e.species for e in cover.mix], cover.density, cover.made, len(bpy.data.objects)) == before
 
 
 def test_soil_is_browner_under_trees_and_greener_in_the_light():

@@ -8,8 +8,9 @@ the cover is an ordinary one: it can be changed, updated, frozen and removed.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Generator, Iterable, Iterator, Mapping
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
@@ -19,14 +20,17 @@ from numpy.typing import NDArray
 from ...errors import SceneError, TetFloraError
 from ...files import is_identifier
 from ...growth.hashing import child_key, key_of_seed, uniform
+from ...jobs import Progress
 from ...planting.canopy import Canopy
 from ...planting.cover import Floor, Habitat, Stratum, covered, tinted
 from ...species.litter import FALLEN
 from ..materials.soil import is_soil, soil_material
-from ..species.edits import catalogue, species_data, species_for, store_species
-from .canopy import canopy_of, crown_for, floor_steps, is_cover, shedder_of
+from ..runtime import JobData, guarded, is_there
+from ..species.edits import catalogue, revert_species, species_data, species_for, store_species
+from ..worker import steps_in_thread
+from .canopy import canopy_of, crown_for, crown_steps, floor_steps, is_cover, shedder_of, standing
 from .distances import HECTARE
-from .populations import Made, add_population, make_plants, refuse_frozen, remove_population
+from .populations import Made, add_population, forget_population, make_plants_steps, refuse_frozen, still_there
 from .rules import active_population, copy_settings, grounds_of
 from .terrain import MASKS, read_ground
 
@@ -48,6 +52,8 @@ MOST = 1_000_000
 _SHEDS = 1.2
 #: What is covered where the plants above are of no population.
 _ANYBODY = "plants"
+#: Fraction of the work after which plants are placed, and what is done before.
+_PLANTING, _UNDER = 0.7, "Light and litter under the plants"
 #: Soil without anything on it, linear RGB.
 HUMUS = np.array([0.036, 0.025, 0.016])
 #: How bright low plants are together, of how bright one blade is.
@@ -94,8 +100,8 @@ def cover_steps(
     soil: bool = True,
     grounds: Iterable[bpy.types.Object] | None = None,
     masks: Mapping[str, Any] | None = None,
-) -> Generator[float, None, Covered]:
-    """Cover the ground of a population; yields the fraction of the work that is done.
+) -> Generator[Progress, object, Covered]:
+    """Cover the ground of a population.
 
     What an earlier run made for the same population is replaced; settings that were changed since stay. Closing the
     steps leaves everything as it was.
@@ -114,9 +120,22 @@ def cover_steps(
     Raises
     ------
     SceneError
-        It has no ground or no plants above it, or the cover is frozen.
+        It has no ground or no plants above it, or the cover is frozen; or something was deleted meanwhile.
     """
-    yield 0.0
+    data = JobData("Covering the ground", scene)
+    return guarded(data, _cover_steps(data, scene, depsgraph, population, soil, grounds, masks or {}))
+
+
+def _cover_steps(
+    data: JobData,
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    population: bpy.types.PropertyGroup,
+    soil: bool,
+    grounds: Iterable[bpy.types.Object] | None,
+    masks: Mapping[str, Any],
+) -> Generator[Progress, object, Covered]:
+    yield (progress := Progress(0.0, _UNDER))
     uid = population.uid or _ANYBODY
     found = _cover_of(scene, uid)
     if found is not None:
@@ -126,35 +145,74 @@ def cover_steps(
         raise SceneError(
             f'"{population.name}" has no ground in this scene; select meshes and click Use Selected Meshes'
         )
-    own = {name: getattr(population, name) for name in MASKS} | dict(masks or {})
+    data.add_objects(grounds)
+    yield from crown_steps(progress, scene, standing(scene))
+    population = _again(data, scene, population, uid)
+    own = {name: getattr(population, name) for name in MASKS} | dict(masks)
     ground = read_ground(grounds, depsgraph, **own)
     canopy, above = canopy_of(scene, depsgraph)
     if not len(canopy):
         raise SceneError(f'"{population.name}" has no plants whose ground could be covered; click Update first')
-    yield 0.05
-    steps = floor_steps(canopy, ground.triangles, len(above))
+    yield (progress := Progress(0.05, _UNDER))
+    floor = yield from steps_in_thread(_told(floor_steps(canopy, ground.triangles, len(above))), progress)
+    yield Progress(_PLANTING, "Planting")
+    population = _again(data, scene, population, uid)
+    with _restored(scene, uid):
+        parts = _parts(scene, canopy, above)
+        found = _cover_of(scene, uid) or _add(scene, population, grounds, masks)
+        _mix(found, parts, ground.map_area)
+        with closing(make_plants_steps(scene, depsgraph, found)) as steps:
+            made = yield from _scaled(steps, _PLANTING)
+        bare = _lay_soil(scene, _cover_of(scene, uid), grounds, floor, above, ground.map_area) if soil else []
+    return Covered(made, bare)
+
+
+def _again(
+    data: JobData, scene: bpy.types.Scene, population: bpy.types.PropertyGroup, uid: str
+) -> bpy.types.PropertyGroup:
+    """A population, fetched again after others may have been added; settings for new ones stay where they are."""
+    return population if uid == _ANYBODY else still_there(data, scene, uid)
+
+
+def _told(steps: Generator[float, object, Floor]) -> Generator[Progress, object, Floor]:
+    """The maps, with their progress as a part of the whole."""
     while True:
         try:
-            yield 0.05 + 0.7 * next(steps)
+            yield Progress(0.05 + (_PLANTING - 0.05) * next(steps), _UNDER)
         except StopIteration as stop:
-            floor = stop.value
-            break
-    yield 0.8
-    # From here on the scene changes.
-    parts = _parts(scene, canopy, above)
-    number = None
-    if found is None:
-        number = len(scene.tetflora.populations)
-        found = _add(scene, population, grounds, masks or {})
-    _mix(found, parts, ground.map_area)
+            return stop.value
+
+
+def _scaled(steps: Generator[Progress, object, Made], begin: float) -> Generator[Progress, object, Made]:
+    """Steps that are the last part of others."""
+    while True:
+        try:
+            step = next(steps)
+        except StopIteration as stop:
+            return stop.value
+        yield replace(step, fraction=begin + (1.0 - begin) * step.fraction)
+
+
+@contextmanager
+def _restored(scene: bpy.types.Scene, uid: str) -> Iterator[None]:
+    """Where what is done ends early, forget a cover that is new, or what was added to one, and species of litter."""
+    group, found = scene.tetflora, _cover_of(scene, uid)
+    active, species = group.populations_index, {edit.identifier for edit in group.species_edits}
+    there, density = (len(found.mix), found.density) if found else (0, 0.0)
     try:
-        made = make_plants(scene, depsgraph, found)
-    except TetFloraError:
-        if number is not None:
-            remove_population(scene, number)
+        yield
+    except BaseException:  # an error, or Esc
+        cover = _cover_of(scene, uid) if is_there(scene) else None
+        if cover is not None and found is None:
+            forget_population(scene, cover.uid, active)
+        elif cover is not None:
+            while len(cover.mix) > there:
+                cover.mix.remove(len(cover.mix) - 1)
+            cover.density = density
+        for identifier in [e.identifier for e in group.species_edits] if is_there(scene) else ():
+            if identifier not in species:
+                revert_species(identifier)
         raise
-    bare = _lay_soil(scene, found, grounds, floor, above, ground.map_area) if soil else []
-    return Covered(made, bare)
 
 
 def _cover_of(scene: bpy.types.Scene, uid: str) -> bpy.types.PropertyGroup | None:

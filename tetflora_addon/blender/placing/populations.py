@@ -23,6 +23,7 @@ from ...planting.places import Placement
 from ..runtime import JobData, guarded, is_there
 from ..scene.fields import fields_of, stored_size
 from ..worker import at_once, call_in_thread
+from .canopy import crown_steps, is_cover, standing
 from .plant_objects import (
     POPULATION_MARK,
     add_field,
@@ -139,17 +140,19 @@ def make_plants_steps(
 def _make_plants_steps(
     data: JobData, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraPopulation
 ) -> Generator[Progress, object, Made]:
-    yield Progress(0.0, "Reading the ground")
+    progress, uid = Progress(0.0, "Reading the ground"), population.uid
+    yield progress
     refuse_frozen(population)
+    species = {entry.species for entry in population.mix}
+    if is_cover(population):
+        species |= standing(scene)
+    yield from crown_steps(progress, scene, species)
+    population = still_there(data, scene, uid)
     search = read_search(scene, depsgraph, population, set(_sorted_out(scene, population)[0]))
     progress = Progress(0.1, "Looking for places")
     yield progress
-    uid = population.uid
     placement = yield from call_in_thread(progress, search.placement)
-    population = next((p for p in scene.tetflora.populations if p.uid == uid), None)
-    if population is None:
-        data.stop("its population was deleted")
-        data.check()
+    population = still_there(data, scene, uid)
     if population.as_field == 'EMPTIES' and len(placement) > MOST_EMPTIES:
         raise SceneError(
             f"{len(placement):,} plants exceed the limit of {MOST_EMPTIES:,} empties; "
@@ -177,6 +180,15 @@ def _make_plants_steps(
     population.placed_by = fingerprint(population)
     returned = min(returned, len(placement))
     return Made(made, len(placement), placement.wanted, placement.reason, returned, placement.erased)
+
+
+def still_there(data: JobData, scene: bpy.types.Scene, uid: str) -> TetFloraPopulation:
+    """A population, fetched again: adding to the list moves what is in it."""
+    found = next((p for p in scene.tetflora.populations if p.uid == uid), None)
+    if found is None:
+        data.stop("its population was deleted")
+        data.check()
+    return found
 
 
 def _new_plants(
