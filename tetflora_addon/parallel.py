@@ -19,6 +19,9 @@ from typing import TypeVar
 #: More threads than this gain little, as memory is what they wait for; and each has a block of its own in memory.
 MOST_THREADS = 16
 
+#: Results that wait at most until longer items before them are done; each takes the memory of a block.
+MOST_WAITING = 4
+
 #: Environment variable with the number of threads where nobody has chosen one, for farms and tests.
 VARIABLE = "TETFLORA_THREADS"
 
@@ -55,8 +58,8 @@ def blocks(number: int, size: int) -> list[slice]:
 def on_all_cores(function: Callable[[_Item], _Result], items: Iterable[_Item]) -> Iterator[_Result]:
     """Results of a function for items, in their order.
 
-    No more are made ahead than there are threads. An error is raised where its result would come; what is not asked
-    for any more is not begun.
+    A few more are made ahead than there are threads, so that a thread has work while another is at a longer item. An
+    error is raised where its result would come; what is not asked for any more is not begun.
     """
     if threads() < 2 or within():
         yield from map(function, items)
@@ -65,7 +68,7 @@ def on_all_cores(function: Callable[[_Item], _Result], items: Iterable[_Item]) -
     try:
         for item in items:
             pending.append(_pool().submit(function, item))
-            if len(pending) >= threads():
+            if len(pending) >= threads() + min(threads(), MOST_WAITING):
                 yield pending.popleft().result()
         while pending:
             yield pending.popleft().result()

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,8 +13,9 @@ from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.hashing import uniform
 from ..parallel import blocks, on_all_cores
+from ..processes.pool import in_processes
 from ..proxies.facet_sizes import FacetPixels, polygon_facet_sizes
-from ..proxies.facet_weights import facet_weights
+from ..proxies.facet_weights import FacetWeights, facet_weights
 from ..proxies.microsurfaces import Facets
 from ..refinement.contents import LARGE
 from ..refinement.decisions import Decision
@@ -32,6 +35,8 @@ _THIN = 0.21, 1.4
 #: Parts of plants that are drawn to find out what to expect: where only the image limits them, and where a limit that
 #: must hold is near; polygons that are too few to tell; and how far expectations may be corrected.
 _DRAWN, _SOME, _ROUGH = (800, 3000), 300.0, (0.4, 2.5)
+#: Parts from which on other processes draw some of them.
+_WORTH = 300
 #: Draw of this module: which parts. That of the transition would choose those whose wood is real.
 _SAMPLE = 224
 #: Parts that are looked at together; sums of these are summed up in their order.
@@ -111,18 +116,20 @@ class Expected:
         some = self.every.take(np.flatnonzero(chosen))
         transition = Transition(self.flora, self.camera, limit, self.tolerance)
         weights = facet_weights(self.flora, ())
-        real = sum(portion_blocks(self.sight, some, transition, form=_cost))
-        seen = some.visibility > 0
-        groups = [some.take(np.flatnonzero(group)) for group in (seen, ~seen)]
-        made = [portion_facets(self.sight, group, weights, pixels, transition, _count) for group in groups]
-        facets = [sum(number for _, number, _ in of_group) for of_group in made]
+        seen, sample = some.visibility > 0, _Sample(self.sight, transition, weights, pixels)
+        groups = [(kind, some.take(np.flatnonzero(group))) for kind, group in enumerate((seen | True, seen, ~seen))]
+        # The longest first.
+        facets_seen, real, facets_hidden = in_processes(
+            _drawn_of, sample, (groups[1], groups[0], groups[2]), len(some) > _WORTH
+        )
         sizes, fraction = sizes_of(self.flora, some, self.sight.shadows), np.where(some.real, 1.0, 0.0)
         fraction *= np.where(seen, transition.of_branches(some.parts.branches, some.visibility), 0.0)
         faces = _real_faces(self.flora, some, transition) + transition.detail.more(some.parts, some.visibility)
         faces += _bare(self.flora, some, self.camera, limit)
         expected = (some.within * fraction * faces).sum() + _tubes(self.flora, some, transition, fraction).sum()
         left = np.bincount(~seen, some.within * (1.0 - fraction) * sizes.counts(pixels), minlength=2)
-        self.found = np.clip((np.array([real, *facets]) + _SOME) / (np.array([expected, *left]) + _SOME), *_ROUGH)
+        found = np.array([real, facets_seen, facets_hidden])
+        self.found = np.clip((found + _SOME) / (np.array([expected, *left]) + _SOME), *_ROUGH)
 
     def polygons(self, pixels: float, limit: float, weight: float, every: bool) -> float:
         """Polygons of other meshes, and facets in their place; of what is seen, or of all."""
@@ -139,6 +146,25 @@ class Expected:
         # What is large there stays as it is as long as facets are smaller.
         feature = np.where(np.isinf(cells.feature), LARGE, cells.feature)
         return held[cells.nodes] & (self.result.decision == Decision.EXPLICIT) & (feature < limit)
+
+
+@dataclass(frozen=True)
+class _Sample:
+    """What parts that are drawn as a sample are drawn with."""
+
+    sight: Sight
+    transition: Transition
+    weights: FacetWeights
+    pixels: FacetPixels
+
+
+def _drawn_of(sample: _Sample, group: tuple[int, Portions]) -> float:
+    """Polygons of some portions (kind 0), or facets."""
+    kind, portions = group
+    if kind == 0:
+        return sum(portion_blocks(sample.sight, portions, sample.transition, form=_cost))
+    made = portion_facets(sample.sight, portions, sample.weights, sample.pixels, sample.transition, _count)
+    return float(sum(number for _, number, _ in made))
 
 
 def _cost(block: Block) -> float:

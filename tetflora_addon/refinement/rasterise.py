@@ -22,7 +22,7 @@ from ..parallel import blocks, on_all_cores
 from ..tetrahedra.geometry import face_area_vectors, projected_area, volume
 
 #: Pairs of a primitive and a pixel of its bounding box that are tested together; some 100 bytes each.
-PAIRS_AT_ONCE = 1 << 19
+PAIRS_AT_ONCE = 1 << 15
 #: Primitives whose bounding boxes are computed together.
 PRIMITIVES_AT_ONCE = 1 << 17
 #: Tetrahedra that one thread draws at a time.
