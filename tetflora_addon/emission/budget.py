@@ -40,8 +40,10 @@ FACETS_FIRST = 6.0
 #: Reserved fraction of a budget that somebody has set, since expected numbers are means; and how many deviations of a
 #: number that is drawn at random, which is most for small budgets.
 _RESERVE, _DEVIATIONS = 0.06, 2.0
-_STEPS = 10  # of bisection on the logarithm of factors, between 1 and:
-_LARGEST = 256.0
+#: Factors are found as closely as this, on their logarithm, from 1 to the largest.
+_CLOSE, _LARGEST = 0.005, 256.0
+#: A number that stands for none where it is divided by, or its logarithm is taken.
+_NOTHING = 1e-9
 #: Fraction of a limit up to which what is expected certainly fits.
 _SURE = 0.6
 #: Largest factor on hidden facets that the image alone may ask for.
@@ -184,15 +186,15 @@ def _factors(
     few = min(_FEW_HIDDEN, allowed / 2)
     reserved = max(_HIDDEN * allowed, few)
 
-    def fits(factor: float) -> bool:
+    def load(factor: float) -> float:
         for_hidden = min(unseen(factor, hidden), reserved)
         if every:  # hidden facets do not grow for ever; what they need then is taken from those that are seen
             for_hidden = max(for_hidden, unseen(factor, max(hidden, largest)))
-        return seen(factor) + for_hidden <= allowed
+        return (seen(factor) + for_hidden) / max(allowed, _NOTHING)
 
-    factor = _smallest(fits)
+    factor = _smallest(load)
     for_hidden = min(reserved, max(seen(factor), few))
-    return factor, _smallest(lambda by: unseen(factor, by) <= for_hidden, largest)
+    return factor, _smallest(lambda by: unseen(factor, by) / max(for_hidden, _NOTHING), largest)
 
 
 def _side(factor: float, settings: RefinementSettings) -> float:
@@ -231,12 +233,33 @@ def _large(result: Refinement) -> NDArray[np.float64]:
     return np.bincount(held.cell[large], minlength=len(result.tree))[result.nodes].astype(np.float64)
 
 
-def _smallest(fits: Callable[[float], bool], largest: float = _LARGEST) -> float:
-    """Minimum factor from 1 on that fits, or the largest where none does."""
-    if fits(1.0):
+def _smallest(load: Callable[[float], float], largest: float = _LARGEST) -> float:
+    """Minimum factor from 1 on with which a load, which falls with it, is at most 1; the largest where it never is.
+
+    Numbers of facets are nearly powers of their sides, so that lines between logarithms lead there at once.
+    """
+
+    def excess(at: float) -> float:
+        return float(np.log(max(load(float(np.exp(at))), _NOTHING)))
+
+    low, high, above, below = 0.0, float(np.log(largest)), excess(0.0), None
+    if above <= 0.0:
         return 1.0
-    low, high = 0.0, np.log(largest)
-    for _ in range(_STEPS):
-        middle = (low + high) / 2
-        low, high = (low, middle) if fits(np.exp(middle)) else (middle, high)
+    steps = 0
+    while high - low > _CLOSE:
+        steps += 1
+        if steps % 3 == 0:  # where lines lead astray
+            guess = (low + high) / 2
+        elif below is None:
+            guess = low + above / 2
+        else:
+            guess = low + (high - low) * above / (above - below)
+        # Beyond where it should be, so that what is left of the interval lies on the near side.
+        guess += _CLOSE / 3 if guess - low < high - guess else -_CLOSE / 3
+        guess = min(max(guess, low + _CLOSE / 3), high - _CLOSE / 3)
+        found = excess(guess)
+        if found <= 0.0:
+            high, below = guess, found
+        else:
+            low, above = guess, found
     return float(np.exp(high))

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.hashing import uniform
-from ..parallel import blocks, on_all_cores
 from ..processes.pool import in_processes
-from ..proxies.facet_sizes import FacetPixels, polygon_facet_sizes
+from ..proxies.facet_sizes import FacetPixels, FacetSizes, polygon_facet_sizes
 from ..proxies.facet_weights import FacetWeights, facet_weights
 from ..proxies.microsurfaces import Facets
 from ..refinement.contents import LARGE
@@ -39,8 +38,8 @@ _DRAWN, _SOME, _ROUGH = (800, 3000), 300.0, (0.4, 2.5)
 _WORTH = 300
 #: Draw of this module: which parts. That of the transition would choose those whose wood is real.
 _SAMPLE = 224
-#: Parts that are looked at together; sums of these are summed up in their order.
-_TOGETHER = 50_000
+#: Parts, seen and not, that tell about all at a detail that is tried, to half a per cent; and which of them.
+_TELLING, _CHOSEN = 40_000, 225
 
 
 class Expected:
@@ -52,17 +51,29 @@ class Expected:
         # Of polygons, and of facets that are seen or not, what was found over what was expected.
         self.found = np.ones(3)
         some = portions.visibility > 0
-        self.flora, self.camera, self.portions = flora, camera, portions.take(np.flatnonzero(some))
-        self.sizes = sizes_of(flora, self.portions, self.sight.shadows)
+        self.flora, self.camera = flora, camera
+        self.portions, self.sizes, self.times = self._telling(portions.take(np.flatnonzero(some)))
         self.faces_coarse = _real_faces(flora, self.portions, Transition(flora, camera, 1.0, np.inf))
         self.any_bare = bool((flora.leaf_count[self.portions.parts.branches.row] <= 0).any())
         self.tolerance = TOLERANCE
-        unseen = sizes_of(flora, portions.take(np.flatnonzero(~some)), self.sight.shadows)
-        self.unseen_sizes = [unseen.take(block) for block in blocks(len(unseen), _TOGETHER)]
+        _, *self.unseen_sizes = self._telling(portions.take(np.flatnonzero(~some)))
         self.result, held, hidden = result, result.holdings.polygons, result.chosen(Decision.HIDDEN)
         self.cell = held.cell
         self.hidden = hidden[held.cell] | ~result.in_view[held.cell]
         self.faces = polygon_facet_sizes(held, camera, hidden)
+
+    def _telling(self, portions: Portions) -> tuple[Portions, FacetSizes, NDArray[np.float64]]:
+        """As many portions (n,) as tell about all, the sizes of their facets, and for how many each of them speaks.
+
+        What has many facets is chosen more likely, and speaks for fewer.
+        """
+        sizes = sizes_of(self.sight.flora, portions, self.sight.shadows)
+        if len(portions) <= _TELLING:
+            return portions, sizes, np.ones(len(portions))
+        many = sizes.counts(FacetPixels(1.0)) + portions.parts.totals.polygons**0.5
+        likely = np.minimum(_TELLING * many / max(float(many.sum()), 1e-300), 1.0)
+        chosen = np.flatnonzero(uniform(portions.parts.branches.key, _CHOSEN) < likely)
+        return portions.take(chosen), sizes.take(chosen), 1.0 / likely[chosen]
 
     @property
     def tolerance(self) -> float:
@@ -80,7 +91,8 @@ class Expected:
         """Polygons of near leaves beyond those of their models."""
         branches = self.portions.parts.branches
         fraction = Transition(self.flora, self.camera, limit).of_branches(branches, self.portions.visibility)
-        return float((np.where(self.portions.real, fraction, 0.0) * self.portions.within * self.faces_finer).sum())
+        real = np.where(self.portions.real, fraction, 0.0)
+        return float((self.times * real * self.portions.within * self.faces_finer).sum())
 
     def seen(self, pixels: float, limit: float, weight: float, safe: bool = False) -> float:
         """Polygons, and facets counted with a weight, of all plants that are seen.
@@ -94,13 +106,13 @@ class Expected:
         facets = found[1] * weight * self.sizes.counts(FacetPixels(pixels))
         bare = _bare(self.flora, self.portions, self.camera, limit) if self.any_bare else 0.0
         faces = found[0] * (self.faces_coarse + self.faces_finer + bare)
-        tubes = found[0] * float(_tubes(self.flora, self.portions, transition, real).sum())
-        return float((self.portions.within * (real * faces + (1.0 - real) * facets)).sum()) + tubes
+        tubes = found[0] * _tubes(self.flora, self.portions, transition, real)
+        return float((self.times * (self.portions.within * (real * faces + (1.0 - real) * facets) + tubes)).sum())
 
     def unseen(self, pixels: FacetPixels, safe: bool = False) -> float:
         """Facets of all plants that are not seen; safe as for `seen`."""
-        found = on_all_cores(lambda sizes: float(sizes.counts(pixels).sum()), self.unseen_sizes)
-        return float(max(self.found[2], float(safe))) * sum(found)
+        sizes, times = self.unseen_sizes
+        return float(max(self.found[2], float(safe))) * float(times @ sizes.counts(pixels))
 
     def together(self, settings: RefinementSettings) -> float:
         """Expected polygons and facets of all, seen or not, at the details of the settings."""
@@ -178,9 +190,9 @@ def _count(facets: Facets, _seen: bool) -> int:
 
 def _tubes(flora: Flora, portions: Portions, transition: Transition, real: NDArray[np.float64]) -> NDArray[np.float64]:
     """Expected polygons (n,) of thick wood of portions of whose leaves a fraction (n,) is real."""
-    branches, rows = portions.parts.branches, flora.rows[portions.parts.branches.row]
-    own = rows["sides"] * (rows["segments"] + rows["rings"]).astype(np.float64)
-    return transition.of_thickness(branches, portions.best) * own * ~rows["phantom"] * (1.0 - real)
+    branches, rows = portions.parts.branches, flora.rows
+    faces = rows["sides"] * (rows["segments"] + rows["rings"]).astype(np.float64) * ~rows["phantom"]
+    return transition.of_thickness(branches, portions.best) * faces[branches.row] * (1.0 - real)
 
 
 def _real_faces(flora: Flora, portions: Portions, transition: Transition) -> NDArray[np.float64]:
