@@ -26,6 +26,7 @@ from ..refinement.loop import Refinement
 from ..refinement.settings import RefinementSettings
 from .expected import Expected
 from .leaf_detail import TOLERANCE
+from .portions import Sight
 
 #: Approximate bytes of a polygon in Blender (110) and in a renderer (500) together.
 BYTES_PER_POLYGON = 610
@@ -68,12 +69,15 @@ class Detail:
         Width in pixels up to which leaves are facets.
     tolerance : float
         Pixels by which the margins of near leaves may be off; infinite where only their models are drawn.
+    sight : Sight or None
+        What is seen of plants with these decisions, where facets take their place.
     """
 
     refinement: Refinement
     pixels: FacetPixels
     leaf_limit: float
     tolerance: float = TOLERANCE
+    sight: Sight | None = None
 
 
 def enough(camera: Camera) -> float:
@@ -130,10 +134,11 @@ def afford(
         count.calibrate(FacetPixels(_side(factor, settings), hidden), _limit(factor, settings), near)
         factor, hidden = _affordable(count, settings, limits)
     limit = _limit(factor, settings)
-    small = count.too_small(limit) if factor > 1.0 else np.zeros(0, bool)
+    small, sight = count.too_small(limit) if factor > 1.0 else np.zeros(0, bool), count.sight
     if small.any():
+        sight = None
         result = replace(result, decision=np.where(small, Decision.PROXY, result.decision).astype(np.int8))
-    return Detail(result, FacetPixels(_side(factor, settings), hidden), limit, count.tolerance)
+    return Detail(result, FacetPixels(_side(factor, settings), hidden), limit, count.tolerance, sight)
 
 
 def _unreserved(budget: float) -> float:

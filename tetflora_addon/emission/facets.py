@@ -66,6 +66,7 @@ def facet_parts(
     pixels: FacetPixels,
     transition: Transition | None = None,
     form: Form | None = None,
+    sight: Sight | None = None,
 ) -> Iterator[Parts]:
     """Facets of all that is not drawn as it is; no block is empty.
 
@@ -84,10 +85,13 @@ def facet_parts(
         wood of all that is seen. Without, all of every plant gets facets.
     form : callable, optional
         What becomes of facets where they are made; without, they stay what they are.
+    sight : Sight, optional
+        Of the result, where there is one.
     """
+    sight = sight or Sight(flora, result, camera)
     parts: list[Part] = []
     current = None
-    for species, *made in _facets(flora, result, camera, pixels, transition, form):
+    for species, *made in _facets(sight, result, pixels, transition, form):
         full = sum(len(facets) for facets, _ in parts) >= BLOCK_POLYGONS
         if parts and (full or species != current):
             yield Parts(current, tuple(parts))
@@ -100,16 +104,14 @@ def facet_parts(
 
 
 def _facets(
-    flora: Flora,
+    sight: Sight,
     result: Refinement,
-    camera: Camera,
     pixels: FacetPixels,
     transition: Transition | None,
     form: Form | None,
 ) -> Iterator[tuple[int | None, Any, bool]]:
     """Facets in runs of about `FACETS_AT_ONCE`, species by species."""
-    sight = Sight(flora, result, camera)
-    portions = sight.portions()
+    flora, camera, portions = sight.flora, sight.camera, sight.portions()
     weights = facet_weights(flora, _drawn(flora, portions, transition))
     yield from portion_facets(sight, portions, weights, pixels, transition, form)
     explicit = result.chosen(Decision.EXPLICIT) if transition else np.zeros(len(result.tree), bool)
@@ -120,9 +122,9 @@ def _facets(
             yield None, facets if form is None else form(facets, seen), seen
 
 
-def drawn_species(flora: Flora, result: Refinement, camera: Camera, transition: Transition | None) -> list[int]:
-    """Species of which facets may be drawn, by index; arguments as for `facet_parts`."""
-    return _drawn(flora, Sight(flora, result, camera).portions(), transition)
+def drawn_species(sight: Sight, transition: Transition | None) -> list[int]:
+    """Species of which facets may be drawn, by index."""
+    return _drawn(sight.flora, sight.portions(), transition)
 
 
 def _drawn(flora: Flora, portions: Portions, transition: Transition | None) -> list[int]:

@@ -34,6 +34,7 @@ from .facets import Form, Parts, facet_parts
 from .leaf_detail import TOLERANCE
 from .light import BakedLight, baked_attributes
 from .plants import Transition
+from .portions import Sight
 from .shells import proxy_shells
 
 Buffers = MeshBuffers | PointBuffers
@@ -56,6 +57,8 @@ class Refined:
         Area that the renderer draws of a sphere of radius 1.
     tolerance : float
         Pixels by which the margins of near leaves may be off.
+    sight : Sight or None
+        What is seen of plants, where that is known already; None in forms without facets.
     """
 
     flora: Flora
@@ -65,6 +68,7 @@ class Refined:
     transition: Transition | None = None
     disc: float = np.pi
     tolerance: float = TOLERANCE
+    sight: Sight | None = None
 
     @property
     def facet_pixels(self) -> float | None:
@@ -73,7 +77,8 @@ class Refined:
 
     def facet_parts(self, form: Form | None = None) -> Iterator[Parts]:
         """Facets of the proxies, or what a form makes of them, block by block."""
-        return facet_parts(self.flora, self.refinement, self.camera, self.pixels, self.transition, form)
+        given = self.flora, self.refinement, self.camera, self.pixels, self.transition, form
+        return facet_parts(*given, sight=self.sight)
 
 
 @dataclass(frozen=True)

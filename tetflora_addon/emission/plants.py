@@ -150,13 +150,15 @@ def explicit_blocks(
     camera: Camera,
     transition: Transition | None = None,
     tolerance: float = np.inf,
+    sight: Sight | None = None,
 ) -> Iterator[Block]:
     """Polygons of explicit tetrahedra, and thick wood of all that is seen, in blocks from front to back.
 
     With a transition, small leaves are left to facets, by a random number of each leaf. Without, everything that lies
     in explicit tetrahedra for the most part is polygons, and the margins of near leaves may be off by a tolerance.
+    A sight of the result with a transition may be given where there is one.
     """
-    sight = Sight(flora, result, camera, facets=transition is not None)
+    sight = sight or Sight(flora, result, camera, facets=transition is not None)
     yield from portion_blocks(sight, sight.portions(), transition, tolerance)
 
 

@@ -109,13 +109,19 @@ class Sight:
             self._close &= result.in_view
         lowest = result.plants.parts.branches.position[:, 2].min(initial=np.inf)
         self.shadows = ThrownShadows(camera, result.lights, float(lowest))
+        self._every: Portions | None = None
 
     def __getstate__(self) -> dict[str, object]:
         """What other processes need to open portions: all but the plants themselves."""
-        return {**vars(self), "plants": self.plants.without_parts()}
+        return {**vars(self), "plants": self.plants.without_parts(), "_every": None}
 
     def portions(self) -> Portions:
-        """All parts, front to back."""
+        """All parts, front to back; kept, as polygons and facets are made of the same ones."""
+        if self._every is None:
+            self._every = self._sorted_portions()
+        return self._every
+
+    def _sorted_portions(self) -> Portions:
         made = self._portions(self.plants.parts, self.plants.points)
         branches = made.parts.branches
         # Ties are broken by the plants themselves, so that their order in the scene does not matter.

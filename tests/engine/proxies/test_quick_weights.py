@@ -93,7 +93,7 @@ def seen_from(distance: float, limit: float, monkeypatch: pytest.MonkeyPatch) ->
     camera = Camera("PERSP", eye, frame, (-0.5, 0.5, -0.5, 0.5), 0.01, 10.0 * distance, 200, 200)
     refinement = at_once(loop.refine(flora, seeds, camera, RefinementSettings()))
     transition = Transition(flora, camera, limit)
-    drawn = facets.drawn_species(flora, refinement, camera, transition)
+    drawn = facets.drawn_species(facets.Sight(flora, refinement, camera), transition)
     list(facets.facet_parts(flora, refinement, camera, facets.FacetPixels(0.33), transition))
     return drawn, measured
 

@@ -23,6 +23,7 @@ from ...emission.facets import drawn_species
 from ...emission.forms import EmissionForm, Refined
 from ...emission.plants import Transition, expanded_blocks, explicit_blocks
 from ...emission.polygons import polygon_blocks
+from ...emission.portions import Sight
 from ...jobs import Progress
 from ...processes import pool
 from ...proxies.facet_weights import measuring, unmeasured
@@ -282,10 +283,11 @@ def _refined(
         return Refined(flora, refinement, camera, tolerance=detail.tolerance)
     transition = Transition(flora, camera, detail.leaf_limit, detail.tolerance)
     yield Progress(_LOOP_FRACTION, "Analyzing leaf clustering")
+    sight = detail.sight or Sight(flora, refinement, camera)
     if unmeasured(flora):
-        for name, done in measuring(flora, drawn_species(flora, refinement, camera, transition)):
+        for name, done in measuring(flora, drawn_species(sight, transition)):
             yield Progress(_LOOP_FRACTION, f'Analyzing leaf clustering of "{name}": {done:.0%}')
-    return Refined(flora, refinement, camera, detail.pixels, transition, disc, detail.tolerance)
+    return Refined(flora, refinement, camera, detail.pixels, transition, disc, detail.tolerance, sight)
 
 
 def _write_refined(
@@ -309,7 +311,8 @@ def _write_refined(
     baking = None
     if given.sources is not None:
         baking = Baking(given.sources, leaves=scene.tetflora.baked_light == 'ALL')
-    blocks = explicit_blocks(flora, refined.refinement, camera, refined.transition, refined.tolerance)
+    how = refined.transition, refined.tolerance, refined.sight
+    blocks = explicit_blocks(flora, refined.refinement, camera, *how)
     yield from write_blocks(results, flora, blocks, statistics, _LOOP_FRACTION, baking)
     if given.explicit is not None:
         blocks = polygon_blocks(refined.refinement, camera, refined.facet_pixels)
