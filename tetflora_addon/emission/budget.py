@@ -13,7 +13,7 @@ for each polygon.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,7 +77,7 @@ class Detail:
     pixels: FacetPixels
     leaf_limit: float
     tolerance: float = TOLERANCE
-    sight: Sight | None = None
+    sight: Sight | None = field(default=None, compare=False)
 
 
 def enough(camera: Camera) -> float:

@@ -71,7 +71,7 @@ class Expected:
         if len(portions) <= _TELLING:
             return portions, sizes, np.ones(len(portions))
         many = sizes.counts(FacetPixels(1.0)) + portions.parts.totals.polygons**0.5
-        likely = np.minimum(_TELLING * many / max(float(many.sum()), 1e-300), 1.0)
+        likely = np.minimum(_TELLING * many / float(many.sum()), 1.0)
         chosen = np.flatnonzero(uniform(portions.parts.branches.key, _CHOSEN) < likely)
         return portions.take(chosen), sizes.take(chosen), 1.0 / likely[chosen]
 

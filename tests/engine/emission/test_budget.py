@@ -13,7 +13,7 @@ from hypothesis import settings as examples
 from hypothesis import strategies as st
 
 from tests.engine.emission.test_emission import scene, with_decision
-from tetflora_addon.emission import budget
+from tetflora_addon.emission import budget, expected
 from tetflora_addon.emission.budget import (
     BYTES_PER_POLYGON,
     BYTES_PER_SPHERE,
@@ -200,3 +200,48 @@ def test_spheres_take_less_of_a_budget_of_memory_and_as_much_of_one_of_polygons(
     facets = spheres(BYTES_PER_POLYGON, max_memory=memory / 1e9)
     assert facets.memory(BYTES_PER_POLYGON) <= memory
     assert facets.detail.pixels.seen > tight.detail.pixels.seen
+
+
+@given(st.floats(-2.0, 9.0), st.floats(0.2, 3.0), st.sampled_from(["power", "floor", "step", "bend"]))
+@examples(max_examples=100)
+def test_the_factor_is_the_smallest_that_fits(size: float, power: float, kind: str) -> None:
+    """Whatever way a load falls; straight lines take few steps."""
+    asked = []
+
+    def load(factor: float) -> float:
+        asked.append(factor)
+        whole = np.exp(size) * factor**-power
+        return {
+            "power": whole,
+            "floor": max(whole, 0.3 * np.exp(size)),
+            "step": np.exp(size) if factor < 20.0 else 1e-4,
+            "bend": (whole + np.exp(size) * min(1.0, (3.0 / factor) ** 4)) / 2.0,
+        }[kind]
+
+    found = budget._smallest(load)
+    assert len(asked) <= (10 if kind == "power" else 40)
+    if found < 250.0:
+        assert load(found) <= 1.0
+    if found > 1.0:
+        assert load(found * np.exp(-1.01 * budget._CLOSE)) > 1.0
+
+
+def test_some_parts_tell_about_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On average over samples, polygons and facets that are expected are those of all."""
+    (flora, _, camera, _), result = scene(), mostly_hidden(0.1)
+    asked = [(lambda e, p=p: e.seen(p, p, 1.0), lambda e, p=p: e.unseen(FacetPixels(p))) for p in (0.3, 1.0, 4.0)]
+
+    def counts(found: Expected) -> list[float]:
+        return [count(found) for both in asked for count in both]
+
+    whole = Expected(flora, result, camera)
+    monkeypatch.setattr(expected, "_TELLING", len(whole.every) // 4)
+    made = []
+    for draw in range(40):
+        monkeypatch.setattr(expected, "_CHOSEN", 1000 + draw)
+        some = Expected(flora, result, camera)
+        assert len(some.portions) < len(whole.portions)
+        made.append(counts(some))
+    noise = np.std(made, axis=0) / np.sqrt(len(made))
+    assert (np.abs(np.mean(made, axis=0) - counts(whole)) <= 4.0 * noise).all()
+    assert (noise <= 0.06 * np.array(counts(whole))).all()
