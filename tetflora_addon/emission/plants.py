@@ -269,10 +269,19 @@ def expanded_blocks(flora: Flora, seeds: Seeds, camera: Camera | None = None) ->
     """Polygons of all plants, seen or not; for comparison. A camera sees what is near as finely as everywhere."""
     plants = trunks(flora.rows, seeds)
     detail = None if camera is None else LeafDetail(flora, camera)
-    runs = list(chunks(flora.polygons[plants.row], BLOCK_POLYGONS))
-    for number, run in enumerate(runs):
-        whole = list(expand(flora, plants.take(run)))
-        yield from _block(flora, whole, None, np.zeros(0), number, (number + 1) / len(runs), detail)
+    full = flora.polygons[plants.row]
+    parts = list(chunks(full, BLOCK_POLYGONS))
+    runs = ((number, (number + 1) / len(parts), plants.take(run)) for number, run in enumerate(parts))
+    for made in in_processes(_expanded, (flora, detail), runs, float(full.sum()) > WORTH_PROCESSES):
+        while made:
+            yield made.pop(0)
+
+
+def _expanded(given: tuple[Flora, LeafDetail | None], run: tuple[int, float, Branches]) -> list[Block]:
+    """The meshes of one run of whole plants."""
+    (flora, detail), (number, fraction, plants) = given, run
+    whole = list(expand(flora, plants))
+    return list(_block(flora, whole, None, np.zeros(0), number, fraction, detail))
 
 
 def _block(
