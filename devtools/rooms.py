@@ -53,7 +53,7 @@ _TABLE = {
     "blender": ". processes growth camera refinement",
     "blender/materials": ". light emission blender",
     "blender/species": ". leaves species blender",
-    "blender/scene": ". species growth camera refinement planting light emission "
+    "blender/scene": ". species growth compiled camera refinement planting light emission "
     "blender blender/materials blender/species",
     "blender/results": f". leaves species refinement emission {_LOW}",
     "blender/placing": f". species growth compiled planting {_LOW}",

@@ -12,9 +12,8 @@ import json
 import re
 from dataclasses import fields
 
-from tetflora_addon.leaves.models import LEAF_MODELS
+from tetflora_addon.leaves.models import LEAF_MODELS, Spines
 from tetflora_addon.leaves.schema import OUTLINES
-from tetflora_addon.leaves.spines import Spines
 from tetflora_addon.species.catalogue import load_species
 from tetflora_addon.species.schema import FOLLOWS, LENGTH_HIGH, ORDER_KEYS, Key
 from tetflora_addon.species.species import CROWN_SHAPES, LEAF_KINDS

@@ -14,8 +14,8 @@ from bpy_extras import view3d_utils
 from ..tetflora_addon.blender.placing.ground import Ground, Hit
 from ..tetflora_addon.blender.placing.plant_objects import add_plant, next_seed
 from ..tetflora_addon.blender.runtime import GoneError, JobData, redraw
-from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, default_species, display_height, operator_items
-from ..tetflora_addon.blender.species.edits import catalogue
+from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, default_species, operator_items
+from ..tetflora_addon.blender.species.edits import catalogue, display_height
 from ..tetflora_addon.blender.viewport.points import GroundCursor, circle
 from ..tetflora_addon.errors import TetFloraError
 from .base import NO_VIEWPORT, Tool, in_object_mode, select_only

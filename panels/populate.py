@@ -21,7 +21,7 @@ from ..operators.populations import (
     TETFLORA_OT_set_population_ground,
     TETFLORA_OT_update_population,
 )
-from ..tetflora_addon.blender.placing.distances import distance_of, empty_means, follows_species
+from ..tetflora_addon.blender.placing.distances import distance_to_draw, empty_means, follows_species
 from ..tetflora_addon.blender.placing.properties import MODES
 from ..tetflora_addon.blender.placing.rules import awaits_update, is_outdated, shown_population
 from ..tetflora_addon.blender.species.edits import catalogue
@@ -96,7 +96,7 @@ class TETFLORA_PT_populate(SidebarPanel, bpy.types.Panel):
             column.prop(settings, "density", text="Per Hectare")  # the whole name is wider than labels are
         else:
             column.prop(settings, "count")
-        draw_below(column, f"At least {shown_length(distance_of(settings))} apart")
+        draw_below(column, f"At least {_distance(settings)} apart")
         draw_properties(column, settings, "as_field", "seed")
         active = context.active_object
         marked = active is not None and active.tetflora.is_occluder
@@ -198,6 +198,11 @@ class TETFLORA_PT_populate_size(_PartOfPopulate, bpy.types.Panel):
         draw_properties(layout, settings, "scale_at_top", "tilt")
 
 
+def _distance(settings: bpy.types.PropertyGroup) -> str:
+    found = distance_to_draw(settings)
+    return "…" if found is None else shown_length(found)
+
+
 def _draw_distance(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
     """The switch between the distance that suits the species and the artist's own, and the one that counts."""
     row = layout.row(heading="Min Distance")
@@ -205,7 +210,7 @@ def _draw_distance(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup
     if follows_species(settings):
         right = row.row()
         right.alignment = 'RIGHT'
-        right.label(text=shown_length(distance_of(settings)))
+        right.label(text=_distance(settings))
     else:
         layout.prop(settings, "min_distance", text=" ")
 

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
@@ -21,6 +20,10 @@ _LEAF_LEANS = 0.25  # of the length of leaves, which makes the crown of grass: i
 LEVEL = 0.7  # of the area of leaves is seen from above, between those that stand in all directions and those that lie
 _LOWEST = 0.03  # of the leaves are lower than the crown's base
 _PLANTS = 16  # over which the length of trunks is averaged
+
+
+_MOST = 256  # crowns that are kept
+_known: dict[Species, Crown] = {}
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,11 @@ class Crown:
         return LEVEL * self.leaves + self.wood / np.pi
 
 
-@lru_cache(maxsize=256)
+def known_crown(species: Species) -> Crown | None:
+    """What `crown_of` has found already, at once; None where it has not been asked."""
+    return _known.get(species)
+
+
 def crown_of(species: Species) -> Crown:
     """The mean crown of a species; its samples are drawn at the first time, which takes some hundredths of a second.
 
@@ -67,6 +74,15 @@ def crown_of(species: Species) -> Crown:
     SpeciesError
         A leaf is still the name of a Blender object.
     """
+    found = _known.get(species)
+    if found is None:
+        while len(_known) >= _MOST:
+            _known.pop(next(iter(_known)), None)
+        found = _known[species] = _crown_of(species)
+    return found
+
+
+def _crown_of(species: Species) -> Crown:
     flora = compile_species([species])
     number = np.arange(_PLANTS)
     origin, upright, one = np.zeros((_PLANTS, 3)), np.tile(np.eye(3), (_PLANTS, 1, 1)), np.ones(_PLANTS)

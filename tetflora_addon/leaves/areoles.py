@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import GOLDEN_ANGLE, cross, perpendicular
-from .models import LeafModel
-from .spines import Spines
+from .models import LeafModel, Spines
 
 #: What the colour of the leaf is times that of spines, straw on green, and of the felt on areoles.
 _SPINE, _FELT = (3.6, 1.9, 2.7), (1.7, 0.85, 0.9)

@@ -16,15 +16,25 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import SpeciesError
 from .compounds import Compound
 from .needles import Needles
-from .outlines import Blade
+from .outlines import Blade, limited
 from .shapes import LEAF_SHAPES
-from .spines import Spines
 
 MAX_LEAF_POLYGONS = 2000
 MAX_LEAF_CORNERS = 4 * MAX_LEAF_POLYGONS  # of all faces; and vertices
 MAX_FACE_CORNERS = 128  # polygons are what blocks, budgets and limits count, so none may be much larger than another
 MAX_COORDINATE = 100.0  # in leaf lengths; keeps areas and bounds far from what floats can hold
 MAX_UV = 10_000.0
+
+
+@dataclass(frozen=True)
+class Spines:
+    """Spines on a closed body; lengths are fractions of the leaf's."""
+
+    distance: float = limited(0.1, 0.03, 1, "distance of areoles, from which spines grow")
+    number: int = limited(2, 1, 12, "spines of an areole")
+    length: float = limited(0.07, 0.005, 1, "length of a spine")
+    thickness: float = limited(0.003, 0.0005, 0.05, "thickness of a spine at its base")
+    lean: float = limited(35.0, 0, 85, "angle between a spine and what is perpendicular to the leaf, degrees")
 
 
 @dataclass(frozen=True, eq=False)

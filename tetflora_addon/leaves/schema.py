@@ -14,10 +14,9 @@ from .blades import check_outline
 from .bodies import closed_parts
 from .compounds import Compound
 from .levels import TOLERANCES, fitted, surface_of
-from .models import LEAF_MODELS, LeafModel, leaf_model
+from .models import LEAF_MODELS, LeafModel, Spines, leaf_model
 from .needles import Needles
 from .outlines import Blade
-from .spines import Spines
 
 #: Most forms of a leaf.
 MAX_FORMS = 8

@@ -16,25 +16,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import memory
-from ...compiled.crowns import Crown, crown_of
+from ...compiled.crowns import Crown
 from ...emission.budget import enough
-from ...errors import SpeciesError, TetFloraError
+from ...errors import TetFloraError
 from ...refinement.estimate import Estimate, Stand, estimate
 from ..attributes import read
 from ..runtime import Handlers
 from ..scene.camera import read_camera
+from ..scene.crowns import crown_to_draw
 from ..scene.fields import field_kinds, stored_size
 from ..scene.objects import objects_within, renderable_objects
 from ..scene.skeletons import species_of
-from ..species.catalogue import display_height
-from ..species.edits import species_for
 from .contents import check_settings, memory_left, picture_bytes, settings_from
 
 _LOOKED_AT = 2_000  # plants of each kind of storage that stand for all
 _PATIENCE = 30.0  # times that counting took before plants are counted again
 _GIGA, _MEGA = memory.GIGABYTE, 1e6
-#: Of a plant whose species cannot be compiled: crown radius over its height, and polygons.
-_SLENDER, _POLYGONS = 0.2, 50_000.0
 
 
 @dataclass
@@ -52,12 +49,15 @@ _counted = _Counted()
 
 
 def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimate | None:
-    """What refining takes by the present settings; None without plants, or where the camera cannot be used."""
+    """What refining takes by the present settings.
+
+    None without plants, where the camera cannot be used, and in a window for a moment, until crowns are known.
+    """
     depsgraph = view_layer.depsgraph
     if depsgraph is None or scene.camera is None:
         return None
     stand = _stand_of(scene, view_layer)
-    if not stand.number:
+    if stand is None or not stand.number:
         return None
     try:
         check_settings(scene)
@@ -104,7 +104,7 @@ def polygons_text(number: float) -> str:
     return f"{float(f'{number:.2g}'):,.0f} polygons"
 
 
-def _stand_of(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand:
+def _stand_of(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand | None:
     layer, now = (scene.name, view_layer.name), time.perf_counter()
     waits = now - _counted.at < _PATIENCE * _counted.took
     if _counted.stand is None or _counted.layer != layer or (_counted.stale and not waits):
@@ -114,7 +114,7 @@ def _stand_of(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand:
     return _counted.stand
 
 
-def _count(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand:
+def _count(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand | None:
     single: list[bpy.types.Object] = []
     parts: list[tuple[int, NDArray[np.float64], NDArray[np.float64], list[str]]] = []
     for obj in renderable_objects(view_layer):
@@ -131,11 +131,13 @@ def _count(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand:
                 parts.append(_plants(within, np.array(obj.matrix_world)))
     if single:
         parts.append(_plants(single, np.eye(4)))
-    crowns: dict[str, Crown] = {}
+    crowns: dict[str, Crown | None] = {}
     rows = []
     for number, foot, scale, species in parts:
         for identifier in set(species) - crowns.keys():
-            crowns[identifier] = _crown(scene, identifier)
+            crowns[identifier] = crown_to_draw(scene, identifier)
+        if None in crowns.values():
+            return None
         known = np.array([[c.radius, c.height, c.polygons, c.leaf] for c in map(crowns.get, species)])
         rows.append((number, foot, known * np.column_stack([scale, scale, np.ones(len(scale)), scale])))
     return _merged(rows)
@@ -188,14 +190,6 @@ def _stored(points: bpy.types.Mesh | bpy.types.PointCloud, name: str, chosen: ND
     values = np.zeros(len(attribute.data), np.float32 if attribute.data_type == 'FLOAT' else np.int32)
     attribute.data.foreach_get("value", values)
     return values[chosen] if len(values) > chosen[-1] else None
-
-
-def _crown(scene: bpy.types.Scene, identifier: str) -> Crown:
-    try:
-        return crown_of(species_for(scene, identifier))
-    except SpeciesError:  # missing, broken, or with an object for a leaf
-        height = display_height(identifier)
-        return Crown(_SLENDER * height, height, _POLYGONS)
 
 
 def _on_change(*_: object) -> None:

@@ -7,8 +7,7 @@ Populations that cover the ground of others are left out: they stand under the c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable
-from contextlib import suppress
+from collections.abc import Callable, Generator
 from dataclasses import fields
 from hashlib import blake2b
 
@@ -16,20 +15,14 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiled.crowns import Crown, crown_of
-from ...errors import SpeciesError
-from ...jobs import Progress
 from ...planting.canopy import Canopy, Sheet
 from ...planting.cover import Floor, Habitat, Suits, mapping
-from ...species.species import Species
 from ..attributes import world_matrix
+from ..scene.crowns import crown_for
 from ..scene.fields import field_kinds, fields_of, read_field
 from ..scene.skeletons import species_of
-from ..species.catalogue import display_height
-from ..species.edits import species_for
-from ..worker import at_once, call_in_thread
+from ..worker import at_once
 
-_UNKNOWN = (0.2, 0.3, 0.5)  # crown of a species that cannot be compiled: radius, base over height; area over radius³
 _kept: dict[str, Floor] = {}  # the last one, by content: settings change more often than the plants above
 
 
@@ -84,33 +77,6 @@ def standing(scene: bpy.types.Scene) -> set[str]:
     for field in fields_of(objects):
         found.update(species_of(kind) for kind in field_kinds(field))
     return found
-
-
-def crown_steps(
-    progress: Progress, scene: bpy.types.Scene, identifiers: Iterable[str]
-) -> Generator[Progress, object, None]:
-    """Find the crowns of species in the background, so that nobody has to wait for them later."""
-    species = []
-    for identifier in sorted(identifiers):
-        with suppress(SpeciesError):
-            species.append(species_for(scene, identifier))
-    yield from call_in_thread(progress, _find_crowns, species)
-
-
-def _find_crowns(species: Iterable[Species]) -> None:
-    for one in species:
-        with suppress(SpeciesError):  # with an object for a leaf
-            crown_of(one)
-
-
-def crown_for(scene: bpy.types.Scene, identifier: str) -> Crown:
-    """The mean crown of a species; a guess where it cannot be compiled."""
-    try:
-        return crown_of(species_for(scene, identifier))
-    except SpeciesError:  # missing, broken, or with an object for a leaf
-        height = display_height(identifier)
-        radius = _UNKNOWN[0] * height
-        return Crown(radius, height, 0.0, _UNKNOWN[1] * height, _UNKNOWN[2] * radius**3)
 
 
 def floor_steps(canopy: Canopy, triangles: NDArray[np.float64], kinds: int) -> Generator[float, object, Floor]:

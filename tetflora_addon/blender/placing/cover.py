@@ -26,9 +26,10 @@ from ...planting.cover import Floor, Habitat, Stratum, covered, tinted
 from ...species.litter import FALLEN
 from ..materials.soil import is_soil, soil_material
 from ..runtime import JobData, guarded, is_there
+from ..scene.crowns import crown_for, crown_steps
 from ..species.edits import catalogue, revert_species, species_data, species_for, store_species
 from ..worker import steps_in_thread
-from .canopy import canopy_of, crown_for, crown_steps, floor_steps, is_cover, shedder_of, standing
+from .canopy import canopy_of, floor_steps, is_cover, shedder_of, standing
 from .distances import HECTARE
 from .populations import Made, add_population, forget_population, make_plants_steps, refuse_frozen, still_there
 from .rules import active_population, copy_settings, grounds_of

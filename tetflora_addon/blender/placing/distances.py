@@ -8,16 +8,17 @@ anything yet, or the file is older than this choice and keeps what it meant.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 
-from ...compiled.crowns import crown_of
+from ...compiled.crowns import Crown
 from ...errors import SpeciesError
 from ...planting.distances import suggested_distance
-from ..species.catalogue import default_species, display_height
-from ..species.edits import species_for
+from ..scene.crowns import crown_for, crown_to_draw
+from ..species.catalogue import default_species
 
 #: Square metres of the area that densities are counted on: foresters count trees by the hectare.
 HECTARE = 10_000.0
@@ -29,7 +30,6 @@ SOURCES = (
     ('SPECIES', "Species", "From the crowns of the species", 1),
     ('OWN', "Own", "Set by the artist", 2),
 )
-_SLENDER = 0.2  # crown radius of a plant over its height, where its species cannot be compiled
 
 
 @dataclass(frozen=True)
@@ -100,16 +100,30 @@ def distance_of(settings: bpy.types.PropertyGroup) -> float:
     return suggestion(settings) if follows_species(settings) else settings.min_distance
 
 
+def distance_to_draw(settings: bpy.types.PropertyGroup) -> float | None:
+    """The same for panels: None for a moment, until the crowns of the species are known."""
+    return _suggestion(settings, crown_to_draw) if follows_species(settings) else settings.min_distance
+
+
 def suggestion(settings: bpy.types.PropertyGroup) -> float:
     """Distance in metres that suits the species of a population or brush.
 
-    Species are compiled at the first time, some hundredths of a second each; panels may ask for it.
+    Species are compiled at the first time, up to a tenth of a second each.
     """
+    return _suggestion(settings, crown_for)
+
+
+def _suggestion(
+    settings: bpy.types.PropertyGroup, find: Callable[[bpy.types.Scene, str], Crown | None]
+) -> float | None:
     try:
         mixture = _mixture_of(settings)
     except SpeciesError:  # an empty catalogue, of which Populate and the brush complain
         return settings.min_distance
-    radii = [_radius(settings.id_data, identifier) for identifier in mixture.weights]
+    crowns = [find(settings.id_data, identifier) for identifier in mixture.weights]
+    if None in crowns:
+        return None
+    radii = [crown.radius for crown in crowns]
     suited = suggested_distance(radii, list(mixture.weights.values()), mixture.scale, mixture.density)
     return float(np.float32(suited))  # as Blender stores it, so that it is the same when the artist takes it over
 
@@ -123,13 +137,6 @@ def _mixture_of(settings: bpy.types.PropertyGroup) -> Mixture:
     if _is_brush(settings):
         return Mixture(painted_weights(settings.id_data), scale, settings.density / SQUARE)
     return Mixture(weights_of(settings), scale, settings.density / HECTARE if settings.by_density else None)
-
-
-def _radius(scene: bpy.types.Scene, identifier: str) -> float:
-    try:
-        return crown_of(species_for(scene, identifier)).radius
-    except SpeciesError:  # missing, broken, or with an object for a leaf
-        return _SLENDER * display_height(identifier)
 
 
 def choose(settings: bpy.types.PropertyGroup, by_species: bool) -> None:

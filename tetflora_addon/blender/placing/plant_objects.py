@@ -19,8 +19,7 @@ from ..saved_files import VERSION
 from ..scene.fields import fields_of, quaternions, read_field, stored_size, write_field
 from ..scene.plants import single_plants
 from ..scene.skeletons import form_of, species_of
-from ..species.catalogue import display_height
-from ..species.edits import catalogue
+from ..species.edits import catalogue, display_height
 
 COLLECTION = "TetFlora plants"
 FIELD = "Field of plants"

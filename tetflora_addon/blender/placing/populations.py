@@ -21,9 +21,10 @@ from ...growth.hashing import child_key, key_of_seed, uniform
 from ...jobs import Progress
 from ...planting.places import Placement
 from ..runtime import JobData, guarded, is_there
+from ..scene.crowns import crown_steps
 from ..scene.fields import fields_of, stored_size
 from ..worker import at_once, call_in_thread
-from .canopy import crown_steps, is_cover, standing
+from .canopy import is_cover, standing
 from .plant_objects import (
     POPULATION_MARK,
     add_field,

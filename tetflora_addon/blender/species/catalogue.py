@@ -31,7 +31,6 @@ FALLBACK_ICON = 'OUTLINER_OB_EMPTY'
 
 #: Identifier of the only item when there is nothing to choose.
 NO_SPECIES = "NONE"
-FALLBACK_HEIGHT = 5.0  # metres, of the arrow of a plant whose species cannot be read
 #: Ending of species files.
 ENDING = ".json"
 
@@ -129,14 +128,6 @@ def _items(known: Mapping[str, SpeciesInfo], icons: Mapping[str, int], present: 
 def operator_items(_operator: bpy.types.OperatorProperties, _context: bpy.types.Context | None) -> list[Item]:
     """Items for an operator's ``species``."""
     return items_for()
-
-
-def display_height(identifier: str) -> float:
-    """Height of a species' trunk in metres, for the arrow that stands for a plant in the viewport."""
-    try:
-        return float(species_for(None, identifier).orders[0].length.mean)
-    except SpeciesError:
-        return FALLBACK_HEIGHT
 
 
 def default_species(before: bool = False) -> str:

@@ -36,6 +36,8 @@ from ...species.species import Species
 from ..preferences import species_folders
 from ..runtime import Listeners
 
+_FALLBACK_HEIGHT = 5.0  # metres, of the arrow of a plant whose species cannot be read
+
 #: Called after every change of a species, without arguments; the preview listens.
 listeners = Listeners()
 
@@ -133,6 +135,14 @@ def species_for(scene: bpy.types.Scene | None, identifier: str) -> Species:
     """
     edit = find_edit(scene, identifier)
     return load_species(identifier, known=listed()) if edit is None else _species(edit.text, identifier)
+
+
+def display_height(identifier: str) -> float:
+    """Height of a species' trunk in metres, for the arrow that stands for a plant in the viewport."""
+    try:
+        return float(species_for(None, identifier).orders[0].length.mean)
+    except SpeciesError:
+        return _FALLBACK_HEIGHT
 
 
 @lru_cache(maxsize=64)

@@ -1,0 +1,101 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Mean crowns of the species of a scene: at once for what is made of them, in the background for panels.
+
+A species is compiled for its crown once in a session, which takes up to a tenth of a second. A panel that is drawn
+must not wait for that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable
+from contextlib import suppress
+
+import bpy
+
+from ...compiled.crowns import Crown, crown_of, known_crown
+from ...errors import SpeciesError
+from ...jobs import Progress
+from ...species.species import Species
+from ..runtime import call_soon, redraw
+from ..species.edits import display_height, species_for
+from ..worker import call_in_thread
+
+#: Of a species that cannot be compiled: radius and base over height; leaf area over radius³, and polygons.
+_RADIUS, _BASE, _AREA, _POLYGONS = 0.2, 0.3, 0.5, 50_000.0
+_SOON = 0.05  # seconds between two looks at crowns that are being found
+
+_wanted: list[Species] = []
+_finding: list[Generator] = []  # at most one
+_without: set[Species] = set()  # an object for a leaf
+
+
+def crown_for(scene: bpy.types.Scene, identifier: str) -> Crown:
+    """The mean crown of a species; a guess where it cannot be compiled."""
+    try:
+        return crown_of(species_for(scene, identifier))
+    except SpeciesError:  # missing, broken, or with an object for a leaf
+        return _guess(identifier)
+
+
+def crown_to_draw(scene: bpy.types.Scene, identifier: str) -> Crown | None:
+    """The same for a panel, without waiting: None where it is only being looked for; the window is then drawn again."""
+    try:
+        species = species_for(scene, identifier)
+    except SpeciesError:
+        return _guess(identifier)
+    if _in_background():
+        return crown_for(scene, identifier)
+    if species in _without:
+        return _guess(identifier)
+    known = known_crown(species)
+    if known is None:
+        if species not in _wanted:
+            _wanted.append(species)
+        call_soon(_find, _SOON)
+    return known
+
+
+def crown_steps(
+    progress: Progress, scene: bpy.types.Scene, identifiers: Iterable[str]
+) -> Generator[Progress, object, None]:
+    """Find the crowns of species in the background, so that nobody has to wait for them later."""
+    species = []
+    for identifier in sorted(identifiers):
+        with suppress(SpeciesError):
+            species.append(species_for(scene, identifier))
+    yield from call_in_thread(progress, _find_all, species)
+
+
+def _in_background() -> bool:
+    return bpy.app.background
+
+
+def _find() -> float | None:
+    """Of a timer: look for what panels have asked for."""
+    if not _finding:
+        if not _wanted:
+            return None
+        _finding.append(call_in_thread(Progress(0.0, "Compiling species"), _find_all, tuple(_wanted)))
+        _wanted.clear()
+    try:
+        next(_finding[0])
+    except StopIteration:
+        _finding.clear()
+        redraw()
+        return _SOON if _wanted else None
+    return _SOON
+
+
+def _find_all(species: Iterable[Species]) -> None:
+    for one in species:
+        try:
+            crown_of(one)
+        except SpeciesError:
+            _without.add(one)
+
+
+def _guess(identifier: str) -> Crown:
+    height = display_height(identifier)
+    radius = _RADIUS * height
+    return Crown(radius, height, _POLYGONS, _BASE * height, _AREA * radius**3)
