@@ -5,6 +5,10 @@
 Vectors are (n, 3) and frames (n, 3, 3), but memory holds one component of all n after the other. Arithmetic on such
 arrays runs along n without strides, and its results keep the layout. Only indexing and stacking have to take care of
 it; the functions below do.
+
+Where things come and go in small steps, what that costs goes with what changes, not with what is there: `Growing` has
+room to spare and is changed in place, for few columns that are looked at all the time. `Chunks` only collects, for many
+columns that nobody looks at before all is done.
 """
 
 from __future__ import annotations
@@ -12,13 +16,19 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import cache
-from typing import Any, Self
+from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from .parallel import blocks
+
 #: Steps of `spiral` that spread directions evenly: the golden section twice, and the golden angle over π.
 GOLDEN_TURN, GOLDEN_ANGLE = 1.0 + np.sqrt(5.0), 3.0 - np.sqrt(5.0)
+#: Room to spare where columns of `Growing` are made larger: one part in so many of what is there.
+_SPARE = 3
+#: Indices that are looked at at a time: numpy makes 64 bit of each, which stays in the cache. Threads gain nothing.
+_AT_ONCE = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -127,6 +137,18 @@ def spread(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int
     return owner, np.arange(len(owner)) - first[owner]
 
 
+def rows_within(chosen: NDArray[np.bool_], index: NDArray[np.int32]) -> NDArray[np.intp]:
+    """Rows (k,), ascending, of which an index (n,) is among those of a mask."""
+    found = [np.flatnonzero(np.take(chosen, index[block])) + block.start for block in blocks(len(index), _AT_ONCE)]
+    return np.concatenate([np.zeros(0, np.intp), *found])
+
+
+def renumber(index: NDArray[np.int32], number: NDArray[np.int32]) -> None:
+    """Replace an index (n,), in place, by the new numbers (m,) of what it points to."""
+    for block in blocks(len(index), _AT_ONCE):
+        index[block] = np.take(number, index[block])
+
+
 def _joined(columns: list[Any]) -> Any:
     if not columns or columns[0] is None:
         return None
@@ -200,3 +222,113 @@ def spiral(z: NDArray, index: NDArray, step: float) -> NDArray:
     """Unit vectors (n, 3) of a Fibonacci lattice: heights z (n,), turned by ``index`` (n,) × π × ``step``."""
     turn, level = np.pi * step * index, np.sqrt(1.0 - z * z)
     return np.stack([level * np.cos(turn), level * np.sin(turn), z], axis=1)
+
+
+Rows = TypeVar("Rows", bound=Arrays)
+
+
+class Growing(Generic[Rows]):
+    """Things of one kind in columns that have room to spare; takes them over and changes them in place.
+
+    All columns must be arrays. They lie row by row, as a few rows of many are asked for.
+    """
+
+    def __init__(self, rows: Rows) -> None:
+        self._kind, self._number = type(rows), len(rows)
+        self._columns = {name: np.ascontiguousarray(getattr(rows, name)) for name in _names(self._kind)}
+
+    def __len__(self) -> int:
+        return self._number
+
+    @property
+    def rows(self) -> Rows:
+        """All things, not a copy: valid until some are appended or exchanged; whoever writes there changes them."""
+        return self._kind(*(own[: self._number] for own in self._columns.values()))
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all columns, with the room to spare."""
+        return sum(own.nbytes for own in self._columns.values())
+
+    def append(self, new: Rows) -> None:
+        """Put things behind all others."""
+        start, self._number = self._number, self._number + len(new)
+        for name, own in self._columns.items():
+            if self._number > len(own):  # one column after the other: only one is there twice
+                wider = np.empty((self._number + self._number // _SPARE, *own.shape[1:]), own.dtype)
+                wider[:start] = own[:start]
+                self._columns[name] = own = wider
+            own[start : self._number] = getattr(new, name)
+
+    def exchange(self, gone: NDArray[np.intp], new: Rows) -> None:
+        """Drop rows (k,), ascending, and put new things in their places first, then behind all others.
+
+        Those that stay keep their order, and so do new ones: what is in one order stays so.
+        """
+        reused = gone[: len(new)]
+        for name, own in self._columns.items():
+            own[reused] = getattr(new, name)[: len(reused)]
+        if len(new) > len(gone):
+            self.append(new.take(slice(len(gone), None)))
+        elif len(gone) > len(new):
+            self._drop(gone[len(new) :])
+
+    def _drop(self, gone: NDArray[np.intp]) -> None:
+        """Move up all that is behind rows (k,) that are dropped; rare, as what is opened is more than it was."""
+        first, kept = int(gone[0]), np.ones(self._number, bool)
+        kept[gone] = False
+        stay = first + np.flatnonzero(kept[first:])
+        self._number = first + len(stay)
+        for own in self._columns.values():
+            own[first : self._number] = np.take(own, stay, axis=0)
+
+
+class Chunks(Generic[Rows]):
+    """Things of one kind in the chunks that they came in; what is taken out is only marked until all are joined."""
+
+    def __init__(self, first: Rows) -> None:
+        self._kind, self._chunks, self._there, self._number = type(first), [], [], 0
+        self.marked = 0
+        self.append(first)
+
+    def __len__(self) -> int:
+        """Rows, with those that are marked."""
+        return self._number
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all columns, with rows that are marked."""
+        return sum(chunk.nbytes for chunk in self._chunks) + self._number
+
+    def append(self, new: Rows) -> None:
+        """Put things behind all others, not copied."""
+        self._chunks.append(new)
+        self._there.append(np.ones(len(new), bool))
+        self._number += len(new)
+
+    def take_out(self, rows: NDArray[np.intp]) -> Rows:
+        """Mark and return rows (k,), ascending, none of which is marked."""
+        out, start = [], 0
+        ends = np.cumsum([len(chunk) for chunk in self._chunks])
+        runs = np.split(rows, np.searchsorted(rows, ends[:-1]))
+        for chunk, there, own in zip(self._chunks, self._there, runs, strict=True):
+            if len(own):
+                out.append(chunk.take(own - start))
+                there[own - start] = False
+            start += len(chunk)
+        self.marked += len(rows)
+        return self._kind.concatenate(out)
+
+    @property
+    def there(self) -> NDArray[np.bool_]:
+        """Rows (n,) that are not marked."""
+        return np.concatenate(self._there)
+
+    def joined(self) -> Rows:
+        """All that is not marked, as the only chunk from now on: rows have new numbers, in the same order."""
+        if len(self._chunks) > 1 or self.marked:
+            some = zip(self._chunks, self._there, strict=True)
+            one = self._kind.concatenate([chunk.take(there) for chunk, there in some])
+            self._chunks, self._there, self._number, self.marked = [], [], 0, 0
+            self.append(one)
+        return self._chunks[0]

@@ -17,7 +17,7 @@ from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.growth import WholeBranches
 from ..leaves.levels import chosen_polygons, coarse_error
-from ..refinement.shares import PlantParts
+from ..refinement.contents import PlantParts
 from ..species.species import LEAF_KINDS
 from ..subplants.wood_detail import Pixels
 

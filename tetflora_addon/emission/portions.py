@@ -22,10 +22,10 @@ from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..proxies.facet_sizes import coarseness
 from ..proxies.thrown_shadows import ThrownShadows
-from ..refinement.contents import feature_width
+from ..refinement.contents import PlantParts, feature_width
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
-from ..refinement.shares import PlantParts, SharePoints, lowered, opened, share_points
+from ..refinement.shares import SharePoints, lowered, opened, share_points
 
 #: Pixels from which on a part that is seen only here and there is opened.
 MIXED = 24.0

@@ -14,7 +14,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays
+from ..arrays import Arrays, column, nested
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.branches import Branches
@@ -123,6 +123,50 @@ def sums(totals: Totals, cells: NDArray[np.integer], number: int) -> Totals:
         np.bincount(cells, totals.polygons, number),
         np.where(only_large, np.inf, width),
     )
+
+
+@dataclass(frozen=True)
+class PlantParts(Arrays):
+    """Parts of plants (n): sub-plants, and branches without what grows on them.
+
+    Attributes
+    ----------
+    branches : Branches of n
+    alone : (n,) bool
+        Only the branch itself, with the leaves that it bears.
+    totals : Totals of n
+    extent : (n,) float64
+        Longest side, metres.
+    """
+
+    branches: Branches = field(metadata=nested(Branches))
+    alone: NDArray[np.bool_] = field(metadata=column(dtype=bool))
+    totals: Totals = field(metadata=nested(Totals))
+    extent: NDArray[np.float64]
+
+    @classmethod
+    def of_subplants(cls, flora: Flora, branches: Branches) -> PlantParts:
+        """Whole sub-plants (n,)."""
+        bound = flora.sampled_bound[branches.row]
+        extent = np.maximum(2.0 * bound[:, 0], bound[:, 2] - bound[:, 1]) * branches.length
+        return cls(branches, np.zeros(len(branches), bool), subplant_totals(flora, branches), extent)
+
+    @classmethod
+    def of_bodies(cls, flora: Flora, branches: Branches) -> PlantParts:
+        """Branches (n,) without what grows on them."""
+        return cls(branches, np.ones(len(branches), bool), piece_totals(flora, as_pieces(branches)), branches.length)
+
+    def can_open(self, flora: Flora) -> NDArray[np.bool_]:
+        """Parts (n,) on which something else grows."""
+        row = self.branches.row
+        return ~self.alone & ((flora.rows["next"][row] >= 0).any(axis=1) | flora.rows["phantom"][row])
+
+
+def as_pieces(branches: Branches) -> Pieces:
+    """Branches (n,) as one piece each, from base to tip as if they were straight."""
+    none = np.zeros(len(branches))
+    tip = branches.position + branches.length[:, None] * branches.frame[:, :, 2]
+    return Pieces(branches, none, none + 1.0, branches.position, tip)
 
 
 @dataclass(frozen=True)

@@ -309,7 +309,7 @@ def step_of(state: Refinement) -> Step:
     """Figures of a state, valid only before the loop goes on."""
     numbers = np.bincount(state.decision, minlength=len(Decision))
     explicit = state.decision == Decision.EXPLICIT
-    alone = state.plants.parts.alone
+    subplants, bodies = state.plants.numbers
     return Step(
         tetrahedra_made=int(state.tree.tetrahedra_made),
         levels=int(state.tree.levels),
@@ -317,8 +317,8 @@ def step_of(state: Refinement) -> Step:
         proxy=int(numbers[Decision.PROXY]),
         hidden=int(numbers[Decision.HIDDEN]),
         explicit=int(numbers[Decision.EXPLICIT]),
-        subplants=int((~alone).sum()),
-        pieces=int(alone.sum()),
+        subplants=subplants,
+        pieces=bodies,
         foreign=len(state.holdings),
         polygons=round(float(state.totals.polygons[explicit].sum())),
         seconds=sum(state.seconds.values()),

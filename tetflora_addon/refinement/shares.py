@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, column, nested, spread
+from ..arrays import Arrays, Chunks, Growing, column, renumber, rows_within, spread
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..compiled.samples import Points
@@ -32,7 +32,7 @@ from ..growth.seeds import Seeds
 from ..parallel import blocks, each_on_all_cores
 from ..subplants.pieces import Pieces, open_branches
 from ..tetrahedra.tree import TetrahedralTree
-from .contents import Held, Totals, piece_totals, subplant_totals, sums
+from .contents import Held, PlantParts, Totals, as_pieces, sums
 
 #: Sub-plants larger than this many times the longest edge of a tetrahedron that is divided are opened.
 LARGE = 1.6
@@ -47,52 +47,10 @@ _PLACES = np.linspace(0.0, 1.0, 9)
 FILLED = 4
 #: Sub-plants that are opened, and points that are lowered, at a time; bounds what that takes to some hundred megabytes.
 OPENED_AT_ONCE, LOWERED_AT_ONCE = 40_000, 200_000
+#: Parts that have been opened are dropped once they are more than one in so many.
+_OPENED = 3
 #: Draw of this module: where a part's run of samples starts.
 _START = 221
-
-
-@dataclass(frozen=True)
-class PlantParts(Arrays):
-    """PlantParts of plants (n): sub-plants, and branches without what grows on them.
-
-    Attributes
-    ----------
-    branches : Branches of n
-    alone : (n,) bool
-        Only the branch itself, with the leaves that it bears.
-    totals : Totals of n
-    extent : (n,) float64
-        Longest side, metres.
-    """
-
-    branches: Branches = field(metadata=nested(Branches))
-    alone: NDArray[np.bool_] = field(metadata=column(dtype=bool))
-    totals: Totals = field(metadata=nested(Totals))
-    extent: NDArray[np.float64]
-
-    @classmethod
-    def of_subplants(cls, flora: Flora, branches: Branches) -> PlantParts:
-        """Whole sub-plants (n,)."""
-        bound = flora.sampled_bound[branches.row]
-        extent = np.maximum(2.0 * bound[:, 0], bound[:, 2] - bound[:, 1]) * branches.length
-        return cls(branches, np.zeros(len(branches), bool), subplant_totals(flora, branches), extent)
-
-    @classmethod
-    def of_bodies(cls, flora: Flora, branches: Branches) -> PlantParts:
-        """Branches (n,) without what grows on them."""
-        return cls(branches, np.ones(len(branches), bool), piece_totals(flora, as_pieces(branches)), branches.length)
-
-    def can_open(self, flora: Flora) -> NDArray[np.bool_]:
-        """PlantParts (n,) on which something else grows."""
-        row = self.branches.row
-        return ~self.alone & ((flora.rows["next"][row] >= 0).any(axis=1) | flora.rows["phantom"][row])
-
-
-def as_pieces(branches: Branches) -> Pieces:
-    """Branches (n,) as one piece each, from base to tip as if they were straight."""
-    none = np.zeros(len(branches))
-    tip = branches.position + branches.length[:, None] * branches.frame[:, :, 2]
-    return Pieces(branches, none, none + 1.0, branches.position, tip)
 
 
 @dataclass(frozen=True)
@@ -234,8 +192,34 @@ def lowered(tree: TetrahedralTree, points: SharePoints, some: NDArray[np.intp] |
     return cell
 
 
+@dataclass(frozen=True)
+class _Figures(Arrays):
+    """What a pass asks of all parts (n).
+
+    Attributes
+    ----------
+    reach : (n,) float64
+        Extent of those that can be opened, metres; 0 of others.
+    area, polygons, width : (n,) float64
+        Of their totals.
+    """
+
+    reach: NDArray[np.float64]
+    area: NDArray[np.float64]
+    polygons: NDArray[np.float64]
+    width: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, flora: Flora, parts: PlantParts) -> _Figures:
+        reach, totals = np.where(parts.can_open(flora), parts.extent, 0.0), parts.totals
+        return cls(reach, totals.area, totals.polygons, totals.width)
+
+
 class SharedPlants:
     """All plants of a refinement, as parts and the points on them; changes as the tree is divided.
+
+    A pass costs what it changes. Parts that it opens are only marked, and new ones stay in chunks of their own, until
+    somebody asks for `parts` or `points`; new points take the places of those on opened parts.
 
     Parameters
     ----------
@@ -244,30 +228,49 @@ class SharedPlants:
     camera : Camera
     filled : bool
         Whether proxies fill their tetrahedra, so that small ones without points would be holes.
-
-    Attributes
-    ----------
-    parts : PlantParts
-    points : SharePoints
     """
 
     def __init__(self, flora: Flora, seeds: Seeds, camera: Camera, filled: bool = False) -> None:
         self.flora, self.camera, self._times = flora, camera, FILLED if filled else 1
-        self.parts = PlantParts.of_subplants(flora, trunks(flora.rows, seeds)) if len(seeds) else PlantParts.empty()
-        self.points = self._points(self.parts, None) if len(seeds) else SharePoints.empty()
+        parts = PlantParts.of_subplants(flora, trunks(flora.rows, seeds)) if len(seeds) else PlantParts.empty()
+        self._hold(parts, self._points_on(parts, None) if len(seeds) else SharePoints.empty())
         while (near := self.thick(self.parts) & self.parts.can_open(flora)).any():
-            self._open(near, self.points.take(np.flatnonzero(~near[self.points.part])))
+            self._open(near, None)
+
+    def _hold(self, parts: PlantParts, points: SharePoints) -> None:
+        self._parts, self._figures = Chunks(parts), Growing(_Figures.of(self.flora, parts))
+        self._points, self._bodies = Growing(points), int(parts.alone.sum())
+
+    @property
+    def parts(self) -> PlantParts:
+        """All parts, in one piece: asking costs a copy of them where a pass has opened some, and changes no result."""
+        return self._drop_opened()
+
+    @property
+    def points(self) -> SharePoints:
+        """All points, of `parts`; valid until the next pass."""
+        self._drop_opened()
+        return self._points.rows
+
+    @property
+    def numbers(self) -> tuple[int, int]:
+        """How many sub-plants and how many branches alone there are."""
+        return len(self._parts) - self._parts.marked - self._bodies, self._bodies
 
     @property
     def nbytes(self) -> int:
-        """Bytes of all arrays."""
-        return self.parts.nbytes + self.points.nbytes
+        """Bytes of all arrays, with what waits to be dropped and room to spare."""
+        return self._parts.nbytes + self._figures.nbytes + self._points.nbytes
+
+    def with_parts(self, parts: PlantParts, points: SharePoints) -> SharedPlants:
+        """The same with other parts and the points on them."""
+        made = copy(self)
+        made._hold(parts, points)
+        return made
 
     def without_parts(self) -> SharedPlants:
         """The same with no plants, for what asks only how large other parts are."""
-        made = copy(self)
-        made.parts, made.points = PlantParts.empty(), SharePoints.empty()
-        return made
+        return self.with_parts(PlantParts.empty(), SharePoints.empty())
 
     def pixels(self, parts: PlantParts) -> NDArray[np.float64]:
         """Extent (n,) of parts in the image."""
@@ -302,42 +305,50 @@ class SharedPlants:
         (nodes,) bool
             Nodes whose contents have changed.
         """
-        points = self.points
+        points = self._points.rows
         changed = dividing.copy()
-        inside = np.flatnonzero(np.take(dividing, points.cell))
-        cell = points.cell[inside]
-        part = points.part[inside]
-        large = self.parts.extent[part] > LARGE * edge[cell]
-        opening = np.zeros(len(self.parts), bool)
-        opening[part[large]] = True
-        opening &= self.parts.can_open(self.flora)
+        inside = rows_within(dividing, points.cell)
+        part = np.take(points.part, inside)
+        large = np.take(self._figures.rows.reach, part) > LARGE * np.take(edge, np.take(points.cell, inside))
         # Handed on in place: millions of points that stay where they are are not looked at.
-        points.cell[inside] = lowered(tree, points, inside)
-        changed[points.cell[inside]] = True
-        if opening.any():
-            gone = np.take(opening, points.part)
-            changed[points.cell[gone]] = True
-            stay = np.flatnonzero(~gone)
-            self._open(opening, points.take(stay))
-            new = np.arange(len(stay), len(self.points))
-            cell = lowered(tree, self.points, new)
-            self.points.cell[new] = cell
-            changed[cell] = True
+        points.cell[inside] = cell = lowered(tree, points, inside)
+        changed[cell] = True
+        if large.any():
+            opening = np.zeros(len(self._parts), bool)
+            opening[part[large]] = True
+            changed[self._open(opening, tree)] = True
         return changed
 
-    def _open(self, opening: NDArray[np.bool_], kept_points: SharePoints) -> None:
-        number = np.cumsum(~opening) - 1
-        kept = self.parts.take(np.flatnonzero(~opening))
-        parts, points = [kept], [replace(kept_points, part=number[kept_points.part].astype(np.int32))]
-        count = len(kept)
-        for new, _, lines in opened(self.flora, self.parts.take(np.flatnonzero(opening))):
-            made = self._points(new, lines)
+    def _open(self, opening: NDArray[np.bool_], tree: TetrahedralTree | None) -> NDArray[np.int32]:
+        """Open parts (n,); returns nodes (k,) of points that leave or come. Without a tree these stay in the root."""
+        gone = rows_within(opening, self._points.rows.part)
+        count, parts, points = len(self._parts), [], []
+        for new, _, lines in opened(self.flora, self._parts.take_out(np.flatnonzero(opening))):
+            made = self._points_on(new, lines)
             points.append(replace(made, part=made.part + np.int32(count)))
             parts.append(new)
             count += len(new)
-        self.parts, self.points = PlantParts.concatenate(parts), SharePoints.concatenate(points)
+        new_parts, new_points = PlantParts.concatenate(parts), SharePoints.concatenate(points)
+        if tree is not None:
+            new_points = replace(new_points, cell=lowered(tree, new_points))
+        left = np.take(self._points.rows.cell, gone)
+        self._points.exchange(gone, new_points)
+        self._parts.append(new_parts)
+        self._figures.append(_Figures.of(self.flora, new_parts))
+        self._bodies += int(new_parts.alone.sum())
+        if _OPENED * self._parts.marked > len(self._parts):
+            self._drop_opened()
+        return np.concatenate([left, new_points.cell])
 
-    def _points(self, parts: PlantParts, lines: Axes | None) -> SharePoints:
+    def _drop_opened(self) -> PlantParts:
+        """All parts, after those that have been opened are dropped and the others numbered anew."""
+        if self._parts.marked:
+            there = self._parts.there
+            renumber(self._points.rows.part, (np.cumsum(there) - 1).astype(np.int32))
+            self._figures = Growing(self._figures.rows.take(there))
+        return self._parts.joined()
+
+    def _points_on(self, parts: PlantParts, lines: Axes | None) -> SharePoints:
         along = 0
         if lines is not None:
             along = parts.branches.length / np.maximum(2.0 * APART * parts.branches.radius, 1e-300)
@@ -346,21 +357,24 @@ class SharedPlants:
 
     def totals(self, chosen: NDArray[np.bool_]) -> tuple[Totals, NDArray[np.int32]]:
         """Totals (k,) of points in chosen nodes, a mask (nodes,), and their nodes (k,)."""
-        points = self.points if chosen.all() else self.points.take(np.flatnonzero(chosen[self.points.cell]))
-        whole, part = self.parts.totals, points.part
-        fraction = (points.leaf + points.wood) / np.maximum(whole.area, 1e-300)[part]
-        return Totals(points.leaf, points.wood, whole.polygons[part] * fraction, whole.width[part]), points.cell
+        points, figures = self._points.rows, self._figures.rows
+        cell, part, leaf, wood = points.cell, points.part, points.leaf, points.wood
+        if not chosen.all():
+            some = rows_within(chosen, cell)
+            cell, part, leaf, wood = (np.take(own, some) for own in (cell, part, leaf, wood))
+        fraction = (leaf + wood) / np.maximum(np.take(figures.area, part), 1e-300)
+        return Totals(leaf, wood, np.take(figures.polygons, part) * fraction, np.take(figures.width, part)), cell
 
     def held(self, nodes: int) -> tuple[Held[Branches], Held[Pieces]]:
         """Sub-plants and branches alone, once for each node that holds some of them, with the totals of that."""
-        points = self.points
+        parts, points = self.parts, self.points
         pair, row = np.unique(points.part.astype(np.int64) * nodes + points.cell, return_inverse=True)
         totals, _ = self.totals(np.ones(nodes, bool))
         found = sums(totals, row, len(pair))
         part, cell = pair // nodes, (pair % nodes).astype(np.int32)
-        alone = self.parts.alone[part]
+        alone = parts.alone[part]
         made = []
         for chosen in (np.flatnonzero(~alone), np.flatnonzero(alone)):
-            made.append((self.parts.branches.take(part[chosen]), cell[chosen], found.take(chosen)))
+            made.append((parts.branches.take(part[chosen]), cell[chosen], found.take(chosen)))
         subplants, bodies = made
         return Held(*subplants), Held(as_pieces(bodies[0]), *bodies[1:])

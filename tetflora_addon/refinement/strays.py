@@ -17,8 +17,8 @@ from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.growth import trunks
 from ..growth.seeds import Seeds
+from .contents import PlantParts
 from .polygons import Polygons
-from .shares import PlantParts
 
 #: Strays are so many times as far from the camera as all others, or as so many metres if these are nearer.
 GAP, NEAR = 16.0, 1000.0

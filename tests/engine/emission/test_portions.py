@@ -136,10 +136,7 @@ def test_portions_come_front_to_back_whatever_the_order_of_plants() -> None:
     plants, parts = result.plants, result.plants.parts
     order = np.random.default_rng(0).permutation(len(parts))
     inverse = np.argsort(order).astype(np.int32)
-    shuffled = type(plants).__new__(type(plants))
-    shuffled.__dict__.update(plants.__dict__)
-    shuffled.parts = parts.take(order)
-    shuffled.points = replace(plants.points, part=inverse[plants.points.part])
+    shuffled = plants.with_parts(parts.take(order), replace(plants.points, part=inverse[plants.points.part]))
     other = sight(replace(result, plants=shuffled)).portions()
     assert np.array_equal(other.parts.branches.key, found.parts.branches.key)
     assert np.array_equal(other.visibility, found.visibility)

@@ -16,8 +16,7 @@ from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.proxies.summaries import Summaries, extinction_matrices, summarise
-from tetflora_addon.refinement.contents import Contents, Held, piece_totals, subplant_totals
-from tetflora_addon.refinement.shares import as_pieces
+from tetflora_addon.refinement.contents import Contents, Held, as_pieces, piece_totals, subplant_totals
 from tetflora_addon.tetrahedra.tree import TetrahedralTree
 
 

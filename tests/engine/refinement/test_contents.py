@@ -10,8 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.engine import support
-from tetflora_addon.refinement.contents import Totals, bounding_box, piece_totals, subplant_totals, sums
-from tetflora_addon.refinement.shares import PlantParts, as_pieces
+from tetflora_addon.refinement.contents import (
+    PlantParts,
+    Totals,
+    as_pieces,
+    bounding_box,
+    piece_totals,
+    subplant_totals,
+    sums,
+)
 from tetflora_addon.subplants.pieces import expand, wood_areas
 
 

@@ -14,14 +14,17 @@ from numpy.typing import NDArray
 
 from tests.engine import support
 from tests.engine.growth.test_drawn import flora as drawn_flora
+from tetflora_addon.arrays import Arrays
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.branches import Branches
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.growth.wind import Wind
-from tetflora_addon.refinement.contents import Totals, bounding_box, subplant_totals, sums
-from tetflora_addon.refinement.shares import LARGE, PlantParts, SharedPlants, opened, share_points
+from tetflora_addon.refinement.contents import PlantParts, Totals, bounding_box, subplant_totals, sums
+from tetflora_addon.refinement.loop import refine, step_of
+from tetflora_addon.refinement.settings import RefinementSettings
+from tetflora_addon.refinement.shares import LARGE, SharedPlants, opened, share_points
 from tetflora_addon.subplants.pieces import expand
 from tetflora_addon.tetrahedra.geometry import squared_edges, volume
 from tetflora_addon.tetrahedra.roots import view_root
@@ -240,6 +243,102 @@ def test_more_points_where_there_are_more_pixels() -> None:
     assert (points.leaf == 0).all()
     np.testing.assert_allclose(np.bincount(points.part, points.wood), parts.totals.wood_area, rtol=1e-6)
     assert np.allclose(points.optical_area, points.wood / 2)
+
+
+def columns_of(rows: Arrays) -> list[NDArray]:
+    """All arrays of a structure."""
+    own = [value for value in vars(rows).values() if value is not None]
+    return [a for value in own for a in (columns_of(value) if isinstance(value, Arrays) else [value])]
+
+
+def check_same(one: SharedPlants, other: SharedPlants) -> None:
+    """To the bit, and in the same order."""
+    for a, b in ((one.parts, other.parts), (one.points, other.points)):
+        assert len(columns_of(a)) == len(columns_of(b)) > 4
+        for mine, its in zip(columns_of(a), columns_of(b), strict=True):
+            np.testing.assert_array_equal(mine, its)
+
+
+#: What may be asked of plants between two passes.
+QUESTIONS = {
+    "parts": lambda plants, tree: plants.parts,
+    "points": lambda plants, tree: plants.points,
+    "held": lambda plants, tree: plants.held(len(tree)),
+    "without": lambda plants, tree: plants.without_parts(),
+}
+
+
+@given(VIEWS, st.lists(st.lists(st.sampled_from(sorted(QUESTIONS)), max_size=3), min_size=3, max_size=5))
+@settings(deadline=None, max_examples=8)
+def test_what_is_asked_on_the_way_changes_nothing(view: tuple[int, str], asked: list[list[str]]) -> None:
+    """Each pass changes the same nodes and gives them the same totals, and the same parts and points are left.
+
+    What is asked is right, and no area is lost.
+    """
+    flora, seeds, rng = support.compiled(support.RICH), support.grove(4, 2.5), np.random.default_rng(view[0])
+    camera = camera_of(rng, view[1])
+    one, other = (SharedPlants(flora, seeds, camera) for _ in range(2))
+    tree = view_root(camera, bounding_box(flora, one.parts.branches))
+    root = np.arange(len(tree)) == 0
+    for plants in (one, other):
+        plants.update(tree, root, np.where(root, np.inf, 0.0))
+    at_once, rounds = one.numbers[1], 0
+    while rounds < len(asked):
+        nodes = np.unique(one.totals(np.ones(len(tree), bool))[1])
+        nodes = nodes[rng.random(len(nodes)) < 0.5]
+        longest = np.sqrt(squared_edges(tree.vertices(nodes)).max(axis=1))
+        tree.split(tree.split(nodes).ravel())
+        edge = np.zeros(len(tree))
+        edge[nodes] = longest
+        changed = [plants.update(tree, edge > 0.0, edge) for plants in (one, other)]
+        np.testing.assert_array_equal(*changed)
+        if one.numbers[1] == at_once:
+            continue  # nothing is opened so far
+        questions, rounds = asked[rounds], rounds + 1
+        for question in questions:
+            QUESTIONS[question](other, tree)
+        if "parts" in questions:
+            check_whole(flora, seeds, other)
+            check_points(tree, other)
+        (mine, cell), (its, same_cell) = (plants.totals(changed[0]) for plants in (one, other))
+        np.testing.assert_array_equal(cell, same_cell)
+        for a, b in zip(columns_of(mine), columns_of(its), strict=True):
+            np.testing.assert_array_equal(a, b)
+        assert one.numbers == other.numbers
+    every, _ = one.totals(np.ones(len(tree), bool))
+    assert one.numbers == ((~one.parts.alone).sum(), one.parts.alone.sum())
+    for name in ("leaf_area", "wood_area", "polygons"):
+        assert getattr(every, name).sum(dtype=float) == pytest.approx(getattr(one.parts.totals, name).sum(), rel=1e-6)
+    check_same(one, other)
+    check_whole(flora, seeds, one)
+    check_points(tree, one)
+
+
+def test_what_is_asked_of_a_state_of_the_loop_changes_nothing() -> None:
+    """Parts of each state are right; the result is that of a loop of which nobody asks anything."""
+    flora, seeds = support.compiled(support.RICH), support.grove(9, 2.0)
+    camera, given = support.camera((0, -7, 3), (0, 0, 1.5), pixels=256), RefinementSettings(visibility_resolution=64)
+    results, pieces = [], set()
+    for asking in (False, True):
+        states = refine(flora, seeds, camera, given)
+        while True:
+            try:
+                state = next(states)
+            except StopIteration as stop:
+                results.append(stop.value)
+                break
+            step = step_of(state)
+            pieces.add(step.pieces)
+            if asking:
+                check_whole(flora, seeds, state.plants)
+                check_points(state.tree, state.plants)
+                assert step.pieces == state.plants.parts.alone.sum()
+                assert step.subplants + step.pieces == len(state.plants.parts)
+    one, other = results
+    assert len(pieces) > 2  # some are opened more than once
+    check_same(one.plants, other.plants)
+    np.testing.assert_array_equal(one.decision, other.decision)
+    np.testing.assert_array_equal(one.transmittance, other.transmittance)
 
 
 def test_nobody_is_shared_by_nobody() -> None:
