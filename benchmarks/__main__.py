@@ -17,6 +17,7 @@ from devtools import session
 #: Benchmarks by name, in the order of ``all``.
 NAMES = (
     "row80",
+    "time_to_picture",
     "plants",
     "bounds",
     "averages",
@@ -25,6 +26,7 @@ NAMES = (
     "extinction",
     "looks",
     "leaf_looks",
+    "leaf_instances",
     "tetrahedra",
     "landscape",
     "scaling",

@@ -9,6 +9,8 @@ import platform
 import resource
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -22,6 +24,25 @@ def peak_mb() -> float:
 
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak / (1e6 if sys.platform == "darwin" else 1e3) + pool.peak() / 1e6
+
+
+def cpu_s() -> float:
+    """Seconds of all processors so far, of this process and of those that it started, the ended ones included.
+
+    Those that still run count only where the system has a ``/proc``.
+    """
+    own = os.times()
+    return own.user + own.system + own.children_user + own.children_system + sum(_running_children_s())
+
+
+def _running_children_s() -> Iterator[float]:
+    own, tick = os.getpid(), os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 1
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):  # ended meanwhile
+            # After the name, which may hold anything: state, parent, …, ticks in programs and in the system.
+            fields = path.read_text().rpartition(")")[2].split()
+            if int(fields[1]) == own:
+                yield (int(fields[11]) + int(fields[12])) / tick
 
 
 def forget_peak() -> None:
