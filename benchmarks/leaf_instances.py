@@ -32,7 +32,7 @@ from .report import ROOT, Targets, cpu_s, peak_mb
 WAYS = ("polygons", "instances")
 #: Polygons of a leaf: those of levels of the species, or a twig of kites, by view and engine.
 UNITS = {
-    "CYCLES": {"crown": ("1", "26", "72", "391", "twig"), "stand": ("1", "26", "twig")},
+    "CYCLES": {"crown": ("1", "14", "26", "72", "391", "twig"), "stand": ("1", "14", "26", "twig")},
     "EEVEE": {"crown": ("1", "72"), "stand": ("1",)},
 }
 QUICK_UNITS = {"CYCLES": {"crown": ("1", "72")}, "EEVEE": {}}

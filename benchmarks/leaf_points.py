@@ -27,6 +27,8 @@ from tetflora_addon.species import catalogue
 from tetflora_addon.subplants.leaf_copies import LeafCopies
 
 SPECIES = "broadleaf_tree"
+#: Has a leaf so coarse that the species has none of as few polygons.
+COARSE = "beech"
 #: Trees of each view, and how far the camera is from their middle, metres.
 TREES = {"crown": 1, "stand": 6}
 AWAY = {"crown": 9.0, "stand": 90.0}
@@ -125,7 +127,9 @@ def model_of(unit: str, leaves: Leaves) -> LeafModel:
         return _twig(leaves)
     if unit == "1":
         return replace(KITE, positions=leaf_kites(own).positions[0])
-    level = next(level for level in leaf_levels(own) if level.model.polygons == int(unit))
+    (coarse,) = catalogue.load_species(COARSE).leaf
+    levels = *leaf_levels(own), *leaf_levels(coarse)
+    level = next(level for level in levels if level.model.polygons == int(unit))
     return replace(level.model, positions=level.shapes[0])
 
 
