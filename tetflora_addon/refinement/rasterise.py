@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 from ..arrays import Arrays, column, spread
 from ..camera.camera import Camera
 from ..camera.silhouette import silhouette_area, window_bounds
-from ..parallel import blocks, on_all_cores
+from ..parallel import blocks
 from ..tetrahedra.geometry import face_area_vectors, projected_area, volume
 
 #: Pairs of a primitive and a pixel of its bounding box that are tested together; some 100 bytes each.
-PAIRS_AT_ONCE = 1 << 15
+PAIRS_AT_ONCE = 1 << 14
 #: Primitives whose bounding boxes are computed together.
 PRIMITIVES_AT_ONCE = 1 << 17
-#: Tetrahedra that one thread draws at a time.
+#: Tetrahedra that are drawn at a time.
 TETRAHEDRA_AT_ONCE = 1 << 11
 #: Shift of the sample from the pixel's centre, in pixels. The view pyramid's own planes run exactly through centres of
 #: pixels; shifted by next to nothing, each ray is on one side of every such plane.
@@ -106,7 +106,8 @@ def tetrahedron_fragments(vertices: NDArray[np.float64], camera: Camera, width: 
         part = _fragments(vertices[block], camera, width, height)
         return replace(part, cell=part.cell + np.int32(block.start))
 
-    return Fragments.concatenate(list(on_all_cores(drawn, blocks(len(vertices), TETRAHEDRA_AT_ONCE))))
+    # One after another: threads, and other processes, took as long for the many small steps of this.
+    return Fragments.concatenate([drawn(block) for block in blocks(len(vertices), TETRAHEDRA_AT_ONCE)])
 
 
 def occluder_depth(triangles: NDArray[np.float64], camera: Camera, width: int, height: int) -> NDArray[np.float64]:
