@@ -77,8 +77,9 @@ def shared(
     root = np.arange(len(tree)) == 0
     plants.update(tree, root, np.where(root, np.inf, 0.0))
     at_once = plants.parts.alone.sum()  # thick wood in view is opened before anything is divided
+    closed = plants.parts.can_open(flora).any()  # not where the camera is that near to all of them
     while rounds > 0:
-        rounds -= bool(plants.parts.alone.sum() > at_once)
+        rounds -= bool(plants.parts.alone.sum() > at_once or not closed)
         nodes = np.unique(plants.points.cell)
         divide(tree, plants, nodes[rng.random(len(nodes)) < 0.7])
     return tree, plants
