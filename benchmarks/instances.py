@@ -29,9 +29,9 @@ PLANTS = {"CYCLES": (8_636, 100_000, 1_000_000), "EEVEE": (8_636,)}
 QUICK_PLANTS = {"CYCLES": (8_636,), "EEVEE": ()}
 #: Different plants of each species.
 VARIANTS = 8
-#: Samples that images have, and those of timed images, the first of which give the seconds before the first sample.
+#: Samples that images have, and those of timed images.
 SAMPLES = {"CYCLES": 64, "EEVEE": 16}
-TIMED = {"CYCLES": (1, 9), "EEVEE": (1, 5)}
+TIMED = {"CYCLES": 9, "EEVEE": 5}
 SIZE = 960, 540
 _LONGEST = 3600  # seconds of one process
 
@@ -102,6 +102,7 @@ def measure(path: Path, what: str, engine: str) -> dict[str, float]:
     from .compare import difference
     from .report import peak_mb
     from .row80 import timed_refine, timed_render
+    from .time_to_picture import of_render
 
     begun = time.perf_counter()
     bpy.ops.wm.open_mainfile(filepath=str(path))
@@ -111,15 +112,12 @@ def measure(path: Path, what: str, engine: str) -> dict[str, float]:
     read_s, refine_s = time.perf_counter() - begun, 0.0
     if what == "refined":
         refine_s = timed_refine(scene)[1]
-    few, more = TIMED[engine]
     image = path.with_name(f"{what}-{engine}.png")
-    first = timed_render(scene, image, few, engine=kind)
-    last = timed_render(scene, image, more, engine=kind)
+    times = of_render(scene, image, kind, TIMED[engine])
     peak = peak_mb()
     again = image.with_stem(f"{image.stem}-again")
-    timed_render(scene, again, more, seed=1, engine=kind)
-    sample = max(last - first, 0.0) / (more - few)
-    setup = max(first - few * sample, 0.0)
+    timed_render(scene, again, TIMED[engine], seed=1, engine=kind)
+    setup, sample = times["setup_s"], times["sample_s"]
     return {
         "read_s": read_s,
         "refine_s": refine_s,

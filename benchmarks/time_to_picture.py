@@ -184,11 +184,22 @@ def measure(path: Path, what: str, engine: str, samples: int, percent: int, fram
 
 
 def _frame(scene: object, image: Path, what: str, engine: str, samples: int) -> dict[str, float]:
-    from .row80 import timed_refine, timed_render
+    from .row80 import timed_refine
 
     begun = _clocks()
     timed_refine(scene, expand_everything=what == "expanded")
     figures = dict(zip(("refine_cpu_s", "refine_s"), _since(begun), strict=True))
+    return figures | of_render(scene, image, engine, samples)
+
+
+def of_render(scene: object, image: Path, engine: str, samples: int) -> dict[str, float]:
+    """Seconds by both clocks before the first sample, and of each sample.
+
+    Two renders of different numbers of samples do not tell: the first one prepares more.
+    """
+    from .row80 import timed_render
+
+    figures: dict[str, float] = {}
     begun = _clocks()
     with marked() as marks:
         timed_render(scene, image, samples, engine=engine)
