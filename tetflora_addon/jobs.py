@@ -23,16 +23,29 @@ class Progress:
         For the status bar.
     waiting : bool
         Whether nothing is new: the next step waits as well.
+    amid : bool
+        Whether something small is half done: whoever looks after the job may do that later.
     """
 
     fraction: float
     message: str
     waiting: bool = False
+    amid: bool = False
 
     @property
     def again(self) -> Progress:
         """The same, while nothing is new."""
         return replace(self, waiting=True)
+
+    def during(self, steps: Generator[object, None, _Result]) -> Generator[Progress, object, _Result]:
+        """The same after each of some small steps; returns what these return."""
+        amid = replace(self, amid=True)
+        while True:
+            try:
+                next(steps)
+            except StopIteration as stop:
+                return stop.value
+            yield amid
 
 
 def at_once(steps: Generator[object, object, _Result]) -> _Result:

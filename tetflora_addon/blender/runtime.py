@@ -160,7 +160,7 @@ _running: list[tuple[JobData, Generator]] = []
 
 
 def guarded(data: JobData, steps: Generator[Any, Any, _Result]) -> Generator[Any, Any, _Result]:
-    """Run a job that must not outlive what it holds; steps that wait look for little.
+    """Run a job that must not outlive what it holds; after steps that wait, or are small, little is looked for.
 
     Closing the steps has to leave everything as it was, whatever is gone.
 
@@ -178,7 +178,7 @@ def guarded(data: JobData, steps: Generator[Any, Any, _Result]) -> Generator[Any
                     item = steps.send(sent)
                 except StopIteration as stop:
                     return stop.value
-            waits = getattr(item, "waiting", False)
+            waits = getattr(item, "waiting", False) or getattr(item, "amid", False)
             sent = yield item
     finally:
         _running.remove(own)

@@ -321,12 +321,7 @@ def _write_refined(
         clock.lap("emit")
         yield from bake_light(baking, refined)
         clock.lap("light")
-    progress = Progress(0.95, "Making proxies")
-    yield progress
-    for done in write_proxies(results, form, refined, statistics, baking):
-        if done is not None:
-            progress = Progress(0.95 + 0.05 * done, f"Making proxies: {statistics.polygons_proxy:,}")
-        yield progress.again if done is None else progress
+    yield from write_proxies(results, form, refined, statistics, baking)
 
 
 def _count(statistics: Statistics, refinement: Refinement) -> None:

@@ -41,14 +41,15 @@ def write_blocks(
     """Write blocks of plants; progress goes from a given fraction to .95, and the statistics count."""
     materials: dict[tuple[int, str, int], list[bpy.types.Material]] = {}
 
-    def write(block: Block) -> Progress:
+    def write(block: Block) -> Generator[None, None, Progress]:
         species, what = flora.species[block.species], (block.species, block.kind, block.form)
         if what not in materials:
             baked = baking is not None and baking.leaves
             made = [baked_material()] if baked else materials_of(results.scene, species, block.kind, block.form)
             materials[what] = made
         name = f"{species.name} {block.kind} {block.number:03d}"
-        obj = results.add(name, block.kind, block.buffers, materials[what], species)
+        yield
+        obj = yield from results.add(name, block.kind, block.buffers, materials[what], species)
         _made(obj, block.buffers, statistics, baking, lit=True)
         return Progress(start + (0.95 - start) * block.fraction, f"Making polygons: {statistics.polygons_meshed:,}")
 
@@ -64,10 +65,10 @@ def write_polygons(
 ) -> Generator[Progress, None, None]:
     """Write polygons of meshes that take part, with their own materials; the statistics count."""
 
-    def write(block: PolygonBlock) -> Progress:
+    def write(block: PolygonBlock) -> Generator[None, None, Progress]:
         name = explicit.meshes.surfaces[block.surface].name
         materials = explicit.materials[block.surface]
-        obj = results.add(f"{name} {block.number:03d}", "explicit", block.buffers, materials)
+        obj = yield from results.add(f"{name} {block.number:03d}", "explicit", block.buffers, materials)
         _made(obj, block.buffers, statistics, baking, lit=False)
         return Progress(0.95, f"Keeping polygons: {statistics.polygons_meshed:,}")
 
@@ -75,13 +76,13 @@ def write_polygons(
 
 
 def _written(
-    blocks: Iterator[_Block], write: Callable[[_Block], Progress], progress: Progress
+    blocks: Iterator[_Block], write: Callable[[_Block], Generator[None, None, Progress]], progress: Progress
 ) -> Generator[Progress, None, None]:
     """Write blocks one by one, while the next is computed."""
     with closing(in_thread(blocks, ahead=1)) as made:
         for block in made:
             if block is not None:
-                progress = write(block)
+                progress = yield from progress.during(write(block))
             yield progress.again if block is None else progress
 
 

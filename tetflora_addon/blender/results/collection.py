@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from contextlib import closing
 
 import bpy
 
@@ -12,7 +13,7 @@ from ...buffers import MeshBuffers, PointBuffers
 from ...species.species import Species
 from ..materials.nodes import is_own, tag
 from ..runtime import JobData, is_there
-from .meshes import point_object, write_mesh
+from .meshes import mesh_steps, point_object
 from .output import (
     KIND,
     PURPOSE,
@@ -85,10 +86,21 @@ class Results:
         buffers: MeshBuffers,
         materials: list[bpy.types.Material],
         species: Species | None = None,
-    ) -> bpy.types.Object:
-        """Write one mesh as an object of the collection; of one species, or of None."""
-        name = self._name(name)
-        mesh = write_mesh(name, buffers, materials)
+    ) -> Generator[None, None, bpy.types.Object]:
+        """Write one mesh as an object of the collection, step by step; of one species, or of None."""
+        name, known = self._name(name), False
+        steps = mesh_steps(name, buffers, materials)
+        with closing(steps):
+            while True:
+                try:
+                    mesh = next(steps)
+                except StopIteration as stop:
+                    mesh = stop.value
+                    break
+                if mesh is not None and not known and self.data is not None:
+                    self.data.add("a part of the result", mesh)
+                    known = True
+                yield
         self._made += [mesh, *materials]
         return self._link(name, bpy.data.objects.new(name, mesh), kind, species)
 

@@ -7,16 +7,18 @@ Where Python cannot resize point clouds, geometry nodes make them from the verti
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Iterator, Sequence
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
 from ...buffers import MeshBuffers, PointBuffers
+from ...jobs import at_once
 from ..attributes import face_offsets, members, type_for, write
 from ..compat import can_resize_point_clouds
 from ..materials.nodes import Graph, get_or_create
+from ..runtime import is_there
 
 UV_MAP = "UVMap"
 
@@ -52,33 +54,51 @@ def write_mesh(name: str, buffers: MeshBuffers, materials: Sequence[bpy.types.Ma
         Arrays of wrong shape or type, or indices out of range, with which Blender would crash later; no datablock is
         left behind.
     """
+    return at_once(mesh_steps(name, buffers, materials))
+
+
+def mesh_steps(
+    name: str, buffers: MeshBuffers, materials: Sequence[bpy.types.Material | None] = ()
+) -> Generator[bpy.types.Mesh | None, None, bpy.types.Mesh]:
+    """The same array by array, so that nobody waits for long; yields the mesh as soon as there is one.
+
+    Closing the generator removes it.
+    """
     check_buffers(buffers)
+    yield None
     mesh = bpy.data.meshes.new(name)
     try:
-        _fill(mesh, buffers)
+        for _ in _fill(mesh, buffers):
+            yield mesh
         for material in materials:
             mesh.materials.append(material)
     except BaseException:
-        bpy.data.meshes.remove(mesh)
+        if is_there(mesh):
+            bpy.data.meshes.remove(mesh)
         raise
     return mesh
 
 
-def _fill(mesh: bpy.types.Mesh, buffers: MeshBuffers) -> None:
+def _fill(mesh: bpy.types.Mesh, buffers: MeshBuffers) -> Iterator[None]:
     mesh.vertices.add(len(buffers.positions))
     mesh.edges.add(len(buffers.edge_verts))
     mesh.loops.add(len(buffers.corner_verts))
     mesh.polygons.add(buffers.polygons)
+    yield
     write(mesh, "position", buffers.positions)
+    yield
     write(mesh, ".edge_verts", buffers.edge_verts)
     write(mesh, ".corner_vert", buffers.corner_verts)
     write(mesh, ".corner_edge", buffers.corner_edges)
+    yield
     # Offsets are no attribute, but setting the starts of faces writes the very same array.
     mesh.polygons.foreach_set("loop_start", np.ascontiguousarray(buffers.face_offsets[:-1]))
     for key, (domain, values) in buffers.attributes.items():
+        yield
         if key == UV_MAP:
             mesh.uv_layers.new(name=UV_MAP, do_init=False)
         write(mesh, key, values, domain)
+    yield
     if not buffers.smooth and buffers.polygons:
         # A mesh without this layer is smooth; `shade_flat` does the same far more slowly.
         write(mesh, "sharp_face", np.ones(buffers.polygons, bool), "FACE")

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ...buffers import MeshBuffers, PointBuffers
 from ...emission.forms import Buffers, Refined
 from ...emission.light import AT_ONCE, BakedLight, SheetList, Sources, at_vertices, baked_attributes, baked_light
+from ...jobs import Progress
 from ...refinement.statistics import Statistics
 from ...species.species import Species
 from ..attributes import face_offsets, read, write
@@ -103,7 +104,7 @@ def _light_of_mesh(
 
 def write_proxies(
     results: Results, form: ProxyForm, refined: Refined, statistics: Statistics, baking: Baking | None = None
-) -> Generator[float | None, None, None]:
+) -> Generator[Progress, None, None]:
     """Make the proxies of a refined scene; a thread makes the next block while one is written.
 
     Parameters
@@ -118,37 +119,42 @@ def write_proxies(
 
     Yields
     ------
-    float or None
-        Estimated fraction that is done; None while there is nothing to write.
+    Progress
+        From .95 on.
     """
     emission = form.emission
     baked = baking is not None and emission.baked_blocks is not None
     blocks = emission.baked_blocks(refined, baking.light, baking.first_facet) if baked else emission.blocks(refined)
     statistics.facet_pixels = refined.facet_pixels or 0.0
     with closing(in_thread((buffers for buffers in blocks), ahead=1)) as made:
-        number = 0
+        number, progress = 0, Progress(0.95, "Making proxies")
+        yield progress
         for buffers in made:
             if buffers is None:
-                yield None
+                yield progress.again
                 continue
             species = None if buffers.species is None else refined.flora.species[buffers.species]
-            _add(results, form, buffers, number, baked, species)
+            yield from progress.during(_added(results, form, buffers, number, baked, species))
             statistics.polygons_proxy += buffers.polygons
             statistics.memory_mb += buffers.nbytes / 1e6
-            yield 1 - 0.9**number
+            progress = Progress(1.0 - 0.05 * 0.9**number, f"Making proxies: {statistics.polygons_proxy:,}")
+            yield progress
             number += 1
 
 
-def _add(
+def _added(
     results: Results, form: ProxyForm, buffers: Buffers, number: int, baked: bool, species: Species | None
-) -> None:
+) -> Generator[None, None, None]:
+    """Write one block of proxies step by step."""
     points = isinstance(buffers, PointBuffers)
     material = (form.baked_material if baked else form.point_material if points else form.material)()
     if not baked:
         set_sockets(material, results.scene, form.sockets)
     name = f"{'TetFlora' if species is None else species.name} proxies {number:03d}"
-    add = results.add_points if points else results.add
-    add(name, "proxy", buffers, [material], species)
+    if points:
+        results.add_points(name, "proxy", buffers, [material], species)
+    else:
+        yield from results.add(name, "proxy", buffers, [material], species)
 
 
 def set_sockets(material: bpy.types.Material, scene: bpy.types.Scene, sockets: Mapping[str, str]) -> None:

@@ -35,7 +35,7 @@ from ..settings import wind_of
 from .state import camera_now
 
 #: Seconds without a change before it begins, and seconds of work between two redraws.
-QUIET, SLICE = 0.6, 0.03
+QUIET, SLICE = 0.6, 0.02
 _BUSY = 0.5  # seconds until it looks again whether Blender has time
 _LOOK = 0.2  # seconds between two looks at the viewport
 _CHANGING = (bpy.types.Object, bpy.types.Camera, bpy.types.Light, bpy.types.Mesh, bpy.types.PointCloud, bpy.types.Curve)
