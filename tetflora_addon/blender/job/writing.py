@@ -22,7 +22,7 @@ from ...jobs import Progress
 from ...refinement.statistics import Statistics
 from ..materials.materials import baked_material
 from ..results.collection import Results
-from ..results.leaf_objects import materials_of
+from ..results.leaf_objects import material_steps
 from ..results.proxies import Baking
 from ..scene.explicit import Explicit
 from ..worker import in_thread, steps_in_thread
@@ -44,9 +44,10 @@ def write_blocks(
     def write(block: Block) -> Generator[None, None, Progress]:
         species, what = flora.species[block.species], (block.species, block.kind, block.form)
         if what not in materials:
-            baked = baking is not None and baking.leaves
-            made = [baked_material()] if baked else materials_of(results.scene, species, block.kind, block.form)
-            materials[what] = made
+            if baking is not None and baking.leaves:
+                materials[what] = [baked_material()]
+            else:
+                materials[what] = yield from material_steps(results.scene, species, block.kind, block.form)
         name = f"{species.name} {block.kind} {block.number:03d}"
         yield
         obj = yield from results.add(name, block.kind, block.buffers, materials[what], species)

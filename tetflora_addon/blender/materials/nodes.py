@@ -106,7 +106,8 @@ class Graph:
         """Add a node, set its properties, and link or set its inputs: a value, a socket, or a node's first output."""
         node = self.tree.nodes.new(kind)
         for key, value in settings.items():
-            setattr(node, key, value)
+            if getattr(node, key) != value:  # Blender looks through the whole tree after each change
+                setattr(node, key, value)
         for key, value in (inputs or {}).items():
             self.feed(find_socket(node.inputs, key), value)
         return node
@@ -117,7 +118,7 @@ class Graph:
             value = value.outputs[0]
         if isinstance(value, bpy.types.NodeSocket):
             self.tree.links.new(value, socket)
-        else:
+        elif not _has(socket, value):
             socket.default_value = value
 
     def attribute(self, name: str, output: str) -> bpy.types.NodeSocket:
@@ -189,19 +190,24 @@ class Graph:
 
     def arrange(self) -> None:
         """Lay the nodes out in columns by their distance from the outputs, for whoever opens the editor."""
-        column = {node: 0 for node in self.tree.nodes}
-        for _ in range(len(column)):
+        nodes = list(self.tree.nodes)
+        number = {node.as_pointer(): i for i, node in enumerate(nodes)}
+        # Nodes and links are asked once: each question takes as long as hundreds of comparisons.
+        links = [(number[link.from_node.as_pointer()], number[link.to_node.as_pointer()]) for link in self.tree.links]
+        column = [0] * len(nodes)
+        for _ in nodes:
             moved = False
-            for link in self.tree.links:
-                wanted = column[link.to_node] + 1
-                if column[link.from_node] < wanted:
-                    column[link.from_node], moved = wanted, True
+            for here, there in links:
+                if column[here] <= column[there]:
+                    column[here], moved = column[there] + 1, True
             if not moved:
                 break
         rows: dict[int, int] = {}
-        for node, place in column.items():
-            node.location = (-220.0 * place, -200.0 * rows.get(place, 0))
+        places = []
+        for place in column:
+            places += (-220.0 * place, -200.0 * rows.get(place, 0))
             rows[place] = rows.get(place, 0) + 1
+        self.tree.nodes.foreach_set("location", places)
 
 
 def active_output(tree: bpy.types.NodeTree | None, kind: str) -> bpy.types.Node | None:
@@ -227,6 +233,11 @@ def find_socket(sockets: Any, key: str) -> bpy.types.NodeSocket:
             if getattr(socket, attribute) == key:
                 return socket
     raise KeyError(f"No socket {key} among {', '.join(socket.name for socket in sockets)}")
+
+
+def _has(socket: bpy.types.NodeSocket, value: Any) -> bool:
+    """Whether a socket has a number already, as Blender stores it."""
+    return isinstance(value, float | int) and isinstance(socket.default_value, float) and socket.default_value == value
 
 
 def smooth_step(graph: Graph, value: Any, low: Any, high: Any) -> bpy.types.NodeSocket:

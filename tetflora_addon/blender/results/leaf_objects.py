@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import replace
 from itertools import pairwise
 
@@ -13,7 +14,7 @@ from ...errors import SpeciesError
 from ...leaves.models import LeafModel, leaf_model
 from ...species.species import LEAF_KINDS, Species
 from ..attributes import evaluated_mesh
-from ..materials.materials import bark_material
+from ..materials.materials import bark_material, bark_steps
 from ..materials.nodes import is_ours
 from ..scene.skeletons import form_of, read_skeleton, species_of
 from ..species.edits import species_for
@@ -109,6 +110,15 @@ def materials_of(scene: bpy.types.Scene, species: Species, kind: str, form: int)
     if any(own):
         return own
     return [_in_viewports(species_leaf_material(species, kind), species, kind)]
+
+
+def material_steps(
+    scene: bpy.types.Scene, species: Species, kind: str, form: int
+) -> Generator[None, None, list[bpy.types.Material]]:
+    """`materials_of` in steps."""
+    if kind == "bark" and replaced_material(scene, species.identifier, kind) is None:
+        yield from bark_steps(species.name, species.bark)
+    return materials_of(scene, species, kind, form)
 
 
 def brought_materials(scene: bpy.types.Scene, kind_of_plant: str) -> list[list[str]]:
