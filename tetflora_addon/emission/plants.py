@@ -272,7 +272,8 @@ def expanded_blocks(flora: Flora, seeds: Seeds, camera: Camera | None = None) ->
     full = flora.polygons[plants.row]
     parts = list(chunks(full, BLOCK_POLYGONS))
     runs = ((number, (number + 1) / len(parts), plants.take(run)) for number, run in enumerate(parts))
-    for made in in_processes(_expanded, (flora, detail), runs, float(full.sum()) > WORTH_PROCESSES):
+    worth = len(parts) > 1 and float(full.sum()) > WORTH_PROCESSES
+    for made in in_processes(_expanded, (flora, detail), runs, worth):
         while made:
             yield made.pop(0)
 
