@@ -4,8 +4,8 @@
 
 Seconds are processor time of the whole process, with one thread, so that they are those of one core; on two cores they
 are those of the clock, with many blocks and processes that have begun. Memory is what numpy holds at most, by
-`tracemalloc`, plus the meshes that Blender holds by then, for the plants of about one block: where there are more blocks,
-what is held beside the meshes stays the same and the ratio falls.
+`tracemalloc`, plus the meshes that Blender holds by then, for the plants of about one block: with more blocks, what is
+held beside the meshes stays the same and the ratio falls.
 """
 
 from __future__ import annotations
