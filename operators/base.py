@@ -18,7 +18,7 @@ LINKED = (
 )
 NO_VIEWPORT = "This tool requires a 3D viewport"
 NO_CAMERA = "The scene has no active camera; add one with Add > Camera"
-_SLICE = 0.02  # seconds of work between two looks at the keyboard
+_SLICE = 0.01  # seconds of work between two looks at the keyboard
 
 #: A condition of an operator: why it is not available in a context, or an empty text.
 Need = Callable[[bpy.types.Context], str]
