@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 
 import bpy
 import numpy as np
@@ -18,6 +19,12 @@ from .report import peak_mb
 #: Different plants in all; species have equal parts of them, rounded up.
 VARIANTS = 8
 _NAME = "Variants"
+#: Attributes of places: their types, and the sockets that they feed.
+_NAMED = (
+    ("turned", 'FLOAT_VECTOR', "Rotation"),
+    ("size", 'FLOAT', "Scale"),
+    ("variant", 'INT', "Instance Index"),
+)
 
 
 def build(scene: bpy.types.Scene, of_each: int = 0) -> dict[str, float]:
@@ -72,25 +79,32 @@ def _points(seeds: Seeds, each: int) -> bpy.types.Mesh:
 
 def _nodes(variants: bpy.types.Collection) -> bpy.types.GeometryNodeTree:
     """Vertices in, instances of the members of a collection out."""
+    tree, members, placed = placing_nodes("GeometryNodeCollectionInfo", _NAMED)
+    members.inputs["Collection"].default_value = variants
+    members.inputs["Separate Children"].default_value = True
+    placed.inputs["Pick Instance"].default_value = True
+    return tree
+
+
+def placing_nodes(
+    source: str, named: Iterable[tuple[str, str, str]]
+) -> tuple[bpy.types.GeometryNodeTree, bpy.types.Node, bpy.types.Node]:
+    """A tree that places what a kind of node gives on vertices; with that node, and the one that places.
+
+    named: attributes, with their types and the sockets of the latter that they feed.
+    """
     tree = bpy.data.node_groups.new("Instances", 'GeometryNodeTree')
     tree.interface.new_socket("Geometry", in_out='INPUT', socket_type='NodeSocketGeometry')
     tree.interface.new_socket("Geometry", in_out='OUTPUT', socket_type='NodeSocketGeometry')
     new, link = tree.nodes.new, tree.links.new
     given, made = new("NodeGroupInput"), new("NodeGroupOutput")
-    members, placed = new("GeometryNodeCollectionInfo"), new("GeometryNodeInstanceOnPoints")
-    members.inputs["Collection"].default_value = variants
-    members.inputs["Separate Children"].default_value = True
-    placed.inputs["Pick Instance"].default_value = True
+    members, placed = new(source), new("GeometryNodeInstanceOnPoints")
     link(given.outputs[0], placed.inputs["Points"])
-    link(members.outputs[0], placed.inputs["Instance"])
-    for name, kind, socket in (
-        ("turned", 'FLOAT_VECTOR', "Rotation"),
-        ("size", 'FLOAT', "Scale"),
-        ("variant", 'INT', "Instance Index"),
-    ):
+    link(next(s for s in members.outputs if s.type == 'GEOMETRY'), placed.inputs["Instance"])
+    for name, kind, socket in named:
         stored = new("GeometryNodeInputNamedAttribute")
         stored.data_type = kind
         stored.inputs["Name"].default_value = name
         link(next(s for s in stored.outputs if s.enabled), placed.inputs[socket])
     link(placed.outputs[0], made.inputs[0])
-    return tree
+    return tree, members, placed

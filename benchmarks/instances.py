@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import subprocess
 import sys
 import tempfile
 import time
@@ -21,7 +20,8 @@ from pathlib import Path
 
 from devtools import session
 
-ROOT = Path(__file__).resolve().parent.parent
+from .report import ROOT, records_of
+
 WHATS = ("refined", "instances")
 ENGINES = ("CYCLES", "EEVEE")
 #: Plants of the landscape; EEVEE takes many minutes for instances of more in software.
@@ -33,7 +33,6 @@ VARIANTS = 8
 SAMPLES = {"CYCLES": 64, "EEVEE": 16}
 TIMED = {"CYCLES": 9, "EEVEE": 5}
 SIZE = 960, 540
-_LONGEST = 3600  # seconds of one process
 
 TARGETS: dict[str, dict[str, float]] = {
     "cycles_time_ratio": {"max": 0.8},
@@ -66,14 +65,9 @@ def _apart(what: str, engine: str, plants: int) -> dict[str, float]:
     """Figures of one case, by a process of its own."""
     with tempfile.TemporaryDirectory() as folder:
         for only in (("--store",), ()):
-            command = [sys.executable, "-m", "benchmarks.instances", what, "--engine", engine, "--plants", str(plants)]
-            command += ["--folder", folder, *only]
-            done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=_LONGEST, check=False)
-            if done.returncode:
-                raise RuntimeError(f"{what} {engine} {plants} failed:\n{done.stderr[-2000:]}")
-    line = next(line for line in reversed(done.stdout.splitlines()) if line.startswith("{"))
-    print(line, flush=True)
-    return json.loads(line)
+            command = ["benchmarks.instances", what, "--engine", engine, "--plants", str(plants)]
+            found = records_of([*command, "--folder", folder, *only])
+    return found[-1]
 
 
 def store(path: Path, what: str, plants: int) -> None:
@@ -117,13 +111,12 @@ def measure(path: Path, what: str, engine: str) -> dict[str, float]:
     peak = peak_mb()
     again = image.with_stem(f"{image.stem}-again")
     timed_render(scene, again, TIMED[engine], seed=1, engine=kind)
-    setup, sample = times["setup_s"], times["sample_s"]
     return {
         "read_s": read_s,
         "refine_s": refine_s,
-        "setup_s": setup,
-        "sample_s": sample,
-        "total_s": read_s + refine_s + setup + SAMPLES[engine] * sample,
+        "setup_s": times["setup_s"],
+        "sample_s": times["sample_s"],
+        "total_s": read_s + refine_s + times["setup_s"] + SAMPLES[engine] * times["sample_s"],
         "peak_mb": peak,
         "flip_noise": difference(image, again).flip,
     }

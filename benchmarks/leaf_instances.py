@@ -20,14 +20,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 from devtools import session
 
-from .report import ROOT, Targets, cpu_s, peak_mb
+from .report import Targets, cpu_s, peak_mb, records_of
 
 WAYS = ("polygons", "instances")
 #: Polygons of a leaf: those of levels of the species, or a twig of kites, by view and engine.
@@ -69,13 +68,8 @@ def run(quick: bool) -> dict[str, float]:
 
 def _apart(cases: list[str], engine: str) -> dict[str, dict[str, float]]:
     """Figures of cases by a process of their own."""
-    command = [sys.executable, "-m", "benchmarks.leaf_instances", *cases, "--engine", engine]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=3600, check=False)
-    if done.returncode:
-        raise RuntimeError(f"{' '.join(cases)} {engine} failed:\n{done.stderr[-2000:]}")
-    lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
-    print(*lines, sep="\n", flush=True)
-    return {found["case"]: found for found in map(json.loads, lines)}
+    command = ["benchmarks.leaf_instances", *cases, "--engine", engine]
+    return {found["case"]: found for found in records_of(command)}
 
 
 def measure(case: str, engine: str, folder: Path) -> dict:
@@ -84,8 +78,7 @@ def measure(case: str, engine: str, folder: Path) -> dict:
 
     from . import leaf_points
     from .compare import linear_light, read_picture
-    from .row80 import timed_render
-    from .time_to_picture import marked
+    from .time_to_picture import of_render
 
     view, unit, way = case.split(":")
     session.clean_file()
@@ -99,12 +92,8 @@ def measure(case: str, engine: str, folder: Path) -> dict:
     write = cpu_s() - begun
     samples, image = EEVEE_TIMED if eevee else TIMED, folder / "image.png"
     for _ in range(2 if eevee else 1):
-        begun = cpu_s()
-        with marked() as marks:
-            timed_render(scene, image, samples, engine=kind)
-    first, last = marks["first"][0], marks["last"][0]
-    sample = (last - first) / (samples - 1 if eevee else samples)
-    setup = first - begun - (sample if eevee else 0.0)
+        times = of_render(scene, image, kind, samples)
+    setup, sample = times["setup_cpu_s"], times["sample_cpu_s"]
     return {
         "case": case,
         "leaves": len(leaves.size),

@@ -26,6 +26,8 @@ from tetflora_addon.leaves.models import LeafModel, leaf_model
 from tetflora_addon.species import catalogue
 from tetflora_addon.subplants.leaf_copies import LeafCopies
 
+from .forest_instances import placing_nodes
+
 SPECIES = "broadleaf_tree"
 #: Has a leaf so coarse that the species has none of as few polygons.
 COARSE = "beech"
@@ -181,20 +183,9 @@ def _points(leaves: Leaves) -> bpy.types.Mesh:
 
 def _nodes(source: bpy.types.Object) -> bpy.types.GeometryNodeTree:
     """Vertices in, instances of an object out."""
-    tree = bpy.data.node_groups.new("Instances", 'GeometryNodeTree')
-    for in_out in ('INPUT', 'OUTPUT'):
-        tree.interface.new_socket("Geometry", in_out=in_out, socket_type='NodeSocketGeometry')
-    new, link = tree.nodes.new, tree.links.new
-    given, made = new("NodeGroupInput"), new("NodeGroupOutput")
-    leaf, placed = new("GeometryNodeObjectInfo"), new("GeometryNodeInstanceOnPoints")
+    tree, leaf, _ = placing_nodes(
+        "GeometryNodeObjectInfo", (("turn", 'QUATERNION', "Rotation"), ("size", 'FLOAT', "Scale"))
+    )
     leaf.inputs["Object"].default_value = source
     leaf.inputs["As Instance"].default_value = True
-    link(given.outputs[0], placed.inputs["Points"])
-    link(leaf.outputs["Geometry"], placed.inputs["Instance"])
-    for name, kind, socket in (("turn", 'QUATERNION', "Rotation"), ("size", 'FLOAT', "Scale")):
-        stored = new("GeometryNodeInputNamedAttribute")
-        stored.data_type = kind
-        stored.inputs["Name"].default_value = name
-        link(next(s for s in stored.outputs if s.enabled), placed.inputs[socket])
-    link(placed.outputs[0], made.inputs[0])
     return tree

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import platform
 import resource
@@ -49,6 +50,24 @@ def forget_peak() -> None:
     """Let `peak_mb` begin with what the process has now, where the system can do that."""
     if CLEAR_PEAK.exists():
         CLEAR_PEAK.write_text("5")
+
+
+def records_of(command: list[str]) -> list[dict]:
+    """What a module of this repository prints as lines of JSON, called with arguments in a process of its own.
+
+    Raises
+    ------
+    RuntimeError
+        It has failed, with the end of what it says.
+    """
+    whole = [sys.executable, "-m", *command]
+    done = subprocess.run(whole, cwd=ROOT, capture_output=True, text=True, timeout=3600, check=False)
+    if done.returncode:
+        raise RuntimeError(f"{' '.join(command)} failed:\n{done.stderr[-2000:]}")
+    lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
+    for line in lines:
+        print(*command, line, flush=True)
+    return [json.loads(line) for line in lines]
 
 
 def machine() -> str:

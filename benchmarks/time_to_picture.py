@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import subprocess
 import sys
 import tempfile
 import time
@@ -31,7 +30,7 @@ from pathlib import Path
 
 from devtools import session
 
-from .report import ROOT, Targets, cpu_s, peak_mb
+from .report import ROOT, Targets, cpu_s, peak_mb, records_of
 
 SCENES = ("row80", "stand", "landscape")
 WHATS = ("refined", "expanded")
@@ -48,7 +47,6 @@ EEVEE_PERCENT, QUICK_PERCENT = 50, 50
 PARTS = 16
 _STEPS = ("refine", "setup", "sample", "total")
 _CLOCKS = ("_cpu_s", "_s")
-_LONGEST = 3600  # seconds of one process
 
 TARGETS: Targets = {
     "row80_cycles_cold_ratio": {"max": 0.85},
@@ -135,15 +133,11 @@ def apart(scene: str, what: str, engine: str, quick: bool, part: int | None = No
     """Figures of one case, by a process of its own."""
     with tempfile.TemporaryDirectory() as folder:
         for only in (["--store"], []):
-            command = [sys.executable, "-m", "benchmarks.time_to_picture", scene, what, "--engine", engine]
+            command = ["benchmarks.time_to_picture", scene, what, "--engine", engine]
             command += ["--folder", folder, *only, *(["--quick"] if quick else [])]
             command += [] if part is None else ["--part", str(part)]
-            done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=_LONGEST, check=False)
-            if done.returncode:
-                raise RuntimeError(f"{scene} {what} {engine} {part} failed:\n{done.stderr[-2000:]}")
-    line = next(line for line in reversed(done.stdout.splitlines()) if line.startswith("{"))
-    print(scene, what, engine, part, line, flush=True)
-    return json.loads(line)
+            found = records_of(command)
+    return found[-1]
 
 
 def store(path: Path, name: str, part: int | None) -> None:
@@ -175,7 +169,7 @@ def measure(path: Path, what: str, engine: str, samples: int, percent: int, fram
     figures: dict = {}
     for frame in frames:
         figures[frame] = _frame(scene, path.with_suffix(".png"), what, kind, samples)
-        # Of the first frame: processes that begin later count what this one had then as theirs.
+        # Of the first frame alone: the second one has the first image's result beside its own.
         figures.setdefault("peak_mb", peak_mb())
         figures[frame] |= dict(zip(("read_cpu_s", "read_s"), read if frame == "cold" else (0.0, 0.0), strict=True))
         for end in _CLOCKS:

@@ -20,9 +20,8 @@ _LEAF_LEANS = 0.25  # of the length of leaves, which makes the crown of grass: i
 LEVEL = 0.7  # of the area of leaves is seen from above, between those that stand in all directions and those that lie
 _LOWEST = 0.03  # of the leaves are lower than the crown's base
 _PLANTS = 16  # over which the length of trunks is averaged
-
-
 _MOST = 256  # crowns that are kept
+
 _known: dict[Species, Crown] = {}
 
 

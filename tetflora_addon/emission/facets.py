@@ -111,8 +111,8 @@ def _facets(
     form: Form | None,
 ) -> Iterator[tuple[int | None, Any, bool]]:
     """Facets in runs of about `FACETS_AT_ONCE`, species by species."""
-    flora, camera, portions = sight.flora, sight.camera, sight.portions()
-    weights = facet_weights(flora, _drawn(flora, portions, transition))
+    camera, portions = sight.camera, sight.portions()
+    weights = facet_weights(sight.flora, drawn_species(sight, transition))
     yield from portion_facets(sight, portions, weights, pixels, transition, form)
     explicit = result.chosen(Decision.EXPLICIT) if transition else np.zeros(len(result.tree), bool)
     held = result.holdings.polygons
@@ -123,12 +123,8 @@ def _facets(
 
 
 def drawn_species(sight: Sight, transition: Transition | None) -> list[int]:
-    """Species of which facets may be drawn, by index."""
-    return _drawn(sight.flora, sight.portions(), transition)
-
-
-def _drawn(flora: Flora, portions: Portions, transition: Transition | None) -> list[int]:
-    """Species of portions whose leaves are not all real; where they are, so is all wood."""
+    """Species of which facets may be drawn, by index: leaves are not all real; where they are, so is all wood."""
+    flora, portions = sight.flora, sight.portions()
     branches, visibility = portions.parts.branches, portions.visibility
     facets = np.ones(len(portions), bool)
     if transition is not None:

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from contextlib import closing
 
 import bpy
 
@@ -88,19 +87,8 @@ class Results:
         species: Species | None = None,
     ) -> Generator[None, None, bpy.types.Object]:
         """Write one mesh as an object of the collection, step by step; of one species, or of None."""
-        name, known = self._name(name), False
-        steps = mesh_steps(name, buffers, materials)
-        with closing(steps):
-            while True:
-                try:
-                    mesh = next(steps)
-                except StopIteration as stop:
-                    mesh = stop.value
-                    break
-                if mesh is not None and not known and self.data is not None:
-                    self.data.add("a part of the result", mesh)
-                    known = True
-                yield
+        name = self._name(name)
+        mesh = yield from mesh_steps(name, buffers, materials)
         self._made += [mesh, *materials]
         return self._link(name, bpy.data.objects.new(name, mesh), kind, species)
 

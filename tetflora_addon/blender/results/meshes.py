@@ -59,17 +59,13 @@ def write_mesh(name: str, buffers: MeshBuffers, materials: Sequence[bpy.types.Ma
 
 def mesh_steps(
     name: str, buffers: MeshBuffers, materials: Sequence[bpy.types.Material | None] = ()
-) -> Generator[bpy.types.Mesh | None, None, bpy.types.Mesh]:
-    """The same array by array, so that nobody waits for long; yields the mesh as soon as there is one.
-
-    Closing the generator removes it.
-    """
+) -> Generator[None, None, bpy.types.Mesh]:
+    """The same array by array, so that nobody waits for long; closing the generator removes the mesh."""
     check_buffers(buffers)
-    yield None
+    yield
     mesh = bpy.data.meshes.new(name)
     try:
-        for _ in _fill(mesh, buffers):
-            yield mesh
+        yield from _fill(mesh, buffers)
         for material in materials:
             mesh.materials.append(material)
     except BaseException:
@@ -84,15 +80,15 @@ def _fill(mesh: bpy.types.Mesh, buffers: MeshBuffers) -> Iterator[None]:
     mesh.edges.add(len(buffers.edge_verts))
     mesh.loops.add(len(buffers.corner_verts))
     mesh.polygons.add(buffers.polygons)
+    # Offsets are no attribute, but setting the starts of faces writes the very same array. It comes first, so that the
+    # mesh is valid whenever Blender looks at it between two steps, as for undo.
+    mesh.polygons.foreach_set("loop_start", np.ascontiguousarray(buffers.face_offsets[:-1]))
     yield
     write(mesh, "position", buffers.positions)
     yield
     write(mesh, ".edge_verts", buffers.edge_verts)
     write(mesh, ".corner_vert", buffers.corner_verts)
     write(mesh, ".corner_edge", buffers.corner_edges)
-    yield
-    # Offsets are no attribute, but setting the starts of faces writes the very same array.
-    mesh.polygons.foreach_set("loop_start", np.ascontiguousarray(buffers.face_offsets[:-1]))
     for key, (domain, values) in buffers.attributes.items():
         yield
         if key == UV_MAP:
