@@ -26,7 +26,7 @@ from tetflora_addon.refinement.contents import sums as sums_by_node
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.descent import cut, push_down
 from tetflora_addon.refinement.loop import Refinement, refine
-from tetflora_addon.refinement.mesh_features import mesh_features
+from tetflora_addon.assets.mesh_features import mesh_features
 from tetflora_addon.refinement.polygons import Meshes, Polygons, Surface, area_fractions
 from tetflora_addon.refinement.settings import RefinementSettings
 from tetflora_addon.refinement.views import widened_for

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
-from ...refinement.mesh_features import mesh_features
+from ...assets.mesh_features import mesh_features
 from ...refinement.polygons import Meshes, Surface
 from ..attributes import face_offsets, members, read, values_of, world_matrix
 from ..materials.means import Looks

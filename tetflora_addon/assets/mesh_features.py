@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..storage import keeping
 
-#: Bytes of cached features, ten a face: each frame of an animation needs the same again.
+#: Bytes of cached features, ten a face.
 MOST_BYTES = 128 << 20
 #: Squared boundary over area of a flat sheet, at least (a disc has 4π, a half ball 2π): with less it is bent back.
 _SHEET = 2 * np.pi
@@ -25,8 +25,7 @@ _ONE_OF_MANY = 1 / 64
 _ROUNDS = 6
 
 
-@keeping(MOST_BYTES)
-def mesh_features(
+def classified(
     positions: NDArray[np.float64], corner_verts: NDArray[np.integer], face_offsets: NDArray[np.integer]
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.float64]]:
     """Classify the faces of a mesh.
@@ -167,3 +166,7 @@ def _mean_curvature(
             (v + np.bincount(a, v[b], faces) + np.bincount(b, v[a], faces)) / weight for v in (integral, around)
         )
     return np.abs(integral) / np.maximum(around, 1e-300)
+
+
+#: `classified`, its results kept for as long as there is room: each frame of an animation needs the same again.
+mesh_features = keeping(MOST_BYTES)(classified)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 
 from tests.engine.refinement.test_polygons import SEEDS, surface, thicket
 from tetflora_addon.growth.hashing import mix
-from tetflora_addon.refinement.mesh_features import mesh_features
+from tetflora_addon.assets.mesh_features import mesh_features
 
 
 def tube(radius: float, length: float, sides: int = 8, rings: int = 20) -> tuple[np.ndarray, list[list[int]]]:

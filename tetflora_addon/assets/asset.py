@@ -1,0 +1,216 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Compiled assets: clusters with all that refinement asks about them, samples for facets, and several assets as one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Arrays, column
+
+#: Faces up to which a cluster is drawn as a mesh of its own, where it is near.
+MESH_FACES = 2048
+#: Facets for each of which a weight is known, as of `proxies.facet_weights`.
+COUNTS = 4.0 ** np.arange(-1, 6)
+
+
+@dataclass(frozen=True)
+class Clusters(Arrays):
+    """Clusters (c) in the space of their asset: parents before children, those of one parent together.
+
+    Attributes
+    ----------
+    parent, child, children : (c,) int32
+        Parent or −1, first child, and number of children.
+    low, high : (c, 3) float64
+        Bounds of all vertices, metres.
+    leaf_area, wood_area : (c,) float64
+        One-sided area of sheets, and surface of solids, m², without what is transparent.
+    faces : (c,) int32
+    first_face : (c,) int64
+        First of its faces in the asset's order.
+    width : (c,) float64
+        Mean width of its leaves and wood, by area, metres.
+    one_leaf : (c,) float64
+        Mean area of its sheets, m²; 0 where there are none.
+    colour : (c, 3) float64
+    transmission : (c,) float64
+    moment : (c, 6) float64
+        Mean of n nᵀ by optical area: xx, yy, zz, xy, xz, yz.
+    leaf_sample, leaf_samples, wood_sample, wood_samples : (c,) int32
+        First sample and number of samples on sheets, and on solids; each stands for an equal area.
+    weights : (c, 7) float64
+        Fraction of their area that facets need to block as much light, for each of `COUNTS`.
+    """
+
+    parent: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
+    child: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
+    children: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
+    low: NDArray[np.float64] = field(metadata=column(3))
+    high: NDArray[np.float64] = field(metadata=column(3))
+    leaf_area: NDArray[np.float64]
+    wood_area: NDArray[np.float64]
+    faces: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
+    first_face: NDArray[np.int64] = field(metadata=column(dtype=np.int64))
+    width: NDArray[np.float64]
+    one_leaf: NDArray[np.float64]
+    colour: NDArray[np.float64] = field(metadata=column(3))
+    transmission: NDArray[np.float64]
+    moment: NDArray[np.float64] = field(metadata=column(6))
+    leaf_sample: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
+    leaf_samples: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
+    wood_sample: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
+    wood_samples: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
+    weights: NDArray[np.float64] = field(metadata=column(len(COUNTS)))
+
+    @property
+    def optical_area(self) -> NDArray[np.float64]:
+        """Area (c,) that can block light, m²: sheets, and half of what is closed."""
+        return self.leaf_area + self.wood_area / 2
+
+    @property
+    def meshes(self) -> NDArray[np.bool_]:
+        """Clusters (c,) that are drawn as meshes where they are near: the largest with no more than `MESH_FACES`."""
+        small = (self.faces <= MESH_FACES) | (self.children == 0)
+        return small & ~(small[self.parent] & (self.parent >= 0))
+
+
+@dataclass(frozen=True)
+class Samples(Arrays):
+    """Places (s) on the surfaces of clusters, in the space of their asset.
+
+    Attributes
+    ----------
+    position : (s, 3) float32
+        Metres.
+    normal : (s, 3) float16
+    colour : (s, 3) float16
+    transmission : (s,) float16
+    """
+
+    position: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
+    normal: NDArray[np.float16] = field(metadata=column(3, dtype=np.float16))
+    colour: NDArray[np.float16] = field(metadata=column(3, dtype=np.float16))
+    transmission: NDArray[np.float16] = field(metadata=column(dtype=np.float16))
+
+
+@dataclass(frozen=True)
+class Asset:
+    """A compiled asset.
+
+    Attributes
+    ----------
+    name : str
+    digest : str
+        Of the source.
+    clusters : Clusters of c
+    samples : Samples of s
+    part, face : (f,) int32
+        Part of the source, and face of that part's surface, for each face, those of a cluster together.
+    """
+
+    name: str
+    digest: str
+    clusters: Clusters
+    samples: Samples
+    part: NDArray[np.int32]
+    face: NDArray[np.int32]
+
+    @property
+    def faces(self) -> int:
+        """Number of its faces."""
+        return len(self.face)
+
+    def faces_of(self, cluster: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Parts (k,) and faces (k,) of a cluster."""
+        start = int(self.clusters.first_face[cluster])
+        some = slice(start, start + int(self.clusters.faces[cluster]))
+        return self.part[some], self.face[some]
+
+
+@dataclass(frozen=True)
+class Assets:
+    """Several assets as one: their clusters and samples, one asset after the other.
+
+    Attributes
+    ----------
+    every : tuple of Asset
+    clusters : Clusters of c
+    samples : Samples of s
+    root : (a + 1,) int64
+        First cluster of each, and their number.
+    """
+
+    every: tuple[Asset, ...]
+    clusters: Clusters
+    samples: Samples
+    root: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, assets: Sequence[Asset]) -> Assets:
+        """All of some."""
+        root = np.cumsum([0, *(len(a.clusters) for a in assets)])
+        sample = np.cumsum([0, *(len(a.samples) for a in assets)])
+        moved = []
+        for asset, first, at in zip(assets, root[:-1].tolist(), sample[:-1].tolist(), strict=True):
+            own = asset.clusters
+            moved.append(
+                replace(
+                    own,
+                    parent=np.where(own.parent < 0, -1, own.parent + first).astype(np.int32),
+                    child=(own.child + np.int32(first)).astype(np.int32),
+                    leaf_sample=own.leaf_sample + np.int32(at),
+                    wood_sample=own.wood_sample + np.int32(at),
+                )
+            )
+        return cls(tuple(assets), Clusters.concatenate(moved), Samples.concatenate([a.samples for a in assets]), root)
+
+    @classmethod
+    def none(cls) -> Assets:
+        """No assets."""
+        return cls.of(())
+
+    def asset_of(self, cluster: NDArray[np.integer]) -> NDArray[np.int64]:
+        """Asset (n,) that clusters (n,) belong to."""
+        return np.searchsorted(self.root, cluster, side="right") - 1
+
+
+@dataclass(frozen=True)
+class Instances(Arrays):
+    """Places of assets (n).
+
+    Attributes
+    ----------
+    asset : (n,) int32
+    linear : (n, 3, 3) float64
+        From the space of the asset to the world, without the translation: turned, stretched or mirrored.
+    position : (n, 3) float64
+        Of the asset's origin, metres.
+    key : (n,) uint64
+        Tells individuals apart.
+    """
+
+    asset: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
+    linear: NDArray[np.float64] = field(metadata=column(3, 3))
+    position: NDArray[np.float64] = field(metadata=column(3))
+    key: NDArray[np.uint64] = field(metadata=column(dtype=np.uint64))
+
+    def counted_from(self, origin: NDArray[np.float64]) -> Instances:
+        """The same in coordinates that begin at a place (3,)."""
+        return replace(self, position=self.position - origin) if origin.any() else self
+
+    @property
+    def scale(self) -> NDArray[np.float64]:
+        """Mean scale (n,): the cube root of the factor on volumes."""
+        return np.cbrt(np.abs(np.linalg.det(self.linear)))
+
+    @property
+    def largest(self) -> NDArray[np.float64]:
+        """Largest factor (n,) on any length, or somewhat more where an instance is stretched (Frobenius norm)."""
+        gram = np.linalg.norm(self.linear, axis=1)
+        even = gram.max(axis=1, initial=0.0)
+        return np.where(gram.max(axis=1) > 1.001 * gram.min(axis=1), np.linalg.norm(self.linear, axis=(1, 2)), even)

@@ -1,0 +1,137 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Weights of the facets of clusters: the fraction of its area that facets need to block as much light as it does.
+
+Leaves hide each other; a few large facets in their place do so less, and would be too opaque (`proxies.facet_weights`
+says more). Parallel rays are cast through the triangles of some clusters of each depth, which let through what is
+transparent, and through facets at their samples, as many as there may be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import perpendicular, unit
+from ..compiled.rays import basis, covered
+from ..growth.hashing import child_key, key_of_seed, uniform
+from .asset import COUNTS, Clusters, Samples
+from .measures import Run
+
+#: Rays across the longer side of a cluster; clusters of a depth that are looked at, and directions.
+RAYS, CLUSTERS = 56, 5
+DIRECTIONS = np.array([[0.8, 0.5, 0.33166248], [-0.45, 0.85, 0.27386128], [0.35, 0.25, 0.90277350]])
+#: Facets for each number of them, over all sets; sets of few large ones; and weights that are tried.
+FACETS, FEW_SETS, TRIED = 192, 16, np.array([0.25, 0.5, 0.75, 1.0])
+_TURN, _PICK = 245, 246
+_CORNERS = np.array([[0.0, 1.0], [-np.sqrt(3) / 2, -0.5], [np.sqrt(3) / 2, -0.5]]) * 2 / 27**0.25
+
+
+def facet_weights_of(
+    clusters: Clusters, samples: Samples, triangles: Callable[[int], Iterator[Run]], start: float = 0.0
+) -> Generator[float, None, NDArray[np.float64]]:
+    """Weights (c, counts) for each of `asset.COUNTS`; yields the fraction that is done, from a start to 1.
+
+    triangles: those of a cluster, in runs.
+    """
+    depth = np.zeros(len(clusters), np.int64)
+    while (deeper := np.where(clusters.parent >= 0, depth[clusters.parent] + 1, 0)).max() > depth.max():
+        depth = deeper
+    weights = np.ones((len(clusters), len(COUNTS)))
+    for level in range(int(depth.max()) + 1):
+        own = np.flatnonzero((depth == level) & (clusters.optical_area > 0.0))
+        some = own[np.unique((np.arange(CLUSTERS) + 0.5) * len(own) // CLUSTERS).astype(np.int64)] if len(own) else own
+        found = np.zeros((2, len(COUNTS), len(TRIED)))
+        for cluster in some.tolist():
+            found += _looked(clusters, samples, cluster, triangles(cluster))
+        weights[depth == level] = _fitting(found)
+        yield start + (1.0 - start) * (level + 1) / (int(depth.max()) + 1)
+    return weights
+
+
+def _fitting(found: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Weights (counts,) with which facets block as much: areas (2, counts, tried) of the cluster, and of its facets."""
+    wanted, made = found
+    out = np.ones(len(COUNTS))
+    for k in range(len(COUNTS)):
+        if made[k].max() > 0.0:
+            out[k] = np.interp(wanted[k, 0], made[k], TRIED, left=TRIED[0] * wanted[k, 0] / max(made[k, 0], 1e-300))
+    return np.clip(out, 0.1, 1.0)
+
+
+@dataclass(frozen=True)
+class _View:
+    """A lattice of rays through the bound of a cluster, all in one direction: one a step of u and of v."""
+
+    u: NDArray[np.float64]
+    v: NDArray[np.float64]
+    origin: NDArray[np.float64]
+    step: float
+
+    @classmethod
+    def of(cls, clusters: Clusters, cluster: int, direction: NDArray[np.float64]) -> _View:
+        u, v = basis(direction / np.linalg.norm(direction))
+        bound = np.stack([clusters.low[cluster], clusters.high[cluster]])
+        box = np.stack(np.meshgrid(*bound.T, indexing="ij"), -1).reshape(-1, 3)
+        flat = np.stack([box @ u, box @ v], axis=1)
+        return cls(u, v, flat.min(axis=0), max(float(np.ptp(flat, axis=0).max()), 1e-12) / RAYS)
+
+    def met(self, corners: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.int64]]:
+        """Triangles (k,) of some (t, 3, 3), and rays (k, 2), that meet."""
+        flat = (np.stack([corners @ self.u, corners @ self.v], axis=-1).reshape(-1, 2) - self.origin) / self.step
+        first = np.arange(0, len(flat), 3)
+        return covered(flat, first, np.full(len(first), 3))
+
+
+def _looked(clusters: Clusters, samples: Samples, cluster: int, runs: Iterator[Run]) -> NDArray[np.float64]:
+    """Areas (2, counts, tried) that a cluster blocks, and that its facets do, over those of its bound."""
+    views = [_View.of(clusters, cluster, direction) for direction in DIRECTIONS]
+    through = np.zeros((len(views), RAYS * RAYS))
+    for run in runs:
+        # Both sides of what is closed count: it is either that blocks a ray.
+        light = np.log(np.maximum(1.0 - run.coverage.astype(np.float64), 1e-12))
+        for own, view in zip(through, views, strict=True):
+            triangle, ray = view.met(run.corners)
+            inside = np.flatnonzero(((ray >= 0) & (ray < RAYS)).all(axis=1))
+            own += np.bincount(ray[inside, 0] * RAYS + ray[inside, 1], light[triangle[inside]], RAYS * RAYS)
+    out = np.zeros((2, len(COUNTS), len(TRIED)))
+    out[0] = float((1.0 - np.exp(through)).sum()) / RAYS**2
+    for k, count in enumerate(COUNTS):
+        for w, weight in enumerate(TRIED):
+            for view in views:
+                out[1, k, w] += _blocked_by_facets(clusters, samples, cluster, view, float(count), weight)
+    return out
+
+
+def _blocked_by_facets(
+    clusters: Clusters, samples: Samples, cluster: int, view: _View, count: float, weight: float
+) -> float:
+    """Area over that of the lattice that ``count`` facets block, the mean of several sets of them."""
+    each = max(round(count), 1)
+    sets = int(np.ceil(FACETS / each)) if each >= 4 else FEW_SETS
+    area = clusters.optical_area[cluster] / count * weight
+    number = np.arange(sets * each)
+    owner = number // each
+    key = child_key(key_of_seed(number), cluster)
+    leaf = clusters.leaf_area[cluster] / clusters.optical_area[cluster]
+    runs = (clusters.leaf_sample, clusters.wood_sample), (clusters.leaf_samples, clusters.wood_samples)
+    on_leaf = (number % each + uniform(key_of_seed(owner), _PICK)) / each < leaf
+    first, many = (np.where(on_leaf, a[cluster], b[cluster]) for a, b in runs)
+    pick = first + np.minimum((uniform(key, _PICK) * many).astype(np.int64), np.maximum(many - 1, 0))
+    normal = unit(samples.normal[pick].astype(np.float64))
+    across = perpendicular(normal)
+    turn = 2 * np.pi * uniform(key, _TURN)[:, None]
+    across = np.cos(turn) * across + np.sin(turn) * np.cross(normal, across)
+    along = np.cross(normal, across)
+    place = samples.position[pick].astype(np.float64)
+    corner = _CORNERS[None, :, :1] * across[:, None] + _CORNERS[None, :, 1:] * along[:, None]
+    facet, ray = view.met(place[:, None] + np.sqrt(area) * corner)
+    if not len(facet):
+        return 0.0
+    low, (tall, wide) = ray.min(axis=0), np.ptp(ray, axis=0) + 1
+    cell = np.sort((owner[facet] * tall + ray[:, 0] - low[0]) * wide + ray[:, 1] - low[1])
+    # A facet smaller than a step is missed more often than not, but hit by as many rays on the mean.
+    return (1 + int(np.count_nonzero(np.diff(cell)))) / sets / RAYS**2 * min(count, 1.0)

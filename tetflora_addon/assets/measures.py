@@ -1,0 +1,250 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Triangles of an asset in the order of its clusters, looked at in runs: areas, bounds, orientation and samples.
+
+A run is of whole clusters without children. What it takes does not grow with the asset.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import spread
+from ..growth.hashing import child_key, key_of_seed, uniform
+from .asset import Samples
+from .clusters import Hierarchy
+from .patches import Patches
+from .source import AssetSource
+
+#: Triangles of which all is looked at at a time.
+AT_ONCE = 60_000
+#: Samples of a cluster without children, and how many either kind of surface has at least.
+SAMPLES, FEWEST = 32, 4
+#: Transmission of sheets where the material leaves it open.
+_SHEET_TRANSMISSION = 0.3
+#: Draws of the places of samples.
+ALONG, _U, _V = 241, 242, 243
+_GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
+_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+
+@dataclass(frozen=True)
+class Pool:
+    """Patches (p) of all parts of a source.
+
+    Attributes
+    ----------
+    patches : tuple of Patches or None
+        By surface.
+    part, patch : (p,) int32
+        Part of the source, and patch of its surface.
+    centre : (p, 3) float32
+        In the space of the asset.
+    triangles : (p,) int32
+    """
+
+    patches: tuple[Patches | None, ...]
+    part: NDArray[np.int32]
+    patch: NDArray[np.int32]
+    centre: NDArray[np.float32]
+    triangles: NDArray[np.int32]
+
+
+def pool_of(source: AssetSource, patches: tuple[Patches | None, ...]) -> Pool:
+    """All patches of the parts of a source, from those of its surfaces."""
+    number = np.array([0 if p is None else len(p) for p in patches])
+    part, patch = spread(number[source.surface])
+    centre, triangles = np.zeros((len(part), 3), np.float32), np.zeros(len(part), np.int32)
+    for s, own in enumerate(patches):
+        at = np.flatnonzero(source.surface[part] == s)
+        if own is not None and len(at):
+            matrix = source.matrices[part[at]].astype(np.float32)
+            local = own.centre[patch[at]]
+            centre[at] = np.einsum("nij,nj->ni", matrix[:, :3, :3], local) + matrix[:, :3, 3]
+            triangles[at] = np.diff(own.first)[patch[at]]
+    return Pool(patches, part.astype(np.int32), patch.astype(np.int32), centre, triangles)
+
+
+@dataclass(frozen=True)
+class Run:
+    """Triangles (t) of a run of clusters.
+
+    Attributes
+    ----------
+    cluster : (t,) int64
+        Among those without children, in their order; ascending.
+    corners : (t, 3, 3) float64
+        In the space of the asset, metres.
+    part, face : (t,) int32
+    new_face : (t,) bool
+        The first triangle of a face.
+    colour : (t, 3) float32
+    transmission, coverage : (t,) float32
+    solid : (t,) bool
+    width : (t,) float32
+        Metres.
+    """
+
+    cluster: NDArray[np.int64]
+    corners: NDArray[np.float64]
+    part: NDArray[np.int32]
+    face: NDArray[np.int32]
+    new_face: NDArray[np.bool_]
+    colour: NDArray[np.float32]
+    transmission: NDArray[np.float32]
+    coverage: NDArray[np.float32]
+    solid: NDArray[np.bool_]
+    width: NDArray[np.float32]
+
+
+def runs_of(
+    source: AssetSource, pool: Pool, hierarchy: Hierarchy, first: int = 0, last: int | None = None
+) -> Iterator[Run]:
+    """Triangles of the smallest clusters from one to before another, some clusters at a time."""
+    small = np.flatnonzero(hierarchy.children == 0)
+    small = small[np.argsort(hierarchy.first[small], kind="stable")][first:last]
+    done = np.concatenate([[0], np.cumsum(pool.triangles[hierarchy.order], dtype=np.int64)])
+    load = done[hierarchy.last[small]] - done[hierarchy.first[small]]
+    for block in np.split(np.arange(len(small)), np.flatnonzero(np.diff(np.cumsum(load) // AT_ONCE)) + 1):
+        own = small[block]
+        of, index = spread(hierarchy.last[own] - hierarchy.first[own])
+        yield _run(source, pool, hierarchy.order[hierarchy.first[own][of] + index], first + block[of])
+
+
+def _run(source: AssetSource, pool: Pool, some: NDArray[np.int64], cluster: NDArray[np.int64]) -> Run:
+    """Triangles of some patches (k,), each of a cluster (k,)."""
+    of, index = spread(pool.triangles[some])
+    count = len(of)
+    corners = np.zeros((count, 3, 3))
+    part, face = pool.part[some][of], np.zeros(count, np.int32)
+    colour, solid = np.zeros((count, 3), np.float32), np.zeros(count, bool)
+    transmission, coverage, width = np.zeros((3, count), np.float32)
+    surface = source.surface[part]
+    for s in np.unique(surface):
+        at = np.flatnonzero(surface == s)
+        own, shown = pool.patches[s], source.surfaces[s]
+        patch = pool.patch[some][of[at]]
+        triangle = own.triangle[own.first[patch] + index[at]]
+        matrix = source.matrices[part[at]]
+        local = shown.positions[shown.triangles[triangle]].astype(np.float64)
+        # By component: numpy multiplies small matrices one by one.
+        for i in range(3):
+            along = sum(matrix[:, i, k, None] * local[:, :, k] for k in range(3))
+            corners[at, :, i] = along + matrix[:, i, 3, None]
+        face[at] = of_face = shown.face[triangle]
+        colour[at], coverage[at] = shown.colour[of_face], shown.coverage[of_face]
+        solid[at] = own.solid[patch]
+        through = shown.transmission[of_face].astype(np.float32)
+        unknown = np.where(solid[at], np.float32(0.0), np.float32(_SHEET_TRANSMISSION))
+        transmission[at] = np.where(np.isnan(through), unknown, through)
+        width[at] = own.width[patch] * np.cbrt(np.abs(np.linalg.det(matrix[:, :3, :3])))
+    new_face = (np.diff(face, prepend=-1) != 0) | (np.diff(part, prepend=-1) != 0)
+    return Run(cluster[of], corners, part, face, new_face, colour, transmission, coverage, solid, width)
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What is known of the smallest clusters (c) of a run, and samples on them.
+
+    Attributes
+    ----------
+    low, high : (c, 3) float64
+    sums : (c, 16) float64
+        Sheets, solids, optical area; faces; faces of sheets; optical area times width, colour (3), transmission, and
+        n nᵀ (6).
+    samples : Samples of s
+    counts : (c, 2) int64
+        Samples on sheets and on solids of each.
+    part, face : (f,) int32
+        Faces of the clusters, one after the other.
+    """
+
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    sums: NDArray[np.float64]
+    samples: Samples
+    counts: NDArray[np.int64]
+    part: NDArray[np.int32]
+    face: NDArray[np.int32]
+
+
+def measured(run: Run) -> Measured:
+    """Look at the triangles of a run."""
+    start = np.flatnonzero(np.diff(run.cluster, prepend=-1))
+    owner = np.cumsum(np.diff(run.cluster, prepend=-1) != 0) - 1
+    vector = 0.5 * np.cross(run.corners[:, 1] - run.corners[:, 0], run.corners[:, 2] - run.corners[:, 0])
+    size = np.linalg.norm(vector, axis=1)
+    normal = vector / np.maximum(size, 1e-300)[:, None]
+    shown = size * run.coverage
+    optical = np.where(run.solid, 0.5, 1.0) * shown
+    columns = [np.where(run.solid, 0.0, shown), np.where(run.solid, shown, 0.0), optical]
+    columns += [run.new_face, run.new_face & ~run.solid, optical * run.width]
+    columns += [optical * run.colour[:, k] for k in range(3)] + [optical * run.transmission]
+    columns += [optical * normal[:, i] * normal[:, j] for i, j in _PAIRS]
+    sums = np.stack([np.add.reduceat(column.astype(np.float64), start) for column in columns], axis=1)
+    samples, counts = _samples(run, owner, start, optical, normal)
+    first = np.flatnonzero(run.new_face)
+    return Measured(
+        np.minimum.reduceat(run.corners.min(axis=1), start, axis=0),
+        np.maximum.reduceat(run.corners.max(axis=1), start, axis=0),
+        sums,
+        samples,
+        counts,
+        run.part[first],
+        run.face[first],
+    )
+
+
+def shared_out(leaf: NDArray[np.float64], wood: NDArray[np.float64], number: int) -> NDArray[np.int64]:
+    """How many of a number of samples are on sheets and how many on solids (c, 2), by their optical areas (c,)."""
+    total = np.maximum(leaf + wood, 1e-300)
+    on_leaves = np.clip(np.rint(number * leaf / total), FEWEST, number - FEWEST)
+    on_leaves = np.where(leaf <= 0.0, 0, np.where(wood <= 0.0, number, on_leaves))
+    on_wood = np.where(wood <= 0.0, 0, number - on_leaves)
+    return np.stack([on_leaves, on_wood], axis=1).astype(np.int64)
+
+
+def well_spread(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Owner (m,) and place (m,) of so many things each, in an order in which any run is spread over all of an owner."""
+    owner, index = spread(counts)
+    place = np.lexsort([index * _GOLDEN % 1.0, owner])
+    rank = np.empty(len(owner), np.int64)
+    rank[place] = index  # of the owner's things by golden section
+    return owner, rank
+
+
+def _samples(
+    run: Run, owner: NDArray[np.int64], start: NDArray[np.intp], optical: NDArray[np.float64], normal: NDArray
+) -> tuple[Samples, NDArray[np.int64]]:
+    """Samples of equal areas on sheets, and on solids, of the clusters of a run; sheets first, cluster by cluster."""
+    kinds = [np.where(run.solid, 0.0, optical), np.where(run.solid, optical, 0.0)]
+    areas = [np.add.reduceat(kind, start) for kind in kinds]
+    counts = shared_out(*areas, SAMPLES)
+    made, order = [], []
+    for kind, area, count in zip(kinds, areas, counts.T, strict=True):
+        cluster, rank = well_spread(count)
+        key = child_key(key_of_seed(run.cluster[start][cluster]), rank)
+        done = np.cumsum(kind)
+        before = (done - kind)[start]
+        at = before[cluster] + area[cluster] * (rank + uniform(key, ALONG)) / np.maximum(count, 1)[cluster]
+        pick = np.minimum(np.searchsorted(done, at, side="right"), len(kind) - 1)
+        # Rounding may lead to a neighbour of another cluster or kind.
+        pick = np.clip(pick, start[cluster], np.append(start[1:], len(kind))[cluster] - 1)
+        root, v = np.sqrt(uniform(key, _U)), uniform(key, _V)
+        weight = np.stack([1 - root, root * (1 - v), root * v], axis=1)
+        place = np.einsum("nk,nki->ni", weight, run.corners[pick])
+        made.append(
+            Samples(
+                place.astype(np.float32),
+                normal[pick].astype(np.float16),
+                run.colour[pick].astype(np.float16),
+                run.transmission[pick].astype(np.float16),
+            )
+        )
+        order.append(cluster)
+    cluster = np.concatenate(order)
+    return Samples.concatenate(made).take(np.argsort(cluster, kind="stable")), counts

@@ -1,0 +1,185 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Patches of a mesh: its islands, such as leaves, and pieces of islands that are large, such as trunks.
+
+Clusters are made of whole patches, so that no leaf is in two of them. Blender calls connected faces an island.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import spread
+from ..growth.hashing import mix
+from .mesh_features import classified
+from .source import AssetSurface
+
+#: Faces of a patch at most; an island with more is cut into pieces of about so many that lie together.
+MOST_FACES = 48
+#: Triangles whose features are found at a time; bounds what that takes to some thirty megabytes.
+AT_ONCE = 100_000
+#: Bits of a coordinate of the curve along which large islands are cut.
+_BITS = 10
+
+
+@dataclass(frozen=True)
+class Patches:
+    """Patches (p) of a surface, and its triangles in their order.
+
+    Attributes
+    ----------
+    triangle : (t,) int32
+        Triangles of the surface, patch after patch, those of a face together.
+    first : (p + 1,) int64
+        First of these of each patch.
+    faces : (p,) int32
+        Faces of each.
+    solid : (p,) bool
+        Of a closed surface, or a tube with open ends: half of it is never seen.
+    width : (p,) float32
+        Of the leaf, or the local thickness of the solid, in the unit of the positions.
+    centre : (p, 3) float32
+        Mean of its corners.
+    """
+
+    triangle: NDArray[np.int32]
+    first: NDArray[np.int64]
+    faces: NDArray[np.int32]
+    solid: NDArray[np.bool_]
+    width: NDArray[np.float32]
+    centre: NDArray[np.float32]
+
+    def __len__(self) -> int:
+        return len(self.faces)
+
+
+def patches_of(surface: AssetSurface) -> Patches:
+    """Divide a surface, which has faces, into patches."""
+    island = islands(surface)
+    triangle = np.argsort(island, kind="stable").astype(np.int32)
+    island = island[triangle]
+    solid, width = _features(surface, triangle, island)
+    # Faces in that order: all of their triangles are in one island, and lie together.
+    new_face = np.diff(surface.face[triangle], prepend=-1) != 0
+    new_island = np.diff(island, prepend=-1) != 0
+    start = np.flatnonzero(new_island)
+    count = np.bincount(np.cumsum(new_island) - 1, new_face).astype(np.int64)
+    if (count > MOST_FACES).any():
+        at, sorted_ = _along_a_curve(surface, triangle, new_island, count > MOST_FACES)
+        for own in (triangle, solid, width):
+            own[at] = own[sorted_]
+        new_face = np.diff(surface.face[triangle], prepend=-1) != 0
+    number = np.cumsum(new_face) - np.cumsum(new_face)[start][np.cumsum(new_island) - 1]
+    pieces = np.ceil(count / MOST_FACES).astype(np.int64)
+    most = -(-count // pieces)
+    new = new_island | (new_face & (number % most[np.cumsum(new_island) - 1] == 0))
+    first = np.append(np.flatnonzero(new), len(triangle))
+    owner = np.cumsum(new) - 1
+    size = np.maximum(np.diff(first), 1)
+    corners = surface.positions[surface.triangles[triangle]].mean(axis=1, dtype=np.float32)
+    centre = np.add.reduceat(corners, first[:-1], axis=0) / size[:, None]
+    return Patches(
+        triangle,
+        first,
+        np.bincount(owner, new_face).astype(np.int32),
+        solid[first[:-1]],
+        (np.add.reduceat(width, first[:-1]) / size).astype(np.float32),
+        centre.astype(np.float32),
+    )
+
+
+def islands(surface: AssetSurface) -> NDArray[np.int32]:
+    """Island (t,) of each triangle of a surface: many files split vertices at seams, so those of one place are one."""
+    place = _places(surface.positions)
+    label = np.arange(int(place.max(initial=-1)) + 1, dtype=np.int32)
+    corners = place[surface.triangles]
+    # Triangles of a face hang together, whatever their corners.
+    same = np.flatnonzero(np.diff(surface.face) == 0)
+    a = np.concatenate([corners[:, 0], corners[:, 1], corners[same, 0]])
+    b = np.concatenate([corners[:, 1], corners[:, 2], corners[same + 1, 0]])
+    while True:
+        la, lb = label[a], label[b]
+        apart = la != lb
+        if not apart.any():
+            break
+        a, b, la, lb = a[apart], b[apart], la[apart], lb[apart]
+        # The larger of two roots gets the smaller one as its parent; then all point to their roots.
+        np.minimum.at(label, np.maximum(la, lb), np.minimum(la, lb))
+        while True:
+            shorter = label[label]
+            if (shorter == label).all():
+                break
+            label = shorter
+    return label[corners[:, 0]]
+
+
+def _places(positions: NDArray[np.float32]) -> NDArray[np.int32]:
+    """Number (v,) of the place of each vertex, by a hash of its coordinates."""
+    bits = np.ascontiguousarray(positions + np.float32(0.0)).view(np.uint32)  # no negative zeros
+    key = mix(mix(bits[:, 0].astype(np.uint64) << np.uint64(32) | bits[:, 1]) ^ bits[:, 2])
+    order = np.argsort(key, kind="stable")
+    key = key[order]
+    new = np.ones(len(key), bool)
+    new[1:] = key[1:] != key[:-1]
+    place = np.empty(len(order), np.int32)
+    place[order] = np.cumsum(new, dtype=np.int32) - 1
+    return place
+
+
+def _features(
+    surface: AssetSurface, triangle: NDArray[np.int32], island: NDArray[np.int32]
+) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
+    """Whether triangles (t,), sorted by island, are of solids, and how wide what they are of is."""
+    solid, width = np.zeros(len(triangle), bool), np.zeros(len(triangle), np.float32)
+    for run in _whole_runs(island):
+        corners = surface.triangles[triangle[run]]
+        used, vertex = np.unique(corners, return_inverse=True)
+        offsets = np.arange(0, corners.size + 1, 3)
+        positions = surface.positions[used].astype(np.float64)
+        solid[run], _, width[run] = classified(positions, vertex.reshape(-1).astype(np.int32), offsets)
+    return solid, width
+
+
+def _whole_runs(island: NDArray[np.int32]) -> Iterator[slice]:
+    """Slices of triangles, sorted by island (t,), with whole islands and about `AT_ONCE` triangles."""
+    first = np.flatnonzero(np.diff(island, prepend=-1))
+    block = first // AT_ONCE
+    starts = first[np.flatnonzero(np.diff(block, prepend=-1))]
+    for start, stop in zip(starts, [*starts[1:], len(island)], strict=True):
+        yield slice(int(start), int(stop))
+
+
+def _along_a_curve(
+    surface: AssetSurface, triangle: NDArray[np.int32], new_island: NDArray[np.bool_], large: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Places (k,) of the triangles of large islands, and what is to be there (k,) to follow a curve that fills space.
+
+    All triangles of a face stay together. The curve is Morton's ("A computer oriented geodetic data base", 1966).
+    """
+    start = np.append(np.flatnonzero(new_island), len(triangle))
+    owner, index = spread(np.diff(start)[large])
+    at = start[:-1][large][owner] + index
+    corners = surface.positions[surface.triangles[triangle[at]]].mean(axis=1, dtype=np.float32)
+    face = surface.face[triangle[at]]
+    # All triangles of a face go where its first one is.
+    head = np.maximum.accumulate(np.where(np.diff(face, prepend=-1) != 0, np.arange(len(at)), 0))
+    corners = corners[head]
+    low = corners.min(axis=0)
+    cell = (corners - low) / max(float((corners.max(axis=0) - low).max()), 1e-30) * ((1 << _BITS) - 1)
+    code = np.zeros(len(at), np.int64)
+    for axis in range(3):
+        code |= _spaced(cell[:, axis].astype(np.int64)) << axis
+    order = np.lexsort([face, code, owner])
+    return at, at[order]
+
+
+def _spaced(value: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Bits of numbers (n,) below 1,024 with two zeros between them."""
+    value = (value | value << 16) & 0x030000FF
+    value = (value | value << 8) & 0x0300F00F
+    value = (value | value << 4) & 0x030C30C3
+    return (value | value << 2) & 0x09249249
