@@ -287,7 +287,7 @@ class Chunks(Generic[Rows]):
     """Things of one kind in the chunks that they came in; what is taken out is only marked until all are joined."""
 
     def __init__(self, first: Rows) -> None:
-        self._kind, self._chunks, self._there, self._number = type(first), [], [], 0
+        self.kind, self._chunks, self._there, self._number = type(first), [], [], 0
         self.marked = 0
         self.append(first)
 
@@ -317,7 +317,7 @@ class Chunks(Generic[Rows]):
                 there[own - start] = False
             start += len(chunk)
         self.marked += len(rows)
-        return self._kind.concatenate(out)
+        return self.kind.concatenate(out)
 
     @property
     def there(self) -> NDArray[np.bool_]:
@@ -328,7 +328,7 @@ class Chunks(Generic[Rows]):
         """All that is not marked, as the only chunk from now on: rows have new numbers, in the same order."""
         if len(self._chunks) > 1 or self.marked:
             some = zip(self._chunks, self._there, strict=True)
-            one = self._kind.concatenate([chunk.take(there) for chunk, there in some])
+            one = self.kind.concatenate([chunk.take(there) for chunk, there in some])
             self._chunks, self._there, self._number, self.marked = [], [], 0, 0
             self.append(one)
         return self._chunks[0]

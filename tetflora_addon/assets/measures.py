@@ -80,8 +80,8 @@ class Run:
     corners : (t, 3, 3) float64
         In the space of the asset, metres.
     part, face : (t,) int32
-    new_face : (t,) bool
-        The first triangle of a face.
+    new_face, new_patch : (t,) bool
+        The first triangle of a face, and of a patch.
     colour : (t, 3) float32
     transmission, coverage : (t,) float32
     solid : (t,) bool
@@ -94,6 +94,7 @@ class Run:
     part: NDArray[np.int32]
     face: NDArray[np.int32]
     new_face: NDArray[np.bool_]
+    new_patch: NDArray[np.bool_]
     colour: NDArray[np.float32]
     transmission: NDArray[np.float32]
     coverage: NDArray[np.float32]
@@ -143,7 +144,7 @@ def _run(source: AssetSource, pool: Pool, some: NDArray[np.int64], cluster: NDAr
         transmission[at] = np.where(np.isnan(through), unknown, through)
         width[at] = own.width[patch] * np.cbrt(np.abs(np.linalg.det(matrix[:, :3, :3])))
     new_face = (np.diff(face, prepend=-1) != 0) | (np.diff(part, prepend=-1) != 0)
-    return Run(cluster[of], corners, part, face, new_face, colour, transmission, coverage, solid, width)
+    return Run(cluster[of], corners, part, face, new_face, index == 0, colour, transmission, coverage, solid, width)
 
 
 @dataclass(frozen=True)
@@ -154,7 +155,7 @@ class Measured:
     ----------
     low, high : (c, 3) float64
     sums : (c, 16) float64
-        Sheets, solids, optical area; faces; faces of sheets; optical area times width, colour (3), transmission, and
+        Sheets, solids, optical area; faces; patches of sheets; optical area times width, colour (3), transmission, and
         n nᵀ (6).
     samples : Samples of s
     counts : (c, 2) int64
@@ -182,7 +183,7 @@ def measured(run: Run) -> Measured:
     shown = size * run.coverage
     optical = np.where(run.solid, 0.5, 1.0) * shown
     columns = [np.where(run.solid, 0.0, shown), np.where(run.solid, shown, 0.0), optical]
-    columns += [run.new_face, run.new_face & ~run.solid, optical * run.width]
+    columns += [run.new_face, run.new_patch & ~run.solid, optical * run.width]
     columns += [optical * run.colour[:, k] for k in range(3)] + [optical * run.transmission]
     columns += [optical * normal[:, i] * normal[:, j] for i, j in _PAIRS]
     sums = np.stack([np.add.reduceat(column.astype(np.float64), start) for column in columns], axis=1)

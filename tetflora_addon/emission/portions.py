@@ -25,7 +25,8 @@ from ..proxies.thrown_shadows import ThrownShadows
 from ..refinement.contents import PlantParts, feature_width
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
-from ..refinement.shares import SharePoints, lowered, opened, share_points
+from ..refinement.shared_parts import SharePoints, lowered
+from ..refinement.shares import opened, share_points
 
 #: Pixels from which on a part that is seen only here and there is opened.
 MIXED = 24.0

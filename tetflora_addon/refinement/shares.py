@@ -13,13 +13,11 @@ points follows the size in the image, so that the work is bounded by what the im
 from __future__ import annotations
 
 from collections.abc import Iterator
-from copy import copy
-from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Chunks, Growing, column, renumber, rows_within, spread
+from ..arrays import spread
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..compiled.samples import Points
@@ -29,13 +27,10 @@ from ..growth.foliage import leaf_start
 from ..growth.growth import radius_at, trunks
 from ..growth.hashing import uniform
 from ..growth.seeds import Seeds
-from ..parallel import blocks, each_on_all_cores
 from ..subplants.pieces import Pieces, open_branches
-from ..tetrahedra.tree import TetrahedralTree
-from .contents import Held, PlantParts, Totals, as_pieces, sums
+from .contents import Held, PlantParts, as_pieces, sums
+from .shared_parts import SharedParts, SharePoints
 
-#: Sub-plants larger than this many times the longest edge of a tetrahedron that is divided are opened.
-LARGE = 1.6
 #: Pixels along a part for each of its points on leaves; fewest and most of these; points on wood for each of them.
 PIXELS_A_POINT, FEWEST, MOST, WOOD = 6.0, 4, 64, 0.25
 #: Wood that is wider in the view than this part of the image is looked for where it is, whatever share of its plant it
@@ -45,39 +40,10 @@ THICK, APART, MOST_ALONG = 0.08, 1.0, 96
 _PLACES = np.linspace(0.0, 1.0, 9)
 #: How many times as many points there are where proxies fill their tetrahedra.
 FILLED = 4
-#: Sub-plants that are opened, and points that are lowered, at a time; bounds what that takes to some hundred megabytes.
-OPENED_AT_ONCE, LOWERED_AT_ONCE = 40_000, 200_000
-#: Parts that have been opened are dropped once they are more than one in so many.
-_OPENED = 3
+#: Sub-plants that are opened at a time; bounds what that takes to some hundred megabytes.
+OPENED_AT_ONCE = 40_000
 #: Draw of this module: where a part's run of samples starts.
 _START = 221
-
-
-@dataclass(frozen=True)
-class SharePoints(Arrays):
-    """Points (m) on parts of plants; each stands for a fraction of its part's area.
-
-    Attributes
-    ----------
-    part : (m,) int32
-    cell : (m,) int32
-        Node of the tree that the point is in.
-    position : (m, 3) float32
-        Metres, world space.
-    leaf, wood : (m,) float32
-        Area that it stands for, m²; one of the two is 0.
-    """
-
-    part: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    cell: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
-    position: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
-    leaf: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
-    wood: NDArray[np.float32] = field(metadata=column(dtype=np.float32))
-
-    @property
-    def optical_area(self) -> NDArray[np.float32]:
-        """Area (m,) that can block light, m²."""
-        return self.leaf + self.wood / 2
 
 
 def share_points(
@@ -166,60 +132,8 @@ def opened(flora: Flora, parts: PlantParts) -> Iterator[tuple[PlantParts, NDArra
                 yield PlantParts.of_subplants(flora, grown), chosen[body[parent]], None
 
 
-def lowered(tree: TetrahedralTree, points: SharePoints, some: NDArray[np.intp] | None = None) -> NDArray[np.int32]:
-    """Terminal nodes (m,) that points are in, below those that they are known to be in.
-
-    some: indices (k,) of points, by default all, of which alone they are wanted (k,).
-    """
-    cell, children = points.cell if some is None else points.cell[some], tree.children.reshape(-1)
-    every = np.flatnonzero(np.take(children, 2 * cell) >= 0)
-    cell = cell.copy()
-
-    def lower(block: slice) -> None:
-        moving = every[block]
-        place = np.take(points.position, moving if some is None else some[moving], axis=0).astype(np.float64)
-        while len(moving):
-            at = np.take(cell, moving)
-            plane = tree.planes(at)
-            side = plane[:, 3] + np.einsum("ni,ni->n", plane[:, :3], place) >= 0.0
-            at = np.take(children, 2 * at + side)
-            cell[moving] = at
-            left = np.flatnonzero(np.take(children, 2 * at) >= 0)
-            if len(left) < len(moving):
-                moving, place = moving[left], np.take(place, left, axis=0)
-
-    each_on_all_cores(lower, blocks(len(every), LOWERED_AT_ONCE))
-    return cell
-
-
-@dataclass(frozen=True)
-class _Figures(Arrays):
-    """What a pass asks of all parts (n).
-
-    Attributes
-    ----------
-    reach : (n,) float64
-        Extent of those that can be opened, metres; 0 of others.
-    area, polygons, width : (n,) float64
-        Of their totals.
-    """
-
-    reach: NDArray[np.float64]
-    area: NDArray[np.float64]
-    polygons: NDArray[np.float64]
-    width: NDArray[np.float64]
-
-    @classmethod
-    def of(cls, flora: Flora, parts: PlantParts) -> _Figures:
-        reach, totals = np.where(parts.can_open(flora), parts.extent, 0.0), parts.totals
-        return cls(reach, totals.area, totals.polygons, totals.width)
-
-
-class SharedPlants:
-    """All plants of a refinement, as parts and the points on them; changes as the tree is divided.
-
-    A pass costs what it changes. Parts that it opens are only marked, and new ones stay in chunks of their own, until
-    somebody asks for `parts` or `points`; new points take the places of those on opened parts.
+class SharedPlants(SharedParts[PlantParts]):
+    """All plants of a refinement, as parts and the points on them.
 
     Parameters
     ----------
@@ -231,42 +145,24 @@ class SharedPlants:
     """
 
     def __init__(self, flora: Flora, seeds: Seeds, camera: Camera, filled: bool = False) -> None:
-        self.flora, self.camera, self._times = flora, camera, FILLED if filled else 1
+        super().__init__(camera)
+        self.flora, self._times = flora, FILLED if filled else 1
         parts = PlantParts.of_subplants(flora, trunks(flora.rows, seeds)) if len(seeds) else PlantParts.empty()
-        self._hold(parts, self._points_on(parts, None) if len(seeds) else SharePoints.empty())
+        self.hold(parts, self.points_on(parts, None) if len(seeds) else SharePoints.empty())
         while (near := self.thick(self.parts) & self.parts.can_open(flora)).any():
-            self._open(near, None)
+            self.open(near, None)
 
-    def _hold(self, parts: PlantParts, points: SharePoints) -> None:
-        self._parts, self._figures = Chunks(parts), Growing(_Figures.of(self.flora, parts))
-        self._points, self._bodies = Growing(points), int(parts.alone.sum())
+    def can_open(self, parts: PlantParts) -> NDArray[np.bool_]:
+        """As `SharedParts.can_open`."""
+        return parts.can_open(self.flora)
 
-    @property
-    def parts(self) -> PlantParts:
-        """All parts, in one piece: asking costs a copy of them where a pass has opened some, and changes no result."""
-        return self._drop_opened()
+    def alone(self, parts: PlantParts) -> NDArray[np.bool_]:
+        """Branches without what grows on them."""
+        return parts.alone
 
-    @property
-    def points(self) -> SharePoints:
-        """All points, of `parts`; valid until the next pass."""
-        self._drop_opened()
-        return self._points.rows
-
-    @property
-    def numbers(self) -> tuple[int, int]:
-        """How many sub-plants and how many branches alone there are."""
-        return len(self._parts) - self._parts.marked - self._bodies, self._bodies
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of all arrays, with what waits to be dropped and room to spare."""
-        return self._parts.nbytes + self._figures.nbytes + self._points.nbytes
-
-    def with_parts(self, parts: PlantParts, points: SharePoints) -> SharedPlants:
-        """The same with other parts and the points on them."""
-        made = copy(self)
-        made._hold(parts, points)
-        return made
+    def opened(self, parts: PlantParts) -> Iterator[tuple[PlantParts, NDArray[np.int64], Axes | None]]:
+        """As `opened` of this module."""
+        return opened(self.flora, parts)
 
     def without_parts(self) -> SharedPlants:
         """The same with no plants, for what asks only how large other parts are."""
@@ -289,81 +185,13 @@ class SharedPlants:
             out |= (width > camera.extent_around(at)) & (camera.clearance(at) < beside)
         return out
 
-    def update(self, tree: TetrahedralTree, dividing: NDArray[np.bool_], edge: NDArray[np.float64]) -> NDArray:
-        """Hand points in divided nodes on, and open what is large there.
-
-        Parameters
-        ----------
-        tree : TetrahedralTree
-        dividing : (nodes,) bool
-            Nodes that have been divided.
-        edge : (nodes,) float64
-            Their longest edge, metres.
-
-        Returns
-        -------
-        (nodes,) bool
-            Nodes whose contents have changed.
-        """
-        points = self._points.rows
-        changed = dividing.copy()
-        inside = rows_within(dividing, points.cell)
-        part = np.take(points.part, inside)
-        large = np.take(self._figures.rows.reach, part) > LARGE * np.take(edge, np.take(points.cell, inside))
-        # Handed on in place: millions of points that stay where they are are not looked at.
-        points.cell[inside] = cell = lowered(tree, points, inside)
-        changed[cell] = True
-        if large.any():
-            opening = np.zeros(len(self._parts), bool)
-            opening[part[large]] = True
-            changed[self._open(opening, tree)] = True
-        return changed
-
-    def _open(self, opening: NDArray[np.bool_], tree: TetrahedralTree | None) -> NDArray[np.int32]:
-        """Open parts (n,); returns nodes (k,) of points that leave or come. Without a tree these stay in the root."""
-        gone = rows_within(opening, self._points.rows.part)
-        count, parts, points = len(self._parts), [], []
-        for new, _, lines in opened(self.flora, self._parts.take_out(np.flatnonzero(opening))):
-            made = self._points_on(new, lines)
-            points.append(replace(made, part=made.part + np.int32(count)))
-            parts.append(new)
-            count += len(new)
-        new_parts, new_points = PlantParts.concatenate(parts), SharePoints.concatenate(points)
-        if tree is not None:
-            new_points = replace(new_points, cell=lowered(tree, new_points))
-        left = np.take(self._points.rows.cell, gone)
-        self._points.exchange(gone, new_points)
-        self._parts.append(new_parts)
-        self._figures.append(_Figures.of(self.flora, new_parts))
-        self._bodies += int(new_parts.alone.sum())
-        if _OPENED * self._parts.marked > len(self._parts):
-            self._drop_opened()
-        return np.concatenate([left, new_points.cell])
-
-    def _drop_opened(self) -> PlantParts:
-        """All parts, after those that have been opened are dropped and the others numbered anew."""
-        if self._parts.marked:
-            there = self._parts.there
-            renumber(self._points.rows.part, (np.cumsum(there) - 1).astype(np.int32))
-            self._figures = Growing(self._figures.rows.take(there))
-        return self._parts.joined()
-
-    def _points_on(self, parts: PlantParts, lines: Axes | None) -> SharePoints:
+    def points_on(self, parts: PlantParts, lines: Axes | None) -> SharePoints:
+        """As `SharedParts.points_on`."""
         along = 0
         if lines is not None:
             along = parts.branches.length / np.maximum(2.0 * APART * parts.branches.radius, 1e-300)
             along = np.where(self.thick(parts), np.minimum(along, MOST_ALONG), 0.0).astype(np.int64)
         return share_points(self.flora, parts, self.pixels(parts), lines, times=self._times, along=along)
-
-    def totals(self, chosen: NDArray[np.bool_]) -> tuple[Totals, NDArray[np.int32]]:
-        """Totals (k,) of points in chosen nodes, a mask (nodes,), and their nodes (k,)."""
-        points, figures = self._points.rows, self._figures.rows
-        cell, part, leaf, wood = points.cell, points.part, points.leaf, points.wood
-        if not chosen.all():
-            some = rows_within(chosen, cell)
-            cell, part, leaf, wood = (np.take(own, some) for own in (cell, part, leaf, wood))
-        fraction = (leaf + wood) / np.maximum(np.take(figures.area, part), 1e-300)
-        return Totals(leaf, wood, np.take(figures.polygons, part) * fraction, np.take(figures.width, part)), cell
 
     def held(self, nodes: int) -> tuple[Held[Branches], Held[Pieces]]:
         """Sub-plants and branches alone, once for each node that holds some of them, with the totals of that."""
