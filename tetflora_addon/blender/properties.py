@@ -11,9 +11,10 @@ from .results import output_properties
 from .results.forms import form_property
 from .runtime import Listeners
 from .scene.explicit import EXPLICIT_PROPERTY
+from .scene.objects import SCATTER_PROPERTY
 from .scene.skeletons import FORM_TYPES
 from .settings import AnimationProperties, RefinementProperties
-from .species import editor, edits
+from .species import asset_species, editor, edits
 from .species.catalogue import SpeciesChoice
 from .viewport import state
 
@@ -88,6 +89,7 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
         override=_OVERRIDES,
     )
     is_explicit: BoolProperty(**EXPLICIT_PROPERTY, override=_OVERRIDES)
+    is_scatter: BoolProperty(**SCATTER_PROPERTY, override=_OVERRIDES)
     population: StringProperty(
         name="Population", description="Identity of the population that created this", options={'HIDDEN'}
     )
@@ -98,6 +100,8 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
 
 class TetFloraLeafObject(bpy.types.PropertyGroup, SpeciesChoice):
     """A mesh of the user's that replaces the leaf of a species."""
+
+    takes_assets = False  # they have no leaves of their own
 
     leaf: PointerProperty(
         name="Leaf",
@@ -206,6 +210,12 @@ class TetFloraScene(RefinementProperties, AnimationProperties, bpy.types.Propert
         type=edits.TetFloraSpeciesEdit,
         options={'HIDDEN'},
     )
+    asset_species: CollectionProperty(
+        name="Asset Species",
+        description="Objects and collections of this file that are species",
+        type=asset_species.TetFloraAssetSpecies,
+        options={'HIDDEN'},
+    )
     species_editor: PointerProperty(name="Species Editor", type=editor.TetFloraSpeciesEditor, options={'HIDDEN'})
     statistics: StringProperty(
         name="Statistics",
@@ -214,7 +224,7 @@ class TetFloraScene(RefinementProperties, AnimationProperties, bpy.types.Propert
     )
 
 
-_MODULES = (properties, output_properties, state, editor, edits, settings)
+_MODULES = (properties, output_properties, state, editor, edits, asset_species, settings)
 CLASSES = (
     *(cls for module in _MODULES for cls in module.CLASSES),
     TetFloraFieldEntry,

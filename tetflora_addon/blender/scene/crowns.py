@@ -18,6 +18,7 @@ from ...errors import SpeciesError
 from ...jobs import Progress
 from ...species.species import Species
 from ..runtime import call_soon, redraw
+from ..species.asset_species import TetFloraAssetSpecies, find_asset
 from ..species.edits import display_height, species_for
 from ..worker import call_in_thread
 
@@ -32,6 +33,9 @@ _without: set[Species] = set()  # an object for a leaf
 
 def crown_for(scene: bpy.types.Scene, identifier: str) -> Crown:
     """The mean crown of a species; a guess where it cannot be compiled."""
+    asset = find_asset(scene, identifier)
+    if asset is not None:
+        return _measured(asset)
     try:
         return crown_of(species_for(scene, identifier))
     except SpeciesError:  # missing, broken, or with an object for a leaf
@@ -40,6 +44,9 @@ def crown_for(scene: bpy.types.Scene, identifier: str) -> Crown:
 
 def crown_to_draw(scene: bpy.types.Scene, identifier: str) -> Crown | None:
     """The same for a panel, without waiting: None where it is only being looked for; the window is then drawn again."""
+    asset = find_asset(scene, identifier)
+    if asset is not None:
+        return _measured(asset)
     try:
         species = species_for(scene, identifier)
     except SpeciesError:
@@ -93,6 +100,11 @@ def _find_all(species: Iterable[Species]) -> None:
             crown_of(one)
         except SpeciesError:
             _without.add(one)
+
+
+def _measured(asset: TetFloraAssetSpecies) -> Crown:
+    colour = tuple(asset.colour)
+    return Crown(asset.radius, asset.height, asset.polygons, asset.base, asset.leaves, 0.0, colour)
 
 
 def _guess(identifier: str) -> Crown:

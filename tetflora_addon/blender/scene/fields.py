@@ -8,7 +8,8 @@ wrote them. Nothing here loops over plants.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -22,7 +23,7 @@ from ...growth.seeds import Seeds
 from ...planting.places import new_seeds
 from ..attributes import frames_of, read, values_of, write
 from .objects import geometry_of
-from .skeletons import kind_of, kind_of_choice
+from .skeletons import kind_of, kind_of_choice, species_of
 
 #: Types of objects that can be marked as fields.
 FIELD_TYPES = {'MESH', 'POINTCLOUD'}
@@ -81,6 +82,80 @@ def read_field(
         An attribute of the wrong type or domain, or points with an invalid position or scale; the message names the
         object, the number of points and the first one.
     """
+    points = _read_points(obj, depsgraph, geometry)
+    kinds, position, rotation, own_scale = points.kinds, points.position, points.rotation, points.scale
+    matrices = matrices.astype(np.float64)  # single precision in some versions of Blender
+    world = matrices[:, :3, :3]
+    with np.errstate(invalid="ignore", over="ignore"):  # what is no number is refused below
+        place = (position @ world.transpose(0, 2, 1) + matrices[:, None, :3, 3]).reshape(-1, 3)
+        frame, scale, sound = _frames(world, rotation, own_scale)
+        sound &= np.isfinite(place.sum(axis=1))
+    _refuse(obj, ~sound.reshape(len(matrices), -1).all(axis=0), "zero scale or an invalid position or rotation")
+    species = np.tile(points.species.astype(np.int32), len(matrices))
+    return Seeds(kinds, species, points.seeds(keys), place, frame, scale)
+
+
+def read_field_matrices(
+    obj: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    matrices: NDArray[np.float64],
+    wanted: Container[str],
+    keys: NDArray[np.uint64] | None = None,
+    geometry: bpy.types.GeometrySet | None = None,
+) -> Iterator[tuple[str, NDArray[np.int64], NDArray[np.float64]]]:
+    """Plants of a field of some species, with all of their transform: stretched and mirrored as the points are.
+
+    Parameters and errors are those of `read_field`.
+
+    Yields
+    ------
+    kind : str
+        Of each of ``wanted`` that occurs; a kind whose species is not wanted is left out.
+    seed : (m,) int64
+    matrices : (m, 4, 4) float64
+        To world space.
+    """
+    kinds = field_kinds(obj)
+    if not any(species_of(kind) in wanted for kind in kinds):
+        return
+    points = _read_points(obj, depsgraph, geometry)
+    seeds = points.seeds(keys).reshape(-1, len(points.species))
+    seeds = np.broadcast_to(seeds, (len(matrices), seeds.shape[1]))
+    for number, kind in enumerate(kinds):
+        own = np.flatnonzero(points.species == number)
+        if species_of(kind) not in wanted or not len(own):
+            continue
+        local = np.zeros((len(own), 4, 4))
+        local[:, :3, :3] = np.moveaxis(points.rotation[:, :, own] * points.scale[:, own], 2, 0)
+        local[:, :3, 3], local[:, 3, 3] = points.position[own], 1.0
+        placed = matrices.astype(np.float64)[:, None] @ local
+        bad = np.zeros(len(points.species), bool)
+        bad[own] = ~np.isfinite(placed).all(axis=(0, 2, 3))
+        _refuse(obj, bad, "an invalid position or rotation")
+        yield kind, seeds[:, own].reshape(-1), placed.reshape(-1, 4, 4)
+
+
+@dataclass(frozen=True)
+class _Points:
+    """Points of a field in its own space; a rotation (3, 3, n), scale (1, n) or (3, n) along its axes."""
+
+    kinds: tuple[str, ...]
+    position: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+    scale: NDArray[np.float64]
+    species: NDArray[np.int64]
+    seed: NDArray[np.int64]
+
+    def seeds(self, keys: NDArray[np.uint64] | None) -> NDArray[np.int64]:
+        """Seeds of the points in all places with the given keys; those of the points themselves where it is None."""
+        if keys is None:
+            return self.seed
+        return child_key(key_of_seed(self.seed), keys[:, None]).view(np.int64).reshape(-1)
+
+
+def _read_points(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, geometry: bpy.types.GeometrySet | None
+) -> _Points:
     geometry = geometry or geometry_of(obj, depsgraph)
     if geometry is not None and obj.type == 'MESH' and obj.data.is_editmode:
         # What is evaluated has no attributes then. Blender keeps this copy with the evaluated object, and frees it.
@@ -99,16 +174,7 @@ def read_field(
     kinds = field_kinds(obj)
     species = _joined([_integers(obj, part, "species", size, 0) for part, size in sized], (0,))
     _refuse(obj, (species < 0) | (species >= len(kinds)), f"a species number outside the list of {len(kinds)} species")
-    if keys is not None:
-        seed = child_key(key_of_seed(seed), keys[:, None]).view(np.int64).reshape(-1)
-    matrices = matrices.astype(np.float64)  # single precision in some versions of Blender
-    world = matrices[:, :3, :3]
-    with np.errstate(invalid="ignore", over="ignore"):  # what is no number is refused below
-        place = (position @ world.transpose(0, 2, 1) + matrices[:, None, :3, 3]).reshape(-1, 3)
-        frame, scale, sound = _frames(world, rotation, own_scale)
-        sound &= np.isfinite(place.sum(axis=1))
-    _refuse(obj, ~sound.reshape(len(matrices), -1).all(axis=0), "zero scale or an invalid position or rotation")
-    return Seeds(kinds, np.tile(species.astype(np.int32), len(matrices)), seed, place, frame, scale)
+    return _Points(kinds, position, rotation, own_scale, species, seed)
 
 
 def write_field(

@@ -10,8 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
-from zlib import crc32
 
 import bpy
 import numpy as np
@@ -19,9 +17,24 @@ from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed
-from ..attributes import evaluated_mesh, members, read, values_of, world_matrix
+from ..attributes import evaluated_mesh, members, read, world_matrix
+from ..species.asset_species import asset_of
+from .instances import name_keys, references_of
 
-_ONE_BY_ONE = {'VERTS', 'FACES'}  # ways to instance whose places only Blender knows
+#: Of the property `is_scatter`.
+SCATTER_PROPERTY = {
+    "name": "Refine Scatter",
+    "description": (
+        "Refine what the object's modifiers or particles scatter: instances stay as they are where they are near, and "
+        "become proxies where they are far or hidden. The object goes on scattering by its own rules, and its own "
+        "surface stays as it is"
+    ),
+    "options": set(),
+}
+#: Ways to instance whose places only Blender knows.
+ONE_BY_ONE = {'VERTS', 'FACES'}
+#: Instances within instances that are followed, as many as Blender draws.
+DEEPEST = 8
 _OCCLUDER_REMEDY = (
     "an occluder must be a mesh with faces. Add faces, or turn off Occluder in the TetFlora tab of the sidebar"
 )
@@ -73,8 +86,23 @@ def renderable_objects(view_layer: bpy.types.ViewLayer) -> Iterator[bpy.types.Ob
 
 
 def takes_part(obj: bpy.types.Object) -> bool:
-    """Whether an object is a plant, a field of plants, or a mesh that takes part in refinement."""
-    return obj.tetflora.is_plant or obj.tetflora.is_field or obj.tetflora.is_explicit
+    """Whether an object is a plant, a field of plants, a mesh that takes part in refinement, or shows assets."""
+    group = obj.tetflora
+    return group.is_plant or group.is_field or group.is_explicit or scatters(obj)
+
+
+def scatters(obj: bpy.types.Object) -> bool:
+    """Whether what an object instances is refined as assets: it is marked so, or is a dropped asset."""
+    return obj.tetflora.is_scatter or is_drop(obj)
+
+
+def is_drop(obj: bpy.types.Object) -> bool:
+    """Whether an object shows a collection that is a species, as the asset browser makes them: it is a plant of it."""
+    collection = obj.instance_collection if obj.instance_type == 'COLLECTION' else None
+    if collection is None or obj.tetflora.is_plant or obj.tetflora.is_field:
+        return False
+    species = asset_of(collection)
+    return species is not None and not species.variants
 
 
 def taking_part(scene: bpy.types.Scene) -> list[bpy.types.Object]:
@@ -104,6 +132,12 @@ def has_nodes(obj: bpy.types.Object) -> bool:
 def may_instance(obj: bpy.types.Object) -> bool:
     """Whether an object may instance others."""
     return obj.is_instancer or has_nodes(obj)
+
+
+def may_scatter(obj: bpy.types.Object) -> bool:
+    """Whether an object may show instances that are refined as assets; cheap."""
+    group = obj.tetflora
+    return not (group.is_plant or group.is_field) and (may_instance(obj) or len(obj.particle_systems) > 0)
 
 
 def objects_within(collection: bpy.types.Collection) -> list[bpy.types.Object]:
@@ -157,14 +191,14 @@ def copies_of(objects: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgrap
     left: set[bpy.types.Object] = set()
     groups: dict[bpy.types.Collection, list[bpy.types.Object]] = {}
     for obj in objects:
-        if obj.instance_type in _ONE_BY_ONE or len(obj.particle_systems):
+        if obj.instance_type in ONE_BY_ONE or len(obj.particle_systems):
             left.add(obj)
         elif obj.instance_type == 'COLLECTION' and obj.instance_collection is not None:
             groups.setdefault(obj.instance_collection, []).append(obj)
         elif has_nodes(obj):
             try:
                 walk = _Walk(depsgraph)
-                walk.nodes(obj, world_matrix(obj, depsgraph)[None].astype(np.float64), _name_keys([obj]))
+                walk.nodes(obj, world_matrix(obj, depsgraph)[None].astype(np.float64), name_keys([obj]))
                 found += walk.found
             except _OneByOne:
                 left.add(obj)
@@ -172,7 +206,7 @@ def copies_of(objects: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgrap
         try:
             walk = _Walk(depsgraph)
             matrices = np.array([world_matrix(obj, depsgraph) for obj in instancers], dtype=np.float64)
-            walk.collection(collection, matrices, _name_keys(instancers))
+            walk.collection(collection, matrices, name_keys(instancers))
             found += walk.found
         except _OneByOne:
             left.update(instancers)
@@ -217,14 +251,19 @@ class _Walk:
     def __init__(self, depsgraph: bpy.types.Depsgraph) -> None:
         self.depsgraph = depsgraph
         self.found: list[Copies] = []
+        self._depth = 0
 
     def object(self, obj: bpy.types.Object, matrices: NDArray[np.float64], keys: NDArray[np.uint64]) -> None:
+        self._depth += 1
+        if not obj.hide_render and self._depth <= DEEPEST:
+            self._object(obj, matrices, keys)
+        self._depth -= 1
+
+    def _object(self, obj: bpy.types.Object, matrices: NDArray[np.float64], keys: NDArray[np.uint64]) -> None:
         group = obj.tetflora
-        if obj.hide_render:
-            return
         if group.is_plant or group.is_field:
             self.found.append(Copies(obj, None, matrices, keys))
-        if obj.instance_type in _ONE_BY_ONE or len(obj.particle_systems):
+        if obj.instance_type in ONE_BY_ONE or len(obj.particle_systems):
             raise _OneByOne
         if obj.instance_type == 'COLLECTION' and obj.instance_collection is not None:
             self.collection(obj.instance_collection, matrices, keys)
@@ -243,42 +282,19 @@ class _Walk:
             self._instances(obj, geometry, matrices, keys)
 
     def _instances(self, owner, geometry: bpy.types.GeometrySet, matrices: NDArray, keys: NDArray[np.uint64]) -> None:
-        points = geometry.instances_pointcloud()
-        if points is None or not len(points.points):
-            return
-        references = geometry.instance_references()
-        reference, transform, number = _read_instances(points)
-        order = np.argsort(reference, kind="stable")
-        bounds = np.searchsorted(reference[order], np.arange(len(references) + 1))
-        for target, (start, end) in zip(references, pairwise(bounds), strict=True):
-            if target is None or start == end:
-                continue
-            rows = order[start:end]
-            # Columns one after the other: a single product for each place, not one for each instance.
-            columns = transform[rows].reshape(-1, 4) @ matrices.transpose(0, 2, 1)
-            places = columns.reshape(-1, 4, 4).transpose(0, 2, 1)
-            names = child_key(keys[:, None], number[rows]).reshape(-1)
+        for target, rows in references_of(geometry):
             if isinstance(target, bpy.types.Object):
-                self.object(target.original, places, names)
+                original = target.original
+                if may_take_part(original) or len(original.particle_systems):
+                    self.object(original, *rows.within(matrices, keys))
             elif isinstance(target, bpy.types.Collection):
                 # Objects of evaluated collections are evaluated too; the walk works on originals.
-                self.collection(target.original, places, names)
+                self.collection(target.original, *rows.within(matrices, keys))
             else:
+                places, names = rows.within(matrices, keys)
                 if owner.tetflora.is_field:
                     self.found.append(Copies(owner, target, places, names))
                 self._instances(owner, target, places, names)
-
-
-def _read_instances(points: bpy.types.PointCloud) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.int64]]:
-    """Reference, columns of the transform (n, 4, 4) and identifier of each instance."""
-    transform = read(points, "instance_transform").reshape(-1, 4, 4).astype(np.float64)
-    own = points.attributes.get("id")
-    known = own is not None and own.data_type == 'INT'
-    return (
-        read(points, ".reference_index"),
-        transform,
-        values_of(own).astype(np.int64) if known else np.arange(len(transform)),
-    )
 
 
 def _one_by_one(instancers: set[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Iterator[Copies]:
@@ -291,10 +307,6 @@ def _one_by_one(instancers: set[bpy.types.Object], depsgraph: bpy.types.Depsgrap
             if (group.is_plant or group.is_field) and not original.hide_render and obj.type == original.type:
                 key = key_of_seed(np.array([instance.random_id]))
                 yield Copies(original, None, np.array(instance.matrix_world, dtype=np.float64)[None], key)
-
-
-def _name_keys(objects: Sequence[bpy.types.Object]) -> NDArray[np.uint64]:
-    return key_of_seed(np.array([crc32(obj.name_full.encode()) for obj in objects]))
 
 
 def _triangles(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> NDArray[np.float64]:

@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The plants of a scene as arrays: single objects, instances and fields.
 
-Only this file and `objects` loop over plants, and only over those that are objects.
+Plants whose species is an asset do not grow and are read apart, with all of their transform. Only this file and
+`objects` loop over plants, and only over those that are objects.
 """
 
-from dataclasses import replace
+from collections.abc import Container
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -15,9 +17,11 @@ from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed
 from ...growth.seeds import Seeds
 from ..attributes import frames_of, world_matrix
+from ..species.asset_species import asset_of, asset_species, find_asset, name_of
 from ..species.edits import catalogue
-from .fields import read_field
-from .objects import Copies, copies_of, may_instance, renderable_objects
+from .fields import read_field, read_field_matrices
+from .instances import name_keys
+from .objects import Copies, copies_of, is_drop, may_instance, renderable_objects
 from .skeletons import kind_of, kind_of_choice, species_of
 
 _NAMED = 3  # objects that a message names before it only counts
@@ -51,15 +55,16 @@ def read_plants_of(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
 ) -> tuple[Seeds, tuple[tuple[str, int], ...]]:
     """The same, and the names of the objects that they belong to, in their order, each with the number of its own."""
+    assets = asset_species(scene)
     objects = sorted(renderable_objects(view_layer), key=lambda o: o.name_full)
     grouped = [(o, o.tetflora) for o in objects]  # asking an object for its group is half of the time
     grouped = [(o, group) for o, group in grouped if group.is_plant or group.is_field]
     own = [o for o, _ in grouped]
-    single = [o for o, group in grouped if group.is_plant and group.enabled]
+    single = [o for o, group in grouped if group.is_plant and group.enabled and group.species not in assets]
     read = [(single[0].name if single else "", single_plants(single, depsgraph))]
     copies = copies_of([o for o in objects if may_instance(o)], depsgraph)
     enabled = [c for c in copies if c.owner.tetflora.enabled]
-    read += [(c.owner.name, _copied_plants(c)) for c in enabled if c.owner.tetflora.is_plant and c.geometry is None]
+    read += [(c.owner.name, _copied_plants(c)) for c in enabled if _is_plant(c) and _species(c.owner) not in assets]
     for obj in own:
         if obj.tetflora.is_field and obj.tetflora.enabled:
             read.append((obj.name, read_field(obj, depsgraph, world_matrix(obj, depsgraph)[None])))
@@ -68,7 +73,7 @@ def read_plants_of(
         for c in enabled
         if c.owner.tetflora.is_field
     ]
-    read = [(name, seeds) for name, seeds in read if len(seeds)]
+    read = [(name, growing) for name, seeds in read if len(growing := _grown(seeds, assets))]
     if not read:
         found = own or copies
         off = found and not any(o.tetflora.enabled for o in (*own, *(c.owner for c in copies)))
@@ -78,6 +83,97 @@ def read_plants_of(
     if single:
         owners[:1] = [(obj.name, 1) for obj in single]
     return _merged(read), tuple(owners)
+
+
+def _is_plant(copies: Copies) -> bool:
+    return copies.owner.tetflora.is_plant and copies.geometry is None
+
+
+def _species(plant: bpy.types.Object) -> str:
+    return plant.tetflora.species
+
+
+def _grown(seeds: Seeds, assets: Container[str]) -> Seeds:
+    """Plants without those whose species is an asset."""
+    grows = np.array([species_of(kind) not in assets for kind in seeds.identifiers], bool)
+    return seeds if grows.all() else seeds.take(np.flatnonzero(grows[seeds.species]))
+
+
+@dataclass(frozen=True)
+class AssetPlants:
+    """Plants of one species that is an asset.
+
+    Attributes
+    ----------
+    species : str
+        Identifier.
+    owners : tuple of bpy.types.Object
+        The original object that they are, that they are instances of, or whose points they are; several objects of a
+        plant each, one for each place.
+    seed : (n,) int64
+    matrices : (n, 4, 4) float64
+        To world space; stretched and mirrored as the objects, points and instances are.
+    """
+
+    species: str
+    owners: tuple[bpy.types.Object, ...]
+    seed: NDArray[np.int64]
+    matrices: NDArray[np.float64]
+
+
+def read_asset_plants(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
+) -> list[AssetPlants]:
+    """Enabled plants of a view layer that render and whose species is an asset, in the order of `read_plants`.
+
+    Objects that show a collection which is a species count as plants of it, with a seed from their name.
+
+    Raises
+    ------
+    SceneError
+        A transform that is not a number; the message names the object.
+    """
+    assets = asset_species(scene)
+    if not assets:
+        return []
+    objects = sorted(renderable_objects(view_layer), key=lambda o: o.name_full)
+    single: dict[str, list[bpy.types.Object]] = {}
+    drops: dict[str, list[bpy.types.Object]] = {}
+    fields = []
+    for obj in objects:
+        group = obj.tetflora
+        if group.is_plant and group.enabled and group.species in assets:
+            single.setdefault(group.species, []).append(obj)
+        elif group.is_field and group.enabled:
+            fields.append(obj)
+        elif is_drop(obj):
+            drops.setdefault(asset_of(obj.instance_collection, scene).identifier, []).append(obj)
+    found = []
+    for group in (single, drops):
+        for species, owners in group.items():
+            seed = np.array([o.tetflora.seed for o in owners], dtype=np.int64)
+            if group is drops:
+                seed = name_keys(owners).view(np.int64)
+            matrices = np.array([world_matrix(o, depsgraph) for o in owners], dtype=np.float64)
+            found.append(AssetPlants(species, tuple(owners), seed, matrices))
+    copies = [c for c in copies_of([o for o in objects if may_instance(o)], depsgraph) if c.owner.tetflora.enabled]
+    for c in copies:
+        if _is_plant(c) and _species(c.owner) in assets:
+            seed = child_key(key_of_seed(c.owner.tetflora.seed), c.keys).view(np.int64)
+            found.append(AssetPlants(_species(c.owner), (c.owner,), seed, c.matrices))
+    read = [(obj, world_matrix(obj, depsgraph)[None], None, None) for obj in fields]
+    read += [(c.owner, c.matrices, c.keys, c.geometry) for c in copies if c.owner.tetflora.is_field]
+    for obj, matrices, keys, geometry in read:
+        for kind, seed, placed in read_field_matrices(obj, depsgraph, matrices, assets, keys, geometry):
+            found.append(AssetPlants(species_of(kind), (obj,), seed, placed))
+    for plants in found:
+        bad = ~np.isfinite(plants.matrices).all(axis=(1, 2))
+        if bad.any():
+            names = [plants.owners[min(i, len(plants.owners) - 1)].name for i in np.flatnonzero(bad).tolist()[:_NAMED]]
+            raise SceneError(
+                f"{_listed(list(dict.fromkeys(names)))}: an invalid position; clear it with Alt S and Alt G"
+            )
+    return found
 
 
 def _none_left(off: bool, fields: list[str], hidden: int) -> str:
@@ -162,8 +258,14 @@ def _check_species(plants: list[tuple[str, str]]) -> None:
     bad = [(name, species) for name, kind in plants if (species := species_of(kind)) not in known]
     if bad:
         species = bad[0][1]
+        names = _listed([name for name, other in bad if other == species])
+        if find_asset(None, species) is not None:
+            raise SceneError(
+                f'{names}: "{name_of(species)}", which was used as their species, was deleted; undo that, or choose '
+                "another species in the TetFlora tab of the sidebar"
+            )
         raise SceneError(
-            f'{_listed([name for name, other in bad if other == species])}: unknown species "{species}"; choose '
+            f'{names}: unknown species "{species}"; choose '
             "another in the TetFlora tab of the sidebar, or add "
             f"{species or 'its file'}{'.json' if species else ''} with Load Species"
         )

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Species of the catalogue in Blender: thumbnails, items of menus, the property that stores a choice, and files.
 
-Thumbnails are PNG files beside the species. Only sound species files are saved or loaded.
+Thumbnails are PNG files beside the species; an asset has Blender's own preview of it, or the picture that was made when
+it became a species. Only sound species files are saved or loaded.
 """
 
 import json
@@ -14,6 +15,7 @@ from typing import Any
 from zlib import crc32
 
 import bpy
+import numpy as np
 from bpy.props import EnumProperty, StringProperty
 from bpy.utils import previews
 
@@ -22,7 +24,8 @@ from ...files import inside, is_identifier, is_regular, write_whole
 from ...species.catalogue import FIRST_BEFORE, SpeciesInfo, builtin_folder, checked_identifier
 from ...species.schema import species_file, species_from_json
 from ..preferences import own_species_folder, species_folders
-from .edits import catalogue, species_data, species_for, tell_listeners
+from .asset_species import PICTURE_SIDE, PREFIX, TetFloraAssetSpecies, datablock_of, find_asset, name_of, picture_of
+from .edits import catalogue, grown, species_data, species_for, tell_listeners
 
 FOLDER = "thumbnails"
 THUMBNAIL_ENDING = ".png"
@@ -69,11 +72,32 @@ def icon_of(identifier: str) -> int:
 
 
 def _icon_of(identifier: str) -> int:
+    asset = find_asset(None, identifier)
+    if asset is not None:
+        return _icon_of_asset(asset)
     path = thumbnail_file(identifier)
     if path is None or _thumbnails is None:
         return 0
     name = f"{path}|{path.stat().st_mtime_ns}"  # so that a replaced file is loaded again
     found = _thumbnails.get(name) or _thumbnails.load(name, str(path), 'IMAGE')
+    return found.icon_id
+
+
+def _icon_of_asset(asset: TetFloraAssetSpecies) -> int:
+    datablock = datablock_of(asset)
+    if datablock is not None and datablock.preview is not None and datablock.preview.image_size[0]:
+        return datablock.preview.icon_id
+    if not asset.picture or _thumbnails is None:
+        return 0
+    name = f"{asset.identifier}|{crc32(asset.picture.encode())}"
+    found = _thumbnails.get(name)
+    if found is None:
+        pixels = picture_of(asset)
+        if pixels is None:
+            return 0
+        found = _thumbnails.new(name)
+        found.image_size = PICTURE_SIDE, PICTURE_SIDE
+        found.image_pixels_float.foreach_set(pixels.astype(np.float32).ravel() / 255.0)
     return found.icon_id
 
 
@@ -97,15 +121,17 @@ def number_of(identifier: str) -> int:
     return crc32(identifier.encode(errors="backslashreplace")) & 0x7FFFFFFF
 
 
-def items_for(present: str = "") -> list[Item]:
+def items_for(present: str = "", assets: bool = True) -> list[Item]:
     """Items of an enumeration: the catalogue, and the present choice if the catalogue does not have it.
 
     Parameters
     ----------
     present : str
         Identifier that is chosen now; it survives although its file is missing.
+    assets : bool
+        Whether objects that are used as species are among the items.
     """
-    known = catalogue()
+    known = catalogue() if assets else grown()
     icons = {identifier: icon_of(identifier) for identifier in known}
     missing = present if present not in known else ""
     stamp = (missing, *((i.identifier, i.name, i.description, icons[i.identifier]) for i in known.values()))
@@ -121,7 +147,9 @@ def _items(known: Mapping[str, SpeciesInfo], icons: Mapping[str, int], present: 
     ]
     if present and present not in known:
         text = "This species is not in the catalog; Refine fails until you add it or choose another"
-        items.append((present, f"{readable(present, NAME)} (missing)", text, 'ERROR', number_of(present)))
+        if present.startswith(PREFIX):
+            text = "The object of this species was deleted; Refine fails until you undo that or choose another species"
+        items.append((present, f"{readable(name_of(present), NAME)} (missing)", text, 'ERROR', number_of(present)))
     return items or [(NO_SPECIES, "No species found", "The catalog is empty", 'ERROR', 0)]
 
 
@@ -156,6 +184,9 @@ class SpeciesChoice:
     writes it.
     """
 
+    #: Whether the enumeration has assets.
+    takes_assets = True
+
     species: StringProperty(
         name="Species",
         description="File name of the species in the catalog, without extension",
@@ -164,7 +195,7 @@ class SpeciesChoice:
     species_choice: EnumProperty(
         name="Species",
         description="Species from the catalog",
-        items=lambda self, _context: items_for(self.species),
+        items=lambda self, _context: items_for(self.species, self.takes_assets),
         get=lambda self: _chosen(self),
         set=lambda self, number: _choose(self, number),
         options={'SKIP_SAVE'},
@@ -172,7 +203,7 @@ class SpeciesChoice:
 
     def species_if_empty(self) -> str:
         """What counts where no species is stored; a group may know better."""
-        return items_for()[0][0]
+        return items_for(assets=self.takes_assets)[0][0]
 
 
 def _chosen(group: SpeciesChoice) -> int:
@@ -181,7 +212,7 @@ def _chosen(group: SpeciesChoice) -> int:
 
 
 def _choose(group: SpeciesChoice, number: int) -> None:
-    for identifier, *_, item_number in items_for(group.species):
+    for identifier, *_, item_number in items_for(group.species, group.takes_assets):
         if item_number == number and number:
             group.species = identifier
             tell_listeners()

@@ -35,6 +35,7 @@ from ...species.schema import species_file, species_from_json
 from ...species.species import Species
 from ..preferences import species_folders
 from ..runtime import Listeners
+from .asset_species import asset_infos, find_asset, refuse_asset
 
 _FALLBACK_HEIGHT = 5.0  # metres, of the arrow of a plant whose species cannot be read
 
@@ -45,6 +46,8 @@ listeners = Listeners()
 _TRUSTED = 0.0 if bpy.app.background else 0.3
 _seen: dict[str, SpeciesInfo] | None = None
 _seen_at = 0.0
+_assets: dict[str, SpeciesInfo] | None = None  # of the open file
+_assets_at = 0.0
 _looking = True  # False within `looked_at_once`
 _read: dict[str, dict[str, Any]] = {}  # decoded files, as long as what was seen is trusted
 _odd: list[str] = []  # files of the folders that are no species, each with the reason
@@ -101,8 +104,8 @@ def looked_at_once() -> Iterator[None]:
 
 def look_again() -> None:
     """A species file has changed."""
-    global _seen
-    _seen = None
+    global _seen, _assets
+    _seen = _assets = None
 
 
 def find_edit(scene: bpy.types.Scene | None, identifier: str) -> TetFloraSpeciesEdit | None:
@@ -131,14 +134,18 @@ def species_for(scene: bpy.types.Scene | None, identifier: str) -> Species:
     Raises
     ------
     SpeciesError
-        Unknown, or broken; the message names the key and what is allowed.
+        Unknown, or broken; the message names the key and what is allowed. Or an asset, which does not grow.
     """
+    refuse_asset(scene, identifier)
     edit = find_edit(scene, identifier)
     return load_species(identifier, known=listed()) if edit is None else _species(edit.text, identifier)
 
 
 def display_height(identifier: str) -> float:
     """Height of a species' trunk in metres, for the arrow that stands for a plant in the viewport."""
+    asset = find_asset(None, identifier)
+    if asset is not None:
+        return asset.height
     try:
         return float(species_for(None, identifier).orders[0].length.mean)
     except SpeciesError:
@@ -156,6 +163,7 @@ def problem_of(scene: bpy.types.Scene | None, identifier: str) -> str:
     if edit is not None:
         return _problem(edit.text, identifier)
     try:
+        refuse_asset(scene, identifier)
         load_species(identifier, known=listed())
     except SpeciesError as error:
         return str(error)
@@ -182,8 +190,9 @@ def species_data(scene: bpy.types.Scene | None, identifier: str) -> dict[str, An
     Raises
     ------
     SpeciesError
-        Unknown species, or a file that holds no JSON object.
+        Unknown species, an asset, or a file that holds no JSON object.
     """
+    refuse_asset(scene, identifier)
     edit = find_edit(scene, identifier)
     if edit is not None:
         return _decoded(edit.text, identifier)
@@ -277,7 +286,26 @@ def new_identifier(name: str, taken: Callable[[str], bool]) -> str:
 
 
 def catalogue() -> dict[str, SpeciesInfo]:
-    """All species that this user or this file has, by identifier, in the order in which they are offered."""
+    """All species that this user or this file has, by identifier, in the order in which they are offered.
+
+    Assets are among them; `grown` leaves them out.
+    """
+    known = listed()
+    own = edited_infos() | _seen_assets()
+    return in_order(known | own) if own else known
+
+
+def _seen_assets() -> dict[str, SpeciesInfo]:
+    """What menus show of assets; looked at as often as folders."""
+    global _assets, _assets_at
+    now = time.monotonic()
+    if _assets is None or now - _assets_at >= _TRUSTED:
+        _assets, _assets_at = asset_infos(), now
+    return _assets
+
+
+def grown() -> dict[str, SpeciesInfo]:
+    """The species of the catalogue that grow, and not the assets."""
     known = listed()
     edited = edited_infos()
     return in_order(known | edited) if edited else known

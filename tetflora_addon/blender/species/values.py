@@ -225,6 +225,8 @@ def _transmission_property(kind: str) -> Any:
 class WholeSpecies(SpeciesChoice):
     """Properties of the editor that do not come from the keys of an order."""
 
+    takes_assets = False  # there is nothing to edit in them
+
     order_index: IntProperty(name="Active Order", min=0, options={'HIDDEN'})
     order: EnumProperty(
         name="Order",

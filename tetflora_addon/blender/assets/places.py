@@ -1,0 +1,373 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where assets stand: what marked objects scatter, and plants whose species is an asset.
+
+An object's nodes, particles or collection are followed to the first level of what they instance: that are the assets.
+A group of instances without anything of its own is opened, so that what is a tree counts as the asset; one of very
+many parts is taken for a tree itself. All places of an asset are computed at once, as arrays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SceneError
+from ...growth.hashing import child_key, key_of_seed, uniform
+from ..attributes import world_matrix
+from ..scene.explicit import SURFACE_TYPES
+from ..scene.instances import Reference, name_keys, references_of
+from ..scene.objects import DEEPEST, ONE_BY_ONE, geometry_of, has_nodes, renderable_objects, rendered_objects
+from ..scene.plants import AssetPlants, read_asset_plants
+from ..species.asset_species import TetFloraAssetSpecies, asset_species
+from .target import Target
+
+#: Instances up to which something that has nothing else is a group of assets; what has more is an asset of many parts.
+MOST_IN_GROUP = 256
+_VARIANT = 0x7F4A  # child of a plant's key that draws its variant
+_TINY = 1e-9  # of an axis over the longest: such instances are flat or have no size, as under masks of scatter tools
+
+
+@dataclass(frozen=True)
+class Places:
+    """Places of one asset.
+
+    Attributes
+    ----------
+    target : Target
+        What stands there.
+    owner : bpy.types.Object
+        The original object that shows it: the instancer, the plant or the field; the first one where each place has its
+        own.
+    matrices : (n, 4, 4) float64
+        From the asset's space to world space.
+    keys : (n,) uint64
+        Tell individuals apart, through animations as well.
+    owners : tuple of bpy.types.Object
+        Of each place where they differ, n of them; else only the ``owner``.
+    """
+
+    target: Target
+    owner: bpy.types.Object
+    matrices: NDArray[np.float64]
+    keys: NDArray[np.uint64]
+    owners: tuple[bpy.types.Object, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Where nothing is said, all places are of one owner."""
+        if not self.owners:
+            object.__setattr__(self, "owners", (self.owner,))
+
+    def __len__(self) -> int:
+        """Number of places."""
+        return len(self.keys)
+
+
+@dataclass
+class Scatter:
+    """What an object scatters.
+
+    Attributes
+    ----------
+    places : list of Places
+    left : dict of str to int
+        Instances that are no assets, by name and number: empties, lights, cameras and volumes.
+    own_faces : bool
+        Whether the object shows a surface of its own, such as the ground that it scatters on.
+    """
+
+    places: list[Places] = field(default_factory=list)
+    left: dict[str, int] = field(default_factory=dict)
+    own_faces: bool = False
+
+
+def read_places(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
+) -> list[Places]:
+    """Places of all assets of a view layer that render: first of plants, then of objects that scatter, by name.
+
+    Parameters
+    ----------
+    depsgraph : bpy.types.Depsgraph
+        In which originals are shown, as `results.hiding.originals_shown` does.
+
+    Raises
+    ------
+    SceneError
+        A transform that is not a number, a species whose collection has no object with faces, or a marked object of a
+        kind that cannot be read; the message names the object.
+    """
+    found = plant_places(scene, depsgraph, view_layer)
+    marked = sorted((o for o in renderable_objects(view_layer) if o.tetflora.is_scatter), key=lambda o: o.name_full)
+    for scatter in read_scatters(marked, depsgraph).values():
+        found += scatter.places
+    return found
+
+
+def plant_places(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
+) -> list[Places]:
+    """Places of plants whose species is an asset, by the variants of each.
+
+    An object stands as it is turned and scaled in the scene, at the place of the plant instead of its own.
+
+    Raises
+    ------
+    SceneError
+        As `read_places`.
+    """
+    read = read_asset_plants(scene, depsgraph, view_layer)
+    if not read:
+        return []
+    species = asset_species(scene)
+    variants = {one: variants_of(species[one], depsgraph) for one in {plants.species for plants in read}}
+    found = []
+    for plants in read:
+        found += _by_variant(plants, variants[plants.species])
+    return found
+
+
+Variant = tuple[Target, NDArray[np.float64]]
+
+
+def variants_of(entry: TetFloraAssetSpecies, depsgraph: bpy.types.Depsgraph) -> list[Variant]:
+    """What plants of a species look like: each target with the matrix (4, 4) from its space to that of the plant.
+
+    Raises
+    ------
+    SceneError
+        Nothing of it has faces.
+    """
+    if entry.object is not None:
+        return [_as_it_stands(entry.object, depsgraph)]
+    if not entry.variants:
+        return [(_target(entry.collection), np.eye(4))]
+    objects = sorted(entry.collection.objects, key=lambda o: o.name_full)
+    # Hiding some leaves them out. But where all are hidden, it is so that they show as plants only.
+    objects = [o for o in objects if not o.hide_render] or objects
+    found = [_as_it_stands(o, depsgraph) for o in objects if shows_faces(o, depsgraph)]
+    for child in sorted(entry.collection.children, key=lambda c: c.name_full):
+        if not child.hide_render and shows_faces(child, depsgraph):
+            found.append((_target(child), np.eye(4)))
+    if not found:
+        raise SceneError(
+            f'The collection "{entry.collection.name}", which is used as a species, has no object with faces; add some'
+        )
+    return found
+
+
+def _as_it_stands(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Variant:
+    turned = np.eye(4)
+    turned[:3, :3] = world_matrix(obj, depsgraph)[:3, :3]
+    return _target(obj), turned
+
+
+def _by_variant(plants: AssetPlants, variants: list[Variant]) -> list[Places]:
+    keys = key_of_seed(plants.seed)
+    if len(variants) == 1:
+        chosen = np.zeros(len(keys), np.int64)
+    else:
+        chosen = (uniform(child_key(keys, _VARIANT), 0) * len(variants)).astype(np.int64)
+    found = []
+    for number, (target, turned) in enumerate(variants):
+        matrices = plants.matrices @ turned
+        own = np.flatnonzero((chosen == number) & _sizeable(matrices))
+        if len(own):
+            owners = plants.owners if len(plants.owners) == 1 else tuple(plants.owners[i] for i in own.tolist())
+            found.append(Places(target, owners[0], matrices[own], keys[own], owners))
+    return found
+
+
+def read_scatters(objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> dict[bpy.types.Object, Scatter]:
+    """What each of some original objects scatters.
+
+    Raises
+    ------
+    SceneError
+        A transform that is not a number; the message names the object.
+    """
+    found, slow = {}, []
+    for obj in objects:
+        walk = found[obj] = _Walk(obj, depsgraph)
+        if obj.instance_type in ONE_BY_ONE or len(obj.particle_systems):
+            slow.append(obj)
+        else:
+            walk.shown(obj, world_matrix(obj, depsgraph)[None].astype(np.float64), name_keys([obj]))
+    if slow:
+        _one_by_one({obj: found[obj] for obj in slow}, depsgraph)
+    return {obj: walk.scatter() for obj, walk in found.items()}
+
+
+def shows_faces(shown: Reference, depsgraph: bpy.types.Depsgraph, depth: int = 0) -> bool:
+    """Whether anything with a surface is shown by an original object or collection, or by evaluated geometry."""
+    if depth > DEEPEST:
+        return False
+    if isinstance(shown, bpy.types.Collection):
+        return any(shows_faces(o, depsgraph, depth + 1) for o in rendered_objects(shown))
+    if isinstance(shown, bpy.types.Object):
+        group = shown.instance_collection if shown.instance_type == 'COLLECTION' else None
+        if group is not None and shows_faces(group, depsgraph, depth + 1):
+            return True
+        if shown.type not in SURFACE_TYPES:
+            return False
+        evaluated = shown.evaluated_get(depsgraph)
+        if not evaluated.is_evaluated:
+            return _has_polygons(shown)
+        if shown.type != 'MESH':
+            return _has_polygons(evaluated)
+        shown = evaluated.evaluated_geometry()
+    return _has_surface(shown) or any(
+        shows_faces(_original(target), depsgraph, depth + 1) for target, _ in references_of(shown)
+    )
+
+
+def _has_polygons(obj: bpy.types.Object) -> bool:
+    """Whether an object of any type with a surface has faces as a mesh, or is made of hair."""
+    if obj.type == 'CURVES':
+        return len(obj.data.curves) > 0
+    mesh = obj.to_mesh()
+    try:
+        return mesh is not None and len(mesh.polygons) > 0
+    finally:
+        obj.to_mesh_clear()
+
+
+def _has_surface(geometry: bpy.types.GeometrySet) -> bool:
+    if geometry.mesh is not None and len(geometry.mesh.polygons):
+        return True
+    return geometry.curves is not None and len(geometry.curves.curves) > 0
+
+
+def _original(target: Reference) -> Reference:
+    return target if isinstance(target, bpy.types.GeometrySet) else target.original
+
+
+def _target(datablock: bpy.types.Object | bpy.types.Collection) -> Target:
+    return Target(datablock=datablock, geometry=None, owner=None, name=datablock.name)
+
+
+class _Walk:
+    """Follows what one object instances to its assets, with all places at once."""
+
+    def __init__(self, owner: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+        self.owner, self.depsgraph = owner, depsgraph
+        self.left: dict[str, int] = {}
+        self._parts: dict[Target, list[tuple[NDArray, NDArray]]] = {}
+        self._faces: dict[Reference, bool] = {}
+
+    def scatter(self) -> Scatter:
+        """What was found, each target once."""
+        places = []
+        for target, parts in self._parts.items():
+            matrices, keys = (
+                column[0] if len(parts) == 1 else np.concatenate(column) for column in zip(*parts, strict=True)
+            )
+            bad = int((~np.isfinite(matrices).all(axis=(1, 2))).sum())
+            if bad:
+                raise SceneError(
+                    f'"{self.owner.name}": {bad:,} of {len(keys):,} instances of "{target.name}" have an invalid '
+                    "position, rotation or scale; correct its modifiers, or turn off Refine Scatter in the TetFlora "
+                    "tab of the sidebar"
+                )
+            whole = _sizeable(matrices)
+            if not whole.all():
+                matrices, keys = matrices[whole], keys[whole]
+            if len(keys):
+                places.append(Places(target, self.owner, matrices, keys))
+        return Scatter(places, self.left, self._own_faces())
+
+    def _own_faces(self) -> bool:
+        if self.owner.type not in SURFACE_TYPES:
+            return False
+        if self.owner.type == 'MESH' and (geometry := geometry_of(self.owner, self.depsgraph)) is not None:
+            return _has_surface(geometry)
+        evaluated = self.owner.evaluated_get(self.depsgraph)
+        return _has_polygons(evaluated if evaluated.is_evaluated else self.owner)
+
+    def shown(self, obj: bpy.types.Object, places: NDArray[np.float64], keys: NDArray, depth: int = 0) -> None:
+        """Take what an object instances."""
+        if obj.instance_type == 'COLLECTION' and obj.instance_collection is not None:
+            self.take(obj.instance_collection, places, keys, depth + 1)
+        if has_nodes(obj) and (geometry := self._geometry(obj)) is not None:
+            self._instances(geometry, places, keys, depth + 1)
+
+    def take(self, shown: Reference, places: NDArray[np.float64], keys: NDArray, depth: int) -> None:
+        """Take an asset, or what a group of them holds."""
+        if depth <= DEEPEST and self._is_group(shown):
+            if isinstance(shown, bpy.types.Object):
+                self.shown(shown, places, keys, depth)
+            else:
+                self._instances(shown, places, keys, depth)
+        elif self.has_faces(shown):
+            if isinstance(shown, bpy.types.GeometrySet):
+                target = Target(datablock=None, geometry=shown, owner=self.owner, name=shown.name or self.owner.name)
+            else:
+                target = _target(shown)
+            self.add(target, places, keys)
+        else:
+            name = getattr(shown, "name", "") or self.owner.name
+            self.left[name] = self.left.get(name, 0) + len(keys)
+
+    def add(self, target: Target, places: NDArray[np.float64], keys: NDArray[np.uint64]) -> None:
+        """Note places of an asset."""
+        self._parts.setdefault(target, []).append((places, keys))
+
+    def has_faces(self, shown: Reference) -> bool:
+        """As `shows_faces`, asked once."""
+        if shown not in self._faces:
+            self._faces[shown] = shows_faces(shown, self.depsgraph)
+        return self._faces[shown]
+
+    def _instances(self, geometry: bpy.types.GeometrySet, places: NDArray, keys: NDArray, depth: int) -> None:
+        for target, rows in references_of(geometry):
+            self.take(_original(target), *rows.within(places, keys), depth)
+
+    def _is_group(self, shown: Reference) -> bool:
+        """Whether something has no surface of its own, and instances a few others."""
+        if isinstance(shown, bpy.types.Collection):
+            return False
+        if isinstance(shown, bpy.types.Object):
+            if shown.type not in SURFACE_TYPES:
+                return shown.instance_type == 'COLLECTION' and shown.instance_collection is not None
+            if not has_nodes(shown) or shown.type != 'MESH' or (geometry := self._geometry(shown)) is None:
+                return False
+            shown = geometry
+        points = shown.instances_pointcloud()
+        return points is not None and 0 < len(points.points) <= MOST_IN_GROUP and not _has_surface(shown)
+
+    def _geometry(self, obj: bpy.types.Object) -> bpy.types.GeometrySet | None:
+        evaluated = obj.evaluated_get(self.depsgraph)
+        try:
+            return evaluated.evaluated_geometry() if evaluated.is_evaluated else None
+        except TypeError:  # a type without geometry
+            return None
+
+
+def _one_by_one(walks: dict[bpy.types.Object, _Walk], depsgraph: bpy.types.Depsgraph) -> None:
+    """Instances of particles and on vertices and faces, which only Blender's own list has."""
+    listed: dict[tuple[bpy.types.Object, bpy.types.Object], tuple[list, list]] = {}
+    for instance in depsgraph.object_instances:
+        if instance.is_instance and instance.show_self and (owner := instance.parent.original) in walks:
+            obj = instance.object
+            original = obj.original
+            if obj.type == original.type:  # parts of another type come once more
+                matrices, numbers = listed.setdefault((owner, original), ([], []))
+                matrices.append(tuple(map(tuple, instance.matrix_world)))
+                numbers.append(instance.random_id)
+    for (owner, original), (matrices, numbers) in listed.items():
+        walk, keys = walks[owner], child_key(name_keys([owner]), np.array(numbers, np.int64))
+        if walk.has_faces(original):
+            walk.add(_target(original), np.array(matrices, np.float64), keys)
+        else:
+            walk.left[original.name] = walk.left.get(original.name, 0) + len(keys)
+
+
+def _sizeable(matrices: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether each of some places (n, 4, 4) has a size along three axes."""
+    x, y, z = (matrices[:, :3, i] for i in range(3))
+    longest = np.sqrt(np.maximum.reduce([np.einsum("ni,ni->n", axis, axis) for axis in (x, y, z)]))
+    volume = np.abs(np.einsum("ni,ni->n", x, np.cross(y, z)))
+    return volume > _TINY * longest**3

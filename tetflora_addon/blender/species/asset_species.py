@@ -1,0 +1,160 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Species that are assets: objects and collections of this file that stand for plants as they are.
+
+A list of the scene holds them, each with an identifier as species files have, and not the objects themselves: what is
+linked from a library cannot be written to. As with edits of species, those of the scene at hand come before those of
+the file's other scenes. What of their measures plants need, such as the size of the crown, is measured when an object
+becomes a species and when plants are placed; panels only read it.
+"""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, FloatProperty, FloatVectorProperty, PointerProperty, StringProperty
+from numpy.typing import NDArray
+
+from ...errors import NAME, SpeciesError, readable
+from ...files import is_identifier
+from ...species.catalogue import SpeciesInfo
+
+#: What identifiers of assets begin with.
+PREFIX = "asset-"
+#: Side of stored pictures in pixels.
+PICTURE_SIDE = 64
+
+Datablock = bpy.types.Object | bpy.types.Collection
+
+
+class TetFloraAssetSpecies(bpy.types.PropertyGroup):
+    """An object or collection that is a species."""
+
+    identifier: StringProperty(name="Identifier", description="Identifier that plants store")
+    name: StringProperty(name="Name", description="Name of the asset when it was used last")
+    object: PointerProperty(name="Object", description="What plants of the species look like", type=bpy.types.Object)
+    collection: PointerProperty(
+        name="Collection", description="What plants of the species look like", type=bpy.types.Collection
+    )
+    variants: BoolProperty(
+        name="Variants", description="Each object of the collection is a plant by itself, chosen by the plant's seed"
+    )
+    # Of a plant of scale 1.
+    radius: FloatProperty(name="Crown Radius", description="Half of the width, meters", default=1.0)
+    base: FloatProperty(name="Crown Base", description="Height below which there is little, meters")
+    height: FloatProperty(name="Height", description="Height above the asset's origin, meters", default=5.0)
+    polygons: FloatProperty(name="Polygons", description="Number of faces")
+    leaves: FloatProperty(name="Leaf Area", description="One-sided area, square meters")
+    colour: FloatVectorProperty(name="Color", description="Mean color, linear", size=3, default=(0.1, 0.2, 0.05))
+    picture: StringProperty(name="Picture", description="Small picture for menus, as compressed pixels")
+
+
+def entries_of(scene: bpy.types.Scene | None = None) -> Iterator[TetFloraAssetSpecies]:
+    """Asset species of this file, those of a scene first; identifiers that break the rule are as good as absent."""
+    # While add-ons are enabled at startup bpy.data has nothing.
+    others = [s for s in getattr(bpy.data, "scenes", ()) if s != scene]
+    for one in ([scene] if scene is not None else []) + others:
+        yield from (entry for entry in one.tetflora.asset_species if is_identifier(entry.identifier))
+
+
+def find_asset(scene: bpy.types.Scene | None, identifier: str) -> TetFloraAssetSpecies | None:
+    """The asset species with an identifier, whether its object is still there or not; None for grown species."""
+    if not identifier.startswith(PREFIX):
+        return None
+    return next((entry for entry in entries_of(scene) if entry.identifier == identifier), None)
+
+
+def datablock_of(entry: TetFloraAssetSpecies) -> Datablock | None:
+    """What stands for plants of an asset species; None where it was deleted.
+
+    What the artist deletes stays in the file as long as anything refers to it, and be it only this list: then it is as
+    good as gone.
+    """
+    found = entry.object or entry.collection
+    return found if found is not None and found.users > _references()[found] else None
+
+
+def _references() -> Counter[Datablock]:
+    """How many entries of the file refer to each object and collection."""
+    return Counter(datablock for entry in entries_of() for datablock in (entry.object, entry.collection))
+
+
+def asset_species(scene: bpy.types.Scene | None = None) -> dict[str, TetFloraAssetSpecies]:
+    """All asset species whose object or collection is there, by identifier; empty, at no cost, in most files."""
+    references = _references()
+    found: dict[str, TetFloraAssetSpecies] = {}
+    for entry in entries_of(scene):
+        datablock = entry.object or entry.collection
+        if datablock is not None and datablock.users > references[datablock]:
+            found.setdefault(entry.identifier, entry)
+    return found
+
+
+def asset_of(datablock: Datablock, scene: bpy.types.Scene | None = None) -> TetFloraAssetSpecies | None:
+    """The species that an object or a collection is."""
+    return next((entry for entry in entries_of(scene) if datablock in (entry.object, entry.collection)), None)
+
+
+def asset_infos() -> dict[str, SpeciesInfo]:
+    """What menus show of asset species."""
+    found: dict[str, SpeciesInfo] = {}
+    for identifier, entry in asset_species().items():
+        datablock = entry.object or entry.collection
+        what = "Object" if entry.object else "Variants in a collection" if entry.variants else "Collection"
+        text = f"{what} of this file, used as it is; {entry.height:.3g} m tall"
+        found[identifier] = SpeciesInfo(identifier, readable(datablock.name, NAME), text, Path())
+    return found
+
+
+def name_of(identifier: str) -> str:
+    """What to call an asset species in messages, even one whose object was deleted; the identifier of any other."""
+    entry = find_asset(None, identifier)
+    if entry is None:
+        return identifier
+    datablock = datablock_of(entry)
+    return entry.name if datablock is None else datablock.name
+
+
+def refuse_asset(scene: bpy.types.Scene | None, identifier: str) -> None:
+    """Refuse an asset where a species is needed that grows.
+
+    Raises
+    ------
+    SpeciesError
+        It is one; or it was one, and its object was deleted.
+    """
+    entry = find_asset(scene, identifier)
+    if entry is not None:
+        name = readable(name_of(identifier), NAME)
+        if datablock_of(entry) is None:
+            raise SpeciesError(
+                f'"{name}", which was used as a species, was deleted; undo that, or choose another species'
+            )
+        raise SpeciesError(f'"{name}" is an asset: it does not grow, and there is nothing to change in it here')
+
+
+def stored_picture(pixels: NDArray[np.uint8]) -> str:
+    """A picture (`PICTURE_SIDE`, `PICTURE_SIDE`, 4), the lowest row first, as text."""
+    return base64.b85encode(zlib.compress(np.ascontiguousarray(pixels, np.uint8).tobytes(), 9)).decode()
+
+
+def picture_of(entry: TetFloraAssetSpecies) -> NDArray[np.uint8] | None:
+    """The stored picture; None where there is none that could be read."""
+    size = PICTURE_SIDE * PICTURE_SIDE * 4
+    try:
+        unpack = zlib.decompressobj()
+        pixels = unpack.decompress(base64.b85decode(entry.picture.encode()), size)
+    except (ValueError, zlib.error):
+        return None
+    if len(pixels) != size:
+        return None
+    return np.frombuffer(pixels, np.uint8).reshape(PICTURE_SIDE, PICTURE_SIDE, 4)
+
+
+CLASSES = (TetFloraAssetSpecies,)
