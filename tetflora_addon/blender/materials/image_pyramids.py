@@ -1,0 +1,195 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Images as pyramids of ever coarser copies, so that one look at the right copy is the mean over a piece of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..attributes import image_pixels, linear_rgb
+
+#: Columns or rows of the finest copy that is kept; finer ones say nothing about whole faces of a plant.
+MOST_TEXELS = 2048
+#: Rows of an image that are worked on at once.
+_ROWS = 256
+#: Bytes of pyramids that are kept for the next material.
+_MOST_BYTES = 512 << 20
+
+
+@dataclass(frozen=True)
+class Pyramid:
+    """Copies of an image, each half as wide as the one before.
+
+    Attributes
+    ----------
+    texels : (n,) uint64
+        Of all copies; each is four float16: linear RGB times alpha, and alpha.
+    start, columns, rows : (l,) int32
+        First texel, and size, of each copy.
+    width, height : (l,) float32
+        Texels that the whole image would be wide and high in each copy; of sizes that are no power of two, the last
+        texels stick out.
+    """
+
+    texels: NDArray[np.uint64]
+    start: NDArray[np.int32]
+    columns: NDArray[np.int32]
+    rows: NDArray[np.int32]
+    width: NDArray[np.float32]
+    height: NDArray[np.float32]
+
+    @property
+    def side(self) -> float:
+        """Texels across in the finest copy: the root of their number."""
+        return float(np.sqrt(self.width[0] * self.height[0]))
+
+    @property
+    def levels(self) -> int:
+        """Number of copies l."""
+        return len(self.start)
+
+    def look(
+        self, u: NDArray[np.float32], v: NDArray[np.float32], size: NDArray[np.float32], extension: str
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Mean colours (3, p, k) and alpha (p, k) around some points.
+
+        Parameters
+        ----------
+        u, v : (p, k) or (1, 1) float32
+        size : (1, k) float32
+            Side of the square that counts, in units of the image.
+        extension : {'REPEAT', 'EXTEND', 'CLIP', 'MIRROR'}
+        """
+        with np.errstate(divide="ignore"):
+            level = np.floor(np.log2(size * self.side))
+        level = np.clip(np.nan_to_num(level), 0, self.levels - 1).astype(np.int32)
+        outside = None
+        if extension == 'CLIP':
+            outside = (u < 0) | (u > 1) | (v < 0) | (v > 1)
+        x, x0, x1 = _columns(u, self.width[level], self.columns[level], extension)
+        y, y0, y1 = _columns(v, self.height[level], self.rows[level], extension)
+        first, stride = self.start[level], self.columns[level]
+        low, high = first + y0 * stride, first + y1 * stride
+        found = self._texels(low + x0) * ((1 - x) * (1 - y))[..., None]
+        found += self._texels(low + x1) * (x * (1 - y))[..., None]
+        found += self._texels(high + x0) * ((1 - x) * y)[..., None]
+        found += self._texels(high + x1) * (x * y)[..., None]
+        if outside is not None:
+            found[outside] = 0
+        colour, alpha = np.ascontiguousarray(np.moveaxis(found[..., :3], -1, 0)), found[..., 3].copy()
+        return colour / np.maximum(alpha, 1e-6), alpha
+
+    def _texels(self, index: NDArray[np.int32]) -> NDArray[np.float32]:
+        return np.take(self.texels, index).view(np.float16).reshape(*index.shape, 4).astype(np.float32)
+
+
+def _columns(
+    u: NDArray[np.float32], width: NDArray[np.float32], columns: NDArray[np.int32], extension: str
+) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int32]]:
+    """Of one axis: where between two texels, and both of these."""
+    if extension == 'REPEAT':
+        u = u - np.floor(u)
+    elif extension == 'MIRROR':
+        u = 1 - np.abs(1 - (u - 2 * np.floor(u * np.float32(0.5))))
+    else:
+        u = np.clip(u, 0, 1)
+    x = u * width - np.float32(0.5)
+    whole = np.floor(x)
+    x -= whole
+    first = whole.astype(np.int32)
+    second = first + 1
+    if extension == 'REPEAT':
+        first = np.where(first < 0, columns - 1, np.minimum(first, columns - 1))
+        return x, first, np.where(second >= columns, 0, second)
+    return x, np.clip(first, 0, columns - 1), np.clip(second, 0, columns - 1)
+
+
+class Pyramids:
+    """Pyramids of images, each read once; all are forgotten when they take too much memory."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[bpy.types.Image, bool], Pyramid | None] = {}
+
+    def of(self, image: bpy.types.Image, weighted: bool) -> Pyramid | None:
+        """The pyramid of an image, see `pyramid_of`."""
+        key = image, weighted
+        if key not in self._known:
+            if sum(p.texels.nbytes for p in self._known.values() if p is not None) > _MOST_BYTES:
+                self._known.clear()
+            self._known[key] = pyramid_of(image, weighted)
+        return self._known[key]
+
+
+def pyramid_of(image: bpy.types.Image, weighted: bool) -> Pyramid | None:
+    """The pyramid of an image; None if it has no pixels.
+
+    Parameters
+    ----------
+    image : bpy.types.Image
+    weighted : bool
+        Whether its alpha counts: coarser copies then have the colour of what is not transparent.
+    """
+    width, height, channels = *image.size, image.channels
+    if not (width and height and channels):
+        return None
+    halvings = max(0, int(np.ceil(np.log2(max(width, height) / MOST_TEXELS))))
+    levels = [_finest(image, weighted, halvings)]
+    widths = [np.array([width, height], np.float32) / (1 << halvings)]
+    while min(levels[-1].shape[:2]) > 1:
+        levels.append(_halved(levels[-1]))
+        widths.append(widths[-1] / 2)
+    sizes = [level.shape[0] * level.shape[1] for level in levels]
+    texels = np.concatenate([level.astype(np.float16).reshape(-1, 4) for level in levels])
+    return Pyramid(
+        texels=texels.view(np.uint64).reshape(-1),
+        start=np.cumsum([0, *sizes[:-1]]).astype(np.int32),
+        columns=np.array([level.shape[1] for level in levels], np.int32),
+        rows=np.array([level.shape[0] for level in levels], np.int32),
+        width=np.array(widths, np.float32)[:, 0],
+        height=np.array(widths, np.float32)[:, 1],
+    )
+
+
+def _finest(image: bpy.types.Image, weighted: bool, halvings: int) -> NDArray[np.float32]:
+    """The finest copy that is kept (h, w, 4): linear RGB times alpha, and alpha."""
+    pixels = image_pixels(image)
+    height, channels = pixels.shape[0], pixels.shape[2]
+    # Eight bits have 256 values: a table is ten times as fast as a power.
+    table = None if image.is_float else linear_rgb(image, np.linspace(0, 1, 256, dtype=np.float32)[:, None])[:, 0]
+    table = None if table is None else table.astype(np.float32)
+    # Pixels of floating point images are multiplied by their alpha already.
+    associated = image.is_float and image.alpha_mode not in {'CHANNEL_PACKED', 'NONE'}
+    found = []
+    step = max(_ROWS, 1 << halvings)
+    for row in range(0, height, step):
+        block = pixels[row : row + step]
+        out = np.ones((*block.shape[:2], 4), np.float32)
+        if table is not None:
+            colour = block[..., :3] if channels >= 3 else block[..., :1]
+            out[..., :3] = np.take(table, (colour * 255 + 0.5).astype(np.uint8))
+        else:
+            out[..., :3] = np.clip(linear_rgb(image, block), 0, None)
+        if channels == 4 and image.alpha_mode != 'NONE':
+            alpha = np.clip(block[..., 3:], 0, 1)
+            if weighted:
+                out[..., 3:] = alpha
+                if not associated:
+                    out[..., :3] *= alpha
+            elif associated:
+                out[..., :3] /= np.maximum(alpha, 1e-6)
+        for _ in range(halvings):
+            out = _halved(out)
+        found.append(np.minimum(out, np.float32(60_000)).astype(np.float16))
+    return np.concatenate(found)
+
+
+def _halved(level: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Half as many columns and rows; the last ones count twice where their number is odd."""
+    height, width = level.shape[:2]
+    level = np.pad(level, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge") if height % 2 or width % 2 else level
+    halves = level[0::2].astype(np.float32) + level[1::2]
+    return (halves[:, 0::2] + halves[:, 1::2]) * np.float32(0.25)

@@ -1,0 +1,216 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a tree of shaders returns, lets through and leaves open, at many points of a surface at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import bpy
+import numpy as np
+
+from ..compat import tree_in_use
+from .colour_maths import Values, luminance
+from .means import GREY, Look, Looks
+from .node_values import NodeValues, NotUnderstood, Stack, source_of
+from .nodes import active_output, find_socket
+
+# Shaders by what they let through of the light that they scatter, and the input of their colour.
+_SIMPLE = {
+    'BSDF_DIFFUSE': ("Color", 0.0),
+    'BSDF_TRANSLUCENT': ("Color", 1.0),
+    'BSDF_GLOSSY': ("Color", 0.0),
+    'BSDF_METALLIC': ("Base Color", 0.0),
+    'BSDF_SHEEN': ("Color", 0.0),
+    'BSDF_TOON': ("Color", 0.0),
+    'BSDF_GLASS': ("Color", 1.0),
+    'BSDF_REFRACTION': ("Color", 1.0),
+    'BSDF_HAIR': ("Color", 0.5),
+    'BSDF_HAIR_PRINCIPLED': ("Color", 0.5),
+    'SUBSURFACE_SCATTERING': ("Color", 0.5),
+    'EMISSION': ("Color", 0.0),
+}
+
+
+class Scattered(NamedTuple):
+    """What points of a surface do with light.
+
+    Attributes
+    ----------
+    cover : (p, k)
+        Fraction that is not transparent.
+    colour : (3, p, k)
+        Fraction of light that is scattered to either side; none where transparent.
+    through : (p, k)
+        Lightness of the part that leaves on the other side.
+    """
+
+    cover: Values
+    colour: Values
+    through: Values
+
+
+@dataclass
+class Notes:
+    """What was not understood of a material.
+
+    Attributes
+    ----------
+    needs_baking : bool
+        Some nodes are only known to a renderer; means stand for them.
+    problems : list of str
+        For the artist.
+    """
+
+    needs_baking: bool = False
+    problems: list[str] = field(default_factory=list)
+
+    def tell(self, problem: str) -> None:
+        """Add a problem, if it is new."""
+        if problem not in self.problems:
+            self.problems.append(problem)
+
+
+_ONE, _NONE = np.ones((1, 1), np.float32), np.zeros((1, 1), np.float32)
+_BLACK = np.zeros((3, 1, 1), np.float32)
+_HOLE = Scattered(_NONE, _BLACK, _NONE)
+_UNLIT = Scattered(_ONE, _BLACK, _NONE)
+
+
+class SurfaceShaders:
+    """Evaluates the shaders of a material at some points.
+
+    Parameters
+    ----------
+    material : bpy.types.Material
+    looks : Looks
+        For the means of what is not understood.
+    notes : Notes
+        Filled while evaluating.
+    """
+
+    def __init__(self, material: bpy.types.Material, looks: Looks, notes: Notes) -> None:
+        self.material, self.notes = material, notes
+        self._looks, self._means = looks, None
+        output = active_output(tree_in_use(material), 'OUTPUT_MATERIAL')
+        self._surface = None if output is None else find_socket(output.inputs, "Surface")
+        if self._surface is not None and source_of(self._surface, ())[0] is None:
+            self._surface = None
+            notes.tell(
+                f'Material "{material.name}" has no surface shader; its viewport color stands for it. Link a shader to '
+                "the Surface of its Material Output"
+            )
+
+    def at(self, values: NodeValues) -> Scattered | None:
+        """What all points do with light; None where the material has no shaders."""
+        return None if self._surface is None else self._shader(values, self._surface, ())
+
+    @property
+    def plain(self) -> Look:
+        """Of a material without shaders: its colour in viewports."""
+        return Look(tuple(np.clip(self.material.diffuse_color[:3], 0, 1)))
+
+    def _shader(self, values: NodeValues, socket: bpy.types.NodeSocket, stack: Stack) -> Scattered:
+        source, stack = source_of(socket, stack)
+        if source is None or not source.is_output:
+            return _UNLIT
+        node = source.node
+        if (simple := _SIMPLE.get(node.type)) is not None:
+            colour = self._colour(values, node, simple[0], stack)
+            if node.type == 'EMISSION':
+                colour = colour * self._number(values, node, "Strength", stack, 1.0)
+            return _solid(_ONE, colour, np.full((1, 1), simple[1], np.float32))
+        work = _SHADERS.get(node.type)
+        if work is not None:
+            return work(self, values, node, stack)
+        self.notes.needs_baking = True
+        look = self._mean()
+        colour = np.array(look.colour, np.float32).reshape(3, 1, 1)
+        through = np.full((1, 1), np.nan_to_num(look.transmission), np.float32)
+        return _solid(np.full((1, 1), look.coverage, np.float32), colour, through)
+
+    def _principled(self, values: NodeValues, node: bpy.types.Node, stack: Stack) -> Scattered:
+        colour = self._colour(values, node, "Base Color", stack)
+        glass = self._number(values, node, "Transmission Weight", stack, 0.0)
+        inside = self._number(values, node, "Subsurface Weight", stack, 0.0)
+        through = np.clip(np.maximum(glass, inside / 2), 0, 1)
+        alpha = self._number(values, node, "Alpha", stack, None)
+        return _solid(np.clip(alpha, 0, 1), colour, through)
+
+    def _specular(self, values: NodeValues, node: bpy.types.Node, stack: Stack) -> Scattered:
+        gone = np.clip(self._number(values, node, "Transparency", stack, 0.0), 0, 1)
+        return _solid(1 - gone, self._colour(values, node, "Base Color", stack), _NONE)
+
+    def _transparent(self, values: NodeValues, node: bpy.types.Node, stack: Stack) -> Scattered:
+        try:
+            colour = np.clip(values.colour(node, "Color", stack), 0, 1)
+        except NotUnderstood:
+            return _HOLE
+        return Scattered(1 - luminance(colour), _BLACK, _NONE)
+
+    def _mix(self, values: NodeValues, node: bpy.types.Node, stack: Stack) -> Scattered:
+        factor = np.clip(self._number(values, node, "Fac", stack, 0.5), 0, 1)
+        a, b = (self._shader(values, find_socket(node.inputs, key), stack) for key in ("Shader", "Shader_001"))
+        return Scattered(*(x + factor * (y - x) for x, y in zip(a, b, strict=True)))
+
+    def _add(self, values: NodeValues, node: bpy.types.Node, stack: Stack) -> Scattered:
+        a, b = (self._shader(values, find_socket(node.inputs, key), stack) for key in ("Shader", "Shader_001"))
+        # Light that either lets pass straight passes; more than all of it cannot.
+        cover = np.clip(a.cover + b.cover - 1, 0, 1)
+        return Scattered(cover, a.colour + b.colour, a.through + b.through)
+
+    def _holdout(self, _values: NodeValues, _node: bpy.types.Node, _stack: Stack) -> Scattered:
+        return _UNLIT
+
+    def _colour(self, values: NodeValues, node: bpy.types.Node, key: str, stack: Stack) -> Values:
+        try:
+            return np.clip(values.colour(node, key, stack), 0, 1)
+        except NotUnderstood as error:
+            self._note(error)
+            colour = self.material.diffuse_color[:3] if error.problem else self._mean().colour
+            return np.clip(np.array(colour, np.float32), 0, 1).reshape(3, 1, 1)
+
+    def _number(
+        self, values: NodeValues, node: bpy.types.Node, key: str, stack: Stack, unknown: float | None
+    ) -> Values:
+        """A number; `unknown`, or the mean coverage if that is None, where it is not understood."""
+        try:
+            return values.number(node, key, stack)
+        except NotUnderstood as error:
+            self._note(error)
+            if unknown is None:
+                unknown = 1.0 if error.problem else self._mean().coverage
+            return np.full((1, 1), unknown, np.float32)
+
+    def _note(self, error: NotUnderstood) -> None:
+        if not error.problem:
+            self.notes.needs_baking = True
+        else:
+            self.notes.tell(error.problem)
+
+    def _mean(self) -> Look:
+        if self._means is None:
+            self._means = self._looks.of(self.material, {})
+        return self._means
+
+
+def _solid(cover: Values, colour: Values, through: Values) -> Scattered:
+    scattered = np.clip(colour, 0, 1) * cover
+    return Scattered(cover, scattered, luminance(scattered) * through)
+
+
+def grey() -> Look:
+    """What Blender shows where there is no material."""
+    return Look(GREY, 0.0)
+
+
+_SHADERS: dict[str, Callable[[SurfaceShaders, NodeValues, bpy.types.Node, Stack], Scattered]] = {
+    'BSDF_PRINCIPLED': SurfaceShaders._principled,
+    'EEVEE_SPECULAR': SurfaceShaders._specular,
+    'BSDF_TRANSPARENT': SurfaceShaders._transparent,
+    'MIX_SHADER': SurfaceShaders._mix,
+    'ADD_SHADER': SurfaceShaders._add,
+    'HOLDOUT': SurfaceShaders._holdout,
+}
