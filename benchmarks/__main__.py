@@ -37,6 +37,7 @@ NAMES = (
     "forest",
     "curves",
     "foreign",
+    "assets",
     "closed_form",
     "edited_species",
     "fidelity",

@@ -1,0 +1,170 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures of the benchmark `assets`: refined woods and crowns beside the renderer's own instances of the same trees.
+
+What is compared is where trees cover more than a twentieth of a pixel of the plain picture. Woods are refined with
+everything that the extension does to assets (`REFINE`), even where plain instances would be cheaper.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from tetflora_addon.blender.job import refine
+
+from . import asset_scenes
+from .asset_cases import mark
+from .asset_scenes import DISTANCES, LIGHTS, PICTURE, Scatter
+from .compare import difference, read_picture, render
+from .row80 import timed_refine
+
+INSTANCES = 16
+SAMPLES, QUICK_SAMPLES = 192, 32
+COVERAGE_SAMPLES = 64
+LEAST_COVERAGE = 0.05
+#: Metres of a pixel where crowns are compared, and samples there.
+PIXELS = (0.05, 0.1, 0.2)
+CROWN_SAMPLES, QUICK_CROWN_SAMPLES = 256, 64
+TENTHS = 10
+#: Least of a crown's row that is covered where its colour counts.
+_LEAST_ROW = 0.02
+
+
+def woods(kind: str, folder: Path, quick: bool, warped: bool = False) -> dict[str, float]:
+    """FLIP of a refined wood in each light and from each distance, and of two plain pictures in the first light."""
+    scene, samples = bpy.context.scene, QUICK_SAMPLES if quick else SAMPLES
+    asset_scenes.build(scene, Scatter(kind, INSTANCES, size=PICTURE, warped=warped, quick=quick))
+    found: dict[str, float] = {}
+    masks: dict[str, NDArray[np.bool_]] = {}
+    for distance, light in _views(scene):
+        name = f"{kind}-{distance}-{light}"
+        render(scene, folder / f"{name}-plain.png", samples)
+        if light == next(iter(LIGHTS)):
+            masks[distance] = coverage(scene, folder / "coverage.png") > LEAST_COVERAGE
+            render(scene, folder / f"{name}-again.png", samples, seed=1)
+            pair = folder / f"{name}-plain.png", folder / f"{name}-again.png"
+            found[f"noise_{kind}_{distance}"] = difference(*pair, masks[distance]).flip
+    mark("REFINE")
+    for distance, light in _views(scene):
+        name = f"{kind}-{distance}-{light}"
+        statistics, _ = timed_refine(scene)
+        render(scene, folder / f"{name}-refined.png", samples)
+        pair = folder / f"{name}-plain.png", folder / f"{name}-refined.png"
+        made = difference(*pair, masks[distance])
+        key = f"{kind}_{distance}_{light}"
+        found |= {f"flip_{key}": made.flip, f"colour_{key}": made.colour}
+        found[f"polygons_{kind}_{distance}"] = statistics.polygons_meshed + statistics.polygons_proxy
+    return found
+
+
+def plain_woods(kind: str, folder: Path, quick: bool) -> dict[str, float]:
+    """Only the plain half of `woods`."""
+    scene, samples = bpy.context.scene, QUICK_SAMPLES if quick else SAMPLES
+    asset_scenes.build(scene, Scatter(kind, INSTANCES, size=PICTURE, quick=quick))
+    found = {}
+    for distance, light in _views(scene):
+        name = f"{kind}-{distance}-{light}"
+        render(scene, folder / f"{name}-plain.png", samples)
+        render(scene, folder / f"{name}-again.png", samples, seed=1)
+        mask = coverage(scene, folder / "coverage.png") > LEAST_COVERAGE
+        pair = folder / f"{name}-plain.png", folder / f"{name}-again.png"
+        found[f"noise_{kind}_{distance}_{light}"] = difference(*pair, mask).flip
+    return found
+
+
+def _views(scene: bpy.types.Scene) -> Iterator[tuple[str, str]]:
+    """Names of distances and lights, which the scene has while each lasts."""
+    for distance, metres in DISTANCES.items():
+        asset_scenes.aim(scene, metres)
+        for light in LIGHTS:
+            asset_scenes.set_sun(scene, light)
+            bpy.context.view_layer.update()
+            yield distance, light
+
+
+def crown(kind: str, folder: Path, quick: bool) -> dict[str, float]:
+    """How much light a crown lets through, and the colour of its tenths from below to above, refined and plain."""
+    scene = bpy.context.scene
+    samples = QUICK_CROWN_SAMPLES if quick else CROWN_SAMPLES
+    asset_scenes.alone(scene, kind, quick)
+    plain, again, found = {}, {}, {}
+    for pixel in PIXELS:
+        asset_scenes.frame(scene, pixel)
+        plain[pixel] = silhouette(scene, folder / f"crown-{pixel}-plain.exr", samples)
+        again[pixel] = silhouette(scene, folder / f"crown-{pixel}-again.exr", samples, seed=1)
+        found |= {f"noise_{key}": value for key, value in _compared(plain[pixel], again[pixel], pixel).items()}
+    mark("REFINE")
+    for pixel in PIXELS:
+        asset_scenes.frame(scene, pixel)
+        timed_refine(scene)
+        found |= _compared(plain[pixel], silhouette(scene, folder / f"crown-{pixel}-refined.exr", samples), pixel)
+    refine.clear(scene)
+    return found
+
+
+def _compared(plain: NDArray, test: NDArray, pixel: float) -> dict[str, float]:
+    """Figures of two silhouettes (height, width, 4)."""
+    mask = plain[..., 3] > LEAST_COVERAGE
+    error = float((plain[..., 3] - test[..., 3])[mask].mean())
+    a, b = (tenths(p) for p in (plain, test))
+    apart = np.abs(b - a).mean(axis=1) / a.mean(axis=1)
+    return {f"dT_{pixel}": error, f"tenth_{pixel}": float(apart.max()), f"tenths_apart_{pixel}": float(np.ptp(a[:, 0]))}
+
+
+def tenths(silhouette: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Mean colour (10, 3) of what is covered in each tenth of the height of a crown, from below to above."""
+    rows = silhouette[::-1].astype(np.float64)
+    covered = np.flatnonzero((rows[..., 3] > LEAST_COVERAGE).mean(axis=1) > _LEAST_ROW)
+    # The lowest fifth is trunk.
+    first = covered[0] + (covered[-1] + 1 - covered[0]) // 5
+    bands = np.array_split(rows[first : covered[-1] + 1], TENTHS)
+    return np.array([band[..., :3].sum(axis=(0, 1)) / band[..., 3].sum() for band in bands])
+
+
+def silhouette(scene: bpy.types.Scene, path: Path, samples: int, seed: int = 0) -> NDArray[np.float32]:
+    """Light and alpha (height, width, 4), linear and premultiplied, of what is not ground or sky."""
+    with ground_as_holes():
+        before = scene.render.film_transparent
+        scene.render.film_transparent = True
+        try:
+            render(scene, path, samples, seed, form='OPEN_EXR')
+        finally:
+            scene.render.film_transparent = before
+    return read_picture(path)
+
+
+def coverage(scene: bpy.types.Scene, path: Path) -> NDArray[np.float32]:
+    """How much of each pixel (height, width) is not ground or sky, 0 to 1."""
+    bounces = scene.cycles.max_bounces
+    scene.cycles.max_bounces = 0
+    try:
+        return silhouette(scene, path.with_suffix(".exr"), COVERAGE_SAMPLES)[..., 3]
+    finally:
+        scene.cycles.max_bounces = bounces
+
+
+@contextmanager
+def ground_as_holes() -> Iterator[None]:
+    """Make holes in the image of all ground; instances come out of ground, so it is its material that does it."""
+    trees = [bpy.data.materials[name].node_tree for name in ("Meadow", "Forest floor")]
+    changed = []
+    for tree in trees:
+        output = next(node for node in tree.nodes if node.type == 'OUTPUT_MATERIAL')
+        hole = tree.nodes.new("ShaderNodeHoldout")
+        changed.append((tree, output, hole, output.inputs["Surface"].links[0].from_socket))
+        tree.links.new(hole.outputs[0], output.inputs["Surface"])
+    color_mode = bpy.context.scene.render.image_settings.color_mode
+    bpy.context.scene.render.image_settings.color_mode = 'RGBA'
+    try:
+        yield
+    finally:
+        bpy.context.scene.render.image_settings.color_mode = color_mode
+        for tree, output, hole, before in changed:
+            tree.links.new(before, output.inputs["Surface"])
+            tree.nodes.remove(hole)

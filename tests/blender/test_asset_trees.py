@@ -1,0 +1,109 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Trees and woods of the benchmark `assets` are what they say."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import bpy
+import numpy as np
+import pytest
+
+from benchmarks import asset_scenes, asset_shapes, asset_trees
+from devtools import session
+
+
+@pytest.fixture(autouse=True)
+def clean() -> Iterator[None]:
+    session.clean_file()
+    yield
+    session.clean_file()
+
+
+def _positions(mesh: bpy.types.Mesh) -> np.ndarray:
+    found = np.zeros((len(mesh.vertices), 3), np.float32)
+    mesh.vertices.foreach_get("co", found.ravel())
+    return found
+
+
+@pytest.mark.parametrize("kind", asset_trees.KINDS)
+def test_tree_is_valid_and_about_twelve_metres_high(kind: str) -> None:
+    mesh = asset_trees.make(kind, quick=True).data
+    assert not mesh.validate()
+    low, high = _positions(mesh).min(axis=0), _positions(mesh).max(axis=0)
+    assert 11.0 < high[2] < 13.0 and -0.2 < low[2] < 0.0
+    assert np.all(high[:2] - low[:2] < 12.0)
+    assert len(mesh.uv_layers) == 1 and all(mesh.materials)
+
+
+def test_leafy_tree_has_as_many_triangles_as_asked_for() -> None:
+    mesh = asset_trees.leafy("Tree", 200_000).data
+    assert 0 <= 200_000 - len(mesh.polygons) < 16
+    assert len(mesh.loops) == 3 * len(mesh.polygons)
+
+
+def test_closed_leaves_are_closed() -> None:
+    rng = np.random.default_rng(1)
+    twigs = asset_shapes.branches(asset_trees.ORDERS[:2], rng)[-1]
+    places = asset_shapes.stalks(twigs, 50, rng)
+    made = asset_shapes.closed_leaves(places, np.tile([0.1, 0.06], (50, 1)))
+    assert len(made.triangles) == 50 * 16
+    edges = np.concatenate([made.triangles[:, [i, (i + 1) % 3]] for i in range(3)])
+    ahead = {tuple(edge) for edge in edges.tolist()}
+    # Each edge once in each direction: closed, and all triangles turn the same way.
+    assert len(ahead) == len(edges) and ahead == {(b, a) for a, b in ahead}
+    a, b, c = (made.positions[made.triangles[:, i]] for i in range(3))
+    assert (np.cross(a, b) * c).sum() / 6 > 0  # the volume: outward
+
+
+def test_cards_are_quads_with_holes_in_a_texture_whose_colour_varies() -> None:
+    tree = asset_trees.make("cards")
+    mesh = tree.data
+    sides = np.zeros(len(mesh.polygons), np.int32)
+    mesh.polygons.foreach_get("loop_total", sides)
+    assert (sides == 4).sum() == asset_trees.CARDS and mesh.polygons[-1].material_index == 1
+    areas = np.zeros(len(sides), np.float32)
+    mesh.polygons.foreach_get("area", areas)
+    assert np.sqrt(areas[sides == 4]).min() > 0.25 and np.sqrt(areas[sides == 4]).max() < 0.55
+    image = bpy.data.images["Sprigs"]
+    assert tuple(image.size) == (1024, 1024)
+    pixels = np.zeros(1024 * 1024 * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    tiles = pixels.reshape(2, 512, 2, 512, 4).swapaxes(1, 2).reshape(4, -1, 4)
+    assert np.all((tiles[:, :, 3].mean(axis=1) > 0.15) & (tiles[:, :, 3].mean(axis=1) < 0.7))
+    means = np.array([tile[tile[:, 3] > 0.5, :3].mean(axis=0) for tile in tiles])
+    assert np.all(np.diff(means[:, 0]) > 0.03)
+
+
+def test_nodes_place_leaves_on_the_skeleton() -> None:
+    tree = asset_trees.make("nodes")
+    bpy.context.scene.collection.objects.link(tree)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    shown = [i.object.name.split(": ")[-1] for i in depsgraph.object_instances if i.is_instance]
+    assert len(shown) == asset_trees.LEAVES and {"leaf 0", "leaf 1", "leaf 2"} == set(shown)
+
+
+def test_different_trees_differ() -> None:
+    one, other = (_positions(tree.data) for tree in asset_trees.different(2, 60_000))
+    assert len(one) == len(other) and not np.allclose(one, other)
+    assert len({m.name for m in bpy.data.materials if m.name.startswith("Leaf ")}) == 2
+
+
+@pytest.mark.parametrize(("instances", "warped"), [(1, False), (10, False), (400, True)])
+def test_scatter_shows_exactly_so_many(instances: int, warped: bool) -> None:
+    scene = bpy.context.scene
+    wanted = asset_scenes.Scatter(instances=instances, warped=warped, quick=True)
+    instancer = asset_scenes.build(scene, wanted)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    found = np.array([np.array(i.matrix_world) for i in depsgraph.object_instances if i.is_instance])
+    assert len(found) == instances
+    assert len(instancer.evaluated_get(depsgraph).data.polygons) == len(instancer.data.polygons)  # the ground stays
+    assert found[:, 1, 3].min() > 0.0
+    scale = np.linalg.norm(found[:, :3, :3], axis=1)
+    mirrored = np.linalg.det(found[:, :3, :3]) < 0
+    if warped:
+        assert 0.3 < mirrored.mean() < 0.7 and np.ptp(scale / scale[:, :1], axis=1).max() > 0.3
+    else:
+        assert not mirrored.any() and np.allclose(scale, scale[:, :1], rtol=1e-5)
+        assert scale.min() > 0.69 and scale.max() < 1.31
