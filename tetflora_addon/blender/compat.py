@@ -84,3 +84,11 @@ def dot_shader() -> str:
     except ValueError:
         return 'FLAT_COLOR'
     return 'POINT_FLAT_COLOR'
+
+
+def set_node_input(modifier: bpy.types.NodesModifier, identifier: str, value: object) -> None:
+    """Set an input of a modifier's geometry nodes; before 5.2 it is a custom property of the modifier."""
+    if hasattr(modifier, "properties"):
+        getattr(modifier.properties.inputs, identifier).value = value
+    else:
+        modifier[identifier] = value

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Hashable, Sequence
+from typing import TypeVar
 
 import bpy
 
@@ -16,6 +17,7 @@ from .meshes import mesh_steps, point_object
 from .output import (
     KIND,
     PURPOSE,
+    SOURCE,
     dress,
     dress_collection,
     keep_materials,
@@ -23,6 +25,7 @@ from .output import (
     parent_of,
     remove_collection,
     remove_made,
+    remove_sources,
     result_collections,
 )
 
@@ -31,6 +34,8 @@ _LONGEST = 59
 #: Custom property of collections under construction.
 UNFINISHED = "tetflora_unfinished"
 NAMES = {'VIEW': "TetFlora", 'RENDER': "TetFlora render"}
+
+_Made = TypeVar("_Made", bound=bpy.types.ID)
 
 
 class Results:
@@ -63,6 +68,8 @@ class Results:
         self.collection: bpy.types.Collection | None = None
         self._made: list[bpy.types.ID] = []
         self._names: list[tuple[bpy.types.ID, str]] = []
+        self._held: list[bpy.types.ID] = []
+        self._shared: dict[Hashable, bpy.types.ID] = {}
         self._waiting: list[tuple[bpy.types.Object, Species | None]] = []
 
     def open(self) -> None:
@@ -87,7 +94,7 @@ class Results:
         species: Species | None = None,
     ) -> Generator[None, None, bpy.types.Object]:
         """Write one mesh as an object of the collection, step by step; of one species, or of None."""
-        name = self._name(name)
+        name = self.name_for(name)
         mesh = yield from mesh_steps(name, buffers, materials)
         self._made += [mesh, *materials]
         return self._link(name, bpy.data.objects.new(name, mesh), kind, species)
@@ -102,10 +109,10 @@ class Results:
     ) -> bpy.types.Object:
         """Write one cloud of points, which has one material, as an object of the collection."""
         self._made += materials
-        name = self._name(name)
+        name = self.name_for(name)
         return self._link(name, point_object(name, buffers, *materials), kind, species)
 
-    def _name(self, name: str) -> str:
+    def name_for(self, name: str) -> str:
         """A name that ends in a number, with the mark; shortened so that Blender does not cut off the end."""
         if not self.mark:
             return name
@@ -113,15 +120,59 @@ class Results:
         end = f" {number}{self.mark}"
         return stem.encode()[: _LONGEST - len(end)].decode(errors="ignore") + end
 
-    def _link(self, name: str, made: bpy.types.Object, kind: str, species: Species | None) -> bpy.types.Object:
-        self._made += [made, made.data]
-        self._names += [(made, name), (made.data, name)]
+    def hold(self, made: bpy.types.ID, name: str = "") -> None:
+        """Take over a datablock that is in no scene, with an object's data: it goes with the results that show it."""
+        for datablock in (made, getattr(made, "data", None)):
+            if datablock is not None:
+                self._held.append(datablock)
+                self._names += [(datablock, name)] if name else []
+                tag(datablock)
+
+    def shared(self, key: Hashable, make: Callable[[], _Made]) -> _Made:
+        """What was made for a key, made only once for these results."""
+        if key not in self._shared:
+            self._shared[key] = make()
+        return self._shared[key]
+
+    def add_object(
+        self,
+        name: str,
+        made: bpy.types.Object,
+        kind: str,
+        sources: Sequence[bpy.types.ID] = (),
+        placed: bool = False,
+    ) -> bpy.types.Object:
+        """Add an object that was made elsewhere, under a name by `name_for`.
+
+        Parameters
+        ----------
+        name : str
+        made : bpy.types.Object
+        kind : str
+            See `output.KIND`.
+        sources : sequence of bpy.types.ID
+            What it shows instances of. If TetFlora made that, it goes with the last object that shows it.
+        placed : bool
+            It has a transform and data of its own, which stay; otherwise it counts from the origin.
+        """
+        for source in sources:
+            if is_own(source):
+                made[SOURCE] = source
+        return self._link(name, made, kind, None, placed)
+
+    def _link(
+        self, name: str, made: bpy.types.Object, kind: str, species: Species | None, placed: bool = False
+    ) -> bpy.types.Object:
+        own = [made] if placed else [made, made.data]
+        self._made += own
+        self._names += [(datablock, name) for datablock in own]
         if self.data is not None:
-            self.data.add("a part of the result", made, made.data)
-        tag(made.data)
-        made.location = self.origin
+            self.data.add("a part of the result", *own)
+        if not placed:
+            made.location = self.origin
         made[KIND] = kind
-        tag(made)
+        for datablock in own:
+            tag(datablock)
         if self.purpose == 'VIEW':
             self._show(made, species)
         else:
@@ -155,14 +206,16 @@ class Results:
         else:
             self.scene.collection.children.link(self.collection)
             mark_runtime(self.collection, True)
+        remove_sources(self._held)  # that nothing shows
 
     def discard(self) -> None:
         """Remove everything made so far, whatever of it or of the scene somebody else has removed."""
         if self.collection is not None and is_there(self.collection):
             remove_collection(self.scene if is_there(self.scene) else None, self.collection)
         self.collection = None
-        remove_made(self._made)
-        self._made, self._waiting = [], []
+        remove_made([*self._made, *self._held])
+        self._held = []
+        self._made, self._waiting, self._shared = [], [], {}
 
 
 def dress_results(scene: bpy.types.Scene) -> None:

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 import bpy
 
 from ..materials.nodes import is_own, untag
-from .output import KIND, PARENT, PURPOSE, mark_runtime, remove_collection, result_collections
+from .output import KIND, PARENT, PURPOSE, mark_runtime, remove_collection, result_collections, sources_of
 
 #: Custom properties of hidden objects, as JSON: hide_render and hide_viewport before ("flags"), and the names of the
 #: scenes with the results ("scenes"). Results of a render come last and go first.
@@ -114,6 +114,8 @@ def keep_results(scene: bpy.types.Scene) -> int:
     kept = 0
     for collection in result_collections(scene, 'VIEW'):
         mark_runtime(collection, False)
+        for source in sources_of(collection.objects):
+            untag(source)
         for obj in collection.objects:
             if is_own(obj):
                 kept += obj.get(KIND) != PARENT

@@ -15,6 +15,7 @@ import bpy
 
 from ..materials.nodes import is_ours, is_own, tag
 from ..runtime import is_there
+from .looks import likeness
 
 #: Custom property of a result object: 'leaf', 'blossom', 'bark', 'explicit' or 'proxy', or the parent of a species.
 KIND = "tetflora_kind"
@@ -22,6 +23,8 @@ KIND = "tetflora_kind"
 SPECIES = "tetflora_species"
 MATERIAL = "tetflora_material"
 PARENT = "species"
+#: Custom property of a result object: the object or collection that TetFlora made for it to show instances of.
+SOURCE = "tetflora_source"
 #: Custom property of a result collection: 'VIEW' for the artist's results, 'RENDER' for those of a running render.
 PURPOSE = "tetflora_purpose"
 _KEPT = "tetflora_kept"  # on materials that a file holds although it does not hold the results that use them
@@ -55,12 +58,15 @@ def replaced_material(scene: bpy.types.Scene, identifier: str, kind: str) -> bpy
 
 def dress(scene: bpy.types.Scene, made: bpy.types.Object, identifier: str) -> None:
     """Apply a scene's output settings to a result object; ``identifier`` is empty where species are mixed."""
-    output, entry = scene.tetflora.output, entry_of(scene, identifier)
+    output, entry, like = scene.tetflora.output, entry_of(scene, identifier), likeness(made)
     for name in SWITCHES:
-        if getattr(made, f"visible_{name}") != getattr(output, name):  # after each, Blender lists all objects anew
-            setattr(made, f"visible_{name}", getattr(output, name))
-    made.pass_index = output.pass_index if entry is None else entry.pass_index
-    made.lightgroup = (entry.light_group if entry is not None else "") or output.light_group
+        shown = getattr(output, name) and (like is None or name not in like["off"])
+        if getattr(made, f"visible_{name}") != shown:  # after each, Blender lists all objects anew
+            setattr(made, f"visible_{name}", shown)
+    if like is None:
+        made.pass_index = output.pass_index if entry is None else entry.pass_index
+    own = (entry.light_group if entry is not None else "") if like is None else like["light_group"]
+    made.lightgroup = own or output.light_group
     made[SPECIES] = identifier
     first = made.material_slots[0].material if made.material_slots else None
     made[MATERIAL] = first.name if first is not None else ""
@@ -105,6 +111,27 @@ def mark_runtime(collection: bpy.types.Collection, runtime: bool) -> None:
             obj.is_runtime_data = runtime
             if obj.data is not None and is_own(obj.data):
                 obj.data.is_runtime_data = runtime
+    for source in sources_of(collection.objects):
+        source.is_runtime_data = runtime
+
+
+def sources_of(objects: Iterable[bpy.types.Object]) -> list[bpy.types.ID]:
+    """What TetFlora made for result objects to show instances of: collections, objects and their data, each once."""
+    found: dict[bpy.types.ID, None] = {}
+    waiting = list({source for obj in objects if (source := obj.get(SOURCE)) is not None and is_own(source)})
+    while waiting:
+        source = waiting.pop()
+        if source in found:
+            continue
+        found[source] = None
+        inner = [o for o in source.objects if is_own(o)] if isinstance(source, bpy.types.Collection) else [source]
+        for obj in inner:
+            found[obj] = None
+            if obj.data is not None and is_own(obj.data):
+                found[obj.data] = None
+            if (more := obj.get(SOURCE)) is not None and is_own(more):
+                waiting.append(more)
+    return list(found)
 
 
 def adopt_materials(scene: bpy.types.Scene, collection: bpy.types.Collection) -> list[str]:
@@ -163,19 +190,36 @@ def remove_collection(scene: bpy.types.Scene | None, collection: bpy.types.Colle
         for child in list(collection.children):
             if child.name not in scene.collection.children:
                 scene.collection.children.link(child)
+    sources = sources_of(own)
     data = [o.data for o in own if o.data is not None and is_own(o.data)]
-    groups, materials = _groups(own), {m for d in data for m in d.materials if m is not None and is_own(m)}
+    every = [*own, *(s for s in sources if isinstance(s, bpy.types.Object))]
+    groups = _groups(every)
+    materials = {m for o in every if o.data is not None and is_own(o.data) for m in o.data.materials}
     removed = [*own, *(d for d in data if d.users <= 1), collection]
     bpy.data.batch_remove(removed)
-    return len(removed) + _remove_unused(materials, groups)
+    unused = {m for m in materials if m is not None and is_own(m)}
+    return len(removed) + remove_sources(sources) + _remove_unused(unused, groups)
+
+
+def remove_sources(sources: Iterable[bpy.types.ID]) -> int:
+    """Remove what results could show instances of and nothing uses any more; returns the number of datablocks removed."""
+    left, removed = [s for s in sources if is_there(s)], 0
+    while unused := [s for s in left if s.users == 0 and is_own(s)]:
+        left = [s for s in left if s not in unused] if len(unused) < len(left) else []
+        bpy.data.batch_remove(unused)
+        removed += len(unused)
+    return removed
 
 
 def remove_made(datablocks: Iterable[bpy.types.ID]) -> None:
     """Remove objects that are in no collection, and data and materials of TetFlora's that nothing uses then."""
     there = [datablock for datablock in dict.fromkeys(datablocks) if is_there(datablock)]
     objects = [d for d in there if isinstance(d, bpy.types.Object) and is_own(d) and not d.users_collection]
-    groups = _groups(objects)
+    sources = [*sources_of(objects), *(d for d in there if isinstance(d, bpy.types.Collection))]
+    sources += [o for c in sources if isinstance(c, bpy.types.Collection) for o in c.objects]
+    groups = _groups({*objects, *(s for s in sources if isinstance(s, bpy.types.Object))})
     bpy.data.batch_remove(objects)
+    remove_sources(dict.fromkeys(sources))
     data = [d for d in there if is_there(d) and isinstance(d, bpy.types.Mesh | bpy.types.PointCloud) and not d.users]
     bpy.data.batch_remove(data)
     left = [d for d in there if is_there(d)]

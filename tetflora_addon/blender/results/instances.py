@@ -1,0 +1,289 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Results that are instances of the artist's own objects, or of meshes of clusters: points with a matrix each.
+
+Nothing is copied: materials, modifiers and attributes are those of the original because it is the original. Geometry
+nodes turn the vertices of a mesh into instances, because they show what is hidden, excluded or linked as well, and
+take any matrix: mirrored, stretched, sheared.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Protocol
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..attributes import read, write
+from ..compat import set_node_input
+from ..materials.nodes import Graph, find_socket, get_or_create
+from .collection import Results
+from .looks import look_like
+
+#: Attributes of points: where each instance stands, and which of several objects it shows.
+MATRIX, PICK = "tf_matrix", "tf_pick"
+#: Kinds of results, see `output.KIND`.
+KIND_WHOLE, KIND_CLUSTERS = "asset", "asset clusters"
+_VERSION = 1
+_NAMES = {
+    'OBJECT': "TetFlora Instances",
+    'COLLECTION': "TetFlora Collection Instances",
+    'CHILDREN': "TetFlora Cluster Instances",
+}
+_SOURCE = "Source"
+_COMPONENTS = ("mesh", "curves", "pointcloud", "volume")
+
+Source = bpy.types.Object | bpy.types.Collection
+
+
+def add_instances(
+    results: Results,
+    name: str,
+    source: Source,
+    matrices: NDArray[np.float64],
+    ids: NDArray[np.int32],
+    like: bpy.types.Object | None = None,
+) -> bpy.types.Object:
+    """Add one object that shows many instances of an object or a collection.
+
+    Parameters
+    ----------
+    results : Results
+    name : str
+        Of the new object, ending in a number.
+    source : bpy.types.Object or bpy.types.Collection
+        The artist's own, or what `carrier_of` returned. Visible or not, in the scene or not, of this file or not.
+    matrices : (n, 4, 4) float64
+        Any affine maps from the space of the source, relative to ``results.origin``, metres. An object's space is its
+        local one; a collection's begins at its ``instance_offset``.
+    ids : (n,) int32
+        Become the instances' ``id``, which random values of materials follow.
+    like : bpy.types.Object, optional
+        Object that shows the instances in the artist's scene: see `look_like`.
+
+    Returns
+    -------
+    bpy.types.Object
+        In the result collection.
+    """
+    kind = 'COLLECTION' if isinstance(source, bpy.types.Collection) else 'OBJECT'
+    name = results.name_for(name)
+    made = _instancer(name, kind, source, matrices, ids)
+    look_like(made, like)
+    return results.add_object(name, made, KIND_WHOLE, [source])
+
+
+def add_cluster_instances(
+    results: Results,
+    name: str,
+    objects: Sequence[bpy.types.Object],
+    pick: NDArray[np.int32],
+    matrices: NDArray[np.float64],
+    ids: NDArray[np.int32],
+    like: bpy.types.Object | None = None,
+) -> bpy.types.Object:
+    """Add one object that shows instances of many objects, such as those of `add_cluster`.
+
+    Parameters
+    ----------
+    results, name, matrices, ids, like
+        As for `add_instances`; matrices apply to the meshes of the objects, whose own transforms do not count.
+    objects : sequence of bpy.types.Object
+        In no collection of a scene. The same sequence shares one collection.
+    pick : (n,) int32
+        Index of the object that each instance shows.
+    """
+    key = ("clusters", *(o.session_uid for o in objects))
+    collection = results.shared(key, lambda: _collection(results, "clusters", objects))
+    # Blender numbers the objects of a collection by their names.
+    order = sorted(range(len(objects)), key=lambda i: _natural(objects[i].name))
+    place = np.zeros(len(objects), np.int32)
+    place[order] = np.arange(len(objects), dtype=np.int32)
+    name = results.name_for(name)
+    made = _instancer(name, 'CHILDREN', collection, matrices, ids, place[pick])
+    look_like(made, like)
+    return results.add_object(name, made, KIND_CLUSTERS, [collection])
+
+
+def add_cluster(
+    results: Results, stem: str, number: int, mesh: bpy.types.Mesh, like: bpy.types.Object | None = None
+) -> bpy.types.Object:
+    """Make an object of a mesh of a cluster, in no collection, for `add_cluster_instances`.
+
+    Parameters
+    ----------
+    stem : str
+        Name of the asset.
+    number : int
+        Of the cluster; the name ends in it.
+    mesh : bpy.types.Mesh
+        Becomes the result's, and goes with it.
+    like : bpy.types.Object, optional
+        The object that the faces are of, whose color, pass index and the like materials may read.
+    """
+    name = results.name_for(f"{stem} {number:06d}")
+    made = bpy.data.objects.new(name, mesh)
+    look_like(made, like)
+    results.hold(made, name)
+    return made
+
+
+class Bare(Protocol):
+    """Geometry that nodes instance and that is no object's own.
+
+    Attributes
+    ----------
+    name : str
+    geometry : bpy.types.GeometrySet
+    """
+
+    name: str
+    geometry: bpy.types.GeometrySet
+
+
+def carrier_of(results: Results, target: Bare) -> Source:
+    """Something to instance for geometry that is no object's: an object with a copy of it, made once for a result.
+
+    A collection of such objects where the geometry is more than one mesh; its instances are instances there too.
+    """
+    return results.shared(("carrier", target), lambda: _carrier(results, target.name, target.geometry))
+
+
+def _carrier(results: Results, name: str, geometry: bpy.types.GeometrySet) -> Source:
+    parts = [c for c in (getattr(geometry, kind, None) for kind in _COMPONENTS) if c is not None]
+    parts = [c for c in parts if not isinstance(c, bpy.types.Mesh) or len(c.vertices)]
+    points = geometry.instances_pointcloud()
+    nested = points is not None and len(points.points) > 0
+    objects = [_carried(results, name, part) for part in parts]
+    if len(objects) == 1 and not nested:
+        return objects[0]
+    if nested:
+        objects += _nested(results, name, geometry, points)
+    return _collection(results, name, objects)
+
+
+def _carried(results: Results, name: str, part: bpy.types.ID) -> bpy.types.Object:
+    data = part.copy()
+    name = results.name_for(f"{name} 0")
+    data.name = name
+    for number, material in enumerate(data.materials):
+        if material is not None and material.is_evaluated:
+            data.materials[number] = material.original
+    made = bpy.data.objects.new(name, data)
+    results.hold(made, name)
+    return made
+
+
+def _nested(
+    results: Results, name: str, geometry: bpy.types.GeometrySet, points: bpy.types.PointCloud
+) -> list[bpy.types.Object]:
+    """Objects that show the instances within geometry."""
+    reference = read(points, ".reference_index")
+    transform = read(points, "instance_transform").reshape(-1, 4, 4).transpose(0, 2, 1)
+    order = np.argsort(reference, kind="stable")
+    references = geometry.instance_references()
+    bounds = np.searchsorted(reference[order], np.arange(len(references) + 1))
+    made = []
+    for inner, (start, end) in zip(references, pairwise(bounds), strict=True):
+        if inner is None or start == end:
+            continue
+        known = isinstance(inner, bpy.types.Object | bpy.types.Collection)
+        source = inner.original if known else _carrier(results, name, inner)
+        kind = 'COLLECTION' if isinstance(source, bpy.types.Collection) else 'OBJECT'
+        rows = order[start:end]
+        own = results.name_for(f"{name} {len(made) + 1}")
+        made.append(_instancer(own, kind, source, transform[rows], rows.astype(np.int32)))
+        results.hold(made[-1], own)
+    return made
+
+
+def _instancer(
+    name: str,
+    kind: str,
+    source: Source,
+    matrices: NDArray[np.floating],
+    ids: NDArray[np.int32],
+    pick: NDArray[np.int32] | None = None,
+) -> bpy.types.Object:
+    """An object in no collection whose nodes show instances of a source."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(len(matrices))
+    columns = np.ascontiguousarray(matrices.transpose(0, 2, 1), np.float32)  # as Blender stores them
+    write(mesh, "position", columns[:, 3, :3])
+    write(mesh, MATRIX, columns.reshape(-1, 16), data_type='FLOAT4X4')
+    write(mesh, "id", np.asarray(ids, np.int32))
+    if pick is not None:
+        write(mesh, PICK, pick)
+    made = bpy.data.objects.new(name, mesh)
+    modifier = made.modifiers.new("Instances", 'NODES')
+    modifier.node_group = group = _group(kind)
+    given = next(s for s in group.interface.items_tree if s.name == _SOURCE and s.in_out == 'INPUT')
+    set_node_input(modifier, given.identifier, source)
+    return made
+
+
+def _group(kind: str) -> bpy.types.NodeTree:
+    """Geometry nodes that turn points into instances of an object, of a collection, or of the objects of one."""
+    socket = "Object" if kind == 'OBJECT' else "Collection"
+
+    def build(tree: bpy.types.NodeTree) -> None:
+        for name, in_out, socket_type in (
+            ("Geometry", 'INPUT', "Geometry"),
+            (_SOURCE, 'INPUT', socket),
+            ("Geometry", 'OUTPUT', "Geometry"),
+        ):
+            tree.interface.new_socket(name=name, in_out=in_out, socket_type=f"NodeSocket{socket_type}")
+        graph = Graph(tree)
+        given = graph.node("NodeGroupInput").outputs
+        if kind == 'OBJECT':
+            info = graph.node("GeometryNodeObjectInfo", {"Object": given[_SOURCE]}, transform_space='ORIGINAL')
+            find_socket(info.inputs, "As Instance").default_value = True
+            shown = find_socket(info.outputs, "Geometry")
+        else:
+            info = graph.node("GeometryNodeCollectionInfo", {"Collection": given[_SOURCE]}, transform_space='ORIGINAL')
+            for key in ("Separate Children", "Reset Children"):
+                find_socket(info.inputs, key).default_value = kind == 'CHILDREN'
+            shown = find_socket(info.outputs, "Instances")
+        # Points lose their matrices, or instances would keep them as well. Only here: to remove them from instances, or
+        # to do anything to what these show, would turn objects into plain geometry.
+        bare = graph.node("GeometryNodeRemoveAttribute", {"Geometry": given["Geometry"], "Name": MATRIX})
+        pick = graph.node("FunctionNodeInputInt")
+        if kind == 'CHILDREN':
+            pick = graph.node("GeometryNodeInputNamedAttribute", {"Name": PICK}, data_type='INT')
+        placed = graph.node("GeometryNodeInstanceOnPoints", {"Points": bare, "Instance": shown, "Instance Index": pick})
+        find_socket(placed.inputs, "Pick Instance").default_value = True  # the source, not a geometry that holds it
+        stored = graph.node("GeometryNodeInputNamedAttribute", {"Name": MATRIX}, data_type='FLOAT4X4')
+        number = graph.node("GeometryNodeInputIndex")
+        matrix = graph.node(
+            "GeometryNodeSampleIndex",
+            {"Geometry": given["Geometry"], "Value": stored, "Index": number},
+            data_type='FLOAT4X4',
+            domain='POINT',
+        )
+        turned = graph.node("GeometryNodeSetInstanceTransform", {"Instances": placed, "Transform": matrix})
+        graph.node("NodeGroupOutput", {"Geometry": turned})
+        graph.arrange()
+
+    def new(name: str) -> bpy.types.NodeTree:
+        return bpy.data.node_groups.new(name, "GeometryNodeTree")
+
+    return get_or_create(bpy.data.node_groups, _NAMES[kind], _VERSION, new, build)
+
+
+def _collection(results: Results, name: str, objects: Sequence[bpy.types.Object]) -> bpy.types.Collection:
+    """A collection in no scene; the dot keeps it out of menus."""
+    made = bpy.data.collections.new(f".TetFlora {name}")
+    for obj in objects:
+        made.objects.link(obj)
+    results.hold(made)
+    return made
+
+
+def _natural(name: str) -> list[tuple[bool, int, str]]:
+    """Key to sort names as Blender does: numbers within count as such, and case does not."""
+    parts = re.split(r"(\d+)", name.casefold())
+    return [(p.isdigit(), int(p) if p.isdigit() else 0, p) for p in parts if p]
