@@ -20,12 +20,16 @@ def register() -> None:
     preferences.register()
     bpy.types.VIEW3D_MT_add.append(menus.draw_in_add_menu)
     bpy.types.VIEW3D_MT_object.append(menus.draw_in_object_menu)
+    for menu in (bpy.types.OUTLINER_MT_object, bpy.types.OUTLINER_MT_collection):
+        menu.append(menus.draw_in_outliner)
     render.nothing_refined.append(menus.open_nothing_refined)
 
 
 def unregister() -> None:
     """Unregister panels and menus."""
     render.nothing_refined.remove(menus.open_nothing_refined)
+    for menu in (bpy.types.OUTLINER_MT_object, bpy.types.OUTLINER_MT_collection):
+        menu.remove(menus.draw_in_outliner)
     bpy.types.VIEW3D_MT_object.remove(menus.draw_in_object_menu)
     bpy.types.VIEW3D_MT_add.remove(menus.draw_in_add_menu)
     preferences.unregister()

@@ -10,6 +10,11 @@ from ..operators.add import (
     TETFLORA_OT_populate,
     TETFLORA_OT_use_as_form,
 )
+from ..operators.assets import (
+    TETFLORA_OT_refine_scatter,
+    TETFLORA_OT_stop_using_as_species,
+    TETFLORA_OT_use_as_species,
+)
 from ..operators.brush import TETFLORA_OT_paint_plants
 from ..operators.ground_cover import TETFLORA_OT_ground_cover
 from ..operators.ground_tools import TETFLORA_OT_place_plant
@@ -126,6 +131,9 @@ class TETFLORA_MT_object(bpy.types.Menu):
             _POPULATE,
             Button(TETFLORA_OT_mark_occluder, 'MOD_MASK', "Mark or Unmark as Occluder"),
             Button(TETFLORA_OT_mark_explicit, 'MESH_ICOSPHERE', "Refine or Ignore These Meshes"),
+            Button(TETFLORA_OT_use_as_species, 'ASSET_MANAGER'),
+            Button(TETFLORA_OT_stop_using_as_species, 'X'),
+            Button(TETFLORA_OT_refine_scatter, 'OUTLINER_OB_POINTCLOUD', "Refine Scatter or Keep It Plain"),
             Button(TETFLORA_OT_use_as_form, 'CURVE_DATA'),
             Button(TETFLORA_OT_mark_field, 'POINTCLOUD_DATA', "Use or Stop Using as Field of Plants"),
             *CONVERSIONS,
@@ -160,6 +168,16 @@ def draw_in_object_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> No
     """The entry in the 3D view's Object menu."""
     menu.layout.separator()
     menu.layout.menu(TETFLORA_MT_object.__name__, icon='OUTLINER_OB_FORCE_FIELD')
+
+
+def draw_in_outliner(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    """Entries in the Outliner's menus of objects and collections."""
+    menu.layout.separator()
+    draw_buttons(
+        menu.layout,
+        Button(TETFLORA_OT_use_as_species, 'ASSET_MANAGER', "Use as TetFlora Species"),
+        Button(TETFLORA_OT_stop_using_as_species, 'X', "Stop Using as TetFlora Species"),
+    )
 
 
 class TETFLORA_MT_pie(bpy.types.Menu):

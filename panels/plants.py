@@ -5,12 +5,15 @@
 import bpy
 
 from ..operators.add import TETFLORA_OT_use_as_form
+from ..operators.assets import TETFLORA_OT_stop_using_as_species, TETFLORA_OT_use_as_species
 from ..operators.marks import TETFLORA_OT_mark_field
 from ..operators.plants import TETFLORA_OT_remove_plants
 from ..operators.refine import TETFLORA_OT_make_plant_mesh
+from ..tetflora_addon.blender.assets.marks import can_be_species, is_species
 from ..tetflora_addon.blender.scene.fields import FIELD_TYPES, stored_size
 from ..tetflora_addon.blender.scene.objects import has_nodes
 from ..tetflora_addon.blender.scene.skeletons import FORM_TYPES
+from ..tetflora_addon.blender.species.asset_species import name_of
 from ..tetflora_addon.blender.species.edits import catalogue
 from .base import Button, SidebarPanel, TETFLORA_UL_field_species, draw_buttons, draw_properties, split_layout
 from .menus import CONVERSIONS, PLANT_TOOLS, TETFLORA_MT_add_plant, draw_species_menu
@@ -29,7 +32,7 @@ class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
             plant = active.tetflora
             column.prop(plant, "species_choice")
             if plant.species not in catalogue():
-                column.label(text=f'"{plant.species}" is not in the catalog', icon='ERROR')
+                column.label(text=f'"{name_of(plant.species)}" is not in the catalog', icon='ERROR')
             draw_properties(column, plant, "seed", "enabled", "form")
         elif active is not None and active.tetflora.is_field:
             _draw_field(column, active)
@@ -38,6 +41,7 @@ class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
         layout.menu(TETFLORA_MT_add_plant.__name__, text="Add Plant", icon='ADD')
         if active is None or active.tetflora.is_plant:
             return
+        _draw_asset(layout, active)
         # A mesh with faces is ground or something else, as a rule; the Object menu offers these for it too.
         faces = active.type == 'MESH' and len(active.data.polygons) > 0
         if active.type in FORM_TYPES and not faces:
@@ -47,6 +51,17 @@ class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
             text = "Field of Plants" if field else "Use as Field of Plants"
             icon = 'CHECKMARK' if field else 'POINTCLOUD_DATA'
             Button(TETFLORA_OT_mark_field, icon, text).draw(layout, depress=field)
+
+
+def _draw_asset(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
+    """Whether an object is used as a species."""
+    if is_species(obj):
+        row = layout.row(align=True)
+        row.label(text="Used as a species", icon='CHECKMARK')
+        Button(TETFLORA_OT_use_as_species, 'FILE_REFRESH', "").draw(row)
+        Button(TETFLORA_OT_stop_using_as_species, 'X', "").draw(row)
+    elif can_be_species(obj):
+        Button(TETFLORA_OT_use_as_species, 'ASSET_MANAGER').draw(layout)
 
 
 def _draw_field(column: bpy.types.UILayout, obj: bpy.types.Object) -> None:
@@ -61,7 +76,7 @@ def _draw_field(column: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         column.prop(kinds[field.field_species_index], "form")
     for species in {entry.species for entry in kinds} or {field.species}:
         if species not in catalogue():
-            column.label(text=f'"{species}" is not in the catalog', icon='ERROR')
+            column.label(text=f'"{name_of(species)}" is not in the catalog', icon='ERROR')
     draw_properties(column, field, "seed", "enabled")
 
 

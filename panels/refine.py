@@ -5,6 +5,7 @@
 import bpy
 
 from ..operators.add import TETFLORA_OT_first_forest
+from ..operators.assets import TETFLORA_OT_refine_scatter
 from ..operators.marks import can_be_explicit
 from ..operators.refine import TETFLORA_OT_clear, TETFLORA_OT_refine
 from ..tetflora_addon.blender.job.forecast import forecast_text, memory_text
@@ -12,9 +13,11 @@ from ..tetflora_addon.blender.job.render import render_errors
 from ..tetflora_addon.blender.placing.first_forest import is_first_forest
 from ..tetflora_addon.blender.results.forms import few_bounces, form_of
 from ..tetflora_addon.blender.results.output import KIND
-from ..tetflora_addon.blender.scene.objects import has_contents
+from ..tetflora_addon.blender.scene.objects import has_contents, may_scatter
+from ..tetflora_addon.blender.scene.scatterers import is_drop, is_scatter
 from ..tetflora_addon.blender.viewport import auto
 from .base import (
+    Button,
     SidebarPanel,
     TETFLORA_UL_leaf_objects,
     draw_below,
@@ -75,10 +78,24 @@ class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
         active = context.active_object
         if active is not None and (can_be_explicit(active) or active.tetflora.is_explicit):
             layout.prop(active.tetflora, "is_explicit")
+        if active is not None and (may_scatter(active) or is_scatter(active)):
+            _draw_scatter(layout, active)
         draw_properties(layout, settings, "refine_at_render", "auto_refine")
         row = layout.row()
         row.active = settings.auto_refine
         row.prop(settings, "follow_viewport")
+
+
+def _draw_scatter(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
+    """Whether what an object scatters is refined; the mark of a linked one is not its own."""
+    if obj.library is None and is_drop(obj):
+        layout.label(text="A plant of the species that it shows", icon='CHECKMARK')
+    elif obj.library is None:
+        layout.prop(obj.tetflora, "is_scatter")
+    else:
+        marked = is_scatter(obj)
+        text, icon = ("Refine Scatter", 'CHECKBOX_HLT' if marked else 'CHECKBOX_DEHLT')
+        Button(TETFLORA_OT_refine_scatter, icon, text).draw(layout, depress=marked)
 
 
 def _draw_memory(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:

@@ -10,8 +10,8 @@ from .placing import properties
 from .results import output_properties
 from .results.forms import form_property
 from .runtime import Listeners
+from .scene import scatterers
 from .scene.explicit import EXPLICIT_PROPERTY
-from .scene.objects import SCATTER_PROPERTY
 from .scene.skeletons import FORM_TYPES
 from .settings import AnimationProperties, RefinementProperties
 from .species import asset_species, editor, edits
@@ -89,7 +89,7 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
         override=_OVERRIDES,
     )
     is_explicit: BoolProperty(**EXPLICIT_PROPERTY, override=_OVERRIDES)
-    is_scatter: BoolProperty(**SCATTER_PROPERTY, override=_OVERRIDES)
+    is_scatter: BoolProperty(**scatterers.SCATTER_PROPERTY, override=_OVERRIDES)
     population: StringProperty(
         name="Population", description="Identity of the population that created this", options={'HIDDEN'}
     )
@@ -216,6 +216,12 @@ class TetFloraScene(RefinementProperties, AnimationProperties, bpy.types.Propert
         type=asset_species.TetFloraAssetSpecies,
         options={'HIDDEN'},
     )
+    linked_scatters: CollectionProperty(
+        name="Linked Scatterers",
+        description="Linked objects whose scatter is refined",
+        type=scatterers.TetFloraLinkedScatter,
+        options={'HIDDEN'},
+    )
     species_editor: PointerProperty(name="Species Editor", type=editor.TetFloraSpeciesEditor, options={'HIDDEN'})
     statistics: StringProperty(
         name="Statistics",
@@ -224,7 +230,7 @@ class TetFloraScene(RefinementProperties, AnimationProperties, bpy.types.Propert
     )
 
 
-_MODULES = (properties, output_properties, state, editor, edits, asset_species, settings)
+_MODULES = (properties, output_properties, state, editor, edits, asset_species, scatterers, settings)
 CLASSES = (
     *(cls for module in _MODULES for cls in module.CLASSES),
     TetFloraFieldEntry,

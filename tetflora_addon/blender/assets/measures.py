@@ -21,6 +21,7 @@ from ..scene.explicit import SURFACE_TYPES
 from ..scene.instances import Reference, references_of
 from ..scene.objects import DEEPEST, has_nodes, rendered_objects
 from ..species.asset_species import PICTURE_SIDE
+from .target import Target
 
 _POINTS = 60_000  # of a picture
 _TRIANGLES = 200_000  # of one mesh that are looked at
@@ -61,8 +62,8 @@ class _Mesh:
 class _Collector:
     """Meshes that something shows, each with its places."""
 
-    def __init__(self, depsgraph: bpy.types.Depsgraph) -> None:
-        self.depsgraph, self.looks = depsgraph, Looks()
+    def __init__(self, depsgraph: bpy.types.Depsgraph, only_boxes: bool = False) -> None:
+        self.depsgraph, self.looks, self.only_boxes = depsgraph, Looks(), only_boxes
         self.meshes: list[tuple[_Mesh, NDArray[np.float64], float]] = []  # places (k, 4, 4), each for so many
 
     def take(self, shown: Reference, places: NDArray[np.float64], weight: float = 1.0, depth: int = 0) -> None:
@@ -91,7 +92,7 @@ class _Collector:
             self._add(shown.mesh, [], places, weight)
         for target, rows in references_of(shown):
             below, _ = rows.within(places, np.zeros(len(places), np.uint64))
-            step = max(-(-len(below) // _INSTANCES), 1)
+            step = 1 if self.only_boxes else max(-(-len(below) // _INSTANCES), 1)
             below = below[::step]
             original = target if isinstance(target, bpy.types.GeometrySet) else target.original
             self.take(original, below, weight * step, depth + 1)
@@ -103,8 +104,12 @@ class _Collector:
             self.meshes.append((self._read(mesh, slots), places, weight))
 
     def _read(self, mesh: bpy.types.Mesh, slots: list[bpy.types.Material | None]) -> _Mesh:
-        mesh.calc_loop_triangles()
         positions = np.nan_to_num(read(mesh, "position").astype(np.float64))
+        low, high = positions.min(axis=0), positions.max(axis=0)
+        if self.only_boxes:
+            none = np.zeros(0)
+            return _Mesh(none, none, none, none, low, high, len(mesh.polygons), 0.0)
+        mesh.calc_loop_triangles()
         triangles = members(mesh.loop_triangles, "loops", 3, np.int32)
         faces = members(mesh.loop_triangles, "polygon_index", dtype=np.int32)
         if len(triangles) > _TRIANGLES:
@@ -126,8 +131,8 @@ class _Collector:
             area,
             np.array([look.colour for look in looks])[slot],
             coverage,
-            positions.min(axis=0),
-            positions.max(axis=0),
+            low,
+            high,
             len(mesh.polygons),
             (0.5 + 0.5 * loose) * float(area @ coverage),
         )
@@ -162,12 +167,27 @@ def measure(
     return Measures(*numbers, colour, found[0].picture)
 
 
+def reach_of(target: Target, depsgraph: bpy.types.Depsgraph) -> float:
+    """Distance from an asset's origin within which all of it lies, metres in its own space."""
+    collector = _Collector(depsgraph, only_boxes=True)
+    collector.take(target.datablock or target.geometry, np.eye(4)[None])
+    reach = 0.0
+    for mesh, places, _ in collector.meshes:
+        reach = max(reach, float(np.linalg.norm(_corners(mesh, places), axis=-1).max()))
+    return reach
+
+
+def _corners(mesh: _Mesh, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Corners (k, 8, 3) of a mesh's box in its places."""
+    corner = np.array(np.meshgrid(*zip(mesh.low, mesh.high, strict=True))).reshape(3, -1).T
+    return corner @ places[:, :3, :3].transpose(0, 2, 1) + places[:, None, :3, 3]
+
+
 def _measured(meshes: list[tuple[_Mesh, NDArray[np.float64], float]], picture: bool) -> Measures:
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     total = leaves = polygons = 0.0
     for mesh, places, weight in meshes:
-        corner = np.array(np.meshgrid(*zip(mesh.low, mesh.high, strict=True))).reshape(3, -1).T
-        box = corner @ places[:, :3, :3].transpose(0, 2, 1) + places[:, None, :3, 3]
+        box = _corners(mesh, places)
         low, high = np.minimum(low, box.min(axis=(0, 1))), np.maximum(high, box.max(axis=(0, 1)))
         size = weight * float((np.abs(np.linalg.det(places[:, :3, :3])) ** (2.0 / 3.0)).sum())
         total += size * float(mesh.area.sum())

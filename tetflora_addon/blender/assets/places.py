@@ -9,7 +9,7 @@ many parts is taken for a tree itself. All places of an asset are computed at on
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import bpy
 import numpy as np
@@ -22,6 +22,7 @@ from ..scene.explicit import SURFACE_TYPES
 from ..scene.instances import Reference, name_keys, references_of
 from ..scene.objects import DEEPEST, ONE_BY_ONE, geometry_of, has_nodes, renderable_objects, rendered_objects
 from ..scene.plants import AssetPlants, read_asset_plants
+from ..scene.scatterers import is_scatter
 from ..species.asset_species import TetFloraAssetSpecies, asset_species
 from .target import Target
 
@@ -65,6 +66,14 @@ class Places:
         """Number of places."""
         return len(self.keys)
 
+    def counted_from(self, origin: NDArray[np.float64]) -> Places:
+        """The same in coordinates that begin at a place (3,) of the present ones."""
+        if not origin.any():
+            return self
+        matrices = self.matrices.copy()
+        matrices[:, :3, 3] -= origin
+        return replace(self, matrices=matrices)
+
 
 @dataclass
 class Scatter:
@@ -101,7 +110,7 @@ def read_places(
         kind that cannot be read; the message names the object.
     """
     found = plant_places(scene, depsgraph, view_layer)
-    marked = sorted((o for o in renderable_objects(view_layer) if o.tetflora.is_scatter), key=lambda o: o.name_full)
+    marked = sorted((o for o in renderable_objects(view_layer) if is_scatter(o)), key=lambda o: o.name_full)
     for scatter in read_scatters(marked, depsgraph).values():
         found += scatter.places
     return found

@@ -17,3 +17,10 @@ class Target:
     geometry: bpy.types.GeometrySet | None
     owner: bpy.types.Object | None
     name: str
+
+
+def digest_of(target: Target, depsgraph: bpy.types.Depsgraph) -> str:
+    """Stands in until there is one of all that the target shows."""
+    shown = target.datablock
+    data = getattr(shown, "data", None)
+    return f"{target.name}|{getattr(shown, 'name_full', '')}|{len(getattr(data, 'polygons', ()))}"

@@ -22,6 +22,7 @@ from ...refinement.statistics import Statistics
 from ...refinement.strays import Strays
 from ...species.catalogue import list_species, load_species
 from ...species.species import Species
+from ..assets.places import Places, read_places
 from ..results.forms import form_of
 from ..results.hiding import originals_shown
 from ..results.leaf_objects import resolved_species
@@ -36,7 +37,8 @@ from ..settings import check_limits, wind_of
 class Given:
     """Contents of a scene; ``explicit`` is None where no mesh takes part, ``sources`` where no light is baked.
 
-    ``owners`` are the objects of the plants in their order, each with the number of its own.
+    ``owners`` are the objects of the plants in their order, each with the number of its own; ``places`` are those of
+    assets.
     """
 
     seeds: Seeds
@@ -45,6 +47,7 @@ class Given:
     lights: tuple[Light, ...]
     sources: Sources | None = None
     owners: tuple[tuple[str, int], ...] = ()
+    places: tuple[Places, ...] = ()
 
     @property
     def species(self) -> tuple[str, ...]:
@@ -68,6 +71,7 @@ class Given:
             occluders=self.occluders - origin,
             lights=tuple(light.counted_from(origin) for light in self.lights),
             sources=None if sources is None else sources.counted_from(origin),
+            places=tuple(one.counted_from(origin) for one in self.places),
         )
 
     def named(self, strays: Strays) -> dict[str, float]:
@@ -102,10 +106,11 @@ def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_laye
     check_settings(scene)
     with originals_shown(scene, depsgraph):
         explicit = read_explicit(depsgraph, view_layer)
+        places = tuple(read_places(scene, depsgraph, view_layer))
         try:
             seeds, owners = read_plants_of(scene, depsgraph, view_layer)
         except NoPlantsError:
-            if explicit is None:
+            if explicit is None and not places:
                 raise
             none = np.zeros(0)
             frames = none.reshape(0, 3), none.reshape(0, 3, 3)
@@ -113,7 +118,7 @@ def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_laye
         lights = (*read_lights(depsgraph, view_layer), *sky_suns(scene))
         baked = scene.tetflora.baked_light != 'OFF' and not scene.tetflora.expand_everything
         sources = read_sources(scene, depsgraph, view_layer) if baked else None
-        return Given(seeds, explicit, read_occluders(depsgraph, view_layer), lights, sources, owners)
+        return Given(seeds, explicit, read_occluders(depsgraph, view_layer), lights, sources, owners, places)
 
 
 def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Flora:

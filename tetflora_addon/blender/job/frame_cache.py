@@ -18,6 +18,8 @@ import numpy as np
 from ...camera.camera import Camera
 from ...camera.view_cells import Around, ViewCells, cell_camera
 from ...species.species import Species
+from ..assets.measures import reach_of
+from ..assets.target import digest_of
 from ..compat import drawn_disc
 from ..results.hiding import hidden_originals, hide_originals, show_originals
 from ..results.leaf_objects import brought_materials, resolved_species
@@ -26,6 +28,7 @@ from ..results.proxies import shade_again
 from ..scene.camera import read_camera
 from ..scene.skeletons import species_of
 from ..settings import wind_of
+from ..species.asset_species import TetFloraAssetSpecies, asset_species
 from ..species.edits import species_for
 from .contents import Given, read_scene, settings_from
 
@@ -68,7 +71,7 @@ def scene_digest(
     camera: Camera | None = None,
     given: Given | None = None,
 ) -> str:
-    """Digest of camera, plants, meshes that take part, occluders, lights, settings, species, materials and wind.
+    """Digest of camera, plants, meshes, assets, occluders, lights, settings, species, materials and wind.
 
     In the wind it changes with each frame.
 
@@ -93,6 +96,9 @@ def scene_digest(
         slots = [[getattr(material, "name_full", "") for material in slots] for slots in given.explicit.materials]
         explicit = meshes.surfaces, meshes.surface, meshes.linear, meshes.origin, slots
     species = [resolved_species(scene, identifier, depsgraph) for identifier in given.species]
+    targets = {one.target: "" for one in given.places}
+    for target in targets:
+        targets[target] = digest_of(target, depsgraph)
     for part in (
         camera or read_camera(scene, depsgraph),
         given.seeds,
@@ -100,6 +106,7 @@ def scene_digest(
         given.lights,
         given.sources,
         explicit,
+        [(targets[one.target], _names(one.owners), one.matrices, one.keys) for one in given.places],
         choices(scene),
         [_digest_of_species(one) for one in species],
         [brought_materials(scene, identifier) for identifier in given.species],
@@ -108,12 +115,21 @@ def scene_digest(
     return content.hexdigest()
 
 
+def _names(objects: Sequence[bpy.types.Object]) -> list[str]:
+    return [obj.name_full for obj in objects]
+
+
 def choices(scene: bpy.types.Scene) -> list:
     """Settings of a scene in its digest, without any object; cheap enough for every change."""
     group = scene.tetflora
     materials = [(e.species, *(getattr(getattr(e, k), "name", "") for k in REPLACED)) for e in group.output.species]
     chosen = [getattr(group, name) for name in _CHOICES]
-    return [settings_from(scene), chosen, materials, wind_of(scene), drawn_disc(scene.render.engine)]
+    assets = [(identifier, _asset_name(one), one.variants) for identifier, one in asset_species(scene).items()]
+    return [settings_from(scene), chosen, materials, assets, wind_of(scene), drawn_disc(scene.render.engine)]
+
+
+def _asset_name(entry: TetFloraAssetSpecies) -> str:
+    return (entry.object or entry.collection).name_full
 
 
 def _digest_of_species(species: Species) -> str:
@@ -159,12 +175,12 @@ def shared_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, given:
     camera, settings = read_camera(scene, depsgraph, region_only=True), scene.tetflora
     if not (settings.share_frames and camera_moves(scene)) or wind_of(scene) is not None:
         return camera  # in the wind, no two frames are equal
-    around = None if given is None else _around(scene, given)
+    around = None if given is None else _around(scene, depsgraph, given)
     return cell_camera(camera, ViewCells(settings.cell_length, settings.cell_turn), around) or camera
 
 
-def _around(scene: bpy.types.Scene, given: Given) -> Around:
-    """Spheres around meshes, and around plants with the length of all branches on the way to the last twig."""
+def _around(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, given: Given) -> Around:
+    """Spheres around meshes and assets, and around plants with all branches on the way to the last twig."""
     seeds, meshes = given.seeds, None if given.explicit is None else given.explicit.meshes
     # Lengths are in metres for trunks, and in those of their parents for all others.
     orders = [species_for(scene, species_of(kind)).orders for kind in seeds.identifiers]
@@ -174,6 +190,12 @@ def _around(scene: bpy.types.Scene, given: Given) -> Around:
         reach = [np.linalg.norm(surface.positions, axis=1).max() for surface in meshes.surfaces]
         centres.append(meshes.origin)
         radii.append(np.array(reach)[meshes.surface] * meshes.largest)
+    reaches = {one.target: 0.0 for one in given.places}
+    for target in reaches:
+        reaches[target] = reach_of(target, depsgraph)
+    for one in given.places:
+        centres.append(one.matrices[:, :3, 3])
+        radii.append(reaches[one.target] * np.linalg.norm(one.matrices[:, :3, :3], axis=1).max(axis=1))
     return Around(np.concatenate(centres), np.concatenate(radii))
 
 

@@ -3,7 +3,8 @@
 """The artist's own objects that take part in refinement (``tetflora.is_explicit``): other trees, rocks, scans.
 
 All evaluated surfaces count. An object that collections or nodes instance takes part with every instance, and so does
-everything else that such an instancer shows, because an instancer can only be hidden as a whole.
+everything else that such an instancer shows, because an instancer can only be hidden as a whole. What an object shows
+whose scatter is refined counts as assets instead.
 """
 
 from __future__ import annotations
@@ -15,13 +16,14 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import SceneError
 from ...assets.mesh_features import mesh_features
+from ...errors import SceneError
 from ...refinement.polygons import Meshes, Surface
 from ..attributes import face_offsets, members, read, values_of, world_matrix
 from ..materials.means import Looks
 from ..materials.nodes import is_ours
 from .objects import may_instance, renderable_objects
+from .scatterers import scatters
 
 #: Of the property `is_explicit`.
 EXPLICIT_PROPERTY = {
@@ -78,7 +80,7 @@ def read_explicit(depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLaye
         owner = instance.parent.original if instance.is_instance else instance.object.original
         if owner not in wanted or not instance.show_self or instance.object.type not in SURFACE_TYPES:
             continue
-        if instance.is_instance and _unseen(instance):
+        if instance.is_instance and (_unseen(instance) or scatters(owner)):
             continue
         if reader.add(instance.object, np.array(instance.matrix_world, dtype=np.float64)):
             found.add(owner)
@@ -116,6 +118,7 @@ def _instancers_of_marked(rendered: set[bpy.types.Object], depsgraph: bpy.types.
         and instance.object.original.tetflora.is_explicit
         and not _unseen(instance)
         and instance.parent.original in rendered
+        and not scatters(instance.parent.original)
     }
 
 

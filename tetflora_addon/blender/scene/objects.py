@@ -18,19 +18,10 @@ from numpy.typing import NDArray
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed
 from ..attributes import evaluated_mesh, members, read, world_matrix
-from ..species.asset_species import asset_of
+from ..species.asset_species import asset_species
 from .instances import name_keys, references_of
+from .scatterers import scatters
 
-#: Of the property `is_scatter`.
-SCATTER_PROPERTY = {
-    "name": "Refine Scatter",
-    "description": (
-        "Refine what the object's modifiers or particles scatter: instances stay as they are where they are near, and "
-        "become proxies where they are far or hidden. The object goes on scattering by its own rules, and its own "
-        "surface stays as it is"
-    ),
-    "options": set(),
-}
 #: Ways to instance whose places only Blender knows.
 ONE_BY_ONE = {'VERTS', 'FACES'}
 #: Instances within instances that are followed, as many as Blender draws.
@@ -91,24 +82,13 @@ def takes_part(obj: bpy.types.Object) -> bool:
     return group.is_plant or group.is_field or group.is_explicit or scatters(obj)
 
 
-def scatters(obj: bpy.types.Object) -> bool:
-    """Whether what an object instances is refined as assets: it is marked so, or is a dropped asset."""
-    return obj.tetflora.is_scatter or is_drop(obj)
-
-
-def is_drop(obj: bpy.types.Object) -> bool:
-    """Whether an object shows a collection that is a species, as the asset browser makes them: it is a plant of it."""
-    collection = obj.instance_collection if obj.instance_type == 'COLLECTION' else None
-    if collection is None or obj.tetflora.is_plant or obj.tetflora.is_field:
-        return False
-    species = asset_of(collection)
-    return species is not None and not species.variants
-
-
 def taking_part(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """Objects of a scene that refinement reads, hidden ones included: plants, meshes, occluders and lamps."""
+    """Objects of a scene that refinement reads, hidden ones included: plants, meshes, assets, occluders and lamps."""
     every = objects_within(scene.collection)
-    return [obj for obj in every if obj.type == 'LIGHT' or takes_part(obj) or obj.tetflora.is_occluder]
+    found = [obj for obj in every if obj.type == 'LIGHT' or takes_part(obj) or obj.tetflora.is_occluder]
+    for asset in asset_species(scene).values():
+        found += [asset.object] if asset.object is not None else objects_within(asset.collection)
+    return found
 
 
 def may_take_part(obj: bpy.types.Object) -> bool:

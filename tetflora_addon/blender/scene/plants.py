@@ -21,7 +21,8 @@ from ..species.asset_species import asset_of, asset_species, find_asset, name_of
 from ..species.edits import catalogue
 from .fields import read_field, read_field_matrices
 from .instances import name_keys
-from .objects import Copies, copies_of, is_drop, may_instance, renderable_objects
+from .objects import Copies, copies_of, may_instance, renderable_objects
+from .scatterers import is_drop
 from .skeletons import kind_of, kind_of_choice, species_of
 
 _NAMED = 3  # objects that a message names before it only counts

@@ -8,21 +8,25 @@ Without a window, plants are read only on request, and the only handlers are tho
 from __future__ import annotations
 
 import time
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 
 import bpy
 
-from ...compiled.flora import compile_species
+from ...compiled.flora import Flora, compile_species
 from ...errors import TetFloraError
+from ...growth.seeds import Seeds
 from ...jobs import Progress
 from ...preview.levels import Level, Levels, gather
 from ...preview.light_plants import Shapes, bounds_of_plants, light_plants
+from ...preview.simple_crowns import joined, simple_crowns
 from ...refinement.loop import refine as refine_loop
 from ..job.contents import compile_for, load_for, read_scene, refinement_settings
 from ..runtime import Handlers, JobData, call_off, call_soon, guarded, redraw
 from ..scene.camera import read_camera
+from ..scene.crowns import crown_for
 from ..scene.objects import taking_part
-from ..scene.plants import NoPlantsError, read_plants
+from ..scene.plants import NoPlantsError, read_asset_plants, read_plants
+from ..scene.scatterers import is_drop
 from ..species import edits
 from ..worker import call_in_thread, steps_in_thread
 from . import state
@@ -98,9 +102,7 @@ def read_shapes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Shape
         if form == 'NONE':
             preview.shapes = None
         else:
-            seeds = read_plants(scene, depsgraph, depsgraph.view_layer)
-            make = light_plants if form == 'LIGHT' else bounds_of_plants
-            preview.shapes = make(compile_for(seeds.identifiers, scene, depsgraph), seeds)
+            preview.shapes = _shapes_of(scene, depsgraph, light_plants if form == 'LIGHT' else bounds_of_plants)
     except NoPlantsError as error:
         preview.shapes, preview.message = None, str(error)
     except TetFloraError as error:
@@ -109,6 +111,25 @@ def read_shapes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Shape
     preview.seconds = time.perf_counter() - begin
     redraw()
     return preview.shapes
+
+
+def _shapes_of(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, make: Callable[[Flora, Seeds], Shapes]
+) -> Shapes:
+    """Plants that grow in the form of ``make``, and those that are assets as simple crowns."""
+    crowns = []
+    for plants in read_asset_plants(scene, depsgraph, depsgraph.view_layer):
+        crown = crown_for(scene, plants.species)
+        size = crown.radius, crown.base, crown.height
+        crowns.append(simple_crowns(plants.matrices, size, crown.colour, boxes=make is bounds_of_plants))
+    try:
+        seeds = read_plants(scene, depsgraph, depsgraph.view_layer)
+    except NoPlantsError:
+        if not crowns:
+            raise
+        return joined(crowns)
+    grown = make(compile_for(seeds.identifiers, scene, depsgraph), seeds)
+    return joined([grown, *crowns]) if crowns else grown
 
 
 def schedule() -> None:
@@ -135,7 +156,8 @@ def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         datablock = update.id
         if isinstance(datablock, bpy.types.Object):
             own = datablock.original.tetflora
-            if (own.is_plant or own.is_field) and (update.is_updated_transform or update.is_updated_geometry):
+            shown = own.is_plant or own.is_field or is_drop(datablock.original)
+            if shown and (update.is_updated_transform or update.is_updated_geometry):
                 schedule()
                 return
         # Deleted objects are reported only as updates of what they were in.
