@@ -30,8 +30,9 @@ _DOMAINS = ("POINT", "FACE", "CORNER")
 def write_mesh(name: str, buffers: MeshBuffers, materials: Sequence[bpy.types.Material | None] = ()) -> bpy.types.Mesh:
     """Make a mesh datablock from buffers.
 
-    Topology is copied, edges included, so that Blender computes nothing. Positions and indices are written through the
-    mesh's attributes, which are plain memory; the collections ``vertices`` and ``loops`` are many times slower.
+    Topology is copied, edges included, so that Blender computes nothing; where buffers have none it finds them.
+    Positions and indices are written through the mesh's attributes, which are plain memory; the collections
+    ``vertices`` and ``loops`` are many times slower.
 
     Parameters
     ----------
@@ -86,9 +87,12 @@ def _fill(mesh: bpy.types.Mesh, buffers: MeshBuffers) -> Iterator[None]:
     yield
     write(mesh, "position", buffers.positions)
     yield
-    write(mesh, ".edge_verts", buffers.edge_verts)
     write(mesh, ".corner_vert", buffers.corner_verts)
-    write(mesh, ".corner_edge", buffers.corner_edges)
+    if len(buffers.edge_verts):
+        write(mesh, ".edge_verts", buffers.edge_verts)
+        write(mesh, ".corner_edge", buffers.corner_edges)
+    elif buffers.polygons:
+        mesh.update(calc_edges=True)
     for key, (domain, values) in buffers.attributes.items():
         yield
         if key == UV_MAP:
@@ -121,7 +125,8 @@ def check_buffers(buffers: MeshBuffers) -> None:
         raise ValueError(f"face_offsets must rise from 0 to {corners} corners in steps of at least 3")
     _check_range("edge_verts", buffers.edge_verts, vertices)
     _check_range("corner_verts", buffers.corner_verts, vertices)
-    _check_range("corner_edges", buffers.corner_edges, len(buffers.edge_verts))
+    if len(buffers.edge_verts):
+        _check_range("corner_edges", buffers.corner_edges, len(buffers.edge_verts))
     sizes = {"POINT": vertices, "FACE": faces, "CORNER": corners}
     for key, (domain, values) in buffers.attributes.items():
         if domain not in _DOMAINS:

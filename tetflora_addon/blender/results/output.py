@@ -202,7 +202,7 @@ def remove_collection(scene: bpy.types.Scene | None, collection: bpy.types.Colle
 
 
 def remove_sources(sources: Iterable[bpy.types.ID]) -> int:
-    """Remove what results could show instances of and nothing uses any more; returns the number of datablocks removed."""
+    """Remove what results could show instances of, and nothing uses any more; returns the number removed."""
     left, removed = [s for s in sources if is_there(s)], 0
     while unused := [s for s in left if s.users == 0 and is_own(s)]:
         left = [s for s in left if s not in unused] if len(unused) < len(left) else []
