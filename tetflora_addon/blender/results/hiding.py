@@ -15,6 +15,7 @@ from contextlib import contextmanager
 import bpy
 
 from ..materials.nodes import is_own, untag
+from .hiding_linked import hide_linked, leave_hidden, linked_hidden, scenes_hiding, show_linked
 from .output import KIND, PARENT, PURPOSE, mark_runtime, remove_collection, result_collections, sources_of
 
 #: Custom properties of hidden objects, as JSON: hide_render and hide_viewport before ("flags"), and the names of the
@@ -25,8 +26,17 @@ OVERRIDES = "tetflora_hidden_overrides"
 
 
 def hide_originals(scene: bpy.types.Scene, purpose: str, originals: Sequence[bpy.types.Object]) -> None:
-    """Hide objects that results replace, in viewports too unless the results are only for a render."""
+    """Hide objects that results replace, in viewports too unless the results are only for a render.
+
+    Raises
+    ------
+    SceneError
+        One is linked in such a way that it cannot be hidden: see `hiding_linked.check_linked`. None is hidden then.
+    """
+    hide_linked(scene, purpose, [original for original in originals if original.library is not None])
     for original in originals:
+        if original.library is not None:
+            continue
         # Where it is hidden for another scene already, its current visibility is not the artist's.
         flags, scenes = _marker(original, purpose) or ([original.hide_render, original.hide_viewport], [])
         if scene.name in scenes and original.hide_render:
@@ -52,11 +62,13 @@ def hidden_originals(scene: bpy.types.Scene, purpose: str | None = None) -> list
     They may not be in the scene any more.
     """
     purposes = HIDDEN if purpose is None else [purpose]
-    return [o for which in purposes for o in _marked(which) if _concerns(scene, o, which)]
+    own = [o for which in purposes for o in _marked(which) if _concerns(scene, o, which)]
+    return own + [o for which in purposes for o in linked_hidden(scene, which)]
 
 
 def show_originals(scene: bpy.types.Scene, purpose: str) -> None:
     """Show what is hidden for a scene's results of one purpose."""
+    show_linked(scene, purpose)
     for original in hidden_originals(scene, purpose):
         flags, _ = _marker(original, purpose)
         others = _others(scene, original, purpose)
@@ -64,6 +76,19 @@ def show_originals(scene: bpy.types.Scene, purpose: str) -> None:
             _mark(original, purpose, flags, others)
         else:
             _show(original, purpose)
+
+
+def artists_flags(original: bpy.types.Object) -> list[bool]:
+    """Whether an object is hidden in renders and in viewports, as the artist left it."""
+    marks = [marker for purpose in HIDDEN if (marker := _marker(original, purpose)) is not None]
+    return marks[0][0] if marks else [original.hide_render, original.hide_viewport]
+
+
+def forget_marks(copied: bpy.types.Object) -> None:
+    """Let a copy of an object count as never hidden."""
+    for key in HIDDEN.values():
+        if key in copied:
+            del copied[key]
 
 
 def _show(original: bpy.types.Object, purpose: str) -> None:
@@ -111,6 +136,7 @@ def keep_results(scene: bpy.types.Scene) -> int:
     for original in _marked('VIEW'):
         if _concerns(scene, original, 'VIEW') and not _others(scene, original, 'VIEW'):
             del original[HIDDEN['VIEW']]
+    leave_hidden(scene)
     kept = 0
     for collection in result_collections(scene, 'VIEW'):
         mark_runtime(collection, False)
@@ -129,16 +155,21 @@ def keep_results(scene: bpy.types.Scene) -> int:
     return kept
 
 
-def lift_marks() -> dict[tuple[str, str], str]:
+def lift_marks() -> dict[tuple, str | list]:
     """Show what is hidden for results that files do not hold: those of renders, and the artist's unless saved.
 
     Returns
     -------
     dict
-        The marks by purpose and name of the object, for `restore_marks`.
+        The marks by purpose and name of the object, and linked objects by purpose, name of the scene and None, for
+        `restore_marks`.
     """
     saving = {scene.name for scene in bpy.data.scenes if scene.tetflora.output.save_results}
     lifted = {}
+    for scene, purpose in list(scenes_hiding()):
+        if purpose == 'RENDER' or scene.name not in saving:
+            lifted[purpose, scene.name, None] = [key_of(o) for o in linked_hidden(scene, purpose)]
+            show_linked(scene, purpose)
     for purpose in ('RENDER', 'VIEW'):
         for original in _marked(purpose):
             if purpose == 'RENDER' or not saving.intersection(_marker(original, purpose)[1]):
@@ -147,9 +178,28 @@ def lift_marks() -> dict[tuple[str, str], str]:
     return lifted
 
 
-def restore_marks(lifted: dict[tuple[str, str], str]) -> None:
+def key_of(obj: bpy.types.Object) -> tuple[str, str]:
+    """Names of an object and of its library, empty for this file. Saving a file may change the paths of libraries."""
+    return obj.name, "" if obj.library is None else obj.library.name
+
+
+def object_of(key: tuple[str, str]) -> bpy.types.Object | None:
+    """The object of a key by `key_of`; None where it is gone."""
+    name, home = key
+    library = bpy.data.libraries.get(home) if home else None
+    if home and library is None:
+        return None
+    return bpy.data.objects.get((name, None if library is None else library.filepath))
+
+
+def restore_marks(lifted: dict[tuple, str | list]) -> None:
     """Hide again what `lift_marks` showed."""
-    for (purpose, name), mark in reversed(lifted.items()):
+    for (purpose, name, *linked), mark in reversed(lifted.items()):
+        if linked:
+            scene, objects = bpy.data.scenes.get((name, None)), [object_of(key) for key in mark]
+            if scene is not None:
+                hide_linked(scene, purpose, [obj for obj in objects if obj is not None])
+            continue
         original = bpy.data.objects.get((name, None))
         if original is not None:
             original[HIDDEN[purpose]] = mark
@@ -159,6 +209,9 @@ def restore_marks(lifted: dict[tuple[str, str], str]) -> None:
 
 def show_left_over() -> None:
     """Show what is hidden for results that the file that was just read does not hold."""
+    for scene, purpose in list(scenes_hiding()):
+        if purpose == 'RENDER' or not result_collections(scene, 'VIEW'):
+            show_linked(scene, purpose)
     for original in _marked('RENDER'):
         _show(original, 'RENDER')
     for original in _marked('VIEW'):
@@ -197,15 +250,20 @@ def originals_shown(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | Non
 
     The dependency graph is updated if it is given, which only evaluated data requires.
     """
+    linked = [(scene, purpose, linked_hidden(scene, purpose)) for scene, purpose in scenes_hiding()]
+    for home, purpose, _ in linked:
+        show_linked(home, purpose)
     marked = {purpose: _marked(purpose) for purpose in ('RENDER', 'VIEW')}
     before = {o: (o.hide_render, o.hide_viewport) for every in marked.values() for o in every}
     for purpose, every in marked.items():
         for o in every:
             o.hide_render, o.hide_viewport = _marker(o, purpose)[0]
     try:
-        if before and depsgraph is not None:
+        if (before or linked) and depsgraph is not None:
             depsgraph.update()
         yield
     finally:
         for o, flags in before.items():
             o.hide_render, o.hide_viewport = flags
+        for home, purpose, every in reversed(linked):
+            hide_linked(home, purpose, every)

@@ -23,6 +23,8 @@ KIND = "tetflora_kind"
 SPECIES = "tetflora_species"
 MATERIAL = "tetflora_material"
 PARENT = "species"
+#: Kind of a result that is a copy of what the artist's own object shows besides instances: no plants.
+STAND_IN = "stand-in"
 #: Custom property of a result object: the object or collection that TetFlora made for it to show instances of.
 SOURCE = "tetflora_source"
 #: Custom property of a result collection: 'VIEW' for the artist's results, 'RENDER' for those of a running render.
@@ -58,6 +60,8 @@ def replaced_material(scene: bpy.types.Scene, identifier: str, kind: str) -> bpy
 
 def dress(scene: bpy.types.Scene, made: bpy.types.Object, identifier: str) -> None:
     """Apply a scene's output settings to a result object; ``identifier`` is empty where species are mixed."""
+    if made.get(KIND) == STAND_IN:
+        return
     output, entry, like = scene.tetflora.output, entry_of(scene, identifier), likeness(made)
     for name in SWITCHES:
         shown = getattr(output, name) and (like is None or name not in like["off"])
