@@ -103,6 +103,11 @@ class MeshLooks:
         self._slot = read(mesh, "material_index") if "material_index" in types and len(materials) > 1 else None
 
     @property
+    def first_map(self) -> str:
+        """The UV map that renders first; '' if there is none."""
+        return self._layers.first
+
+    @property
     def needs_baking(self) -> list[int]:
         """Slots whose materials have nodes that only a renderer knows."""
         return [slot for slot, plan in enumerate(self.plans) if plan.notes.needs_baking]

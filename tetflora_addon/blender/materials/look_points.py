@@ -18,9 +18,9 @@ from .means import Look, Looks
 from .node_values import NodeValues, NotUnderstood
 from .surface_shaders import Notes, Scattered, SurfaceShaders, grey
 
-#: Parts along an edge, at most; texels of the finest image along an edge of a part, about: less where steps, or several
-#: images, make the mean of what nodes get something else than the mean of what comes out.
-_MOST_PARTS = 32
+#: Parts along an edge, at most; texels of the finest image along an edge of a part, about. Where steps, or several
+#: images, make the mean of what nodes get something else than the mean of what comes out, single texels are looked at.
+_MOST_PARTS, _MOST_PARTS_UNEVEN = 32, 64
 _TEXELS, _TEXELS_UNEVEN = 8.0, 3.0
 #: Texture coordinates and colours that differ by less are the same.
 _SAME = 1.0 / (1 << 14)
@@ -103,7 +103,8 @@ class Plan:
             step = max(1, _BATCH // (n * n))
             for start in range(0, len(rows), step):
                 some = rows[start : start + step]
-                sizes = {name: height[None, some] / np.float32(n) for name, (_, height) in extents.items()}
+                part = np.float32(0 if self.uneven else 1 / n)
+                sizes = {name: height[None, some] * part for name, (_, height) in extents.items()}
                 points = _Sampled(self, layers, known, {name: corners[name][some] for name in self.names}, sizes, n)
                 found[some] = _means(self.shaders.at(NodeValues(points, known.curves)))
         return found[which]
@@ -111,9 +112,9 @@ class Plan:
     def _parts(self, lengths: list[NDArray[np.float32]], count: int, most: int) -> NDArray[np.int32]:
         """Parts along an edge of each triangle: a power of two that follows its texels, and fewer if they are many."""
         texels = np.max(lengths, axis=0) * self.texels if lengths else np.zeros(count, np.float32)
-        wanted = np.clip(texels / (_TEXELS_UNEVEN if self.uneven else _TEXELS), 1 if self.maps else 2, _MOST_PARTS)
+        limit, each = (_MOST_PARTS_UNEVEN, _TEXELS_UNEVEN) if self.uneven else (_MOST_PARTS, _TEXELS)
+        wanted = np.clip(texels / each, 1 if self.maps else 2, limit)
         parts = (1 << np.ceil(np.log2(wanted)).astype(np.int32)).astype(np.int32)
-        limit = _MOST_PARTS
         while limit > 2 and (parts.astype(np.int64) ** 2).sum() > most:
             limit //= 2
             parts = np.minimum(parts, limit)

@@ -17,8 +17,8 @@ from .means import GREY, Look, Looks
 from .node_values import NodeValues, NotUnderstood, Stack, source_of
 from .nodes import active_output, find_socket
 
-# Shaders by what they let through of the light that they scatter, and the input of their colour.
-_SIMPLE = {
+#: Shaders by what they let through of the light that they scatter, and the input of their colour.
+SIMPLE = {
     'BSDF_DIFFUSE': ("Color", 0.0),
     'BSDF_TRANSLUCENT': ("Color", 1.0),
     'BSDF_GLOSSY': ("Color", 0.0),
@@ -117,7 +117,7 @@ class SurfaceShaders:
         if source is None or not source.is_output:
             return _UNLIT
         node = source.node
-        if (simple := _SIMPLE.get(node.type)) is not None:
+        if (simple := SIMPLE.get(node.type)) is not None:
             colour = self._colour(values, node, simple[0], stack)
             if node.type == 'EMISSION':
                 colour = colour * self._number(values, node, "Strength", stack, 1.0)

@@ -1,0 +1,213 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an asset consists of: each distinct mesh once, with all of its places in the asset, as arrays.
+
+Objects, collections, nodes, particles and what is instanced by instances are followed down to meshes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SceneError
+from ..attributes import world_matrix
+from ..materials.nodes import is_ours
+from ..scene.explicit import SURFACE_TYPES
+from ..scene.instances import references_of
+from ..scene.objects import ONE_BY_ONE, has_nodes, rendered_objects
+
+Slots = list[bpy.types.Material | None]
+
+
+@dataclass
+class Part:
+    """A mesh of an asset.
+
+    Attributes
+    ----------
+    name : str
+        Of the object, for messages.
+    shown : bpy.types.Object or bpy.types.GeometrySet
+        The original object whose mesh it is, or the geometry.
+    places : list of (n, 4, 4) float64
+        From its space to that of the asset.
+    """
+
+    name: str
+    shown: bpy.types.Object | bpy.types.GeometrySet
+    places: list[NDArray[np.float64]] = field(default_factory=list)
+
+    @property
+    def matrices(self) -> NDArray[np.float64]:
+        """All places (n, 4, 4)."""
+        return np.concatenate(self.places)
+
+    @contextmanager
+    def opened(self, depsgraph: bpy.types.Depsgraph) -> Iterator[tuple[bpy.types.Mesh, Slots] | None]:
+        """The mesh as it is evaluated, and its materials, while the context lasts; None if it has no faces."""
+        if isinstance(self.shown, bpy.types.GeometrySet):
+            mesh = self.shown.mesh
+            yield None if mesh is None or not len(mesh.polygons) else (mesh, _originals(mesh.materials))
+            return
+        obj = _evaluated(self.shown, depsgraph)
+        try:
+            mesh = _mesh_of(obj)
+            if mesh is None or not len(mesh.polygons):
+                yield None
+                return
+            slots = _originals(mesh.materials)
+            for i, slot in enumerate(obj.material_slots):
+                if slot.link == 'OBJECT' and i < len(slots):
+                    slots[i] = slot.material.original if slot.material else None
+            yield mesh, slots
+        finally:
+            obj.to_mesh_clear()
+
+
+def _evaluated(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.Object:
+    """The evaluated object; the original where it is not evaluated, which has no modifiers then."""
+    evaluated = obj.evaluated_get(depsgraph)
+    return evaluated if evaluated.is_evaluated else obj
+
+
+def _mesh_of(obj: bpy.types.Object) -> bpy.types.Mesh | None:
+    try:
+        return obj.to_mesh()
+    except RuntimeError:  # hair, of which nodes may have made a mesh all the same
+        return None
+
+
+def _originals(materials: bpy.types.IDMaterials) -> Slots:
+    return [m.original if m is not None else None for m in materials] or [None]
+
+
+def parts_of(
+    shown: bpy.types.Object | bpy.types.Collection | bpy.types.GeometrySet,
+    name: str,
+    depsgraph: bpy.types.Depsgraph,
+) -> tuple[list[Part], list[str]]:
+    """Meshes of an asset with their places, and warnings of what is left out.
+
+    Raises
+    ------
+    SceneError
+        Something instances itself; the message names it.
+    """
+    walk = _Walk(name, depsgraph)
+    start = np.eye(4)[None]
+    if isinstance(shown, bpy.types.GeometrySet):
+        walk.geometry(shown, start, ())
+    elif isinstance(shown, bpy.types.Collection):
+        walk.collection(shown, start, ())
+    else:
+        walk.object(shown, start, ())
+    return list(walk.parts.values()), walk.warnings
+
+
+Path = tuple[bpy.types.ID, ...]
+
+
+class _Walk:
+    """Follows references down to meshes, with all places at once; a path are the datablocks that it is in."""
+
+    def __init__(self, name: str, depsgraph: bpy.types.Depsgraph) -> None:
+        self.name, self.depsgraph = name, depsgraph
+        self.parts: dict[object, Part] = {}
+        self.warnings: list[str] = []
+
+    def object(self, obj: bpy.types.Object, matrices: NDArray[np.float64], path: Path) -> None:
+        """Take an original object with what it instances."""
+        if obj in path:
+            raise SceneError(
+                f'"{obj.name}" instances itself, by way of "{path[-1].name}"; change what one of the two instances'
+            )
+        path = (*path, obj)
+        if not obj.is_instancer or obj.show_instancer_for_render or obj.instance_type == 'COLLECTION':
+            self._own(obj, matrices)
+        if obj.instance_type in ONE_BY_ONE or len(obj.particle_systems):
+            self._one_by_one(obj, matrices)
+            return
+        if obj.instance_type == 'COLLECTION' and obj.instance_collection is not None:
+            self.collection(obj.instance_collection, matrices, path)
+        if has_nodes(obj) and (evaluated := obj.evaluated_get(self.depsgraph)).is_evaluated:
+            try:
+                geometry = evaluated.evaluated_geometry()
+            except TypeError:  # an object without geometry
+                return
+            self._instances(geometry, matrices, path)
+            if obj.type == 'CURVES' and geometry.mesh is not None:
+                self._add(obj, Part(obj.name, geometry), matrices)
+
+    def collection(self, collection: bpy.types.Collection, matrices: NDArray[np.float64], path: Path) -> None:
+        """Take what a collection shows in renders."""
+        if collection in path:
+            raise SceneError(
+                f'The collection "{collection.name}" instances itself, by way of "{path[-1].name}"; take that object '
+                "out of the collection, or let it instance another one"
+            )
+        path = (*path, collection)
+        back = np.eye(4)
+        back[:3, 3] = -np.array(collection.instance_offset)
+        for obj in sorted(rendered_objects(collection), key=lambda o: o.name_full):
+            self.object(obj, matrices @ (back @ world_matrix(obj, self.depsgraph)), path)
+
+    def geometry(self, geometry: bpy.types.GeometrySet, matrices: NDArray[np.float64], path: Path) -> None:
+        """Take geometry without an object, with what it instances."""
+        if geometry.mesh is not None:
+            name = geometry.name or (path[-1].name if path else self.name)
+            self._add(geometry, Part(name, geometry), matrices)
+        self._instances(geometry, matrices, path)
+
+    def _instances(self, geometry: bpy.types.GeometrySet, matrices: NDArray[np.float64], path: Path) -> None:
+        keys = np.zeros(len(matrices), np.uint64)
+        for target, rows in references_of(geometry):
+            places, _ = rows.within(matrices, keys)
+            if isinstance(target, bpy.types.GeometrySet):
+                self.geometry(target, places, path)
+            elif isinstance(target, bpy.types.Collection):
+                self.collection(target.original, places, path)
+            else:
+                self.object(target.original, places, path)
+
+    def _one_by_one(self, obj: bpy.types.Object, matrices: NDArray[np.float64]) -> None:
+        """Instances on vertices and faces, and of particles, which only Blender's own list has."""
+        back = np.linalg.pinv(world_matrix(obj, self.depsgraph).astype(np.float64))
+        found: dict[bpy.types.Object, list[NDArray[np.float64]]] = {}
+        for instance in self.depsgraph.object_instances:
+            if not instance.is_instance or not instance.show_self or instance.parent.original != obj:
+                continue
+            if instance.object.original != obj:
+                place = back @ np.array(instance.matrix_world, dtype=np.float64)
+                found.setdefault(instance.object.original, []).append(place)
+        if not found:
+            self.warnings.append(
+                f'What "{obj.name}" instances on vertices, faces or particles is left out of "{self.name}", because it '
+                "is not in the scene; link it to the scene, or make its instances real"
+            )
+        for shown, places in found.items():
+            self._own(shown, (matrices[:, None] @ np.array(places)).reshape(-1, 4, 4))
+
+    def _own(self, obj: bpy.types.Object, matrices: NDArray[np.float64]) -> None:
+        """Take the surface of an object itself."""
+        if obj.type not in SURFACE_TYPES or is_ours(obj):
+            return
+        if obj.type == 'CURVES':
+            if not has_nodes(obj):
+                self.warnings.append(f'The hair of "{obj.name}" is left out of "{self.name}"; give it faces by nodes')
+            return
+        evaluated = _evaluated(obj, self.depsgraph)
+        if obj.type == 'MESH':
+            # Objects that share a mesh and its materials are one.
+            own = tuple(s.material for s in obj.material_slots if s.link == 'OBJECT')
+            self._add((evaluated.data.as_pointer(), own), Part(obj.name, obj), matrices)
+        else:
+            self._add(obj, Part(obj.name, obj), matrices)
+
+    def _add(self, key: object, part: Part, matrices: NDArray[np.float64]) -> None:
+        self.parts.setdefault(key, part).places.append(matrices)
