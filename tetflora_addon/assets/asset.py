@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,19 +31,22 @@ class Clusters(Arrays):
         Bounds of all vertices, metres.
     leaf_area, wood_area : (c,) float64
         One-sided area of sheets, and surface of solids, m², without what is transparent.
+    body_area : (c,) float64
+        The part of that of solids which are as many as leaves: closed leaves, berries, twigs. Facets stand for them as
+        for leaves.
     faces : (c,) int32
     first_face : (c,) int64
         First of its faces in the asset's order.
     width : (c,) float64
         Mean width of its leaves and wood, by area, metres.
     one_leaf : (c,) float64
-        Mean area of its sheets, m²; 0 where there are none.
+        Mean optical area of its leaves, m²; 0 where there are none.
     colour : (c, 3) float64
     transmission : (c,) float64
     moment : (c, 6) float64
         Mean of n nᵀ by optical area: xx, yy, zz, xy, xz, yz.
     leaf_sample, leaf_samples, wood_sample, wood_samples : (c,) int32
-        First sample and number of samples on sheets, and on solids; each stands for an equal area.
+        First sample and number of samples on leaves, and on wood; each of either stands for an equal optical area.
     weights : (c, 7) float64
         Fraction of their area that facets need to block as much light, for each of `COUNTS`.
     """
@@ -54,6 +58,7 @@ class Clusters(Arrays):
     high: NDArray[np.float64] = field(metadata=column(3))
     leaf_area: NDArray[np.float64]
     wood_area: NDArray[np.float64]
+    body_area: NDArray[np.float64]
     faces: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
     first_face: NDArray[np.int64] = field(metadata=column(dtype=np.int64))
     width: NDArray[np.float64]
@@ -71,6 +76,11 @@ class Clusters(Arrays):
     def optical_area(self) -> NDArray[np.float64]:
         """Area (c,) that can block light, m²: sheets, and half of what is closed."""
         return self.leaf_area + self.wood_area / 2
+
+    @property
+    def leaf_optical(self) -> NDArray[np.float64]:
+        """The part (c,) of the optical area that facets stand for as for leaves, m²."""
+        return self.leaf_area + self.body_area / 2
 
     @property
     def meshes(self) -> NDArray[np.bool_]:
@@ -173,6 +183,17 @@ class Assets:
     def none(cls) -> Assets:
         """No assets."""
         return cls.of(())
+
+    @cached_property
+    def mesh_of(self) -> NDArray[np.int64]:
+        """The cluster (c,) with a mesh of its own that each is or lies in; −1 for those above such."""
+        out = np.where(self.clusters.meshes, np.arange(len(self.clusters)), -1)
+        while True:  # a level at a time
+            parent = np.maximum(self.clusters.parent, 0)
+            below = np.flatnonzero((out < 0) & (self.clusters.parent >= 0) & (out[parent] >= 0))
+            if not len(below):
+                return out
+            out[below] = out[parent[below]]
 
     def asset_of(self, cluster: NDArray[np.integer]) -> NDArray[np.int64]:
         """Asset (n,) that clusters (n,) belong to."""

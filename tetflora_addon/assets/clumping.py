@@ -116,7 +116,7 @@ def _blocked_by_facets(
     number = np.arange(sets * each)
     owner = number // each
     key = child_key(key_of_seed(number), cluster)
-    leaf = clusters.leaf_area[cluster] / clusters.optical_area[cluster]
+    leaf = clusters.leaf_optical[cluster] / clusters.optical_area[cluster]
     runs = (clusters.leaf_sample, clusters.wood_sample), (clusters.leaf_samples, clusters.wood_samples)
     on_leaf = (number % each + uniform(key_of_seed(owner), _PICK)) / each < leaf
     first, many = (np.where(on_leaf, a[cluster], b[cluster]) for a, b in runs)

@@ -95,8 +95,8 @@ def _clusters(hierarchy: Hierarchy, parts: list[Measured]) -> tuple[Clusters, Sa
     begin = np.zeros(len(first), np.int64)
     begin[small] = np.cumsum(number[small]) - number[small]
     begin[inner] = len(samples) + np.cumsum(number[inner]) - number[inner]
-    leaf, wood, optical, faces, sheets = every[:, :5].T
-    mean = every[:, 5:] / np.maximum(optical, 1e-300)[:, None]
+    leaf, wood, optical, faces, leaves, bodies = every[:, :6].T
+    mean = every[:, 6:] / np.maximum(optical, 1e-300)[:, None]
     before = np.cumsum(np.append(0, sums[:, 3]))
     clusters = Clusters(
         hierarchy.parent,
@@ -106,10 +106,11 @@ def _clusters(hierarchy: Hierarchy, parts: list[Measured]) -> tuple[Clusters, Sa
         bounds[:, 1],
         leaf,
         wood,
+        np.minimum(bodies, wood),
         faces.astype(np.int32),
         before[first].astype(np.int64),
         mean[:, 0],
-        leaf / np.maximum(sheets, 1.0),
+        (leaf + bodies / 2) / np.maximum(leaves, 1.0),
         mean[:, 1:4],
         mean[:, 4],
         mean[:, 5:],
@@ -132,7 +133,7 @@ def _samples_above(
 ) -> tuple[Samples, NDArray[np.int64]]:
     """Samples of clusters with children (k): some of those of the smallest clusters, in proportion to their areas."""
     inner = np.flatnonzero(hierarchy.children > 0)
-    areas = np.stack([sums[:, 0], sums[:, 1] / 2], axis=1)
+    areas = np.stack([sums[:, 0] + sums[:, 5] / 2, (sums[:, 1] - sums[:, 5]) / 2], axis=1)
     done = np.concatenate([np.zeros((1, 2)), np.cumsum(areas, axis=0)])
     within = done[last[inner]] - done[first[inner]]
     within[within < 1e-12 * np.maximum(done[-1], 1e-300)] = 0.0

@@ -29,6 +29,8 @@ _SHEET_TRANSMISSION = 0.3
 #: Draws of the places of samples.
 ALONG, _U, _V = 241, 242, 243
 _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
+#: Islands of solids that are a larger part of all faces' area than this are wood; others are as many as leaves.
+_WOOD = 1.0 / 256.0
 _PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
@@ -45,6 +47,8 @@ class Pool:
     centre : (p, 3) float32
         In the space of the asset.
     triangles : (p,) int32
+    woody : (p,) bool
+        Of a large solid: a trunk, not a berry or a closed leaf.
     """
 
     patches: tuple[Patches | None, ...]
@@ -52,6 +56,7 @@ class Pool:
     patch: NDArray[np.int32]
     centre: NDArray[np.float32]
     triangles: NDArray[np.int32]
+    woody: NDArray[np.bool_]
 
 
 def pool_of(source: AssetSource, patches: tuple[Patches | None, ...]) -> Pool:
@@ -59,6 +64,7 @@ def pool_of(source: AssetSource, patches: tuple[Patches | None, ...]) -> Pool:
     number = np.array([0 if p is None else len(p) for p in patches])
     part, patch = spread(number[source.surface])
     centre, triangles = np.zeros((len(part), 3), np.float32), np.zeros(len(part), np.int32)
+    island, solid, share = np.zeros(len(part)), np.zeros(len(part), bool), np.zeros(len(part))
     for s, own in enumerate(patches):
         at = np.flatnonzero(source.surface[part] == s)
         if own is not None and len(at):
@@ -66,7 +72,12 @@ def pool_of(source: AssetSource, patches: tuple[Patches | None, ...]) -> Pool:
             local = own.centre[patch[at]]
             centre[at] = np.einsum("nij,nj->ni", matrix[:, :3, :3], local) + matrix[:, :3, 3]
             triangles[at] = np.diff(own.first)[patch[at]]
-    return Pool(patches, part.astype(np.int32), patch.astype(np.int32), centre, triangles)
+            solid[at] = own.solid[patch[at]]
+            island[at] = own.island[patch[at]] * np.abs(np.linalg.det(matrix[:, :3, :3])) ** (2.0 / 3.0)
+            # An island is as many patches as it is cut into.
+            share[at] = island[at] / np.maximum(np.round(own.pieces[patch[at]]), 1)
+    woody = solid & (island > _WOOD * share.sum())
+    return Pool(patches, part.astype(np.int32), patch.astype(np.int32), centre, triangles, woody)
 
 
 @dataclass(frozen=True)
@@ -84,7 +95,7 @@ class Run:
         The first triangle of a face, and of a patch.
     colour : (t, 3) float32
     transmission, coverage : (t,) float32
-    solid : (t,) bool
+    solid, woody : (t,) bool
     width : (t,) float32
         Metres.
     """
@@ -99,6 +110,7 @@ class Run:
     transmission: NDArray[np.float32]
     coverage: NDArray[np.float32]
     solid: NDArray[np.bool_]
+    woody: NDArray[np.bool_]
     width: NDArray[np.float32]
 
 
@@ -124,7 +136,7 @@ def _run(source: AssetSource, pool: Pool, some: NDArray[np.int64], cluster: NDAr
     part, face = pool.part[some][of], np.zeros(count, np.int32)
     colour, solid = np.zeros((count, 3), np.float32), np.zeros(count, bool)
     transmission, coverage, width = np.zeros((3, count), np.float32)
-    surface = source.surface[part]
+    surface, woody = source.surface[part], pool.woody[some][of]
     for s in np.unique(surface):
         at = np.flatnonzero(surface == s)
         own, shown = pool.patches[s], source.surfaces[s]
@@ -144,7 +156,9 @@ def _run(source: AssetSource, pool: Pool, some: NDArray[np.int64], cluster: NDAr
         transmission[at] = np.where(np.isnan(through), unknown, through)
         width[at] = own.width[patch] * np.cbrt(np.abs(np.linalg.det(matrix[:, :3, :3])))
     new_face = (np.diff(face, prepend=-1) != 0) | (np.diff(part, prepend=-1) != 0)
-    return Run(cluster[of], corners, part, face, new_face, index == 0, colour, transmission, coverage, solid, width)
+    return Run(
+        cluster[of], corners, part, face, new_face, index == 0, colour, transmission, coverage, solid, woody, width
+    )
 
 
 @dataclass(frozen=True)
@@ -154,12 +168,12 @@ class Measured:
     Attributes
     ----------
     low, high : (c, 3) float64
-    sums : (c, 16) float64
-        Sheets, solids, optical area; faces; patches of sheets; optical area times width, colour (3), transmission, and
-        n nᵀ (6).
+    sums : (c, 17) float64
+        Areas of sheets and solids, optical area; faces; patches that are not wood; area of solids that are not;
+        optical area times width, colour (3), transmission, and n nᵀ (6).
     samples : Samples of s
     counts : (c, 2) int64
-        Samples on sheets and on solids of each.
+        Samples on leaves and on wood of each.
     part, face : (f,) int32
         Faces of the clusters, one after the other.
     """
@@ -183,7 +197,8 @@ def measured(run: Run) -> Measured:
     shown = size * run.coverage
     optical = np.where(run.solid, 0.5, 1.0) * shown
     columns = [np.where(run.solid, 0.0, shown), np.where(run.solid, shown, 0.0), optical]
-    columns += [run.new_face, run.new_patch & ~run.solid, optical * run.width]
+    columns += [run.new_face, run.new_patch & ~run.woody, np.where(run.solid & ~run.woody, shown, 0.0)]
+    columns += [optical * run.width]
     columns += [optical * run.colour[:, k] for k in range(3)] + [optical * run.transmission]
     columns += [optical * normal[:, i] * normal[:, j] for i, j in _PAIRS]
     sums = np.stack([np.add.reduceat(column.astype(np.float64), start) for column in columns], axis=1)
@@ -201,7 +216,7 @@ def measured(run: Run) -> Measured:
 
 
 def shared_out(leaf: NDArray[np.float64], wood: NDArray[np.float64], number: int) -> NDArray[np.int64]:
-    """How many of a number of samples are on sheets and how many on solids (c, 2), by their optical areas (c,)."""
+    """How many of a number of samples are on leaves and how many on wood (c, 2), by their optical areas (c,)."""
     total = np.maximum(leaf + wood, 1e-300)
     on_leaves = np.clip(np.rint(number * leaf / total), FEWEST, number - FEWEST)
     on_leaves = np.where(leaf <= 0.0, 0, np.where(wood <= 0.0, number, on_leaves))
@@ -221,8 +236,8 @@ def well_spread(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[n
 def _samples(
     run: Run, owner: NDArray[np.int64], start: NDArray[np.intp], optical: NDArray[np.float64], normal: NDArray
 ) -> tuple[Samples, NDArray[np.int64]]:
-    """Samples of equal areas on sheets, and on solids, of the clusters of a run; sheets first, cluster by cluster."""
-    kinds = [np.where(run.solid, 0.0, optical), np.where(run.solid, optical, 0.0)]
+    """Samples of equal areas on leaves, and on wood, of the clusters of a run; leaves first, cluster by cluster."""
+    kinds = [np.where(run.woody, 0.0, optical), np.where(run.woody, optical, 0.0)]
     areas = [np.add.reduceat(kind, start) for kind in kinds]
     counts = shared_out(*areas, SAMPLES)
     made, order = [], []

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..arrays import spread
 from ..growth.hashing import mix
+from ..parallel import blocks
 from .mesh_features import classified
 from .source import AssetSurface
 
@@ -44,6 +45,10 @@ class Patches:
         Of the leaf, or the local thickness of the solid, in the unit of the positions.
     centre : (p, 3) float32
         Mean of its corners.
+    island : (p,) float32
+        Area of the island that each is or is cut from, in that unit squared.
+    pieces : (p,) int32
+        How many that island is cut into.
     """
 
     triangle: NDArray[np.int32]
@@ -52,6 +57,8 @@ class Patches:
     solid: NDArray[np.bool_]
     width: NDArray[np.float32]
     centre: NDArray[np.float32]
+    island: NDArray[np.float32]
+    pieces: NDArray[np.int32]
 
     def __len__(self) -> int:
         return len(self.faces)
@@ -80,15 +87,25 @@ def patches_of(surface: AssetSurface) -> Patches:
     first = np.append(np.flatnonzero(new), len(triangle))
     owner = np.cumsum(new) - 1
     size = np.maximum(np.diff(first), 1)
-    corners = surface.positions[surface.triangles[triangle]].mean(axis=1, dtype=np.float32)
-    centre = np.add.reduceat(corners, first[:-1], axis=0) / size[:, None]
+    centre, area = np.zeros((len(size), 3), np.float32), np.zeros(len(triangle), np.float32)
+    for run in blocks(len(triangle), AT_ONCE):
+        corners = surface.positions[surface.triangles[triangle[run]]]
+        sides = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        area[run] = 0.5 * np.linalg.norm(np.cross(*sides), axis=1)
+        for axis in range(3):
+            centre[:, axis] += np.bincount(owner[run], corners[:, :, axis].mean(axis=1), len(size))
+    centre /= size[:, None]
+    of = np.cumsum(new_island)[first[:-1]] - 1
+    whole = np.add.reduceat(area, start)[of]
     return Patches(
         triangle,
         first,
         np.bincount(owner, new_face).astype(np.int32),
         solid[first[:-1]],
         (np.add.reduceat(width, first[:-1]) / size).astype(np.float32),
-        centre.astype(np.float32),
+        centre,
+        whole.astype(np.float32),
+        np.bincount(of)[of].astype(np.int32),
     )
 
 

@@ -24,6 +24,9 @@ from ..proxies.facet_sizes import FacetPixels
 from ..refinement.decisions import Decision, contributions
 from ..refinement.loop import Refinement
 from ..refinement.settings import RefinementSettings
+from .asset_expected import AssetExpected
+from .asset_plan import Keeping
+from .asset_sight import AssetSight
 from .expected import Expected
 from .leaf_detail import TOLERANCE
 from .portions import Sight
@@ -92,6 +95,7 @@ def afford(
     settings: RefinementSettings,
     faces: float | None = None,
     primitive_bytes: float = BYTES_PER_POLYGON,
+    assets: tuple[AssetSight, Keeping] | None = None,
 ) -> Detail:
     """Detail that fits into the budget of the settings.
 
@@ -106,6 +110,8 @@ def afford(
         Faces of each proxy tetrahedron; by default proxies are facets or spheres, whose number follows their size.
     primitive_bytes : float
         Memory of one facet or sphere.
+    assets : AssetSight, Keeping, optional
+        What is seen of instances of assets, and which of them are always drawn as the originals.
     """
     detail = Detail(result, FacetPixels(settings.facet), settings.leaf_limit)
     memory = settings.max_memory * 1e9 / BYTES_PER_POLYGON or np.inf
@@ -115,7 +121,7 @@ def afford(
         if not np.isfinite(allowed):
             return detail
         return replace(detail, refinement=_fitted_shells(result, allowed, faces), tolerance=np.inf)
-    count = Expected(flora, result, camera)
+    count = Expected(flora, result, camera, AssetExpected(*assets) if assets else None)
     # A sphere is a whole polygon for the limit on polygons, but only a part of one for memory: a budget for each.
     # What other meshes have out of sight takes from what somebody allows, not from what the image shows.
     on_top = min(count.finer(settings.leaf_limit), _ON_TOP)

@@ -21,6 +21,7 @@ from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 from ..refinement.settings import RefinementSettings
 from ..subplants.wood_detail import finer
+from .asset_expected import AssetExpected
 from .facets import portion_facets, sizes_of
 from .leaf_detail import TOLERANCE, LeafDetail
 from .plants import Block, Transition, portion_blocks
@@ -45,7 +46,8 @@ _TELLING, _CHOSEN = 40_000, 225
 class Expected:
     """Expected polygons and facets of a refinement."""
 
-    def __init__(self, flora: Flora, result: Refinement, camera: Camera) -> None:
+    def __init__(self, flora: Flora, result: Refinement, camera: Camera, assets: AssetExpected | None = None) -> None:
+        self.assets = assets
         self.sight = Sight(flora, result, camera)
         self.every = portions = self.sight.portions()
         # Of polygons, and of facets that are seen or not, what was found over what was expected.
@@ -95,7 +97,7 @@ class Expected:
         return float((self.times * real * self.portions.within * self.faces_finer).sum())
 
     def seen(self, pixels: float, limit: float, weight: float, safe: bool = False) -> float:
-        """Polygons, and facets counted with a weight, of all plants that are seen.
+        """Polygons, and facets counted with a weight, of all plants and assets that are seen.
 
         safe: never fewer than were expected before `calibrate`; some plants do not tell exactly about all.
         """
@@ -107,12 +109,15 @@ class Expected:
         bare = _bare(self.flora, self.portions, self.camera, limit) if self.any_bare else 0.0
         faces = found[0] * (self.faces_coarse + self.faces_finer + bare)
         tubes = found[0] * _tubes(self.flora, self.portions, transition, real)
-        return float((self.times * (self.portions.within * (real * faces + (1.0 - real) * facets) + tubes)).sum())
+        of_assets = self.assets.seen(pixels, limit, weight) if self.assets else 0.0
+        of_plants = self.times * (self.portions.within * (real * faces + (1.0 - real) * facets) + tubes)
+        return float(of_plants.sum()) + of_assets
 
     def unseen(self, pixels: FacetPixels, safe: bool = False) -> float:
-        """Facets of all plants that are not seen; safe as for `seen`."""
+        """Facets of all plants and assets that are not seen; safe as for `seen`."""
         sizes, times = self.unseen_sizes
-        return float(max(self.found[2], float(safe))) * float(times @ sizes.counts(pixels))
+        of_assets = self.assets.unseen(pixels) if self.assets else 0.0
+        return float(max(self.found[2], float(safe))) * float(times @ sizes.counts(pixels)) + of_assets
 
     def together(self, settings: RefinementSettings) -> float:
         """Expected polygons and facets of all, seen or not, at the details of the settings."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,8 @@ from ..refinement.contents import bounding_cylinders, piece_totals
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 from ..subplants.pieces import whole_pieces
+from .asset_plan import AssetPlan, planned_facets
+from .asset_sight import AssetSight
 from .plants import Transition
 from .polygons import polygon_facets
 from .portions import MIXED, Portions, Sight, in_chunks
@@ -67,6 +70,7 @@ def facet_parts(
     transition: Transition | None = None,
     form: Form | None = None,
     sight: Sight | None = None,
+    assets: tuple[AssetSight, AssetPlan] | None = None,
 ) -> Iterator[Parts]:
     """Facets of all that is not drawn as it is; no block is empty.
 
@@ -87,11 +91,16 @@ def facet_parts(
         What becomes of facets where they are made; without, they stay what they are.
     sight : Sight, optional
         Of the result, where there is one.
+    assets : AssetSight, AssetPlan, optional
+        What instances of assets are drawn as.
     """
     sight = sight or Sight(flora, result, camera)
     parts: list[Part] = []
     current = None
-    for species, *made in _facets(sight, result, pixels, transition, form):
+    every = _facets(sight, result, pixels, transition, form)
+    if assets is not None:
+        every = chain(every, ((None, *made) for made in planned_facets(*assets, pixels, form)))
+    for species, *made in every:
         full = sum(len(facets) for facets, _ in parts) >= BLOCK_POLYGONS
         if parts and (full or species != current):
             yield Parts(current, tuple(parts))

@@ -29,6 +29,8 @@ from ..proxies.drawn import (
 from ..proxies.facet_sizes import FacetPixels
 from ..proxies.microsurfaces import Facets
 from ..refinement.loop import Refinement
+from .asset_plan import AssetPlan
+from .asset_sight import AssetSight
 from .budget import BYTES_PER_POLYGON, BYTES_PER_SPHERE
 from .facets import Form, Parts, facet_parts
 from .leaf_detail import TOLERANCE
@@ -59,6 +61,8 @@ class Refined:
         Pixels by which the margins of near leaves may be off.
     sight : Sight or None
         What is seen of plants, where that is known already; None in forms without facets.
+    assets : AssetSight, AssetPlan or None
+        What instances of assets are drawn as; None where there are none.
     """
 
     flora: Flora
@@ -69,6 +73,7 @@ class Refined:
     disc: float = np.pi
     tolerance: float = TOLERANCE
     sight: Sight | None = None
+    assets: tuple[AssetSight, AssetPlan] | None = None
 
     @property
     def facet_pixels(self) -> float | None:
@@ -78,7 +83,7 @@ class Refined:
     def facet_parts(self, form: Form | None = None) -> Iterator[Parts]:
         """Facets of the proxies, or what a form makes of them, block by block."""
         given = self.flora, self.refinement, self.camera, self.pixels, self.transition, form
-        return facet_parts(*given, sight=self.sight)
+        return facet_parts(*given, sight=self.sight, assets=self.assets)
 
 
 @dataclass(frozen=True)

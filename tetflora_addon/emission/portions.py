@@ -20,26 +20,21 @@ from numpy.typing import NDArray
 from ..arrays import Arrays, column, nested
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
-from ..proxies.facet_sizes import coarseness
 from ..proxies.thrown_shadows import ThrownShadows
 from ..refinement.contents import PlantParts, feature_width
-from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 from ..refinement.shared_parts import SharePoints, lowered
 from ..refinement.shares import opened, share_points
+from .seen import CLOSE, SeenNodes
 
 #: Pixels from which on a part that is seen only here and there is opened.
 MIXED = 24.0
-#: Pixels from which on leaves are real although they are hidden, at a limit of a pixel.
-CLOSE = 16.0
 #: Pixels from which on wood is looked for where no point of it is seen, and the fraction of it that is expected to be.
 CLOSE_WOOD, _OF_WOOD = 4.0, 0.05
 #: How far from its middle a part reaches, over its extent.
 _REACH = 0.6
 #: Points on the leaves of such a part, at most, that tell where it is seen.
 POINTS = 12
-#: Fraction of its area from which on a part counts as seen here and there.
-SOME = 0.01
 
 
 @dataclass(frozen=True)
@@ -92,22 +87,7 @@ class Sight:
 
     def __init__(self, flora: Flora, result: Refinement, camera: Camera, facets: bool = True) -> None:
         self.flora, self.camera, self.tree, self.plants = flora, camera, result.tree, result.plants
-        nodes, explicit = result.nodes, result.decision == Decision.EXPLICIT
-        seen = np.isin(result.decision, (Decision.EXPLICIT, Decision.PROXY)) if facets else explicit
-        size = len(result.tree)
-        self._visibility, self._rank = np.zeros(size), np.zeros(size, np.int32)
-        # What is explicit although it is hidden is so for its shadow; without facets all that is explicit is drawn.
-        shown = np.where(explicit & ((result.transmittance <= 0.0) | (not facets)), 1.0, result.transmittance)
-        self._visibility[nodes] = np.where(seen, np.maximum(shown, 1e-3), 0.0)
-        self._rank[nodes] = result.rank
-        self._explicit = result.chosen(Decision.EXPLICIT)
-        self._inside = result.in_view | self._explicit
-        self._coarse = coarseness(result)
-        # Hidden, within the view, and near enough at least in places.
-        self._close, self._facets = np.zeros(size, bool), facets
-        if facets:
-            self._close[nodes] = (result.decision == Decision.HIDDEN) & (result.cells.feature >= CLOSE)
-            self._close &= result.in_view
+        self.nodes, self._facets = SeenNodes(result, facets), facets
         lowest = result.plants.parts.branches.position[:, 2].min(initial=np.inf)
         self.shadows = ThrownShadows(camera, result.lights, float(lowest))
         self._every: Portions | None = None
@@ -129,36 +109,10 @@ class Sight:
         return made.take(np.lexsort([*branches.position.T, branches.key, made.rank]))
 
     def _portions(self, parts: PlantParts, points: SharePoints) -> Portions:
-        count, cell = len(parts), points.cell
-        area = points.optical_area.astype(np.float64)
-        total = np.bincount(points.part, area, count)
-        total = np.where(total > 0, total, 1.0)
-
-        def mean(values: NDArray) -> NDArray[np.float64]:
-            return np.bincount(points.part, area * values, count) / total
-
-        visibility, explicit = self._visibility[cell], self._explicit[cell]
-        close = self._close_points(parts, points)
-        visibility[close], explicit[close] = CLOSE**-2.0, True
-        seen = mean(visibility > 0)
-        unseen = np.maximum(1.0 - seen, 1e-12)
-        first = np.full(count, -1, np.int64)
-        first[points.part[::-1]] = np.arange(len(points))[::-1]
-        best = np.zeros(count)
-        np.maximum.at(best, points.part, visibility)
-        made = Portions(
-            parts,
-            np.where(seen > SOME, mean(visibility), 0.0),
-            np.where(seen > SOME, best, 0.0),
-            mean(explicit) > 0,
-            (seen > SOME) & (seen < 1.0 - SOME),
-            mean(self._inside[cell]) <= 0.0,
-            np.where(seen < 1.0, mean(self._coarse[cell] * (visibility <= 0)) / unseen, 1.0),
-            np.where(first >= 0, self._rank[cell[first]], 0).astype(np.int32),
-            np.ones(count),
-        )
+        seen = self.nodes.of(points, len(parts), self._close_points(parts, points))
+        made = Portions(parts, *vars(seen).values(), np.ones(len(parts)))
         if self._facets:
-            self._let_in(made, np.bincount(points.part, minlength=count))
+            self._let_in(made, np.bincount(points.part, minlength=len(parts)))
         return made
 
     def _close_points(self, parts: PlantParts, points: SharePoints) -> NDArray[np.intp]:
@@ -168,7 +122,7 @@ class Sight:
         a sphere as large as a leaf is known for what it is. Leaves take their place, as if just enough of their light
         arrived that those of `CLOSE` pixels count as wide as a limit of one.
         """
-        at = np.flatnonzero(self._close[points.cell])
+        at = np.flatnonzero(self.nodes.close[points.cell])
         width = feature_width(self.flora, parts.branches.take(points.part[at]))
         return at[width >= CLOSE * self.camera.extent_around(points.position[at].astype(np.float64))]
 

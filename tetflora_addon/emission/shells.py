@@ -208,7 +208,8 @@ def proxy_shells(flora: Flora, result: Refinement, light: BakedLight | None = No
     fine = np.isfinite(contents.polygons.totals.width)
     if not fine.all():
         contents = replace(contents, polygons=contents.polygons.take(fine))
-    summaries = summarise(flora, contents, index, len(nodes))
+    assets = result.assets.placed, result.assets.held(len(result.tree))
+    summaries = summarise(flora, contents, index, len(nodes), assets)
     vertices = result.tree.vertices(nodes)
     matrices, normal, plane = extinction_matrices(summaries, volume(vertices))
     vertices, matrices = set_apart(vertices, matrices)

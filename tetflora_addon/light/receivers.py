@@ -73,7 +73,8 @@ class Clouds(Arrays):
         fine = np.isfinite(contents.polygons.totals.width)
         if not fine.all():
             contents = replace(contents, polygons=contents.polygons.take(fine))
-        summaries = summarise(flora, contents, cell_of_node(refinement), len(nodes))
+        assets = refinement.assets.placed, refinement.assets.held(len(refinement.tree))
+        summaries = summarise(flora, contents, cell_of_node(refinement), len(nodes), assets)
         vertices = refinement.tree.vertices(nodes)
         matrices, normal, plane = extinction_matrices(summaries, volume(vertices))
         colour = summaries.colour

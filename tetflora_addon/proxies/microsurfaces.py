@@ -154,7 +154,7 @@ def kept_out_of_view(
     return replace(facets, centre=centre, side=facets.side * fraction)
 
 
-def _trapped(colour: NDArray[np.float64], weight: NDArray[np.float64]) -> NDArray[np.float64]:
+def trapped(colour: NDArray[np.float64], weight: NDArray[np.float64]) -> NDArray[np.float64]:
     """Colour (n, 3) of clusters of surfaces that are seen by a fraction ``weight`` (n,) of their area.
 
     What one surface scatters meets another of its cluster with the probability p = 1 − weight, and is dimmed again:
@@ -165,7 +165,7 @@ def _trapped(colour: NDArray[np.float64], weight: NDArray[np.float64]) -> NDArra
     return colour * (1.0 - p) / (1.0 - p * colour)
 
 
-def _numbers(
+def facet_numbers(
     key: NDArray, area: NDArray, facet: NDArray, path: int, draw: int, real: NDArray | None = None
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """Owner, index, key and area of the facets that areas (n,) are cut into; their expected number is area / facet.
@@ -232,7 +232,7 @@ def _leaves_of_subplants(
     rows, points = flora.rows, flora.samples.leaves
     one = flora.one_leaf_area(subplants)
     facet = np.maximum(side**2, one)
-    owner, index, key, area = _numbers(subplants.key, totals.leaf_area, facet, _FACET_PATH, _LEAF_COUNT, real)
+    owner, index, key, area = facet_numbers(subplants.key, totals.leaf_area, facet, _FACET_PATH, _LEAF_COUNT, real)
     pick, place, base = _picked(flora, points, subplants, owner, index, key)
     leaf_row = points.row[pick]
     frame = products(base, gathered(points.frame, pick).astype(np.float64))
@@ -247,7 +247,7 @@ def _leaves_of_subplants(
         frame[:, :, 0],
         frame[:, :, 1],
         np.sqrt(area * weight[owner]),
-        _trapped(colour, weight[owner]),
+        trapped(colour, weight[owner]),
         flora.leaf.transmission[leaf_row],
         _carried(flora, subplants, owner, centre),
     )
@@ -271,7 +271,7 @@ def _leaves_of_pieces(
     centre = leaves.position + 0.5 * leaves.size[:, None] * frame[:, :, 1]
     places = outwardness(rows, branches, owner, t), youth(rows, row[owner], t)
     colour = _facet_colours(flora, row[owner], key, area / one.clip(1e-300)[owner], *places)
-    colour = _trapped(colour, weight[owner])
+    colour = trapped(colour, weight[owner])
     transmission = flora.leaf.transmission[row[owner]]
     velocity = None
     if own.later is not None:
@@ -285,7 +285,7 @@ def _wood_of_subplants(
 ) -> Facets:
     points = flora.samples.wood
     wood = totals.wood_area / 2
-    owner, index, key, area = _numbers(subplants.key, wood, side**2, _WOOD_PATH, _WOOD_COUNT, real)
+    owner, index, key, area = facet_numbers(subplants.key, wood, side**2, _WOOD_PATH, _WOOD_COUNT, real)
     pick, centre, base = _picked(flora, points, subplants, owner, index, key)
     axis = np.einsum("nij,nj->ni", base, points.frame[pick, :, 2].astype(np.float64))
     colour = flora.rows["branch_colour"][points.row[pick], 0]
@@ -334,7 +334,7 @@ def _along(
     draw: int,
     real: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
-    """Owner, index, key, area and place along the branch of the facets of pieces, see `_numbers`.
+    """Owner, index, key, area and place along the branch of the facets of pieces, see `facet_numbers`.
 
     They are those of whole segments of branches, of which a piece has what lies on it: they do not depend on where a
     branch is cut. What they stand for begins at fractions ``start`` (n,) of the branches. Along a segment they follow
@@ -347,7 +347,7 @@ def _along(
     length = np.maximum(pieces.t1 - first, 0.0)
     part = np.where(length > 0, np.maximum(high - low, length) / np.maximum(length, 1e-12), 0.0)
     numbered = mix(pieces.branches.key ^ (number.astype(np.uint64) + np.uint64(path)))
-    owner, index, key, one = _numbers(numbered, area * part, facet, path, draw, real)
+    owner, index, key, one = facet_numbers(numbered, area * part, facet, path, draw, real)
     t = low[owner] + (high - low)[owner] * ((uniform(numbered, _PLACE)[owner] + index * _GOLDEN) % 1.0)
     on = np.flatnonzero((t >= first[owner]) & (t < pieces.t1[owner]))
     return owner[on], index[on], key[on], one[on], t[on]

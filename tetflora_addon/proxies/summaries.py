@@ -13,7 +13,8 @@ from ..arrays import unit
 from ..compiled.clumping import factors
 from ..compiled.flora import Flora
 from ..compiled.orientation import leaf_moments, own_leaf_moments, wood_moments
-from ..refinement.contents import Contents
+from ..refinement.asset_parts import AssetParts, PlacedAssets
+from ..refinement.contents import Contents, Held
 from ..refinement.polygons import MEASURED_AT_ONCE
 from ..subplants.pieces import Pieces, chunks, outward_ends, piece_leaf_colours
 
@@ -54,7 +55,13 @@ class Summaries:
         return self.optical_area * factors(self.clumping, volumes)
 
 
-def summarise(flora: Flora, contents: Contents, index: NDArray[np.integer], count: int) -> Summaries:
+def summarise(
+    flora: Flora,
+    contents: Contents,
+    index: NDArray[np.integer],
+    count: int,
+    assets: tuple[PlacedAssets, Held[AssetParts]] | None = None,
+) -> Summaries:
     """Sum up contents by tetrahedron.
 
     Parameters
@@ -65,6 +72,8 @@ def summarise(flora: Flora, contents: Contents, index: NDArray[np.integer], coun
         Number of the summary that each node of the tree contributes to; contents of nodes with −1 are skipped.
     count : int
         Number of summaries.
+    assets : PlacedAssets, Held of AssetParts, optional
+        Clusters of instances, from `SharedAssets.held`.
     """
     sums = np.zeros((count, 16))  # area, then times area: colour, transmission, moment, clumping
     for held in (contents.subplants, contents.pieces):
@@ -96,6 +105,8 @@ def summarise(flora: Flora, contents: Contents, index: NDArray[np.integer], coun
         values = [area, colour, (leaf * transmission)[:, None], moment.reshape(-1, 9), area * clumped]
         _add(sums, index[held.cell], np.concatenate(values, axis=1))
     _add_polygons(sums, contents, index)
+    if assets is not None:
+        _add_assets(sums, *assets, index)
     area = sums[:, 0]
     mean = sums / np.where(area > 0, area, 1)[:, None]
     return Summaries(area, mean[:, 1:4], mean[:, 4], _moments(mean[:, 5:14].reshape(-1, 3, 3)), mean[:, 14:])
@@ -126,6 +137,23 @@ def _add_polygons(sums: NDArray[np.float64], contents: Contents, index: NDArray[
             [np.ones_like(optical), meshes.colours[slot], meshes.transmission[slot][:, None], moment, even], axis=1
         )
         _add(sums, index[contents.polygons.cell[some]][owner], optical * seen)
+
+
+def _add_assets(
+    sums: NDArray[np.float64], placed: PlacedAssets, held: Held[AssetParts], index: NDArray[np.integer]
+) -> None:
+    held = held.take(np.flatnonzero(index[held.cell] >= 0))
+    clusters, cluster, area = placed.assets.clusters, held.items.cluster, held.totals.optical_area[:, None]
+    local, full = clusters.moment[cluster], np.empty((len(cluster), 3, 3))
+    for k, (i, j) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))):
+        full[:, i, j] = full[:, j, i] = local[:, k]
+    turn = placed.cofactors(held.items.instance)
+    moment = turn @ full @ turn.transpose(0, 2, 1)
+    moment /= np.maximum(np.trace(moment, axis1=1, axis2=2), 1e-300)[:, None, None]
+    even = np.broadcast_to([1.0, 0.0], (len(cluster), 2))
+    look = clusters.colour[cluster], clusters.transmission[cluster][:, None]
+    seen = np.concatenate([np.ones_like(area), *look, moment.reshape(-1, 9), even], axis=1)
+    _add(sums, index[held.cell], area * seen)
 
 
 def _moments(sums: NDArray[np.float64]) -> NDArray[np.float64]:

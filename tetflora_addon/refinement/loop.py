@@ -19,12 +19,14 @@ from ..compiled.flora import Flora
 from ..growth.seeds import Seeds
 from ..tetrahedra.geometry import squared_edges
 from ..tetrahedra.tree import TetrahedralTree
+from .asset_parts import PlacedAssets, SharedAssets
 from .contents import Contents, Held, Holdings, Totals, bounding_box, in_the_root, large_polygons, sums
 from .decisions import Decision, Terminals, decide, gains_nothing, without_splits
 from .descent import Slack, push_down
 from .lights import Light, decide_by_shadows, seen_ground, shadows_of
 from .polygons import Polygons
 from .settings import RefinementSettings
+from .shared_parts import SharedParts
 from .shares import SharedPlants
 from .statistics import Step, Stopwatch
 from .strays import Strays, strays_of
@@ -53,6 +55,8 @@ class Refinement:
     tree : TetrahedralTree
     plants : SharedPlants
         All plants, shared among terminal nodes.
+    assets : SharedAssets
+        All instances of assets, likewise.
     holdings : Holdings
         All polygons, in terminal nodes.
     cells : Terminals of t
@@ -77,6 +81,7 @@ class Refinement:
 
     tree: TetrahedralTree
     plants: SharedPlants
+    assets: SharedAssets
     holdings: Holdings
     cells: Terminals
     transmittance: NDArray[np.float64]
@@ -129,6 +134,7 @@ def refine(
     occluders: NDArray[np.float64] | None = None,
     polygons: Polygons | None = None,
     lights: Sequence[Light] = (),
+    placed: PlacedAssets | None = None,
 ) -> Generator[Refinement, bool | None, Refinement]:
     """Run the loop; yields the state after the decisions of each pass and returns the last.
 
@@ -139,7 +145,7 @@ def refine(
     flora : Flora
         Compiled species, in the order of ``seeds.identifiers``.
     seeds : Seeds
-        At least one plant, or none where there are polygons.
+        At least one plant, or none where there are polygons or assets.
     camera : Camera
     settings : RefinementSettings
     occluders : (t, 3, 3) float64, optional
@@ -149,25 +155,31 @@ def refine(
     lights : sequence of Light
         Facets of what throws shadows into the view are finer; the tetrahedra of what is hidden are refined for their
         shadows as well if ``settings.shadow_cutoff`` is above 0.
+    placed : PlacedAssets, optional
+        Instances of assets.
     """
     clock = Stopwatch()
-    strays = strays_of(flora, seeds, camera, polygons)
-    seeds, polygons = strays.others(seeds, polygons)
-    plants = SharedPlants(flora, seeds, camera, filled=bool(np.isfinite(settings.proxy_block)))
-    camera = widened_for(camera, settings.margin, flora, plants.parts.branches, polygons)
+    placed = PlacedAssets.none() if placed is None else placed
+    strays = strays_of(flora, seeds, camera, polygons, placed)
+    seeds, polygons, placed = strays.others(seeds, polygons, placed)
+    filled = bool(np.isfinite(settings.proxy_block))
+    plants, assets = SharedPlants(flora, seeds, camera, filled), SharedAssets(placed, camera, filled)
+    camera = widened_for(camera, settings.margin, flora, plants.parts.branches, polygons, assets.parts)
     slack = _slack(camera, settings.visibility_resolution)
     own = Held.none(Polygons) if polygons is None else in_the_root(polygons, large_polygons(polygons, camera))
-    tree = root_for(camera, settings, _bounds(flora, plants, polygons))
+    tree = root_for(camera, settings, _bounds(flora, plants, assets, polygons))
     holdings, most = Holdings(push_down(tree, own, slack)), MOST_FRAGMENTS + 2 * len(own)
     divided = np.arange(len(tree)) == 0
-    plants.update(tree, divided, np.where(divided, np.inf, 0.0))
+    shared = plants, assets
+    for kind in shared:
+        kind.update(tree, divided, np.where(divided, np.inf, 0.0))
     clock.lap("update")
     shadowed = bool(lights) and settings.shadow_cutoff > 0.0
-    ground = seen_ground(camera, occluders, _height(seeds, polygons)) if shadowed else None
+    ground = seen_ground(camera, occluders, _height(seeds, polygons, placed)) if shadowed else None
     buffers = buffers_for(camera, settings.visibility_resolution, occluders)
     # Generations count from the root's own pieces. Passes do not count: a late one may divide what is still coarse.
     deepest = tree.levels - 1 + settings.max_levels
-    cells, buffer = _drawn(tree, buffers, None, None, *_filled(tree, plants, holdings, np.ones(len(tree), bool)))
+    cells, buffer = _drawn(tree, buffers, None, None, *_filled(tree, shared, holdings, np.ones(len(tree), bool)))
     clock.lap("visibility")
     passes = 0
     while True:
@@ -197,7 +209,7 @@ def refine(
         clock.lap("refinement")
         ranks, seconds = rank[cells.nodes], dict(clock.seconds)
         found = cells, transmittance, decision, ranks, passes, not limited, seconds, strays, lights
-        state = Refinement(tree, plants, holdings, *found)
+        state = Refinement(tree, plants, assets, holdings, *found)
         if not splitting.any():
             return state
         if (yield state):
@@ -213,33 +225,35 @@ def refine(
         loose = slack if len(holdings) <= most else _no_cuts
         new = push_down(tree, holdings.take_out(dividing), loose)
         holdings.put(new)
-        changed = plants.update(tree, dividing, edge)
+        changed = plants.update(tree, dividing, edge) | assets.update(tree, dividing, edge)
         changed[new.cell] = True
         clock.lap("update")
         buffer.remove(changed)
         kept = cells.take(np.flatnonzero(~changed[cells.nodes]))
-        cells, buffer = _drawn(tree, buffers, buffer, kept, *_filled(tree, plants, holdings, changed))
+        cells, buffer = _drawn(tree, buffers, buffer, kept, *_filled(tree, shared, holdings, changed))
         clock.lap("visibility")
 
 
-def _height(seeds: Seeds, polygons: Polygons | None) -> float:
+def _height(seeds: Seeds, polygons: Polygons | None, placed: PlacedAssets) -> float:
     """Median height of what there is, metres."""
-    heights = [seeds.position[:, 2], *([] if polygons is None else [polygons.centre[:, 2]])]
+    heights = [seeds.position[:, 2], placed.instances.position[:, 2]]
+    heights += [] if polygons is None else [polygons.centre[:, 2]]
     return float(np.median(np.concatenate(heights)))
 
 
-def _bounds(flora: Flora, plants: SharedPlants, polygons: Polygons | None) -> NDArray[np.float64]:
+def _bounds(flora: Flora, plants: SharedPlants, assets: SharedAssets, polygons: Polygons | None) -> NDArray[np.float64]:
     """Axis-aligned box (2, 3) of all that is there, metres."""
     boxes = [bounding_box(flora, plants.parts.branches)] if len(plants.parts) else []
+    boxes += [assets.parts.bounding_box()] if len(assets.parts) else []
     boxes += [] if polygons is None else [polygons.bounding_box()]
     return np.stack([np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)])
 
 
 def _filled(
-    tree: TetrahedralTree, plants: SharedPlants, holdings: Holdings, changed: NDArray[np.bool_]
+    tree: TetrahedralTree, shared: Sequence[SharedParts], holdings: Holdings, changed: NDArray[np.bool_]
 ) -> tuple[NDArray[np.intp], Totals]:
     """Nodes (n,) whose contents have changed and that hold something, and their totals."""
-    found = [plants.totals(changed), *holdings.totals(changed)]
+    found = [*(kind.totals(changed) for kind in shared), *holdings.totals(changed)]
     every = sums(Totals.concatenate([t for t, _ in found]), np.concatenate([c for _, c in found]), len(tree))
     nodes = np.flatnonzero(every.area > 0)
     return nodes, every.take(nodes)
@@ -319,8 +333,8 @@ def step_of(state: Refinement) -> Step:
         explicit=int(numbers[Decision.EXPLICIT]),
         subplants=subplants,
         pieces=bodies,
-        foreign=len(state.holdings),
+        foreign=len(state.holdings) + state.assets.numbers[0],
         polygons=round(float(state.totals.polygons[explicit].sum())),
         seconds=sum(state.seconds.values()),
-        memory_mb=(state.tree.nbytes + state.plants.nbytes + state.holdings.nbytes) / 1e6,
+        memory_mb=(state.tree.nbytes + state.plants.nbytes + state.assets.nbytes + state.holdings.nbytes) / 1e6,
     )

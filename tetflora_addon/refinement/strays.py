@@ -17,6 +17,7 @@ from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.growth import trunks
 from ..growth.seeds import Seeds
+from .asset_parts import PlacedAssets
 from .contents import PlantParts
 from .polygons import Polygons
 
@@ -35,42 +36,60 @@ class Strays:
 
     Attributes
     ----------
-    plants, instances : (k,) and (m,) int64
-        Rows of the seeds, and instances of other meshes.
-    away : (k + m,) float64
+    plants, assets, instances : (k,), (l,) and (m,) int64
+        Rows of the seeds, of instances of assets, and instances of other meshes.
+    away : (k + l + m,) float64
         How far they are from the camera, metres.
     """
 
     plants: NDArray[np.int64] = field(default_factory=lambda: _NONE)
+    assets: NDArray[np.int64] = field(default_factory=lambda: _NONE)
     instances: NDArray[np.int64] = field(default_factory=lambda: _NONE)
     away: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
-    def others(self, seeds: Seeds, polygons: Polygons | None) -> tuple[Seeds, Polygons | None]:
-        """What is left of plants and polygons; None where no polygon is."""
+    def others(
+        self, seeds: Seeds, polygons: Polygons | None, placed: PlacedAssets
+    ) -> tuple[Seeds, Polygons | None, PlacedAssets]:
+        """What is left of plants, polygons and instances of assets; None where no polygon is."""
         if len(self.plants):
             kept = np.ones(len(seeds), bool)
             kept[self.plants] = False
             seeds = seeds.take(kept)
         if len(self.instances):
             polygons = polygons.take(np.flatnonzero(~np.isin(polygons.instance, self.instances)))
-        return seeds, polygons if polygons is not None and len(polygons) else None
+        if len(self.assets):
+            kept = np.ones(len(placed), bool)
+            kept[self.assets] = False
+            placed = placed.take(kept)
+        return seeds, polygons if polygons is not None and len(polygons) else None, placed
 
 
-def strays_of(flora: Flora, seeds: Seeds, camera: Camera, polygons: Polygons | None = None) -> Strays:
-    """Strays among plants and instances of other meshes; nothing depends on their order."""
+def strays_of(
+    flora: Flora,
+    seeds: Seeds,
+    camera: Camera,
+    polygons: Polygons | None = None,
+    placed: PlacedAssets | None = None,
+) -> Strays:
+    """Strays among plants, assets and instances of other meshes; nothing depends on their order."""
     centre, reach = seeds.position, np.zeros(len(seeds))
+    plants_end = assets_end = len(seeds)
+    if placed is not None and len(placed):
+        own = placed.wholes()
+        centre, reach = np.concatenate([centre, own.centre]), np.append(reach, own.reach)
+        assets_end += len(placed)
     if polygons is not None and len(polygons):
         others = _around_instances(polygons)
         centre, reach = np.concatenate([centre, others[0]]), np.append(reach, others[1])
     away = np.linalg.norm(centre - camera.eye, axis=1)
     some = far_off(away - reach)
-    plants = some[some < len(seeds)]
+    plants = some[some < plants_end]
     if len(plants):
         reach[plants] = PlantParts.of_subplants(flora, trunks(flora.rows, seeds.take(plants))).extent
     for eye in (camera, *camera.shutter):
         some = some[_unseen(eye, centre[some], reach[some], away[some])]
-    own = some < len(seeds)
-    return Strays(some[own], some[~own] - len(seeds), np.concatenate([away[some[own]], away[some[~own]]]))
+    own, last = some < plants_end, some >= assets_end
+    return Strays(some[own], some[~own & ~last] - plants_end, some[last] - assets_end, away[some])
 
 
 def far_off(away: NDArray[np.float64]) -> NDArray[np.int64]:

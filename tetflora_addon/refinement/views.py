@@ -18,6 +18,7 @@ from ..compiled.flora import Flora
 from ..growth.branches import Branches
 from ..tetrahedra.roots import view_root, world_root
 from ..tetrahedra.tree import TetrahedralTree
+from .asset_parts import AssetParts
 from .contents import bounding_cylinders
 from .polygons import Polygons
 from .rasterise import buffer_size, occluder_depth, pixel_rays
@@ -153,7 +154,12 @@ def _may_be_in(vertices: NDArray[np.float64], camera: Camera) -> NDArray[np.bool
 
 
 def widened_for(
-    camera: Camera, margin: float, flora: Flora, subplants: Branches, polygons: Polygons | None = None
+    camera: Camera,
+    margin: float,
+    flora: Flora,
+    subplants: Branches,
+    polygons: Polygons | None = None,
+    assets: AssetParts | None = None,
 ) -> Camera:
     """The camera with a margin, in fractions of the image, and what depth of field and motion blur add to it.
 
@@ -165,6 +171,8 @@ def widened_for(
     reach = np.hypot(radius, half_height)
     if polygons is not None:
         centre, reach = np.concatenate([centre, polygons.centre]), np.append(reach, np.zeros(len(polygons)))
+    if assets is not None:
+        centre, reach = np.concatenate([centre, assets.centre]), np.append(reach, assets.reach)
     across, up = blur_margins(camera, centre, reach)
     return camera.widened(margin + across, margin + up)
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 
 from tests.engine.refinement.test_polygons import SEEDS, surface, thicket
-from tetflora_addon.growth.hashing import mix
 from tetflora_addon.assets.mesh_features import mesh_features
+from tetflora_addon.growth.hashing import mix
 
 
 def tube(radius: float, length: float, sides: int = 8, rings: int = 20) -> tuple[np.ndarray, list[list[int]]]:

@@ -12,7 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.engine.emission.test_emission import scene, with_decision
-from tetflora_addon.emission.portions import CLOSE_WOOD, MIXED, SOME, Portions, Sight, in_chunks
+from tetflora_addon.emission.portions import CLOSE_WOOD, MIXED, Portions, Sight, in_chunks
+from tetflora_addon.emission.seen import SOME
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.loop import Refinement
 

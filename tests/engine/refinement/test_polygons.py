@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tests.engine.subplants.test_leaf_meshes import check_topology
+from tetflora_addon.assets.mesh_features import mesh_features
 from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.emission import budget
 from tetflora_addon.emission.budget import afford
@@ -26,7 +27,6 @@ from tetflora_addon.refinement.contents import sums as sums_by_node
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.descent import cut, push_down
 from tetflora_addon.refinement.loop import Refinement, refine
-from tetflora_addon.assets.mesh_features import mesh_features
 from tetflora_addon.refinement.polygons import Meshes, Polygons, Surface, area_fractions
 from tetflora_addon.refinement.settings import RefinementSettings
 from tetflora_addon.refinement.views import widened_for

@@ -12,6 +12,7 @@ import pytest
 from tests.engine import support
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.growth.seeds import Seeds
+from tetflora_addon.refinement.asset_parts import PlacedAssets
 from tetflora_addon.refinement.strays import FRACTION, MOST, NEAR, far_off, strays_of
 
 
@@ -35,7 +36,7 @@ def test_one_plant_far_beyond_all_others_is_a_stray(far: tuple) -> None:
     strays = strays_of(support.small_flora(), _plants(NEARBY[0], far, *NEARBY[1:]), _camera())
     assert strays.plants.tolist() == [1]
     assert strays.away == pytest.approx(np.linalg.norm(far))
-    seeds, polygons = strays.others(_plants(NEARBY[0], far, *NEARBY[1:]), None)
+    seeds, polygons, _ = strays.others(_plants(NEARBY[0], far, *NEARBY[1:]), None, PlacedAssets.none())
     assert np.array_equal(seeds.position, NEARBY)
     assert polygons is None
 

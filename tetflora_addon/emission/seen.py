@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the loop has found for all nodes of the tree, and what that means for parts by the points on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Arrays, column
+from ..proxies.facet_sizes import coarseness
+from ..refinement.decisions import Decision
+from ..refinement.loop import Refinement
+from ..refinement.shared_parts import SharePoints
+
+#: Pixels from which on leaves are real although they are hidden, at a limit of a pixel.
+CLOSE = 16.0
+#: Fraction of its area from which on a part counts as seen here and there.
+SOME = 0.01
+
+
+@dataclass(frozen=True)
+class Seen(Arrays):
+    """What is seen of parts (n); `portions.Portions` says what the columns are."""
+
+    visibility: NDArray[np.float64]
+    best: NDArray[np.float64]
+    real: NDArray[np.bool_] = field(metadata=column(dtype=bool))
+    mixed: NDArray[np.bool_] = field(metadata=column(dtype=bool))
+    beside: NDArray[np.bool_] = field(metadata=column(dtype=bool))
+    coarse: NDArray[np.float64]
+    rank: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
+
+
+class SeenNodes:
+    """What is seen of all nodes.
+
+    Parameters
+    ----------
+    result : Refinement
+    facets : bool
+        Whether proxies are facets or spheres. If not, only what is explicit counts as seen: the rest are shells.
+
+    Attributes
+    ----------
+    visibility, coarse : (nodes,) float64
+    explicit, inside, close : (nodes,) bool
+        Decided to be explicit; within the view; hidden within it, and near enough at least in places.
+    rank : (nodes,) int32
+        Front-to-back order.
+    """
+
+    def __init__(self, result: Refinement, facets: bool) -> None:
+        nodes, explicit = result.nodes, result.decision == Decision.EXPLICIT
+        seen = np.isin(result.decision, (Decision.EXPLICIT, Decision.PROXY)) if facets else explicit
+        size = len(result.tree)
+        self.visibility, self.rank = np.zeros(size), np.zeros(size, np.int32)
+        # What is explicit although it is hidden is so for its shadow; without facets all that is explicit is drawn.
+        shown = np.where(explicit & ((result.transmittance <= 0.0) | (not facets)), 1.0, result.transmittance)
+        self.visibility[nodes] = np.where(seen, np.maximum(shown, 1e-3), 0.0)
+        self.rank[nodes] = result.rank
+        self.explicit = result.chosen(Decision.EXPLICIT)
+        self.inside = result.in_view | self.explicit
+        self.coarse = coarseness(result)
+        self.close = np.zeros(size, bool)
+        if facets:
+            self.close[nodes] = (result.decision == Decision.HIDDEN) & (result.cells.feature >= CLOSE)
+            self.close &= result.in_view
+
+    def of(self, points: SharePoints, count: int, close: NDArray[np.intp]) -> Seen:
+        """What is seen of so many parts with points (m,) on them, of which some (k,) count as if they were near."""
+        cell, area = points.cell, points.optical_area.astype(np.float64)
+        total = np.bincount(points.part, area, count)
+        total = np.where(total > 0, total, 1.0)
+
+        def mean(values: NDArray) -> NDArray[np.float64]:
+            return np.bincount(points.part, area * values, count) / total
+
+        visibility, explicit = self.visibility[cell], self.explicit[cell]
+        visibility[close], explicit[close] = CLOSE**-2.0, True
+        seen = mean(visibility > 0)
+        unseen = np.maximum(1.0 - seen, 1e-12)
+        first = np.full(count, -1, np.int64)
+        first[points.part[::-1]] = np.arange(len(points))[::-1]
+        best = np.zeros(count)
+        np.maximum.at(best, points.part, visibility)
+        return Seen(
+            np.where(seen > SOME, mean(visibility), 0.0),
+            np.where(seen > SOME, best, 0.0),
+            mean(explicit) > 0,
+            (seen > SOME) & (seen < 1.0 - SOME),
+            mean(self.inside[cell]) <= 0.0,
+            np.where(seen < 1.0, mean(self.coarse[cell] * (visibility <= 0)) / unseen, 1.0),
+            np.where(first >= 0, self.rank[cell[first]], 0).astype(np.int32),
+        )

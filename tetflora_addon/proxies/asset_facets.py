@@ -1,0 +1,138 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Facets of the clusters of assets: places, orientations and colours are those of samples on their faces.
+
+Sizes, numbers and the order in which facets come and go are those of plants (`facet_sizes`, `microsurfaces`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import perpendicular, unit
+from ..assets.asset import COUNTS
+from ..growth.hashing import signed, uniform
+from ..refinement.asset_parts import AssetParts, PlacedAssets
+from ..refinement.contents import Totals
+from .facet_sizes import FacetPixels, FacetSizes
+from .microsurfaces import Facets, facet_numbers, trapped
+from .thrown_shadows import ThrownShadows
+
+#: Child indices of facets of leaves and of wood start here; draws of their numbers, turns and places.
+_LEAF_PATH, _WOOD_PATH = 1 << 42, 1 << 43
+_LEAF_COUNT, _WOOD_COUNT, _TURN, _MOVE = 252, 253, 254, 255
+#: Sides of a facet by which one is moved that has the sample of another.
+_MOVED = 1.5
+#: One-sided layers that are enough where nothing is seen, and how much of its bound a cluster fills.
+_LAYERS, _FILLED = 6.0, 0.6
+
+
+def asset_facet_sizes(
+    placed: PlacedAssets,
+    parts: AssetParts,
+    shadows: ThrownShadows,
+    visibility: NDArray[np.float64],
+    coarse: NDArray[np.float64],
+    beside: NDArray[np.bool_],
+) -> FacetSizes:
+    """Facets of clusters (n,) of a visibility (n,), a coarseness (n,) where that is 0, all of them beside the view."""
+    clusters, scale = placed.assets.clusters, placed.scale[parts.instance] ** 2
+    cluster, count, totals = parts.cluster, len(parts), facet_totals(placed, parts)
+    side = clusters.high[cluster] - clusters.low[cluster]
+    shown = sum(side[:, i] * side[:, (i + 1) % 3] for i in range(3)) / 2.0 * scale * _FILLED
+    kept = np.minimum(_LAYERS * shown / np.maximum(totals.optical_area, 1e-300), 1.0)
+    away = shadows.camera.clearance(parts.centre)
+    return FacetSizes(
+        shadows.camera.extent_around(parts.centre),
+        clusters.one_leaf[cluster] * scale,
+        np.sqrt(totals.wood_area / 2 / np.maximum(totals.polygons, 1)),
+        visibility,
+        coarse,
+        # What is in the view in part gets facets that may be in the view.
+        np.where(beside, away, np.minimum(away, 0.0)),
+        shadows.distance(parts.centre, away, parts.reach),
+        totals,
+        np.ones(count),
+        kept,
+    )
+
+
+def facet_totals(placed: PlacedAssets, parts: AssetParts) -> Totals:
+    """Totals (n,) of clusters, with closed leaves as if they were sheets: half of each is never seen."""
+    totals, bodies = parts.totals, placed.bodies(parts)
+    return replace(totals, leaf_area=totals.leaf_area + bodies / 2, wood_area=totals.wood_area - bodies)
+
+
+def asset_weights(placed: PlacedAssets, parts: AssetParts, number: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Fraction (n,) of their area that facets of clusters (n,) get, of which there are so many (n,) each."""
+    table = placed.assets.clusters.weights[parts.cluster]
+    place = np.log(np.maximum(number, 1e-12) / COUNTS[0]) / np.log(COUNTS[1] / COUNTS[0])
+    place = np.clip(place, 0.0, len(COUNTS) - 1.0)
+    low = np.minimum(place.astype(np.int64), len(COUNTS) - 2)
+    rows = np.arange(len(parts))
+    return table[rows, low] + (place - low) * (table[rows, low + 1] - table[rows, low])
+
+
+def facets_of_assets(
+    placed: PlacedAssets,
+    parts: AssetParts,
+    sizes: FacetSizes,
+    pixels: FacetPixels,
+    left_out: NDArray[np.float64],
+) -> Facets:
+    """Facets of clusters (n,), of which a fraction (n,) is left out."""
+    leaf, wood = sizes.sides(pixels)
+    weight = asset_weights(placed, parts, sizes.whole_optical / np.maximum(leaf, 1e-12) ** 2)
+    key = placed.keys(parts)
+    kinds = (
+        (True, sizes.totals.leaf_area, leaf, _LEAF_PATH, _LEAF_COUNT),
+        (False, sizes.totals.wood_area / 2, wood, _WOOD_PATH, _WOOD_COUNT),
+    )
+    made = []
+    for leafy, area, side, path, draw in kinds:
+        owner, index, own, one = facet_numbers(key, area, side**2, path, draw, left_out)
+        made.append(_placed(placed, parts, key, leafy, owner, index, own, np.sqrt(one * weight[owner]), weight[owner]))
+    return Facets.concatenate(made)
+
+
+def _placed(
+    placed: PlacedAssets,
+    parts: AssetParts,
+    part_key: NDArray[np.uint64],
+    leafy: bool,
+    owner: NDArray[np.int64],
+    index: NDArray[np.int64],
+    key: NDArray[np.uint64],
+    side: NDArray[np.float64],
+    weight: NDArray[np.float64],
+) -> Facets:
+    """Facets (m,) of clusters: each at a sample, turned about its normal as may be."""
+    samples, clusters = placed.assets.samples, placed.assets.clusters
+    pick = placed.picked(parts, part_key, leafy, owner, index)
+    instance = parts.instance[owner]
+    centre = placed.to_world(samples.position[pick], instance)
+    local = samples.normal[pick].astype(np.float64)
+    linear, some = placed.instances.linear, placed.stretched[instance]
+    normal = np.zeros_like(centre)
+    for i in range(3):
+        for k in range(3):
+            normal[:, i] += linear[instance, i, k] * local[:, k]
+    if some.any():
+        at = np.flatnonzero(some)
+        normal[at] = np.einsum("nij,nj->ni", placed.cofactors(instance[at]), local[at])
+    normal = unit(normal)
+    across = perpendicular(normal)
+    turn = 2 * np.pi * uniform(key, _TURN)[:, None]
+    across = np.cos(turn) * across + np.sin(turn) * np.cross(normal, across)
+    along = np.cross(normal, across)
+    # Where there are more facets than samples, none may lie upon another.
+    number = (clusters.leaf_samples if leafy else clusters.wood_samples)[parts.cluster]
+    again = np.flatnonzero(index >= number[owner])
+    if len(again):
+        for axis, by in ((across, _MOVE), (along, _MOVE + 1)):
+            centre[again] += (_MOVED * side[again] * signed(key[again], by))[:, None] * axis[again]
+    colour = trapped(samples.colour[pick].astype(np.float64), weight)
+    return Facets(centre, across, along, side, colour, samples.transmission[pick].astype(np.float64))

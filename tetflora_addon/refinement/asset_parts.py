@@ -1,0 +1,219 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Instances of assets as the loop holds them: clusters, opened as sub-plants are (paper, section 6.5)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Arrays, column, nested, spread
+from ..assets.asset import Assets, Instances
+from ..camera.camera import Camera
+from ..growth.hashing import child_key, uniform
+from .contents import Held, Totals, sums
+from .shared_parts import SharedParts, SharePoints
+
+#: Pixels along a part for each of its points, and the fewest.
+PIXELS_A_POINT, FEWEST = 6.0, 4
+#: How many times as many points there are where proxies fill their tetrahedra.
+FILLED = 4
+#: Draw of this module: where a part's run of samples starts.
+_START = 251
+#: Axes that differ in length by more than this are stretched, and the same of the cosine between them.
+_EVEN = 1e-4
+
+
+@dataclass(frozen=True)
+class AssetParts(Arrays):
+    """Clusters of instances (n).
+
+    Attributes
+    ----------
+    instance : (n,) int32
+    cluster : (n,) int32
+        Of `Assets.clusters`.
+    centre : (n, 3) float64
+        Middle of its bound, metres.
+    totals : Totals of n
+    extent : (n,) float64
+        Longest side of its bound, metres.
+    """
+
+    instance: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
+    cluster: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
+    centre: NDArray[np.float64] = field(metadata=column(3))
+    totals: Totals = field(metadata=nested(Totals))
+    extent: NDArray[np.float64]
+
+    @property
+    def reach(self) -> NDArray[np.float64]:
+        """Distance (n,) from the middle within which all of each is, metres."""
+        return 0.5 * np.sqrt(3.0) * self.extent
+
+    def bounding_box(self) -> NDArray[np.float64]:
+        """Axis-aligned box (2, 3) around all of them, at least one, metres."""
+        reach = self.reach[:, None]
+        return np.stack([(self.centre - reach).min(axis=0), (self.centre + reach).max(axis=0)])
+
+
+class PlacedAssets:
+    """Assets and their instances, and what a cluster of an instance is in the world.
+
+    Parameters
+    ----------
+    assets : Assets
+    instances : Instances
+    """
+
+    def __init__(self, assets: Assets, instances: Instances) -> None:
+        self.assets, self.instances = assets, instances
+        self.scale, self.largest = instances.scale, instances.largest
+        gram = np.einsum("nki,nkj->nij", instances.linear, instances.linear)
+        even = self.scale[:, None, None] ** 2 * np.eye(3)
+        self.stretched = (np.abs(gram - even) > _EVEN * self.scale[:, None, None] ** 2).any(axis=(1, 2))
+
+    def __len__(self) -> int:
+        return len(self.instances)
+
+    @classmethod
+    def none(cls) -> PlacedAssets:
+        """No instances."""
+        return cls(Assets.none(), Instances.empty())
+
+    def take(self, index: NDArray) -> PlacedAssets:
+        """Some instances (k,) or a mask (n,) of them."""
+        return PlacedAssets(self.assets, self.instances.take(index))
+
+    def wholes(self) -> AssetParts:
+        """All instances as they are."""
+        return self.parts(np.arange(len(self)), self.assets.root[self.instances.asset])
+
+    def parts(self, instance: NDArray[np.integer], cluster: NDArray[np.integer]) -> AssetParts:
+        """Clusters (n,) of instances (n,)."""
+        clusters = self.assets.clusters
+        low, high = clusters.low[cluster], clusters.high[cluster]
+        side = (high - low).max(axis=1) * self.largest[instance]
+        leaf, wood = self._areas(instance, cluster)
+        width = clusters.width[cluster] * self.scale[instance]
+        totals = Totals(leaf, wood, clusters.faces[cluster].astype(np.float64), width)
+        centre = self.to_world((low + high) / 2, instance)
+        return AssetParts(instance.astype(np.int32), cluster.astype(np.int32), centre, totals, side)
+
+    def to_world(self, points: NDArray[np.floating], instance: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Points (n, 3) of assets' spaces in the world, by instances (n,)."""
+        linear, out = self.instances.linear, self.instances.position[instance]
+        for i in range(3):
+            for k in range(3):
+                out[:, i] += linear[instance, i, k] * points[:, k]
+        return out
+
+    def cofactors(self, instance: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Matrices (n, 3, 3) that take area vectors of assets' spaces to the world."""
+        a, b, c = np.moveaxis(self.instances.linear[instance], 2, 0)
+        return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=2)
+
+    def _areas(self, instance: NDArray, cluster: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Areas (n,) of sheets and of solids, m²; where an instance is stretched, as its samples say."""
+        clusters, scale = self.assets.clusters, self.scale[instance] ** 2
+        leaf, wood = clusters.leaf_area[cluster] * scale, clusters.wood_area[cluster] * scale
+        some = np.flatnonzero(self.stretched[instance])
+        if len(some):
+            own, of = cluster[some], instance[some]
+            owner, index = spread((clusters.leaf_samples + clusters.wood_samples)[own].astype(np.int64))
+            normal = self.assets.samples.normal[clusters.leaf_sample[own][owner] + index].astype(np.float64)
+            turned = np.einsum("nij,nj->ni", self.cofactors(of[owner]), normal)
+            longer = np.bincount(owner, np.linalg.norm(turned, axis=1), len(own)) / np.bincount(
+                owner, minlength=len(own)
+            )
+            leaf[some] *= longer / scale[some]
+            wood[some] *= longer / scale[some]
+        return leaf, wood
+
+    def bodies(self, parts: AssetParts) -> NDArray[np.float64]:
+        """Area (n,) of solids that facets stand for as for leaves, m²."""
+        clusters = self.assets.clusters
+        part = clusters.body_area[parts.cluster] / np.maximum(clusters.wood_area[parts.cluster], 1e-300)
+        return parts.totals.wood_area * part
+
+    def keys(self, parts: AssetParts) -> NDArray[np.uint64]:
+        """A key (n,) for each part, which tells it apart from all others of all instances."""
+        local = parts.cluster - self.assets.root[self.instances.asset[parts.instance]]
+        return child_key(self.instances.key[parts.instance], local)
+
+    def picked(
+        self, parts: AssetParts, key: NDArray[np.uint64], leafy: bool, owner: NDArray[np.int64], index: NDArray
+    ) -> NDArray[np.int64]:
+        """Samples (m,) of parts (n,) with keys (n,): a run on leaves, or on wood, that begins anywhere."""
+        clusters = self.assets.clusters
+        first = (clusters.leaf_sample if leafy else clusters.wood_sample)[parts.cluster].astype(np.int64)
+        number = (clusters.leaf_samples if leafy else clusters.wood_samples)[parts.cluster].astype(np.int64)
+        start = (uniform(key, _START) * number).astype(np.int64)
+        return first[owner] + (start[owner] + index) % np.maximum(number[owner], 1)
+
+
+class SharedAssets(SharedParts[AssetParts]):
+    """All instances of assets of a refinement, as clusters and the points on them.
+
+    Parameters
+    ----------
+    placed : PlacedAssets
+    camera : Camera
+    filled : bool
+        Whether proxies fill their tetrahedra, so that small ones without points would be holes.
+    """
+
+    def __init__(self, placed: PlacedAssets, camera: Camera, filled: bool = False) -> None:
+        super().__init__(camera)
+        self.placed, self._times = placed, FILLED if filled else 1
+        parts = placed.wholes()
+        self.hold(parts, self.points_on(parts, None))
+
+    def can_open(self, parts: AssetParts) -> NDArray[np.bool_]:
+        """As `SharedParts.can_open`."""
+        return self.placed.assets.clusters.children[parts.cluster] > 0
+
+    def alone(self, parts: AssetParts) -> NDArray[np.bool_]:
+        """None of them counts apart."""
+        return np.zeros(len(parts), bool)
+
+    def opened(self, parts: AssetParts) -> Iterator[tuple[AssetParts, NDArray[np.int64], None]]:
+        """Children of clusters, as `SharedParts.opened`."""
+        clusters = self.placed.assets.clusters
+        owner, index = spread(clusters.children[parts.cluster].astype(np.int64))
+        child = clusters.child[parts.cluster][owner] + index
+        yield self.placed.parts(parts.instance[owner], child), owner, None
+
+    def points_on(self, parts: AssetParts, known: None, most: int | None = None) -> SharePoints:
+        """Points on clusters, all in the root: at their samples; at most so many on each."""
+        pixels = parts.extent / self.camera.extent_around(parts.centre)
+        clusters, key = self.placed.assets.clusters, self.placed.keys(parts)
+        bodies = self.placed.bodies(parts)
+        number = np.ceil(np.maximum(pixels / PIXELS_A_POINT, FEWEST)) * self._times
+        made = []
+        for leafy in (True, False):
+            sheets = parts.totals.leaf_area if leafy else np.zeros(len(parts))
+            solids = bodies if leafy else parts.totals.wood_area - bodies
+            part = (sheets + solids / 2) / np.maximum(parts.totals.optical_area, 1e-300)
+            there = (clusters.leaf_samples if leafy else clusters.wood_samples)[parts.cluster]
+            count = np.minimum(np.ceil(number * part), there)
+            if most is not None:
+                count = np.minimum(count, most)
+            count = np.where((sheets + solids > 0.0) & (there > 0), np.maximum(count, 1), 0).astype(np.int64)
+            owner, index = spread(count)
+            pick = self.placed.picked(parts, key, leafy, owner, index)
+            place = self.placed.to_world(self.placed.assets.samples.position[pick], parts.instance[owner])
+            leaf, wood = ((area / np.maximum(count, 1))[owner].astype(np.float32) for area in (sheets, solids))
+            cell = np.zeros(len(owner), np.int32)
+            made.append(SharePoints(owner.astype(np.int32), cell, place.astype(np.float32), leaf, wood))
+        return SharePoints.concatenate(made)
+
+    def held(self, nodes: int) -> Held[AssetParts]:
+        """Clusters, once for each node that holds some of them, with the totals of that."""
+        parts, points = self.parts, self.points
+        pair, row = np.unique(points.part.astype(np.int64) * nodes + points.cell, return_inverse=True)
+        totals, _ = self.totals(np.ones(nodes, bool))
+        return Held(parts.take(pair // nodes), (pair % nodes).astype(np.int32), sums(totals, row, len(pair)))
