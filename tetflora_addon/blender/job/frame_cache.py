@@ -21,7 +21,7 @@ from ...species.species import Species
 from ..assets.measures import reach_of
 from ..assets.target import digest_of
 from ..compat import drawn_disc
-from ..results.hiding import hidden_originals, hide_originals, key_of, object_of, show_originals
+from ..results.hiding import hidden_originals, hide_originals, name_of, object_named, show_originals
 from ..results.leaf_objects import brought_materials, resolved_species
 from ..results.output import REPLACED, remove_collection, result_collections
 from ..results.proxies import shade_again
@@ -282,7 +282,7 @@ def recall(scene: bpy.types.Scene, key: str) -> bpy.types.Collection | None:
 
 def store(scene: bpy.types.Scene, key: str, collection: bpy.types.Collection, megabytes: float) -> None:
     """Add new results of a scene, and remove the least recently used ones beyond the limit."""
-    originals = [key_of(o) for o in hidden_originals(scene, 'RENDER')]
+    originals = [name_of(o) for o in hidden_originals(scene, 'RENDER')]
     _entries[key] = _Entry(scene.session_uid, collection.name, originals, megabytes, scene.tetflora.statistics)
     wind = wind_of(scene)
     # In a wind without a loop no frame returns.
@@ -296,7 +296,7 @@ def store(scene: bpy.types.Scene, key: str, collection: bpy.types.Collection, me
 def hide_for(scene: bpy.types.Scene, keys: Sequence[str]) -> None:
     """Hide objects that results of some digests replace."""
     names = dict.fromkeys(name for key in keys if key in _entries for name in _entries[key].originals)
-    hide_originals(scene, 'RENDER', [o for name in names if (o := object_of(name)) is not None])
+    hide_originals(scene, 'RENDER', [o for name in names if (o := object_named(name)) is not None])
 
 
 def clear(scene: bpy.types.Scene) -> None:

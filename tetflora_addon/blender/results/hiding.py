@@ -168,7 +168,7 @@ def lift_marks() -> dict[tuple, str | list]:
     lifted = {}
     for scene, purpose in list(scenes_hiding()):
         if purpose == 'RENDER' or scene.name not in saving:
-            lifted[purpose, scene.name, None] = [key_of(o) for o in linked_hidden(scene, purpose)]
+            lifted[purpose, scene.name, None] = [name_of(o) for o in linked_hidden(scene, purpose)]
             show_linked(scene, purpose)
     for purpose in ('RENDER', 'VIEW'):
         for original in _marked(purpose):
@@ -178,13 +178,13 @@ def lift_marks() -> dict[tuple, str | list]:
     return lifted
 
 
-def key_of(obj: bpy.types.Object) -> tuple[str, str]:
+def name_of(obj: bpy.types.Object) -> tuple[str, str]:
     """Names of an object and of its library, empty for this file. Saving a file may change the paths of libraries."""
     return obj.name, "" if obj.library is None else obj.library.name
 
 
-def object_of(key: tuple[str, str]) -> bpy.types.Object | None:
-    """The object of a key by `key_of`; None where it is gone."""
+def object_named(key: tuple[str, str]) -> bpy.types.Object | None:
+    """The object that `name_of` names; None where it is gone."""
     name, home = key
     library = bpy.data.libraries.get(home) if home else None
     if home and library is None:
@@ -196,7 +196,7 @@ def restore_marks(lifted: dict[tuple, str | list]) -> None:
     """Hide again what `lift_marks` showed."""
     for (purpose, name, *linked), mark in reversed(lifted.items()):
         if linked:
-            scene, objects = bpy.data.scenes.get((name, None)), [object_of(key) for key in mark]
+            scene, objects = bpy.data.scenes.get((name, None)), [object_named(key) for key in mark]
             if scene is not None:
                 hide_linked(scene, purpose, [obj for obj in objects if obj is not None])
             continue

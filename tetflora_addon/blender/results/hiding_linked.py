@@ -42,10 +42,10 @@ def check_linked(scene: bpy.types.Scene, originals: Sequence[bpy.types.Object]) 
     for obj in originals:
         if obj.library is None or obj in known:
             continue
-        if scene.library is not None or not any(obj.name in c.objects and obj in c.objects[:] for c in homes):
+        if scene.library is not None or not any(obj in c.objects[:] for c in homes):
             raise SceneError(
-                f'"{obj.name}" is linked and in no collection of the scene "{scene.name}", so it cannot be hidden while '
-                "results replace it; refine the object that instances its collection instead, or choose Object > "
+                f'"{obj.name}" is linked and in no collection of the scene "{scene.name}", so it cannot be hidden '
+                "while results replace it; refine the object that instances its collection instead, or choose Object > "
                 "Library Override > Make"
             )
 
