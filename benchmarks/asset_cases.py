@@ -85,7 +85,8 @@ def timed(path: Path, what: str, engine: str, detail: str = "AUTO") -> dict[str,
 def compiled(kind: str, quick: bool) -> dict[str, float]:
     """Seconds, bytes and exactness of compiling a tree on one core; seconds are those of the processor."""
     from tetflora_addon.assets.compiled import compile_asset
-    from tetflora_addon.blender.assets.target import Target, digest_of, read_source
+    from tetflora_addon.blender.assets.geometry import read_source
+    from tetflora_addon.blender.assets.target import Target, digest_of
 
     scene, tree = bpy.context.scene, asset_trees.make(kind, quick)
     scene.collection.objects.link(tree)

@@ -25,12 +25,12 @@ from .compare import difference, read_picture, render
 from .row80 import timed_refine
 
 INSTANCES = 16
-SAMPLES, QUICK_SAMPLES = 192, 32
+#: By distance: what is far is small and cheap, and has many trees in a pixel.
+SAMPLES, QUICK_DIVISOR = {"near": 64, "middle": 192, "far": 384}, 8
 COVERAGE_SAMPLES = 64
 LEAST_COVERAGE = 0.05
-#: Metres of a pixel where crowns are compared, and samples there.
-PIXELS = (0.05, 0.1, 0.2)
-CROWN_SAMPLES, QUICK_CROWN_SAMPLES = 256, 64
+#: Samples where crowns are compared, by metres of a pixel, and where noise is measured.
+PIXELS, NOISY = {0.05: 96, 0.1: 256, 0.2: 1024}, 0.1
 TENTHS = 10
 #: Least of a crown's row that is covered where its colour counts.
 _LEAST_ROW = 0.02
@@ -38,12 +38,12 @@ _LEAST_ROW = 0.02
 
 def woods(kind: str, folder: Path, quick: bool, warped: bool = False) -> dict[str, float]:
     """FLIP of a refined wood in each light and from each distance, and of two plain pictures in the first light."""
-    scene, samples = bpy.context.scene, QUICK_SAMPLES if quick else SAMPLES
+    scene = bpy.context.scene
     asset_scenes.build(scene, Scatter(kind, INSTANCES, size=PICTURE, warped=warped, quick=quick))
     found: dict[str, float] = {}
     masks: dict[str, NDArray[np.bool_]] = {}
     for distance, light in _views(scene):
-        name = f"{kind}-{distance}-{light}"
+        name, samples = f"{kind}-{distance}-{light}", _samples(distance, quick)
         render(scene, folder / f"{name}-plain.png", samples)
         if light == next(iter(LIGHTS)):
             masks[distance] = coverage(scene, folder / "coverage.png") > LEAST_COVERAGE
@@ -52,7 +52,7 @@ def woods(kind: str, folder: Path, quick: bool, warped: bool = False) -> dict[st
             found[f"noise_{kind}_{distance}"] = difference(*pair, masks[distance]).flip
     mark("REFINE")
     for distance, light in _views(scene):
-        name = f"{kind}-{distance}-{light}"
+        name, samples = f"{kind}-{distance}-{light}", _samples(distance, quick)
         statistics, _ = timed_refine(scene)
         render(scene, folder / f"{name}-refined.png", samples)
         pair = folder / f"{name}-plain.png", folder / f"{name}-refined.png"
@@ -65,17 +65,21 @@ def woods(kind: str, folder: Path, quick: bool, warped: bool = False) -> dict[st
 
 def plain_woods(kind: str, folder: Path, quick: bool) -> dict[str, float]:
     """Only the plain half of `woods`."""
-    scene, samples = bpy.context.scene, QUICK_SAMPLES if quick else SAMPLES
+    scene = bpy.context.scene
     asset_scenes.build(scene, Scatter(kind, INSTANCES, size=PICTURE, quick=quick))
     found = {}
     for distance, light in _views(scene):
-        name = f"{kind}-{distance}-{light}"
+        name, samples = f"{kind}-{distance}-{light}", _samples(distance, quick)
         render(scene, folder / f"{name}-plain.png", samples)
         render(scene, folder / f"{name}-again.png", samples, seed=1)
         mask = coverage(scene, folder / "coverage.png") > LEAST_COVERAGE
         pair = folder / f"{name}-plain.png", folder / f"{name}-again.png"
         found[f"noise_{kind}_{distance}_{light}"] = difference(*pair, mask).flip
     return found
+
+
+def _samples(distance: str, quick: bool) -> int:
+    return SAMPLES[distance] // (QUICK_DIVISOR if quick else 1)
 
 
 def _views(scene: bpy.types.Scene) -> Iterator[tuple[str, str]]:
@@ -91,21 +95,27 @@ def _views(scene: bpy.types.Scene) -> Iterator[tuple[str, str]]:
 def crown(kind: str, folder: Path, quick: bool) -> dict[str, float]:
     """How much light a crown lets through, and the colour of its tenths from below to above, refined and plain."""
     scene = bpy.context.scene
-    samples = QUICK_CROWN_SAMPLES if quick else CROWN_SAMPLES
     asset_scenes.alone(scene, kind, quick)
-    plain, again, found = {}, {}, {}
-    for pixel in PIXELS:
-        asset_scenes.frame(scene, pixel)
-        plain[pixel] = silhouette(scene, folder / f"crown-{pixel}-plain.exr", samples)
-        again[pixel] = silhouette(scene, folder / f"crown-{pixel}-again.exr", samples, seed=1)
-        found |= {f"noise_{key}": value for key, value in _compared(plain[pixel], again[pixel], pixel).items()}
+    plain, found = {}, {}
+    for pixel, samples in _pixels(scene, quick):
+        plain[pixel] = silhouette(scene, folder / f"crown-{kind}-{pixel}-plain.exr", samples)
+        if pixel == NOISY:
+            again = silhouette(scene, folder / f"crown-{kind}-{pixel}-again.exr", samples, seed=1)
+            found |= {f"noise_{key}": value for key, value in _compared(plain[pixel], again, pixel).items()}
     mark("REFINE")
-    for pixel in PIXELS:
-        asset_scenes.frame(scene, pixel)
+    for pixel, samples in _pixels(scene, quick):
         timed_refine(scene)
-        found |= _compared(plain[pixel], silhouette(scene, folder / f"crown-{pixel}-refined.exr", samples), pixel)
+        test = silhouette(scene, folder / f"crown-{kind}-{pixel}-refined.exr", samples)
+        found |= _compared(plain[pixel], test, pixel)
     refine.clear(scene)
     return found
+
+
+def _pixels(scene: bpy.types.Scene, quick: bool) -> Iterator[tuple[float, int]]:
+    """Sizes of pixels, which the scene has while each lasts, and samples."""
+    for pixel, samples in PIXELS.items():
+        asset_scenes.frame(scene, pixel)
+        yield pixel, samples // (QUICK_DIVISOR if quick else 1)
 
 
 def _compared(plain: NDArray, test: NDArray, pixel: float) -> dict[str, float]:

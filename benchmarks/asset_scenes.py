@@ -22,7 +22,7 @@ SPACING, EYE = 7.0, 1.7
 DISTANCES = {"near": 5.0, "middle": 50.0, "far": 250.0}
 #: Elevation of the sun and where its light goes, degrees; the camera looks to 0.
 LIGHTS = {"front": (42.0, 35.0), "back": (28.0, 160.0)}
-SIZE, PICTURE = (1920, 1080), (480, 270)
+SIZE, PICTURE = (1920, 1080), (320, 180)
 #: Holes behind holes that rays go through; Blender's default of 8 makes crowns of cards black.
 _TRANSPARENT = 64
 #: One tree is seen from so far, in an image so wide, metres.
