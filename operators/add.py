@@ -17,7 +17,7 @@ from ..tetflora_addon.blender.placing.rules import copy_companion
 from ..tetflora_addon.blender.scene.skeletons import FORM_TYPES, read_skeleton, upright_turn
 from ..tetflora_addon.blender.settings import properties_of
 from ..tetflora_addon.blender.species.catalogue import NO_SPECIES, default_species, operator_items
-from ..tetflora_addon.blender.species.edits import catalogue
+from ..tetflora_addon.blender.species.edits import catalogue, unknown_text
 from ..tetflora_addon.blender.species.values import present_species
 from ..tetflora_addon.errors import SceneError
 from ..tetflora_addon.jobs import Progress
@@ -261,7 +261,7 @@ def _parse_weights(text: str) -> dict[str, float]:
     for part in filter(None, (p.strip() for p in text.split(","))):
         identifier, _, weight = (p.strip() for p in part.partition(":"))
         if identifier not in known:
-            raise SceneError(f'Unknown species "{identifier}"; choose one of {", ".join(known)}')
+            raise SceneError(unknown_text(identifier))
         try:
             weights[identifier] = weights.get(identifier, 0.0) + (float(weight) if weight else 1.0)
         except ValueError:

@@ -113,6 +113,22 @@ def listed() -> None:
     assert ops().edit_list(which='MIX', action='ADD') == {'FINISHED'}
 
 
+def species_of_mesh() -> None:
+    ground_active()
+    assert ops().use_as_species() == {'FINISHED'}
+
+
+def drop() -> None:
+    """A collection instance of the ground is selected."""
+    forest()
+    held = bpy.data.collections.new("held")
+    held.objects.link(bpy.data.objects["ground"])
+    shown = bpy.data.objects.new("shown", None)
+    shown.instance_type, shown.instance_collection = 'COLLECTION', held
+    scene().collection.objects.link(shown)
+    select(shown)
+
+
 Case = tuple[str, Callable[[], None], str, dict]
 
 CASES: list[Case] = [
@@ -131,6 +147,10 @@ CASES: list[Case] = [
     ("remove_plants all", populated, "remove_plants", {"which": 'ALL'}),
     ("mark_occluder", ground_active, "mark_occluder", {}),
     ("mark_explicit", ground_active, "mark_explicit", {}),
+    ("use_as_species", ground_active, "use_as_species", {}),
+    ("use_as_species of a collection", drop, "use_as_species", {}),
+    ("stop_using_as_species", species_of_mesh, "stop_using_as_species", {}),
+    ("refine_scatter", drop, "refine_scatter", {}),
     ("edit_list add", forest, "edit_list", {"which": 'MIX', "action": 'ADD'}),
     ("edit_list remove", listed, "edit_list", {"which": 'MIX', "action": 'REMOVE'}),
     ("refine", forest, "refine", {}),

@@ -13,6 +13,7 @@ from collections.abc import Iterable
 from hashlib import blake2b
 
 import bpy
+import numpy as np
 
 from ...errors import SceneError
 from ..materials.nodes import is_ours
@@ -29,11 +30,11 @@ from ..species.asset_species import (
     stored_picture,
 )
 from ..species.edits import tell_listeners
-from .measures import measure
+from .measures import measure, size_of
 from .places import Scatter, read_scatters, variants_of
 
 _NO_FACES = "it has no faces. Choose a mesh, curve or collection with a surface, or add faces"
-_SAME = 1e-5  # relative difference of measures that is none
+_SAME = 1e-4  # relative difference of sizes that is none
 
 
 def can_be_species(datablock: Datablock) -> bool:
@@ -59,6 +60,7 @@ def use_as_species(
         Original; may be linked from a library.
     variants : bool
         Each object of the collection, and each collection within it, is a plant of its own, and not all together one.
+        Where an empty is given that shows a collection, the collection is one plant, and so are all such empties.
 
     Raises
     ------
@@ -66,7 +68,7 @@ def use_as_species(
         Nothing of it has faces; the message names it.
     """
     if isinstance(datablock, bpy.types.Object) and datablock.type == 'EMPTY' and datablock.instance_collection:
-        datablock = datablock.instance_collection
+        datablock, variants = datablock.instance_collection, False  # it shows all of it
     if not can_be_species(datablock):
         raise SceneError(f'"{datablock.name}" cannot be used as a species: {_NO_FACES}')
     entry = asset_of(datablock, scene)
@@ -79,7 +81,7 @@ def use_as_species(
     entry.collection = None if entry.object else datablock
     entry.variants = variants and entry.object is None
     try:
-        if not measure_again(depsgraph, entry, True):
+        if not measure_again(depsgraph, entry):
             raise SceneError(f'"{datablock.name}" cannot be used as a species: {_NO_FACES}')
     except SceneError:
         if new:
@@ -103,24 +105,22 @@ def _identifier(datablock: Datablock) -> str:
         number += 1
 
 
-def measure_again(depsgraph: bpy.types.Depsgraph, entry: TetFloraAssetSpecies, picture: bool = False) -> bool:
-    """Measure an asset, and draw its picture if asked for; false where it has no faces."""
-    shown = [(target.datablock, turned) for target, turned in variants_of(entry, depsgraph)]
-    found = measure(shown, depsgraph)
+def measure_again(depsgraph: bpy.types.Depsgraph, entry: TetFloraAssetSpecies) -> bool:
+    """Measure an asset and draw its picture; false where it has no faces."""
+    found = measure(variants_of(entry, depsgraph), depsgraph)
     if found is None:
         return False
     entry.name = (entry.object or entry.collection).name
-    for name in ("radius", "base", "height", "polygons", "leaves"):
-        value = getattr(found, name)
-        if abs(getattr(entry, name) - value) > _SAME * abs(value):  # what is written counts as a change of the scene
-            setattr(entry, name, value)
-    if picture:
-        entry.colour, entry.picture = found.colour, stored_picture(found.picture)
+    for name in ("radius", "base", "height", "polygons", "leaves", "colour"):
+        setattr(entry, name, getattr(found, name))
+    entry.picture = stored_picture(found.picture)
     return True
 
 
 def measure_all(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, identifiers: Iterable[str]) -> None:
-    """Measure those assets anew that plants are to be placed of; what has no faces any more stays as it was.
+    """Measure those assets anew that plants are to be placed of, and whose size has changed.
+
+    What has no faces any more stays as it was.
 
     Raises
     ------
@@ -129,8 +129,11 @@ def measure_all(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, identifi
     """
     known = asset_species(scene)
     for identifier in identifiers:
-        if identifier in known and known[identifier].id_data.library is None:
-            measure_again(depsgraph, known[identifier])
+        entry = known.get(identifier)
+        if entry is not None and entry.id_data.library is None:
+            size = size_of(variants_of(entry, depsgraph), depsgraph)
+            if not np.allclose(size, (entry.radius, entry.height), rtol=_SAME, atol=0.0):
+                measure_again(depsgraph, entry)
 
 
 def stop_using(datablock: Datablock) -> int:

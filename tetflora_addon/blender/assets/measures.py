@@ -8,24 +8,21 @@ count by their mean colour.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..attributes import evaluated_mesh, members, read, world_matrix
-from ..materials.means import Look, Looks
-from ..scene.explicit import SURFACE_TYPES
-from ..scene.instances import Reference, references_of
-from ..scene.objects import DEEPEST, has_nodes, rendered_objects
+from ..attributes import members, read
+from ..materials.means import GREY, Looks
 from ..species.asset_species import PICTURE_SIDE
 from .target import Target
 
 _POINTS = 60_000  # of a picture
 _TRIANGLES = 200_000  # of one mesh that are looked at
-_INSTANCES = 4_000  # of one reference
+_LEAST = 1e-3  # metres that a crown is wide and tall
 _FINER = 2  # pixels of the picture that is made for one that is kept
 _BASE = 0.1  # fraction of the area that lies below the crown's base
 _UP, _SIDE = np.array([0.0, -0.26, 0.966]), np.array([1.0, 0.0, 0.0])  # axes of the picture: a little from above
@@ -47,8 +44,12 @@ class Measures:
 
 @dataclass
 class _Mesh:
-    """Triangles of a mesh: corners (t, 3, 3), area (t,), color (t, 3), coverage (t,), and how many faces it has."""
+    """A mesh in its places (k, 4, 4): corners of triangles (t, 3, 3), area (t,), colour (t, 3), coverage (t,).
 
+    ``faces`` and ``leaves``, the area of leaves, are those of one place.
+    """
+
+    places: NDArray[np.float64]
     corners: NDArray[np.float64]
     area: NDArray[np.float64]
     colour: NDArray[np.float64]
@@ -56,110 +57,81 @@ class _Mesh:
     low: NDArray[np.float64]
     high: NDArray[np.float64]
     faces: int
-    area_of_leaves: float
+    leaves: float
+
+    @property
+    def sizes(self) -> float:
+        """Sum over places of how many times larger areas are there."""
+        return float((np.abs(np.linalg.det(self.places[:, :3, :3])) ** (2.0 / 3.0)).sum())
 
 
-class _Collector:
-    """Meshes that something shows, each with its places."""
-
-    def __init__(self, depsgraph: bpy.types.Depsgraph, only_boxes: bool = False) -> None:
-        self.depsgraph, self.looks, self.only_boxes = depsgraph, Looks(), only_boxes
-        self.meshes: list[tuple[_Mesh, NDArray[np.float64], float]] = []  # places (k, 4, 4), each for so many
-
-    def take(self, shown: Reference, places: NDArray[np.float64], weight: float = 1.0, depth: int = 0) -> None:
-        """Take an original object or collection, or evaluated geometry, at places (k, 4, 4)."""
-        if depth > DEEPEST:
-            return
-        if isinstance(shown, bpy.types.Collection):
-            back = np.eye(4)
-            back[:3, 3] = -np.array(shown.instance_offset)
-            for obj in rendered_objects(shown):
-                self.take(obj, places @ back @ world_matrix(obj, self.depsgraph), weight, depth + 1)
-            return
-        if isinstance(shown, bpy.types.Object):
-            if shown.instance_type == 'COLLECTION' and shown.instance_collection is not None:
-                self.take(shown.instance_collection, places, weight, depth + 1)
-            if shown.type not in SURFACE_TYPES:
-                return
-            with evaluated_mesh(shown, self.depsgraph) as mesh:
-                slots = [slot.material for slot in shown.material_slots]
-                self._add(mesh, slots, places, weight)
-            evaluated = shown.evaluated_get(self.depsgraph)
-            if not has_nodes(shown) or shown.type != 'MESH' or not evaluated.is_evaluated:
-                return
-            shown = evaluated.evaluated_geometry()
-        else:
-            self._add(shown.mesh, [], places, weight)
-        for target, rows in references_of(shown):
-            below, _ = rows.within(places, np.zeros(len(places), np.uint64))
-            step = 1 if self.only_boxes else max(-(-len(below) // _INSTANCES), 1)
-            below = below[::step]
-            original = target if isinstance(target, bpy.types.GeometrySet) else target.original
-            self.take(original, below, weight * step, depth + 1)
-
-    def _add(
-        self, mesh: bpy.types.Mesh | None, slots: list[bpy.types.Material | None], places: NDArray, weight: float
-    ) -> None:
-        if mesh is not None and len(mesh.polygons):
-            self.meshes.append((self._read(mesh, slots), places, weight))
-
-    def _read(self, mesh: bpy.types.Mesh, slots: list[bpy.types.Material | None]) -> _Mesh:
-        positions = np.nan_to_num(read(mesh, "position").astype(np.float64))
-        low, high = positions.min(axis=0), positions.max(axis=0)
-        if self.only_boxes:
-            none = np.zeros(0)
-            return _Mesh(none, none, none, none, low, high, len(mesh.polygons), 0.0)
-        mesh.calc_loop_triangles()
-        triangles = members(mesh.loop_triangles, "loops", 3, np.int32)
-        faces = members(mesh.loop_triangles, "polygon_index", dtype=np.int32)
-        if len(triangles) > _TRIANGLES:
-            some = np.linspace(0, len(triangles) - 1, _TRIANGLES).astype(np.int64)
-            triangles, faces, factor = triangles[some], faces[some], len(triangles) / _TRIANGLES
-        else:
-            factor = 1.0
-        corners = positions[read(mesh, ".corner_vert")[triangles]]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        area = 0.5 * factor * np.sqrt(np.einsum("ni,ni->n", normal, normal))
-        materials = slots or list(mesh.materials)
-        looks = [self.looks.of(m, {}) if m is not None else Look() for m in materials] or [Look()]
-        slot = np.clip(members(mesh.polygons, "material_index", dtype=np.int32)[faces], 0, len(looks) - 1)
-        coverage = np.array([look.coverage for look in looks])[slot]
-        # Of closed leaves both sides have area; each edge of theirs has two faces.
-        loose = min(max(2.0 * len(mesh.edges) / len(mesh.loops) - 1.0, 0.0), 1.0)
-        return _Mesh(
-            corners,
-            area,
-            np.array([look.colour for look in looks])[slot],
-            coverage,
-            low,
-            high,
-            len(mesh.polygons),
-            (0.5 + 0.5 * loose) * float(area @ coverage),
-        )
+def _meshes_of(
+    target: Target, matrix: NDArray[np.float64], depsgraph: bpy.types.Depsgraph, looks: Looks
+) -> list[_Mesh]:
+    found = []
+    for part in target.parts(depsgraph)[0]:
+        with part.opened(depsgraph) as opened:
+            if opened is not None:
+                found.append(_read(*opened, matrix @ part.matrices, looks))
+    return found
 
 
-def measure(
-    shown: Iterable[tuple[bpy.types.Object | bpy.types.Collection, NDArray[np.float64]]], depsgraph: bpy.types.Depsgraph
-) -> Measures | None:
+def _read(
+    mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None], places: NDArray[np.float64], looks: Looks
+) -> _Mesh:
+    mesh.calc_loop_triangles()
+    positions = np.nan_to_num(read(mesh, "position").astype(np.float64))
+    triangles = members(mesh.loop_triangles, "loops", 3, np.int32)
+    faces = members(mesh.loop_triangles, "polygon_index", dtype=np.int32)
+    factor = 1.0
+    if len(triangles) > _TRIANGLES:
+        some = np.linspace(0, len(triangles) - 1, _TRIANGLES).astype(np.int64)
+        triangles, faces, factor = triangles[some], faces[some], len(triangles) / _TRIANGLES
+    corners = positions[read(mesh, ".corner_vert")[triangles]]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = 0.5 * factor * np.sqrt(np.einsum("ni,ni->n", normal, normal))
+    seen = [looks.of(material, {}) for material in materials]
+    slot = np.clip(members(mesh.polygons, "material_index", dtype=np.int32)[faces], 0, len(seen) - 1)
+    coverage = np.array([look.coverage for look in seen])[slot]
+    # Of closed leaves both sides have area; each edge of theirs has two faces.
+    loose = min(max(2.0 * len(mesh.edges) / len(mesh.loops) - 1.0, 0.0), 1.0)
+    return _Mesh(
+        places=places,
+        corners=corners,
+        area=area,
+        colour=np.array([look.colour for look in seen])[slot],
+        coverage=coverage,
+        low=positions.min(axis=0),
+        high=positions.max(axis=0),
+        faces=len(mesh.polygons),
+        leaves=(0.5 + 0.5 * loose) * float(area @ coverage),
+    )
+
+
+def measure(variants: Iterable[tuple[Target, NDArray[np.float64]]], depsgraph: bpy.types.Depsgraph) -> Measures | None:
     """Means over the variants of a species, and a picture of the first.
 
     Parameters
     ----------
-    shown : iterable
-        Original objects and collections, each with the matrix (4, 4) from its space to that of the plant.
+    variants : iterable
+        Targets, each with the matrix (4, 4) from its space to that of the plant.
     depsgraph : bpy.types.Depsgraph
 
     Returns
     -------
     Measures or None
         None where nothing has a face.
+
+    Raises
+    ------
+    SceneError
+        Something instances itself.
     """
-    found = []
-    for datablock, matrix in shown:
-        collector = _Collector(depsgraph)
-        collector.take(datablock, matrix[None])
-        if collector.meshes:
-            found.append(_measured(collector.meshes, picture=not found))
+    found, looks = [], Looks()
+    for target, matrix in variants:
+        meshes = _meshes_of(target, matrix, depsgraph, looks)
+        if meshes:
+            found.append(_measured(meshes, picture=not found))
     if not found:
         return None
     numbers = np.array([(m.radius, m.base, m.height, m.polygons, m.leaves) for m in found]).mean(axis=0).tolist()
@@ -167,56 +139,84 @@ def measure(
     return Measures(*numbers, colour, found[0].picture)
 
 
+def size_of(
+    variants: Iterable[tuple[Target, NDArray[np.float64]]], depsgraph: bpy.types.Depsgraph
+) -> tuple[float, float]:
+    """Radius and height alone, as `measure` finds them, at a fraction of the cost; zeros where nothing has a face."""
+    found = []
+    for target, matrix in variants:
+        boxes = [_corners(low, high, matrix @ places) for low, high, places in _boxes(target, depsgraph)]
+        if boxes:
+            low = np.min([box.min(axis=(0, 1)) for box in boxes], axis=0)
+            found.append(_extent(low, np.max([box.max(axis=(0, 1)) for box in boxes], axis=0)))
+    return tuple(np.mean(found, axis=0).tolist()) if found else (0.0, 0.0)
+
+
 def reach_of(target: Target, depsgraph: bpy.types.Depsgraph) -> float:
-    """Distance from an asset's origin within which all of it lies, metres in its own space."""
-    collector = _Collector(depsgraph, only_boxes=True)
-    collector.take(target.datablock or target.geometry, np.eye(4)[None])
-    reach = 0.0
-    for mesh, places, _ in collector.meshes:
-        reach = max(reach, float(np.linalg.norm(_corners(mesh, places), axis=-1).max()))
-    return reach
+    """Distance from an asset's origin within which all of it lies, metres in its own space.
+
+    Raises
+    ------
+    SceneError
+        It instances itself.
+    """
+    boxes = [np.linalg.norm(_corners(*box), axis=-1).max() for box in _boxes(target, depsgraph)]
+    return float(max(boxes, default=0.0))
 
 
-def _corners(mesh: _Mesh, places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Corners (k, 8, 3) of a mesh's box in its places."""
-    corner = np.array(np.meshgrid(*zip(mesh.low, mesh.high, strict=True))).reshape(3, -1).T
+def _boxes(target: Target, depsgraph: bpy.types.Depsgraph) -> Iterator[tuple[NDArray, NDArray, NDArray]]:
+    """Extent of each mesh of a target, and its places."""
+    for part in target.parts(depsgraph)[0]:
+        with part.opened(depsgraph) as opened:
+            if opened is not None:
+                positions = np.nan_to_num(read(opened[0], "position"))
+                yield positions.min(axis=0), positions.max(axis=0), part.matrices
+
+
+def _extent(low: NDArray[np.float64], high: NDArray[np.float64]) -> tuple[float, float]:
+    """Radius and height of a plant that fills a box."""
+    height = float(high[2] if high[2] > 0.0 else high[2] - low[2])
+    return max(0.5 * float((high - low)[:2].max()), _LEAST), max(height, _LEAST)
+
+
+def _corners(low: NDArray, high: NDArray, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Corners (k, 8, 3) of a box in some places."""
+    corner = np.array(np.meshgrid(*zip(low, high, strict=True)), np.float64).reshape(3, -1).T
     return corner @ places[:, :3, :3].transpose(0, 2, 1) + places[:, None, :3, 3]
 
 
-def _measured(meshes: list[tuple[_Mesh, NDArray[np.float64], float]], picture: bool) -> Measures:
+def _measured(meshes: list[_Mesh], picture: bool) -> Measures:
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    total = leaves = polygons = 0.0
-    for mesh, places, weight in meshes:
-        box = _corners(mesh, places)
+    for mesh in meshes:
+        box = _corners(mesh.low, mesh.high, mesh.places)
         low, high = np.minimum(low, box.min(axis=(0, 1))), np.maximum(high, box.max(axis=(0, 1)))
-        size = weight * float((np.abs(np.linalg.det(places[:, :3, :3])) ** (2.0 / 3.0)).sum())
-        total += size * float(mesh.area.sum())
-        leaves += size * mesh.area_of_leaves
-        polygons += weight * len(places) * mesh.faces
-    points, normals, colours = _sampled(meshes, total)
-    height = float(high[2] if high[2] > 0.0 else high[2] - low[2])
-    radius = max(0.5 * float((high - low)[:2].max()), 1e-3)
+    points, normals, colours = _sampled(meshes)
+    radius, height = _extent(low, high)
     base = float(np.clip(np.quantile(points[:, 2], _BASE), 0.0, height)) if len(points) else 0.0
-    drawn = _drawn(points, normals, colours, low, high) if picture else np.zeros((0, 0, 4), np.uint8)
-    colour = tuple(colours.mean(axis=0).tolist()) if len(colours) else (0.5, 0.5, 0.5)
-    return Measures(radius, base, max(height, 1e-3), polygons, leaves, colour, drawn)
+    return Measures(
+        radius=radius,
+        base=base,
+        height=height,
+        polygons=float(sum(len(mesh.places) * mesh.faces for mesh in meshes)),
+        leaves=sum(mesh.sizes * mesh.leaves for mesh in meshes),
+        colour=tuple(colours.mean(axis=0).tolist()) if len(colours) else GREY,
+        picture=_drawn(points, normals, colours, low, high) if picture else np.zeros((0, 0, 4), np.uint8),
+    )
 
 
-def _sampled(
-    meshes: list[tuple[_Mesh, NDArray[np.float64], float]], total: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _sampled(meshes: list[_Mesh]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Points evenly on what covers, with the normals and colors there, (n, 3) each."""
+    total = sum(mesh.sizes * float(mesh.area.sum()) for mesh in meshes)
     draw = np.random.default_rng(1)
     out: list[tuple[NDArray, NDArray, NDArray]] = []
-    for mesh, places, weight in meshes:
-        size = weight * float((np.abs(np.linalg.det(places[:, :3, :3])) ** (2.0 / 3.0)).sum())
+    for mesh in meshes:
         own = float(mesh.area.sum())
-        number = int(np.ceil(_POINTS * size * own / total)) if total > 0.0 and own > 0.0 else 0
+        number = int(np.ceil(_POINTS * mesh.sizes * own / total)) if own > 0.0 else 0
         if not number:
             continue
         triangle = draw.choice(len(mesh.area), number, p=mesh.area / own)
         triangle = triangle[draw.random(number) < mesh.coverage[triangle]]
-        place = places[draw.integers(len(places), size=len(triangle))]
+        place = mesh.places[draw.integers(len(mesh.places), size=len(triangle))]
         corners = mesh.corners[triangle]
         u, v = draw.random((2, len(triangle), 1))
         u, v = np.where(u + v > 1.0, 1.0 - u, u), np.where(u + v > 1.0, 1.0 - v, v)

@@ -20,7 +20,7 @@ from ...growth.hashing import child_key, key_of_seed, uniform
 from ..attributes import world_matrix
 from ..scene.explicit import SURFACE_TYPES
 from ..scene.instances import Reference, name_keys, references_of
-from ..scene.objects import DEEPEST, ONE_BY_ONE, geometry_of, has_nodes, renderable_objects, rendered_objects
+from ..scene.objects import DEEPEST, ONE_BY_ONE, has_nodes, renderable_objects
 from ..scene.plants import AssetPlants, read_asset_plants
 from ..scene.scatterers import is_scatter
 from ..species.asset_species import TetFloraAssetSpecies, asset_species
@@ -157,10 +157,10 @@ def variants_of(entry: TetFloraAssetSpecies, depsgraph: bpy.types.Depsgraph) -> 
     objects = sorted(entry.collection.objects, key=lambda o: o.name_full)
     # Hiding some leaves them out. But where all are hidden, it is so that they show as plants only.
     objects = [o for o in objects if not o.hide_render] or objects
-    found = [_as_it_stands(o, depsgraph) for o in objects if shows_faces(o, depsgraph)]
-    for child in sorted(entry.collection.children, key=lambda c: c.name_full):
-        if not child.hide_render and shows_faces(child, depsgraph):
-            found.append((_target(child), np.eye(4)))
+    found = [_as_it_stands(o, depsgraph) for o in objects]
+    children = sorted(entry.collection.children, key=lambda c: c.name_full)
+    found += [(_target(child), np.eye(4)) for child in children if not child.hide_render]
+    found = [variant for variant in found if shows_faces(variant[0], depsgraph)]
     if not found:
         raise SceneError(
             f'The collection "{entry.collection.name}", which is used as a species, has no object with faces; add some'
@@ -210,44 +210,23 @@ def read_scatters(objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgrap
     return {obj: walk.scatter() for obj, walk in found.items()}
 
 
-def shows_faces(shown: Reference, depsgraph: bpy.types.Depsgraph, depth: int = 0) -> bool:
-    """Whether anything with a surface is shown by an original object or collection, or by evaluated geometry."""
-    if depth > DEEPEST:
-        return False
-    if isinstance(shown, bpy.types.Collection):
-        return any(shows_faces(o, depsgraph, depth + 1) for o in rendered_objects(shown))
-    if isinstance(shown, bpy.types.Object):
-        group = shown.instance_collection if shown.instance_type == 'COLLECTION' else None
-        if group is not None and shows_faces(group, depsgraph, depth + 1):
-            return True
-        if shown.type not in SURFACE_TYPES:
-            return False
-        evaluated = shown.evaluated_get(depsgraph)
-        if not evaluated.is_evaluated:
-            return _has_polygons(shown)
-        if shown.type != 'MESH':
-            return _has_polygons(evaluated)
-        shown = evaluated.evaluated_geometry()
-    return _has_surface(shown) or any(
-        shows_faces(_original(target), depsgraph, depth + 1) for target, _ in references_of(shown)
-    )
+def shows_faces(target: Target, depsgraph: bpy.types.Depsgraph) -> bool:
+    """Whether a target has any face.
 
-
-def _has_polygons(obj: bpy.types.Object) -> bool:
-    """Whether an object of any type with a surface has faces as a mesh, or is made of hair."""
-    if obj.type == 'CURVES':
-        return len(obj.data.curves) > 0
-    mesh = obj.to_mesh()
-    try:
-        return mesh is not None and len(mesh.polygons) > 0
-    finally:
-        obj.to_mesh_clear()
+    Raises
+    ------
+    SceneError
+        It instances itself; the message names what does.
+    """
+    for part in target.parts(depsgraph)[0]:
+        with part.opened(depsgraph) as opened:
+            if opened is not None:
+                return True
+    return False
 
 
 def _has_surface(geometry: bpy.types.GeometrySet) -> bool:
-    if geometry.mesh is not None and len(geometry.mesh.polygons):
-        return True
-    return geometry.curves is not None and len(geometry.curves.curves) > 0
+    return geometry.mesh is not None and len(geometry.mesh.polygons) > 0
 
 
 def _original(target: Reference) -> Reference:
@@ -265,7 +244,7 @@ class _Walk:
         self.owner, self.depsgraph = owner, depsgraph
         self.left: dict[str, int] = {}
         self._parts: dict[Target, list[tuple[NDArray, NDArray]]] = {}
-        self._faces: dict[Reference, bool] = {}
+        self._faces: dict[Target, bool] = {}
 
     def scatter(self) -> Scatter:
         """What was found, each target once."""
@@ -289,12 +268,9 @@ class _Walk:
         return Scatter(places, self.left, self._own_faces())
 
     def _own_faces(self) -> bool:
-        if self.owner.type not in SURFACE_TYPES:
+        if self.owner.type not in SURFACE_TYPES or (geometry := self._geometry(self.owner)) is None:
             return False
-        if self.owner.type == 'MESH' and (geometry := geometry_of(self.owner, self.depsgraph)) is not None:
-            return _has_surface(geometry)
-        evaluated = self.owner.evaluated_get(self.depsgraph)
-        return _has_polygons(evaluated if evaluated.is_evaluated else self.owner)
+        return _has_surface(geometry)
 
     def shown(self, obj: bpy.types.Object, places: NDArray[np.float64], keys: NDArray, depth: int = 0) -> None:
         """Take what an object instances."""
@@ -310,25 +286,20 @@ class _Walk:
                 self.shown(shown, places, keys, depth)
             else:
                 self._instances(shown, places, keys, depth)
-        elif self.has_faces(shown):
-            if isinstance(shown, bpy.types.GeometrySet):
-                target = Target(datablock=None, geometry=shown, owner=self.owner, name=shown.name or self.owner.name)
-            else:
-                target = _target(shown)
-            self.add(target, places, keys)
+        elif isinstance(shown, bpy.types.GeometrySet):
+            name = shown.name or self.owner.name
+            self.add(Target(datablock=None, geometry=shown, owner=self.owner, name=name), places, keys)
         else:
-            name = getattr(shown, "name", "") or self.owner.name
-            self.left[name] = self.left.get(name, 0) + len(keys)
+            self.add(_target(shown), places, keys)
 
     def add(self, target: Target, places: NDArray[np.float64], keys: NDArray[np.uint64]) -> None:
-        """Note places of an asset."""
-        self._parts.setdefault(target, []).append((places, keys))
-
-    def has_faces(self, shown: Reference) -> bool:
-        """As `shows_faces`, asked once."""
-        if shown not in self._faces:
-            self._faces[shown] = shows_faces(shown, self.depsgraph)
-        return self._faces[shown]
+        """Note places of an asset; of what has no faces only how many there are."""
+        if target not in self._faces:
+            self._faces[target] = shows_faces(target, self.depsgraph)
+        if self._faces[target]:
+            self._parts.setdefault(target, []).append((places, keys))
+        else:
+            self.left[target.name] = self.left.get(target.name, 0) + len(keys)
 
     def _instances(self, geometry: bpy.types.GeometrySet, places: NDArray, keys: NDArray, depth: int) -> None:
         for target, rows in references_of(geometry):
@@ -367,11 +338,8 @@ def _one_by_one(walks: dict[bpy.types.Object, _Walk], depsgraph: bpy.types.Depsg
                 matrices.append(tuple(map(tuple, instance.matrix_world)))
                 numbers.append(instance.random_id)
     for (owner, original), (matrices, numbers) in listed.items():
-        walk, keys = walks[owner], child_key(name_keys([owner]), np.array(numbers, np.int64))
-        if walk.has_faces(original):
-            walk.add(_target(original), np.array(matrices, np.float64), keys)
-        else:
-            walk.left[original.name] = walk.left.get(original.name, 0) + len(keys)
+        keys = child_key(name_keys([owner]), np.array(numbers, np.int64))
+        walks[owner].add(_target(original), np.array(matrices, np.float64), keys)
 
 
 def _sizeable(matrices: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -17,6 +17,7 @@ from ...errors import SceneError
 from ...planting import strokes
 from ...planting.places import Placement
 from ...planting.strokes import Brush
+from ..assets.marks import measure_all
 from ..attributes import world_matrix
 from ..runtime import JobData
 from ..scene.fields import fields_of, read_field
@@ -167,7 +168,8 @@ class Stroke:
         self.scene, self.mode = scene, mode
         self.changed = False  # whether a flush has changed the scene
         self._data = JobData("Paint Plants", scene, view_layer)
-        brush_of(scene)  # reports wrong settings before anything changes
+        _, painted = brush_of(scene)  # reports wrong settings before anything changes
+        measure_all(scene, depsgraph, painted)
         # Moss neither counts for the density of trees nor keeps them away.
         self.standing = Standing(scene, depsgraph, covers=mode == 'ERASE')
         self.ground = Ground(view_layer, depsgraph)

@@ -20,6 +20,7 @@ from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ...jobs import Progress
 from ...planting.places import Placement
+from ..assets.marks import measure_all
 from ..runtime import JobData, guarded, is_there
 from ..scene.crowns import crown_steps
 from ..scene.fields import fields_of, stored_size
@@ -145,6 +146,7 @@ def _make_plants_steps(
     yield progress
     refuse_frozen(population)
     species = {entry.species for entry in population.mix}
+    measure_all(scene, depsgraph, species)
     if is_cover(population):
         species |= standing(scene)
     yield from crown_steps(progress, scene, species)

@@ -31,8 +31,7 @@ from ..scene.fields import fields_of, read_field
 from ..scene.objects import objects_within
 from ..scene.skeletons import species_of
 from ..settings import check_limits
-from ..species.asset_species import find_asset, name_of
-from ..species.edits import catalogue
+from ..species.edits import catalogue, unknown_text
 from .canopy import not_of_covers, read_suits
 from .distances import HECTARE, distance_of, empty_means, weights_of
 from .plant_objects import EMPTIES_UNASKED, plants_of
@@ -281,12 +280,7 @@ def read_search(
     """
     unknown = unknown_species(population)
     if unknown:
-        if find_asset(scene, unknown[0]) is not None:
-            raise SceneError(
-                f'"{name_of(unknown[0])}", which was used as a species, was deleted; undo that, or choose another '
-                f'species for "{population.name or "the new population"}"'
-            )
-        raise SceneError(f'Unknown species "{unknown[0]}"; choose one of {", ".join(catalogue())}')
+        raise SceneError(unknown_text(unknown[0]))
     grounds = grounds_of(scene, population) if grounds is None else grounds
     if not grounds:
         raise SceneError(

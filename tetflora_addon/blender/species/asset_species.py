@@ -71,18 +71,23 @@ def find_asset(scene: bpy.types.Scene | None, identifier: str) -> TetFloraAssetS
 
 
 def datablock_of(entry: TetFloraAssetSpecies) -> Datablock | None:
-    """What stands for plants of an asset species; None where it was deleted.
+    """What stands for plants of an asset species; None where it was deleted."""
+    return _living(entry, _references())
 
-    What the artist deletes stays in the file as long as anything refers to it, and be it only this list: then it is as
-    good as gone.
+
+def _living(entry: TetFloraAssetSpecies, references: Counter[bpy.types.Object]) -> Datablock | None:
+    """What an entry refers to, unless that is an object which the artist has deleted.
+
+    It stays in the file as long as anything refers to it, and be it only these lists.
     """
-    found = entry.object or entry.collection
-    return found if found is not None and found.users > _references()[found] else None
+    if entry.object is None:
+        return entry.collection
+    return entry.object if entry.object.users > references[entry.object] else None
 
 
-def _references() -> Counter[Datablock]:
-    """How many entries of the file refer to each object and collection."""
-    return Counter(datablock for entry in entries_of() for datablock in (entry.object, entry.collection))
+def _references() -> Counter[bpy.types.Object]:
+    """How many entries of the file refer to each object."""
+    return Counter(entry.object for entry in entries_of())
 
 
 def asset_species(scene: bpy.types.Scene | None = None) -> dict[str, TetFloraAssetSpecies]:
@@ -90,8 +95,7 @@ def asset_species(scene: bpy.types.Scene | None = None) -> dict[str, TetFloraAss
     references = _references()
     found: dict[str, TetFloraAssetSpecies] = {}
     for entry in entries_of(scene):
-        datablock = entry.object or entry.collection
-        if datablock is not None and datablock.users > references[datablock]:
+        if _living(entry, references) is not None:
             found.setdefault(entry.identifier, entry)
     return found
 

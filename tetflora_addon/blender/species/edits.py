@@ -35,7 +35,7 @@ from ...species.schema import species_file, species_from_json
 from ...species.species import Species
 from ..preferences import species_folders
 from ..runtime import Listeners
-from .asset_species import asset_infos, find_asset, refuse_asset
+from .asset_species import asset_infos, find_asset, name_of, refuse_asset
 
 _FALLBACK_HEIGHT = 5.0  # metres, of the arrow of a plant whose species cannot be read
 
@@ -302,6 +302,14 @@ def _seen_assets() -> dict[str, SpeciesInfo]:
     if _assets is None or now - _assets_at >= _TRUSTED:
         _assets, _assets_at = asset_infos(), now
     return _assets
+
+
+def unknown_text(identifier: str) -> str:
+    """What is said of an identifier that the catalogue does not have: which asset is gone, or what there is."""
+    if find_asset(None, identifier) is not None:
+        name = readable(name_of(identifier), NAME)
+        return f'"{name}", which was used as a species, was deleted; undo that, or choose another species'
+    return f'Unknown species "{readable(identifier, NAME)}"; choose one of {", ".join(catalogue())}'
 
 
 def grown() -> dict[str, SpeciesInfo]:
