@@ -105,7 +105,7 @@ def clear() -> int:
     """
     number = 0
     try:
-        for entry in _entries(_OURS):
+        for entry in _entries(_OURS, _folder):
             if _is_own(entry.stat(follow_symlinks=False)):
                 Path(entry).unlink(missing_ok=True)
                 number += 1
@@ -120,7 +120,7 @@ def _read(path: Path, shape: tuple[int, ...]) -> NDArray[np.float64] | None:
     most = 8 * prod(shape) + _HEADERS
     try:
         content = read_whole(path, most)
-        _refuse_packed(content, most)
+        refuse_packed(content, most)
         with np.load(io.BytesIO(content), allow_pickle=False) as stored:
             values, name = stored["values"], str(stored["name"])
     except FileNotFoundError:
@@ -134,7 +134,7 @@ def _read(path: Path, shape: tuple[int, ...]) -> NDArray[np.float64] | None:
     return values
 
 
-def _refuse_packed(content: bytes, most: int) -> None:
+def refuse_packed(content: bytes, most: int) -> None:
     """Refuse an archive that would take more memory than it has bytes: ours are not compressed, and say their size.
 
     Raises
@@ -154,7 +154,7 @@ def _refuse_packed(content: bytes, most: int) -> None:
 
 
 def _damaged(path: Path) -> None:
-    _warn(f"{path} is damaged or unreadable and will be rebuilt")
+    warn(f"{path} is damaged or unreadable and will be rebuilt")
 
 
 def _write(path: Path, values: NDArray[np.float64]) -> None:
@@ -163,31 +163,31 @@ def _write(path: Path, values: NDArray[np.float64]) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(inside(path.parent, path.name), content.getvalue())
-        _make_room()
+        make_room(_folder, _OURS, MOST_BYTES)
     except OSError as error:
-        _warn(f"cannot write to the cache folder {path.parent}: {error.strerror}")
+        warn(f"cannot write to the cache folder {path.parent}: {error.strerror}")
 
 
-def _make_room() -> None:
-    """Delete this user's files that were not used for longest, as long as all of them are too large, and those that
-    nobody will end.
+def make_room(folder: Path | None, names: re.Pattern[str], most: int) -> None:
+    """Delete this user's files of some names in a folder that were not used for longest, as long as all of them are
+    larger than ``most`` bytes, and those that nobody will end.
 
     Any of them may be gone already: other processes tidy up as well. What others own counts for them alone, or whoever
     fills the folder would empty the rest of it.
     """
     now, files = time.time(), []
-    for entry in islice(_entries(re.compile(f"{_OURS.pattern}|{_BEGUN.pattern}")), _MOST_ENTRIES):
+    for entry in islice(_entries(re.compile(f"{names.pattern}|{_BEGUN.pattern}"), folder), _MOST_ENTRIES):
         with suppress(OSError):
             status = entry.stat(follow_symlinks=False)
             if not _is_own(status):
                 continue
-            if _OURS.fullmatch(entry.name):
+            if names.fullmatch(entry.name):
                 files.append((status.st_mtime_ns, status.st_size, entry.path))
             elif now - status.st_mtime > _ABANDONED:
                 os.unlink(entry)
     total = sum(size for _, size, _ in files)
     for _, size, path in sorted(files):
-        if total <= MOST_BYTES:
+        if total <= most:
             break
         with suppress(OSError):
             os.unlink(path)
@@ -199,14 +199,15 @@ def _is_own(status: os.stat_result) -> bool:
     return not hasattr(os, "getuid") or status.st_uid == os.getuid()
 
 
-def _entries(pattern: re.Pattern[str]) -> Iterator[os.DirEntry[str]]:
-    """Regular files of the folder by name; none if there is no folder."""
-    if _folder is not None and _folder.is_dir():
-        with os.scandir(_folder) as entries:
+def _entries(pattern: re.Pattern[str], folder: Path | None) -> Iterator[os.DirEntry[str]]:
+    """Regular files of a folder by name; none if there is no folder."""
+    if folder is not None and folder.is_dir():
+        with os.scandir(folder) as entries:
             yield from (e for e in entries if pattern.fullmatch(e.name) and e.is_file(follow_symlinks=False))
 
 
-def _warn(text: str) -> None:
+def warn(text: str) -> None:
+    """Report trouble with the folder, once."""
     global _trouble
     if not _trouble:
         print(f"TetFlora: warning: {text}", file=sys.stderr, flush=True)

@@ -135,6 +135,11 @@ class Asset:
         """Number of its faces."""
         return len(self.face)
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays."""
+        return self.clusters.nbytes + self.samples.nbytes + self.part.nbytes + self.face.nbytes
+
     def faces_of(self, cluster: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Parts (k,) and faces (k,) of a cluster."""
         start = int(self.clusters.first_face[cluster])

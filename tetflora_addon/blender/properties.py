@@ -179,6 +179,27 @@ class TetFloraScene(RefinementProperties, AnimationProperties, bpy.types.Propert
         update=_notify_auto_refine,
         options=set(),
     )
+    asset_detail: EnumProperty(
+        name="Assets",
+        description="When instances of assets are refined",
+        items=(
+            (
+                'AUTO',
+                "Automatic",
+                "Refine instances only where that costs the renderer less: Cycles shows plain instances as long as all "
+                "of their objects fit into memory, EEVEE draws every triangle of each",
+            ),
+            ('REFINE', "Always Refine", "Refine instances whatever they cost"),
+        ),
+        default='AUTO',
+    )
+    bake_assets: BoolProperty(
+        name="Bake Materials of Assets",
+        description=(
+            "Let Cycles find the colors of materials whose nodes only a renderer knows, such as procedural textures. "
+            "Reading an asset takes some seconds longer for each such material, once. Without it, means stand for them"
+        ),
+    )
     expand_everything: BoolProperty(
         name="Expand Everything",
         description=(

@@ -56,6 +56,8 @@ class Statistics:
         Polygons of all plants expanded (compiled estimate).
     polygons_meshed, polygons_proxy : int
         Polygons of the plants' meshes, and faces of proxies.
+    instances, instances_whole, instances_clusters : int
+        Instances of assets that took part; those that are drawn as the originals, and clusters as meshes of their own.
     tetrahedra_made, tetrahedra_terminal, tetrahedra_proxy : int
         All tetrahedra ever made; those that are not divided; those of them that are drawn as proxies.
     passes : int
@@ -79,6 +81,9 @@ class Statistics:
     polygons_full: int = 0
     polygons_meshed: int = 0
     polygons_proxy: int = 0
+    instances: int = 0
+    instances_whole: int = 0
+    instances_clusters: int = 0
     tetrahedra_made: int = 0
     tetrahedra_terminal: int = 0
     tetrahedra_proxy: int = 0

@@ -55,6 +55,11 @@ class Given:
         return self.seeds.identifiers
 
     @property
+    def others(self) -> bool:
+        """Whether there is anything but assets."""
+        return len(self.seeds) > 0 or self.explicit is not None
+
+    @property
     def polygons(self) -> Polygons | None:
         """All explicit polygons."""
         return None if self.explicit is None else Polygons.everything(self.explicit.meshes)
@@ -78,6 +83,8 @@ class Given:
         """Objects that strays belong to, and the least of their distances, metres."""
         ends = np.cumsum([number for _, number in self.owners])
         names = [self.owners[i][0] for i in np.searchsorted(ends, strays.plants, side="right").tolist()]
+        ends = np.cumsum([len(one) for one in self.places])
+        names += [self.places[i].owner.name for i in np.searchsorted(ends, strays.assets, side="right").tolist()]
         meshes = self.explicit.meshes if self.explicit is not None else None
         names += [meshes.surfaces[meshes.surface[i]].name for i in strays.instances.tolist()]
         found: dict[str, float] = {}

@@ -33,7 +33,7 @@ from ..species.edits import species_for
 from .contents import Given, read_scene, settings_from
 
 _MAX_SPECIES = 64
-_CHOICES = ("proxy_form", "baked_light", "expand_everything")
+_CHOICES = ("proxy_form", "baked_light", "expand_everything", "asset_detail", "bake_assets")
 #: Settings of a scene that results do not depend on.
 _IGNORED = {
     "statistics",

@@ -18,6 +18,8 @@ import numpy as np
 from ... import memory, parallel
 from ...camera.camera import Camera, origin_near
 from ...compiled.flora import Flora, compile_species
+from ...emission.asset_plan import plan_of
+from ...emission.asset_sight import AssetSight
 from ...emission.budget import afford
 from ...emission.facets import drawn_species
 from ...emission.forms import EmissionForm, Refined
@@ -45,6 +47,8 @@ from ..runtime import JobData, guarded
 from ..scene.camera import read_camera
 from ..scene.objects import taking_part
 from ..worker import at_once, call_in_thread, nobody_waits, steps_in_thread
+from .asset_writing import write_assets, write_plain
+from .assets import Bound, bind_steps, is_plain
 from .contents import Given, compile_for, in_wind, load_for, memory_left, read_scene, refinement_settings
 from .writing import bake_light, write_blocks, write_polygons
 
@@ -143,19 +147,34 @@ def _refine_steps(
         pool.start()
     statistics = Statistics(plants=len(given.seeds), polygons_full=full, seconds=clock.seconds)
     refined = not scene.tetflora.expand_everything
+    statistics.instances = sum(len(one) for one in given.places)
+    bound, left = None, memory_left(scene, camera)
+    plain = not refined or is_plain(scene, given.places, depsgraph, left)
+    if not plain:
+        bound = yield from bind_steps(scene, given.places, depsgraph, camera, left)
+        clock.lap("compile")
+    if bound is not None:
+        statistics.polygons_full += bound.faces
+        full += bound.faces
     # Explicit objects stay visible themselves where everything is expanded.
     originals = given.explicit.originals if given.explicit is not None and refined else []
     for earlier in result_collections(scene, 'VIEW'):
         adopt_materials(scene, earlier)
     if first_look and refined and full > _MANY and not nobody_waits():
-        yield from _first_look(data, results, flora, given, camera, beside, originals)
+        yield from _first_look(data, results, flora, given, bound, depsgraph, camera, beside, originals)
         clock.lap("first look")
     try:
         if not refined:
             in_main_thread(results.open)
             yield from write_blocks(results, flora, expanded_blocks(flora, given.seeds, camera), statistics, 0.05)
+        elif plain and not given.others:
+            in_main_thread(results.open)  # instances alone, best left as they are
         else:
-            yield from _write_refined(results, flora, given, camera, statistics, clock, refinement_settings(scene))
+            settings = refinement_settings(scene)
+            work = _write_refined(results, flora, given, bound, depsgraph, camera, statistics, clock, settings)
+            originals = [*originals, *(yield from work)]
+        if plain:
+            in_main_thread(partial(write_plain, results, given.places, statistics))
         clock.lap("emit")
         data.check()
     except BaseException:  # an error, Esc (GeneratorExit) or Ctrl+C
@@ -173,6 +192,8 @@ def _first_look(
     results: Results,
     flora: Flora,
     given: Given,
+    bound: Bound | None,
+    depsgraph: bpy.types.Depsgraph,
     camera: Camera,
     beside: Sequence[bpy.types.Collection],
     originals: Sequence[bpy.types.Object],
@@ -182,7 +203,13 @@ def _first_look(
     first.origin, given = results.origin, replace(given, sources=None)
     settings, camera = refinement_settings(results.scene).first_look(), camera.smaller(FIRST_LOOK)
     try:
-        for progress in _write_refined(first, flora, given, camera, Statistics(), Stopwatch(), settings):
+        work = _write_refined(first, flora, given, bound, depsgraph, camera, Statistics(), Stopwatch(), settings)
+        while True:
+            try:
+                progress = next(work)
+            except StopIteration as stop:
+                originals = [*originals, *stop.value]
+                break
             yield Progress(0.02 + 0.03 * progress.fraction, "First look", progress.waiting)
         data.check()
     except BaseException:
@@ -218,7 +245,8 @@ def partition(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[C
     camera = read_camera(scene, depsgraph).local()
     given = read_scene(scene, depsgraph, depsgraph.view_layer).counted_from(camera.origin)
     flora = in_wind(scene, compile_for(given.species, scene, depsgraph), camera)
-    return camera, at_once(_run_loop(flora, given, camera, refinement_settings(scene), Statistics()))
+    bound = at_once(bind_steps(scene, given.places, depsgraph, camera, memory_left(scene, camera)))
+    return camera, at_once(_run_loop(flora, given, bound, camera, refinement_settings(scene), Statistics()))
 
 
 def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:
@@ -241,10 +269,16 @@ def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:
 
 
 def _run_loop(
-    flora: Flora, given: Given, camera: Camera, settings: RefinementSettings, statistics: Statistics
+    flora: Flora,
+    given: Given,
+    bound: Bound | None,
+    camera: Camera,
+    settings: RefinementSettings,
+    statistics: Statistics,
 ) -> Generator[Progress, bool | None, Refinement]:
     """Refine; the statistics get a step for each pass."""
-    passes = loop.refine(flora, given.seeds, camera, settings, given.occluders, given.polygons, given.lights)
+    placed = None if bound is None else bound.placed
+    passes = loop.refine(flora, given.seeds, camera, settings, given.occluders, given.polygons, given.lights, placed)
     fraction, enough = 0.05, None
     while True:
         try:
@@ -264,6 +298,7 @@ def _run_loop(
 def _refined(
     flora: Flora,
     given: Given,
+    bound: Bound | None,
     camera: Camera,
     settings: RefinementSettings,
     form: EmissionForm,
@@ -272,40 +307,47 @@ def _refined(
     clock: Stopwatch,
 ) -> Generator[Progress, bool | None, Refined]:
     """Refine, and find out what the proxies depend on."""
-    refinement = yield from _run_loop(flora, given, camera, settings, statistics)
+    refinement = yield from _run_loop(flora, given, bound, camera, settings, statistics)
     yield Progress(_LOOP_FRACTION, "Choosing polygons and proxies")
-    detail = afford(flora, refinement, camera, settings, form.faces, form.primitive_bytes)
-    refinement = detail.refinement
+    assets = None if bound is None else (AssetSight(refinement, camera, form.facets), bound.keeping)
+    detail = afford(flora, refinement, camera, settings, form.faces, form.primitive_bytes, assets)
     clock.lap("refine")
-    _count(statistics, refinement)
+    _count(statistics, detail.refinement)
     statistics.strays = given.named(refinement.strays)
+    planned = None
+    if assets is not None:
+        sight = assets[0] if detail.refinement is refinement else AssetSight(detail.refinement, camera, form.facets)
+        planned = sight, plan_of(sight, detail.leaf_limit if form.facets else None, bound.keeping)
+    refinement = detail.refinement
     if not form.facets:
-        return Refined(flora, refinement, camera, tolerance=detail.tolerance)
+        return Refined(flora, refinement, camera, tolerance=detail.tolerance, assets=planned)
     transition = Transition(flora, camera, detail.leaf_limit, detail.tolerance)
     yield Progress(_LOOP_FRACTION, "Analyzing leaf clustering")
     sight = detail.sight or Sight(flora, refinement, camera)
     if unmeasured(flora):
         for name, done in measuring(flora, drawn_species(sight, transition)):
             yield Progress(_LOOP_FRACTION, f'Analyzing leaf clustering of "{name}": {done:.0%}')
-    return Refined(flora, refinement, camera, detail.pixels, transition, disc, detail.tolerance, sight)
+    return Refined(flora, refinement, camera, detail.pixels, transition, disc, detail.tolerance, sight, planned)
 
 
 def _write_refined(
     results: Results,
     flora: Flora,
     given: Given,
+    bound: Bound | None,
+    depsgraph: bpy.types.Depsgraph,
     camera: Camera,
     statistics: Statistics,
     clock: Stopwatch,
     settings: RefinementSettings,
-) -> Generator[Progress, bool | None, None]:
-    """Refine, and make meshes and proxies."""
+) -> Generator[Progress, bool | None, list[bpy.types.Object]]:
+    """Refine, and make meshes, instances and proxies; returns objects that scatter what has taken part."""
     scene, form = results.scene, form_of(results.scene)
     left = memory_left(scene, camera)
     # What the process holds already and what the image takes count too.
     settings = replace(settings, max_memory=left / 1e9 if np.isfinite(left) else 0.0)
     disc = drawn_disc(scene.render.engine)
-    work = _refined(flora, given, camera, settings, form.emission, disc, statistics, clock)
+    work = _refined(flora, given, bound, camera, settings, form.emission, disc, statistics, clock)
     refined = yield from steps_in_thread(work, Progress(0.05, "Refining, pass 1"))
     in_main_thread(results.open)
     baking = None
@@ -317,11 +359,15 @@ def _write_refined(
     if given.explicit is not None:
         blocks = polygon_blocks(refined.refinement, camera, refined.facet_pixels)
         yield from write_polygons(results, given.explicit, blocks, statistics, baking)
+    hidden = []
+    if refined.assets is not None:
+        hidden = yield from write_assets(results, bound, refined.assets[1], depsgraph, statistics)
     if baking is not None:
         clock.lap("emit")
         yield from bake_light(baking, refined)
         clock.lap("light")
     yield from write_proxies(results, form, refined, statistics, baking)
+    return hidden
 
 
 def _count(statistics: Statistics, refinement: Refinement) -> None:

@@ -1,0 +1,219 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Assets of a job: which of their places are refined, and the compiled assets that stand there.
+
+Blender's meshes are read here, one asset at a time; the engine compiles each in its thread. What was compiled before is
+found by its digest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...assets import kept
+from ...assets.asset import Asset, Assets, Instances
+from ...assets.compiled import compile_steps
+from ...assets.source import AssetSource
+from ...camera.camera import Camera
+from ...emission.asset_costs import AssetCosts
+from ...emission.asset_plan import Keeping
+from ...errors import SceneError, TetFloraError
+from ...jobs import Progress
+from ...refinement.asset_parts import PlacedAssets
+from ..assets.geometry import read_source_steps
+from ..assets.places import Places
+from ..assets.target import Target, digest_of
+from ..results.hiding import hidden_originals, originals_shown
+from ..worker import steps_in_thread
+
+#: Part of the progress bar that compiling takes.
+_START, _END = 0.02, 0.05
+
+
+@dataclass(frozen=True)
+class Bound:
+    """Assets of a scene that take part in refinement, and where they are.
+
+    Attributes
+    ----------
+    targets : tuple of Target
+        What each asset is of.
+    placed : PlacedAssets
+        Instances, in the coordinates of the job.
+    matrices : (n, 4, 4) float64
+        The same, as Blender takes them.
+    owners : tuple of bpy.types.Object or None
+        Objects that show instances; None for those that are plants of many objects.
+    owner : (n,) int32
+        Index into these.
+    keeping : Keeping
+        Which are always drawn as the originals.
+    warnings : tuple of str
+    """
+
+    targets: tuple[Target, ...]
+    placed: PlacedAssets
+    matrices: NDArray[np.float64]
+    owners: tuple[bpy.types.Object | None, ...]
+    owner: NDArray[np.int32]
+    keeping: Keeping
+    warnings: tuple[str, ...] = field(default=())
+
+    @property
+    def faces(self) -> int:
+        """Faces of all instances."""
+        each = np.array([asset.faces for asset in self.placed.assets.every], np.int64)
+        return int(each[self.placed.instances.asset].sum())
+
+
+def is_plain(
+    scene: bpy.types.Scene, places: Sequence[Places], depsgraph: bpy.types.Depsgraph, left: float
+) -> bool:
+    """Whether instances are best left as they are: the renderer draws them at less cost than anything else."""
+    if not places or scene.tetflora.asset_detail == 'REFINE':
+        return not places
+    targets, costs = _costs(places, depsgraph)
+    return not targets or costs.plain(_in_cycles(scene), left)
+
+
+def bind_steps(
+    scene: bpy.types.Scene,
+    places: Sequence[Places],
+    depsgraph: bpy.types.Depsgraph,
+    camera: Camera,
+    left: float,
+) -> Generator[Progress, bool | None, Bound | None]:
+    """Compile the assets of places, which count from the camera's origin; None where there are none.
+
+    Raises
+    ------
+    TetFloraError
+        An asset that cannot be compiled; the message names it.
+    """
+    if not places:
+        return None
+    targets = list(dict.fromkeys(one.target for one in places))
+    assets, warnings = [], []
+    for number, target in enumerate(targets):
+        progress = Progress(_START + (_END - _START) * number / len(targets), f'Reading "{target.name}"')
+        yield progress
+        asset = yield from _compiled(scene, target, depsgraph, progress, warnings)
+        assets.append(asset)
+    index = {target: i for i, target in enumerate(targets)}
+    owners = list(dict.fromkeys(_owner(one) for one in places))
+    matrices = np.concatenate([one.matrices for one in places])
+    number = [len(one) for one in places]
+    instances = Instances(
+        np.repeat([index[one.target] for one in places], number).astype(np.int32),
+        np.ascontiguousarray(matrices[:, :3, :3]),
+        np.ascontiguousarray(matrices[:, :3, 3]),
+        np.concatenate([one.keys for one in places]),
+    )
+    placed = PlacedAssets(Assets.of(assets), instances)
+    owner = np.repeat([owners.index(_owner(one)) for one in places], number).astype(np.int32)
+    keeping = Keeping(np.zeros(len(targets), bool))
+    if scene.tetflora.asset_detail == 'AUTO':
+        _, costs = _costs(places, depsgraph, _covered(placed, camera))
+        keeping = costs.keeping(_in_cycles(scene), left)
+    return Bound(tuple(targets), placed, matrices, tuple(owners), owner, keeping, tuple(dict.fromkeys(warnings)))
+
+
+def _owner(places: Places) -> bpy.types.Object | None:
+    return places.owner if len(places.owners) == 1 else None
+
+
+def _in_cycles(scene: bpy.types.Scene) -> bool:
+    return scene.render.engine == 'CYCLES'
+
+
+def _costs(
+    places: Sequence[Places], depsgraph: bpy.types.Depsgraph, pixels: NDArray[np.float64] | None = None
+) -> tuple[list[Target], AssetCosts]:
+    numbers: dict[Target, int] = {}
+    for one in places:
+        numbers[one.target] = numbers.get(one.target, 0) + len(one)
+    targets = list(numbers)
+    triangles = np.array([triangles_of(target, depsgraph) for target in targets], np.int64)
+    pixels = np.full(len(targets), np.inf) if pixels is None else pixels
+    return targets, AssetCosts(triangles, np.array(list(numbers.values()), np.int64), pixels)
+
+
+def triangles_of(target: Target, depsgraph: bpy.types.Depsgraph) -> int:
+    """Triangles of an asset, without reading any."""
+    number = 0
+    for part in target.parts(depsgraph)[0]:
+        with part.opened(depsgraph) as opened:
+            if opened is not None:
+                number += (len(opened[0].loops) - 2 * len(opened[0].polygons)) * len(part.matrices)
+    return number
+
+
+def _covered(placed: PlacedAssets, camera: Camera) -> NDArray[np.float64]:
+    """Pixels (a,) that instances of each asset would cover if nothing hid them."""
+    wholes = placed.wholes()
+    seen = camera.clearance(wholes.centre) < wholes.reach
+    pixels = np.minimum(wholes.extent / camera.extent_around(wholes.centre), max(camera.width, camera.height)) ** 2
+    return np.bincount(placed.instances.asset, seen * pixels, len(placed.assets.every))
+
+
+def _compiled(
+    scene: bpy.types.Scene,
+    target: Target,
+    depsgraph: bpy.types.Depsgraph,
+    progress: Progress,
+    warnings: list[str],
+) -> Generator[Progress, bool | None, Asset]:
+    """The compiled asset of a target, known already or made now."""
+    bake = scene.tetflora.bake_assets
+    hidden = bool(hidden_originals(scene))
+    source: AssetSource | None = None
+    with originals_shown(scene, depsgraph):
+        digest = digest_of(target, depsgraph, bake=bake)
+        asset = kept.find(digest)
+        if asset is None and hidden:
+            # While results hide what shows the asset, it is evaluated in here only.
+            source = _read(read_source_steps(target, depsgraph, bake=bake), warnings)
+    if asset is not None:
+        return asset
+    if source is None:
+        steps = read_source_steps(target, depsgraph, bake=bake)
+        while True:
+            try:
+                done = next(steps)
+            except StopIteration as stop:
+                source, told = stop.value
+                warnings += told
+                break
+            yield Progress(progress.fraction, f'Reading "{target.name}": {done:.0%}')
+            depsgraph.update()  # reading what was deleted since the last step would crash Blender
+    try:
+        asset = yield from steps_in_thread(_compiling(source, progress.fraction), progress)
+    except TetFloraError as error:
+        raise SceneError(str(error)) from None
+    kept.keep(asset)
+    return asset
+
+
+def _read(steps: Generator[float, None, tuple[AssetSource, tuple[str, ...]]], warnings: list[str]) -> AssetSource:
+    while True:
+        try:
+            next(steps)
+        except StopIteration as stop:
+            source, told = stop.value
+            warnings += told
+            return source
+
+
+def _compiling(source: AssetSource, fraction: float) -> Generator[Progress, None, Asset]:
+    steps = compile_steps(source)
+    while True:
+        try:
+            done = next(steps)
+        except StopIteration as stop:
+            return stop.value
+        yield Progress(fraction, f'Compiling "{source.name}": {done:.0%}')

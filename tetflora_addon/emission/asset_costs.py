@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What instances of assets cost a renderer, and so which of them are best left as they are.
+
+Cycles keeps an asset once, and a few bytes for each instance: rays find their way through ten thousand instances nearly
+as fast as through ten. Where all assets fit into memory, plain instances are the cheapest. EEVEE and the viewport draw
+every triangle of every instance. ``python -m benchmarks assets`` measures both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .asset_plan import Keeping
+
+#: Bytes that Cycles takes for a triangle of an asset with its tree, and for an instance; what Blender takes for one.
+CYCLES_TRIANGLE, CYCLES_INSTANCE, BLENDER_INSTANCE = 290.0, 1_670.0, 160.0
+#: Fraction of the memory that is left which assets that Cycles loads may take.
+SAFE = 0.8
+#: Triangles of all instances up to which EEVEE draws them as fast as what would take their place.
+EEVEE_FEW = 2_000_000
+#: Fraction of an instance that is to be real for EEVEE to draw all of it.
+EEVEE_WHOLE = 0.6
+#: More than any fraction.
+NEVER = 2.0
+
+
+@dataclass(frozen=True)
+class AssetCosts:
+    """What there is of each asset (a).
+
+    Attributes
+    ----------
+    triangles : (a,) int64
+    instances : (a,) int64
+    pixels : (a,) float64
+        Pixels of the image that its instances would cover if nothing hid them; infinite where that is not known.
+    """
+
+    triangles: NDArray[np.int64]
+    instances: NDArray[np.int64]
+    pixels: NDArray[np.float64]
+
+    def plain(self, cycles: bool, left: float) -> bool:
+        """Whether all instances are best left as they are, with so many bytes left."""
+        if not cycles:
+            return bool((self.triangles * self.instances).sum() <= EEVEE_FEW)
+        return bool(self._loaded.sum() + self._of_instances.sum() <= SAFE * left)
+
+    def keeping(self, cycles: bool, left: float) -> Keeping:
+        """Which assets are drawn as the originals wherever they are, where not all can be."""
+        always = np.zeros(len(self.triangles), bool)
+        if not cycles:
+            return Keeping(always, EEVEE_WHOLE)
+        # Those that cover most for what they take; none but these is loaded at all.
+        cost = self._loaded + self._of_instances
+        order = np.argsort(-self.pixels / np.maximum(cost, 1.0), kind="stable")
+        always[order] = np.cumsum(cost[order]) <= SAFE / 2 * left
+        return Keeping(always, NEVER)
+
+    @property
+    def _loaded(self) -> NDArray[np.float64]:
+        return CYCLES_TRIANGLE * self.triangles
+
+    @property
+    def _of_instances(self) -> NDArray[np.float64]:
+        return (CYCLES_INSTANCE + BLENDER_INSTANCE) * self.instances
