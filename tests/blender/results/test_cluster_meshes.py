@@ -13,7 +13,10 @@ from tests.blender.renders import picture, small_scene
 from tests.blender.scenes import depsgraph
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.attributes import face_offsets, members, read, values_of, write
-from tetflora_addon.blender.results.cluster_meshes import AssetMeshes, cluster_mesh_steps, read_surface
+from tetflora_addon.blender.results.cluster_meshes import AssetMeshes, cluster_mesh_steps
+from tetflora_addon.blender.results.collection import Results
+from tetflora_addon.blender.results.instances import add_cluster, add_cluster_instances
+from tetflora_addon.blender.results.surface_arrays import read_surface
 from tetflora_addon.jobs import at_once
 
 ENGINES = ["CYCLES", compat.eevee_engine()]
@@ -104,8 +107,13 @@ def test_clusters_of_a_mesh_look_like_it(clean_file, engine):
     obj.material_slots[0].material = material(READS[7])
     expected = picture()
     asset = AssetMeshes([read_surface(obj.evaluated_get(depsgraph()))], np.zeros(1), np.eye(4))
+    results = Results(bpy.context.scene, 'VIEW')
+    results.open()
+    made = [add_cluster(results, "ball", n, mesh, obj) for n, mesh in enumerate(clusters_of(asset, 12))]
     bpy.data.objects.remove(obj)
-    shown(clusters_of(asset, 7))
+    places, numbers = np.broadcast_to(np.eye(4), (12, 4, 4)), np.arange(12, dtype=np.int32)
+    add_cluster_instances(results, "clusters 000", made, numbers, places, numbers)
+    results.finish()
     seen = picture()
     assert expected.std() > 0.1
     assert np.abs(seen - expected).mean() < 0.002

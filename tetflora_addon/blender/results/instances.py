@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ..attributes import read, write
 from ..compat import set_node_input
+from ..main_thread import in_main_thread
 from ..materials.nodes import Graph, find_socket, get_or_create
 from .collection import Results
 from .looks import look_like
@@ -277,9 +278,13 @@ def _group(kind: str) -> bpy.types.NodeTree:
 def _collection(results: Results, name: str, objects: Sequence[bpy.types.Object]) -> bpy.types.Collection:
     """A collection in no scene; the dot keeps it out of menus."""
     made = bpy.data.collections.new(f".TetFlora {name}")
-    for obj in objects:
-        made.objects.link(obj)
     results.hold(made)
+
+    def link() -> None:
+        for obj in objects:
+            made.objects.link(obj)
+
+    in_main_thread(link)
     return made
 
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from typing import Any
 
 import bpy
@@ -25,19 +26,24 @@ def look_like(made: bpy.types.Object, like: bpy.types.Object | None) -> None:
     if like is None:
         return
     off = [ray for ray in RAYS if not getattr(like, f"visible_{ray}", True)]
-    for ray in off:
-        setattr(made, f"visible_{ray}", False)
-    for name in _OWN:
-        setattr(made, name, getattr(like, name))
-    made.lightgroup = like.lightgroup
-    for name in _LINKING:
-        setattr(made.light_linking, name, getattr(like.light_linking, name))
+    _copy([f"visible_{ray}" for ray in off] + [*_OWN, "lightgroup"], like, made)
+    _copy(_LINKING, like.light_linking, made.light_linking)
     own, others = getattr(made, "cycles", None), getattr(like, "cycles", None)
     if own is not None and others is not None:
-        for prop in own.bl_rna.properties:
-            if not prop.is_readonly and prop.identifier != "name":
-                setattr(own, prop.identifier, getattr(others, prop.identifier))
+        _copy(
+            [p.identifier for p in own.bl_rna.properties if not p.is_readonly and p.identifier != "name"], others, own
+        )
     made[LIKE] = json.dumps({"off": off, "light_group": like.lightgroup})
+
+
+def _copy(names: Iterable[str], source: bpy.types.bpy_struct, target: bpy.types.bpy_struct) -> None:
+    """Copy what differs: each change makes Blender look at all that depends on it."""
+    for name in names:
+        value = getattr(source, name)
+        value = tuple(value) if getattr(source.bl_rna.properties[name], "is_array", False) else value
+        now = getattr(target, name)
+        if (tuple(now) if isinstance(value, tuple) else now) != value:
+            setattr(target, name, value)
 
 
 def likeness(made: bpy.types.Object) -> dict[str, Any] | None:

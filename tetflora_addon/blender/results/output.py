@@ -207,12 +207,14 @@ def remove_collection(scene: bpy.types.Scene | None, collection: bpy.types.Colle
 
 def remove_sources(sources: Iterable[bpy.types.ID]) -> int:
     """Remove what results could show instances of, and nothing uses any more; returns the number removed."""
-    left, removed = [s for s in sources if is_there(s)], 0
-    while unused := [s for s in left if s.users == 0 and is_own(s)]:
-        left = [s for s in left if s not in unused] if len(unused) < len(left) else []
-        bpy.data.batch_remove(unused)
-        removed += len(unused)
-    return removed
+    left, removed = [s for s in sources if is_there(s) and is_own(s)], 0
+    while True:
+        unused = [s.users == 0 for s in left]
+        if not any(unused):
+            return removed
+        bpy.data.batch_remove([s for s, gone in zip(left, unused, strict=True) if gone])
+        left = [s for s, gone in zip(left, unused, strict=True) if not gone]
+        removed += sum(unused)
 
 
 def remove_made(datablocks: Iterable[bpy.types.ID]) -> None:
