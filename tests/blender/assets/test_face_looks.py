@@ -220,48 +220,6 @@ def test_colour_attributes_colour_each_face(domain, kind):
     np.testing.assert_allclose(found, [(0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (0.7, 0, 0)], atol=1e-3)
 
 
-def _through(paint, node, socket="Color", output=0):
-    """Put a node between the image and the base colour."""
-    texture = next(n for n in paint.tree.nodes if n.type == 'TEX_IMAGE')
-    paint.link(texture.outputs["Color"], node.inputs[socket])
-    paint.link(node.outputs[output], paint.shader.inputs["Base Color"])
-    return node
-
-
-def test_nodes_that_change_colours_are_followed():
-    """An even image, so that each result is known exactly."""
-    given = np.array((0.5, 0.25, 0.125))
-    cases = {
-        "Gamma": ({"Gamma": 2.0}, given**2),
-        "BrightContrast": ({"Bright": 0.1, "Contrast": 0.2}, 1.2 * given + 0.1 - 0.1),
-        "Invert": ({"Fac": 1.0}, 1 - given),
-        "HueSaturation": ({"Saturation": 0.0, "Value": 0.5}, np.full(3, 0.25)),
-        "RGBCurve": ({}, given),
-    }
-    for kind, (inputs, expected) in cases.items():
-        paint = Paint(kind)
-        paint.texture(image(np.tile(given, (4, 4, 1)), space="Non-Color"))
-        node = _through(paint, paint.node(kind))
-        for key, value in inputs.items():
-            node.inputs[next(s.name for s in node.inputs if s.identifier == key)].default_value = value
-        np.testing.assert_allclose(look(paint)[0][0], expected, atol=0.004, err_msg=kind)
-
-
-def test_ramp_and_mix_are_followed():
-    paint = Paint()
-    paint.texture(image(np.tile((0.5, 0.5, 0.5), (4, 4, 1)), space="Non-Color"))
-    ramp = _through(paint, paint.node("ValToRGB"), "Fac")
-    ramp.color_ramp.elements[0].color, ramp.color_ramp.elements[1].color = (1, 0, 0, 1), (0, 0, 1, 1)
-    np.testing.assert_allclose(look(paint)[0][0], (0.5, 0, 0.5), atol=0.004)
-    mix = paint.node("Mix", data_type='RGBA', blend_type='MULTIPLY')
-    by_id = {s.identifier: s for s in mix.inputs}
-    by_id["Factor_Float"].default_value = 0.5
-    by_id["B_Color"].default_value = (0.0, 0.0, 0.5, 1)
-    paint.link(ramp.outputs["Color"], by_id["A_Color"])
-    paint.link(next(s for s in mix.outputs if s.identifier == "Result_Color"), paint.shader.inputs["Base Color"])
-    np.testing.assert_allclose(look(paint)[0][0], (0.25, 0, 0.375), atol=0.004)
-
-
 def test_groups_are_entered_with_what_feeds_them():
     """The group holds the shader and a hole; colour and alpha come from outside, or from the group's own inputs."""
     paint, pixels = Paint(), _leaves(128)
@@ -354,3 +312,57 @@ def test_small_faces_of_a_large_mesh_add_up_to_the_image():
     cells = pixels[:1000, :1000, 3]  # each face shows about five texels across
     shown = cells.reshape(n, 5, n, 5).mean(axis=(1, 3)).ravel()
     assert np.corrcoef(shown, coverage)[0, 1] > 0.5
+
+
+def test_very_wide_images_are_read_at_half_their_size():
+    """Wider than what is kept, with rows that are no power of two."""
+    pixels = np.zeros((90, 5000, 4), np.float32)
+    pixels[..., 0] = np.linspace(0, 1, 5000)
+    pixels[:45, :, 3] = 1
+    paint = Paint()
+    paint.texture(image(pixels, space="Non-Color"), alpha=True)
+    colour, _, coverage, _ = look(paint, QUARTERS)
+    np.testing.assert_allclose(coverage, [1, 1, 0, 0], atol=0.03)  # half a texel of 23
+    np.testing.assert_allclose(colour[:2, 0], [0.25, 0.75], rtol=0.01)
+
+
+def test_pixels_of_floating_point_images_are_associated_with_their_alpha():
+    picture = image(np.tile((0.2, 0.1, 0.4, 0.5), (8, 8, 1)), float_buffer=True, space="Non-Color")
+    paint = Paint()
+    paint.texture(picture, alpha=True)
+    colour, _, coverage, _ = look(paint)
+    np.testing.assert_allclose((*colour[0], coverage[0]), (0.4, 0.2, 0.8, 0.5), rtol=2e-3)
+
+
+def test_tiled_images_are_told():
+    paint = Paint()
+    paint.texture(bpy.data.images.new("tiles", 16, 16, tiled=True))
+    (warning,) = look(paint)[3]
+    assert '"tiles"' in warning
+
+
+def test_two_images_meet_texel_by_texel():
+    """Stripes of one image hide those of another: means of each would not show it."""
+    stripes = np.zeros((512, 512, 3), np.float32)
+    stripes[:, np.arange(512) % 32 < 16] = (1, 0.5, 0.25)
+    mask = np.zeros((512, 512, 3), np.float32)
+    mask[:, np.arange(512) % 32 < 16] = 1
+    paint = Paint()
+    paint.texture(image(stripes, space="Non-Color"))
+    other = paint.node("TexImage", image=image(mask, space="Non-Color"))
+    paint.link(other.outputs["Color"], paint.shader.inputs["Alpha"])
+    colour, _, coverage, _ = look(paint)
+    assert coverage[0] == pytest.approx(0.5, abs=0.01)
+    np.testing.assert_allclose(colour[0], (1, 0.5, 0.25), rtol=0.03)
+
+
+def test_faces_without_area_and_coordinates_that_are_no_numbers_are_borne():
+    paint = Paint()
+    paint.texture(image(np.full((8, 8, 3), 0.5), space="Non-Color"), alpha=True)
+    obj = cards([paint.material], [SQUARE] * 3)
+    for vertex in range(4, 8):
+        obj.data.vertices[vertex].co = (0, 0, 0)
+    obj.data.uv_layers[0].uv[9].vector = (np.nan, np.inf)
+    surface = read(obj)[0].surfaces[0]
+    np.testing.assert_allclose(surface.colour, 0.5, atol=0.003)
+    np.testing.assert_allclose(surface.coverage, 1)

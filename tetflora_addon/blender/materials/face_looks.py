@@ -29,6 +29,7 @@ _COLOURS = {'FLOAT_COLOR', 'BYTE_COLOR'}
 _DOMAINS = {'POINT', 'CORNER', 'FACE'}
 _TYPES = {'FLOAT', 'INT', 'INT8', 'BOOLEAN', 'FLOAT2', 'FLOAT_VECTOR', *_COLOURS}
 _LEAST = 1e-4  # coverage below which a face has no colour of its own
+_FAR = np.float32(1e6)  # texture coordinates and colours beyond it are no use
 _TINY = 1e-30  # added to areas, so that those of faces without any count alike
 
 
@@ -191,7 +192,8 @@ class MeshLooks:
         """Values of an attribute at the corners of some triangles: (t, 3, width)."""
         domain, values = self._values[name]
         rows = {'FACE': np.broadcast_to(face[:, None], loops.shape), 'CORNER': loops}.get(domain, verts)
-        return np.nan_to_num(np.take(values, rows, axis=0).astype(np.float32, copy=False), posinf=0, neginf=0)
+        found = np.nan_to_num(np.take(values, rows, axis=0).astype(np.float32, copy=False), posinf=0, neginf=0)
+        return np.clip(found, -_FAR, _FAR, out=found)
 
 
 def _areas(positions: NDArray[np.float32], verts: NDArray[np.int32]) -> NDArray[np.float64]:

@@ -14,8 +14,8 @@ from ..attributes import image_pixels, linear_rgb
 
 #: Columns or rows of the finest copy that is kept; finer ones say nothing about whole faces of a plant.
 MOST_TEXELS = 2048
-#: Rows of an image that are worked on at once.
-_ROWS = 256
+#: Pixels that are worked on at once, so that they stay in the processor's cache.
+_PIXELS = 1 << 16
 #: Bytes of pyramids that are kept for the next material.
 _MOST_BYTES = 512 << 20
 
@@ -65,7 +65,8 @@ class Pyramid:
         extension : {'REPEAT', 'EXTEND', 'CLIP', 'MIRROR'}
         """
         with np.errstate(divide="ignore"):
-            level = np.floor(np.log2(size * self.side))
+            # Of long images the short side counts: more noise, but nothing from beside the square.
+            level = np.floor(np.log2(size * min(self.width[0], self.height[0])))
         level = np.clip(np.nan_to_num(level), 0, self.levels - 1).astype(np.int32)
         outside = None
         if extension == 'CLIP':
@@ -154,37 +155,40 @@ def pyramid_of(image: bpy.types.Image, weighted: bool) -> Pyramid | None:
     )
 
 
-def _finest(image: bpy.types.Image, weighted: bool, halvings: int) -> NDArray[np.float32]:
+def _finest(image: bpy.types.Image, weighted: bool, halvings: int) -> NDArray[np.float16]:
     """The finest copy that is kept (h, w, 4): linear RGB times alpha, and alpha."""
     pixels = image_pixels(image)
-    height, channels = pixels.shape[0], pixels.shape[2]
+    height, width, channels = pixels.shape
     # Eight bits have 256 values: a table is ten times as fast as a power.
     table = None if image.is_float else linear_rgb(image, np.linspace(0, 1, 256, dtype=np.float32)[:, None])[:, 0]
     table = None if table is None else table.astype(np.float32)
+    has_alpha = channels == 4 and image.alpha_mode != 'NONE'
     # Pixels of floating point images are multiplied by their alpha already.
-    associated = image.is_float and image.alpha_mode not in {'CHANNEL_PACKED', 'NONE'}
-    found = []
-    step = max(_ROWS, 1 << halvings)
+    associated = image.is_float and image.alpha_mode != 'CHANNEL_PACKED'
+    step = max(1 << halvings, _PIXELS // width >> halvings << halvings)
+    found = np.zeros((-(-height // (1 << halvings)), -(-width // (1 << halvings)), 4), np.float16)
     for row in range(0, height, step):
         block = pixels[row : row + step]
-        out = np.ones((*block.shape[:2], 4), np.float32)
-        if table is not None:
-            colour = block[..., :3] if channels >= 3 else block[..., :1]
-            out[..., :3] = np.take(table, (colour * 255 + 0.5).astype(np.uint8))
+        alpha = np.clip(block[..., 3:], 0, 1) if has_alpha else None
+        if table is None:
+            out = np.ones((*block.shape[:2], 4), np.float32)
+            out[..., :3] = np.clip(linear_rgb(image, block), 0, 60_000)
         else:
-            out[..., :3] = np.clip(linear_rgb(image, block), 0, None)
-        if channels == 4 and image.alpha_mode != 'NONE':
-            alpha = np.clip(block[..., 3:], 0, 1)
-            if weighted:
-                out[..., 3:] = alpha
-                if not associated:
-                    out[..., :3] *= alpha
-            elif associated:
-                out[..., :3] /= np.maximum(alpha, 1e-6)
+            block = np.broadcast_to(block[..., :1], (*block.shape[:2], 4)) if channels < 3 else block
+            out = np.take(table, (block * np.float32(255) + np.float32(0.5)).astype(np.uint8))
+            out = np.concatenate([out, np.ones_like(out[..., :1])], axis=2) if channels == 3 else out
+        if has_alpha and associated:
+            out /= np.maximum(alpha, 1e-6)
+        if has_alpha and weighted:
+            out *= alpha
+            out[..., 3:] = alpha
+        else:
+            out[..., 3] = 1
         for _ in range(halvings):
             out = _halved(out)
-        found.append(np.minimum(out, np.float32(60_000)).astype(np.float16))
-    return np.concatenate(found)
+        start = row >> halvings
+        found[start : start + len(out)] = np.minimum(out, np.float32(60_000))
+    return found
 
 
 def _halved(level: NDArray[np.floating]) -> NDArray[np.float32]:

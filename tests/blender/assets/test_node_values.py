@@ -1,0 +1,62 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Nodes between images and shaders are followed, on numbers that are known exactly."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.blender.assets.surfaces import Paint, image, look
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+
+def _through(paint, node, socket="Color", output=0):
+    """Put a node between the image and the base colour."""
+    texture = next(n for n in paint.tree.nodes if n.type == 'TEX_IMAGE')
+    paint.link(texture.outputs["Color"], node.inputs[socket])
+    paint.link(node.outputs[output], paint.shader.inputs["Base Color"])
+    return node
+
+
+def test_nodes_that_change_colours_are_followed():
+    """An even image, so that each result is known exactly."""
+    given = np.array((0.5, 0.25, 0.125))
+    cases = {
+        "Gamma": ({"Gamma": 2.0}, given**2),
+        "BrightContrast": ({"Bright": 0.1, "Contrast": 0.2}, 1.2 * given + 0.1 - 0.1),
+        "Invert": ({"Fac": 1.0}, 1 - given),
+        "HueSaturation": ({"Saturation": 0.0, "Value": 0.5}, np.full(3, 0.25)),
+        "RGBCurve": ({}, given),
+    }
+    for kind, (inputs, expected) in cases.items():
+        paint = Paint(kind)
+        paint.texture(image(np.tile(given, (4, 4, 1)), space="Non-Color"))
+        node = _through(paint, paint.node(kind))
+        for key, value in inputs.items():
+            node.inputs[next(s.name for s in node.inputs if s.identifier == key)].default_value = value
+        np.testing.assert_allclose(look(paint)[0][0], expected, atol=0.004, err_msg=kind)
+
+
+def test_ramp_and_mix_are_followed():
+    paint = Paint()
+    paint.texture(image(np.tile((0.5, 0.5, 0.5), (4, 4, 1)), space="Non-Color"))
+    ramp = _through(paint, paint.node("ValToRGB"), "Fac")
+    ramp.color_ramp.elements[0].color, ramp.color_ramp.elements[1].color = (1, 0, 0, 1), (0, 0, 1, 1)
+    np.testing.assert_allclose(look(paint)[0][0], (0.5, 0, 0.5), atol=0.004)
+    mix = paint.node("Mix", data_type='RGBA', blend_type='MULTIPLY')
+    by_id = {s.identifier: s for s in mix.inputs}
+    by_id["Factor_Float"].default_value = 0.5
+    by_id["B_Color"].default_value = (0.0, 0.0, 0.5, 1)
+    paint.link(ramp.outputs["Color"], by_id["A_Color"])
+    paint.link(next(s for s in mix.outputs if s.identifier == "Result_Color"), paint.shader.inputs["Base Color"])
+    np.testing.assert_allclose(look(paint)[0][0], (0.25, 0, 0.375), atol=0.004)
+
+
+def test_nodes_that_are_switched_off_let_colours_pass():
+    paint = Paint()
+    paint.texture(image(np.tile((0.5, 0.25, 0.125), (4, 4, 1)), space="Non-Color"))
+    node = _through(paint, paint.node("Invert"))
+    node.mute = True
+    np.testing.assert_allclose(look(paint)[0][0], (0.5, 0.25, 0.125), atol=0.003)
