@@ -10,6 +10,7 @@ import pytest
 
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
 from tetflora_addon.blender.assets import marks, places
+from tetflora_addon.blender.compat import shader_tree
 from tetflora_addon.blender.placing.distances import distance_of
 from tetflora_addon.blender.placing.plant_objects import add_plant as place_plant
 from tetflora_addon.blender.scene.crowns import crown_for, crown_to_draw
@@ -70,8 +71,7 @@ def test_an_object_is_a_species_in_all_menus_with_its_measures_and_a_picture():
 def test_the_picture_is_lit_and_in_the_colours_of_the_material():
     obj = crown()
     material = bpy.data.materials.new("red")
-    material.use_nodes = True
-    material.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (0.8, 0.05, 0.05, 1.0)
+    shader_tree(material).nodes["Principled BSDF"].inputs["Base Color"].default_value = (0.8, 0.05, 0.05, 1.0)
     obj.data.materials.append(material)
     entry = find_asset(scene(), species(obj))
     assert tuple(entry.colour) == pytest.approx((0.8, 0.05, 0.05), abs=1e-3)
