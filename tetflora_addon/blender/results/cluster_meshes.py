@@ -20,7 +20,7 @@ from ...arrays import spread
 from ...buffers import MeshBuffers
 from ..attributes import KINDS, write
 from .meshes import mesh_steps
-from .surface_arrays import Layer, SurfaceArrays
+from .surface_arrays import AttributeArray, SurfaceArrays
 
 #: Types by what they can hold: where surfaces differ, an attribute has the later one.
 _WIDER = ('BOOLEAN', 'INT8', 'INT', 'FLOAT', 'FLOAT2', 'FLOAT_VECTOR', 'BYTE_COLOR', 'FLOAT_COLOR')
@@ -81,7 +81,7 @@ class _Piece:
     corner: NDArray[np.integer]
     face: NDArray[np.integer]
 
-    def values(self, layer: Layer | None, domain: str, data_type: str) -> NDArray:
+    def values(self, layer: AttributeArray | None, domain: str, data_type: str) -> NDArray:
         """Values of an attribute of the surface on a domain, as of a type; 0 for None."""
         index = {"POINT": self.vertex, "CORNER": self.corner, "FACE": self.face}
         if layer is None:
@@ -232,7 +232,7 @@ def _slots(pieces: Sequence[_Piece]) -> tuple[list[bpy.types.Material | None], l
     return list(numbers), slots
 
 
-def _attributes(pieces: Sequence[_Piece]) -> Iterator[tuple[str, str, str, list[Layer | None]]]:
+def _attributes(pieces: Sequence[_Piece]) -> Iterator[tuple[str, str, str, list[AttributeArray | None]]]:
     """Name, domain, type and the layer of each piece of all attributes."""
     for key in dict.fromkeys(key for piece in pieces for key in piece.surface.layers):
         yield key, *_common([piece.surface.layers.get(key) for piece in pieces])
@@ -243,7 +243,7 @@ def _attributes(pieces: Sequence[_Piece]) -> Iterator[tuple[str, str, str, list[
             yield f"{_RENDERED}_{kind}", *_common(layers)
 
 
-def _common(layers: list[Layer | None]) -> tuple[str, str, list[Layer | None]]:
+def _common(layers: list[AttributeArray | None]) -> tuple[str, str, list[AttributeArray | None]]:
     """Domain and type that hold all of some layers."""
     known = [layer for layer in layers if layer is not None]
     domains, types = {layer.domain for layer in known}, {layer.data_type for layer in known}

@@ -18,7 +18,7 @@ _OWN = {"position", "material_index", "sharp_face", "sharp_edge", "custom_normal
 
 
 @dataclass(frozen=True)
-class Layer:
+class AttributeArray:
     """An attribute of a mesh.
 
     Attributes
@@ -47,7 +47,7 @@ class SurfaceArrays:
         Material of each face.
     materials : list of bpy.types.Material or None
         At least one.
-    layers : mapping of str to Layer
+    layers : mapping of str to AttributeArray
     rendered : (str, str)
         Names of the UV map and the color attribute that materials read if they name none; empty without any.
     normals : (c, 3) float32 or None
@@ -62,7 +62,7 @@ class SurfaceArrays:
     face_offsets: NDArray[np.int32]
     slots: NDArray[np.int32]
     materials: list[bpy.types.Material | None]
-    layers: Mapping[str, Layer]
+    layers: Mapping[str, AttributeArray]
     rendered: tuple[str, str]
     normals: NDArray[np.float32] | None
     flat: NDArray[np.bool_]
@@ -114,8 +114,8 @@ def read_mesh(mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None]) 
     )
 
 
-def _layers(mesh: bpy.types.Mesh) -> Iterator[tuple[str, Layer]]:
+def _layers(mesh: bpy.types.Mesh) -> Iterator[tuple[str, AttributeArray]]:
     for attribute in mesh.attributes:
         known = attribute.data_type in KINDS and attribute.domain in {'POINT', 'FACE', 'CORNER'}
         if known and attribute.name not in _OWN and not attribute.name.startswith("."):
-            yield attribute.name, Layer(attribute.domain, attribute.data_type, values_of(attribute))
+            yield attribute.name, AttributeArray(attribute.domain, attribute.data_type, values_of(attribute))
