@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from ..attributes import image_pixels, values_of, write
 from ..compat import shader_tree
 from ..materials.colour_maths import luminance
-from ..materials.face_looks import FaceLooks, FaceReader, MeshLooks
 from ..materials.nodes import Graph, find_socket
 from ..materials.surface_shaders import SIMPLE
 
@@ -69,16 +68,17 @@ class BakeInput:
     def of(
         cls,
         mesh: bpy.types.Mesh,
-        looks: MeshLooks,
+        materials: dict[int, bpy.types.Material],
+        slot: NDArray[np.int32],
+        first: str,
         positions: NDArray[np.float32],
         loops: NDArray[np.int32],
         corner_verts: NDArray[np.int32],
         face: NDArray[np.int32],
     ) -> BakeInput:
-        """Copy what baking needs of a mesh."""
-        slots = looks.needs_baking
-        slot = looks.slots(0, len(mesh.polygons))[face]
-        kept = np.flatnonzero(np.isin(slot, slots))
+        """Copy what baking needs of a mesh, whose faces have slots (f,); see `AssetSurface` for the arrays."""
+        slot = slot[face]
+        kept = np.flatnonzero(np.isin(slot, list(materials)))
         loops, slot, face = loops[kept], slot[kept], face[kept]
         verts = corner_verts[loops]
         attributes = {}
@@ -91,18 +91,27 @@ class BakeInput:
                 values = values_of(attribute, "color" if kind in _COLOURS else "").astype(np.float32)
                 attributes[attribute.name] = ('FLOAT_COLOR' if kind in _COLOURS else kind), values[rows]
         return cls(
-            materials={one: looks.materials[one] for one in slots},
-            rows={one: np.flatnonzero(slot == one) for one in slots},
+            materials=materials,
+            rows={one: np.flatnonzero(slot == one) for one in materials},
             corners=positions[verts],
             attributes=attributes,
-            first=looks.first_map,
+            first=first,
             box=(tuple(mesh.texspace_location), tuple(mesh.texspace_size)),
             face=face,
         )
 
 
-def bake_steps(baking: BakeInput, looks: FaceLooks, reader: FaceReader) -> Generator[float, None, None]:
-    """Bake materials and write what they look like over what was known of their faces; yields 1.0 between pieces."""
+def bake_steps(
+    baking: BakeInput, colour: NDArray[np.float16], transmission: NDArray[np.float16], coverage: NDArray[np.float16]
+) -> Generator[float, None, list[str]]:
+    """Bake materials and write their looks over those of faces (f, 3), (f,), (f,); yields 1.0 between pieces.
+
+    Returns
+    -------
+    list of str
+        Warnings: what could not be baked.
+    """
+    warnings = []
     for slot, material in baking.materials.items():
         rows = baking.rows[slot]
         if not len(rows):
@@ -114,20 +123,24 @@ def bake_steps(baking: BakeInput, looks: FaceLooks, reader: FaceReader) -> Gener
                 values[piece] = _baked(baking, material, rows[piece])
                 yield 1.0
         except RuntimeError as error:  # Cycles is switched off, or out of memory
-            reader.warn([f'Material "{material.name}" cannot be baked, means stand for it: {error}'.strip()])
+            warnings.append(f'Material "{material.name}" cannot be baked, means stand for it: {error}'.strip())
             continue
-        _write(looks, baking.face[rows], _areas(baking.corners[rows]), values)
+        faces, (cover, *seen, through) = _by_face(baking.face[rows], _areas(baking.corners[rows]), values)
+        seen = np.stack(seen, axis=1)
+        light = luminance(seen.T.astype(np.float32))
+        coverage[faces] = np.clip(cover, 0, 1)
+        colour[faces] = np.clip(seen / np.maximum(cover, 1e-4)[:, None], 0, 1)
+        transmission[faces] = np.clip(through / np.maximum(light, 1e-6), 0, 1)
+    return warnings
 
 
-def _write(looks: FaceLooks, face: NDArray[np.int32], areas: NDArray, values: NDArray[np.float32]) -> None:
+def _by_face(
+    face: NDArray[np.int32], areas: NDArray[np.float64], values: NDArray[np.float32]
+) -> tuple[NDArray[np.int32], list[NDArray[np.float64]]]:
+    """Faces, and for each column of values its means over them."""
     faces, which = np.unique(face, return_inverse=True)
     total = np.bincount(which, areas)
-    cover, *colour, through = (np.bincount(which, column * areas) / total for column in values.T)
-    colour = np.stack(colour, axis=1)
-    light = luminance(colour.T.astype(np.float32))
-    looks.coverage[faces] = np.clip(cover, 0, 1)
-    looks.colour[faces] = np.clip(colour / np.maximum(cover, 1e-4)[:, None], 0, 1)
-    looks.transmission[faces] = np.clip(through / np.maximum(light, 1e-6), 0, 1)
+    return faces, [np.bincount(which, column * areas) / total for column in values.T]
 
 
 def _areas(corners: NDArray[np.float32]) -> NDArray[np.float64]:

@@ -15,7 +15,7 @@ from ...errors import SceneError
 from ..attributes import members, read
 from ..materials.face_looks import FaceReader
 from .baked_looks import BakeInput, bake_steps
-from .parts import Part
+from .parts import AssetPart
 from .target import Target, digest_of_parts
 
 #: Triangles whose corners become vertices at once.
@@ -61,7 +61,7 @@ def read_source_steps(
     reader.warn(left)
     digest = digest_of_parts(parts, depsgraph, bake)
     surfaces: list[AssetSurface] = []
-    shown: list[Part] = []
+    shown: list[AssetPart] = []
     for number, part in enumerate(parts):
         steps = _surface_steps(part, depsgraph, reader, bake)
         surface = yield from _between(steps, number / len(parts), (number + 1) / len(parts))
@@ -102,7 +102,7 @@ def _between(
 
 
 def _surface_steps(
-    part: Part, depsgraph: bpy.types.Depsgraph, reader: FaceReader, bake: bool
+    part: AssetPart, depsgraph: bpy.types.Depsgraph, reader: FaceReader, bake: bool
 ) -> Generator[float, None, AssetSurface | None]:
     """Read one mesh; None if it has no faces. Between two steps nothing of Blender's meshes is held."""
     baking = None
@@ -120,7 +120,9 @@ def _surface_steps(
         corner_verts = read(mesh, ".corner_vert")
         looks = reader.prepare(mesh, slots)
         if bake and looks.needs_baking:
-            baking = BakeInput.of(mesh, looks, positions, loops, corner_verts, face)
+            chosen = {slot: slots[slot] for slot in looks.needs_baking}
+            slot = looks.slots(0, faces)
+            baking = BakeInput.of(mesh, chosen, slot, looks.first_map, positions, loops, corner_verts, face)
         else:
             names = sorted({slots[slot].name for slot in looks.needs_baking})
             reader.warn(
@@ -131,7 +133,7 @@ def _surface_steps(
     yield 0.0
     found = yield from looks.steps(faces, positions, loops, corner_verts, face)
     if baking is not None:
-        yield from bake_steps(baking, found, reader)
+        reader.warn((yield from bake_steps(baking, found.colour, found.transmission, found.coverage)))
     return AssetSurface(
         name=part.name,
         positions=positions,

@@ -26,7 +26,7 @@ Slots = list[bpy.types.Material | None]
 
 
 @dataclass
-class Part:
+class AssetPart:
     """A mesh of an asset.
 
     Attributes
@@ -91,7 +91,7 @@ def parts_of(
     shown: bpy.types.Object | bpy.types.Collection | bpy.types.GeometrySet,
     name: str,
     depsgraph: bpy.types.Depsgraph,
-) -> tuple[list[Part], list[str]]:
+) -> tuple[list[AssetPart], list[str]]:
     """Meshes of an asset with their places, and warnings of what is left out.
 
     Raises
@@ -118,7 +118,7 @@ class _Walk:
 
     def __init__(self, name: str, depsgraph: bpy.types.Depsgraph) -> None:
         self.name, self.depsgraph = name, depsgraph
-        self.parts: dict[object, Part] = {}
+        self.parts: dict[object, AssetPart] = {}
         self.warnings: list[str] = []
 
     def object(self, obj: bpy.types.Object, matrices: NDArray[np.float64], path: Path) -> None:
@@ -142,7 +142,7 @@ class _Walk:
                 return
             self._instances(geometry, matrices, path)
             if obj.type == 'CURVES' and geometry.mesh is not None:
-                self._add(obj, Part(obj.name, geometry), matrices)
+                self._add(obj, AssetPart(obj.name, geometry), matrices)
 
     def collection(self, collection: bpy.types.Collection, matrices: NDArray[np.float64], path: Path) -> None:
         """Take what a collection shows in renders."""
@@ -161,7 +161,7 @@ class _Walk:
         """Take geometry without an object, with what it instances."""
         if geometry.mesh is not None:
             name = geometry.name or (path[-1].name if path else self.name)
-            self._add(geometry, Part(name, geometry), matrices)
+            self._add(geometry, AssetPart(name, geometry), matrices)
         self._instances(geometry, matrices, path)
 
     def _instances(self, geometry: bpy.types.GeometrySet, matrices: NDArray[np.float64], path: Path) -> None:
@@ -205,9 +205,9 @@ class _Walk:
         if obj.type == 'MESH':
             # Objects that share a mesh and its materials are one.
             own = tuple(s.material for s in obj.material_slots if s.link == 'OBJECT')
-            self._add((evaluated.data.as_pointer(), own), Part(obj.name, obj), matrices)
+            self._add((evaluated.data.as_pointer(), own), AssetPart(obj.name, obj), matrices)
         else:
-            self._add(obj, Part(obj.name, obj), matrices)
+            self._add(obj, AssetPart(obj.name, obj), matrices)
 
-    def _add(self, key: object, part: Part, matrices: NDArray[np.float64]) -> None:
+    def _add(self, key: object, part: AssetPart, matrices: NDArray[np.float64]) -> None:
         self.parts.setdefault(key, part).places.append(matrices)

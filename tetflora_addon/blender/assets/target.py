@@ -15,7 +15,7 @@ import numpy as np
 
 from ..attributes import members, read, values_of
 from .material_digests import attributes_of, material_digest
-from .parts import Part, Slots, parts_of
+from .parts import AssetPart, Slots, parts_of
 
 #: Changes what a digest is of; raise it when what is read of an asset changes.
 _VERSION = 1
@@ -50,7 +50,7 @@ class Target:
         """The datablock or the geometry."""
         return self.geometry if self.datablock is None else self.datablock
 
-    def parts(self, depsgraph: bpy.types.Depsgraph) -> tuple[list[Part], list[str]]:
+    def parts(self, depsgraph: bpy.types.Depsgraph) -> tuple[list[AssetPart], list[str]]:
         """What it consists of, see `parts.parts_of`."""
         return parts_of(self.shown, self.name, depsgraph)
 
@@ -76,7 +76,7 @@ def digest_of(target: Target, depsgraph: bpy.types.Depsgraph, *, bake: bool = Fa
     return digest_of_parts(parts, depsgraph, bake)
 
 
-def digest_of_parts(parts: list[Part], depsgraph: bpy.types.Depsgraph, bake: bool) -> str:
+def digest_of_parts(parts: list[AssetPart], depsgraph: bpy.types.Depsgraph, bake: bool) -> str:
     """As `digest_of`."""
     content = hashlib.sha256(f"{_VERSION} {bake}".encode())
     for part in parts:

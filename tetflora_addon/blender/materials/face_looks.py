@@ -19,7 +19,10 @@ from numpy.typing import NDArray
 
 from ..attributes import read, values_of
 from .colour_maths import luminance
-from .look_points import Known, MeshLayers, plan_of
+from .look_points import Known, MeshLayers, Plan, find_out
+from .means import GREY, Look
+from .node_values import Notes
+from .surface_shaders import SurfaceShaders
 
 #: Triangles that are worked on at once.
 _TRIANGLES = 1 << 16
@@ -94,7 +97,7 @@ class MeshLooks:
         types = {a.name: a.data_type for a in mesh.attributes if a.domain in _DOMAINS and a.data_type in _TYPES}
         self._known, self._layers = known, MeshLayers(first, types)
         self.materials = materials
-        self.plans = [plan_of(material, self._layers, known) for material in materials]
+        self.plans = [_plan_of(material, self._layers, known) for material in materials]
         self._values: dict[str, tuple[str, NDArray]] = {}
         for name in {name for plan in self.plans for name in plan.names}:
             attribute = mesh.attributes[name]
@@ -194,6 +197,21 @@ class MeshLooks:
         rows = {'FACE': np.broadcast_to(face[:, None], loops.shape), 'CORNER': loops}.get(domain, verts)
         found = np.nan_to_num(np.take(values, rows, axis=0).astype(np.float32, copy=False), posinf=0, neginf=0)
         return np.clip(found, -_FAR, _FAR, out=found)
+
+
+def _plan_of(material: bpy.types.Material | None, layers: MeshLayers, known: Known) -> Plan:
+    """Find out how to evaluate a material."""
+    notes = Notes()
+    if material is None:
+        return Plan("", notes, _constant(Look(GREY)))
+    shaders = SurfaceShaders(material, known.looks, notes)
+    plan = Plan(material.name, notes, _constant(shaders.plain), shaders.at)
+    find_out(plan, layers, known)
+    return plan
+
+
+def _constant(look: Look) -> NDArray[np.float32]:
+    return np.array([look.coverage, *np.multiply(look.colour, look.coverage), 0.0], np.float32)
 
 
 def _areas(positions: NDArray[np.float32], verts: NDArray[np.int32]) -> NDArray[np.float64]:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 
@@ -14,9 +15,10 @@ from numpy.typing import NDArray
 from ...growth.hashing import mix
 from .colour_maths import Values
 from .image_pyramids import Pyramid, Pyramids
-from .means import Look, Looks
-from .node_values import NodeValues, NotUnderstood
-from .surface_shaders import Notes, Scattered, SurfaceShaders, grey
+from .means import Looks
+from .node_values import NodeValues, Notes, NotUnderstood
+
+Shade = tuple[Values, Values, Values]
 
 #: Parts along an edge, at most; texels of the finest image along an edge of a part, about. Where steps, or several
 #: images, make the mean of what nodes get something else than the mean of what comes out, single texels are looked at.
@@ -53,10 +55,14 @@ class Plan:
 
     Attributes
     ----------
-    shaders : SurfaceShaders or None
+    name : str
+        Of the material, for messages.
     notes : Notes
     constant : (5,) float32
         Cover, colour times cover, and the lightness of what goes through; of where all has its mean, if it varies.
+    shade : callable, optional
+        What its shaders do with light at some points: cover, colour times cover, lightness of what goes through;
+        None if it has none.
     known : bool
         Whether its transmission is.
     maps, colours : list of str
@@ -67,9 +73,10 @@ class Plan:
         Whether it is not the mean that comes out for the mean.
     """
 
-    shaders: SurfaceShaders | None
+    name: str
     notes: Notes
     constant: NDArray[np.float32]
+    shade: Callable[[NodeValues], Shade | None] | None = None
     known: bool = True
     maps: list[str] = field(default_factory=list)
     colours: list[str] = field(default_factory=list)
@@ -106,7 +113,7 @@ class Plan:
                 part = np.float32(0 if self.uneven else 1 / n)
                 sizes = {name: height[None, some] * part for name, (_, height) in extents.items()}
                 points = _Sampled(self, layers, known, {name: corners[name][some] for name in self.names}, sizes, n)
-                found[some] = _means(self.shaders.at(NodeValues(points, known.curves)))
+                found[some] = _means_of(self.shade(NodeValues(points, known.curves)))
         return found[which]
 
     def _parts(self, lengths: list[NDArray[np.float32]], count: int, most: int) -> NDArray[np.int32]:
@@ -148,7 +155,7 @@ class _Probe:
         return np.full((4, 1, 1), 0.5 if exists else 0.0, np.float32)
 
     def pyramid(self, node: bpy.types.Node, scale: float) -> Pyramid:
-        material, image = self._plan.shaders.material.name, node.image
+        material, image = self._plan.name, node.image
         if image is None:
             raise NotUnderstood(
                 f'An image of material "{material}" is missing; its viewport color stands for it. Choose an image in '
@@ -221,30 +228,19 @@ class _Sampled:
         pass
 
 
-def plan_of(material: bpy.types.Material | None, layers: MeshLayers, known: Known) -> Plan:
-    """Find out how to evaluate a material."""
-    notes = Notes()
-    if material is None:
-        return Plan(None, notes, _constant(grey()))
-    shaders = SurfaceShaders(material, known.looks, notes)
-    plan = Plan(shaders, notes, _constant(shaders.plain))
+def find_out(plan: Plan, layers: MeshLayers, known: Known) -> None:
+    """Evaluate a plan once where everything has its mean, and note what that takes."""
     probe = _Probe(plan, layers, known)
-    scattered = shaders.at(NodeValues(probe, known.curves))
-    if scattered is None:
-        plan.known = False
-        return plan
-    plan.constant = _means(scattered)[0]
-    plan.uneven |= len(probe.images) > 1
-    return plan
+    found = plan.shade(NodeValues(probe, known.curves))
+    plan.known = found is not None
+    if found is not None:
+        plan.constant = _means_of(found)[0]
+        plan.uneven |= len(probe.images) > 1
 
 
-def _constant(look: Look) -> NDArray[np.float32]:
-    return np.array([look.coverage, *np.multiply(look.colour, look.coverage), 0.0], np.float32)
-
-
-def _means(scattered: Scattered) -> NDArray[np.float32]:
+def _means_of(shade: Shade) -> NDArray[np.float32]:
     """Means over the points of each triangle (k, 5); (1, 5) where all are the same."""
-    parts = [part.mean(axis=0) for part in (scattered.cover, *scattered.colour, scattered.through)]
+    parts = [part.mean(axis=0) for part in (shade[0], *shade[1], shade[2])]
     return np.stack(np.broadcast_arrays(*parts), axis=-1)
 
 

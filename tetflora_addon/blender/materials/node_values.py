@@ -9,6 +9,7 @@ direction of a ray, or on which instance it is, counts with its mean.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import bpy
@@ -45,7 +46,28 @@ class NotUnderstood(Exception):
         self.problem = problem
 
 
-class Points(Protocol):
+@dataclass
+class Notes:
+    """What was not understood of a material.
+
+    Attributes
+    ----------
+    needs_baking : bool
+        Some nodes are only known to a renderer; means stand for them.
+    problems : list of str
+        For the artist.
+    """
+
+    needs_baking: bool = False
+    problems: list[str] = field(default_factory=list)
+
+    def tell(self, problem: str) -> None:
+        """Add a problem, if it is new."""
+        if problem not in self.problems:
+            self.problems.append(problem)
+
+
+class SurfacePoints(Protocol):
     """Places on a surface, (p, k): p in each of k triangles."""
 
     def uv(self, name: str) -> tuple[Values, Values, Values]:
@@ -69,12 +91,12 @@ class NodeValues:
 
     Parameters
     ----------
-    points : Points
+    points : SurfacePoints
     curves : dict
         Ramps and curves as tables; kept from one call to the next.
     """
 
-    def __init__(self, points: Points, curves: dict[int, NDArray[np.float32]]) -> None:
+    def __init__(self, points: SurfacePoints, curves: dict[int, NDArray[np.float32]]) -> None:
         self._points, self._curves = points, curves
         self._images: dict[tuple[int, ...], tuple[Values, Values]] = {}
         self._scale, self._size = 1.0, np.zeros((1, 1), np.float32)

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import bpy
@@ -13,8 +12,8 @@ import numpy as np
 
 from ..compat import tree_in_use
 from .colour_maths import Values, luminance
-from .means import GREY, Look, Looks
-from .node_values import NodeValues, NotUnderstood, Stack, source_of
+from .means import Look, Looks
+from .node_values import NodeValues, Notes, NotUnderstood, Stack, source_of
 from .nodes import active_output, find_socket
 
 #: Shaders by what they let through of the light that they scatter, and the input of their colour.
@@ -50,27 +49,6 @@ class Scattered(NamedTuple):
     cover: Values
     colour: Values
     through: Values
-
-
-@dataclass
-class Notes:
-    """What was not understood of a material.
-
-    Attributes
-    ----------
-    needs_baking : bool
-        Some nodes are only known to a renderer; means stand for them.
-    problems : list of str
-        For the artist.
-    """
-
-    needs_baking: bool = False
-    problems: list[str] = field(default_factory=list)
-
-    def tell(self, problem: str) -> None:
-        """Add a problem, if it is new."""
-        if problem not in self.problems:
-            self.problems.append(problem)
 
 
 _ONE, _NONE = np.ones((1, 1), np.float32), np.zeros((1, 1), np.float32)
@@ -199,11 +177,6 @@ class SurfaceShaders:
 def _solid(cover: Values, colour: Values, through: Values) -> Scattered:
     scattered = np.clip(colour, 0, 1) * cover
     return Scattered(cover, scattered, luminance(scattered) * through)
-
-
-def grey() -> Look:
-    """What Blender shows where there is no material."""
-    return Look(GREY, 0.0)
 
 
 _SHADERS: dict[str, Callable[[SurfaceShaders, NodeValues, bpy.types.Node, Stack], Scattered]] = {
