@@ -18,17 +18,21 @@ from numpy.typing import NDArray
 
 from devtools import session
 from tetflora_addon import parallel
+from tetflora_addon.assets import kept
+from tetflora_addon.assets.compiled import compile_asset
+from tetflora_addon.blender.assets.geometry import read_source
+from tetflora_addon.blender.assets.target import Target, digest_of
 from tetflora_addon.processes import pool
 
 from . import asset_scenes, asset_trees
 from .asset_scenes import Scatter
 from .report import cpu_s, forget_peak
-from .row80 import timed_refine
+from .row80 import timed_refine, timed_render
 from .time_to_picture import of_render
 
-#: Samples that images have, and those of timed images.
-SAMPLES = {"CYCLES": 64, "EEVEE": 16}
-TIMED = {"CYCLES": 4, "EEVEE": 3}
+#: Samples that images have in Cycles, of which few are rendered, and in EEVEE: its first sample takes most, so that
+#: more of them cannot be told from few.
+SAMPLES, TIMED, EEVEE_SAMPLES = 64, 4, 2
 _STATUS = Path("/proc/self/status")
 
 
@@ -67,15 +71,18 @@ def timed(path: Path, what: str, engine: str, detail: str = "AUTO") -> dict[str,
         statistics, refine_s = timed_refine(scene)
         figures["polygons"] = statistics.polygons_meshed + statistics.polygons_proxy
     refined = memory()["peak_mb"]
-    times = of_render(scene, path.with_name(f"{path.stem}-{what}-{engine}.png"), kind, TIMED[engine])
-    setup, sample = times["setup_s"], times["sample_s"]
+    image = path.with_name(f"{path.stem}-{what}-{engine}.png")
+    if engine == "EEVEE":
+        figures["render_s"] = timed_render(scene, image, EEVEE_SAMPLES, engine=kind)
+    else:
+        times = of_render(scene, image, kind, TIMED)
+        figures |= {"setup_s": times["setup_s"], "sample_s": times["sample_s"]}
+        figures["render_s"] = times["setup_s"] + SAMPLES * times["sample_s"]
     return {
         **figures,
         "read_s": read_s,
         "refine_s": refine_s,
-        "setup_s": setup,
-        "sample_s": sample,
-        "total_s": read_s + refine_s + setup + SAMPLES[engine] * sample,
+        "total_s": read_s + refine_s + figures["render_s"],
         "opened_mb": opened,
         "refined_mb": refined,
         **memory(),
@@ -84,10 +91,6 @@ def timed(path: Path, what: str, engine: str, detail: str = "AUTO") -> dict[str,
 
 def compiled(kind: str, quick: bool) -> dict[str, float]:
     """Seconds, bytes and exactness of compiling a tree on one core; seconds are those of the processor."""
-    from tetflora_addon.assets.compiled import compile_asset
-    from tetflora_addon.blender.assets.geometry import read_source
-    from tetflora_addon.blender.assets.target import Target, digest_of
-
     scene, tree = bpy.context.scene, asset_trees.make(kind, quick)
     scene.collection.objects.link(tree)
     bpy.context.view_layer.update()
@@ -107,13 +110,17 @@ def compiled(kind: str, quick: bool) -> dict[str, float]:
         "read_s_per_mtri": (read - begun) / triangles * 1e6,
         "compile_s_per_mtri": (done - begun) / triangles * 1e6,
         "bytes_per_triangle": (resident_mb() - before) * 1e6 / triangles,
-        "held_bytes_per_triangle": asset.nbytes / triangles if hasattr(asset, "nbytes") else float("nan"),
+        "held_bytes_per_triangle": asset.nbytes / triangles,
     }
+    kept.keep(asset)
+    kept.forget()
     begun = cpu_s()
-    again = digest_of(target, depsgraph)
-    found = compile_asset(source)
+    digest = digest_of(target, depsgraph)
+    figures["digest_s"] = cpu_s() - begun
+    found = kept.find(digest)
     figures["again_s"] = cpu_s() - begun
-    figures["same"] = float(again == source.digest and len(found.clusters) == len(asset.clusters))
+    if found is None or len(found.clusters) != len(asset.clusters):
+        raise RuntimeError("the compiled asset was not found again")
     return figures | exactness(source, asset)
 
 
@@ -182,7 +189,7 @@ def libraries(folder: Path, number: int, triangles: int) -> dict[str, float]:
 
 def store_many(folder: Path, number: int, layout: str, triangles: int, each: int) -> None:
     """Save a wood of different assets, so many instances of each, out of the first library files."""
-    files = sorted((folder / f"libraries-{triangles}").glob("*.blend"))[:number]
+    files = asset_trees.store_libraries(folder / f"libraries-{triangles}", number, triangles)
     asset_scenes.store_many(many_file(folder, number, layout, triangles), files, layout == "linked", each * number)
 
 

@@ -118,6 +118,7 @@ def different(number: int, triangles: int, first: int = 100) -> Iterator[bpy.typ
 
 def store_libraries(folder: Path, number: int, triangles: int) -> list[Path]:
     """Save different trees each in a file of its own, as a collection of the file's name; files that exist are kept."""
+    folder.mkdir(parents=True, exist_ok=True)
     paths = [folder / f"tree{seed}.blend" for seed in range(100, 100 + number)]
     for seed, path in enumerate(paths, 100):
         if path.exists():

@@ -10,7 +10,7 @@
 
 Parts: ``compile`` (seconds, bytes, areas and bounds), ``pictures`` (FLIP), ``crown`` (light through a crown of cards,
 colour of its tenths), ``forest`` (10,000 and a million instances), ``cycles`` and ``eevee`` (from a .blend file to an
-image of 64 and 16 samples, of which few are rendered), ``many`` (different assets), ``window`` (redraws of the
+image of 64 samples, of which few are rendered, and of 2), ``many`` (different assets), ``window`` (redraws of the
 viewport; needs a full Blender, named by the environment variable BLENDER, and a virtual screen).
 
 Each case runs in a process of its own; memory is that of this process alone, and ``_others_mb`` that of processes that
@@ -38,12 +38,12 @@ LARGE = 250_000
 #: Instances and distances of the race in Cycles.
 COUNTS, QUICK_COUNTS, ENDS = (20, 1_000, 10_000), (20,), ("near", "far")
 #: Instances of plain images in EEVEE, and those that they are extrapolated to.
-EEVEE_PLAIN, EEVEE_COUNTS = (5, 20), (200, 10_000)
+EEVEE_PLAIN, EEVEE_COUNTS = (4, 12), (200, 10_000)
 #: Different assets, their triangles, how many of them plain Cycles takes here, and instances of each.
 MANY, MANY_TRIANGLES, MANY_PLAIN, MANY_EACH = 60, 2_000_000, (2, 6), 10
 QUICK_MANY, QUICK_MANY_TRIANGLES = 6, 300_000
 #: Of images in EEVEE, which draws in software here.
-EEVEE_SIZE = 960, 540
+EEVEE_SIZE = 640, 360
 #: Instances in the window, refined and plain.
 WINDOW, WINDOW_PLAIN = 10_000, 100
 FOREST, MILLION = 10_000, 1_000_000
