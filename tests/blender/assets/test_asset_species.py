@@ -187,6 +187,20 @@ def test_companions_ground_cover_and_the_brush_take_assets():
     assert sum(map(len, read())) > before
 
 
+def test_the_brush_does_not_plant_on_an_asset():
+    rock = crown("Rock", 4.0)
+    add_mesh("ground", size=20.0)
+    brush = scene().tetflora.brush
+    brush.source, brush.species, brush.density = 'ONE', "fern", 20.0
+    for asset, heights in ((False, {0.0, 5.0}), (True, {0.0})):
+        if asset:
+            species(rock)
+        assert bpy.ops.tetflora.paint_plants(mode='PAINT', stroke="3.5 0 0, 4.5 0 0") == {'FINISHED'}
+        plants = [o for o in scene().objects if o.tetflora.is_plant]
+        assert {round(o.location.z, 3) for o in plants} == heights
+        bpy.data.batch_remove(plants)
+
+
 def test_other_operators_on_plants_take_assets():
     own = species(crown())
     plant = add_plant(species="bush")

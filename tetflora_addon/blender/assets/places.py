@@ -176,17 +176,18 @@ def _as_it_stands(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Vari
 
 def _by_variant(plants: AssetPlants, variants: list[Variant]) -> list[Places]:
     keys = key_of_seed(plants.seed)
-    if len(variants) == 1:
-        chosen = np.zeros(len(keys), np.int64)
-    else:
-        chosen = (uniform(child_key(keys, _VARIANT), 0) * len(variants)).astype(np.int64)
+    chosen = np.zeros(len(keys), np.int64)
+    if len(variants) > 1:
+        chosen[:] = uniform(child_key(keys, _VARIANT), 0) * len(variants)
     found = []
     for number, (target, turned) in enumerate(variants):
-        matrices = plants.matrices @ turned
-        own = np.flatnonzero((chosen == number) & _sizeable(matrices))
-        if len(own):
+        own = np.flatnonzero(chosen == number)
+        matrices = (plants.matrices[own].reshape(-1, 4) @ turned).reshape(-1, 4, 4)
+        whole = _sizeable(matrices)
+        if whole.any():
+            own, matrices = own[whole], matrices[whole]
             owners = plants.owners if len(plants.owners) == 1 else tuple(plants.owners[i] for i in own.tolist())
-            found.append(Places(target, owners[0], matrices[own], keys[own], owners))
+            found.append(Places(target, owners[0], matrices, keys[own], owners))
     return found
 
 
@@ -335,7 +336,7 @@ def _one_by_one(walks: dict[bpy.types.Object, _Walk], depsgraph: bpy.types.Depsg
             original = obj.original
             if obj.type == original.type:  # parts of another type come once more
                 matrices, numbers = listed.setdefault((owner, original), ([], []))
-                matrices.append(tuple(map(tuple, instance.matrix_world)))
+                matrices.append(instance.matrix_world.copy())
                 numbers.append(instance.random_id)
     for (owner, original), (matrices, numbers) in listed.items():
         keys = child_key(name_keys([owner]), np.array(numbers, np.int64))

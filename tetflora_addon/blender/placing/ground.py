@@ -16,6 +16,7 @@ from mathutils import Vector
 from numpy.typing import NDArray
 
 from ..materials.nodes import is_ours
+from ..species.asset_species import asset_of
 
 _FEW = 8  # objects of which all are asked; of more only those whose boxes the ray meets
 _ABOVE = 1e-3  # metres above a plant's foot from which it falls, so that rounding does not let it through the ground
@@ -132,6 +133,8 @@ class Ground:
 
 
 def is_ground(obj: bpy.types.Object) -> bool:
-    """Whether plants can stand on an object: visible, and neither a plant, nor a result, nor refined itself."""
+    """Whether plants can stand on an object: visible, and neither a plant or its model, nor a result, nor refined."""
     group = obj.tetflora
-    return not (group.is_plant or group.is_field or group.is_explicit or is_ours(obj)) and obj.visible_get()
+    if group.is_plant or group.is_field or group.is_explicit or is_ours(obj):
+        return False
+    return obj.visible_get() and asset_of(obj) is None
