@@ -4,16 +4,23 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import bpy
 import numpy as np
 import pytest
 
+from panels import menus, plants, refine
+from tests.blender.layouts import Layout
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
 from tetflora_addon.blender.assets import marks, places
 from tetflora_addon.blender.compat import shader_tree
+from tetflora_addon.blender.job import frame_cache
 from tetflora_addon.blender.placing.distances import distance_of
 from tetflora_addon.blender.placing.plant_objects import add_plant as place_plant
 from tetflora_addon.blender.scene.crowns import crown_for, crown_to_draw
+from tetflora_addon.blender.scene.explicit import read_explicit
+from tetflora_addon.blender.scene.objects import has_contents, taking_part
 from tetflora_addon.blender.species import catalogue, edits
 from tetflora_addon.blender.species.asset_species import PICTURE_SIDE, asset_of, asset_species, find_asset, picture_of
 from tetflora_addon.blender.viewport import levels, state
@@ -142,11 +149,11 @@ def test_plants_are_populated_by_its_crown_and_bear_its_name():
     assert bpy.ops.tetflora.populate() == {'FINISHED'}
     population = scene().tetflora.populations[0]
     assert distance_of(population) == pytest.approx(2.4, rel=0.05)  # 1.2 radii
-    plants = [o for o in scene().objects if o.tetflora.is_plant]
-    assert len(plants) > 50 and all(o.name.startswith("Rock") for o in plants)
-    assert plants[0].empty_display_size == pytest.approx(5.0)
+    made = [o for o in scene().objects if o.tetflora.is_plant]
+    assert len(made) > 50 and all(o.name.startswith("Rock") for o in made)
+    assert made[0].empty_display_size == pytest.approx(5.0)
     (found,) = read()
-    assert len(found) == len(plants)
+    assert len(found) == len(made)
     population.as_field = 'FIELD'
     assert bpy.ops.tetflora.update_population() == {'FINISHED'}
     (again,) = read()
@@ -196,9 +203,9 @@ def test_the_brush_does_not_plant_on_an_asset():
         if asset:
             species(rock)
         assert bpy.ops.tetflora.paint_plants(mode='PAINT', stroke="3.5 0 0, 4.5 0 0") == {'FINISHED'}
-        plants = [o for o in scene().objects if o.tetflora.is_plant]
-        assert {round(o.location.z, 3) for o in plants} == heights
-        bpy.data.batch_remove(plants)
+        made = [o for o in scene().objects if o.tetflora.is_plant]
+        assert {round(o.location.z, 3) for o in made} == heights
+        bpy.data.batch_remove(made)
 
 
 def test_other_operators_on_plants_take_assets():
@@ -345,8 +352,6 @@ def test_refine_scatter_says_what_it_found_and_refuses_with_a_reason(capfd):
 
 
 def test_instances_of_a_scatterer_are_not_explicit_as_well():
-    from tetflora_addon.blender.scene.explicit import read_explicit
-
     ground, child = add_mesh("ground"), add_mesh("child")
     child.parent, ground.instance_type = ground, 'VERTS'
     child.tetflora.is_explicit = True
@@ -379,3 +384,77 @@ def test_operators_take_collections_by_name_and_many_objects():
     assert bpy.ops.tetflora.stop_using_as_species() == {'FINISHED'}
     assert bpy.ops.tetflora.stop_using_as_species(collection="held") == {'FINISHED'}
     assert len(scene().tetflora.asset_species) == 0
+
+
+def _drawn(panel, obj):
+    select(obj)
+    layout, context = Layout(), bpy.context
+    names = ("scene", "view_layer", "preferences", "active_object", "mode")
+    known = {name: getattr(context, name) for name in names}
+    panel.draw(SimpleNamespace(layout=layout), SimpleNamespace(region=SimpleNamespace(width=300), **known))
+    return layout
+
+
+def test_panels_offer_what_fits_the_active_object():
+    rock, ground, child = crown("Rock"), add_mesh("ground"), add_mesh("child")
+    assert "tetflora.use_as_species" in _drawn(plants.TETFLORA_PT_plants, rock).names("operator")
+    own = species(rock)
+    shown = _drawn(plants.TETFLORA_PT_plants, rock)
+    assert "tetflora.stop_using_as_species" in shown.names("operator")
+    assert "is_scatter" not in _drawn(refine.TETFLORA_PT_refine, ground).names("prop", 1)
+    child.parent, ground.instance_type = ground, 'VERTS'
+    assert "is_scatter" in _drawn(refine.TETFLORA_PT_refine, ground).names("prop", 1)
+    plant = add_plant(species=own)
+    bpy.data.objects.remove(rock)
+    edits.look_again()
+    labels = [options["text"] for name, _, options in _drawn(plants.TETFLORA_PT_plants, plant).drawn if name == "label"]
+    assert '"Rock" is not in the catalog' in labels
+    layout = Layout()
+    menus.draw_in_outliner(SimpleNamespace(layout=layout), bpy.context)
+    assert layout.names("operator") == ["tetflora.use_as_species", "tetflora.stop_using_as_species"]
+
+
+def test_refine_automatically_hears_of_assets_and_scatters():
+    add_camera()
+    rock, ground, child = crown("Rock"), add_mesh("ground"), add_mesh("child")
+    child.parent, ground.instance_type = ground, 'VERTS'
+    seen = []
+
+    def settings():
+        depsgraph()
+        seen.append(repr(frame_cache.choices(scene())))
+        return len(set(seen))
+
+    assert settings() == 1
+    species(rock)
+    assert settings() == 2
+    rock.name = "Boulder"
+    assert settings() == 3
+    marks.stop_using(rock)
+    assert settings() == 3 and seen[-1] == seen[0]
+    assert not has_contents(scene())
+    ground.tetflora.is_scatter = True
+    assert has_contents(scene()) and ground in taking_part(scene())
+    own = species(rock)
+    assert rock in taking_part(scene())
+    digests = {frame_cache.scene_digest(scene(), depsgraph(), bpy.context.view_layer)}
+    plant = add_plant(species=own)
+    digests.add(frame_cache.scene_digest(scene(), depsgraph(), bpy.context.view_layer))
+    plant.location.x = 1.0
+    digests.add(frame_cache.scene_digest(scene(), depsgraph(), bpy.context.view_layer))
+    assert len(digests) == 3
+
+
+def test_deleting_an_asset_can_be_undone():
+    rock = crown("Rock")
+    own = species(rock)
+    add_plant(species=own)
+    select(rock)
+    bpy.ops.ed.undo_push(message="Before")
+    bpy.ops.object.delete()
+    bpy.ops.ed.undo_push(message="Deleted")
+    edits.look_again()
+    assert own not in edits.catalogue()
+    assert bpy.ops.ed.undo() == {'FINISHED'}
+    edits.look_again()
+    assert own in edits.catalogue() and len(read()) == 1
