@@ -43,14 +43,21 @@ class Hierarchy:
     children: NDArray[np.int32]
 
 
-def hierarchy_of(centre: NDArray[np.floating], triangles: NDArray[np.integer]) -> Hierarchy:
+def hierarchy_of(centre: NDArray[np.floating], triangles: NDArray[np.integer], kind: NDArray[np.integer]) -> Hierarchy:
     """Clusters of patches with middles (p, 3) and so many triangles (p,) each, at least one patch.
 
-    A patch without triangles is none.
+    Kinds (p,) are divided before anything else: a trunk among leaves would be as small as these for all that asks.
     """
-    order = np.arange(len(centre))
+    order = np.argsort(kind, kind="stable")
     first, last, parent = [np.zeros(1, np.int64)], [np.array([len(centre)])], [np.array([-1])]
     start, stop, number, known = first[0], last[0], np.zeros(1, np.int64), 1
+    begin = np.flatnonzero(np.diff(kind[order], prepend=-1))
+    if len(begin) > 1:
+        start, stop = begin.astype(np.int64), np.append(begin[1:], len(centre))
+        first.append(start)
+        last.append(stop)
+        parent.append(np.zeros(len(begin), np.int64))
+        number, known = np.arange(1, 1 + len(begin)), 1 + len(begin)
     # The first cluster has fewer children, so that the last divisions, too, come as many at once.
     depth = max(int(np.ceil(np.log2(max(float(triangles.sum()), 1.0) / SMALL))), 0)
     generations = depth % GENERATIONS or GENERATIONS

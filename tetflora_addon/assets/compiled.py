@@ -47,7 +47,7 @@ def compile_steps(source: AssetSource) -> Generator[float, None, Asset]:
         patches.append(patches_of(surface) if len(surface.triangles) else None)
         yield 0.5 * (number + 1) / len(source.surfaces)
     pool = pool_of(source, tuple(patches))
-    hierarchy = hierarchy_of(pool.centre, pool.triangles)
+    hierarchy = hierarchy_of(pool.centre, pool.triangles, pool.kind)
     parts: list[Measured] = []
     number = int((hierarchy.children == 0).sum())
     for run in runs_of(source, pool, hierarchy):

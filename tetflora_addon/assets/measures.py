@@ -31,6 +31,8 @@ ALONG, _U, _V = 241, 242, 243
 _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 #: Islands of solids that are a larger part of all faces' area than this are wood; others are as many as leaves.
 _WOOD = 1.0 / 256.0
+#: Wood of more than this fraction of the largest width is thick.
+_THICK = 0.3
 _PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
@@ -49,6 +51,8 @@ class Pool:
     triangles : (p,) int32
     woody : (p,) bool
         Of a large solid: a trunk, not a berry or a closed leaf.
+    kind : (p,) int8
+        0 for leaves, 1 for thin wood, 2 for thick.
     """
 
     patches: tuple[Patches | None, ...]
@@ -57,6 +61,7 @@ class Pool:
     centre: NDArray[np.float32]
     triangles: NDArray[np.int32]
     woody: NDArray[np.bool_]
+    kind: NDArray[np.int8]
 
 
 def pool_of(source: AssetSource, patches: tuple[Patches | None, ...]) -> Pool:
@@ -64,7 +69,7 @@ def pool_of(source: AssetSource, patches: tuple[Patches | None, ...]) -> Pool:
     number = np.array([0 if p is None else len(p) for p in patches])
     part, patch = spread(number[source.surface])
     centre, triangles = np.zeros((len(part), 3), np.float32), np.zeros(len(part), np.int32)
-    island, solid, share = np.zeros(len(part)), np.zeros(len(part), bool), np.zeros(len(part))
+    solid, (island, share, width) = np.zeros(len(part), bool), np.zeros((3, len(part)))
     for s, own in enumerate(patches):
         at = np.flatnonzero(source.surface[part] == s)
         if own is not None and len(at):
@@ -73,11 +78,14 @@ def pool_of(source: AssetSource, patches: tuple[Patches | None, ...]) -> Pool:
             centre[at] = np.einsum("nij,nj->ni", matrix[:, :3, :3], local) + matrix[:, :3, 3]
             triangles[at] = np.diff(own.first)[patch[at]]
             solid[at] = own.solid[patch[at]]
-            island[at] = own.island[patch[at]] * np.abs(np.linalg.det(matrix[:, :3, :3])) ** (2.0 / 3.0)
+            scale = np.cbrt(np.abs(np.linalg.det(matrix[:, :3, :3])))
+            island[at], width[at] = own.island[patch[at]] * scale**2, own.width[patch[at]] * scale
             # An island is as many patches as it is cut into.
             share[at] = island[at] / np.maximum(np.round(own.pieces[patch[at]]), 1)
     woody = solid & (island > _WOOD * share.sum())
-    return Pool(patches, part.astype(np.int32), patch.astype(np.int32), centre, triangles, woody)
+    thick = woody & (width > _THICK * width.max(initial=0.0, where=woody))
+    kind = (woody.astype(np.int8) + thick).astype(np.int8)
+    return Pool(patches, part.astype(np.int32), patch.astype(np.int32), centre, triangles, woody, kind)
 
 
 @dataclass(frozen=True)

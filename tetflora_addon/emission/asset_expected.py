@@ -10,6 +10,9 @@ from ..proxies.facet_sizes import FacetPixels
 from .asset_plan import Keeping, real_fractions, sizes_of
 from .asset_sight import AssetSight
 
+#: What a polygon of an instance counts for: the same mesh shows in several places.
+INSTANCED = 0.25
+
 
 class AssetExpected:
     """Expected polygons and facets of instances; those that are always the originals cost nothing.
@@ -32,7 +35,8 @@ class AssetExpected:
         """Polygons, and facets counted with a weight, of what is seen."""
         real = real_fractions(self.sight, self.portions, limit)
         facets = weight * self.sizes.counts(FacetPixels(pixels))
-        return float((real * self.portions.parts.totals.polygons + (1.0 - real) * facets).sum())
+        faces = INSTANCED * self.portions.parts.totals.polygons
+        return float((real * faces + (1.0 - real) * facets).sum())
 
     def unseen(self, pixels: FacetPixels) -> float:
         """Facets of what is not seen."""

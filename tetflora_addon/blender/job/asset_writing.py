@@ -15,11 +15,12 @@ from ...jobs import Progress
 from ...refinement.statistics import Statistics
 from ..assets.places import Places
 from ..assets.target import Target
-from ..results.cluster_meshes import AssetMeshes, cluster_mesh_steps, read_mesh
+from ..results.cluster_meshes import AssetMeshes, cluster_mesh_steps
 from ..results.collection import Results
 from ..results.hiding import originals_shown
 from ..results.instances import add_cluster, add_cluster_instances, add_instances, carrier_of
 from ..results.stand_ins import add_stand_in
+from ..results.surface_arrays import read_mesh
 from .assets import Bound
 
 #: Clusters of which meshes are made between two looks at the window.

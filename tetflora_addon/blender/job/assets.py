@@ -71,9 +71,7 @@ class Bound:
         return int(each[self.placed.instances.asset].sum())
 
 
-def is_plain(
-    scene: bpy.types.Scene, places: Sequence[Places], depsgraph: bpy.types.Depsgraph, left: float
-) -> bool:
+def is_plain(scene: bpy.types.Scene, places: Sequence[Places], depsgraph: bpy.types.Depsgraph, left: float) -> bool:
     """Whether instances are best left as they are: the renderer draws them at less cost than anything else."""
     if not places or scene.tetflora.asset_detail == 'REFINE':
         return not places
