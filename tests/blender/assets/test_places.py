@@ -388,7 +388,7 @@ def test_dropped_collections_of_a_species_are_plants_of_it():
     held = tree().users_collection[0]
     drops = []
     for n in range(3):
-        drop = bpy.data.objects.new("drop", None)
+        drop = bpy.data.objects.new(f"drop {n}", None)
         drop.instance_type, drop.instance_collection = 'COLLECTION', held
         drop.location.x = n
         scene().collection.objects.link(drop)
@@ -396,9 +396,9 @@ def test_dropped_collections_of_a_species_are_plants_of_it():
     assert read() == [] and not has_contents(scene())
     select(drops[0])
     assert bpy.ops.tetflora.use_as_species() == {'FINISHED'}
-    (found,) = read()
-    assert found.owners == tuple(drops) and found.target.datablock == held
-    assert len(set(found.keys.tolist())) == 3 and has_contents(scene())
+    found = read()
+    assert [p.owner for p in found] == drops and {p.target.datablock for p in found} == {held}
+    assert len({int(p.keys[0]) for p in found}) == 3 and has_contents(scene())
     assert bpy.ops.tetflora.stop_using_as_species() == {'FINISHED'}
     assert read() == []
 

@@ -127,7 +127,7 @@ def read_asset_plants(
 ) -> list[AssetPlants]:
     """Enabled plants of a view layer that render and whose species is an asset, in the order of `read_plants`.
 
-    Objects that show a collection which is a species count as plants of it, with a seed from their name.
+    Objects that show a collection which is a species count as plants of it, each by itself, seeded by its name.
 
     Raises
     ------
@@ -139,8 +139,7 @@ def read_asset_plants(
         return []
     objects = sorted(renderable_objects(view_layer), key=lambda o: o.name_full)
     single: dict[str, list[bpy.types.Object]] = {}
-    drops: dict[str, list[bpy.types.Object]] = {}
-    fields = []
+    fields, drops = [], []
     for obj in objects:
         group = obj.tetflora
         if group.is_plant and group.enabled and group.species in assets:
@@ -148,15 +147,16 @@ def read_asset_plants(
         elif group.is_field and group.enabled:
             fields.append(obj)
         elif is_drop(obj):
-            drops.setdefault(asset_of(obj.instance_collection, scene).identifier, []).append(obj)
+            drops.append(obj)
     found = []
-    for group in (single, drops):
-        for species, owners in group.items():
-            seed = np.array([o.tetflora.seed for o in owners], dtype=np.int64)
-            if group is drops:
-                seed = name_keys(owners).view(np.int64)
-            matrices = np.array([world_matrix(o, depsgraph) for o in owners], dtype=np.float64)
-            found.append(AssetPlants(species, tuple(owners), seed, matrices))
+    for species, owners in single.items():
+        seed = np.array([o.tetflora.seed for o in owners], dtype=np.int64)
+        matrices = np.array([world_matrix(o, depsgraph) for o in owners], dtype=np.float64)
+        found.append(AssetPlants(species, tuple(owners), seed, matrices))
+    for obj in drops:  # one by one: each shows its plant itself
+        species = asset_of(obj.instance_collection, scene).identifier
+        placed = world_matrix(obj, depsgraph)[None].astype(np.float64)
+        found.append(AssetPlants(species, (obj,), name_keys([obj]).view(np.int64), placed))
     copies = [c for c in copies_of([o for o in objects if may_instance(o)], depsgraph) if c.owner.tetflora.enabled]
     for c in copies:
         if _is_plant(c) and _species(c.owner) in assets:
