@@ -64,7 +64,7 @@ def timed(path: Path, what: str, engine: str, detail: str = "AUTO") -> dict[str,
     kind = session.eevee() if engine == "EEVEE" else engine
     scene.render.engine = kind
     read_s, figures = time.perf_counter() - begun, {}
-    opened = memory()["peak_mb"]
+    opened, held = memory()["peak_mb"], resident_mb("VmRSS")
     refine_s = 0.0
     if what == "refined":
         mark(detail)
@@ -84,6 +84,7 @@ def timed(path: Path, what: str, engine: str, detail: str = "AUTO") -> dict[str,
         "refine_s": refine_s,
         "total_s": read_s + refine_s + figures["render_s"],
         "opened_mb": opened,
+        "held_opened_mb": held,
         "refined_mb": refined,
         **memory(),
     }
@@ -176,7 +177,7 @@ def wood_file(folder: Path, wanted: Scatter) -> Path:
 
 
 def many_file(folder: Path, number: int, layout: str, triangles: int) -> Path:
-    """Where the file of a wood of different assets is, or shall be; layout: ``linked`` or ``inside``."""
+    """Where the file of a wood of different assets is, or shall be; layout as of `store_many`."""
     return folder / f"many-{number}-{layout}-{triangles}.blend"
 
 
@@ -188,9 +189,16 @@ def libraries(folder: Path, number: int, triangles: int) -> dict[str, float]:
 
 
 def store_many(folder: Path, number: int, layout: str, triangles: int, each: int) -> None:
-    """Save a wood of different assets, so many instances of each, out of the first library files."""
+    """Save a wood of different assets, so many instances of each.
+
+    layout: ``grown``, by nodes at evaluation; ``linked`` from library files, or ``inside`` the file.
+    """
+    path = many_file(folder, number, layout, triangles)
+    if layout == "grown":
+        asset_scenes.store_trees(path, list(asset_trees.grown(number, triangles)), each * number)
+        return
     files = asset_trees.store_libraries(folder / f"libraries-{triangles}", number, triangles)
-    asset_scenes.store_many(many_file(folder, number, layout, triangles), files, layout == "linked", each * number)
+    asset_scenes.store_many(path, files, layout == "linked", each * number)
 
 
 def window_file(folder: Path, what: str, instances: int, quick: bool) -> dict[str, float]:

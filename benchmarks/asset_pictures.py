@@ -29,8 +29,9 @@ INSTANCES = 16
 SAMPLES, QUICK_DIVISOR = {"near": 64, "middle": 192, "far": 384}, 8
 COVERAGE_SAMPLES = 64
 LEAST_COVERAGE = 0.05
-#: Samples where crowns are compared, by metres of a pixel, and where noise is measured.
-PIXELS, NOISY = {0.05: 96, 0.1: 256, 0.2: 1024}, 0.1
+#: Metres of the pixels that crowns are refined for, and of those of the pictures that are compared, with samples.
+#: Cards of .4 m are real in smaller ones.
+COARSE, FINE, CROWN_SAMPLES = (0.8, 1.2, 2.0), 0.1, 256
 TENTHS = 10
 #: Least of a crown's row that is covered where its colour counts.
 _LEAST_ROW = 0.02
@@ -96,44 +97,42 @@ def crown(kind: str, folder: Path, quick: bool) -> dict[str, float]:
     """How much light a crown lets through, and the colour of its tenths from below to above, refined and plain."""
     scene = bpy.context.scene
     asset_scenes.alone(scene, kind, quick)
-    plain, found = {}, {}
-    for pixel, samples in _pixels(scene, quick):
-        plain[pixel] = silhouette(scene, folder / f"crown-{kind}-{pixel}-plain.exr", samples)
-        if pixel == NOISY:
-            again = silhouette(scene, folder / f"crown-{kind}-{pixel}-again.exr", samples, seed=1)
-            found |= {f"noise_{key}": value for key, value in _compared(plain[pixel], again, pixel).items()}
+    samples = CROWN_SAMPLES // (QUICK_DIVISOR if quick else 1)
+    asset_scenes.frame(scene, FINE)
+    plain = silhouette(scene, folder / f"crown-{kind}-plain.exr", samples)
+    again = silhouette(scene, folder / f"crown-{kind}-again.exr", samples, seed=1)
+    found = {f"noise_{key}": value for key, value in _compared(plain, again).items()}
     mark("REFINE")
-    for pixel, samples in _pixels(scene, quick):
-        timed_refine(scene)
-        test = silhouette(scene, folder / f"crown-{kind}-{pixel}-refined.exr", samples)
-        found |= _compared(plain[pixel], test, pixel)
+    for pixel in COARSE:
+        asset_scenes.frame(scene, pixel)
+        statistics, _ = timed_refine(scene)
+        asset_scenes.frame(scene, FINE)
+        test = silhouette(scene, folder / f"crown-{kind}-{pixel}.exr", samples)
+        found |= {f"{key}_{pixel}": value for key, value in _compared(plain, test).items()}
+        found[f"crown_polygons_{pixel}"] = statistics.polygons_meshed + statistics.polygons_proxy
     refine.clear(scene)
     return found
 
 
-def _pixels(scene: bpy.types.Scene, quick: bool) -> Iterator[tuple[float, int]]:
-    """Sizes of pixels, which the scene has while each lasts, and samples."""
-    for pixel, samples in PIXELS.items():
-        asset_scenes.frame(scene, pixel)
-        yield pixel, samples // (QUICK_DIVISOR if quick else 1)
+def _compared(plain: NDArray, test: NDArray) -> dict[str, float]:
+    """How much less a crown covers in a test than in a plain silhouette (height, width, 4), and its tenths' colour."""
+    # Of all of the image: facets are larger than what they stand for, and reach beyond its outline.
+    error = float((plain[..., 3] - test[..., 3]).sum() / (plain[..., 3] > LEAST_COVERAGE).sum())
+    rows = crown_rows(plain)
+    a, b = tenths(plain, rows), tenths(test, rows)
+    return {"dT": error, "tenth": float((np.abs(b - a).mean(axis=1) / a.mean(axis=1)).max())}
 
 
-def _compared(plain: NDArray, test: NDArray, pixel: float) -> dict[str, float]:
-    """Figures of two silhouettes (height, width, 4)."""
-    mask = plain[..., 3] > LEAST_COVERAGE
-    error = float((plain[..., 3] - test[..., 3])[mask].mean())
-    a, b = (tenths(p) for p in (plain, test))
-    apart = np.abs(b - a).mean(axis=1) / a.mean(axis=1)
-    return {f"dT_{pixel}": error, f"tenth_{pixel}": float(apart.max()), f"tenths_apart_{pixel}": float(np.ptp(a[:, 0]))}
+def crown_rows(silhouette: NDArray[np.float32]) -> tuple[int, int]:
+    """First row of a crown from below, and the one after its last; the lowest fifth of a tree is trunk."""
+    covered = np.flatnonzero((silhouette[::-1, :, 3] > LEAST_COVERAGE).mean(axis=1) > _LEAST_ROW)
+    end = int(covered[-1]) + 1
+    return int(covered[0]) + (end - int(covered[0])) // 5, end
 
 
-def tenths(silhouette: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Mean colour (10, 3) of what is covered in each tenth of the height of a crown, from below to above."""
-    rows = silhouette[::-1].astype(np.float64)
-    covered = np.flatnonzero((rows[..., 3] > LEAST_COVERAGE).mean(axis=1) > _LEAST_ROW)
-    # The lowest fifth is trunk.
-    first = covered[0] + (covered[-1] + 1 - covered[0]) // 5
-    bands = np.array_split(rows[first : covered[-1] + 1], TENTHS)
+def tenths(silhouette: NDArray[np.float32], rows: tuple[int, int]) -> NDArray[np.float64]:
+    """Mean colour (10, 3) of what is covered in each tenth of a crown's rows, from below to above."""
+    bands = np.array_split(silhouette[::-1].astype(np.float64)[slice(*rows)], TENTHS)
     return np.array([band[..., :3].sum(axis=(0, 1)) / band[..., 3].sum() for band in bands])
 
 

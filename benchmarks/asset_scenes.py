@@ -143,7 +143,7 @@ def _scatter_nodes(
         link(sides.outputs[0], mirrored.inputs[1])
         scale = mirrored.outputs[0]
     link(scale, placed.inputs["Scale"])
-    # The first rows are nearest to the camera: those are kept where the grid has more points.
+    # The grid has more points where their number is no square.
     index, fewer = new("GeometryNodeInputIndex"), new("FunctionNodeCompare")
     fewer.data_type, fewer.operation = 'INT', 'LESS_THAN'
     ends = [socket for socket in fewer.inputs if socket.enabled]
@@ -237,13 +237,17 @@ def store(path: Path, wanted: Scatter) -> None:
 
 def store_many(path: Path, libraries: list[Path], linked: bool, instances: int) -> None:
     """Save a wood of the trees of library files, linked or with all of them in the file."""
-    scene = bpy.context.scene
     trees = []
     for library in libraries:
         with bpy.data.libraries.load(str(library), link=linked) as (there, here):
             here.objects = list(there.objects)
         trees += here.objects
-    furnish(scene, trees, Scatter(instances=instances, distance="middle"))
+    store_trees(path, trees, instances)
+
+
+def store_trees(path: Path, trees: list[bpy.types.Object], instances: int) -> None:
+    """Save a wood of different trees, seen from the middle distance."""
+    furnish(bpy.context.scene, trees, Scatter(instances=instances, distance="middle"))
     bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=False)
 
 

@@ -86,24 +86,27 @@ def carded(name: str, seed: int = 7) -> bpy.types.Object:
     return bpy.data.objects.new(name, mesh_of(name, surface, materials, quads=CARDS))
 
 
-def noded(name: str, seed: int = 7) -> bpy.types.Object:
-    """Kind ``nodes``: a mesh of bark with loose points, on which nodes instance three leaf objects."""
+def noded(name: str, seed: int = 7, number: int = LEAVES, realized: bool = False) -> bpy.types.Object:
+    """Kind ``nodes``: a mesh of bark with loose points, on which nodes instance three leaf objects.
+
+    realized: what nodes give is one mesh of all leaves.
+    """
     rng = np.random.default_rng(seed)
     made = branches(ORDERS, rng)
     bark = tubes(made, ORDERS)
-    places = stalks(made[-1], LEAVES, rng)
+    places = stalks(made[-1], number, rng)
     material = image_material("Node leaf", leaf_image(), 0.5, _THROUGH)
     leaves = bpy.data.collections.new(f"{name}: leaves")
     shape = open_leaf()
-    for number in range(3):
-        bent = shape.positions * [1.0, 1.0 - 0.15 * number, 1.0 + 0.5 * number]
-        mesh = mesh_of(f"{name}: leaf {number}", Surface(bent, shape.triangles, shape.uv, shape.material), [material])
+    for i in range(3):
+        bent = shape.positions * [1.0, 1.0 - 0.15 * i, 1.0 + 0.5 * i]
+        mesh = mesh_of(f"{name}: leaf {i}", Surface(bent, shape.triangles, shape.uv, shape.material), [material])
         leaves.objects.link(bpy.data.objects.new(mesh.name, mesh))
     mesh = mesh_of(name, bark, [image_material("Node bark", bark_image(), 0.9)], places.base)
     size = _sizes(places, rng, _NODE_LEAF, 1.0)[:, 0]
     _place_attributes(mesh, len(bark.positions), places, size, rng)
     tree = bpy.data.objects.new(name, mesh)
-    tree.modifiers.new("Leaves", 'NODES').node_group = _leaf_nodes(leaves)
+    tree.modifiers.new("Leaves", 'NODES').node_group = _leaf_nodes(leaves, realized)
     return tree
 
 
@@ -114,6 +117,17 @@ def different(number: int, triangles: int, first: int = 100) -> Iterator[bpy.typ
         materials = tree.data.materials
         materials[1] = image_material(f"Leaf {seed}", leaf_image(f"Leaf {seed}", seed), 0.5)
         yield tree
+
+
+def grown(number: int, triangles: int, first: int = 100) -> Iterator[bpy.types.Object]:
+    """Different trees as well, whose nodes make so many triangles of what takes a tenth of the memory in a file."""
+    for seed in range(first, first + number):
+        tree = noded(f"Tree {seed}", seed, 1, True)
+        bark = len(tree.data.polygons)
+        mesh = tree.data
+        bpy.data.objects.remove(tree)
+        bpy.data.meshes.remove(mesh)
+        yield noded(f"Tree {seed}", seed, max((triangles - bark) // 40, 1), True)
 
 
 def store_libraries(folder: Path, number: int, triangles: int) -> list[Path]:
@@ -260,7 +274,7 @@ def _place_attributes(
         mesh.attributes.new(name, kind, 'POINT').data.foreach_set(key, values.ravel())
 
 
-def _leaf_nodes(leaves: bpy.types.Collection) -> bpy.types.GeometryNodeTree:
+def _leaf_nodes(leaves: bpy.types.Collection, realized: bool) -> bpy.types.GeometryNodeTree:
     """The mesh in, the mesh and instances of leaves out."""
     named = (("turned", 'FLOAT_VECTOR', "Rotation"), ("size", 'FLOAT', "Scale"), ("variant", 'INT', "Instance Index"))
     tree, members, placed = placing_nodes("GeometryNodeCollectionInfo", (*named, ("is_leaf", 'BOOLEAN', "Selection")))
@@ -273,5 +287,10 @@ def _leaf_nodes(leaves: bpy.types.Collection) -> bpy.types.GeometryNodeTree:
     both = tree.nodes.new("GeometryNodeJoinGeometry")
     tree.links.new(given.outputs[0], both.inputs[0])
     tree.links.new(placed.outputs[0], both.inputs[0])
-    tree.links.new(both.outputs[0], made.inputs[0])
+    last = both.outputs[0]
+    if realized:
+        whole = tree.nodes.new("GeometryNodeRealizeInstances")
+        tree.links.new(last, whole.inputs[0])
+        last = whole.outputs[0]
+    tree.links.new(last, made.inputs[0])
     return tree
