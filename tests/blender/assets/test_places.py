@@ -295,9 +295,9 @@ def test_a_million_instances_are_read_in_two_seconds():
     graph = depsgraph()
     best = np.inf
     for _ in range(3):
-        begin = time.thread_time()
+        begin = time.process_time()
         (found,) = places.read_places(scene(), graph, bpy.context.view_layer)
-        best = min(best, time.thread_time() - begin)
+        best = min(best, time.process_time() - begin)
     assert len(found) == 1_000_000 and len(np.unique(found.keys)) == 1_000_000
     assert best < 2.0
 

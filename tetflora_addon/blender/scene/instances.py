@@ -19,6 +19,8 @@ from ..attributes import read, values_of
 #: What nodes instance.
 Reference = bpy.types.Object | bpy.types.Collection | bpy.types.GeometrySet
 
+_PART = 4_096  # matrices of one product
+
 
 @dataclass(frozen=True)
 class Rows:
@@ -32,18 +34,26 @@ class Rows:
     ) -> tuple[NDArray[np.float64], NDArray[np.uint64]]:
         """Places (k · n, 4, 4) and keys (k · n,) of the instances in each of k places with their keys."""
         many, own = len(matrices), len(self.number)
+        names = child_key(keys[:, None], self.number).reshape(-1)
+        if own == 1 and np.array_equal(self.columns[0], np.eye(4)):  # as nodes that bring an object make it
+            return matrices, names
         places = np.zeros((many, own, 4, 4))
-        # A product of two large matrices for each of the fewer, and not one of two small ones for each of the more.
+        # A product of two large matrices for each of the fewer, and not one of two small ones for each of the more; in
+        # parts that stay in the processor's cache.
         if many <= own:
-            columns = self.columns.reshape(-1, 4).astype(np.float64)
             for place, matrix in zip(places, matrices, strict=True):
-                place[:] = (columns @ matrix.T).reshape(own, 4, 4).transpose(0, 2, 1)
+                for part in _parts(own):
+                    columns = self.columns[part].reshape(-1, 4).astype(np.float64) @ matrix.T
+                    place[part] = columns.reshape(-1, 4, 4).transpose(0, 2, 1)
         else:
-            rows = matrices.reshape(-1, 4)
             for n, columns in enumerate(self.columns.astype(np.float64)):
-                places[:, n] = (rows @ columns.T).reshape(many, 4, 4)
-        places = places.reshape(-1, 4, 4)
-        return places, child_key(keys[:, None], self.number).reshape(-1)
+                for part in _parts(many):
+                    places[part, n] = (matrices[part].reshape(-1, 4) @ columns.T).reshape(-1, 4, 4)
+        return places.reshape(-1, 4, 4), names
+
+
+def _parts(number: int) -> Iterator[slice]:
+    return (slice(first, first + _PART) for first in range(0, number, _PART))
 
 
 def references_of(geometry: bpy.types.GeometrySet) -> Iterator[tuple[Reference, Rows]]:
