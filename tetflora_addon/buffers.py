@@ -34,7 +34,7 @@ class MeshBuffers:
     smooth : bool
         Whether faces are shaded smooth.
     species : int or None
-        The species all of it is of, if that is known.
+        The species all of it is of, if that is known; −1 for assets.
     """
 
     positions: NDArray[np.float32]

@@ -45,6 +45,10 @@ class Clusters(Arrays):
     transmission : (c,) float64
     moment : (c, 6) float64
         Mean of n nᵀ by optical area: xx, yy, zz, xy, xz, yz.
+    first_leaf : (c,) int64
+        First of its leaves in the asset's order.
+    leaves : (c,) int32
+        Leaves, and other islands as small.
     leaf_sample, leaf_samples, wood_sample, wood_samples : (c,) int32
         First sample and number of samples on leaves, and on wood; each of either stands for an equal optical area.
     weights : (c, 7) float64
@@ -66,6 +70,8 @@ class Clusters(Arrays):
     colour: NDArray[np.float64] = field(metadata=column(3))
     transmission: NDArray[np.float64]
     moment: NDArray[np.float64] = field(metadata=column(6))
+    first_leaf: NDArray[np.int64] = field(metadata=column(dtype=np.int64))
+    leaves: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
     leaf_sample: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
     leaf_samples: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
     wood_sample: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
@@ -81,6 +87,12 @@ class Clusters(Arrays):
     def leaf_optical(self) -> NDArray[np.float64]:
         """The part (c,) of the optical area that facets stand for as for leaves, m²."""
         return self.leaf_area + self.body_area / 2
+
+    @property
+    def leaf_faces(self) -> NDArray[np.float64]:
+        """Mean number (c,) of faces of a leaf; 1 where there are none, or more wood than leaves."""
+        leafy = (self.leaf_optical >= 0.5 * self.optical_area) & (self.leaves > 0)
+        return np.where(leafy, self.faces / np.maximum(self.leaves, 1), 1.0)
 
     @property
     def meshes(self) -> NDArray[np.bool_]:
@@ -109,6 +121,30 @@ class Samples(Arrays):
 
 
 @dataclass(frozen=True)
+class Leaves(Arrays):
+    """Leaves (l) as kites of the same area, in the space of their asset.
+
+    A kite lies in the plane of one of the leaf's faces, chosen in proportion to their areas: on average it shows the
+    same area from everywhere.
+
+    Attributes
+    ----------
+    centre : (l, 3) float32
+        Metres.
+    along, across : (l, 3) float32
+        Halves of its diagonals, metres.
+    colour : (l, 3) float16
+    transmission : (l,) float16
+    """
+
+    centre: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
+    along: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
+    across: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
+    colour: NDArray[np.float16] = field(metadata=column(3, dtype=np.float16))
+    transmission: NDArray[np.float16] = field(metadata=column(dtype=np.float16))
+
+
+@dataclass(frozen=True)
 class Asset:
     """A compiled asset.
 
@@ -119,6 +155,8 @@ class Asset:
         Of the source.
     clusters : Clusters of c
     samples : Samples of s
+    leaves : Leaves of l
+        Those of a cluster together.
     part, face : (f,) int32
         Part of the source, and face of that part's surface, for each face, those of a cluster together.
     """
@@ -127,6 +165,7 @@ class Asset:
     digest: str
     clusters: Clusters
     samples: Samples
+    leaves: Leaves
     part: NDArray[np.int32]
     face: NDArray[np.int32]
 
@@ -138,13 +177,18 @@ class Asset:
     @property
     def nbytes(self) -> int:
         """Bytes of all arrays."""
-        return self.clusters.nbytes + self.samples.nbytes + self.part.nbytes + self.face.nbytes
+        return self.clusters.nbytes + self.samples.nbytes + self.leaves.nbytes + self.part.nbytes + self.face.nbytes
 
     def faces_of(self, cluster: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Parts (k,) and faces (k,) of a cluster."""
         start = int(self.clusters.first_face[cluster])
         some = slice(start, start + int(self.clusters.faces[cluster]))
         return self.part[some], self.face[some]
+
+    def leaves_of(self, cluster: int) -> Leaves:
+        """Leaves (k,) of a cluster."""
+        start = int(self.clusters.first_leaf[cluster])
+        return self.leaves.take(slice(start, start + int(self.clusters.leaves[cluster])))
 
 
 @dataclass(frozen=True)
@@ -188,6 +232,11 @@ class Assets:
     def none(cls) -> Assets:
         """No assets."""
         return cls.of(())
+
+    @cached_property
+    def leaf_faces(self) -> NDArray[np.float64]:
+        """As of `Clusters`."""
+        return self.clusters.leaf_faces
 
     @cached_property
     def mesh_of(self) -> NDArray[np.int64]:

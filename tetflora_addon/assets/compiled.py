@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..errors import TetFloraError
 from ..growth.hashing import child_key, key_of_seed, uniform
 from ..jobs import at_once
-from .asset import COUNTS, Asset, Clusters, Samples
+from .asset import COUNTS, Asset, Clusters, Leaves, Samples
 from .clumping import facet_weights_of
 from .clusters import Hierarchy, hierarchy_of
 from .measures import ALONG, Measured, measured, pool_of, runs_of, shared_out, well_spread
@@ -64,7 +64,9 @@ def compile_steps(source: AssetSource) -> Generator[float, None, Asset]:
     weights = yield from facet_weights_of(clusters, samples, triangles, 0.85)
     part, face = (np.concatenate([getattr(p, name) for p in parts]) for name in ("part", "face"))
     clusters = Clusters(*(weights if name == "weights" else getattr(clusters, name) for name in vars(clusters)))
-    return Asset(source.name, source.digest, clusters, samples, part, face)
+    return Asset(
+        source.name, source.digest, clusters, samples, Leaves.concatenate([p.leaves for p in parts]), part, face
+    )
 
 
 def _smallest(hierarchy: Hierarchy) -> tuple[NDArray[np.intp], NDArray[np.int64]]:
@@ -97,7 +99,7 @@ def _clusters(hierarchy: Hierarchy, parts: list[Measured]) -> tuple[Clusters, Sa
     begin[inner] = len(samples) + np.cumsum(number[inner]) - number[inner]
     leaf, wood, optical, faces, leaves, bodies = every[:, :6].T
     mean = every[:, 6:] / np.maximum(optical, 1e-300)[:, None]
-    before = np.cumsum(np.append(0, sums[:, 3]))
+    before, leaves_before = (np.cumsum(np.append(0, sums[:, k])) for k in (3, 4))
     clusters = Clusters(
         hierarchy.parent,
         hierarchy.child,
@@ -114,6 +116,8 @@ def _clusters(hierarchy: Hierarchy, parts: list[Measured]) -> tuple[Clusters, Sa
         mean[:, 1:4],
         mean[:, 4],
         mean[:, 5:],
+        leaves_before[first].astype(np.int64),
+        leaves.astype(np.int32),
         begin.astype(np.int32),
         every_counts[:, 0].astype(np.int32),
         (begin + every_counts[:, 0]).astype(np.int32),

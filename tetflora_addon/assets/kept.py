@@ -18,14 +18,16 @@ import numpy as np
 
 from .. import storage
 from ..files import inside, read_whole, write_whole
-from .asset import COUNTS, Asset, Clusters, Samples
+from .asset import COUNTS, Asset, Clusters, Leaves, Samples
 
 #: Raise it when assets are compiled in another way.
-METHOD = 3
+METHOD = 4
 #: Bytes of a file at most, of all files of a user, and of what is kept in memory.
 _MOST, _MOST_FILES, _MOST_MEMORY = 1 << 30, 4 << 30, 768 << 20
 _NAMES = re.compile(r"tetflora-compiled-\d+-[0-9a-f]+\.npz")
-_KINDS = {"clusters": Clusters, "samples": Samples}
+_NUMBERS = ("child", "children", "first_face", "faces", "first_leaf", "leaves")
+_NUMBERS += ("leaf_sample", "leaf_samples", "wood_sample", "wood_samples")
+_KINDS = {"clusters": Clusters, "samples": Samples, "leaves": Leaves}
 
 _known: dict[str, Asset] = {}  # least recently asked for first
 
@@ -105,7 +107,7 @@ def _check(asset: Asset, digest: str) -> None:
     ------
     ValueError
     """
-    for kind, rows in ((Clusters, asset.clusters), (Samples, asset.samples)):
+    for kind, rows in ((Clusters, asset.clusters), (Samples, asset.samples), (Leaves, asset.leaves)):
         model = kind.empty()
         for f in fields(kind):
             own, wanted = getattr(rows, f.name), getattr(model, f.name)
@@ -117,8 +119,23 @@ def _check(asset: Asset, digest: str) -> None:
     ends = [(clusters.child + clusters.children, count), (clusters.first_face + clusters.faces, asset.faces)]
     ends += [(clusters.leaf_sample + clusters.leaf_samples, len(asset.samples))]
     ends += [(clusters.wood_sample + clusters.wood_samples, len(asset.samples))]
-    numbers = (clusters.child, clusters.children, clusters.first_face, clusters.faces, clusters.leaf_sample)
-    numbers += (clusters.leaf_samples, clusters.wood_sample, clusters.wood_samples, asset.part, asset.face)
+    ends += [(clusters.first_leaf + clusters.leaves, len(asset.leaves))]
+    numbers = (
+        clusters.first_leaf,
+        clusters.leaves,
+        clusters.child,
+        clusters.children,
+        clusters.first_face,
+        clusters.faces,
+    )
+    numbers += (
+        clusters.leaf_sample,
+        clusters.leaf_samples,
+        clusters.wood_sample,
+        clusters.wood_samples,
+        asset.part,
+        asset.face,
+    )
     sound = (
         count > 0
         and asset.digest == digest

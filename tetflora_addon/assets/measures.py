@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from ..arrays import spread
 from ..growth.hashing import child_key, key_of_seed, uniform
-from .asset import Samples
+from .asset import Leaves, Samples
 from .clusters import Hierarchy
+from .kites import kites_of
 from .patches import Patches
 from .source import AssetSource
 
@@ -33,6 +34,8 @@ _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 _WOOD = 1.0 / 256.0
 #: Wood of more than this fraction of the largest width is thick.
 _THICK = 0.3
+#: More than the patches of any small cluster.
+_MANY = 1 << 20
 _PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
@@ -198,6 +201,8 @@ class Measured:
     samples : Samples of s
     counts : (c, 2) int64
         Samples on leaves and on wood of each.
+    leaves : Leaves of l
+        Those of the clusters, one after the other; patches that are not wood.
     part, face : (f,) int32
         Faces of the clusters, one after the other.
     """
@@ -207,6 +212,7 @@ class Measured:
     sums: NDArray[np.float64]
     samples: Samples
     counts: NDArray[np.int64]
+    leaves: Leaves
     part: NDArray[np.int32]
     face: NDArray[np.int32]
 
@@ -234,9 +240,25 @@ def measured(run: Run) -> Measured:
         sums,
         samples,
         counts,
+        _leaves(run, optical, normal),
         run.part[first],
         run.face[first],
     )
+
+
+def _leaves(run: Run, optical: NDArray[np.float64], normal: NDArray[np.float64]) -> Leaves:
+    """Patches that are not wood, as kites."""
+    some = np.flatnonzero(~run.woody)
+    if not len(some):
+        return Leaves.empty()
+    first = np.flatnonzero(run.new_patch[some])
+    number = (
+        run.cluster[some][first] * _MANY
+        + np.arange(len(first))
+        - np.searchsorted(run.cluster[some][first], run.cluster[some][first])
+    )
+    seen = run.corners[some], optical[some], normal[some], run.colour[some], run.transmission[some]
+    return kites_of(*seen, first, number)
 
 
 def shared_out(leaf: NDArray[np.float64], wood: NDArray[np.float64], number: int) -> NDArray[np.int64]:

@@ -22,6 +22,8 @@ CYCLES_TRIANGLE, CYCLES_INSTANCE, BLENDER_INSTANCE = 290.0, 1_670.0, 160.0
 SAFE = 0.8
 #: Triangles of all instances up to which EEVEE draws them as fast as what would take their place.
 EEVEE_FEW = 2_000_000
+#: What a polygon of a cluster counts for in each of its places: Cycles keeps one mesh for all of them.
+CYCLES_POLYGON = 0.25
 #: Fraction of an instance that is to be real for EEVEE to draw all of it.
 EEVEE_WHOLE = 0.6
 #: More than any fraction.
@@ -59,7 +61,7 @@ class AssetCosts:
         cost = self._loaded + self._of_instances
         order = np.argsort(-self.pixels / np.maximum(cost, 1.0), kind="stable")
         always[order] = np.cumsum(cost[order]) <= SAFE / 2 * left
-        return Keeping(always, NEVER)
+        return Keeping(always, NEVER, CYCLES_POLYGON)
 
     @property
     def _loaded(self) -> NDArray[np.float64]:

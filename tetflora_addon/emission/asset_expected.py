@@ -10,9 +10,6 @@ from ..proxies.facet_sizes import FacetPixels
 from .asset_plan import Keeping, real_fractions, sizes_of
 from .asset_sight import AssetSight
 
-#: What a polygon of an instance counts for: the same mesh shows in several places.
-INSTANCED = 0.25
-
 
 class AssetExpected:
     """Expected polygons and facets of instances; those that are always the originals cost nothing.
@@ -24,19 +21,20 @@ class AssetExpected:
     """
 
     def __init__(self, sight: AssetSight, keeping: Keeping) -> None:
-        self.sight, portions = sight, sight.portions()
+        self.sight, self.keeping, portions = sight, keeping, sight.portions()
         if len(portions):
             portions = portions.take(~keeping.always[sight.placed.instances.asset[portions.parts.instance]])
         seen = portions.visibility > 0.0
         self.portions, hidden = portions.take(np.flatnonzero(seen)), portions.take(np.flatnonzero(~seen))
+        self.leaves = sight.placed.assets.clusters.leaves[self.portions.parts.cluster]
         self.sizes, self.hidden_sizes = sizes_of(sight, self.portions), sizes_of(sight, hidden)
 
     def seen(self, pixels: float, limit: float, weight: float) -> float:
         """Polygons, and facets counted with a weight, of what is seen."""
-        real = real_fractions(self.sight, self.portions, limit)
+        some, full = real_fractions(self.sight, self.portions, limit)
         facets = weight * self.sizes.counts(FacetPixels(pixels))
-        faces = INSTANCED * self.portions.parts.totals.polygons
-        return float((real * faces + (1.0 - real) * facets).sum())
+        faces = full * self.portions.parts.totals.polygons + (some - full) * self.leaves
+        return float((self.keeping.polygon * faces + (1.0 - some) * facets).sum())
 
     def unseen(self, pixels: FacetPixels) -> float:
         """Facets of what is not seen."""

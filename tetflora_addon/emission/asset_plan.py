@@ -24,10 +24,13 @@ from ..refinement.asset_parts import AssetParts
 from ..refinement.decisions import real_fraction
 from .asset_sight import AssetPortions, AssetSight
 from .leaf_detail import FADING
+from .plants import KITES
 from .portions import MIXED, in_chunks
 
 #: Facets of a cluster from which on those of its children have places of their own.
 MANY = 48.0
+#: Faces of a leaf up to which there is no kite for it.
+SIMPLE = 3.0
 #: Approximate number of facets that are made at a time.
 AT_ONCE = 200_000
 
@@ -42,10 +45,13 @@ class Keeping:
         Assets of which every instance is.
     fraction : float
         Fraction of its faces that are to be real; more than 1 for never.
+    polygon : float
+        What a polygon of a cluster counts for in each of its places, over one that is made for its place.
     """
 
     always: NDArray[np.bool_]
     fraction: float = 0.6
+    polygon: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -56,28 +62,36 @@ class AssetPlan:
     ----------
     whole : (k,) int64
         Instances that are the originals.
-    meshes : AssetParts of m
-        Clusters that are meshes.
+    meshes, kites : AssetParts of m, of k
+        Clusters that are meshes of their own faces, and of kites for their leaves.
     facets : AssetPortions of n
         Clusters that are facets.
     """
 
     whole: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     meshes: AssetParts = field(default_factory=AssetParts.empty)
+    kites: AssetParts = field(default_factory=AssetParts.empty)
     facets: AssetPortions = field(default_factory=AssetPortions.empty)
 
 
-def real_fractions(sight: AssetSight, portions: AssetPortions, limit: float | None) -> NDArray[np.float64]:
-    """Fraction (n,) of clusters that is real at a width in pixels up to which leaves are facets.
+def real_fractions(
+    sight: AssetSight, portions: AssetPortions, limit: float | None
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Fractions (n,) of clusters that are meshes, if only of kites, and (n,) that are their own faces.
 
-    None: of each that reaches into an explicit tetrahedron, all.
+    limit: width in pixels up to which leaves are facets; None: of each that reaches into an explicit tetrahedron, all.
     """
     seen = portions.real & (portions.visibility > 0.0)
     if limit is None:
-        return (seen & (portions.visibility >= 0.5)).astype(np.float64)
+        own = (seen & (portions.visibility >= 0.5)).astype(np.float64)
+        return own, own
     parts = portions.parts
     pixels = parts.totals.width / np.maximum(sight.camera.extent_around(parts.centre), 1e-300)
-    return np.where(seen, real_fraction(pixels * portions.visibility**FADING, limit), 0.0)
+    pixels = pixels * portions.visibility**FADING
+    some = np.where(seen, real_fraction(pixels, limit), 0.0)
+    # A card or a leaf of two triangles is no more than a kite.
+    simple = sight.placed.assets.leaf_faces[parts.cluster] <= SIMPLE
+    return some, np.where(simple, some, some * real_fraction(pixels, KITES))
 
 
 def plan_of(sight: AssetSight, limit: float | None, keeping: Keeping) -> AssetPlan:
@@ -93,7 +107,7 @@ def plan_of(sight: AssetSight, limit: float | None, keeping: Keeping) -> AssetPl
     while len(portions):
         # Down to the clusters that are meshes of their own, where some of them may be real.
         above = mesh_of[portions.parts.cluster] < 0
-        some = real_fractions(sight, portions, limit) > 0.0
+        some = real_fractions(sight, portions, limit)[0] > 0.0
         opening = above & (some | (portions.real & portions.mixed & (sight.pixels(portions) > MIXED)))
         done.append(portions.take(~opening))
         portions, _ = sight.opened(portions.take(opening))
@@ -102,18 +116,22 @@ def plan_of(sight: AssetSight, limit: float | None, keeping: Keeping) -> AssetPl
     inner = np.flatnonzero(mesh >= 0)
     pair, of = np.unique(instance[inner] * len(assets.clusters) + mesh[inner], return_inverse=True)
     area = every.parts.totals.optical_area[inner]
-    fraction = np.bincount(of, area * real_fractions(sight, every, limit)[inner], len(pair))
-    fraction /= np.maximum(np.bincount(of, area, len(pair)), 1e-300)
+    whole_area = np.maximum(np.bincount(of, area, len(pair)), 1e-300)
+    meshed, full = (
+        np.bincount(of, area * f[inner], len(pair)) / whole_area for f in real_fractions(sight, every, limit)
+    )
     owner, cluster = pair // len(assets.clusters), pair % len(assets.clusters)
     own = placed.parts(owner, cluster)
-    real = uniform(placed.keys(own), Draw.TRANSITION) < fraction
+    number = uniform(placed.keys(own), Draw.TRANSITION)
+    real = number < full
     faces = np.bincount(owner[real], own.totals.polygons[real], len(placed))
     all_faces = assets.clusters.faces[assets.root[instances.asset]]
     whole = always | (faces >= keeping.fraction * all_faces)
-    drawn = real & ~whole[owner]
+    apart = ~whole[owner]
+    kites = ~real & (number < meshed) & (assets.clusters.leaves[cluster] > 0)
     left = ~whole[instance]
-    left[inner] &= ~real[of]
-    return AssetPlan(np.flatnonzero(whole), own.take(drawn), every.take(left))
+    left[inner] &= ~(real | kites)[of]
+    return AssetPlan(np.flatnonzero(whole), own.take(real & apart), own.take(kites & apart), every.take(left))
 
 
 def planned_facets(

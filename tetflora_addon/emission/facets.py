@@ -45,6 +45,9 @@ DETAIL, FEW = 2.0, 8.0
 #: shows trunk and limbs where they are.
 THROWN = 0.25
 
+#: Stands for a species where facets are of assets.
+ASSETS = -1
+
 #: Some facets or what is drawn for them, and whether the camera sees them: neither hidden nor beside the view.
 Part = tuple[Drawn, bool]
 #: What is made of some facets, which the camera sees or not. Another process may call it.
@@ -53,7 +56,7 @@ Form = Callable[[Facets, bool], Any]
 
 @dataclass(frozen=True)
 class Parts:
-    """Facets of one species, or of other meshes where that is None."""
+    """Facets of one species, of assets (`ASSETS`), or of other meshes where that is None."""
 
     species: int | None
     facets: tuple[Part, ...]
@@ -99,7 +102,7 @@ def facet_parts(
     current = None
     every = _facets(sight, result, pixels, transition, form)
     if assets is not None:
-        every = chain(every, ((None, *made) for made in planned_facets(*assets, pixels, form)))
+        every = chain(every, ((ASSETS, *made) for made in planned_facets(*assets, pixels, form)))
     for species, *made in every:
         full = sum(len(facets) for facets, _ in parts) >= BLOCK_POLYGONS
         if parts and (full or species != current):

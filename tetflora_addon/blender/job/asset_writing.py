@@ -4,12 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...assets.kites import kite_mesh
 from ...emission.asset_plan import AssetPlan
 from ...jobs import Progress
 from ...refinement.statistics import Statistics
@@ -17,8 +18,10 @@ from ..assets.places import Places
 from ..assets.target import Target
 from ..results.cluster_meshes import AssetMeshes, cluster_mesh_steps
 from ..results.collection import Results
+from ..results.forms import ProxyForm
 from ..results.hiding import originals_shown
 from ..results.instances import add_cluster, add_cluster_instances, add_instances, carrier_of
+from ..results.meshes import mesh_steps
 from ..results.stand_ins import add_stand_in
 from ..results.surface_arrays import read_mesh
 from .assets import Bound
@@ -58,7 +61,12 @@ def _ids(keys: NDArray[np.uint64]) -> NDArray[np.int32]:
 
 
 def write_assets(
-    results: Results, bound: Bound, plan: AssetPlan, depsgraph: bpy.types.Depsgraph, statistics: Statistics
+    results: Results,
+    form: ProxyForm,
+    bound: Bound,
+    plan: AssetPlan,
+    depsgraph: bpy.types.Depsgraph,
+    statistics: Statistics,
 ) -> Generator[Progress, None, list[bpy.types.Object]]:
     """Write what a plan draws as instances; returns the objects whose place results take."""
     alone = left_alone(bound, plan)
@@ -73,17 +81,19 @@ def write_assets(
         add_instances(results, f"{target.name} {number:03d}", source, bound.matrices[at], ids[at], shown)
         yield progress
     statistics.instances_whole = len(whole) + int(alone[owner[plan.whole]].sum())
-    own = plan.meshes
-    for target in range(len(bound.targets)):
-        rows = np.flatnonzero(asset[own.instance] == target)
-        if len(rows):
-            given = own.cluster[rows] - bound.placed.assets.root[target], own.instance[rows]
-            yield from _write_clusters(results, bound, target, *given, ids, depsgraph, statistics)
+    for own, kites in ((plan.meshes, False), (plan.kites, True)):
+        for target in range(len(bound.targets)):
+            rows = np.flatnonzero(asset[own.instance] == target)
+            if len(rows):
+                given = own.cluster[rows] - bound.placed.assets.root[target], own.instance[rows]
+                make = _kites(results, form, bound, target) if kites else _clusters(results, bound, target, depsgraph)
+                yield from _write_clusters(results, bound, target, *given, ids, make, kites, statistics)
     hidden = []
     for number, shown in enumerate(bound.owners):
         if _scatters(shown) and not alone[number]:
             hidden.append(shown)
-            add_stand_in(results, f"{shown.name} {number:03d}", shown, depsgraph)
+            with originals_shown(results.scene, depsgraph):
+                add_stand_in(results, f"{shown.name} {number:03d}", shown, depsgraph)
     return hidden
 
 
@@ -96,6 +106,34 @@ def _groups(
         yield bound.targets[target], bound.owners[shown], np.flatnonzero((asset == target) & (owner == shown))
 
 
+Maker = Callable[[int, str], Generator[None, None, tuple[bpy.types.Mesh, int]]]
+
+
+def _clusters(results: Results, bound: Bound, target: int, depsgraph: bpy.types.Depsgraph) -> Maker:
+    """What makes meshes of clusters of their own faces, with the number of these."""
+    with originals_shown(results.scene, depsgraph):
+        meshes = read_meshes(bound.targets[target], depsgraph)
+    asset = bound.placed.assets.every[target]
+
+    def make(cluster: int, name: str) -> Generator[None, None, tuple[bpy.types.Mesh, int]]:
+        part, face = asset.faces_of(cluster)
+        return (yield from cluster_mesh_steps(meshes, name, part, face)), len(face)
+
+    return make
+
+
+def _kites(results: Results, form: ProxyForm, bound: Bound, target: int) -> Maker:
+    """What makes meshes of kites for the leaves of clusters."""
+    material = form.asset_material()
+    asset = bound.placed.assets.every[target]
+
+    def make(cluster: int, name: str) -> Generator[None, None, tuple[bpy.types.Mesh, int]]:
+        buffers = kite_mesh(asset.leaves_of(cluster))
+        return (yield from mesh_steps(name, buffers, [material])), buffers.polygons
+
+    return make
+
+
 def _write_clusters(
     results: Results,
     bound: Bound,
@@ -103,37 +141,33 @@ def _write_clusters(
     cluster: NDArray[np.int64],
     instance: NDArray[np.int32],
     ids: NDArray[np.int32],
-    depsgraph: bpy.types.Depsgraph,
+    make: Maker,
+    kites: bool,
     statistics: Statistics,
 ) -> Generator[Progress, None, None]:
     """Meshes of the clusters of one asset, each once, and instances of them."""
-    name, asset = bound.targets[target].name, bound.placed.assets.every[target]
+    name = bound.targets[target].name + (" kites" if kites else "")
     progress = Progress(0.94, f'Making clusters of "{name}"')
     yield progress
-    with originals_shown(results.scene, depsgraph):
-        meshes = read_meshes(bound.targets[target], depsgraph)
+    like = bound.targets[target].datablock
+    like = like if isinstance(like, bpy.types.Object) else None
     used, pick = np.unique(cluster, return_inverse=True)
     objects = []
     for number, one in enumerate(used.tolist()):
-        part, face = asset.faces_of(one)
-        mesh = yield from progress.during(cluster_mesh_steps(meshes, f"{name} {number:06d}", part, face))
-        objects.append(add_cluster(results, name, number, mesh))
-        statistics.polygons_meshed += len(face)
+        mesh, faces = yield from progress.during(make(one, f"{name} {number:06d}"))
+        objects.append(add_cluster(results, name, number, mesh, like))
+        if kites:
+            statistics.polygons_proxy += faces
+        else:
+            statistics.polygons_meshed += faces
         if number % _AT_ONCE == 0:
             yield progress
     shown = bound.owner[instance]
     for number, who in enumerate(np.unique(shown).tolist()):
         rows = np.flatnonzero(shown == who)
         at = instance[rows]
-        add_cluster_instances(
-            results,
-            f"{name} clusters {number:03d}",
-            objects,
-            pick[rows].astype(np.int32),
-            bound.matrices[at],
-            ids[at],
-            bound.owners[who],
-        )
+        places = pick[rows].astype(np.int32), bound.matrices[at], ids[at]
+        add_cluster_instances(results, f"{name} clusters {number:03d}", objects, *places, bound.owners[who])
     statistics.instances_clusters += len(cluster)
 
 

@@ -361,7 +361,7 @@ def _write_refined(
         yield from write_polygons(results, given.explicit, blocks, statistics, baking)
     hidden = []
     if refined.assets is not None:
-        hidden = yield from write_assets(results, bound, refined.assets[1], depsgraph, statistics)
+        hidden = yield from write_assets(results, form, bound, refined.assets[1], depsgraph, statistics)
     if baking is not None:
         clock.lap("emit")
         yield from bake_light(baking, refined)

@@ -22,6 +22,8 @@ from .nodes import Graph, find_socket, surface_material
 
 PROXY = "TetFlora proxy"
 SPHERE = "TetFlora microsphere"
+ASSET_PROXY = "TetFlora asset proxy"
+ASSET_SPHERE = "TetFlora asset microsphere"
 BAKED = "TetFlora baked"
 
 # Raise these when what they count changes: existing files then get the new nodes beside the old ones.
@@ -118,17 +120,21 @@ def bark_steps(species_name: str, character: str) -> Iterator[None]:
         yield
 
 
-def proxy_material() -> bpy.types.Material:
-    """Material "TetFlora proxy" of all microsurfaces: as a leaf where ``tf_transmission`` is above 0, else as bark."""
+def proxy_material(own: bool = False) -> bpy.types.Material:
+    """Material "TetFlora proxy" of all microsurfaces: as a leaf where ``tf_transmission`` is above 0, else as bark.
+
+    own: "TetFlora asset proxy", for what stands for the artist's own materials: all of it has the gloss that Principled
+    has by default, and what passes has no other tint.
+    """
 
     def build(graph: Graph, _material: bpy.types.Material) -> None:
         normal = graph.node("ShaderNodeNewGeometry").outputs["Normal"]
-        _lead_out(graph, _scattered(graph, _proxy_looks(graph, normal)))
+        _lead_out(graph, _scattered(graph, _proxy_looks(graph, normal, own)))
 
-    return surface_material(PROXY, _PROXY_VERSION, build)
+    return surface_material(ASSET_PROXY if own else PROXY, _PROXY_VERSION, build)
 
 
-def sphere_material() -> bpy.types.Material:
+def sphere_material(own: bool = False) -> bpy.types.Material:
     """Material "TetFlora microsphere" of all microspheres: that of microsurfaces with the sphere's own normal.
 
     Cycles meets spheres of a point cloud only from outside. So light that falls on a sphere is reflected by the half
@@ -137,12 +143,12 @@ def sphere_material() -> bpy.types.Material:
     """
 
     def build(graph: Graph, material: bpy.types.Material) -> None:
-        looks = _proxy_looks(graph, graph.node("ShaderNodeNewGeometry").outputs["Normal"])
+        looks = _proxy_looks(graph, graph.node("ShaderNodeNewGeometry").outputs["Normal"], own)
         thickness = graph.math('MULTIPLY', graph.attribute("radius", "Fac"), 2.0)
         _lead_out(graph, _scattered(graph, looks), thickness)
         material.thickness_mode = 'SLAB'
 
-    return surface_material(SPHERE, _SPHERE_VERSION, build)
+    return surface_material(ASSET_SPHERE if own else SPHERE, _SPHERE_VERSION, build)
 
 
 def baked_material() -> bpy.types.Material:
@@ -180,9 +186,12 @@ def baked_material() -> bpy.types.Material:
     return surface_material(BAKED, _BAKED_VERSION, build)
 
 
-def _proxy_looks(graph: Graph, normal: Any) -> dict[str, Any]:
-    """What proxies feed the scatter group with: gloss where light goes through, as in leaves."""
+def _proxy_looks(graph: Graph, normal: Any, own: bool = False) -> dict[str, Any]:
+    """What proxies feed the scatter group with: gloss where light goes through, as in leaves, unless they are not."""
     colour, transmission = graph.attribute("tf_colour", "Color"), graph.attribute("tf_transmission", "Fac")
+    if own:
+        plain = {"Gloss": GLOSS, "Through Tint": WHITE}
+        return {"Colour": colour, "Transmission": transmission, "Normal": normal, **plain}
     gloss = graph.math('MULTIPLY', graph.math('GREATER_THAN', transmission, 0.0), GLOSS)
     return {"Colour": colour, "Transmission": transmission, "Gloss": gloss, "Normal": normal}
 

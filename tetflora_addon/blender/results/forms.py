@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 import bpy
 
@@ -26,6 +27,7 @@ FEW = 0.5
 _SETTINGS = ("transparent_max_bounces", "min_transparent_bounces")
 
 _Material = Callable[[], bpy.types.Material]
+_ASSET_FACETS, _ASSET_SPHERES = partial(proxy_material, own=True), partial(sphere_material, own=True)
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,8 @@ class ProxyForm:
         Returns the material of meshes, made if needed.
     point_material, baked_material : callable
         The same for point clouds, and for either where light is baked.
+    asset_material, asset_point_material : callable
+        The first two for what stands for assets.
     sockets : mapping of str to str
         Properties of ``scene.tetflora``, shown in the panel Proxy Shading, by the sockets of `material` that they set.
     bounces : int
@@ -59,6 +63,8 @@ class ProxyForm:
     material: _Material = proxy_material
     point_material: _Material = sphere_material
     baked_material: _Material = baked_material
+    asset_material: _Material = _ASSET_FACETS
+    asset_point_material: _Material = _ASSET_SPHERES
     sockets: Mapping[str, str] = field(default_factory=dict)
     bounces: int = 0
 

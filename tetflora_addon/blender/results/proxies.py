@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import closing
 
 import bpy
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...buffers import MeshBuffers, PointBuffers
+from ...emission.facets import ASSETS
 from ...emission.forms import Buffers, Refined
 from ...emission.light import AT_ONCE, BakedLight, SheetList, Sources, at_vertices, baked_attributes, baked_light
 from ...jobs import Progress
@@ -133,8 +134,7 @@ def write_proxies(
             if buffers is None:
                 yield progress.again
                 continue
-            species = None if buffers.species is None else refined.flora.species[buffers.species]
-            yield from progress.during(_added(results, form, buffers, number, baked, species))
+            yield from progress.during(_added(results, form, buffers, number, baked, refined.flora.species))
             statistics.polygons_proxy += buffers.polygons
             statistics.memory_mb += buffers.nbytes / 1e6
             progress = Progress(1.0 - 0.05 * 0.9**number, f"Making proxies: {statistics.polygons_proxy:,}")
@@ -143,12 +143,16 @@ def write_proxies(
 
 
 def _added(
-    results: Results, form: ProxyForm, buffers: Buffers, number: int, baked: bool, species: Species | None
+    results: Results, form: ProxyForm, buffers: Buffers, number: int, baked: bool, every: Sequence[Species]
 ) -> Generator[None, None, None]:
-    """Write one block of proxies step by step."""
-    points = isinstance(buffers, PointBuffers)
-    material = (form.baked_material if baked else form.point_material if points else form.material)()
-    if not baked:
+    """Write one block of proxies, of one of some species, step by step."""
+    points, of_assets = isinstance(buffers, PointBuffers), buffers.species == ASSETS
+    species = None if buffers.species is None or of_assets else every[buffers.species]
+    if baked:
+        material = form.baked_material()
+    else:
+        kinds = (form.asset_material, form.asset_point_material) if of_assets else (form.material, form.point_material)
+        material = kinds[points]()
         set_sockets(material, results.scene, form.sockets)
     name = f"{'TetFlora' if species is None else species.name} proxies {number:03d}"
     if points:
