@@ -32,7 +32,7 @@ from .time_to_picture import of_render
 
 #: Samples that images have in Cycles, of which few are rendered, and in EEVEE: its first sample takes most, so that
 #: more of them cannot be told from few.
-SAMPLES, TIMED, EEVEE_SAMPLES = 64, 4, 2
+SAMPLES, TIMED, EEVEE_SAMPLES = 64, 3, 2
 _STATUS = Path("/proc/self/status")
 
 

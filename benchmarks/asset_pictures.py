@@ -16,6 +16,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from devtools.formats import set_format
 from tetflora_addon.blender.job import refine
 
 from . import asset_scenes
@@ -26,13 +27,15 @@ from .row80 import timed_refine
 
 INSTANCES = 16
 #: By distance: what is far is small and cheap, and has many trees in a pixel.
-SAMPLES, QUICK_DIVISOR = {"near": 64, "middle": 192, "far": 384}, 8
+SAMPLES, QUICK_DIVISOR = {"near": 64, "middle": 256, "far": 256}, 8
 COVERAGE_SAMPLES = 64
 LEAST_COVERAGE = 0.05
 #: Metres of the pixels that crowns are refined for, and of those of the pictures that are compared, with samples.
 #: Cards of .4 m are real in smaller ones.
-COARSE, FINE, CROWN_SAMPLES = (0.8, 1.2, 2.0), 0.1, 256
+COARSE, FINE, CROWN_SAMPLES = (0.8, 1.0, 1.2), 0.1, 256
 TENTHS = 10
+#: Of the renderer's passes, those that sum up to the colour of a surface.
+_PASSES = "diffuse", "glossy", "transmission"
 #: Least of a crown's row that is covered where its colour counts.
 _LEAST_ROW = 0.02
 
@@ -99,28 +102,35 @@ def crown(kind: str, folder: Path, quick: bool) -> dict[str, float]:
     asset_scenes.alone(scene, kind, quick)
     samples = CROWN_SAMPLES // (QUICK_DIVISOR if quick else 1)
     asset_scenes.frame(scene, FINE)
-    plain = silhouette(scene, folder / f"crown-{kind}-plain.exr", samples)
-    again = silhouette(scene, folder / f"crown-{kind}-again.exr", samples, seed=1)
+    plain = silhouette(scene, folder / f"crown-{kind}-plain.exr", samples), albedo(scene, folder / "albedo.exr")
+    again = silhouette(scene, folder / f"crown-{kind}-again.exr", samples, 1), albedo(scene, folder / "albedo.exr", 1)
     found = {f"noise_{key}": value for key, value in _compared(plain, again).items()}
     mark("REFINE")
     for pixel in COARSE:
         asset_scenes.frame(scene, pixel)
         statistics, _ = timed_refine(scene)
         asset_scenes.frame(scene, FINE)
-        test = silhouette(scene, folder / f"crown-{kind}-{pixel}.exr", samples)
+        test = silhouette(scene, folder / f"crown-{kind}-{pixel}.exr", samples), albedo(scene, folder / "albedo.exr")
         found |= {f"{key}_{pixel}": value for key, value in _compared(plain, test).items()}
         found[f"crown_polygons_{pixel}"] = statistics.polygons_meshed + statistics.polygons_proxy
     refine.clear(scene)
     return found
 
 
-def _compared(plain: NDArray, test: NDArray) -> dict[str, float]:
-    """How much less a crown covers in a test than in a plain silhouette (height, width, 4), and its tenths' colour."""
+def _compared(plain: tuple[NDArray, NDArray], test: tuple[NDArray, NDArray]) -> dict[str, float]:
+    """How much less of the image a crown covers than a plain one, and how far the colours of its tenths are from its.
+
+    Both are given as what `silhouette` and `albedo` return. ``tenth`` is of the albedo, ``lit`` under the sky, where
+    the crown shades itself.
+    """
+    light, own = plain[0], plain[1]
     # Of all of the image: facets are larger than what they stand for, and reach beyond its outline.
-    error = float((plain[..., 3] - test[..., 3]).sum() / (plain[..., 3] > LEAST_COVERAGE).sum())
-    rows = crown_rows(plain)
-    a, b = tenths(plain, rows), tenths(test, rows)
-    return {"dT": error, "tenth": float((np.abs(b - a).mean(axis=1) / a.mean(axis=1)).max())}
+    found = {"dT": float((light[..., 3] - test[0][..., 3]).sum() / (light[..., 3] > LEAST_COVERAGE).sum())}
+    rows = crown_rows(light)
+    for name, a, b in (("tenth", own, test[1]), ("lit", light, test[0])):
+        theirs, ours = tenths(a, rows), tenths(b, rows)
+        found[name] = float((np.abs(ours - theirs).mean(axis=1) / theirs.mean(axis=1)).max())
+    return found
 
 
 def crown_rows(silhouette: NDArray[np.float32]) -> tuple[int, int]:
@@ -146,6 +156,38 @@ def silhouette(scene: bpy.types.Scene, path: Path, samples: int, seed: int = 0) 
         finally:
             scene.render.film_transparent = before
     return read_picture(path)
+
+
+def albedo(scene: bpy.types.Scene, path: Path, seed: int = 0) -> NDArray[np.float32]:
+    """Colour of surfaces, all that they do with light, and alpha (height, width, 4), premultiplied, without ground."""
+    bpy.utils.expose_bundled_modules()
+    import OpenImageIO  # Blender's own, which it shows only now
+
+    layer, render_settings, bounces = bpy.context.view_layer, scene.render, scene.cycles.max_bounces
+    scene.cycles.max_bounces = 0
+    for kind in _PASSES:
+        setattr(layer, f"use_pass_{kind}_color", True)
+    try:
+        with ground_as_holes():
+            render_settings.engine, scene.cycles.samples, scene.cycles.seed = 'CYCLES', COVERAGE_SAMPLES, seed
+            scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
+            render_settings.film_transparent, render_settings.filepath = True, str(path)
+            if hasattr(render_settings.image_settings, "media_type"):
+                render_settings.image_settings.media_type = 'MULTI_LAYER_IMAGE'
+            render_settings.image_settings.file_format = 'OPEN_EXR_MULTILAYER'
+            bpy.ops.render.render(write_still=True)
+    finally:
+        set_format(render_settings.image_settings, 'PNG')
+        render_settings.film_transparent, scene.cycles.max_bounces = False, bounces
+        for kind in _PASSES:
+            setattr(layer, f"use_pass_{kind}_color", False)
+    parts = [OpenImageIO.ImageBuf(str(path), i, 0) for i in range(OpenImageIO.ImageBuf(str(path)).nsubimages)]
+    named = {}
+    for part in parts:
+        pixels = part.get_pixels(OpenImageIO.FLOAT)
+        named |= {name.split(".", 1)[1]: pixels[..., i] for i, name in enumerate(part.spec().channelnames)}
+    colours = [sum(named[f"{kind.title()} Color.{c}"] for kind in _PASSES) for c in "RGB"]
+    return np.stack([*colours, named["Combined.A"]], axis=2)
 
 
 def coverage(scene: bpy.types.Scene, path: Path) -> NDArray[np.float32]:

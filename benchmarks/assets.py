@@ -133,11 +133,11 @@ def pictures(quick: bool, plain: bool) -> dict[str, float]:
 
 
 def crowns(quick: bool, plain: bool) -> dict[str, float]:
-    """Transmittance and tenths of a crown of cards."""
+    """Transmittance of a crown of cards, and colour of its tenths: of its surfaces, and as they are lit."""
     if plain:
         return {}
     found = apart("crown", "cards", quick=quick)
-    for name, key in (("dT_max", "dT_"), ("tenth_max", "tenth_")):
+    for name, key in (("dT_max", "dT_"), ("tenth_max", "tenth_"), ("tenth_lit_max", "lit_")):
         values = [abs(value) for other, value in found.items() if other.startswith(key)]
         found |= {name: max(values)} if values else {}
     return found
