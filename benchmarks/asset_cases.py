@@ -202,10 +202,7 @@ def store_many(folder: Path, number: int, layout: str, triangles: int, each: int
 
 
 def window_file(folder: Path, what: str, instances: int, quick: bool) -> dict[str, float]:
-    """Save a wood for the window, refined or plain."""
+    """Save a wood for the window, which refines it if it shall be."""
     asset_scenes.build(bpy.context.scene, Scatter(instances=instances, distance="middle", quick=quick))
-    if what == "refined":
-        mark("REFINE")
-        timed_refine(bpy.context.scene)
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / f"window-{what}.blend"), compress=False)
     return {"instances": instances}

@@ -35,7 +35,8 @@ def redraws(folder: Path, refined: int, plain: int, quick: bool, plain_only: boo
     for name, path in list(files.items())[: len(cases)]:
         out = folder / f"window-{name}"
         out.mkdir(parents=True, exist_ok=True)
-        (out / "wanted.json").write_text(json.dumps({"file": str(path), "redraws": REDRAWS}), encoding="utf-8")
+        wanted = {"file": str(path), "redraws": REDRAWS, "refined": name.startswith("refined")}
+        (out / "wanted.json").write_text(json.dumps(wanted), encoding="utf-8")
         steps = Path(__file__).with_name("asset_window_steps.py")
         result = window.run_in_window(str(Path(blender).absolute()), steps, out, TIMEOUT)
         if not result["ok"]:
