@@ -191,11 +191,13 @@ def libraries(folder: Path, number: int, triangles: int) -> dict[str, float]:
 def store_many(folder: Path, number: int, layout: str, triangles: int, each: int) -> None:
     """Save a wood of different assets, so many instances of each.
 
-    layout: ``grown``, by nodes at evaluation; ``linked`` from library files, or ``inside`` the file.
+    layout: ``grown``, by nodes at evaluation; ``unseen``, the same with an instancer that is disabled in viewports, as
+    artists do with what is heavy; ``linked`` from library files, or ``inside`` the file.
     """
     path = many_file(folder, number, layout, triangles)
-    if layout == "grown":
-        asset_scenes.store_trees(path, list(asset_trees.grown(number, triangles)), each * number)
+    if layout in {"grown", "unseen"}:
+        trees = list(asset_trees.grown(number, triangles))
+        asset_scenes.store_trees(path, trees, each * number, unseen=layout == "unseen")
         return
     files = asset_trees.store_libraries(folder / f"libraries-{triangles}", number, triangles)
     asset_scenes.store_many(path, files, layout == "linked", each * number)

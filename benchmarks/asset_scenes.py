@@ -245,9 +245,9 @@ def store_many(path: Path, libraries: list[Path], linked: bool, instances: int) 
     store_trees(path, trees, instances)
 
 
-def store_trees(path: Path, trees: list[bpy.types.Object], instances: int) -> None:
-    """Save a wood of different trees, seen from the middle distance."""
-    furnish(bpy.context.scene, trees, Scatter(instances=instances, distance="middle"))
+def store_trees(path: Path, trees: list[bpy.types.Object], instances: int, unseen: bool = False) -> None:
+    """Save a wood of different trees from the middle distance; unseen: it is disabled in viewports."""
+    furnish(bpy.context.scene, trees, Scatter(instances=instances, distance="middle")).hide_viewport = unseen
     bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=False)
 
 
