@@ -26,6 +26,9 @@ ASSET_PROXY = "TetFlora asset proxy"
 ASSET_SPHERE = "TetFlora asset microsphere"
 BAKED = "TetFlora baked"
 
+#: Of leaves and bark as artists make them.
+_ROUGHNESS = 0.5
+
 # Raise these when what they count changes: existing files then get the new nodes beside the old ones.
 _PROXY_VERSION = 2
 _SPHERE_VERSION = 1
@@ -123,13 +126,12 @@ def bark_steps(species_name: str, character: str) -> Iterator[None]:
 def proxy_material(own: bool = False) -> bpy.types.Material:
     """Material "TetFlora proxy" of all microsurfaces: as a leaf where ``tf_transmission`` is above 0, else as bark.
 
-    own: "TetFlora asset proxy", for what stands for the artist's own materials: all of it has the gloss that Principled
-    has by default, and what passes has no other tint.
+    own: "TetFlora asset proxy", for what stands for the artist's own materials, which mostly are Principled.
     """
 
     def build(graph: Graph, _material: bpy.types.Material) -> None:
         normal = graph.node("ShaderNodeNewGeometry").outputs["Normal"]
-        _lead_out(graph, _scattered(graph, _proxy_looks(graph, normal, own)))
+        _lead_out(graph, _principled(graph) if own else _scattered(graph, _proxy_looks(graph, normal)))
 
     return surface_material(ASSET_PROXY if own else PROXY, _PROXY_VERSION, build)
 
@@ -143,9 +145,9 @@ def sphere_material(own: bool = False) -> bpy.types.Material:
     """
 
     def build(graph: Graph, material: bpy.types.Material) -> None:
-        looks = _proxy_looks(graph, graph.node("ShaderNodeNewGeometry").outputs["Normal"], own)
-        thickness = graph.math('MULTIPLY', graph.attribute("radius", "Fac"), 2.0)
-        _lead_out(graph, _scattered(graph, looks), thickness)
+        normal = graph.node("ShaderNodeNewGeometry").outputs["Normal"]
+        shader = _principled(graph) if own else _scattered(graph, _proxy_looks(graph, normal))
+        _lead_out(graph, shader, graph.math('MULTIPLY', graph.attribute("radius", "Fac"), 2.0))
         material.thickness_mode = 'SLAB'
 
     return surface_material(ASSET_SPHERE if own else SPHERE, _SPHERE_VERSION, build)
@@ -186,14 +188,19 @@ def baked_material() -> bpy.types.Material:
     return surface_material(BAKED, _BAKED_VERSION, build)
 
 
-def _proxy_looks(graph: Graph, normal: Any, own: bool = False) -> dict[str, Any]:
-    """What proxies feed the scatter group with: gloss where light goes through, as in leaves, unless they are not."""
+def _proxy_looks(graph: Graph, normal: Any) -> dict[str, Any]:
+    """What proxies feed the scatter group with: gloss where light goes through, as in leaves."""
     colour, transmission = graph.attribute("tf_colour", "Color"), graph.attribute("tf_transmission", "Fac")
-    if own:
-        plain = {"Gloss": GLOSS, "Through Tint": WHITE}
-        return {"Colour": colour, "Transmission": transmission, "Normal": normal, **plain}
     gloss = graph.math('MULTIPLY', graph.math('GREATER_THAN', transmission, 0.0), GLOSS)
     return {"Colour": colour, "Transmission": transmission, "Gloss": gloss, "Normal": normal}
+
+
+def _principled(graph: Graph) -> bpy.types.Node:
+    """What stands for the artist's materials: Fresnel's gloss, which is most of what leaves show against the light."""
+    colour, transmission = graph.attribute("tf_colour", "Color"), graph.attribute("tf_transmission", "Fac")
+    front = graph.node("ShaderNodeBsdfPrincipled", {"Base Color": colour, "Roughness": _ROUGHNESS})
+    back = graph.node("ShaderNodeBsdfTranslucent", {"Color": colour})
+    return graph.mix(transmission, front, back)
 
 
 def _scattered(graph: Graph, looks: dict[str, Any]) -> bpy.types.Node:
