@@ -22,10 +22,10 @@ CYCLES_TRIANGLE, CYCLES_INSTANCE, BLENDER_INSTANCE = 290.0, 1_670.0, 160.0
 SAFE = 0.8
 #: Triangles of all instances up to which EEVEE draws them as fast as what would take their place.
 EEVEE_FEW = 2_000_000
-#: What a polygon of a cluster counts for in each of its places: Cycles keeps one mesh for all of them.
-CYCLES_POLYGON = 0.25
 #: Fraction of an instance that is to be real for EEVEE to draw all of it.
 EEVEE_WHOLE = 0.6
+#: The same for Cycles, which is better off with one instance than with some hundred of clusters.
+CYCLES_WHOLE = 0.1
 #: More than any fraction.
 NEVER = 2.0
 
@@ -52,16 +52,22 @@ class AssetCosts:
             return bool((self.triangles * self.instances).sum() <= EEVEE_FEW)
         return bool(self._loaded.sum() + self._of_instances.sum() <= SAFE * left)
 
-    def keeping(self, cycles: bool, left: float) -> Keeping:
-        """Which assets are drawn as the originals wherever they are, where not all can be."""
-        always = np.zeros(len(self.triangles), bool)
+    def keeping(self, cycles: bool, left: float, always: bool = True) -> Keeping:
+        """How instances are drawn that are refined: because not all can be the originals, or whatever it costs.
+
+        always: whether some assets may be the originals everywhere.
+        """
+        kept = np.zeros(len(self.triangles), bool)
         if not cycles:
-            return Keeping(always, EEVEE_WHOLE)
+            return Keeping(kept, EEVEE_WHOLE)
+        if not always and self.plain(cycles, left):
+            return Keeping(kept, CYCLES_WHOLE, shared=True, kites=False)
         # Those that cover most for what they take; none but these is loaded at all.
         cost = self._loaded + self._of_instances
-        order = np.argsort(-self.pixels / np.maximum(cost, 1.0), kind="stable")
-        always[order] = np.cumsum(cost[order]) <= SAFE / 2 * left
-        return Keeping(always, NEVER, CYCLES_POLYGON)
+        if always:
+            order = np.argsort(-self.pixels / np.maximum(cost, 1.0), kind="stable")
+            kept[order] = np.cumsum(cost[order]) <= SAFE / 2 * left
+        return Keeping(kept, NEVER, shared=True)
 
     @property
     def _loaded(self) -> NDArray[np.float64]:

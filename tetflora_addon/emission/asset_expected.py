@@ -5,10 +5,14 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..proxies.facet_sizes import FacetPixels
 from .asset_plan import Keeping, real_fractions, sizes_of
 from .asset_sight import AssetSight
+
+#: What a face of a mesh in one more place counts for.
+SHARED = 0.003
 
 
 class AssetExpected:
@@ -29,12 +33,25 @@ class AssetExpected:
         self.leaves = sight.placed.assets.clusters.leaves[self.portions.parts.cluster]
         self.sizes, self.hidden_sizes = sizes_of(sight, self.portions), sizes_of(sight, hidden)
 
-    def seen(self, pixels: float, limit: float, weight: float) -> float:
-        """Polygons, and facets counted with a weight, of what is seen."""
-        some, full = real_fractions(self.sight, self.portions, limit)
+    def seen(self, pixels: float, limit: float, weight: float, memory: bool = False) -> float:
+        """Polygons, and facets counted with a weight, of what is seen.
+
+        memory: with meshes that the renderer keeps once and shows in many places; else only the image counts.
+        """
+        some, full = real_fractions(self.sight, self.portions, limit, self.keeping.kites)
         facets = weight * self.sizes.counts(FacetPixels(pixels))
-        faces = full * self.portions.parts.totals.polygons + (some - full) * self.leaves
-        return float((self.keeping.polygon * faces + (1.0 - some) * facets).sum())
+        faces = full * self.portions.parts.totals.polygons, (some - full) * self.leaves
+        return self._meshes(*faces, memory) + float(((1.0 - some) * facets).sum())
+
+    def _meshes(self, faces: NDArray[np.float64], kites: NDArray[np.float64], memory: bool) -> float:
+        """What faces and kites (n,) of all places count for."""
+        if not self.keeping.shared:
+            return float((faces + kites).sum())
+        every, asset = self.sight.placed.assets.every, self.sight.placed.instances.asset
+        own = asset[self.portions.parts.instance]
+        there = np.array([[a.faces, len(a.leaves)] for a in every], np.float64).reshape(-1, 2).T
+        placed = np.stack([np.bincount(own, number, len(every)) for number in (faces, kites)])
+        return float(SHARED * placed.sum() + (np.minimum(placed, there).sum() if memory else 0.0))
 
     def unseen(self, pixels: FacetPixels) -> float:
         """Facets of what is not seen."""

@@ -45,13 +45,16 @@ class Keeping:
         Assets of which every instance is.
     fraction : float
         Fraction of its faces that are to be real; more than 1 for never.
-    polygon : float
-        What a polygon of a cluster counts for in each of its places, over one that is made for its place.
+    shared : bool
+        Meshes of clusters cost the renderer as much as one of them, in however many places. Else each place counts.
+    kites : bool
+        Leaves of few pixels are kites.
     """
 
     always: NDArray[np.bool_]
     fraction: float = 0.6
-    polygon: float = 1.0
+    shared: bool = False
+    kites: bool = True
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,7 @@ class AssetPlan:
 
 
 def real_fractions(
-    sight: AssetSight, portions: AssetPortions, limit: float | None
+    sight: AssetSight, portions: AssetPortions, limit: float | None, kites: bool = True
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Fractions (n,) of clusters that are meshes, if only of kites, and (n,) that are their own faces.
 
@@ -91,7 +94,7 @@ def real_fractions(
     some = np.where(seen, real_fraction(pixels, limit), 0.0)
     # A card or a leaf of two triangles is no more than a kite.
     simple = sight.placed.assets.leaf_faces[parts.cluster] <= SIMPLE
-    return some, np.where(simple, some, some * real_fraction(pixels, KITES))
+    return some, np.where(simple | (not kites), some, some * real_fraction(pixels, KITES))
 
 
 def plan_of(sight: AssetSight, limit: float | None, keeping: Keeping) -> AssetPlan:
@@ -107,7 +110,7 @@ def plan_of(sight: AssetSight, limit: float | None, keeping: Keeping) -> AssetPl
     while len(portions):
         # Down to the clusters that are meshes of their own, where some of them may be real.
         above = mesh_of[portions.parts.cluster] < 0
-        some = real_fractions(sight, portions, limit)[0] > 0.0
+        some = real_fractions(sight, portions, limit, keeping.kites)[0] > 0.0
         opening = above & (some | (portions.real & portions.mixed & (sight.pixels(portions) > MIXED)))
         done.append(portions.take(~opening))
         portions, _ = sight.opened(portions.take(opening))
@@ -118,7 +121,8 @@ def plan_of(sight: AssetSight, limit: float | None, keeping: Keeping) -> AssetPl
     area = every.parts.totals.optical_area[inner]
     whole_area = np.maximum(np.bincount(of, area, len(pair)), 1e-300)
     meshed, full = (
-        np.bincount(of, area * f[inner], len(pair)) / whole_area for f in real_fractions(sight, every, limit)
+        np.bincount(of, area * f[inner], len(pair)) / whole_area
+        for f in real_fractions(sight, every, limit, keeping.kites)
     )
     owner, cluster = pair // len(assets.clusters), pair % len(assets.clusters)
     own = placed.parts(owner, cluster)

@@ -109,7 +109,7 @@ class Expected:
         bare = _bare(self.flora, self.portions, self.camera, limit) if self.any_bare else 0.0
         faces = found[0] * (self.faces_coarse + self.faces_finer + bare)
         tubes = found[0] * _tubes(self.flora, self.portions, transition, real)
-        of_assets = self.assets.seen(pixels, limit, weight) if self.assets else 0.0
+        of_assets = self.assets.seen(pixels, limit, weight, safe) if self.assets else 0.0
         of_plants = self.times * (self.portions.within * (real * faces + (1.0 - real) * facets) + tubes)
         return float(of_plants.sum()) + of_assets
 

@@ -20,7 +20,7 @@ from ...assets.asset import Asset, Assets, Instances
 from ...assets.compiled import compile_steps
 from ...assets.source import AssetSource
 from ...camera.camera import Camera
-from ...emission.asset_costs import CYCLES_POLYGON, AssetCosts
+from ...emission.asset_costs import AssetCosts
 from ...emission.asset_plan import Keeping
 from ...errors import SceneError, TetFloraError
 from ...jobs import Progress
@@ -114,10 +114,8 @@ def bind_steps(
     )
     placed = PlacedAssets(Assets.of(assets), instances)
     owner = np.repeat([owners.index(_owner(one)) for one in places], number).astype(np.int32)
-    keeping = Keeping(np.zeros(len(targets), bool), polygon=CYCLES_POLYGON if _in_cycles(scene) else 1.0)
-    if scene.tetflora.asset_detail == 'AUTO':
-        _, costs = _costs(places, depsgraph, _covered(placed, camera))
-        keeping = costs.keeping(_in_cycles(scene), left)
+    _, costs = _costs(places, depsgraph, _covered(placed, camera))
+    keeping = costs.keeping(_in_cycles(scene), left, always=scene.tetflora.asset_detail == 'AUTO')
     return Bound(tuple(targets), placed, matrices, tuple(owners), owner, keeping, tuple(dict.fromkeys(warnings)))
 
 

@@ -20,7 +20,8 @@ from ...preview.levels import Level, Levels, gather
 from ...preview.light_plants import Shapes, bounds_of_plants, light_plants
 from ...preview.simple_crowns import joined, simple_crowns
 from ...refinement.loop import refine as refine_loop
-from ..job.contents import compile_for, load_for, read_scene, refinement_settings
+from ..job.assets import bind_steps
+from ..job.contents import compile_for, load_for, memory_left, read_scene, refinement_settings
 from ..runtime import Handlers, JobData, call_off, call_soon, guarded, redraw
 from ..scene.camera import read_camera
 from ..scene.crowns import crown_for
@@ -67,7 +68,9 @@ def _level_steps(
     yield progress
     flora = yield from call_in_thread(progress, compile_species, load_for(given.species, scene, depsgraph))
     settings = refinement_settings(scene)
-    states = refine_loop(flora, given.seeds, camera, settings, given.occluders, given.polygons, given.lights)
+    bound = yield from bind_steps(scene, given.places, depsgraph, camera, memory_left(scene, camera))
+    others = given.occluders, given.polygons, given.lights, None if bound is None else bound.placed
+    states = refine_loop(flora, given.seeds, camera, settings, *others)
     levels = yield from steps_in_thread(_shown(gather(states, flora, camera)), Progress(0.05, "Level 0"))
     data.check()
     preview = of(scene)
