@@ -102,7 +102,7 @@ class Clusters(Arrays):
 
 
 @dataclass(frozen=True)
-class Samples(Arrays):
+class SurfaceSamples(Arrays):
     """Places (s) on the surfaces of clusters, in the space of their asset.
 
     Attributes
@@ -121,7 +121,7 @@ class Samples(Arrays):
 
 
 @dataclass(frozen=True)
-class Leaves(Arrays):
+class AssetKites(Arrays):
     """Leaves (l) as kites of the same area, in the space of their asset.
 
     A kite lies in the plane of one of the leaf's faces, chosen in proportion to their areas: on average it shows the
@@ -154,8 +154,8 @@ class Asset:
     digest : str
         Of the source.
     clusters : Clusters of c
-    samples : Samples of s
-    leaves : Leaves of l
+    samples : SurfaceSamples of s
+    leaves : AssetKites of l
         Those of a cluster together.
     part, face : (f,) int32
         Part of the source, and face of that part's surface, for each face, those of a cluster together.
@@ -164,8 +164,8 @@ class Asset:
     name: str
     digest: str
     clusters: Clusters
-    samples: Samples
-    leaves: Leaves
+    samples: SurfaceSamples
+    leaves: AssetKites
     part: NDArray[np.int32]
     face: NDArray[np.int32]
 
@@ -185,32 +185,32 @@ class Asset:
         some = slice(start, start + int(self.clusters.faces[cluster]))
         return self.part[some], self.face[some]
 
-    def leaves_of(self, cluster: int) -> Leaves:
+    def leaves_of(self, cluster: int) -> AssetKites:
         """Leaves (k,) of a cluster."""
         start = int(self.clusters.first_leaf[cluster])
         return self.leaves.take(slice(start, start + int(self.clusters.leaves[cluster])))
 
 
 @dataclass(frozen=True)
-class Assets:
+class AssetTable:
     """Several assets as one: their clusters and samples, one asset after the other.
 
     Attributes
     ----------
     every : tuple of Asset
     clusters : Clusters of c
-    samples : Samples of s
+    samples : SurfaceSamples of s
     root : (a + 1,) int64
         First cluster of each, and their number.
     """
 
     every: tuple[Asset, ...]
     clusters: Clusters
-    samples: Samples
+    samples: SurfaceSamples
     root: NDArray[np.int64]
 
     @classmethod
-    def of(cls, assets: Sequence[Asset]) -> Assets:
+    def of(cls, assets: Sequence[Asset]) -> AssetTable:
         """All of some."""
         root = np.cumsum([0, *(len(a.clusters) for a in assets)])
         sample = np.cumsum([0, *(len(a.samples) for a in assets)])
@@ -226,10 +226,12 @@ class Assets:
                     wood_sample=own.wood_sample + np.int32(at),
                 )
             )
-        return cls(tuple(assets), Clusters.concatenate(moved), Samples.concatenate([a.samples for a in assets]), root)
+        return cls(
+            tuple(assets), Clusters.concatenate(moved), SurfaceSamples.concatenate([a.samples for a in assets]), root
+        )
 
     @classmethod
-    def none(cls) -> Assets:
+    def none(cls) -> AssetTable:
         """No assets."""
         return cls.of(())
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..arrays import perpendicular, unit
 from ..compiled.rays import basis, covered
 from ..growth.hashing import child_key, key_of_seed, uniform
-from .asset import COUNTS, Clusters, Samples
+from .asset import COUNTS, Clusters, SurfaceSamples
 from .measures import Run
 
 #: Rays across the longer side of a cluster; clusters of a depth that are looked at, and directions.
@@ -31,7 +31,7 @@ _CORNERS = np.array([[0.0, 1.0], [-np.sqrt(3) / 2, -0.5], [np.sqrt(3) / 2, -0.5]
 
 
 def facet_weights_of(
-    clusters: Clusters, samples: Samples, triangles: Callable[[int], Iterator[Run]], start: float = 0.0
+    clusters: Clusters, samples: SurfaceSamples, triangles: Callable[[int], Iterator[Run]], start: float = 0.0
 ) -> Generator[float, None, NDArray[np.float64]]:
     """Weights (c, counts) for each of `asset.COUNTS`; yields the fraction that is done, from a start to 1.
 
@@ -86,7 +86,7 @@ class _View:
         return covered(flat, first, np.full(len(first), 3))
 
 
-def _looked(clusters: Clusters, samples: Samples, cluster: int, runs: Iterator[Run]) -> NDArray[np.float64]:
+def _looked(clusters: Clusters, samples: SurfaceSamples, cluster: int, runs: Iterator[Run]) -> NDArray[np.float64]:
     """Areas (2, counts, tried) that a cluster blocks, and that its facets do, over those of its bound."""
     views = [_View.of(clusters, cluster, direction) for direction in DIRECTIONS]
     through = np.zeros((len(views), RAYS * RAYS))
@@ -107,7 +107,7 @@ def _looked(clusters: Clusters, samples: Samples, cluster: int, runs: Iterator[R
 
 
 def _blocked_by_facets(
-    clusters: Clusters, samples: Samples, cluster: int, view: _View, count: float, weight: float
+    clusters: Clusters, samples: SurfaceSamples, cluster: int, view: _View, count: float, weight: float
 ) -> float:
     """Area over that of the lattice that ``count`` facets block, the mean of several sets of them."""
     each = max(round(count), 1)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..errors import TetFloraError
 from ..growth.hashing import child_key, key_of_seed, uniform
 from ..jobs import at_once
-from .asset import COUNTS, Asset, Clusters, Leaves, Samples
+from .asset import COUNTS, Asset, AssetKites, Clusters, SurfaceSamples
 from .clumping import facet_weights_of
 from .clusters import Hierarchy, hierarchy_of
 from .measures import ALONG, Measured, measured, pool_of, runs_of, shared_out, well_spread
@@ -65,7 +65,7 @@ def compile_steps(source: AssetSource) -> Generator[float, None, Asset]:
     part, face = (np.concatenate([getattr(p, name) for p in parts]) for name in ("part", "face"))
     clusters = Clusters(*(weights if name == "weights" else getattr(clusters, name) for name in vars(clusters)))
     return Asset(
-        source.name, source.digest, clusters, samples, Leaves.concatenate([p.leaves for p in parts]), part, face
+        source.name, source.digest, clusters, samples, AssetKites.concatenate([p.leaves for p in parts]), part, face
     )
 
 
@@ -77,13 +77,13 @@ def _smallest(hierarchy: Hierarchy) -> tuple[NDArray[np.intp], NDArray[np.int64]
     return small, np.stack(ends)
 
 
-def _clusters(hierarchy: Hierarchy, parts: list[Measured]) -> tuple[Clusters, Samples]:
+def _clusters(hierarchy: Hierarchy, parts: list[Measured]) -> tuple[Clusters, SurfaceSamples]:
     """All clusters, from what is known of the smallest; weights of facets are 1."""
     small, (first, last) = _smallest(hierarchy)
     sums, low, high, counts = (
         np.concatenate([getattr(part, name) for part in parts]) for name in ("sums", "low", "high", "counts")
     )
-    samples = Samples.concatenate([part.samples for part in parts])
+    samples = SurfaceSamples.concatenate([part.samples for part in parts])
     # Of all that lies between two ends; nothing is summed over one large number less another.
     every = np.array([sums[a:b].sum(axis=0) for a, b in zip(first, last, strict=True)])
     bounds = np.array([(low[a:b].min(axis=0), high[a:b].max(axis=0)) for a, b in zip(first, last, strict=True)])
@@ -124,17 +124,17 @@ def _clusters(hierarchy: Hierarchy, parts: list[Measured]) -> tuple[Clusters, Sa
         every_counts[:, 1].astype(np.int32),
         np.ones((len(first), len(COUNTS))),
     )
-    return clusters, Samples.concatenate([samples, above])
+    return clusters, SurfaceSamples.concatenate([samples, above])
 
 
 def _samples_above(
     hierarchy: Hierarchy,
     sums: NDArray[np.float64],
     counts: NDArray[np.int64],
-    samples: Samples,
+    samples: SurfaceSamples,
     first: NDArray[np.int64],
     last: NDArray[np.int64],
-) -> tuple[Samples, NDArray[np.int64]]:
+) -> tuple[SurfaceSamples, NDArray[np.int64]]:
     """Samples of clusters with children (k): some of those of the smallest clusters, in proportion to their areas."""
     inner = np.flatnonzero(hierarchy.children > 0)
     areas = np.stack([sums[:, 0] + sums[:, 5] / 2, (sums[:, 1] - sums[:, 5]) / 2], axis=1)

@@ -18,7 +18,7 @@ import numpy as np
 
 from .. import storage
 from ..files import inside, read_whole, write_whole
-from .asset import COUNTS, Asset, Clusters, Leaves, Samples
+from .asset import COUNTS, Asset, AssetKites, Clusters, SurfaceSamples
 
 #: Raise it when assets are compiled in another way.
 METHOD = 4
@@ -27,7 +27,7 @@ _MOST, _MOST_FILES, _MOST_MEMORY = 1 << 30, 4 << 30, 768 << 20
 _NAMES = re.compile(r"tetflora-compiled-\d+-[0-9a-f]+\.npz")
 _NUMBERS = ("child", "children", "first_face", "faces", "first_leaf", "leaves")
 _NUMBERS += ("leaf_sample", "leaf_samples", "wood_sample", "wood_samples")
-_KINDS = {"clusters": Clusters, "samples": Samples, "leaves": Leaves}
+_KINDS = {"clusters": Clusters, "samples": SurfaceSamples, "leaves": AssetKites}
 
 _known: dict[str, Asset] = {}  # least recently asked for first
 
@@ -107,7 +107,7 @@ def _check(asset: Asset, digest: str) -> None:
     ------
     ValueError
     """
-    for kind, rows in ((Clusters, asset.clusters), (Samples, asset.samples), (Leaves, asset.leaves)):
+    for kind, rows in ((Clusters, asset.clusters), (SurfaceSamples, asset.samples), (AssetKites, asset.leaves)):
         model = kind.empty()
         for f in fields(kind):
             own, wanted = getattr(rows, f.name), getattr(model, f.name)

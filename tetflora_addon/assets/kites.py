@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..arrays import unit
 from ..buffers import MeshBuffers
 from ..growth.hashing import key_of_seed, uniform
-from .asset import Leaves
+from .asset import AssetKites
 
 #: Standard deviations along an ellipse's diameter, and the narrowest and the widest kite, of its length.
 _DIAMETER, _NARROW, _WIDE = 4.0, 0.02, 1.5
@@ -26,7 +26,7 @@ def kites_of(
     transmission: NDArray[np.floating],
     first: NDArray[np.integer],
     number: NDArray[np.integer],
-) -> Leaves:
+) -> AssetKites:
     """Kites for leaves that are runs of triangles.
 
     Parameters
@@ -72,7 +72,7 @@ def kites_of(
     width = 2.0 * area / np.maximum(length, 1e-300)
     mean = np.add.reduceat(optical[:, None] * colour, first, axis=0) / whole
     through = np.add.reduceat(optical * transmission, first) / whole[:, 0]
-    return Leaves(
+    return AssetKites(
         centre.astype(np.float32),
         (length[:, None] / 2 * along).astype(np.float32),
         (width[:, None] / 2 * np.cross(plane, along)).astype(np.float32),
@@ -81,7 +81,7 @@ def kites_of(
     )
 
 
-def kite_mesh(leaves: Leaves) -> MeshBuffers:
+def kite_mesh(leaves: AssetKites) -> MeshBuffers:
     """Kites (l,) as a mesh with the attributes that the material of proxies reads."""
     count = len(leaves)
     points = [leaves.centre - leaves.along, leaves.centre - leaves.across]

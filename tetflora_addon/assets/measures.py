@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..arrays import spread
 from ..growth.hashing import child_key, key_of_seed, uniform
-from .asset import Leaves, Samples
+from .asset import AssetKites, SurfaceSamples
 from .clusters import Hierarchy
 from .kites import kites_of
 from .patches import Patches
@@ -198,10 +198,10 @@ class Measured:
     sums : (c, 17) float64
         Areas of sheets and solids, optical area; faces; patches that are not wood; area of solids that are not;
         optical area times width, colour (3), transmission, and n nᵀ (6).
-    samples : Samples of s
+    samples : SurfaceSamples of s
     counts : (c, 2) int64
         Samples on leaves and on wood of each.
-    leaves : Leaves of l
+    leaves : AssetKites of l
         Those of the clusters, one after the other; patches that are not wood.
     part, face : (f,) int32
         Faces of the clusters, one after the other.
@@ -210,9 +210,9 @@ class Measured:
     low: NDArray[np.float64]
     high: NDArray[np.float64]
     sums: NDArray[np.float64]
-    samples: Samples
+    samples: SurfaceSamples
     counts: NDArray[np.int64]
-    leaves: Leaves
+    leaves: AssetKites
     part: NDArray[np.int32]
     face: NDArray[np.int32]
 
@@ -246,11 +246,11 @@ def measured(run: Run) -> Measured:
     )
 
 
-def _leaves(run: Run, optical: NDArray[np.float64], normal: NDArray[np.float64]) -> Leaves:
+def _leaves(run: Run, optical: NDArray[np.float64], normal: NDArray[np.float64]) -> AssetKites:
     """Patches that are not wood, as kites."""
     some = np.flatnonzero(~run.woody)
     if not len(some):
-        return Leaves.empty()
+        return AssetKites.empty()
     first = np.flatnonzero(run.new_patch[some])
     number = (
         run.cluster[some][first] * _MANY
@@ -281,7 +281,7 @@ def well_spread(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[n
 
 def _samples(
     run: Run, owner: NDArray[np.int64], start: NDArray[np.intp], optical: NDArray[np.float64], normal: NDArray
-) -> tuple[Samples, NDArray[np.int64]]:
+) -> tuple[SurfaceSamples, NDArray[np.int64]]:
     """Samples of equal areas on leaves, and on wood, of the clusters of a run; leaves first, cluster by cluster."""
     kinds = [np.where(run.woody, 0.0, optical), np.where(run.woody, optical, 0.0)]
     areas = [np.add.reduceat(kind, start) for kind in kinds]
@@ -300,7 +300,7 @@ def _samples(
         weight = np.stack([1 - root, root * (1 - v), root * v], axis=1)
         place = np.einsum("nk,nki->ni", weight, run.corners[pick])
         made.append(
-            Samples(
+            SurfaceSamples(
                 place.astype(np.float32),
                 normal[pick].astype(np.float16),
                 run.colour[pick].astype(np.float16),
@@ -309,4 +309,4 @@ def _samples(
         )
         order.append(cluster)
     cluster = np.concatenate(order)
-    return Samples.concatenate(made).take(np.argsort(cluster, kind="stable")), counts
+    return SurfaceSamples.concatenate(made).take(np.argsort(cluster, kind="stable")), counts

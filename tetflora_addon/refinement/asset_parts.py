@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Arrays, column, nested, spread
-from ..assets.asset import Assets, Instances
+from ..assets.asset import AssetTable, Instances
 from ..camera.camera import Camera
 from ..growth.hashing import child_key, uniform
 from .contents import Held, Totals, sums
@@ -35,7 +35,7 @@ class AssetParts(Arrays):
     ----------
     instance : (n,) int32
     cluster : (n,) int32
-        Of `Assets.clusters`.
+        Of `AssetTable.clusters`.
     centre : (n, 3) float64
         Middle of its bound, metres.
     totals : Totals of n
@@ -65,11 +65,11 @@ class PlacedAssets:
 
     Parameters
     ----------
-    assets : Assets
+    assets : AssetTable
     instances : Instances
     """
 
-    def __init__(self, assets: Assets, instances: Instances) -> None:
+    def __init__(self, assets: AssetTable, instances: Instances) -> None:
         self.assets, self.instances = assets, instances
         self.scale, self.largest = instances.scale, instances.largest
         gram = np.einsum("nki,nkj->nij", instances.linear, instances.linear)
@@ -82,7 +82,7 @@ class PlacedAssets:
     @classmethod
     def none(cls) -> PlacedAssets:
         """No instances."""
-        return cls(Assets.none(), Instances.empty())
+        return cls(AssetTable.none(), Instances.empty())
 
     def take(self, index: NDArray) -> PlacedAssets:
         """Some instances (k,) or a mask (n,) of them."""

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...assets import kept
-from ...assets.asset import Asset, Assets, Instances
+from ...assets.asset import Asset, AssetTable, Instances
 from ...assets.compiled import compile_steps
 from ...assets.source import AssetSource
 from ...camera.camera import Camera
@@ -112,7 +112,7 @@ def bind_steps(
         np.ascontiguousarray(matrices[:, :3, 3]),
         np.concatenate([one.keys for one in places]),
     )
-    placed = PlacedAssets(Assets.of(assets), instances)
+    placed = PlacedAssets(AssetTable.of(assets), instances)
     owner = np.repeat([owners.index(_owner(one)) for one in places], number).astype(np.int32)
     _, costs = _costs(places, depsgraph, _covered(placed, camera))
     keeping = costs.keeping(_in_cycles(scene), left, always=scene.tetflora.asset_detail == 'AUTO')
