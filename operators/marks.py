@@ -16,9 +16,8 @@ from ..tetflora_addon.blender.placing.plant_objects import (
 from ..tetflora_addon.blender.placing.populations import adopt, collection_of, owner_of
 from ..tetflora_addon.blender.placing.properties import MOST_EMPTIES
 from ..tetflora_addon.blender.placing.rules import shown_population
-from ..tetflora_addon.blender.scene.explicit import SURFACE_TYPES
 from ..tetflora_addon.blender.scene.fields import FIELD_TYPES, fields_of
-from ..tetflora_addon.blender.scene.objects import may_instance
+from ..tetflora_addon.blender.scene.objects import SURFACE_TYPES, may_instance
 from ..tetflora_addon.blender.species.catalogue import default_species
 from ..tetflora_addon.blender.species.edits import catalogue
 from .base import Reporting, counted, in_object_mode, need, plants_selected, select_only, selected_plants

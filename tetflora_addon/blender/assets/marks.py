@@ -17,8 +17,7 @@ import numpy as np
 
 from ...errors import SceneError
 from ..materials.nodes import is_ours
-from ..scene.explicit import SURFACE_TYPES
-from ..scene.objects import may_instance
+from ..scene.objects import SURFACE_TYPES, may_instance
 from ..species.asset_species import (
     PREFIX,
     Datablock,

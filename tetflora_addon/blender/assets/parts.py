@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from ...errors import SceneError
 from ..attributes import world_matrix
 from ..materials.nodes import is_ours
-from ..scene.explicit import SURFACE_TYPES
 from ..scene.instances import references_of
-from ..scene.objects import ONE_BY_ONE, has_nodes, rendered_objects
+from ..scene.objects import ONE_BY_ONE, SURFACE_TYPES, has_nodes, rendered_objects
 
 Slots = list[bpy.types.Material | None]
 

@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ..attributes import world_matrix
-from ..scene.explicit import SURFACE_TYPES
 from ..scene.instances import Reference, name_keys, references_of
-from ..scene.objects import DEEPEST, ONE_BY_ONE, has_nodes, renderable_objects
+from ..scene.objects import DEEPEST, ONE_BY_ONE, SURFACE_TYPES, has_nodes, renderable_objects
 from ..scene.plants import AssetPlants, read_asset_plants
 from ..scene.scatterers import is_scatter
 from ..species.asset_species import TetFloraAssetSpecies, asset_species

@@ -22,7 +22,7 @@ from ...refinement.polygons import Meshes, Surface
 from ..attributes import face_offsets, members, read, values_of, world_matrix
 from ..materials.means import Looks
 from ..materials.nodes import is_ours
-from .objects import may_instance, renderable_objects
+from .objects import SURFACE_TYPES, may_instance, renderable_objects
 from .scatterers import scatters
 
 #: Of the property `is_explicit`.
@@ -34,7 +34,6 @@ EXPLICIT_PROPERTY = {
     ),
     "options": set(),
 }
-SURFACE_TYPES = {'MESH', 'CURVE', 'SURFACE', 'FONT', 'META', 'CURVES'}
 #: Transmission of sheets whose material leaves it open.
 _SHEET_TRANSMISSION = 0.3
 _TYPES = {'FLOAT', 'FLOAT2', 'FLOAT_VECTOR', 'FLOAT_COLOR', 'BYTE_COLOR'}

@@ -22,6 +22,8 @@ from ..species.asset_species import asset_species
 from .instances import name_keys, references_of
 from .scatterers import scatters
 
+#: Types of objects that have faces, or may have some by nodes.
+SURFACE_TYPES = {'MESH', 'CURVE', 'SURFACE', 'FONT', 'META', 'CURVES'}
 #: Ways to instance whose places only Blender knows.
 ONE_BY_ONE = {'VERTS', 'FACES'}
 #: Instances within instances that are followed, as many as Blender draws.
