@@ -27,8 +27,8 @@ from .leaf_detail import FADING
 from .plants import KITES
 from .portions import MIXED, in_chunks
 
-#: Facets of a cluster from which on those of its children have places of their own.
-MANY = 48.0
+#: Facets of a cluster from which on those of its children have places of their own, and where it is seen in part.
+MANY, FEW = 48.0, 6.0
 #: Faces of a leaf up to which there is no kite for it.
 SIMPLE = 3.0
 #: Approximate number of facets that are made at a time.
@@ -159,15 +159,10 @@ def _facets_of(sight: AssetSight, portions: AssetPortions, pixels: FacetPixels) 
     """Facets of portions, which are opened as far as their places show."""
     while len(portions):
         seen, sizes = portions.visibility > 0.0, sizes_of(sight, portions)
-        many = sizes.counts(pixels) > MANY
-        extent = sight.pixels(portions)
-        opening = sight.assets.can_open(portions.parts) & many & (seen | portions.mixed)
-        opening |= (
-            sight.assets.can_open(portions.parts)
-            & portions.mixed
-            & (extent > MIXED)
-            & (sizes.counts(pixels) > MANY / 8.0)
-        )
+        count, extent = sizes.counts(pixels), sight.pixels(portions)
+        # Where there are more facets than samples they would lie in heaps, and let light pass in between.
+        opening = (count > MANY) | (portions.mixed & (extent > MIXED) & (count > FEW))
+        opening &= sight.assets.can_open(portions.parts)
         for group, beside in ((seen, False), (~seen & ~portions.beside, False), (~seen & portions.beside, True)):
             some = np.flatnonzero(group & ~opening)
             if len(some):
