@@ -4,53 +4,24 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import bpy
 import numpy as np
 import pytest
 
-from panels import menus, plants, refine
-from tests.blender.layouts import Layout
-from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
-from tetflora_addon.blender.assets import marks, places
+from tests.blender.assets.scatters import crown, read, scene, species
+from tests.blender.scenes import add_mesh, add_plant, depsgraph, select
+from tetflora_addon.blender.assets import marks
 from tetflora_addon.blender.compat import shader_tree
-from tetflora_addon.blender.job import frame_cache
 from tetflora_addon.blender.placing.distances import distance_of
 from tetflora_addon.blender.placing.plant_objects import add_plant as place_plant
 from tetflora_addon.blender.scene.crowns import crown_for, crown_to_draw
-from tetflora_addon.blender.scene.explicit import read_explicit
-from tetflora_addon.blender.scene.objects import has_contents, taking_part
 from tetflora_addon.blender.species import catalogue, edits
-from tetflora_addon.blender.species.asset_species import PICTURE_SIDE, asset_of, asset_species, find_asset, picture_of
+from tetflora_addon.blender.species.asset_species import PICTURE_SIDE, asset_of, find_asset, picture_of
 from tetflora_addon.blender.viewport import levels, state
 from tetflora_addon.errors import SceneError, SpeciesError
 from tetflora_addon.files import is_identifier
 
 pytestmark = pytest.mark.usefixtures("clean_file")
-
-
-def scene():
-    return bpy.context.scene
-
-
-def read():
-    return places.read_places(scene(), depsgraph(), bpy.context.view_layer)
-
-
-def crown(name="crown", radius=2.0, low=1.0, high=5.0):
-    """A box as a tree."""
-    corners = [(x, y, z) for z in (low, high) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    faces = [(0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)]
-    mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata([(x * radius, y * radius, z) for x, y, z in corners], [], faces)
-    obj = bpy.data.objects.new(name, mesh)
-    scene().collection.objects.link(obj)
-    return obj
-
-
-def species(asset, variants=False):
-    return marks.use_as_species(scene(), depsgraph(), asset, variants).identifier
 
 
 def test_an_object_is_a_species_in_all_menus_with_its_measures_and_a_picture():
@@ -322,139 +293,3 @@ def test_linked_objects_are_species_and_scatter_without_overrides(linked):
     select(bpy.data.objects["Linked ground"])
     assert bpy.ops.tetflora.refine_scatter() == {'FINISHED'}
     assert len(read()) == 1
-
-
-def test_refine_scatter_says_what_it_found_and_refuses_with_a_reason(capfd):
-    ground, child = add_mesh("ground"), add_mesh("child")
-    select(ground)
-    with pytest.raises(RuntimeError, match="Select an object that scatters others"):
-        bpy.ops.tetflora.refine_scatter()
-    ground.instance_type = 'VERTS'
-    with pytest.raises(RuntimeError, match='"ground" shows no instances now'):
-        bpy.ops.tetflora.refine_scatter()
-    assert not ground.tetflora.is_scatter
-    lamp = bpy.data.objects.new("lamp", bpy.data.lights.new("lamp", 'POINT'))
-    scene().collection.objects.link(lamp)
-    lamp.parent = ground
-    with pytest.raises(RuntimeError, match=r"only objects without faces \(lamp\)"):
-        bpy.ops.tetflora.refine_scatter()
-    child.parent, ground.tetflora.is_explicit = ground, True
-    capfd.readouterr()
-    assert bpy.ops.tetflora.refine_scatter() == {'FINISHED'}
-    assert (
-        "4 instances of 1 asset will be refined; 4 instances without faces left as they are" in capfd.readouterr().out
-    )
-    assert ground.tetflora.is_scatter and not ground.tetflora.is_explicit
-    assert bpy.ops.tetflora.refine_scatter(action='MARK') == {'FINISHED'}
-    assert ground.tetflora.is_scatter
-    assert bpy.ops.tetflora.refine_scatter() == {'FINISHED'}
-    assert not ground.tetflora.is_scatter
-
-
-def test_instances_of_a_scatterer_are_not_explicit_as_well():
-    ground, child = add_mesh("ground"), add_mesh("child")
-    child.parent, ground.instance_type = ground, 'VERTS'
-    child.tetflora.is_explicit = True
-    add_camera()
-
-    def instances():
-        return len(read_explicit(depsgraph(), bpy.context.view_layer).meshes.surface)
-
-    assert instances() >= 4
-    ground.tetflora.is_scatter = True
-    assert instances() <= 1
-
-
-def test_operators_take_collections_by_name_and_many_objects():
-    held = bpy.data.collections.new("held")
-    scene().collection.children.link(held)
-    held.objects.link(crown("one"))
-    assert bpy.ops.tetflora.use_as_species(collection="held") == {'FINISHED'}
-    assert bpy.ops.tetflora.use_as_species(collection="none") == {'CANCELLED'}
-    lamp = bpy.data.objects.new("lamp", bpy.data.lights.new("lamp", 'POINT'))
-    scene().collection.objects.link(lamp)
-    select(crown("two"), crown("three"), lamp)
-    assert bpy.ops.tetflora.use_as_species() == {'FINISHED'}
-    assert sorted(info.name for i, info in edits.catalogue().items() if i in asset_species()) == [
-        "held",
-        "three",
-        "two",
-    ]
-    select(bpy.data.objects["two"], bpy.data.objects["three"])
-    assert bpy.ops.tetflora.stop_using_as_species() == {'FINISHED'}
-    assert bpy.ops.tetflora.stop_using_as_species(collection="held") == {'FINISHED'}
-    assert len(scene().tetflora.asset_species) == 0
-
-
-def _drawn(panel, obj):
-    select(obj)
-    layout, context = Layout(), bpy.context
-    names = ("scene", "view_layer", "preferences", "active_object", "mode")
-    known = {name: getattr(context, name) for name in names}
-    panel.draw(SimpleNamespace(layout=layout), SimpleNamespace(region=SimpleNamespace(width=300), **known))
-    return layout
-
-
-def test_panels_offer_what_fits_the_active_object():
-    rock, ground, child = crown("Rock"), add_mesh("ground"), add_mesh("child")
-    assert "tetflora.use_as_species" in _drawn(plants.TETFLORA_PT_plants, rock).names("operator")
-    own = species(rock)
-    shown = _drawn(plants.TETFLORA_PT_plants, rock)
-    assert "tetflora.stop_using_as_species" in shown.names("operator")
-    assert "is_scatter" not in _drawn(refine.TETFLORA_PT_refine, ground).names("prop", 1)
-    child.parent, ground.instance_type = ground, 'VERTS'
-    assert "is_scatter" in _drawn(refine.TETFLORA_PT_refine, ground).names("prop", 1)
-    plant = add_plant(species=own)
-    bpy.data.objects.remove(rock)
-    edits.look_again()
-    labels = [options["text"] for name, _, options in _drawn(plants.TETFLORA_PT_plants, plant).drawn if name == "label"]
-    assert '"Rock" is not in the catalog' in labels
-    layout = Layout()
-    menus.draw_in_outliner(SimpleNamespace(layout=layout), bpy.context)
-    assert layout.names("operator") == ["tetflora.use_as_species", "tetflora.stop_using_as_species"]
-
-
-def test_refine_automatically_hears_of_assets_and_scatters():
-    add_camera()
-    rock, ground, child = crown("Rock"), add_mesh("ground"), add_mesh("child")
-    child.parent, ground.instance_type = ground, 'VERTS'
-    seen = []
-
-    def settings():
-        depsgraph()
-        seen.append(repr(frame_cache.choices(scene())))
-        return len(set(seen))
-
-    assert settings() == 1
-    species(rock)
-    assert settings() == 2
-    rock.name = "Boulder"
-    assert settings() == 3
-    marks.stop_using(rock)
-    assert settings() == 3 and seen[-1] == seen[0]
-    assert not has_contents(scene())
-    ground.tetflora.is_scatter = True
-    assert has_contents(scene()) and ground in taking_part(scene())
-    own = species(rock)
-    assert rock in taking_part(scene())
-    digests = {frame_cache.scene_digest(scene(), depsgraph(), bpy.context.view_layer)}
-    plant = add_plant(species=own)
-    digests.add(frame_cache.scene_digest(scene(), depsgraph(), bpy.context.view_layer))
-    plant.location.x = 1.0
-    digests.add(frame_cache.scene_digest(scene(), depsgraph(), bpy.context.view_layer))
-    assert len(digests) == 3
-
-
-def test_deleting_an_asset_can_be_undone():
-    rock = crown("Rock")
-    own = species(rock)
-    add_plant(species=own)
-    select(rock)
-    bpy.ops.ed.undo_push(message="Before")
-    bpy.ops.object.delete()
-    bpy.ops.ed.undo_push(message="Deleted")
-    edits.look_again()
-    assert own not in edits.catalogue()
-    assert bpy.ops.ed.undo() == {'FINISHED'}
-    edits.look_again()
-    assert own in edits.catalogue() and len(read()) == 1

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where assets stand: scatters by nodes, collections and particles, and plants whose species is an asset."""
+"""Where assets stand: scatters by nodes, collections and particles."""
 
 from __future__ import annotations
 
@@ -10,87 +10,14 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
+from tests.blender.assets.scatters import Nodes, read, scattered, scene, tree
+from tests.blender.scenes import add_camera, add_mesh, depsgraph
 from tetflora_addon.blender.assets import marks, places
-from tetflora_addon.blender.job import contents, frame_cache
-from tetflora_addon.blender.scene import plants
-from tetflora_addon.blender.scene.fields import write_field
+from tetflora_addon.blender.job import frame_cache
 from tetflora_addon.blender.scene.objects import has_contents
-from tetflora_addon.blender.species.asset_species import find_asset
 from tetflora_addon.errors import SceneError
 
 pytestmark = pytest.mark.usefixtures("clean_file")
-
-
-def scene():
-    return bpy.context.scene
-
-
-def read():
-    return places.read_places(scene(), depsgraph(), bpy.context.view_layer)
-
-
-def tree(name="tree", faces=((0, 1, 2, 3),)):
-    """An asset that is not in the scene's own collection, as those of scatterers are."""
-    made = add_mesh(name, faces, z=1.0)
-    scene().collection.objects.unlink(made)
-    held = bpy.data.collections.get("sources") or bpy.data.collections.new("sources")
-    held.objects.link(made)
-    return made
-
-
-class Nodes:
-    """Geometry nodes of an object, as a chain that ends in its output."""
-
-    def __init__(self, obj):
-        self.group = bpy.data.node_groups.new("nodes", 'GeometryNodeTree')
-        self.group.interface.new_socket("Geometry", in_out='INPUT', socket_type='NodeSocketGeometry')
-        self.group.interface.new_socket("Geometry", in_out='OUTPUT', socket_type='NodeSocketGeometry')
-        self.input, self.output = self.add("NodeGroupInput"), self.add("NodeGroupOutput")
-        obj.modifiers.new("nodes", 'NODES').node_group = self.group
-
-    def add(self, kind, **values):
-        node = self.group.nodes.new(kind)
-        for name, value in values.items():
-            node.inputs[name.replace("_", " ")].default_value = value
-        return node
-
-    def link(self, source, target, name, output=0):
-        self.group.links.new(source.outputs[output], target.inputs[name])
-
-    def asset(self, datablock):
-        """What brings an object or a collection as an instance."""
-        if isinstance(datablock, bpy.types.Object):
-            return self.add("GeometryNodeObjectInfo", Object=datablock, As_Instance=True), "Geometry"
-        return self.add("GeometryNodeCollectionInfo", Collection=datablock), "Instances"
-
-    def scatter(self, source, count, scale=1.0, socket="Geometry"):
-        """Instances of a source on points along x, a metre apart."""
-        points = self.add("GeometryNodePoints", Count=count)
-        index, along = self.add("GeometryNodeInputIndex"), self.add("ShaderNodeCombineXYZ")
-        self.link(index, along, "X")
-        self.link(along, points, "Position")
-        on_points = self.add("GeometryNodeInstanceOnPoints", Scale=(scale, scale, scale))
-        self.link(points, on_points, "Points")
-        self.group.links.new(source.outputs[socket], on_points.inputs["Instance"])
-        return on_points
-
-    def show(self, *shown):
-        """Show the object's own geometry with all of these."""
-        join = self.add("GeometryNodeJoinGeometry")
-        for node in (self.input, *shown):
-            self.link(node, join, "Geometry")
-        self.link(join, self.output, "Geometry")
-
-
-def scattered(datablock, count=5, scale=1.0, name="ground", **options):
-    """A ground that scatters, marked."""
-    ground = add_mesh(name, **options)
-    nodes = Nodes(ground)
-    source, socket = nodes.asset(datablock)
-    nodes.show(nodes.scatter(source, count, scale, socket))
-    ground.tetflora.is_scatter = True
-    return ground
 
 
 def test_what_nodes_scatter_is_read_as_one_array():
@@ -300,133 +227,3 @@ def test_a_million_instances_are_read_in_two_seconds():
         best = min(best, time.process_time() - begin)
     assert len(found) == 1_000_000 and len(np.unique(found.keys)) == 1_000_000
     assert best < 2.0
-
-
-# Plants whose species is an asset.
-
-
-def species(asset, variants=False):
-    return marks.use_as_species(scene(), depsgraph(), asset, variants).identifier
-
-
-def test_a_plant_is_the_asset_as_it_stands_stretched_and_mirrored_as_the_plant():
-    asset = tree()
-    asset.location, asset.rotation_euler, asset.scale = (7.0, 0.0, 0.0), (0.0, 0.0, np.pi / 2), (0.01, 0.01, 0.02)
-    scene().collection.objects.link(asset)
-    own = species(asset)
-    plant = add_plant(species=own, location=(1.0, 2.0, 3.0), scale=(-1.0, 1.0, 5.0))
-    (found,) = read()
-    assert found.target.datablock == asset and found.owner == plant
-    turned = np.array(asset.matrix_world.to_3x3())
-    assert found.matrices[0, :3, :3] == pytest.approx(np.diag([-1.0, 1.0, 5.0]) @ turned, abs=1e-6)
-    assert found.matrices[0, :3, 3] == pytest.approx([1.0, 2.0, 3.0])
-    with pytest.raises(plants.NoPlantsError):
-        plants.read_plants(scene(), depsgraph(), bpy.context.view_layer)
-    given = contents.read_scene(scene(), depsgraph(), bpy.context.view_layer)
-    assert len(given.seeds) == 0 and len(given.places) == 1
-
-
-def test_grown_plants_and_assets_stand_side_by_side():
-    own = species(tree())
-    add_plant("bush", species="bush")
-    held = [add_plant(f"asset {n}", species=own, seed=n, location=(n, 0.0, 0.0)) for n in range(3)]
-    held[2].tetflora.enabled = False
-    given = contents.read_scene(scene(), depsgraph(), bpy.context.view_layer)
-    assert given.species == ("bush",) and given.owners == (("bush", 1),)
-    (found,) = given.places
-    assert found.owners == tuple(held[:2]) and found.matrices[:, 0, 3].tolist() == [0.0, 1.0]
-
-
-def test_a_field_may_hold_both_and_keeps_rotation_and_scale():
-    own = species(tree())
-    turn = np.array([[np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]] * 4)
-    position = np.stack([np.arange(4.0), np.zeros(4), np.zeros(4)], axis=1)
-    kinds, seeds = np.array([0, 1, 1, 0], np.int32), np.arange(4, dtype=np.int32)
-    field = write_field("field", position, turn, np.full(4, 2.0), kinds, seeds, ["bush", own])
-    scene().collection.objects.link(field)
-    field.scale = (1.0, 1.0, 3.0)
-    assert len(plants.read_plants(scene(), depsgraph(), bpy.context.view_layer)) == 2
-    (found,) = read()
-    assert found.owner == field and len(found) == 2
-    assert found.matrices[:, 0, 3] == pytest.approx([1.0, 2.0])
-    wanted = np.array([[0.0, -2.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, 6.0]])
-    assert found.matrices[0, :3, :3] == pytest.approx(wanted, abs=1e-5)
-
-
-def test_instances_of_plants_are_individuals():
-    one, other = tree("one"), tree("other")
-    own = species(one.users_collection[0], variants=True)
-    plant = add_plant(species=own)
-    scene().collection.objects.unlink(plant)
-    bpy.data.collections.new("plants").objects.link(plant)
-    ground = add_mesh("ground")
-    nodes = Nodes(ground)
-    source, socket = nodes.asset(plant)
-    nodes.show(nodes.scatter(source, 400, socket=socket))
-    found = read()
-    assert {p.target.datablock for p in found} == {one, other}
-    assert sum(map(len, found)) == 400 and min(map(len, found)) > 140
-    keys = np.concatenate([p.keys for p in found])
-    assert len(set(keys.tolist())) == 400
-
-
-def test_the_seed_chooses_the_variant_and_nothing_else_does():
-    held = tree("one").users_collection[0]
-    tree("other"), tree("third")
-    own = species(held, variants=True)
-    for seed in range(60):
-        add_plant(f"plant {seed}", species=own, seed=seed)
-    first = {o: p.target.name for p in read() for o in p.owners}
-    assert len(first) == 60 and len(set(first.values())) == 3
-    for plant in first:
-        plant.location.x += 5.0
-        plant.name = f"moved {plant.name}"
-    assert {o: p.target.name for p in read() for o in p.owners} == first
-
-
-def test_dropped_collections_of_a_species_are_plants_of_it():
-    held = tree().users_collection[0]
-    drops = []
-    for n in range(3):
-        drop = bpy.data.objects.new(f"drop {n}", None)
-        drop.instance_type, drop.instance_collection = 'COLLECTION', held
-        drop.location.x = n
-        scene().collection.objects.link(drop)
-        drops.append(drop)
-    assert read() == [] and not has_contents(scene())
-    select(drops[0])
-    assert bpy.ops.tetflora.use_as_species() == {'FINISHED'}
-    found = read()
-    assert [p.owner for p in found] == drops and {p.target.datablock for p in found} == {held}
-    assert len({int(p.keys[0]) for p in found}) == 3 and has_contents(scene())
-    assert bpy.ops.tetflora.stop_using_as_species() == {'FINISHED'}
-    assert read() == []
-
-
-def test_a_deleted_asset_is_named_and_comes_back():
-    asset = tree()
-    scene().collection.objects.link(asset)
-    bpy.data.collections.remove(bpy.data.collections["sources"])
-    own = species(asset)
-    for n in range(5):
-        add_plant(f"plant {n}", species=own, seed=n)
-    assert len(read()[0]) == 5
-    select(asset)
-    bpy.ops.object.delete()
-    with pytest.raises(SceneError, match=r'"plant 0", "plant 1", "plant 2" and 2 more: "tree".*was deleted; undo that'):
-        contents.read_scene(scene(), depsgraph(), bpy.context.view_layer)
-    scene().collection.objects.link(asset)
-    assert len(read()[0]) == 5
-    bpy.data.objects.remove(asset)
-    with pytest.raises(SceneError, match=r'"tree".*was deleted'):
-        contents.read_scene(scene(), depsgraph(), bpy.context.view_layer)
-    assert find_asset(scene(), own) is not None and len(scene().objects) == 5
-
-
-def test_variants_that_lost_their_faces_are_told():
-    held = tree("one").users_collection[0]
-    own = species(held, variants=True)
-    add_plant(species=own)
-    held.objects.unlink(bpy.data.objects["one"])
-    with pytest.raises(SceneError, match=r'The collection "sources".*no object with faces'):
-        read()
