@@ -96,8 +96,13 @@ class Clusters(Arrays):
 
     @property
     def meshes(self) -> NDArray[np.bool_]:
-        """Clusters (c,) that are drawn as meshes where they are near: the largest with no more than `MESH_FACES`."""
-        small = (self.faces <= MESH_FACES) | (self.children == 0)
+        """Clusters (c,) that are drawn as meshes where they are near: the largest with no more than `MESH_FACES`.
+
+        None has both leaves and wood where its children have either: kites take the place of leaves alone.
+        """
+        bark, least = self.optical_area - self.leaf_optical, 1e-9 * self.optical_area
+        mixed = (bark > least) & (self.leaf_optical > least)
+        small = ((self.faces <= MESH_FACES) & ~mixed) | (self.children == 0)
         return small & ~(small[self.parent] & (self.parent >= 0))
 
 
@@ -288,6 +293,8 @@ class Instances(Arrays):
     @property
     def largest(self) -> NDArray[np.float64]:
         """Largest factor (n,) on any length, or somewhat more where an instance is stretched (Frobenius norm)."""
-        gram = np.linalg.norm(self.linear, axis=1)
-        even = gram.max(axis=1, initial=0.0)
-        return np.where(gram.max(axis=1) > 1.001 * gram.min(axis=1), np.linalg.norm(self.linear, axis=(1, 2)), even)
+        length = np.linalg.norm(self.linear, axis=1)
+        even = length.max(axis=1, initial=0.0)
+        skew = [(self.linear[:, :, i] * self.linear[:, :, i - 1]).sum(axis=1) for i in range(3)]
+        uneven = (even > 1.001 * length.min(axis=1)) | (np.abs(skew).max(axis=0) > 1e-3 * even**2)
+        return np.where(uneven, np.linalg.norm(self.linear, axis=(1, 2)), even)

@@ -26,6 +26,8 @@ RAYS, CLUSTERS = 56, 5
 DIRECTIONS = np.array([[0.8, 0.5, 0.33166248], [-0.45, 0.85, 0.27386128], [0.35, 0.25, 0.90277350]])
 #: Facets for each number of them, over all sets; sets of few large ones; and weights that are tried.
 FACETS, FEW_SETS, TRIED = 192, 16, np.array([0.25, 0.5, 0.75, 1.0])
+#: Rays that a cluster blocks from which on what they tell counts more than that leaves so sparse hide nothing.
+SURE = 64.0
 _TURN, _PICK = 245, 246
 _CORNERS = np.array([[0.0, 1.0], [-np.sqrt(3) / 2, -0.5], [np.sqrt(3) / 2, -0.5]]) * 2 / 27**0.25
 
@@ -59,6 +61,8 @@ def _fitting(found: NDArray[np.float64]) -> NDArray[np.float64]:
     for k in range(len(COUNTS)):
         if made[k].max() > 0.0:
             out[k] = np.interp(wanted[k, 0], made[k], TRIED, left=TRIED[0] * wanted[k, 0] / max(made[k, 0], 1e-300))
+        blocked = wanted[k, 0] * RAYS**2
+        out[k] = (blocked * out[k] + SURE) / (blocked + SURE)
     return np.clip(out, 0.1, 1.0)
 
 

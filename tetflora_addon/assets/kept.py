@@ -21,7 +21,7 @@ from ..files import inside, read_whole, write_whole
 from .asset import COUNTS, Asset, AssetKites, Clusters, SurfaceSamples
 
 #: Raise it when assets are compiled in another way.
-METHOD = 4
+METHOD = 5
 #: Bytes of a file at most, of all files of a user, and of what is kept in memory.
 _MOST, _MOST_FILES, _MOST_MEMORY = 1 << 30, 4 << 30, 768 << 20
 _NAMES = re.compile(r"tetflora-compiled-\d+-[0-9a-f]+\.npz")
@@ -116,10 +116,10 @@ def _check(asset: Asset, digest: str) -> None:
             if own.dtype.kind == "f" and not np.isfinite(own).all():
                 raise ValueError(f.name)
     clusters, count = asset.clusters, len(asset.clusters)
-    ends = [(clusters.child + clusters.children, count), (clusters.first_face + clusters.faces, asset.faces)]
-    ends += [(clusters.leaf_sample + clusters.leaf_samples, len(asset.samples))]
-    ends += [(clusters.wood_sample + clusters.wood_samples, len(asset.samples))]
-    ends += [(clusters.first_leaf + clusters.leaves, len(asset.leaves))]
+    runs = [(clusters.child, clusters.children, count), (clusters.first_face, clusters.faces, asset.faces)]
+    runs += [(clusters.leaf_sample, clusters.leaf_samples, len(asset.samples))]
+    runs += [(clusters.wood_sample, clusters.wood_samples, len(asset.samples))]
+    runs += [(clusters.first_leaf, clusters.leaves, len(asset.leaves))]
     numbers = (
         clusters.first_leaf,
         clusters.leaves,
@@ -142,8 +142,8 @@ def _check(asset: Asset, digest: str) -> None:
         and clusters.weights.shape[1] == len(COUNTS)
         and asset.part.dtype == asset.face.dtype == np.int32
         and asset.part.shape == asset.face.shape == (asset.faces,)
-        and all((end <= most).all() for end, most in ends)
         and all((number >= 0).all() for number in numbers)
+        and all((first <= most - number.astype(np.int64)).all() for first, number, most in runs)  # sums may overflow
         and (clusters.parent < np.arange(count)).all()
         and (clusters.child[clusters.children > 0] > np.flatnonzero(clusters.children > 0)).all()
     )

@@ -45,7 +45,8 @@ def kites_of(
     area = np.add.reduceat(optical, first)
     whole = np.maximum(area, 1e-300)[:, None]
     middle = corners.mean(axis=1)
-    centre = np.add.reduceat(optical[:, None] * middle, first, axis=0) / whole
+    counted = np.maximum(optical, 1e-200)[:, None]  # leaves of no area are somewhere, too
+    centre = np.add.reduceat(counted * middle, first, axis=0) / np.add.reduceat(counted, first, axis=0)
     leaf = np.repeat(np.arange(len(first)), np.diff(np.append(first, len(optical))))
     # Second moments of triangles: a twelfth of the sum over corners, and nine twelfths of the middle.
     away = np.concatenate([corners, np.sqrt(9.0) * middle[:, None]], axis=1)

@@ -152,7 +152,7 @@ SOURCES = {
     "leaves": lambda: source_of(leaves()),
     "tree": lambda: source_of(tree(), digest="ab01"),
     "varied": lambda: source_of(tree(2, 1200, varied=True), digest="ab02"),
-    "closed": lambda: source_of(joined(trunk(), leaves(3, 300, closed=True)), digest="ab03"),
+    "closed": lambda: source_of(joined(trunk(), leaves(3, 800, size=0.1, closed=True)), digest="ab03"),
     "skeleton": lambda: on_a_skeleton(),
     "degenerate": lambda: source_of(degenerate(), digest="ab04"),
     "card": lambda: source_of(surface(QUAD, [(0, 1, 2, 3)]), digest="ab05"),
