@@ -25,12 +25,13 @@ ADDON = "tetflora_addon"
 PRODUCT = (ADDON, "operators", "panels")
 
 #: Limits of the product: source files, their lines together, lines of one room, levels of imports in ``blender``.
-MAX_FILES = 240
-MAX_LINES = 48_000
+MAX_FILES = 300
+MAX_LINES = 57_000
 MAX_ROOM_LINES = 4_000
-MAX_LEVELS = 9
+MAX_LEVELS = 10
 
 _LOW = "blender blender/materials blender/species blender/scene"
+_ASSETS = "assets blender/assets"
 _HIGH = "blender/results blender/placing blender/job"
 #: What each room may import besides itself: folders below ``tetflora_addon`` in words separated by spaces. A dot stands
 #: for the files beside these folders, and ``blender`` alone for the files at the top of that folder.
@@ -50,20 +51,22 @@ _TABLE = {
     "planting": ". growth",
     "proxies": ". species growth assets compiled subplants camera refinement",
     "light": ". compiled tetrahedra camera refinement proxies",
-    "emission": ". processes leaves species growth assets compiled subplants tetrahedra camera refinement proxies light",
+    "emission": ". processes leaves species growth compiled subplants tetrahedra camera refinement proxies light",
     "blender": ". processes growth camera refinement",
-    "blender/materials": ". light emission blender",
+    "blender/materials": ". growth light emission blender",
     "blender/species": ". leaves species blender",
-    "blender/scene": ". species growth compiled camera refinement planting light emission "
+    "blender/scene": ". species growth assets compiled camera refinement planting light emission "
     "blender blender/materials blender/species",
+    "blender/assets": f". growth assets {_LOW}",
     "blender/results": f". leaves species refinement emission {_LOW}",
-    "blender/placing": f". species growth compiled planting {_LOW}",
-    "blender/job": f". processes species growth compiled camera refinement proxies emission {_LOW} blender/results",
+    "blender/placing": f". species growth compiled planting {_LOW} blender/assets",
+    "blender/job": f". processes species growth compiled camera refinement proxies emission {_LOW} {_ASSETS} "
+    "blender/results",
     "blender/viewport": f". species growth compiled tetrahedra camera refinement preview {_LOW} {_HIGH}",
     "blender/cli": ". blender blender/scene blender/job",
-    "operators": ". species camera refinement preview planting blender blender/species blender/scene "
+    "operators": ". species camera refinement preview planting blender blender/species blender/scene blender/assets "
     f"{_HIGH} blender/viewport",
-    "panels": f". species blender blender/species blender/scene {_HIGH} blender/viewport operators",
+    "panels": f". species blender blender/species blender/scene blender/assets {_HIGH} blender/viewport operators",
 }
 ARROWS = {room: tuple(others.split()) for room, others in _TABLE.items()}
 #: Rooms of the engine: numpy and the standard library only, never Blender.
@@ -235,12 +238,15 @@ def heights() -> dict[str, int]:
 
 #: Where rooms stand across the picture, so that few arrows pass behind a third room; 0 is left.
 _LANES = {
-    **dict.fromkeys(("species", "growth", "compiled", "subplants", ".", "blender/placing"), 0.3),
+    **dict.fromkeys(("leaves", "species", "growth", "compiled", "subplants", ".", "blender/placing"), 0.3),
     **dict.fromkeys(("tetrahedra", "camera"), 0.62),
     **dict.fromkeys(("preview", "blender/viewport"), 0.12),
     **dict.fromkeys(("blender/species", "blender"), 0.9),
     **dict.fromkeys(("blender/results", "blender/job"), 0.68),
     "planting": 0.78,
+    "processes": 0.46,
+    "assets": 0.62,
+    "blender/assets": 0.4,
     "blender/scene": 0.6,
     "blender/cli": 0.85,
     "operators": 0.3,

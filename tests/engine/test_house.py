@@ -119,7 +119,10 @@ def test_toy_house_is_in_order(toy_house: Path) -> None:
         ({"species/a.py": "class Leaf: pass", "growth/b.py": "class Leaf: pass"}, "class Leaf is defined in"),
         ({"species/a.py": "x = 1\n" * (rooms.MAX_ROOM_LINES + 1)}, f"room species: {rooms.MAX_ROOM_LINES + 1} lines"),
         ({f"growth/a{i}.py": "" for i in range(rooms.MAX_FILES)}, f"files; {rooms.MAX_FILES} is the limit"),
-        ({f"blender/a{i}.py": f"from . import a{i + 1}" for i in range(10)}, "10 levels of imports"),
+        (
+            {f"blender/a{i}.py": f"from . import a{i + 1}" for i in range(rooms.MAX_LEVELS + 1)},
+            f"{rooms.MAX_LEVELS + 1} levels",
+        ),
         ({"attic/a.py": ""}, "room attic is not in devtools/rooms.py"),
     ],
 )
