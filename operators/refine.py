@@ -65,11 +65,7 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
             auto.refined(context.scene)
         forget_render_errors()
         redraw()
-        self.report(
-            {'INFO'},
-            f"{counted(statistics.plants, 'plant')}: {statistics.polygons_meshed:,} of {statistics.polygons_full:,} "
-            f"polygons, {counted(statistics.tetrahedra_proxy, 'proxy')} in {sum(statistics.seconds.values()):.1f} s",
-        )
+        self.report({'INFO'}, _made(context.scene, statistics))
         if not statistics.complete and statistics.passes:
             self.report({'INFO'}, "Stopped early; click Refine again to complete the result")
         outside = _cut_off(context.scene) or _unseen(context.scene, statistics)
@@ -77,6 +73,22 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
             if warning:
                 self.report({'WARNING'}, warning)
         return {'FINISHED'}
+
+
+def _made(scene: bpy.types.Scene, statistics: Statistics) -> str:
+    """What was refined, and what of it was made."""
+    seconds = f"in {sum(statistics.seconds.values()):.1f} s"
+    instances = counted(statistics.instances, "instance")
+    if not (statistics.passes or statistics.plants) and statistics.instances_whole == statistics.instances > 0:
+        why = "" if scene.tetflora.expand_everything else ", as the renderer draws these at the least cost"
+        return f"{instances} of assets stay the originals{why}"
+    what = [counted(statistics.plants, "plant")] if statistics.plants or not statistics.instances else []
+    what += [f"{instances} of assets"] if statistics.instances else []
+    made = f"{statistics.polygons_meshed:,} of {statistics.polygons_full:,} polygons"
+    if statistics.instances:
+        made = f"{counted(statistics.instances_whole, 'original')}, "
+        made += f"{counted(statistics.instances_clusters, 'cluster')}, {statistics.polygons_meshed:,} polygons"
+    return f"{' and '.join(what)}: {made}, {counted(statistics.tetrahedra_proxy, 'proxy')} {seconds}"
 
 
 def _unread_world(scene: bpy.types.Scene) -> str:
@@ -89,7 +101,8 @@ def _unread_world(scene: bpy.types.Scene) -> str:
 
 def _unseen(scene: bpy.types.Scene, statistics: Statistics) -> str:
     """A warning if the camera sees no plant at all, so that nothing was divided after the first look; else empty."""
-    if scene.camera is None or statistics.passes != 1 or statistics.polygons_meshed or scene.tetflora.max_passes:
+    near = statistics.polygons_meshed or statistics.instances_whole or statistics.instances_clusters
+    if scene.camera is None or statistics.passes != 1 or near or scene.tetflora.max_passes:
         return ""
     return (
         f'The camera "{scene.camera.name}" sees no plants. Press Numpad 0 to look through it, and check that it '

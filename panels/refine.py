@@ -13,7 +13,7 @@ from ..tetflora_addon.blender.job.render import render_errors
 from ..tetflora_addon.blender.placing.first_forest import is_first_forest
 from ..tetflora_addon.blender.results.forms import few_bounces, form_of
 from ..tetflora_addon.blender.results.output import KIND
-from ..tetflora_addon.blender.scene.objects import has_contents, may_scatter
+from ..tetflora_addon.blender.scene.objects import has_contents, has_plants, may_scatter
 from ..tetflora_addon.blender.scene.scatterers import is_drop, is_scatter
 from ..tetflora_addon.blender.viewport import auto
 from .base import (
@@ -119,7 +119,7 @@ def hint(scene: bpy.types.Scene) -> str:
     # The first object of a collection shows whether it was kept as meshes: a panel cannot look through all objects.
     first = (next(iter(collection.objects), None) for collection in scene.collection.children_recursive)
     kept = any(obj is not None and KIND in obj for obj in first)
-    return "" if kept or not has_contents(scene) else "Nothing is refined, so renders show no plants"
+    return "" if kept or not has_plants(scene) else "Nothing is refined, so renders show no plants"
 
 
 class _PartOfRefine(SidebarPanel):
@@ -166,6 +166,17 @@ class TETFLORA_PT_proxy_shading(_PartOfRefine, bpy.types.Panel):
         column = split_layout(self).column()
         column.active = not settings.expand_everything and settings.baked_light == 'OFF'
         draw_properties(column, settings, *form_of(context.scene).sockets.values())
+
+
+class TETFLORA_PT_assets(_PartOfRefine, bpy.types.Panel):
+    """Assets: always there, because to look for any among all objects takes too long for a panel."""
+
+    bl_label = "Assets"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        column, settings = self.column(context), context.scene.tetflora
+        column.prop(settings, "asset_detail", text="Detail")  # the panel's name is the rest of theirs
+        column.prop(settings, "bake_assets", text="Bake Materials")
 
 
 class TETFLORA_PT_visibility(_PartOfRefine, bpy.types.Panel):
@@ -221,6 +232,7 @@ CLASSES = (
     TETFLORA_PT_refine,
     TETFLORA_PT_proxies,
     TETFLORA_PT_proxy_shading,
+    TETFLORA_PT_assets,
     TETFLORA_PT_visibility,
     TETFLORA_PT_limits,
     TETFLORA_PT_animation,

@@ -135,8 +135,14 @@ def rows_of(text: str) -> tuple[tuple[str, str], ...]:
         seconds = figures["seconds"]
         full = figures["polygons_full"]
         fraction = f"{figures['polygons_meshed'] / full:.1%}" if full else "–"
+        instances = (
+            ("Instances", "instances"),
+            ("    Originals", "instances_whole"),
+            ("    Clusters", "instances_clusters"),
+        )
         return (
             ("Plants", f"{figures['plants']:,}"),
+            *((name, f"{figures[key]:,}") for name, key in instances if figures.get("instances")),
             ("Polygons If Expanded", f"{full:,}"),
             ("Polygons", f"{figures['polygons_meshed']:,}"),
             ("    Fraction of All", fraction),
@@ -158,6 +164,8 @@ def made_of(text: str) -> str:
         return ""
     figures = json.loads(text)
     polygons = figures["polygons_meshed"] + figures["polygons_proxy"]
+    if not polygons and figures.get("instances"):
+        return f"{figures['instances']:,} instances stay the originals"
     return f"{polygons_text(polygons)} made in {seconds_text(sum(figures['seconds'].values()))}"
 
 

@@ -180,7 +180,7 @@ class TetFloraScene(RefinementProperties, AnimationProperties, bpy.types.Propert
         options=set(),
     )
     asset_detail: EnumProperty(
-        name="Assets",
+        name="Asset Detail",
         description="When instances of assets are refined",
         items=(
             (

@@ -34,7 +34,7 @@ from ..results.hiding import (
 from ..results.output import KIND, adopt_materials, release_materials
 from ..runtime import Handlers, Listeners, complain, failed_frames
 from ..saved_files import clear_unreadable, migrate
-from ..scene.objects import has_contents, show_in, view_layer_groups
+from ..scene.objects import has_contents, has_plants, show_in, view_layer_groups
 from ..scene.plants import NoPlantsError
 from ..species.edits import looked_at_once
 from . import frame_cache, refine
@@ -92,7 +92,7 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
             with looked_at_once():
                 _make(scene)
             made = True
-        elif not scene.tetflora.refine_at_render and has_contents(scene) and not _has_meshes(scene):
+        elif not scene.tetflora.refine_at_render and has_plants(scene) and not _has_meshes(scene):
             _warn_of_nothing()
     except NoPlantsError:
         pass  # the artist has disabled or hidden all of them

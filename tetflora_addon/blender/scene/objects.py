@@ -8,7 +8,7 @@ and all of its places are computed at once as arrays, so that a million instance
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import bpy
@@ -100,10 +100,22 @@ def may_take_part(obj: bpy.types.Object) -> bool:
 
 def has_contents(scene: bpy.types.Scene) -> bool:
     """Whether a scene may hold something to refine; cheap, and never wrong where there is something."""
-    if any(takes_part(o) for o in scene.objects):
+    return _may_hold(scene, takes_part)
+
+
+def has_plants(scene: bpy.types.Scene) -> bool:
+    """Whether a scene may hold plants, of which nothing shows before they are refined; cheap.
+
+    Meshes of the artist and what objects scatter show without.
+    """
+    return _may_hold(scene, lambda obj: obj.tetflora.is_plant or obj.tetflora.is_field)
+
+
+def _may_hold(scene: bpy.types.Scene, wanted: Callable[[bpy.types.Object], bool]) -> bool:
+    if any(wanted(o) for o in scene.objects):
         return True
     # What is instanced need not lie in the scene, but somewhere.
-    return any(takes_part(o) for o in bpy.data.objects) and any(may_instance(o) for o in scene.objects)
+    return any(wanted(o) for o in bpy.data.objects) and any(may_instance(o) for o in scene.objects)
 
 
 def has_nodes(obj: bpy.types.Object) -> bool:

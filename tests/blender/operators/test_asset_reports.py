@@ -1,0 +1,88 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the artist is told of assets: the report of Refine, statistics, hints of panels, and what renders warn of."""
+
+from __future__ import annotations
+
+import json
+from types import SimpleNamespace
+
+import bpy
+import pytest
+
+from panels import refine, results
+from tests.blender.layouts import Layout
+from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph
+from tetflora_addon.blender.assets import marks
+from tetflora_addon.blender.job import render
+from tetflora_addon.blender.scene.objects import has_contents, has_plants
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+
+def scene():
+    return bpy.context.scene
+
+
+@pytest.fixture
+def scatter():
+    """Four instances of a square on the corners of another one, before a camera."""
+    add_camera(location=(0.0, -20.0, 2.0))
+    ground, child = add_mesh("ground", size=4.0), add_mesh("child")
+    child.parent, ground.instance_type = ground, 'VERTS'
+    ground.tetflora.is_scatter = True
+    scene().render.resolution_percentage = 5
+    return ground
+
+
+def test_instances_are_counted_and_said_to_stay_where_that_is_cheapest(scatter, capfd):
+    assert bpy.ops.tetflora.refine() == {'FINISHED'}
+    out = capfd.readouterr().out
+    assert "4 instances of assets stay the originals, as the renderer draws these at the least cost" in out
+    assert "plant" not in out
+    text = scene().tetflora.statistics
+    assert results.made_of(text) == "4 instances stay the originals"
+    rows = dict(results.rows_of(text))
+    assert (rows["Instances"], rows["    Originals"], rows["    Clusters"]) == ("4", "4", "0")
+
+
+def test_refined_instances_are_counted_beside_plants(scatter, capfd):
+    scene().tetflora.asset_detail = 'REFINE'
+    add_plant(species="bush")
+    assert bpy.ops.tetflora.refine() == {'FINISHED'}
+    figures = json.loads(scene().tetflora.statistics)
+    whole, clusters = figures["instances_whole"], figures["instances_clusters"]
+    out = capfd.readouterr().out
+    assert "1 plant and 4 instances of assets: " in out
+    assert f"{whole} original" in out and f"{clusters} cluster" in out
+
+
+def test_statistics_of_plants_alone_say_nothing_of_instances():
+    add_camera(location=(0.0, -20.0, 2.0))
+    add_plant(species="bush")
+    scene().render.resolution_percentage = 5
+    assert bpy.ops.tetflora.refine() == {'FINISHED'}
+    assert "Instances" not in dict(results.rows_of(scene().tetflora.statistics))
+
+
+def test_only_plants_are_missed_in_renders_of_what_is_not_refined(scatter, monkeypatch):
+    """What objects scatter shows without; plants of an asset do not."""
+    warned = []
+    monkeypatch.setattr(render, "_warn_of_nothing", lambda: warned.append(True))
+    settings = scene().tetflora
+    settings.refine_at_render = False
+    for expected in ("", "Nothing is refined, so renders show no plants"):
+        assert has_contents(scene()) and has_plants(scene()) == bool(expected)
+        assert refine.hint(scene()) == expected
+        render.on_render_init(scene())
+        render.on_render_pre(scene())
+        render.on_render_end(scene())
+        assert warned == [True] * bool(expected)
+        add_plant(species=marks.use_as_species(scene(), depsgraph(), bpy.data.objects["child"]).identifier)
+
+
+def test_the_panel_shows_the_settings_of_assets():
+    layout = Layout()
+    panel = SimpleNamespace(layout=layout, column=lambda _context: layout)
+    refine.TETFLORA_PT_assets.draw(panel, bpy.context)
+    assert layout.names("prop", 1) == ["asset_detail", "bake_assets"]
