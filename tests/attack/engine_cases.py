@@ -19,12 +19,12 @@ from tests.attack import material
 from tests.attack.watch import Case, Jail
 from tests.engine import support
 from tetflora_addon import files, storage
+from tetflora_addon.assets.mesh_features import mesh_features
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.emission.polygons import polygon_blocks
 from tetflora_addon.errors import TetFloraError
 from tetflora_addon.leaves.models import LEAF_MODELS
 from tetflora_addon.refinement.loop import Refinement, refine
-from tetflora_addon.assets.mesh_features import mesh_features
 from tetflora_addon.refinement.polygons import Meshes, Polygons, Surface
 from tetflora_addon.refinement.settings import RefinementSettings
 from tetflora_addon.species.catalogue import list_species, load_species, odd_files
