@@ -186,7 +186,7 @@ class TETFLORA_OT_refine_scatter(Reporting, bpy.types.Operator):
             return self.failed(wrong[0])
         prepare_scene(context.scene)
         text = f"{counted(instances, 'instance')} of {counted(len(assets), 'asset')} will be refined"
-        text += f"; {counted(left, 'instance')} without faces left as they are" if left else ""
+        text += f"; {counted(left, 'instance')} without faces will not show in results" if left else ""
         return self.done(f"{text}; {wrong[0]}" if wrong else text)
 
 

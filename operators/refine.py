@@ -8,6 +8,7 @@ import bpy
 
 from ..tetflora_addon import storage
 from ..tetflora_addon.blender.job import refine
+from ..tetflora_addon.blender.job.assets import asset_warnings
 from ..tetflora_addon.blender.job.plant_mesh import make_plant_mesh_steps
 from ..tetflora_addon.blender.job.render import forget_render_errors
 from ..tetflora_addon.blender.placing.plant_objects import plants_of, prepare_scene
@@ -32,6 +33,8 @@ from .base import (
     select_only,
     selected_plants,
 )
+
+_WARNINGS = 4  # about assets, that are told one by one
 
 
 class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
@@ -69,10 +72,22 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
         if not statistics.complete and statistics.passes:
             self.report({'INFO'}, "Stopped early; click Refine again to complete the result")
         outside = _cut_off(context.scene) or _unseen(context.scene, statistics)
-        for warning in (statistics.left_out, outside, few_bounces(context.scene), _unread_world(context.scene)):
+        for warning in (
+            *_few_of(asset_warnings),
+            statistics.left_out,
+            outside,
+            few_bounces(context.scene),
+            _unread_world(context.scene),
+        ):
             if warning:
                 self.report({'WARNING'}, warning)
         return {'FINISHED'}
+
+
+def _few_of(warnings: list[str]) -> list[str]:
+    """The first warnings, and how many more there are."""
+    more = len(warnings) - _WARNINGS
+    return [*warnings[:_WARNINGS], f"{more:,} more warnings about assets"] if more > 1 else warnings
 
 
 def _made(scene: bpy.types.Scene, statistics: Statistics) -> str:

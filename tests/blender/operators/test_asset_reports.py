@@ -14,6 +14,7 @@ from panels import refine, results
 from tests.blender.layouts import Layout
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph
 from tetflora_addon.blender.assets import marks
+from tetflora_addon.blender.compat import shader_tree
 from tetflora_addon.blender.job import render
 from tetflora_addon.blender.scene.objects import has_contents, has_plants
 
@@ -63,6 +64,24 @@ def test_statistics_of_plants_alone_say_nothing_of_instances():
     scene().render.resolution_percentage = 5
     assert bpy.ops.tetflora.refine() == {'FINISHED'}
     assert "Instances" not in dict(results.rows_of(scene().tetflora.statistics))
+
+
+def test_what_is_wrong_with_an_asset_is_told_by_refine_and_by_renders(scatter, capfd):
+    bare = bpy.data.materials.new("bare")
+    tree = shader_tree(bare)
+    tree.nodes.remove(tree.nodes["Principled BSDF"])
+    bpy.data.objects["child"].data.materials.append(bare)
+    scene().tetflora.asset_detail = 'REFINE'
+    text = 'arning: Material "bare" has no surface shader; its viewport color stands for it.'
+    assert bpy.ops.tetflora.refine() == {'FINISHED'}
+    assert text in capfd.readouterr().out
+    bare.diffuse_color = (0.1, 0.2, 0.3, 1.0)  # else the asset would be known, and was told of
+    render.on_render_init(scene())
+    render.on_render_pre(scene())
+    render.on_render_end(scene())
+    assert capfd.readouterr().err.count(text) == 1
+    assert bpy.ops.tetflora.refine() == {'FINISHED'}
+    assert "bare" not in capfd.readouterr().out
 
 
 def test_only_plants_are_missed_in_renders_of_what_is_not_refined(scatter, monkeypatch):

@@ -110,7 +110,9 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--overwrite", action="store_true", help=about)
     render.set_defaults(run=_render)
 
-    stats = commands.add_parser("stats", help="count plants and their polygons without changing anything")
+    stats = commands.add_parser(
+        "stats", help="count plants, their polygons and instances of assets without changing anything"
+    )
     stats.set_defaults(run=_stats)
 
     farm = commands.add_parser("farm", help="write a job for a render farm (Open Job Description)")
@@ -197,7 +199,7 @@ def _render(options: argparse.Namespace) -> dict | None:
 
 def _stats(_options: argparse.Namespace) -> dict:
     statistics = estimate(bpy.context.scene, bpy.context.evaluated_depsgraph_get())
-    return {"plants": statistics.plants, "polygons_full": statistics.polygons_full}
+    return {name: getattr(statistics, name) for name in ("plants", "polygons_full", "instances")}
 
 
 def _farm(options: argparse.Namespace) -> dict:

@@ -34,6 +34,9 @@ from ..worker import steps_in_thread
 #: Part of the progress bar that compiling takes.
 _START, _END = 0.02, 0.05
 
+#: What the artist should know of the assets that were read last, see `Bound`; nothing of those that were known already.
+asset_warnings: list[str] = []
+
 
 @dataclass(frozen=True)
 class Bound:
@@ -93,6 +96,7 @@ def bind_steps(
     TetFloraError
         An asset that cannot be compiled; the message names it.
     """
+    asset_warnings.clear()
     if not places:
         return None
     targets = list(dict.fromkeys(one.target for one in places))
@@ -116,7 +120,8 @@ def bind_steps(
     owner = np.repeat([owners.index(_owner(one)) for one in places], number).astype(np.int32)
     _, costs = _costs(places, depsgraph, _covered(placed, camera))
     keeping = costs.keeping(_in_cycles(scene), left, always=scene.tetflora.asset_detail == 'AUTO')
-    return Bound(tuple(targets), placed, matrices, tuple(owners), owner, keeping, tuple(dict.fromkeys(warnings)))
+    asset_warnings.extend(dict.fromkeys(warnings))
+    return Bound(tuple(targets), placed, matrices, tuple(owners), owner, keeping, tuple(asset_warnings))
 
 
 def _owner(places: Places) -> bpy.types.Object | None:

@@ -156,7 +156,7 @@ def in_wind(scene: bpy.types.Scene, flora: Flora, camera: Camera) -> Flora:
 
 
 def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statistics:
-    """Count plants and polygons of the expanded scene without growing anything.
+    """Count plants, polygons of the expanded scene and instances of assets, without growing or reading any.
 
     Raises
     ------
@@ -165,7 +165,8 @@ def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statisti
     """
     given = read_scene(scene, depsgraph, depsgraph.view_layer)
     flora = compile_for(given.species, scene, depsgraph)
-    return Statistics(plants=len(given.seeds), polygons_full=given.polygons_full(flora))
+    instances = sum(len(one) for one in given.places)
+    return Statistics(plants=len(given.seeds), polygons_full=given.polygons_full(flora), instances=instances)
 
 
 def check_settings(scene: bpy.types.Scene) -> None:

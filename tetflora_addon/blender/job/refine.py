@@ -48,7 +48,7 @@ from ..scene.camera import read_camera
 from ..scene.objects import taking_part
 from ..worker import at_once, call_in_thread, nobody_waits, steps_in_thread
 from .asset_writing import write_assets, write_plain
-from .assets import Bound, bind_steps, is_plain
+from .assets import Bound, asset_warnings, bind_steps, is_plain
 from .contents import Given, compile_for, in_wind, load_for, memory_left, read_scene, refinement_settings
 from .writing import bake_light, write_blocks, write_polygons
 
@@ -148,6 +148,7 @@ def _refine_steps(
     statistics = Statistics(plants=len(given.seeds), polygons_full=full, seconds=clock.seconds)
     refined = not scene.tetflora.expand_everything
     statistics.instances = sum(len(one) for one in given.places)
+    asset_warnings.clear()
     bound, left = None, memory_left(scene, camera)
     plain = not refined or is_plain(scene, given.places, depsgraph, left)
     if not plain:

@@ -38,6 +38,7 @@ from ..scene.objects import has_contents, has_plants, show_in, view_layer_groups
 from ..scene.plants import NoPlantsError
 from ..species.edits import looked_at_once
 from . import frame_cache, refine
+from .assets import asset_warnings
 from .contents import read_scene
 
 
@@ -189,6 +190,8 @@ def _make(scene: bpy.types.Scene) -> None:
             statistics = refine.refine(scene, layer.depsgraph, beside=before, **options)
             if statistics.left_out:
                 _warn(statistics.left_out, " ".join(sorted(statistics.strays)))
+            for text in asset_warnings:
+                _warn(text, text)
             new = [c for c in result_collections(scene, 'RENDER') if c not in before]
             for collection in new:
                 in_main_thread(partial(frame_cache.store, scene, key, collection, statistics.memory_mb))
