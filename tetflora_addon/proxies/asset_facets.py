@@ -123,6 +123,11 @@ def _placed(
     if some.any():
         at = np.flatnonzero(some)
         normal[at] = np.einsum("nij,nj->ni", placed.cofactors(instance[at]), local[at])
+        # Faces of one cluster grow by different factors, and so do their facets.
+        cluster = parts.cluster[owner[at]]
+        mean = parts.totals.area[owner[at]] / (clusters.leaf_area[cluster] + clusters.wood_area[cluster])
+        side = side.copy()
+        side[at] *= np.sqrt(np.linalg.norm(normal[at], axis=1) / mean)
     normal = unit(normal)
     across = perpendicular(normal)
     turn = 2 * np.pi * uniform(key, _TURN)[:, None]

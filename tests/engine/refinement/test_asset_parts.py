@@ -85,7 +85,7 @@ def opened_to_the_end(placed: PlacedAssets) -> AssetParts:
 
 
 def in_a_tree(placed: PlacedAssets, seed: int, rounds: int = 2) -> tuple[TetrahedralTree, SharedAssets]:
-    """Instances in a tree that a random camera roots and random choices divide until some are opened, and then again."""
+    """Instances in a tree that random choices divide until some are opened, twice."""
     rng = np.random.default_rng(seed)
     eye = rng.uniform(-12, 12, 3) * [1, 1, 0.3] + [0, 0, 2]
     camera = support.camera(eye, rng.uniform(-3, 3, 3))
