@@ -125,6 +125,7 @@ def _clusters(results: Results, bound: Bound, target: int, depsgraph: bpy.types.
 def _kites(results: Results, form: ProxyForm, bound: Bound, target: int) -> Maker:
     """What makes meshes of kites for the leaves of clusters."""
     material = form.asset_material()
+    results.use([material])
     asset = bound.placed.assets.every[target]
 
     def make(cluster: int, name: str) -> Generator[None, None, tuple[bpy.types.Mesh, int]]:

@@ -94,9 +94,10 @@ class Results:
         species: Species | None = None,
     ) -> Generator[None, None, bpy.types.Object]:
         """Write one mesh as an object of the collection, step by step; of one species, or of None."""
+        self.use(materials)
         name = self.name_for(name)
         mesh = yield from mesh_steps(name, buffers, materials)
-        self._made += [mesh, *materials]
+        self._made.append(mesh)
         return self._link(name, bpy.data.objects.new(name, mesh), kind, species)
 
     def add_points(
@@ -108,7 +109,7 @@ class Results:
         species: Species | None = None,
     ) -> bpy.types.Object:
         """Write one cloud of points, which has one material, as an object of the collection."""
-        self._made += materials
+        self.use(materials)
         name = self.name_for(name)
         return self._link(name, point_object(name, buffers, *materials), kind, species)
 
@@ -127,6 +128,10 @@ class Results:
                 self._held.append(datablock)
                 self._names += [(datablock, name)] if name else []
                 tag(datablock)
+
+    def use(self, materials: Sequence[bpy.types.Material]) -> None:
+        """Let TetFlora's materials go with what is made, if it is discarded and nothing else uses them."""
+        self._made += materials
 
     def shared(self, key: Hashable, make: Callable[[], _Made]) -> _Made:
         """What was made for a key, made only once for these results."""

@@ -64,7 +64,8 @@ def references_of(geometry: bpy.types.GeometrySet) -> Iterator[tuple[Reference, 
     references = geometry.instance_references()
     reference, transform, number = _read_instances(points)
     if len(references) == 1:
-        yield references[0], Rows(transform, number)
+        if references[0] is not None:  # somebody has deleted it
+            yield references[0], Rows(transform, number)
         return
     order = np.argsort(reference, kind="stable")
     bounds = np.searchsorted(reference[order], np.arange(len(references) + 1))
