@@ -41,7 +41,8 @@ def test_refine_scatter_says_what_it_found_and_refuses_with_a_reason(capfd):
     capfd.readouterr()
     assert bpy.ops.tetflora.refine_scatter() == {'FINISHED'}
     assert (
-        "4 instances of 1 asset will be refined; 4 instances without faces will not show in results" in capfd.readouterr().out
+        "4 instances of 1 asset will be refined; 4 instances without faces will not show in results"
+        in capfd.readouterr().out
     )
     assert ground.tetflora.is_scatter and not ground.tetflora.is_explicit
     assert bpy.ops.tetflora.refine_scatter(action='MARK') == {'FINISHED'}
