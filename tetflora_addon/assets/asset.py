@@ -116,13 +116,14 @@ class SurfaceSamples(Arrays):
         Metres.
     normal : (s, 3) float16
     colour : (s, 3) float16
-    transmission : (s,) float16
+    transmission, roughness : (s,) float16
     """
 
     position: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
     normal: NDArray[np.float16] = field(metadata=column(3, dtype=np.float16))
     colour: NDArray[np.float16] = field(metadata=column(3, dtype=np.float16))
     transmission: NDArray[np.float16] = field(metadata=column(dtype=np.float16))
+    roughness: NDArray[np.float16] = field(metadata=column(dtype=np.float16))
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,7 @@ class AssetKites(Arrays):
     along, across : (l, 3) float32
         Halves of its diagonals, metres.
     colour : (l, 3) float16
-    transmission : (l,) float16
+    transmission, roughness : (l,) float16
     """
 
     centre: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
@@ -147,6 +148,7 @@ class AssetKites(Arrays):
     across: NDArray[np.float32] = field(metadata=column(3, dtype=np.float32))
     colour: NDArray[np.float16] = field(metadata=column(3, dtype=np.float16))
     transmission: NDArray[np.float16] = field(metadata=column(dtype=np.float16))
+    roughness: NDArray[np.float16] = field(metadata=column(dtype=np.float16))
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ def kites_of(
     normal: NDArray[np.float64],
     colour: NDArray[np.floating],
     transmission: NDArray[np.floating],
+    roughness: NDArray[np.floating],
     first: NDArray[np.integer],
     number: NDArray[np.integer],
 ) -> AssetKites:
@@ -36,7 +37,7 @@ def kites_of(
         Area that each blocks, m².
     normal : (t, 3) float64
         Unit vectors.
-    colour, transmission : (t, 3), (t,) float
+    colour, transmission, roughness : (t, 3), (t,), (t,) float
     first : (l,) int
         First triangle of each leaf, ascending from 0 on.
     number : (l,) int
@@ -72,13 +73,14 @@ def kites_of(
     length = np.clip(length, side * np.sqrt(2.0 / _WIDE), side * np.sqrt(2.0 / _NARROW))
     width = 2.0 * area / np.maximum(length, 1e-300)
     mean = np.add.reduceat(optical[:, None] * colour, first, axis=0) / whole
-    through = np.add.reduceat(optical * transmission, first) / whole[:, 0]
+    through, rough = (np.add.reduceat(optical * own, first) / whole[:, 0] for own in (transmission, roughness))
     return AssetKites(
         centre.astype(np.float32),
         (length[:, None] / 2 * along).astype(np.float32),
         (width[:, None] / 2 * np.cross(plane, along)).astype(np.float32),
         mean.astype(np.float16),
         through.astype(np.float16),
+        rough.astype(np.float16),
     )
 
 
@@ -97,5 +99,6 @@ def kite_mesh(leaves: AssetKites) -> MeshBuffers:
         attributes={
             "tf_colour": ("FACE", leaves.colour.astype(np.float32)),
             "tf_transmission": ("FACE", leaves.transmission.astype(np.float32)),
+            "tf_roughness": ("FACE", leaves.roughness.astype(np.float32)),
         },
     )

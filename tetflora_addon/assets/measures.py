@@ -27,6 +27,8 @@ AT_ONCE = 60_000
 SAMPLES, FEWEST = 32, 4
 #: Transmission of sheets where the material leaves it open.
 _SHEET_TRANSMISSION = 0.3
+#: Roughness where nobody knows.
+_ROUGHNESS = 0.5
 #: Draws of the places of samples.
 ALONG, _U, _V = 241, 242, 243
 _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
@@ -105,7 +107,7 @@ class Run:
     new_face, new_patch : (t,) bool
         The first triangle of a face, and of a patch.
     colour : (t, 3) float32
-    transmission, coverage : (t,) float32
+    transmission, coverage, roughness : (t,) float32
     solid, woody : (t,) bool
     width : (t,) float32
         Metres.
@@ -120,6 +122,7 @@ class Run:
     colour: NDArray[np.float32]
     transmission: NDArray[np.float32]
     coverage: NDArray[np.float32]
+    roughness: NDArray[np.float32]
     solid: NDArray[np.bool_]
     woody: NDArray[np.bool_]
     width: NDArray[np.float32]
@@ -146,7 +149,7 @@ def _run(source: AssetSource, pool: Pool, some: NDArray[np.int64], cluster: NDAr
     corners = np.zeros((count, 3, 3))
     part, face = pool.part[some][of], np.zeros(count, np.int32)
     colour, solid = np.zeros((count, 3), np.float32), np.zeros(count, bool)
-    transmission, coverage, width = np.zeros((3, count), np.float32)
+    transmission, coverage, width, roughness = np.zeros((4, count), np.float32)
     surface, woody = source.surface[part], pool.woody[some][of]
     for s in np.unique(surface):
         at = np.flatnonzero(surface == s)
@@ -161,6 +164,7 @@ def _run(source: AssetSource, pool: Pool, some: NDArray[np.int64], cluster: NDAr
             corners[at, :, i] = along + matrix[:, i, 3, None]
         face[at] = of_face = shown.face[triangle]
         colour[at], coverage[at] = shown.colour[of_face], shown.coverage[of_face]
+        roughness[at] = _ROUGHNESS if shown.roughness is None else shown.roughness[of_face]
         solid[at] = own.solid[patch]
         through = shown.transmission[of_face].astype(np.float32)
         unknown = np.where(solid[at], np.float32(0.0), np.float32(_SHEET_TRANSMISSION))
@@ -168,7 +172,19 @@ def _run(source: AssetSource, pool: Pool, some: NDArray[np.int64], cluster: NDAr
         width[at] = own.width[patch] * np.cbrt(np.abs(np.linalg.det(matrix[:, :3, :3])))
     new_face = (np.diff(face, prepend=-1) != 0) | (np.diff(part, prepend=-1) != 0)
     return Run(
-        cluster[of], corners, part, face, new_face, index == 0, colour, transmission, coverage, solid, woody, width
+        cluster[of],
+        corners,
+        part,
+        face,
+        new_face,
+        index == 0,
+        colour,
+        transmission,
+        coverage,
+        roughness,
+        solid,
+        woody,
+        width,
     )
 
 
@@ -257,7 +273,7 @@ def _leaves(run: Run, optical: NDArray[np.float64], normal: NDArray[np.float64])
         + np.arange(len(first))
         - np.searchsorted(run.cluster[some][first], run.cluster[some][first])
     )
-    seen = run.corners[some], optical[some], normal[some], run.colour[some], run.transmission[some]
+    seen = run.corners[some], optical[some], normal[some], run.colour[some], run.transmission[some], run.roughness[some]
     return kites_of(*seen, first, number)
 
 
@@ -305,6 +321,7 @@ def _samples(
                 normal[pick].astype(np.float16),
                 run.colour[pick].astype(np.float16),
                 run.transmission[pick].astype(np.float16),
+                run.roughness[pick].astype(np.float16),
             )
         )
         order.append(cluster)

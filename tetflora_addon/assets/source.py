@@ -29,6 +29,8 @@ class AssetSurface:
         Fraction of light that is scattered through; NaN where nobody knows.
     coverage : (f,) float16
         Fraction of each that is not transparent.
+    roughness : (f,) float16 or None
+        Of its gloss; None where nobody knows.
     """
 
     name: str
@@ -38,6 +40,7 @@ class AssetSurface:
     colour: NDArray[np.float16]
     transmission: NDArray[np.float16]
     coverage: NDArray[np.float16]
+    roughness: NDArray[np.float16] | None = None
 
     @property
     def faces(self) -> int:

@@ -140,4 +140,5 @@ def _placed(
         for axis, by in ((across, _MOVE), (along, _MOVE + 1)):
             centre[again] += (_MOVED * side[again] * signed(key[again], by))[:, None] * axis[again]
     colour = trapped(samples.colour[pick].astype(np.float64), weight)
-    return Facets(centre, across, along, side, colour, samples.transmission[pick].astype(np.float64))
+    through, rough = (own[pick].astype(np.float64) for own in (samples.transmission, samples.roughness))
+    return Facets(centre, across, along, side, colour, through, roughness=rough)

@@ -41,12 +41,15 @@ class Triangles(Arrays):
     transmission : (n,) float32
     velocity : (n, 3) float32 or None
         Metres a second; None for plants at rest.
+    roughness : (n,) float32 or None
+        As of facets.
     """
 
     corners: NDArray[np.float32]
     colour: NDArray[np.float32]
     transmission: NDArray[np.float32]
     velocity: NDArray[np.float32] | None = None
+    roughness: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,7 @@ class Spheres(Arrays):
     radius : (n,) float32
     colour : (n, 3) float32
     transmission : (n,) float32
-    velocity : (n, 3) float32 or None
+    velocity, roughness : (n, 3) float32 or None, (n,) float32 or None
         As of triangles.
     """
 
@@ -69,6 +72,7 @@ class Spheres(Arrays):
     colour: NDArray[np.float32]
     transmission: NDArray[np.float32]
     velocity: NDArray[np.float32] | None = None
+    roughness: NDArray[np.float32] | None = None
 
 
 #: Facets, or what is drawn in their place.
@@ -117,9 +121,11 @@ def triangle_mesh(triangles: Triangles) -> MeshBuffers:
     """Triangles as a mesh with the attributes that the material of proxies reads."""
     n = len(triangles)
     every = np.arange(3 * n, dtype=np.int32).reshape(n, 3)
-    motion = {}
+    more = {}
     if triangles.velocity is not None:
-        motion["velocity"] = "POINT", np.repeat(triangles.velocity, 3, axis=0)
+        more["velocity"] = "POINT", np.repeat(triangles.velocity, 3, axis=0)
+    if triangles.roughness is not None:
+        more["tf_roughness"] = "FACE", triangles.roughness
     return MeshBuffers(
         positions=triangles.corners.reshape(-1, 3),
         edge_verts=np.stack([every, np.roll(every, -1, axis=1)], axis=2).reshape(-1, 2),
@@ -129,7 +135,7 @@ def triangle_mesh(triangles: Triangles) -> MeshBuffers:
         attributes={
             "tf_colour": ("FACE", triangles.colour),
             "tf_transmission": ("FACE", triangles.transmission),
-            **motion,
+            **more,
         },
     )
 
@@ -143,6 +149,7 @@ def sphere_points(spheres: Spheres) -> PointBuffers:
             "tf_colour": spheres.colour,
             "tf_transmission": spheres.transmission,
             **({} if spheres.velocity is None else {"velocity": spheres.velocity}),
+            **({} if spheres.roughness is None else {"tf_roughness": spheres.roughness}),
         },
     )
 
@@ -167,6 +174,8 @@ def facing(facets: Facets, camera: Camera) -> NDArray[np.float64]:
     return np.abs(np.einsum("ni,ni->n", facets.normal, ray)) / np.maximum(np.linalg.norm(ray, axis=1), 1e-300)
 
 
-def _shaded(facets: Facets) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32] | None]:
-    velocity = None if facets.velocity is None else facets.velocity.astype(np.float32)
-    return facets.colour.astype(np.float32), facets.transmission.astype(np.float32), velocity
+def _shaded(
+    facets: Facets,
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32] | None, NDArray[np.float32] | None]:
+    more = (None if own is None else own.astype(np.float32) for own in (facets.velocity, facets.roughness))
+    return facets.colour.astype(np.float32), facets.transmission.astype(np.float32), *more

@@ -56,6 +56,8 @@ class Facets(Arrays):
     transmission : (n,) float64
     velocity : (n, 3) float64 or None
         Metres a second; None for plants at rest.
+    roughness : (n,) float64 or None
+        Of the gloss of assets; None where the material knows.
     """
 
     centre: NDArray[np.float64]
@@ -65,6 +67,7 @@ class Facets(Arrays):
     colour: NDArray[np.float64]
     transmission: NDArray[np.float64]
     velocity: NDArray[np.float64] | None = None
+    roughness: NDArray[np.float64] | None = None
 
     @property
     def normal(self) -> NDArray[np.float64]:

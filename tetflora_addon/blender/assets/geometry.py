@@ -142,6 +142,7 @@ def _surface_steps(
         colour=found.colour,
         transmission=found.transmission,
         coverage=found.coverage,
+        roughness=found.roughness,
     )
 
 

@@ -18,7 +18,7 @@ from .material_digests import attributes_of, material_digest
 from .parts import AssetPart, Slots, parts_of
 
 #: Changes what a digest is of; raise it when what is read of an asset changes.
-_VERSION = 1
+_VERSION = 2
 _COLOURS = {'FLOAT_COLOR', 'BYTE_COLOR'}
 _TYPES = {'FLOAT', 'INT', 'BOOLEAN', 'FLOAT2', 'FLOAT_VECTOR', *_COLOURS}
 

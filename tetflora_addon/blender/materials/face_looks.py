@@ -18,10 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..attributes import read, values_of
+from ..compat import tree_in_use
 from .colour_maths import luminance
 from .look_points import Known, MeshLayers, Plan, find_out
 from .means import GREY, Look
 from .node_values import Notes
+from .nodes import active_output, find_socket, upstream
 from .surface_shaders import SurfaceShaders
 
 #: Triangles that are worked on at once.
@@ -33,6 +35,7 @@ _DOMAINS = {'POINT', 'CORNER', 'FACE'}
 _TYPES = {'FLOAT', 'INT', 'INT8', 'BOOLEAN', 'FLOAT2', 'FLOAT_VECTOR', *_COLOURS}
 _LEAST = 1e-4  # coverage below which a face has no colour of its own
 _FAR = np.float32(1e6)  # texture coordinates and colours beyond it are no use
+_ROUGH = 0.5  # of materials that do not say
 _TINY = 1e-30  # added to areas, so that those of faces without any count alike
 
 
@@ -48,11 +51,14 @@ class FaceLooks:
         Fraction of scattered light that leaves on the other side; NaN where nobody knows.
     coverage : (f,) float16
         Fraction that is not transparent.
+    roughness : (f,) float16
+        Of the gloss of each face's material.
     """
 
     colour: NDArray[np.float16]
     transmission: NDArray[np.float16]
     coverage: NDArray[np.float16]
+    roughness: NDArray[np.float16]
 
 
 class FaceReader:
@@ -142,7 +148,7 @@ class MeshLooks:
         face : (t,) int32
             Ascending.
         """
-        made = FaceLooks(np.zeros((faces, 3), np.float16), np.zeros(faces, np.float16), np.ones(faces, np.float16))
+        made = FaceLooks(np.zeros((faces, 3), np.float16), *(np.ones(faces, np.float16) for _ in range(3)))
         if not any(plan.names for plan in self.plans):
             constant = np.array([plan.constant for plan in self.plans])
             for low in range(0, faces, _TRIANGLES):
@@ -176,6 +182,7 @@ class MeshLooks:
         colour = np.where((cover > _LEAST)[:, None], colour / np.maximum(cover, _LEAST)[:, None], plain[slot])
         made.colour[faces] = np.clip(colour, 0, 1)
         made.coverage[faces] = np.clip(cover, 0, 1)
+        made.roughness[faces] = np.array([roughness_of(material) for material in self.materials])[slot]
         made.transmission[faces] = np.where(known[slot], np.clip(passed, 0, 1), np.nan)
 
     def _triangles(
@@ -197,6 +204,16 @@ class MeshLooks:
         rows = {'FACE': np.broadcast_to(face[:, None], loops.shape), 'CORNER': loops}.get(domain, verts)
         found = np.nan_to_num(np.take(values, rows, axis=0).astype(np.float32, copy=False), posinf=0, neginf=0)
         return np.clip(found, -_FAR, _FAR, out=found)
+
+
+def roughness_of(material: bpy.types.Material | None) -> float:
+    """Roughness of a material's gloss, that of its first shader with one; half where nodes feed it."""
+    output = None if material is None else active_output(tree_in_use(material), 'OUTPUT_MATERIAL')
+    for node in () if output is None else upstream(find_socket(output.inputs, "Surface")):
+        if node.type in {'BSDF_PRINCIPLED', 'EEVEE_SPECULAR', 'BSDF_GLOSSY'}:
+            rough = find_socket(node.inputs, "Roughness")
+            return _ROUGH if rough.is_linked else float(np.clip(rough.default_value, 0.0, 1.0))
+    return _ROUGH
 
 
 def _plan_of(material: bpy.types.Material | None, layers: MeshLayers, known: Known) -> Plan:

@@ -26,9 +26,6 @@ ASSET_PROXY = "TetFlora asset proxy"
 ASSET_SPHERE = "TetFlora asset microsphere"
 BAKED = "TetFlora baked"
 
-#: Of leaves and bark as artists make them.
-_ROUGHNESS = 0.5
-
 # Raise these when what they count changes: existing files then get the new nodes beside the old ones.
 _PROXY_VERSION = 2
 _SPHERE_VERSION = 1
@@ -198,7 +195,9 @@ def _proxy_looks(graph: Graph, normal: Any) -> dict[str, Any]:
 def _principled(graph: Graph) -> bpy.types.Node:
     """What stands for the artist's materials: Fresnel's gloss, which is most of what leaves show against the light."""
     colour, transmission = graph.attribute("tf_colour", "Color"), graph.attribute("tf_transmission", "Fac")
-    front = graph.node("ShaderNodeBsdfPrincipled", {"Base Color": colour, "Roughness": _ROUGHNESS})
+    front = graph.node(
+        "ShaderNodeBsdfPrincipled", {"Base Color": colour, "Roughness": graph.attribute("tf_roughness", "Fac")}
+    )
     back = graph.node("ShaderNodeBsdfTranslucent", {"Color": colour})
     return graph.mix(transmission, front, back)
 
