@@ -64,7 +64,7 @@ _TABLE = {
     "blender/results",
     "blender/viewport": f". species growth compiled tetrahedra camera refinement preview {_LOW} {_HIGH}",
     "blender/cli": ". blender blender/scene blender/job",
-    "operators": ". species camera refinement preview planting blender blender/species blender/scene blender/assets "
+    "operators": ". species assets camera refinement preview planting blender blender/species blender/scene blender/assets "
     f"{_HIGH} blender/viewport",
     "panels": f". species blender blender/species blender/scene blender/assets {_HIGH} blender/viewport operators",
 }

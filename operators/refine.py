@@ -7,6 +7,7 @@ from collections.abc import Generator
 import bpy
 
 from ..tetflora_addon import storage
+from ..tetflora_addon.assets import kept
 from ..tetflora_addon.blender.job import refine
 from ..tetflora_addon.blender.job.assets import asset_warnings
 from ..tetflora_addon.blender.job.plant_mesh import make_plant_mesh_steps
@@ -225,7 +226,7 @@ class TETFLORA_OT_clear_cache(Reporting, bpy.types.Operator):
     bl_options = {'REGISTER'}
 
     def run(self, _context: bpy.types.Context) -> set[str]:
-        return self.done(f"{counted(storage.clear(), 'file')} deleted from {storage.used()}")
+        return self.done(f"{counted(storage.clear() + kept.clear(), 'file')} deleted from {storage.used()}")
 
 
 CLASSES = (

@@ -95,23 +95,30 @@ def remembered(
     return values
 
 
-def clear() -> int:
+def clear(folder: Path | None = None, names: re.Pattern[str] | None = None) -> int:
     """Delete all results of this user in the folder, and nothing else that lies there; returns how many there were.
+
+    Parameters
+    ----------
+    folder : Path, optional
+        Another one than that which is used, for files of other names.
+    names : re.Pattern, optional
+        Of these.
 
     Raises
     ------
     TetFloraError
         Some cannot be deleted.
     """
-    number = 0
+    number, folder = 0, folder or _folder
     try:
-        for entry in _entries(_OURS, _folder):
+        for entry in _entries(names or _OURS, folder):
             if _is_own(entry.stat(follow_symlinks=False)):
                 Path(entry).unlink(missing_ok=True)
                 number += 1
     except OSError as error:
         raise TetFloraError(
-            f"Cannot clear the cache folder {_folder}: {error.strerror}. Check its permissions"
+            f"Cannot clear the cache folder {folder}: {error.strerror}. Check its permissions"
         ) from None
     return number
 

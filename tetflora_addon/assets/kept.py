@@ -63,6 +63,19 @@ def keep(asset: Asset) -> None:
         storage.warn(f"cannot write to the cache folder {path.parent}: {error.strerror}")
 
 
+def clear() -> int:
+    """Delete all compiled assets of this user in the folder, and drop those in memory; returns how many files.
+
+    Raises
+    ------
+    TetFloraError
+        As `storage.clear`.
+    """
+    forget()
+    used = storage.used()
+    return storage.clear(used / "assets", _NAMES) if used is not None else 0
+
+
 def forget() -> None:
     """Drop what is kept in memory."""
     _known.clear()

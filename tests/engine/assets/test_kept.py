@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.engine import support
 from tests.engine.assets import trees
+from tests.engine.refinement.test_asset_parts import opened_to_the_end, placed_of
 from tests.limits import full_disk
 from tetflora_addon import storage
 from tetflora_addon.assets import kept
@@ -157,8 +157,6 @@ def test_a_full_disk_stops_nobody(folder: Path, capsys: pytest.CaptureFixture) -
 
 def use(one: Asset) -> None:
     """What refinement does with an asset."""
-    from tests.engine.refinement.test_asset_parts import opened_to_the_end, placed_of
-
     parts = opened_to_the_end(placed_of(one))
     assert len(parts)
     for cluster in range(len(one.clusters)):
@@ -228,4 +226,16 @@ def test_a_file_that_claims_to_be_large_is_not_believed(folder: Path) -> None:
     path.write_bytes(content.getvalue())
     found = kept.find("ab")
     assert found is None or same(found, asset())
-    assert support is not None
+
+
+def test_clearing_deletes_what_is_ours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(storage, "_folder", tmp_path)
+    folder = tmp_path / "assets"
+    folder.mkdir()
+    own = folder / f"tetflora-compiled-{kept.METHOD}-ab12.npz"
+    own.write_bytes(b"one")
+    (folder / "notes.txt").write_text("stays")
+    assert kept.clear() == 1
+    assert not own.exists()
+    assert (folder / "notes.txt").exists()
+    assert kept.clear() == 0

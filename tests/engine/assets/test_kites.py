@@ -29,7 +29,7 @@ def test_kites_have_the_area_that_leaves_block(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", ["leaves", "varied", "closed", "skeleton", "degenerate", "card"])
 def test_kites_are_where_leaves_are(kind: str) -> None:
-    """Middles within the bound of their cluster; no longer than twice as long as that of the leaf."""
+    """Middles within the bound of their cluster."""
     asset = trees.compiled(kind)
     for cluster in np.flatnonzero(asset.clusters.children == 0).tolist():
         own = asset.leaves_of(cluster)
