@@ -64,8 +64,8 @@ _TABLE = {
     "blender/results",
     "blender/viewport": f". species growth compiled tetrahedra camera refinement preview {_LOW} {_HIGH}",
     "blender/cli": ". blender blender/scene blender/job",
-    "operators": ". species assets camera refinement preview planting blender blender/species blender/scene blender/assets "
-    f"{_HIGH} blender/viewport",
+    "operators": ". species assets camera refinement preview planting blender blender/species blender/scene "
+    f"blender/assets {_HIGH} blender/viewport",
     "panels": f". species blender blender/species blender/scene blender/assets {_HIGH} blender/viewport operators",
 }
 ARROWS = {room: tuple(others.split()) for room, others in _TABLE.items()}
