@@ -10,7 +10,7 @@ transparent, and through facets at their samples, as many as there may be.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,6 +117,9 @@ def _blocked_by_facets(
     each = max(round(count), 1)
     sets = int(np.ceil(FACETS / each)) if each >= 4 else FEW_SETS
     area = clusters.optical_area[cluster] / count * weight
+    # Facets of dense clusters may be far larger than the bound: rays farther apart tell as much about these.
+    apart = max(float(np.sqrt(area)) / (RAYS * view.step), 1.0)
+    view = replace(view, step=view.step * apart)
     number = np.arange(sets * each)
     owner = number // each
     key = child_key(key_of_seed(number), cluster)
@@ -138,4 +141,4 @@ def _blocked_by_facets(
     low, (tall, wide) = ray.min(axis=0), np.ptp(ray, axis=0) + 1
     cell = np.sort((owner[facet] * tall + ray[:, 0] - low[0]) * wide + ray[:, 1] - low[1])
     # A facet smaller than a step is missed more often than not, but hit by as many rays on the mean.
-    return (1 + int(np.count_nonzero(np.diff(cell)))) / sets / RAYS**2 * min(count, 1.0)
+    return (1 + int(np.count_nonzero(np.diff(cell)))) * apart**2 / sets / RAYS**2 * min(count, 1.0)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from tests.engine.assets import trees
+from tetflora_addon.assets import clumping
 from tetflora_addon.assets.asset import COUNTS
 from tetflora_addon.assets.compiled import compile_asset
 
@@ -42,3 +43,20 @@ def test_holes_count_as_such() -> None:
     thin = replace(full, coverage=np.full(full.faces, 0.25, np.float16))
     whole, some = (compile_asset(trees.source_of(s)).clusters.weights[0, 0] for s in (full, thin))
     assert some > whole + 0.1
+
+
+def test_leaves_that_lie_in_a_heap_take_no_longer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Facets as large as all of them would meet millions of rays."""
+    most, met = [], clumping._View.met
+
+    def counted(view: clumping._View, corners: np.ndarray) -> tuple:
+        found = met(view, corners)
+        most.append(len(found[0]) / len(corners))
+        return found
+
+    monkeypatch.setattr(clumping._View, "met", counted)
+    matrices = np.tile(np.eye(4), (150, 1, 1))
+    heap = trees.source_of(trees.leaves(1, 1), shown=np.zeros(150), matrices=matrices)
+    weights = compile_asset(heap).clusters.weights[0]
+    assert max(most) <= 2 * clumping.RAYS**2
+    assert weights[0] == pytest.approx(0.1)
