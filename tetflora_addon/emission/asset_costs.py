@@ -66,7 +66,10 @@ class AssetCosts:
         cost = self._loaded + self._of_instances
         if always:
             order = np.argsort(-self.pixels / np.maximum(cost, 1.0), kind="stable")
-            kept[order] = np.cumsum(cost[order]) <= SAFE / 2 * left
+            room = SAFE / 2 * left
+            for one in order.tolist():  # of some dozens; one that does not fit keeps no other out
+                kept[one] = cost[one] <= room
+                room -= cost[one] if kept[one] else 0.0
         return Keeping(kept, NEVER, shared=True)
 
     @property
