@@ -67,7 +67,7 @@ def run(scene, **settings):
 
 
 def shown():
-    """Mesh and world matrix of all that is drawn as an instance, without spheres, which are instances in Blender 4.5."""
+    """Mesh and world matrix of all that is drawn as an instance; spheres are instances too in Blender 4.5."""
     return [
         (i.object.original.data.name, np.array(i.matrix_world))
         for i in depsgraph().object_instances
