@@ -9,7 +9,7 @@ from ..operators.assets import TETFLORA_OT_stop_using_as_species, TETFLORA_OT_us
 from ..operators.marks import TETFLORA_OT_mark_field
 from ..operators.plants import TETFLORA_OT_remove_plants
 from ..operators.refine import TETFLORA_OT_make_plant_mesh
-from ..tetflora_addon.blender.assets.marks import can_be_species, is_species
+from ..tetflora_addon.blender.assets.marks import is_species
 from ..tetflora_addon.blender.scene.fields import FIELD_TYPES, stored_size
 from ..tetflora_addon.blender.scene.objects import has_nodes
 from ..tetflora_addon.blender.scene.skeletons import FORM_TYPES
@@ -60,8 +60,6 @@ def _draw_asset(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         row.label(text="Used as a species", icon='CHECKMARK')
         Button(TETFLORA_OT_use_as_species, 'FILE_REFRESH', "").draw(row)
         Button(TETFLORA_OT_stop_using_as_species, 'X', "").draw(row)
-    elif can_be_species(obj):
-        Button(TETFLORA_OT_use_as_species, 'ASSET_MANAGER').draw(layout)
 
 
 def _draw_field(column: bpy.types.UILayout, obj: bpy.types.Object) -> None:
