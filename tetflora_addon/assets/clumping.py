@@ -22,7 +22,7 @@ from .asset import COUNTS, Clusters, SurfaceSamples
 from .measures import Run
 
 #: Rays across the longer side of a cluster; clusters of a depth that are looked at, and directions.
-RAYS, CLUSTERS = 56, 5
+RAYS, CLUSTERS = 56, 3
 DIRECTIONS = np.array([[0.8, 0.5, 0.33166248], [-0.45, 0.85, 0.27386128], [0.35, 0.25, 0.90277350]])
 #: Facets for each number of them, over all sets; sets of few large ones; and weights that are tried.
 FACETS, FEW_SETS, TRIED = 192, 16, np.array([0.25, 0.5, 0.75, 1.0])
