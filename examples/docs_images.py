@@ -34,6 +34,7 @@ def main() -> int:
     from .demo import run
     from .landscape import render_landscape
     from .million import render_million
+    from .scattered import main as render_scattered
     from .species_sheet import render_opening, render_sheet
     from .wood import build as build_wood
     from .wood import render_dolly, render_interior
@@ -55,6 +56,8 @@ def main() -> int:
     build_wood(bpy.context.scene)
     render_dolly(IMAGES / "dolly.jpg")
     render_interior(IMAGES / "interior.jpg")
+    session.clean_file()
+    render_scattered([])
     session.stop()
     large = [p.name for p in IMAGES.iterdir() if p.stat().st_size > LARGEST]
     if large:

@@ -62,8 +62,8 @@ def main(arguments: list[str] | None = None) -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--instances", type=int, default=10_000)
-    parser.add_argument("--width", type=int, default=960)
-    parser.add_argument("--samples", type=int, default=48)
+    parser.add_argument("--width", type=int, default=800)
+    parser.add_argument("--samples", type=int, default=20)
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "images" / "assets.jpg")
     given = parser.parse_args(arguments)
     session.start()
