@@ -18,7 +18,6 @@ from pathlib import Path
 import bpy
 from PIL import Image
 
-from benchmarks import asset_scenes
 from devtools import session
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -35,6 +34,7 @@ def render(scene: bpy.types.Scene, path: Path) -> Image.Image:
 
 def pair(instances: int, width: int, samples: int) -> Image.Image:
     """Both pictures, one above the other."""
+    from benchmarks import asset_scenes
     from tetflora_addon.blender.job.refine import refine
 
     scene, size = bpy.context.scene, (width, width * 9 // 20)
