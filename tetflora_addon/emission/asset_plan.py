@@ -27,6 +27,8 @@ from .leaf_detail import FADING
 from .plants import KITES
 from .portions import MIXED, in_chunks
 
+#: How many times as far plain instances are kept where the renderer shows a mesh in many places for the cost of one.
+FARTHER = 20.0
 #: Facets of a cluster from which on those of its children have places of their own, and where it is seen in part.
 MANY, FEW = 48.0, 6.0
 #: Faces of a leaf up to which there is no kite for it.
@@ -91,6 +93,9 @@ def real_fractions(
     parts = portions.parts
     pixels = parts.totals.width / np.maximum(sight.camera.extent_around(parts.centre), 1e-300)
     pixels = pixels * portions.visibility**FADING
+    if not kites:
+        # An instance costs as much as three facets: all that is seen is real, but for specks.
+        seen, pixels = portions.visibility > 0.0, pixels * FARTHER
     some = np.where(seen, real_fraction(pixels, limit), 0.0)
     # A card or a leaf of two triangles is no more than a kite.
     simple = sight.placed.assets.leaf_faces[parts.cluster] <= SIMPLE
@@ -107,6 +112,13 @@ def plan_of(sight: AssetSight, limit: float | None, keeping: Keeping) -> AssetPl
     always = keeping.always[instances.asset]
     portions = portions.take(~always[portions.parts.instance])
     done = [AssetPortions.empty()]
+    if not keeping.kites and keeping.fraction <= 1.0:
+        # Whole instances that are real need not be opened to find out that most of each is.
+        root = portions.parts.cluster == assets.root[instances.asset[portions.parts.instance]]
+        real = root & (real_fractions(sight, portions, limit, keeping.kites)[1] >= 1.0)
+        always = always.copy()
+        always[portions.parts.instance[real]] = True
+        portions = portions.take(~real)
     while len(portions):
         # Down to the clusters that are meshes of their own, where some of them may be real.
         above = mesh_of[portions.parts.cluster] < 0

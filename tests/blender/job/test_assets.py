@@ -302,7 +302,7 @@ def test_all_as_it_is_where_everything_is_expanded():
 
 
 def test_two_scatterers_of_one_asset_are_both_replaced():
-    scene, ground, tree = forest()
+    scene, ground, tree = forest(eevee_engine())
     other = add_mesh("other", faces=())
     nodes = Nodes(other)
     source, socket = nodes.asset(tree)
