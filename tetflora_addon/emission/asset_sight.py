@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, column, nested
+from ..arrays import nested
 from ..camera.camera import Camera
 from ..proxies.thrown_shadows import ThrownShadows
 from ..refinement.asset_parts import AssetParts
@@ -22,17 +22,15 @@ POINTS = 12
 
 
 @dataclass(frozen=True)
-class AssetPortions(Arrays):
-    """Clusters of instances (n), and what is seen of them; columns as of `portions.Portions`."""
+class AssetPortions(Seen):
+    """Clusters of instances (n), and what is seen of them.
+
+    Attributes
+    ----------
+    parts : AssetParts of n
+    """
 
     parts: AssetParts = field(metadata=nested(AssetParts))
-    visibility: NDArray[np.float64]
-    best: NDArray[np.float64]
-    real: NDArray[np.bool_] = field(metadata=column(dtype=bool))
-    mixed: NDArray[np.bool_] = field(metadata=column(dtype=bool))
-    beside: NDArray[np.bool_] = field(metadata=column(dtype=bool))
-    coarse: NDArray[np.float64]
-    rank: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
 
 
 class AssetSight:
@@ -66,7 +64,7 @@ class AssetSight:
         at = np.flatnonzero(self.nodes.close[points.cell])
         width = parts.totals.width[points.part[at]]
         close = at[width >= CLOSE * self.camera.extent_around(points.position[at].astype(np.float64))]
-        made = AssetPortions(parts, *vars(self.nodes.of(points, len(parts), close)).values())
+        made = AssetPortions(*vars(self.nodes.of(points, len(parts), close)).values(), parts)
         if self._facets:
             self._let_in(made)
         return made
@@ -91,7 +89,7 @@ class AssetSight:
             owner.append(of)
         every, of = AssetParts.concatenate(parts), np.concatenate(owner)
         seen = portions.take(of)
-        made = AssetPortions(every, *(getattr(seen, name) for name in _INHERITED))
+        made = AssetPortions(*(getattr(seen, name) for name in _INHERITED), every)
         unclear = np.flatnonzero(seen.mixed)
         if not len(unclear):
             return made, of
@@ -104,7 +102,7 @@ class AssetSight:
             column_ = getattr(made, name).copy()
             column_[unclear] = getattr(known, name)
             columns.append(column_)
-        return AssetPortions(every, *columns), of
+        return AssetPortions(*columns, every), of
 
     def pixels(self, portions: AssetPortions) -> NDArray[np.float64]:
         """Extent (n,) of clusters in the image."""

@@ -23,7 +23,23 @@ SOME = 0.01
 
 @dataclass(frozen=True)
 class Seen(Arrays):
-    """What is seen of parts (n); `portions.Portions` says what the columns are."""
+    """What is seen of parts (n).
+
+    Attributes
+    ----------
+    visibility : (n,) float64
+        Mean fraction of light that nothing in front blocks, 0 where all of it is hidden or beside the view.
+    best : (n,) float64
+        The largest visibility in any of its tetrahedra.
+    real : (n,) bool
+        Whether some of it may be drawn as it is: it reaches into an explicit tetrahedron.
+    mixed, beside : (n,) bool
+        Seen in part only; all of it is out of view.
+    coarse : (n,) float64
+        How much larger its facets are where it is hidden, see `facet_sizes.coarseness`.
+    rank : (n,) int32
+        Front-to-back order of the tetrahedra that they begin in.
+    """
 
     visibility: NDArray[np.float64]
     best: NDArray[np.float64]
