@@ -258,10 +258,6 @@ class AssetTable:
                 return out
             out[below] = out[parent[below]]
 
-    def asset_of(self, cluster: NDArray[np.integer]) -> NDArray[np.int64]:
-        """Asset (n,) that clusters (n,) belong to."""
-        return np.searchsorted(self.root, cluster, side="right") - 1
-
 
 @dataclass(frozen=True)
 class Instances(Arrays):
