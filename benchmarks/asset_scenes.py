@@ -11,7 +11,7 @@ from pathlib import Path
 import bpy
 from mathutils import Matrix, Vector
 
-from examples.row80 import add_daylight
+from examples.daylight import add_daylight
 from tetflora_addon.blender import compat
 
 from . import asset_trees

@@ -21,7 +21,7 @@ import numpy as np
 from mathutils import Vector
 from numpy.typing import NDArray
 
-from examples.row80 import add_daylight
+from examples.daylight import add_daylight
 from tetflora_addon import memory
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.job.plant_mesh import single_seed

@@ -16,7 +16,7 @@ import numpy as np
 from mathutils import Vector
 from numpy.typing import NDArray
 
-from examples.row80 import add_daylight
+from examples.daylight import add_daylight
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import refine
 

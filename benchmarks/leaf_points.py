@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from examples.row80 import add_daylight
+from examples.daylight import add_daylight
 from tetflora_addon.blender.job.plant_mesh import single_seed
 from tetflora_addon.blender.materials.materials import leaf_material
 from tetflora_addon.blender.results.meshes import write_mesh

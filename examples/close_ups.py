@@ -136,7 +136,7 @@ class Subject:
         from tetflora_addon.blender.placing.cover import cover_steps
         from tetflora_addon.blender.worker import at_once
 
-        from .row80 import add_daylight
+        from .daylight import add_daylight
 
         scene = bpy.context.scene
         number = np.arange(_AROUND + 1)

@@ -18,7 +18,7 @@ from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.placing import plant_objects, terrain
 from tetflora_addon.planting import places, rules
 
-from .row80 import add_daylight
+from .daylight import add_daylight
 from .terrain import Terrain, elevation
 
 PLANTS = 8_636

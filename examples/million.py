@@ -25,8 +25,8 @@ from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.placing import plant_objects, terrain
 from tetflora_addon.planting import places, rules
 
+from .daylight import add_daylight
 from .haze import add_haze
-from .row80 import add_daylight
 from .terrain import Terrain
 
 PLANTS = 1_000_000

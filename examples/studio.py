@@ -17,7 +17,7 @@ from devtools import session
 from devtools.formats import set_format
 from tetflora_addon.blender import compat
 
-from .row80 import add_daylight
+from .daylight import add_daylight
 
 #: Degrees by which the camera looks down, and by which plants stand to its side of the sun.
 _PITCH, _SUN = 9.0, -40.0

@@ -32,7 +32,7 @@ def render_thumbnail(identifier: str, path: Path) -> None:
     from tetflora_addon.blender.job import plant_mesh
     from tetflora_addon.jobs import at_once
 
-    from .row80 import add_daylight
+    from .daylight import add_daylight
 
     session.clean_file()
     scene = bpy.context.scene

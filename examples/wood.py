@@ -67,7 +67,7 @@ def build(scene: bpy.types.Scene) -> None:
     """Fill an empty scene with land, wood, meadow, an oak of its own at the origin, sun and sky."""
     from tetflora_addon.blender.placing import first_forest
 
-    from .row80 import add_daylight
+    from .daylight import add_daylight
 
     oak = bpy.data.objects.new("The oak", None)
     oak.location = (0.0, 0.0, float(height(np.zeros(1), np.zeros(1))[0]))
