@@ -12,11 +12,13 @@ from math import pi, radians, tan
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from tetflora_addon.blender import compat
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.emission import plants
 from tetflora_addon.growth import seeds
+from tetflora_addon.growth.hashing import signed, uniform
 from tetflora_addon.species import catalogue
 
 SPECIES = ("oak", "birch", "spruce", "aspen")
@@ -44,6 +46,21 @@ class Stand:
 
     scene: bpy.types.Scene
     columns: dict[str, slice]
+
+
+@dataclass(frozen=True)
+class Above:
+    """A scene with plants seen from above.
+
+    Attributes
+    ----------
+    scene : bpy.types.Scene
+    kind : (height, width) int
+        Species (index) of the plant that is nearest to each pixel, top row first.
+    """
+
+    scene: bpy.types.Scene
+    kind: NDArray[np.integer]
 
 
 def build(scene: bpy.types.Scene, pixels: int, light: str, each: int, species: tuple[str, ...] = SPECIES) -> Stand:
@@ -132,6 +149,43 @@ def forest(scene: bpy.types.Scene, count: int, light: str, columns: int = 512) -
     _aim(scene, (columns, columns // 4), eye, far)
     middle = focal / 2 * ((eye - HEIGHT) / far + eye / near)
     scene.camera.data.shift_y = -middle / columns
+
+
+def above(scene: bpy.types.Scene, species: tuple[str, ...], each: int, side: float, pixels: int, light: str) -> Above:
+    """Fill an empty scene with plants of their own heights on a square, seen from above by an orthographic camera.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    species : tuple of str
+    each : int
+        Plants of each species.
+    side : float
+        Of the square that the image shows, metres.
+    pixels : int
+        The same in pixels.
+    light : str
+        One of `LIGHTS`.
+    """
+    count = each * len(species)
+    # One in each cell of a grid, anywhere in the middle of it; which species is in which is drawn too.
+    columns = round(np.sqrt(count))
+    rows = -(-count // columns)
+    key = np.arange(count).astype(np.uint64)
+    kind = np.argsort(uniform(key, 1)) % len(species)
+    cell = np.stack([np.arange(count) % columns, np.arange(count) // columns], axis=1)
+    moved = cell + 0.5 + 0.5 * np.stack([signed(key, 2), signed(key, 3)], axis=1)
+    place = (moved / [columns, rows] - 0.5) * side
+    for i, (s, (x, y)) in enumerate(zip(kind.tolist(), place.tolist(), strict=True)):
+        _add_plant(scene, f"{species[s]} {i + 1:02d}", species[s], i, (x, y, 0.0), 2.399963 * i, 1.0)
+    _add_ground(scene, 2.0 * side)
+    set_light(scene, light)
+    _aim(scene, (pixels, pixels), 100.0, 100.0)
+    scene.camera.data.type, scene.camera.data.ortho_scale = 'ORTHO', side
+    scene.camera.rotation_euler = (0.0, 0.0, 0.0)
+    middle = ((np.arange(pixels) + 0.5) / pixels - 0.5) * side
+    away = np.hypot(middle[None, :, None] - place[:, 0], -middle[:, None, None] - place[:, 1])
+    return Above(scene, kind[away.argmin(axis=2)])
 
 
 def _add_plant(
