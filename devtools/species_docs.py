@@ -15,8 +15,8 @@ from dataclasses import fields
 from tetflora_addon.leaves.models import LEAF_MODELS, Spines
 from tetflora_addon.leaves.schema import OUTLINES
 from tetflora_addon.species.catalogue import load_species
-from tetflora_addon.species.schema import FOLLOWS, LENGTH_HIGH, ORDER_KEYS, Key
-from tetflora_addon.species.species import CROWN_SHAPES, LEAF_KINDS
+from tetflora_addon.species.schema import CHOICES, FOLLOWS, LENGTH_HIGH, ORDER_KEYS, Key
+from tetflora_addon.species.species import CROWN_SHAPES
 
 from . import forms
 from .house import ROOT
@@ -29,6 +29,8 @@ _WRITTEN = {
     "integer": "whole number",
     "shape": "name",
     "kind": "name",
+    "envelope": "name",
+    "inclination": "name",
     "rgb": "`[r, g, b]`",
     "colour": "`[[r, g, b], [variation of each]]`",
 }
@@ -37,8 +39,8 @@ _WRITTEN = {
 def _limits(name: str, key: Key) -> str:
     if key.kind == "shape":
         return "see below"
-    if key.kind == "kind":
-        return ", ".join(f"`{name}`" for name in LEAF_KINDS)
+    if key.kind in CHOICES:
+        return ", ".join(f"`{name}`" for name in CHOICES[key.kind])
     limits = f"{key.low:g} to {key.high:g}"
     return f"{limits}; {key.low:g} to {LENGTH_HIGH:g} after order 0" if name == "length" else limits
 

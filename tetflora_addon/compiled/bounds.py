@@ -14,6 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..growth.envelopes import reaches
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR
 from ..growth.wind import widest_sway
 from ..species.species import crown_ratio
@@ -79,7 +80,8 @@ def own_leaf_reaches(rows: NDArray[np.void], model_reach: NDArray[np.float64]) -
     """How far leaves stick out beyond the axes that bear them (r,), at plant scale 1, metres; see `leaf_reaches`."""
     factor = np.maximum(rows["leaf_size_tip"], 1) * np.maximum(rows["leaf_size_young"], 1)
     largest = rows["leaf_size"].sum(axis=1) * factor
-    return np.where(rows["leaves"].sum(axis=1) > 0, largest * model_reach, 0.0)
+    beyond = model_reach + np.where(rows["envelope"] > 0, 0.5, 0.0)  # solids hold the middles of leaves
+    return np.where(rows["leaves"].sum(axis=1) > 0, largest * beyond, 0.0)
 
 
 def _tilted(bound: NDArray, angle: NDArray, scale: NDArray) -> tuple[NDArray, NDArray, NDArray]:
@@ -150,7 +152,9 @@ def leaf_reaches(
 def _unit_bound(rows: NDArray[np.void], index: int, bounds: NDArray[np.float64]) -> NDArray[np.float64]:
     row = rows[index]
     radius, low, high, turn = _axis_envelope(row)
-    bound = np.array([radius.max(), min(low.min(), 0.0), max(high.max(), 0.0)])
+    solid = float(reaches(row))
+    rises = solid * np.sin(min(turn.max(), np.pi / 2))
+    bound = np.array([radius.max() + solid, min(low.min(), 0.0) - rises, max(high.max(), 0.0) + rises])
     knot_t = np.linspace(0, 1, len(radius))
     for sort in (LATERAL, FORK, DEAD):
         if row["next"][sort] < 0:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ..errors import SpeciesError
 from ..growth.branches import Branches
+from ..growth.envelopes import reaches
 from ..growth.foliage import YOUTH
 from ..growth.growth import fullness
 from ..growth.rows import LATERAL, build_rows
@@ -284,6 +285,7 @@ def _with_drawn(rows: NDArray[np.void], bound: NDArray[np.float64]) -> NDArray[n
         child = own["next"][:, LATERAL]
         farthest = np.hypot(bound[child, 0], np.maximum(bound[child, 2], -bound[child, 1]))
         reach = np.where(child >= 0, own["size"][:, 0] * rows["length"][child].sum(axis=1) * farthest, 0.0)
+        reach = np.maximum(reach, own["size"][:, 0] * reaches(own))
         across, height = np.hypot(own["knots"][..., 0], own["knots"][..., 1]), own["knots"][..., 2]
         if is_windy(rows):  # no point moves farther than an arc that turns as its height does
             above = np.maximum(height.max(), 0.0)

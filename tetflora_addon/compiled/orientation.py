@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ..arrays import GOLDEN_ANGLE, columns, cross, perpendicular, spiral
 from ..growth.axes import Axes, axes
 from ..growth.branches import Branches
+from ..growth.envelopes import axis_places
 from ..growth.foliage import leaf_frames, leaf_keys, leaf_lights, leaf_places, leaf_sizes, outwardness, settled
 from ..growth.growth import branch_counts, chosen_children, drawn_children, fullness, leaf_counts, radius_at
 from ..growth.hashing import Draw, key_of_seed, mix, thinned, uniform
@@ -346,7 +347,7 @@ def _own_leaves(
     if rows["leaf_spray"][row[0]] == 0:
         # The first leaf stands anywhere around the branch, and so does any other: evenly, a good deal of chance goes.
         roll, index = roll + each / _LEAVES, np.zeros_like(index)
-    _, along = lines.at(owner, t)
+    _, along = lines.at(owner, axis_places(rows, branches, row, owner, t))
     frame = leaf_frames(rows, row, along.astype(np.float32), roll, index, key)
     outward = outwardness(rows, branches, owner, t)
     light = leaf_lights(rows, row, key, outward if place is None else np.full(len(t), place))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..arrays import Arrays, cross, dot, gathered
 from .axes import Axes
 from .branches import Branches
+from .envelopes import EVEN_JITTER, inclined, leaf_sites, leaf_start
 from .growth import level_azimuth
 from .hashing import Draw, child_key, signed, uniform
 from .rows import ranged
@@ -63,7 +64,7 @@ def leaf_keys(branches: Branches, owner: NDArray[np.int64], index: NDArray[np.in
 def leaf_places(
     rows: NDArray[np.void], branches: Branches, owner: NDArray, index: NDArray, counts: NDArray, key: NDArray[np.uint64]
 ) -> NDArray[np.float64]:
-    """Fractions (m,) of the branches' axes at which leaves sit; those of a whorl share that of the first of them."""
+    """Fractions (m,) of branches at which leaves sit (see `envelopes`); those of a whorl share that of the first."""
     row = _rows_of(branches, owner)
     whorl = rows["leaf_whorl"][row]
     number = np.take(counts, owner)
@@ -72,15 +73,11 @@ def leaf_places(
         node = index // whorl
         key = np.where(index % whorl > 0, leaf_keys(branches, owner, node * whorl), key)
         number = number // whorl
-    fraction = (node + 0.5 + _PLACE_JITTER * signed(key, Draw.PLACE)) / number
+    jitter = np.where(rows["envelope"][row] > 0, EVEN_JITTER, _PLACE_JITTER)
+    fraction = (node + 0.5 + jitter * signed(key, Draw.PLACE)) / number
     start = leaf_start(rows, branches)
     start = start[:1] if len(row) == 1 and (start == start[:1]).all() else np.take(start, owner)
     return start + (1 - start) * fraction
-
-
-def leaf_start(rows: NDArray[np.void], branches: Branches) -> NDArray[np.float64]:
-    """Fraction (n,) of each branch's axis that is bare of leaves."""
-    return ranged(rows, "leaf_start", branches.row, branches.key, Draw.LEAF_START)
 
 
 def outwardness(
@@ -163,12 +160,15 @@ def place_leaves(
     row = _rows_of(branches, owner)
     skies = None if lines.skies is None else lines.skies.astype(np.float32)
     light = Axes(lines.knots, lines.frames.astype(np.float32), lines.segments, skies)
-    position, frame = light.at(owner, t)
-    sky = light.sky_at(owner, t)
+    position, frame, at = leaf_sites(rows, branches, light, row, owner, key, t)
+    sky = light.sky_at(owner, at)
     frame = leaf_frames(rows, row, frame, np.take(uniform(branches.key, Draw.ROLL), owner), index, key, sky)
     alike = not (rows["gradient"][row].any() or rows["sunlit"][row].any())
     outward = np.zeros(1) if alike else outwardness(rows, branches, owner, t)
     size = np.take(branches.scale, owner) * leaf_sizes(rows, row, key, outward, t)
+    solid = rows["envelope"][row] > 0
+    if solid.any():  # from the middle to the base
+        position -= (0.5 * size * solid)[:, None] * frame[:, :, 1]
     light = leaf_lights(rows, row, key, outward)
     return Leaves(owner, key, position, frame, size, light, _SKY if sky is None else sky)
 
@@ -198,6 +198,9 @@ def leaf_frames(
     sky : (m, 3) float32, optional
         Where up is, if not along z.
     """
+    kind = rows["inclination"][row]
+    if kind.all():
+        return inclined(frame, kind, key)
     step, jitter = rows["leaf_azimuth"][row].T
     whorl = rows["leaf_whorl"][row]
     node, within = (index // whorl, (index % whorl) / whorl) if (whorl > 1).any() else (index, 0.0)
@@ -209,7 +212,8 @@ def leaf_frames(
     turns -= np.rint(turns)  # whole turns would cost single precision its last digits
     azimuth = (turns * (2 * np.pi)).astype(np.float32)
     angle = ranged(rows, "leaf_angle", row, key, Draw.ANGLE).astype(np.float32)
-    return _leaf_frames(frame, azimuth, angle)
+    out = _leaf_frames(frame, azimuth, angle)
+    return np.where(kind[:, None, None] > 0, inclined(frame, kind, key), out) if kind.any() else out
 
 
 def _leaf_frames(

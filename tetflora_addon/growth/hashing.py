@@ -64,6 +64,12 @@ class Draw(IntEnum):
     DEAD_ROUND = 229
     BUD = 230
     BROKEN = 231
+    LEAF_INCLINATION = 232
+    LEAF_BEARING = 233
+    LEAF_SIDE = 234
+    LEAF_TWIST = 235
+    ENVELOPE_ACROSS = 236
+    ENVELOPE_AROUND = 237
 
 
 def mix(z: NDArray[np.uint64]) -> NDArray[np.uint64]:

@@ -19,7 +19,18 @@ from numpy.typing import NDArray
 from ..species.extras import dead_part
 from ..species.members import expected_forks
 from ..species.skeletons import drawn_branches
-from ..species.species import CROWN_SHAPES, LEAF_KINDS, Dead, Order, Range, Species, crown_ratio, fork_cuts
+from ..species.species import (
+    CROWN_SHAPES,
+    LEAF_ENVELOPES,
+    LEAF_INCLINATIONS,
+    LEAF_KINDS,
+    Dead,
+    Order,
+    Range,
+    Species,
+    crown_ratio,
+    fork_cuts,
+)
 from .drawn_lines import MAX_SEGMENTS, DrawnLines, drawn_lines
 from .hashing import signed
 
@@ -49,6 +60,7 @@ ROW_DTYPE = np.dtype(
     + [(name, np.float64, (3,)) for name in ("leaf_colour_tip", "leaf_colour_young")]
     + [(name, np.int64) for name in _INTEGERS]
     + [(name, np.int64) for name in ("crown", "leaf_kind", "species", "order", "rings")]
+    + [("envelope", np.int64), ("envelope_radius", np.float64), ("inclination", np.int64)]
     + [("next", np.int32, (4,)), ("count", np.float64, (4, 2)), ("start", np.float64, (4, 2))]
     + [("fraction", np.float64, (4, 2)), ("part", np.float64, (2,))]
     + [("nominal", np.float64), ("pipe_radius", np.float64), ("fork_power", np.float64)]
@@ -205,6 +217,9 @@ def _row(order: Order, species: int, number: int) -> np.void:
     row["gradient"] = sizes != {1.0} or colours != {order.leaf_colour.mean}
     row["sunlit"] = order.leaf_light_tip != order.leaf_light.mean
     row["crown"], row["leaf_kind"] = CROWN_SHAPES.index(order.crown), LEAF_KINDS.index(order.leaf_kind)
+    row["envelope"] = LEAF_ENVELOPES.index(order.leaf_envelope)
+    row["envelope_radius"] = order.leaf_envelope_radius if row["envelope"] else 0.0
+    row["inclination"] = LEAF_INCLINATIONS.index(order.leaf_inclination)
     row["species"], row["order"], row["outward"] = species, number, number <= 1
     row["count"] = order.branches, (0, 0), order.spurs, (0, 0)
     row["start"] = order.branch_start, (0, 0), order.spur_start, (0, 0)

@@ -23,7 +23,8 @@ from ..compiled.flora import Flora
 from ..compiled.samples import Points
 from ..growth.axes import Axes
 from ..growth.branches import Branches
-from ..growth.foliage import leaf_start
+from ..growth.envelopes import leaf_sites, leaf_start
+from ..growth.foliage import leaf_keys
 from ..growth.growth import radius_at, trunks
 from ..growth.hashing import uniform
 from ..growth.seeds import Seeds
@@ -85,11 +86,13 @@ def share_points(
             if leafy:
                 start = leaf_start(flora.rows, parts.branches)[owner]
                 t = start + (1.0 - start) * t
+                some, key = parts.branches, leaf_keys(parts.branches, owner, index)
+                position = leaf_sites(flora.rows, some, lines, some.row[owner], owner, key, t)[0]
             else:  # thicker parts have more of the wood
                 thick = radius_at(flora.rows, parts.branches.take(owner), t)
                 mean = np.bincount(owner, thick, len(parts)) / np.maximum(count, 1)
                 even = even * thick / np.maximum(mean, 1e-300)[owner]
-            position = lines.at(owner, t)[0]
+                position = lines.at(owner, t)[0]
         else:
             position = _sampled(flora.samples.leaves if leafy else flora.samples.wood, parts.branches, owner, index)
         none = np.zeros(len(owner), np.float32)

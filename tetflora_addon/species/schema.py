@@ -20,7 +20,7 @@ from ..leaves.schema import read_forms
 from .extras import read_bud, read_dead
 from .members import expected_polygons
 from .skeletons import MAX_ORDERS
-from .species import BARKS, CROWN_SHAPES, LEAF_KINDS, Colour, Order, Range, Species
+from .species import BARKS, CROWN_SHAPES, LEAF_ENVELOPES, LEAF_INCLINATIONS, LEAF_KINDS, Colour, Order, Range, Species
 
 FORMAT = 1
 MAX_FILE_BYTES = 4_000_000
@@ -35,7 +35,7 @@ class Key:
 
     Attributes
     ----------
-    kind : {'range', 'number', 'integer', 'shape', 'kind', 'colour', 'rgb'}
+    kind : {'range', 'number', 'integer', 'shape', 'kind', 'envelope', 'inclination', 'colour', 'rgb'}
         A range is written ``[mean, variation]``, or as a number where it has no variation; mean − variation and mean +
         variation both have to lie in the limits.
     low, high : float
@@ -104,7 +104,16 @@ ORDER_KEYS: dict[str, Key] = {
     "spurs": Key("range", 0, 10_000, [0, 0], "", "number of short shoots on each branch, as defined by spur"),
     "spur_start": Key("range", 0, 0.99, [0.1, 0], "fraction of the length", "part at the base without short shoots"),
     "leaf_kind": Key("kind", 0, 0, "leaf", "", "what grows on the branch: the leaf or the blossom of the species"),
-    "leaves": Key("range", 0, 10_000, [0, 0], "", "number of leaves directly on each branch of this order"),
+    "leaves": Key("range", 0, 100_000, [0, 0], "", "number of leaves directly on each branch of this order"),
+    "leaf_envelope": Key(
+        "envelope", 0, 0, "none", "", "solid around the branch that leaves fill evenly, instead of sitting on its axis"
+    ),
+    "leaf_envelope_radius": Key(
+        "number", 0.001, 20, 0.5, "fraction of the length", "radius of the solid; of a box half of its side"
+    ),
+    "leaf_inclination": Key(
+        "inclination", 0, 0, "branch", "", "distribution of the angle between leaf normals and the axis of the branch"
+    ),
     "leaf_whorl": Key("integer", 1, 64, 1, "", "leaves at each node: 1 alternate, 2 opposite, 3 or more a whorl"),
     "leaf_start": Key("range", 0, 0.99, [0.1, 0], "fraction of the length", "part at the base without leaves"),
     "leaf_size": Key("range", 0.0005, 20, [0.08, 0.02], "m", "length of a leaf"),
@@ -162,7 +171,12 @@ FOLLOWS = {
     "leaf_colour_young": "leaf_colour",
 }
 #: What a key of a kind may be, where that is one of a few names.
-CHOICES = {"shape": CROWN_SHAPES, "kind": LEAF_KINDS}
+CHOICES = {
+    "shape": CROWN_SHAPES,
+    "kind": LEAF_KINDS,
+    "envelope": LEAF_ENVELOPES,
+    "inclination": LEAF_INCLINATIONS,
+}
 
 
 class _Reader:
@@ -267,6 +281,8 @@ def _read_order(reader: _Reader, data: Any, where: str, first: bool, last: bool)
         raise reader.fail(
             f"{where}.branches", "must be [0, 0], because no order follows; add an order to describe these branches"
         )
+    if values["leaf_envelope"] != "none" and values["forks"].high > 0:
+        raise reader.fail(f"{where}.leaf_envelope", 'must be "none", because the branch forks; or set forks to [0, 0]')
     return Order(**values)
 
 

@@ -19,6 +19,10 @@ from ..leaves.models import LeafModel
 from .skeletons import Skeleton
 
 LEAF_KINDS = ("leaf", "blossom")
+LEAF_ENVELOPES = ("none", "sphere", "cylinder", "cone", "box")
+"""Solids around a branch that leaves may fill."""
+LEAF_INCLINATIONS = ("branch", "spherical", "planophile", "erectophile", "plagiophile", "extremophile", "uniform")
+"""How leaves stand: as the branch has it, or by a distribution of the angle between their normals and its axis."""
 BARKS = (
     "ridged", "plated", "smooth", "banded", "ringed", "fibrous", "jointed", "netted", "peeling", "scaly",
     "interlaced", "pitted", "papery",
@@ -136,6 +140,12 @@ class Order:
         Mean colour of leaves at the outside of the crown.
     leaf_colour_young : tuple of float
         Mean colour of leaves at the end of a branch, inside the crown.
+    leaf_envelope : str
+        Which of `LEAF_ENVELOPES` the leaves fill, from where they begin to the tip of the branch.
+    leaf_envelope_radius : float
+        Its radius, or half of the side of a box, as a fraction of the branch's length.
+    leaf_inclination : str
+        Which of `LEAF_INCLINATIONS` the leaves have.
     """
 
     length: Range
@@ -180,6 +190,9 @@ class Order:
     leaf_colour: Colour
     leaf_colour_tip: tuple[float, float, float]
     leaf_colour_young: tuple[float, float, float]
+    leaf_envelope: str = "none"
+    leaf_envelope_radius: float = 0.5
+    leaf_inclination: str = "branch"
 
 
 @dataclass(frozen=True)
@@ -346,6 +359,9 @@ _LATER: dict[str, Callable[[NDArray[np.void]], NDArray[np.float64] | float]] = {
     "leaf_light_tip": lambda rows: rows["leaf_light"][:, 0],
     "leaf_size_young": lambda _: 1.0,
     "leaf_colour_young": lambda rows: rows["leaf_colour"][:, 0],
+    "envelope": lambda _: 0.0,
+    "envelope_radius": lambda _: 0.0,
+    "inclination": lambda _: 0.0,
 }
 #: Sorts of children in the first tables that were kept; others count where a species has them.
 _FIRST_SORTS = 3

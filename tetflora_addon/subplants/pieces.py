@@ -18,7 +18,8 @@ from ..compiled.averages import own_leaf_integrals, tube_perimeter
 from ..compiled.flora import Flora
 from ..growth.axes import axes, profile_integral
 from ..growth.branches import Branches
-from ..growth.foliage import leaf_start, outwardness
+from ..growth.envelopes import leaf_start
+from ..growth.foliage import outwardness
 from ..growth.growth import WholeBranches, children, drawn_children
 
 

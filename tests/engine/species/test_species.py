@@ -83,7 +83,7 @@ ORDER_MISTAKES = [
     ("sides", 2, "3 to 64"),
     ("branches", [-3, 0], "0 to 10000"),
     ("branches", [3, 4], "0 to 10000"),
-    ("leaves", [10_001, 0], "0 to 10000"),
+    ("leaves", [100_001, 0], "0 to 100000"),
     ("angle", [175, 10], "0 to 180"),
     ("angle_tip", 181, "0 to 180"),
     ("crown", "cubic", "conical"),
