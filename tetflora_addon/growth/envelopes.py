@@ -21,7 +21,7 @@ from .rows import ranged
 
 #: Leaves of a solid are displaced along it so far, in distances between them, that they lie evenly.
 EVEN_JITTER = 0.5
-_BOX = LEAF_ENVELOPES.index("box")
+BOX = LEAF_ENVELOPES.index("box")
 _TABLE = np.linspace(0.0, np.pi / 2, 4097)
 #: Weights of cos 2θ and cos 4θ in densities 2 (1 + a cos 2θ + b cos 4θ) / π of the inclination (Goel and Strebel,
 #: "Simple beta distribution representation of leaf orientation in vegetation canopies", Agronomy Journal, 1984; the
@@ -42,7 +42,12 @@ def leaf_start(rows: NDArray[np.void], branches: Branches) -> NDArray[np.float64
 
 def reaches(rows: NDArray[np.void]) -> NDArray[np.float64]:
     """How far the solids that leaves fill reach from the axes of branches (r,), in lengths of these."""
-    return rows["envelope_radius"] * np.where(rows["envelope"] == _BOX, np.sqrt(2.0), 1.0)
+    return rows["envelope_radius"] * np.where(rows["envelope"] == BOX, np.sqrt(2.0), 1.0)
+
+
+def are_solids(rows: NDArray[np.void]) -> NDArray[np.bool_]:
+    """Rows (r,) of branches that bear nothing but leaves in a solid."""
+    return (rows["envelope"] > 0) & (rows["next"] < 0).all(axis=1)
 
 
 def axis_places(
@@ -98,8 +103,8 @@ def leaf_sites(
         width = np.choose(shape, [0.0, 2.0 * np.sqrt(np.clip(up * (1.0 - up), 0.0, None)), 1.0, 1.0 - up, 1.0])
         a, b = uniform(key, Draw.ENVELOPE_ACROSS), uniform(key, Draw.ENVELOPE_AROUND)
         out, turn = np.sqrt(a), 2.0 * np.pi * b
-        x = np.where(shape == _BOX, 2.0 * a - 1.0, out * np.cos(turn))
-        y = np.where(shape == _BOX, 2.0 * b - 1.0, out * np.sin(turn))
+        x = np.where(shape == BOX, 2.0 * a - 1.0, out * np.cos(turn))
+        y = np.where(shape == BOX, 2.0 * b - 1.0, out * np.sin(turn))
         radius = width * rows["envelope_radius"][row] * np.take(branches.length, owner)
         position = position + (radius * x)[:, None] * frame[:, :, 0] + (radius * y)[:, None] * frame[:, :, 1]
     return position, frame, at

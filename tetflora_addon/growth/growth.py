@@ -18,6 +18,7 @@ from ..species.members import dead_vigour
 from ..species.species import crown_ratio
 from .axes import Axes, axes, profile
 from .branches import Branches, Pose
+from .envelopes import BOX
 from .hashing import Draw, child_key, key_of_seed, signed, uniform
 from .rows import DEAD, FORK, LATERAL, SPUR, flare_rings, ranged, varied
 from .seeds import Seeds
@@ -70,7 +71,8 @@ def trunks(rows: NDArray[np.void], seeds: Seeds) -> Branches:
     key = key_of_seed(np.where(rows["exact"][row], 0, seeds.seed))
     length = seeds.scale * ranged(rows, "length", row, key, Draw.LENGTH)
     radius = length * ranged(rows, "thickness", row, key, Draw.THICKNESS)
-    roll = np.where(rows["phantom"][row], 0.0, 2 * np.pi * uniform(key, Draw.ROLL))
+    straight = rows["phantom"][row] | (rows["envelope"][row] == BOX)
+    roll = np.where(straight, 0.0, 2 * np.pi * uniform(key, Draw.ROLL))
     frame = turned(seeds.frame, roll, ranged(rows, "angle", row, key, Draw.ANGLE))
     plant = np.arange(len(seeds), dtype=np.int32)
     scale = np.asarray(seeds.scale, dtype=np.float64)

@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 
 from ..compiled.flora import Flora
 from ..growth.branches import Branches
+from ..growth.envelopes import are_solids
 from ..growth.growth import trunks
 from ..growth.hashing import mix
 from ..growth.seeds import Seeds
@@ -69,10 +70,14 @@ class FacetWeights:
     ----------
     whole, own : (r, k) float64
         For each of `COUNTS`, of sub-plants, and of what branches themselves bear, by the facets of a whole branch.
+    solid : (r,) bool, optional
+        Rows of which a branch has more facets than that: its leaves fill a solid and nothing else grows on it. Facets
+        reach beyond its surface by a part of their side, so what is missing falls as the root of their number.
     """
 
     whole: NDArray[np.float64]
     own: NDArray[np.float64]
+    solid: NDArray[np.bool_] | None = None
 
     def of_subplants(self, row: NDArray[np.integer], count: NDArray[np.float64]) -> NDArray[np.float64]:
         """Weights (n,) for sub-plants of rows (n,) and numbers of facets (n,)."""
@@ -80,7 +85,10 @@ class FacetWeights:
 
     def of_pieces(self, row: NDArray[np.integer], count: NDArray[np.float64]) -> NDArray[np.float64]:
         """Weights (n,) for pieces of branches, by rows (n,) and the numbers of facets (n,) of whole branches."""
-        return _between(self.own, row, count)
+        out = _between(self.own, row, count)
+        if self.solid is None or not self.solid.any():
+            return out
+        return np.where(self.solid[row], 1.0 - (1.0 - out) * np.sqrt(COUNTS[-1] / np.maximum(count, COUNTS[-1])), out)
 
 
 def _between(table: NDArray[np.float64], row: NDArray[np.integer], count: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -110,7 +118,7 @@ def _of_flora(flora: Flora, species: tuple[int, ...]) -> FacetWeights:
     for number in species:
         at_once(measuring(flora, (number,)))
         weights[:, flora.rows["species"] == number] = _known(flora, number)
-    return FacetWeights(*weights)
+    return FacetWeights(*weights, are_solids(flora.rows))
 
 
 def unmeasured(flora: Flora) -> list[int]:

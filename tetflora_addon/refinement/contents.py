@@ -18,6 +18,7 @@ from ..arrays import Arrays, column, nested
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.branches import Branches
+from ..growth.envelopes import are_solids, reaches
 from ..growth.growth import fullness
 from ..subplants.pieces import Pieces, leaf_fraction, piece_leaf_integrals, wood_areas
 from .polygons import Polygons
@@ -149,12 +150,15 @@ class PlantParts(Arrays):
         """Whole sub-plants (n,)."""
         bound = flora.sampled_bound[branches.row]
         extent = np.maximum(2.0 * bound[:, 0], bound[:, 2] - bound[:, 1]) * branches.length
-        return cls(branches, np.zeros(len(branches), bool), subplant_totals(flora, branches), extent)
+        # Leaves of a solid have places of their own, however few of them are asked for.
+        alone = are_solids(flora.rows)[branches.row]
+        return cls(branches, alone, subplant_totals(flora, branches), extent)
 
     @classmethod
     def of_bodies(cls, flora: Flora, branches: Branches) -> PlantParts:
         """Branches (n,) without what grows on them."""
-        return cls(branches, np.ones(len(branches), bool), piece_totals(flora, as_pieces(branches)), branches.length)
+        extent = branches.length * np.maximum(1.0, 2.0 * reaches(flora.rows)[branches.row])
+        return cls(branches, np.ones(len(branches), bool), piece_totals(flora, as_pieces(branches)), extent)
 
     def can_open(self, flora: Flora) -> NDArray[np.bool_]:
         """Parts (n,) on which something else grows."""

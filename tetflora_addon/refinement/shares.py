@@ -23,7 +23,7 @@ from ..compiled.flora import Flora
 from ..compiled.samples import Points
 from ..growth.axes import Axes
 from ..growth.branches import Branches
-from ..growth.envelopes import leaf_sites, leaf_start
+from ..growth.envelopes import are_solids, leaf_sites, leaf_start
 from ..growth.foliage import leaf_keys
 from ..growth.growth import radius_at, trunks
 from ..growth.hashing import uniform
@@ -34,6 +34,8 @@ from .shared_parts import SharedParts, SharePoints
 
 #: Pixels along a part for each of its points on leaves; fewest and most of these; points on wood for each of them.
 PIXELS_A_POINT, FEWEST, MOST, WOOD = 6.0, 4, 64, 0.25
+#: Most points on leaves that fill a solid, which cannot be opened: they are as many as their square is large.
+MOST_IN_SOLID = 1024
 #: Wood that is wider in the view than this part of the image is looked for where it is, whatever share of its plant it
 #: has: such sub-plants are opened at once, and their branches have points so many widths apart, at most so many.
 THICK, APART, MOST_ALONG = 0.08, 1.0, 96
@@ -73,7 +75,10 @@ def share_points(
     along : (n,) int64, optional
         Points on the wood of branches alone at least.
     """
-    number = times * np.ceil(np.clip(pixels / PIXELS_A_POINT, FEWEST, most)).astype(np.int64)
+    number = np.clip(pixels / PIXELS_A_POINT, FEWEST, most)
+    solid = are_solids(flora.rows)[parts.branches.row]
+    number[solid] = np.clip((pixels[solid] / PIXELS_A_POINT) ** 2, FEWEST, MOST_IN_SOLID * most // MOST)
+    number = times * np.ceil(number).astype(np.int64)
     made = []
     for leafy in (True, False):
         area = parts.totals.leaf_area if leafy else parts.totals.wood_area
