@@ -32,7 +32,8 @@ from .averages import NODES, quadratic
 _PIECE = 128
 _BRANCHES = 2048  # of each row that are looked at, each with the sky elsewhere
 _MET = 256  # of each row that are grown upwards from the trunk, to see how they stand
-_LEAVES = 4  # on each of them
+_LEAVES = 4  # on each of them,
+_INCLINED = 32  # or so many that stand all around by chance
 _SORTS = (LATERAL, FORK, SPUR, DEAD)
 _ALONG, _CHILD = 111, 112  # draws of this module, beyond those of growth
 _UP = np.array([0.0, 0.0, 1.0])
@@ -333,11 +334,12 @@ def _own_leaves(
     counts = leaf_counts(rows, branches)
     if not counts.any():
         counts = np.ones_like(counts)
-    bearers = np.flatnonzero(counts)
-    owner, each = np.repeat(bearers, _LEAVES), np.tile(np.arange(_LEAVES), len(bearers))
-    row, number = branches.row[:1], counts[owner]
+    bearers, row = np.flatnonzero(counts), branches.row[:1]
+    leaves = _INCLINED if rows["inclination"][row[0]] else _LEAVES
+    owner, each = np.repeat(bearers, leaves), np.tile(np.arange(leaves), len(bearers))
+    number = counts[owner]
     # Evenly over the leaves of each branch, beginning anywhere.
-    part = (uniform(branches.key, _CHILD)[owner] + each / _LEAVES) % 1.0
+    part = (uniform(branches.key, _CHILD)[owner] + each / leaves) % 1.0
     index = (part * number).astype(np.int64)
     if rows["leaf_spray"][row[0]] > 0:  # one leaf after the other, so that both sides of the spray have as many
         index = (index - index % _LEAVES + each) % number
@@ -346,7 +348,7 @@ def _own_leaves(
     roll = uniform(branches.key, Draw.ROLL)[owner]
     if rows["leaf_spray"][row[0]] == 0:
         # The first leaf stands anywhere around the branch, and so does any other: evenly, a good deal of chance goes.
-        roll, index = roll + each / _LEAVES, np.zeros_like(index)
+        roll, index = roll + each / leaves, np.zeros_like(index)
     _, along = lines.at(owner, axis_places(rows, branches, row, owner, t))
     frame = leaf_frames(rows, row, along.astype(np.float32), roll, index, key)
     outward = outwardness(rows, branches, owner, t)
@@ -356,10 +358,10 @@ def _own_leaves(
     weight = number * (size * branches.scale[owner]) ** 2
     # F T Fᵀ, summed over the leaves of each branch: their frames side by side.
     left = _product(frame.reshape(-1, 3).astype(np.float64), turn).reshape(-1, 3, 3) * weight[:, None, None]
-    left, right = (f.reshape(-1, _LEAVES, 3, 3).swapaxes(1, 2).reshape(-1, 3, 3 * _LEAVES) for f in (left, frame))
+    left, right = (f.reshape(-1, leaves, 3, 3).swapaxes(1, 2).reshape(-1, 3, 3 * leaves) for f in (left, frame))
     out = _Sums(np.zeros((len(branches), 3, 3)), np.zeros(len(branches)))
     out.moment[bearers] = left @ right.transpose(0, 2, 1)
-    out.weight[bearers] = weight.reshape(-1, _LEAVES).sum(axis=1)
+    out.weight[bearers] = weight.reshape(-1, leaves).sum(axis=1)
     return out
 
 

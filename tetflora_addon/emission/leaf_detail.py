@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
+from ..growth.envelopes import reaches
 from ..growth.growth import WholeBranches
 from ..leaves.levels import chosen_polygons, coarse_error
 from ..refinement.contents import PlantParts
@@ -68,16 +69,17 @@ class LeafDetail:
         size = self.flora.rows["leaf_size"][branches.row].sum(axis=1) * branches.scale
         for factor in ("leaf_size_tip", "leaf_size_young"):
             size = size * np.maximum(self.flora.rows[factor][branches.row], 1.0)
+        beside = size + reaches(self.flora.rows)[branches.row] * branches.length
         # The base tells of most branches that they are too far away.
         around = camera.extent_around(branches.position)
-        pixels = size / self._nearest(around, branches.length + size) / self.tolerance * visibility
+        pixels = size / self._nearest(around, branches.length + beside) / self.tolerance * visibility
         near = np.flatnonzero(pixels > most)
         if not len(near):
             return out
         knots = whole.lines.knots[near]
         extent = camera.extent_around(knots.reshape(-1, 3)).reshape(len(near), -1).min(axis=1)
         between = np.linalg.norm(np.diff(knots, axis=1), axis=2).max(axis=1) / 2.0
-        nearest = self._nearest(extent, between + size[near])
+        nearest = self._nearest(extent, between + beside[near])
         out[near] = size[near] / np.maximum(nearest, extent / _NEARER) / self.tolerance * visibility[near]
         return out
 

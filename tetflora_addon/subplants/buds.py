@@ -96,7 +96,8 @@ def _places(flora: Flora, whole: WholeBranches) -> tuple[NDArray[np.int64], NDAr
     """Branch (m,), leaf in whose axil it is, or -1 for the one at the end, and key of each bud of branches (n)."""
     rows, branches = flora.rows, whole.branches
     lateral = np.array([-1.0 if one.bud is None else one.bud.lateral for one in flora.species])
-    lateral = lateral[rows["species"][branches.row]]
+    # Leaves that fill a solid stand in no axils.
+    lateral = np.where(rows["envelope"][branches.row] > 0, -1.0, lateral[rows["species"][branches.row]])
     number = leaf_counts(rows, branches)
     bears = (lateral >= 0.0) & (number > 0)
     ends = np.flatnonzero(bears & (rows["next"][branches.row, FORK] < 0))

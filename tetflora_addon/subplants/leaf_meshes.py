@@ -194,14 +194,9 @@ class _Bearers:
 
     def add(self, copies: LeafCopies, form: int) -> None:
         """Place all leaves of one of the forms."""
-        rows = self.flora.rows
-        for part in self._chunks(len(copies.model.positions)):
-            bearers = self.whole.take(part)
-            owner, index, key, forms = self._leaves(part)
-            if len(self.forms) > 1:
-                chosen = np.flatnonzero(forms == form)
-                owner, index, key = owner[chosen], index[chosen], key[chosen]
-            t = leaf_places(rows, bearers.branches, owner, index, self.counts[part], key)
+        rows, vertices = self.flora.rows, len(copies.model.positions)
+        for bearers, counts, owner, index, key in self._runs(form, vertices):
+            t = leaf_places(rows, bearers.branches, owner, index, counts, key)
             leaves = place_leaves(rows, bearers.branches, bearers.lines, owner, index, key, t)
             frame = in_wind(
                 rows, bearers.branches, leaves, settled(rows, self.row, leaves.frame, leaves.light, leaves.sky)
@@ -217,6 +212,21 @@ class _Bearers:
                 motion = (again.position - leaves.position) / seconds, (turned - frame) / np.float32(seconds)
             colours = leaf_colours(rows, self.row, key, *places)
             copies.add(key, leaves.position, frame, leaves.size, colours, motion)
+
+    def _runs(self, form: int, vertices: int) -> Iterator[tuple[WholeBranches, *tuple[NDArray, ...]]]:
+        """Branches and their counts; branch, number and key of some leaves of a form, which has a number of vertices.
+
+        A single branch may bear a crown.
+        """
+        most = max(_VERTICES_AT_ONCE // vertices, 1)
+        for part in self._chunks(vertices):
+            *leaves, forms = self._leaves(part)
+            if len(self.forms) > 1:
+                chosen = np.flatnonzero(forms == form)
+                leaves = [of[chosen] for of in leaves]
+            bearers = self.whole.take(part)
+            for begin in range(0, len(leaves[0]), most):
+                yield bearers, self.counts[part], *(of[begin : begin + most] for of in leaves)
 
     def _chunks(self, vertices: int) -> Iterator[slice]:
         """Runs of branches, for leaves of a number of vertices."""
