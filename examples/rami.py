@@ -54,20 +54,40 @@ def build(scene: bpy.types.Scene, stand: Canopy, rings: int | None = None, plant
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     scene.collection.objects.link(camera)
     scene.camera = camera
-    if not plants:
-        return
+    if plants:
+        place(
+            scene,
+            stand,
+            {
+                kind: [[crown_mesh(kind, solid, seed)] for seed in range(VARIANTS if solid.shape != "box" else 1)]
+                for kind, solid in stand.solids.items()
+            },
+            rings,
+        )
+
+
+def place(
+    scene: bpy.types.Scene, stand: Canopy, crowns: dict[str, list[list[bpy.types.Mesh]]], rings: int | None = None
+) -> None:
+    """Objects at all places of a canopy that share some meshes, each turned about its vertical.
+
+    Parameters
+    ----------
+    crowns : dict of str to list
+        For each kind some crowns, each one mesh or several.
+    """
     for kind, solid in stand.solids.items():
-        meshes = [crown_mesh(kind, solid, seed) for seed in range(VARIANTS if solid.shape != "box" else 1)]
         places = stand.padded(kind, rings)
         turns = np.random.default_rng(1).uniform(0, 2 * pi, len(places))
-        for number, place in enumerate(places.tolist()):
+        for number, origin in enumerate(places.tolist()):
             # A copy repeats its original: number in the scene, not in the padding.
             own = number % len(stand.places[kind])
-            crown = bpy.data.objects.new(kind, meshes[own % len(meshes)])
-            crown.location = place
-            if solid.shape != "box":
-                crown.rotation_euler.z = turns[own]
-            scene.collection.objects.link(crown)
+            for mesh in crowns[kind][own % len(crowns[kind])]:
+                crown = bpy.data.objects.new(kind, mesh)
+                crown.location = origin
+                if solid.shape != "box":
+                    crown.rotation_euler.z = turns[own]
+                scene.collection.objects.link(crown)
 
 
 def crown_mesh(kind: str, solid: Solid, seed: int) -> bpy.types.Mesh:

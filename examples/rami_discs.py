@@ -4,8 +4,8 @@
 
 Definitions and published curves are in ``examples/data/rami.json``. What that does not tell follows the descriptions of
 RAMI-IV and V: HET10 and HET20 are crowns like HET01's, a twentieth as large; homogeneous layers are 1 m thick, of discs
-of 0.05 m; HOM26 is an erectophile layer of leaf area index 1 above a planophile one of 5. No crown crosses the border of
-its scene or another crown.
+of 0.05 m; HOM26 is an erectophile layer of leaf area index 1 above a planophile one of 5. No crown crosses the border
+of its scene or another crown.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from functools import cache
-from math import pi, sin, sqrt
+from math import exp, pi, sin, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -25,8 +25,9 @@ COVERS = ("HOM23", "HOM33", "HOM26", "HET10", "HET20")
 CORNERS = 8
 #: Side of HET06, metres: the data gives the size of one tree under this name, the definition says 500.
 _HET06_SIDE = 500.0
-#: Leaf area over a homogeneous scene, metres: enough that its cover differs from the expected one by a thousandth.
+#: Side of the scenes that are seen from above only, and radius of the discs of layers, metres.
 _LAYER_SIDE = 10.0
+_LAYER_DISC = 0.05
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,27 @@ class Canopy:
     @property
     def leaf_area_index(self) -> float:
         """Leaf area over ground area."""
-        return sum(solid.leaf_area * len(self.places[kind]) for kind, solid in self.solids.items()) / self.side**2
+        areas = {kind: solid.leaf_area * len(self.places[kind]) for kind, solid in self.solids.items()}
+        grounds = {kind: s.across if s.shape == "box" else self.side for kind, s in self.solids.items()}
+        return sum(area / grounds[kind] ** 2 for kind, area in areas.items())
+
+    @property
+    def expected_cover(self) -> float:
+        """Share of the ground that is covered from above, if leaves are infinitely small and independent.
+
+        1 − e^{−G L} under a layer. Under a sphere of optical depth τ along its diameter, 1 − 2 (1 − (1 + τ) e^{−τ})
+        / τ² of its disc, the mean of 1 − e^{−τ c} over chords of c diameters, whose density is 2 c.
+        """
+        depths = {kind: extinction(solid.inclination) * solid.leaf_area for kind, solid in self.solids.items()}
+        clear, covered = 1.0, 0.0
+        for kind, solid in self.solids.items():
+            if solid.shape == "box":
+                clear *= exp(-depths[kind] / solid.across**2)
+            else:
+                depth = depths[kind] / (4 / 3 * pi * solid.radius**3) * solid.across
+                share = 1 - 2 * (1 - (1 + depth) * exp(-depth)) / depth**2
+                covered += share * len(self.places[kind]) * pi * solid.radius**2 / self.side**2
+        return 1 - clear + covered
 
     def padded(self, kind: str, rings: int | None = None) -> NDArray[np.float64]:
         """Places (n, 3) of a kind with those of the copies around, the scene itself first."""
@@ -162,18 +183,20 @@ def canopy(name: str, seed: int = 0) -> Canopy:
     if name in ("HET10", "HET20"):
         share = 0.2 if name == "HET10" else 0.4
         solids = {"crown": Solid("sphere", 0.5, 1.0, 49_999, 0.005)}
-        side = 10.0
-        number = round(share * side**2 / (pi * 0.25))
+        number = round(share * _LAYER_SIDE**2 / (pi * 0.25))
+        side = sqrt(number * pi * 0.25 / share)
         places = _scattered(solids, {"crown": number}, {"crown": (0.51, 0.51)}, side / 2 - 0.5, seed)
-        return Canopy(name, sqrt(number * pi * 0.25 / share), 1.01, ground, sun, 1, solids, places)
+        return Canopy(name, side, 1.01, ground, sun, 0, solids, places)
     layers = {"HOM23": ((1.0, "planophile"),), "HOM33": ((1.0, "erectophile"),)}
     layers["HOM26"] = (5.0, "planophile"), (1.0, "erectophile")
+    # Discs of the surroundings reach over the border of the target.
+    half = _LAYER_SIDE / 2 + 2 * _LAYER_DISC
     solids = {}
     for index, inclination in layers[name]:
-        number = round(index * _LAYER_SIDE**2 / (pi * 0.05**2))
-        solids[inclination] = Solid("box", _LAYER_SIDE / 2, 1.0, number, 0.05, inclination=inclination)
+        number = round(index * (2 * half) ** 2 / (pi * _LAYER_DISC**2))
+        solids[inclination] = Solid("box", half, 1.0, number, _LAYER_DISC, inclination=inclination)
     places = {kind: np.array([(0.0, 0.0, float(layer))]) for layer, kind in enumerate(solids)}
-    return Canopy(name, _LAYER_SIDE, float(len(solids)), ground, sun, 1, solids, places)
+    return Canopy(name, _LAYER_SIDE, float(len(solids)), ground, sun, 0, solids, places)
 
 
 def _solid(shape: str, given: dict, radius: float, height: float = 0.0, trunk: tuple[float, ...] = ()) -> Solid:
