@@ -11,7 +11,7 @@ import json
 import time
 from collections.abc import Sequence
 from itertools import pairwise
-from math import ceil, cos, radians
+from math import ceil
 from pathlib import Path
 
 import bpy
@@ -185,7 +185,7 @@ def _view(scene: bpy.types.Scene, stand: Canopy, form: str, pixels: int, angle: 
         statistics, seconds = timed_refine(scene, expand_everything=False, proxy_form=form)
         rami_species.make_lambertian()
         row |= {"refine_s": round(seconds, 2), "facets": statistics.polygons_proxy, "real": statistics.polygons_meshed}
-    samples = ceil(_RAYS / (width * max(round(width * cos(radians(angle))), 1)))
+    samples = ceil(_RAYS / (scene.render.resolution_x * scene.render.resolution_y))
     start = time.perf_counter()
     pixels_of = rami.radiance(scene, FOLDER / "view.exr", samples)
     row |= {"render_s": round(time.perf_counter() - start, 2), "peak_mb": round(peak_mb())}

@@ -206,7 +206,8 @@ def set_view(scene: bpy.types.Scene, stand: Canopy, zenith: float, pixels: int) 
     camera.data.ortho_scale = stand.side
     camera.data.clip_start, camera.data.clip_end = 1.0, 2 * _FAR
     height = pixels * cos(angle)
-    rows = max(round(height), 1)
+    # Blender renders no fewer than four rows.
+    rows = max(round(height), 4)
     render.resolution_x, render.resolution_y, render.resolution_percentage = pixels, rows, 100
     render.pixel_aspect_x, render.pixel_aspect_y = max(rows / height, 1.0), max(height / rows, 1.0)
 
