@@ -35,6 +35,8 @@ _RAYS = 100_000
 _WIDTH = 160
 #: Copies on each side in which plants are refined: what lies further out reaches the target by several scatterings.
 _RINGS = 2
+#: Gigabytes that plants and renderer may take.
+_MEMORY = 3.0
 
 
 def views(name: str, number: int) -> NDArray[np.float64]:
@@ -149,6 +151,7 @@ def _scene(stand: Canopy, form: str) -> bpy.types.Scene:
     scene = bpy.context.scene
     rami.build(scene, stand, plants=form == POLYGONS)
     scene.tetflora.refine_at_render = False
+    scene.tetflora.max_memory = _MEMORY
     scene.render.use_persistent_data = form in (POLYGONS, EXPANDED)
     if form == EXPANDED:
         rami.place(scene, stand, {kind: expanded(scene, stand, kind) for kind in stand.solids})
