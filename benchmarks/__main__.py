@@ -41,6 +41,7 @@ NAMES = (
     "closed_form",
     "edited_species",
     "fidelity",
+    "rami",
     "above",
     "populate",
     "viewport",

@@ -1,0 +1,89 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Draw what was measured of RAMI's scenes over the published curves: ``python -m benchmarks.rami_figure``."""
+
+# ruff: noqa: E402  (run as a program, it starts Blender before it imports what needs Blender)
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from devtools import session
+
+session.start()
+
+import matplotlib
+
+matplotlib.use("Agg")
+from matplotlib import pyplot as plt
+from numpy import interp
+
+from examples.rami_discs import CURVES, canopy, published
+
+from .rami_measure import EXPANDED, FORMS, POLYGONS, Measured
+from .report import ROOT
+
+COLOURS = {
+    POLYGONS: "black",
+    EXPANDED: "tab:gray",
+    'MICROSURFACES': "tab:blue",
+    'MICROSPHERES': "tab:green",
+    'SHELLS': "tab:orange",
+    'AUTOMATIC': "tab:red",
+}
+LABELS = {POLYGONS: "polygons", EXPANDED: "plants, expanded"}
+
+
+def draw(path: Path, pixels: dict[str, int]) -> None:
+    """Factors above, differences from the published curve below, a column for each scene; missing curves are left out.
+
+    Parameters
+    ----------
+    path : Path
+    pixels : dict of str to int
+        Width of a crown for each scene.
+    """
+    figure, axes = plt.subplots(
+        2, len(CURVES), figsize=(13.5, 6.5), sharex=True, height_ratios=(3, 2), layout="constrained"
+    )
+    for column, name in enumerate(CURVES):
+        angles, known = published(name)
+        found = Measured(name)
+        above, below = axes[:, column]
+        above.plot(angles, known, color="0.75", linewidth=6, label="published (Eradiate)", zorder=0)
+        for form in (POLYGONS, EXPANDED, *FORMS):
+            at, factors = found.curve(form, pixels[name])
+            if not len(at):
+                continue
+            style = {"color": COLOURS[form], "linewidth": 1.1, "marker": "." if form != POLYGONS else "", "ms": 4}
+            label = LABELS.get(form, form.lower())
+            above.plot(at, factors, label=label, **style)
+            below.plot(at, 100 * (factors / interp(at, angles, known) - 1), **style)
+        below.axhline(0, color="0.75", linewidth=3, zorder=0)
+        below.axhspan(-3, 3, color="0.93", zorder=-1)
+        below.set_ylim(-12, 12)
+        below.set_xlabel("view zenith, degrees (negative: sun's side)")
+        above.set_title(f"{name}, {pixels[name]} pixels a crown, sun at {canopy(name).sun_zenith:g}°")
+        above.set_ylim(bottom=0)
+    axes[0, 0].set_ylabel("bidirectional reflectance factor")
+    axes[1, 0].set_ylabel("difference from published, %")
+    axes[0, 0].legend(fontsize=8, loc="lower left")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=100)
+    plt.close(figure)
+
+
+def main() -> int:
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--pixels", type=int, nargs=len(CURVES), default=[8, 8, 2], help="a crown, by scene")
+    parser.add_argument("--output", type=Path, default=ROOT / "docs" / "images" / "rami.png")
+    given = parser.parse_args()
+    draw(given.output, dict(zip(CURVES, given.pixels, strict=True)))
+    session.stop()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
