@@ -16,6 +16,7 @@ from tetflora_addon.compiled.bounds import ring_stretch, unit_bounds, widest_rad
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.branches import Branches
 from tetflora_addon.refinement.contents import bounding_bodies
+from tetflora_addon.species.species import LEAF_ENVELOPES, LEAF_INCLINATIONS
 from tetflora_addon.subplants.pieces import expand, open_subplants
 from tetflora_addon.subplants.tubes import tube_buffers
 from tetflora_addon.subplants.wood_detail import Pixels
@@ -94,6 +95,9 @@ SHAPES = st.fixed_dictionaries(
         "leaf_size_young": st.sampled_from([1.0, 1.0, 0.3, 2.0]),
         "leaf_whorl": st.integers(1, 3),
         "leaf_start": ranges(0, 0.99, 0.2),
+        "leaf_envelope": st.sampled_from(["none", *LEAF_ENVELOPES]),
+        "leaf_envelope_radius": st.floats(0.01, 2),
+        "leaf_inclination": st.sampled_from(["branch", *LEAF_INCLINATIONS]),
     }
 )
 LEANS = st.fixed_dictionaries(
@@ -123,12 +127,16 @@ def any_species(first: dict, second: dict, leans: list[dict]) -> Flora:
         "leaf_size_young",
         "leaf_whorl",
         "flare",
+        "leaf_envelope",
+        "leaf_envelope_radius",
     )
     data["orders"][2].update({key: first[key] for key in keys})
     # Forks multiply: three times three stems and what they bear would be slow to grow, not harder to bound.
     data["orders"][1]["fork_levels"] = 1
     for order in data["orders"]:
         order["branches"] = [min(order.get("branches", [0])[0], 3), 0]
+        if order.get("forks", [0])[0] > 0:
+            order["leaf_envelope"] = "none"
     return support.compiled(data)
 
 
