@@ -21,7 +21,7 @@ from ..arrays import spread
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..compiled.samples import Points
-from ..growth.axes import Axes
+from ..growth.axes import Axes, axes
 from ..growth.branches import Branches
 from ..growth.envelopes import are_solids, leaf_sites, leaf_start
 from ..growth.foliage import leaf_keys
@@ -34,8 +34,8 @@ from .shared_parts import SharedParts, SharePoints
 
 #: Pixels along a part for each of its points on leaves; fewest and most of these; points on wood for each of them.
 PIXELS_A_POINT, FEWEST, MOST, WOOD = 6.0, 4, 64, 0.25
-#: Most points on leaves that fill a solid, which cannot be opened: they are as many as their square is large.
-MOST_IN_SOLID = 1024
+#: The same of leaves that fill a solid, which cannot be opened: there is a point in each square of so many pixels.
+PIXELS_IN_SOLID, FEWEST_IN_SOLID, MOST_IN_SOLID = 3.0, 16, 2048
 #: Wood that is wider in the view than this part of the image is looked for where it is, whatever share of its plant it
 #: has: such sub-plants are opened at once, and their branches have points so many widths apart, at most so many.
 THICK, APART, MOST_ALONG = 0.08, 1.0, 96
@@ -75,24 +75,21 @@ def share_points(
     along : (n,) int64, optional
         Points on the wood of branches alone at least.
     """
-    number = np.clip(pixels / PIXELS_A_POINT, FEWEST, most)
+    number = times * np.ceil(np.clip(pixels / PIXELS_A_POINT, FEWEST, most)).astype(np.int64)
+    wood = np.maximum(np.ceil(WOOD * number).astype(np.int64), along)
     solid = are_solids(flora.rows)[parts.branches.row]
-    number[solid] = np.clip((pixels[solid] / PIXELS_A_POINT) ** 2, FEWEST, MOST_IN_SOLID * most // MOST)
-    number = times * np.ceil(number).astype(np.int64)
+    squares, most = (pixels[solid] / PIXELS_IN_SOLID) ** 2, max(MOST_IN_SOLID * most // MOST, FEWEST_IN_SOLID)
+    number[solid] = times * np.ceil(np.clip(squares, FEWEST_IN_SOLID, most)).astype(np.int64)
     made = []
     for leafy in (True, False):
         area = parts.totals.leaf_area if leafy else parts.totals.wood_area
-        wood = np.maximum(np.ceil(WOOD * number).astype(np.int64), along)
         count = np.where(area > 0, number if leafy else wood, 0)
         owner, index = spread(count)
         even = (area / np.maximum(count, 1))[owner]
         if lines is not None:
             t = (index + 0.5) / count[owner]
             if leafy:
-                start = leaf_start(flora.rows, parts.branches)[owner]
-                t = start + (1.0 - start) * t
-                some, key = parts.branches, leaf_keys(parts.branches, owner, index)
-                position = leaf_sites(flora.rows, some, lines, some.row[owner], owner, key, t)[0]
+                position = _along_leaves(flora, parts.branches, lines, owner, index, t)
             else:  # thicker parts have more of the wood
                 thick = radius_at(flora.rows, parts.branches.take(owner), t)
                 mean = np.bincount(owner, thick, len(parts)) / np.maximum(count, 1)
@@ -100,10 +97,28 @@ def share_points(
                 position = lines.at(owner, t)[0]
         else:
             position = _sampled(flora.samples.leaves if leafy else flora.samples.wood, parts.branches, owner, index)
+            some = np.flatnonzero(solid[owner])
+            if leafy and len(some):  # more places than samples
+                given = owner[some], index[some], (index[some] + 0.5) / count[owner[some]]
+                position[some] = _along_leaves(flora, parts.branches, axes(flora.rows, parts.branches), *given)
         none = np.zeros(len(owner), np.float32)
         areas = (even.astype(np.float32), none) if leafy else (none, even.astype(np.float32))
         made.append(SharePoints(owner.astype(np.int32), none.astype(np.int32), position.astype(np.float32), *areas))
     return SharePoints.concatenate(made)
+
+
+def _along_leaves(
+    flora: Flora,
+    branches: Branches,
+    lines: Axes,
+    owner: NDArray[np.int64],
+    index: NDArray[np.int64],
+    part: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Places (m, 3) of leaves on branches, after parts (m,) of them; ``index`` (m,) numbers those of a branch."""
+    start = leaf_start(flora.rows, branches)[owner]
+    t, key = start + (1.0 - start) * part, leaf_keys(branches, owner, index)
+    return leaf_sites(flora.rows, branches, lines, branches.row[owner], owner, key, t)[0]
 
 
 def _sampled(
