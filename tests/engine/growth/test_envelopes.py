@@ -29,6 +29,7 @@ from tetflora_addon.jobs import at_once
 from tetflora_addon.proxies.facet_sizes import FacetPixels
 from tetflora_addon.proxies.facet_weights import COUNTS, FacetWeights, facet_weights, fitting
 from tetflora_addon.proxies.microsurfaces import Facets
+from tetflora_addon.refinement.shares import SharedPlants
 from tetflora_addon.species.species import LEAF_ENVELOPES, LEAF_INCLINATIONS, fingerprint
 
 SOLIDS, RADIUS, BARE = LEAF_ENVELOPES[1:], 0.3, 0.2
@@ -184,6 +185,20 @@ def test_all_area_is_drawn_at_any_size(name: str, pixels: int, monkeypatch: pyte
         beside = np.concatenate([some.centre for some in made]) - [0.0, 0.0, 2.0]
         away = np.abs(beside[:, None, :2] - seeds.position[None, :, :2]).max(axis=2).min(axis=1)
         assert away.max() < RADIUS * 4 + 0.2
+
+
+def test_points_of_a_solid_are_all_different_and_even() -> None:
+    """It cannot be opened, and proxies that fill their cells must find it everywhere."""
+    flora = compiled("sphere")
+    seeds = support.plants(5)
+    camera = support.camera((30, 0, 18), (0, 0, 2), pixels=1000, view=10.0, kind="ORTHO")
+    points = SharedPlants(flora, seeds, camera, filled=True).points
+    place = points.position[points.leaf > 0].astype(float)
+    assert len(np.unique(place, axis=0)) == len(place) > 3_000
+    assert points.leaf.sum() == pytest.approx(flora.leaf_areas(trunks(flora.rows, seeds))[0], rel=1e-5)
+    centre = [0.0, 0.0, 4 * (BARE + 1) / 2]
+    relative = (place - centre) / np.array([4 * RADIUS, 4 * RADIUS, 2 * (1 - BARE)])
+    assert (relative**2).sum(axis=1).mean() == pytest.approx(0.6, abs=0.02)
 
 
 def drawn(part: facets.Parts) -> Iterator[Facets]:
