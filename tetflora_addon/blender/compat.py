@@ -54,6 +54,15 @@ def disable_bump_correction(material: bpy.types.Material) -> None:
         cycles.use_bump_map_correction = False
 
 
+def loses_summed_lobes() -> bool:
+    """Whether Cycles loses light where lobes around several normals are added.
+
+    It counts the probability of those that it has cut off at the face's horizon, but not their light (issue 139870 of
+    Blender); mended in 5.0, which also brought this node.
+    """
+    return not hasattr(bpy.types, "ShaderNodeRadialTiling")
+
+
 def can_resize_point_clouds() -> bool:
     """Whether Python can fill point clouds; otherwise only geometry nodes make points."""
     return "resize" in bpy.types.PointCloud.bl_rna.functions

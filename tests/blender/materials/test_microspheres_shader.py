@@ -47,18 +47,13 @@ def engine_and_samples(name: str, samples: int) -> dict:
     return {"engine": compat.eevee_engine(), "samples": 1} if name == "EEVEE" else {"engine": name, "samples": samples}
 
 
-def tolerance() -> float:
-    """Cycles of 4.5 LTS takes away up to a twentieth where normals lean off the face; later ones do not."""
-    return 0.01 if bpy.app.version >= (5, 0, 0) else 0.055
-
-
 @pytest.mark.parametrize("tilt", [0.0, 0.9])
 @pytest.mark.parametrize(("plane", "s", "transmission"), MIXTURES)
 def test_a_white_cloud_vanishes_in_white_surroundings(plane, s, transmission, tilt):
     """A constant sky is found by scattered rays alone."""
     small_scene(sky=1.0, samples=256, size=8, width=0.5)
     place(tilt, Plane=plane, s=s, Transmission=transmission, Normal=(0.3, 0.2, 0.9))
-    assert picture().mean() == pytest.approx(1.0, abs=tolerance())
+    assert picture().mean() == pytest.approx(1.0, abs=0.01)
 
 
 @pytest.mark.parametrize("transmission", [0.0, 0.5])
@@ -72,7 +67,7 @@ def test_light_that_is_sampled_counts_as_light_that_is_hit(plane, transmission):
     texture.inputs["Color1"].default_value = texture.inputs["Color2"].default_value = (1.0, 1.0, 1.0, 1.0)
     tree.links.new(where.outputs["Generated"], texture.inputs["Vector"])
     tree.links.new(texture.outputs["Color"], tree.nodes["Background"].inputs["Color"])
-    assert picture().mean() == pytest.approx(1.0, abs=tolerance())
+    assert picture().mean() == pytest.approx(1.0, abs=0.01)
 
 
 def test_eevee_gains_and_loses_no_more():

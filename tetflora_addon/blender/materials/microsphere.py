@@ -14,12 +14,14 @@ import bpy
 
 from ...light import scattering
 from ...light.scattering import GLOSS, GLOSS_ROUGHNESS
-from .nodes import LEAF_GREEN, Graph, shader_group
+from ..compat import loses_summed_lobes
+from .nodes import LEAF_GREEN, Graph, find_socket, shader_group
 
 MICROSPHERE = "TetFlora Microsphere"
 SCATTER = "TetFlora Scatter"
 
-_VERSION = 1
+#: Where sums of lobes lose light, the nodes are others.
+_VERSION = 1 + loses_summed_lobes()
 _SCATTER_VERSION = 2
 
 WHITE = (1.0, 1.0, 1.0, 1.0)
@@ -57,6 +59,7 @@ def microsphere_group() -> bpy.types.NodeTree:
     scattered the fraction Transmission leaves on the other side. Cycles cuts each lobe off at the face's own horizon;
     of a cosine lobe around m the fraction (1 − |m·n|) / 2 lies beyond it, n being the face's normal. That fraction goes
     to an even lobe on the face's far side, so nothing is lost and nothing counts twice. EEVEE has no such horizon.
+    Where Cycles loses light of lobes around several normals, each sample has one normal by chance.
     """
     about = "0: particles face the viewer, as in the paper; 1: particles are round from all sides"
     facing = "Normal of particles with their own surface; at zero, particles face the viewer"
@@ -90,7 +93,7 @@ def _shaders(graph: Graph, given: Any) -> dict[str, bpy.types.NodeSocket]:
         'particle': graph.math('SUBTRACT', 1.0, given["Plane"]),
         'plane': graph.math('SUBTRACT', given["Plane"], kept),
     }
-    full, simple = [], []
+    full, simple, lobes = [], [], []
     beyond: dict[str, list] = {'near': [], 'far': []}
     for name, normal in (('particle', particle), ('plane', plane)):
         reflected, transmitted = (graph.vector('SCALE', colour, weights[name]) for colour in (back, through))
@@ -104,9 +107,39 @@ def _shaders(graph: Graph, given: Any) -> dict[str, bpy.types.NodeSocket]:
         lost = graph.math('MULTIPLY_ADD', graph.math('ABSOLUTE', facing), -0.5, 0.5)
         beyond['near'].append(graph.vector('SCALE', far, lost))
         beyond['far'].append(graph.vector('SCALE', near, lost))
-    full += _sheet(graph, *(graph.vector('ADD', *beyond[side]) for side in ('near', 'far')), face)
+        lobes.append((near, far, normal, lost))
     highlight = _highlight(graph, plane, gloss, width)
+    if loses_summed_lobes():
+        sheet, share = _one_of(graph, lobes, given["Plane"])
+        seen = _highlight(graph, plane, graph.math('MULTIPLY', gloss, share), width)
+        return {"Cycles": _sum(graph, [*sheet, seen]), "EEVEE": _sum(graph, [*simple, highlight])}
+    full += _sheet(graph, *(graph.vector('ADD', *beyond[side]) for side in ('near', 'far')), face)
     return {"Cycles": _sum(graph, [*full, highlight]), "EEVEE": _sum(graph, [*simple, highlight])}
+
+
+def _one_of(graph: Graph, lobes: list[tuple], planes: Any) -> tuple[list[bpy.types.Node], Any]:
+    """A sheet around one normal: particle or plane by chance, divided by its probability; and the highlight's factor.
+
+    What the horizon cuts off of one lobe of a normal is added to the other, with which it has no direction in common.
+    """
+    where = graph.node("ShaderNodeNewGeometry").outputs["Position"]
+    noise = graph.node("ShaderNodeTexWhiteNoise", {"Vector": where, "W": 2.0}, noise_dimensions='4D')
+    flat = graph.math('LESS_THAN', find_socket(noise.outputs, "Value"), planes)
+    near, far, normal, lost = (_chosen(graph, *pair, flat) for pair in zip(*lobes, strict=True))
+    chance = graph.math('ABSOLUTE', graph.math('SUBTRACT', graph.math('SUBTRACT', 1.0, flat), planes))
+    # Never chosen where it is 0 but for rounding.
+    share = graph.math('DIVIDE', 1.0, graph.math('MAXIMUM', chance, 1e-6))
+    added = graph.math('DIVIDE', lost, graph.math('SUBTRACT', 1.0, lost))
+    both = [
+        graph.vector('SCALE', graph.vector('ADD', own, graph.vector('SCALE', other, added)), share)
+        for own, other in ((near, far), (far, near))
+    ]
+    return _sheet(graph, *both, normal), graph.math('MULTIPLY', share, flat)
+
+
+def _chosen(graph: Graph, first: Any, second: Any, which: Any) -> bpy.types.NodeSocket:
+    """The first of two vectors where `which` is 0, the second where it is 1."""
+    return graph.vector('ADD', first, graph.vector('SCALE', graph.vector('SUBTRACT', second, first), which))
 
 
 def _particle_normal(graph: Graph, given: Any, geometry: Any) -> bpy.types.NodeSocket:

@@ -12,7 +12,7 @@ from typing import Any
 
 import bpy
 
-from ..compat import blend_in_mesh_order, disable_bump_correction
+from ..compat import blend_in_mesh_order, disable_bump_correction, loses_summed_lobes
 from .microsphere import ENGINES, LOBE_INPUTS, UNIT, microsphere_group
 from .nodes import Graph, find_socket, shader_group, surface_material
 
@@ -21,8 +21,9 @@ SHELL_MATERIAL = "TetFlora shell"
 BAKED_SHELL = "TetFlora Baked Shell"
 BAKED_SHELL_MATERIAL = "TetFlora baked shell"
 
-_GROUP_VERSION = 2
-_MATERIAL_VERSION = 2
+# With the group within.
+_GROUP_VERSION = 2 + loses_summed_lobes()
+_MATERIAL_VERSION = 2 + loses_summed_lobes()
 _BAKED_VERSION = 1
 
 # Longer than any cell, for faces that the ray runs away from, metres.
