@@ -26,7 +26,7 @@ from examples.rami_discs import COVERS, Canopy, canopy, data
 from .rami_measure import EXPANDED, FOLDER, FORMS, Measured, expanded
 from .row80 import timed_refine
 
-SIZES = (2, 8, 32)
+SIZES = (1, 2, 8, 32)
 _RAYS = 600_000
 
 

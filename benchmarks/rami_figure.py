@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draw what was measured of RAMI's scenes over the published curves: ``python -m benchmarks.rami_figure``."""
+"""What was measured of RAMI's scenes, drawn over the published curves and as a table.
+
+``python -m benchmarks.rami_figure`` draws, ``python -m benchmarks.rami_figure --table`` prints.
+"""
 
 # ruff: noqa: E402  (run as a program, it starts Blender before it imports what needs Blender)
 from __future__ import annotations
@@ -8,6 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from statistics import median
 
 from devtools import session
 
@@ -21,7 +25,7 @@ from numpy import interp
 
 from examples.rami_discs import CURVES, canopy, published
 
-from .rami_measure import EXPANDED, FORMS, POLYGONS, Measured
+from .rami_measure import EXPANDED, FORMS, POLYGONS, Measured, errors
 from .report import ROOT
 
 COLOURS = {
@@ -74,12 +78,47 @@ def draw(path: Path, pixels: dict[str, int]) -> None:
     plt.close(figure)
 
 
+def table() -> str:
+    """RMS error, its mean, the worst beside the hotspot (%), seconds and memory of each case, in Markdown."""
+    lines = [
+        "| scene | as | pixels a crown | views | RMS, % | mean, % | hotspot, % | against our own, RMS % | refine, s "
+        "| render, s | process, MB |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for name in CURVES:
+        found = Measured(name)
+        own = found.curve(EXPANDED)
+        for form in (POLYGONS, EXPANDED, *FORMS):
+            sizes = {int(key.split()[1]) for key in found.rows if key.split()[0] == form and not key.endswith("b0")}
+            for size in sorted(sizes):
+                at, factors = found.curve(form, size)
+                rows = [found.get(form, size, angle, -1) for angle in at.tolist()]
+                error, beside = errors(name, at, factors), "–"
+                if len(own[0]) and form != EXPANDED:
+                    beside = f"{100 * errors(name, at, factors, own)['rms']:.1f}"
+                refine, render = (
+                    f"{median(row[key] for row in rows):.1f}" if key in rows[0] else "–"
+                    for key in ("refine_s", "render_s")
+                )
+                lines.append(
+                    f"| {name} | {LABELS.get(form, form.lower())} | {size or '–'} | {len(at)} "
+                    f"| {100 * error['rms']:.1f} | {100 * error['mean']:+.1f} | {100 * error['hotspot']:.1f} "
+                    f"| {beside} | {refine} | {render} | {median(row['peak_mb'] for row in rows):,.0f} |"
+                )
+    return "\n".join(lines)
+
+
 def main() -> int:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--pixels", type=int, nargs=len(CURVES), default=[8, 8, 2], help="a crown, by scene")
     parser.add_argument("--output", type=Path, default=ROOT / "docs" / "images" / "rami.png")
+    parser.add_argument("--table", action="store_true", help="print a table instead")
     given = parser.parse_args()
+    if given.table:
+        print(table())
+        session.stop()
+        return 0
     draw(given.output, dict(zip(CURVES, given.pixels, strict=True)))
     session.stop()
     return 0
