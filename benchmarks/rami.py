@@ -70,10 +70,11 @@ def main() -> int:
     parser.add_argument("--pixels", type=int, nargs="+", default=[8], help="width of a crown in the image")
     parser.add_argument("--views", type=int, default=20, help="how many of the 76 view zeniths")
     parser.add_argument("--zenith", type=float, nargs="+", help="these view zeniths instead")
-    parser.add_argument("--single", action="store_true", help="light that is scattered once")
+    parser.add_argument("--bounces", type=int, default=-1, help="0 for light that is scattered once, 1 for twice, ...")
+    parser.add_argument("--single", action="store_true", help="as --bounces 0")
     parser.add_argument("--again", action="store_true", help="measure what is known, too")
     given = parser.parse_args()
-    bounces = 0 if given.single else -1
+    bounces = 0 if given.single else given.bounces
     for name in given.scene:
         angles = views(name, given.views).tolist() if given.zenith is None else given.zenith
         for form in given.form:
