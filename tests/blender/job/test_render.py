@@ -215,6 +215,35 @@ def test_bounces_of_each_scene_come_back(stage, stub):
     assert [scene.cycles.transparent_max_bounces for scene in (stage, other)] == [10, 11]
 
 
+@pytest.mark.parametrize("refined_before", [False, True])
+def test_eevee_traces_rays_while_plants_are_rendered(stage, stub, refined_before):
+    """Or the sky would shine into crowns. A choice of the artist's among the methods of tracing stays."""
+    stage.render.engine, eevee = compat.eevee_engine(), stage.eevee
+    stage.tetflora.refine_at_render = not refined_before
+    if refined_before:
+        results = collection.Results(stage, 'VIEW')
+        results.open()
+        results.finish()
+    for traced, fast in ((False, False), (False, True), (True, False)):
+        eevee.use_raytracing, eevee.use_fast_gi = traced, fast
+        render.on_render_pre(stage)
+        assert (eevee.use_raytracing, eevee.use_fast_gi) == (True, not traced or fast)
+        render.on_save_pre("")
+        assert (eevee.use_raytracing, eevee.use_fast_gi) == (traced, fast)
+        render.on_save_post("")
+        assert eevee.use_raytracing
+        render.on_render_end(stage)
+        assert (eevee.use_raytracing, eevee.use_fast_gi) == (traced, fast)
+
+
+def test_eevee_without_plants_is_as_the_artist_set_it(stage, stub):
+    bpy.data.objects.remove(bpy.data.objects["plant"])
+    stage.render.engine, stage.eevee.use_raytracing = compat.eevee_engine(), False
+    render.on_render_pre(stage)
+    assert not stage.eevee.use_raytracing
+    render.on_render_end(stage)
+
+
 def test_a_scene_that_is_deleted_in_the_middle_of_a_render_stops_neither_saving_nor_its_end(stage, stub):
     stage.render.engine = 'CYCLES'
     stage.tetflora.proxy_form = 'SHELLS'

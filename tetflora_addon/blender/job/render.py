@@ -22,7 +22,7 @@ import bpy
 from ...errors import TetFloraError
 from ..main_thread import in_main_thread
 from ..results.collection import has_results, leave_out_of_file, result_collections
-from ..results.forms import raise_bounces
+from ..results.forms import raise_settings, restore_settings
 from ..results.hiding import (
     lift_marks,
     originals_shown,
@@ -49,7 +49,7 @@ class _Rendering:
     busy: bool = False
     hidden: list[str] = field(default_factory=list)
     lifted: dict[tuple[str, str], str] = field(default_factory=dict)  # marks of originals, while a file is written
-    bounces: dict[str, dict[str, int]] = field(default_factory=dict)  # of Cycles, as they were, by name of the scene
+    raised: dict[str, dict[tuple[str, str], int]] = field(default_factory=dict)  # as they were, by name of the scene
     outer: str = ""  # scene that is rendered; those that its sequencer shows begin and end renders of their own
     scenes: list[str] = field(default_factory=list)  # all of these
     warnings: list[str] = field(default_factory=list)
@@ -106,6 +106,8 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     finally:
         if not made:
             in_main_thread(partial(_take_back, scene))
+            if has_results(scene):
+                _raise(scene)
         _rendering.busy = False
 
 
@@ -130,8 +132,8 @@ def on_render_end(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
 def on_save_pre(_path: object, _other: object = None) -> None:
     """Before a file is written: undo what is hidden or raised for a render."""
     _show_hidden()
-    for name in _rendering.bounces:
-        _set_bounces(name)
+    for name in _rendering.raised:
+        _lower(name)
     leave_out_of_file()
     _rendering.lifted = lift_marks()
     pack_override_marks()
@@ -141,9 +143,9 @@ def on_save_post(_path: object, _other: object = None) -> None:
     """After a file was written: hide and raise it again for a render that goes on."""
     for collection in _named(_rendering.hidden):
         collection.hide_render = True
-    for name in _rendering.bounces:
+    for name in _rendering.raised:
         if (scene := bpy.data.scenes.get((name, None))) is not None:
-            raise_bounces(scene)
+            raise_settings(scene)
     unpack_override_marks()
     restore_marks(_rendering.lifted)
     _rendering.lifted.clear()
@@ -155,7 +157,7 @@ def on_load_post(_path: object, _other: object = None) -> None:
     clear_unreadable()
     _rendering.busy, _rendering.outer = False, ""
     _rendering.scenes.clear()
-    _rendering.bounces.clear()
+    _rendering.raised.clear()
     _rendering.hidden.clear()
     _rendering.lifted.clear()
     failed_frames.clear()
@@ -201,7 +203,7 @@ def _make(scene: bpy.types.Scene) -> None:
         # Otherwise Blender crashes when it renders new objects in a layer that is not the window's, or for a sequencer.
         for layer in scene.view_layers:
             layer.update()
-    _rendering.bounces.setdefault(scene.name, {}).update(raise_bounces(scene))
+    _raise(scene)
 
 
 def _layers_of(scene: bpy.types.Scene) -> list[list[bpy.types.ViewLayer]]:
@@ -223,16 +225,20 @@ def _hide(scene: bpy.types.Scene, keys: list[str]) -> None:
 def _take_back(scene: bpy.types.Scene) -> None:
     _show_hidden()
     _rendering.hidden.clear()
-    _set_bounces(scene.name)
-    _rendering.bounces.pop(scene.name, None)
+    _lower(scene.name)
+    _rendering.raised.pop(scene.name, None)
     frame_cache.clear(scene)
     refine.clear(scene, for_render=True)
 
 
-def _set_bounces(scene: str) -> None:
+def _raise(scene: bpy.types.Scene) -> None:
+    _rendering.raised.setdefault(scene.name, {}).update(raise_settings(scene))
+
+
+def _lower(scene: str) -> None:
     found = bpy.data.scenes.get((scene, None))  # a script may delete or rename it between two frames
-    for name, value in _rendering.bounces.get(scene, {}).items() if found is not None else ():
-        setattr(found.cycles, name, value)
+    if found is not None:
+        restore_settings(found, _rendering.raised.get(scene, {}))
 
 
 def _show_hidden() -> None:

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Proxy forms: a table with a row for each item of the setting Proxies, and the bounces of Cycles that they need.
+"""Proxy forms: a table with a row for each item of the setting Proxies, and what plants need of the render engine.
 
-A new form is a new row. Transparent bounces matter for shells: a ray passes two faces of each, and is black where it
-runs out of bounces. EEVEE has no bounces.
+A new form is a new row. Transparent bounces of Cycles matter for shells: a ray passes two faces of each, and is black
+where it runs out of bounces. EEVEE has no bounces, but without ray tracing nothing keeps the sky out of crowns.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from functools import partial
 import bpy
 
 from ...emission.forms import AUTOMATIC, MICROSPHERES, MICROSURFACES, SHELLS, EmissionForm
+from ..compat import EEVEE_ENGINES
 from ..materials.materials import baked_material, proxy_material, sphere_material
 from ..materials.shell import baked_shell_material, shell_material
 
@@ -25,6 +26,8 @@ FEW = 0.5
 #: Settings of Cycles: the number at which rays end, and the number below which they go on to their ends. Beyond that,
 #: weak light goes on by chance, as noise.
 _SETTINGS = ("transparent_max_bounces", "min_transparent_bounces")
+#: Settings of EEVEE, on while plants are rendered: the sky counts by how much of it the depth buffer leaves open.
+_OCCLUSION = ("use_raytracing", "use_fast_gi")
 
 _Material = Callable[[], bpy.types.Material]
 _ASSET_FACETS, _ASSET_SPHERES = partial(proxy_material, own=True), partial(sphere_material, own=True)
@@ -165,15 +168,27 @@ def _redefine() -> None:
         settings.proxy_form = form_property()
 
 
-def raise_bounces(scene: bpy.types.Scene) -> dict[str, int]:
-    """Raise bounces that are too few for a scene's proxies; returns the changed settings of ``scene.cycles`` before."""
+def raise_settings(scene: bpy.types.Scene) -> dict[tuple[str, str], int]:
+    """Raise what is too low for a scene's plants in its engine; returns what was changed, by engine and setting.
+
+    The second of EEVEE's settings is the artist's where the first is on.
+    """
+    before = {}
+    if scene.render.engine in EEVEE_ENGINES and not scene.eevee.use_raytracing:
+        before = {("eevee", name): getattr(scene.eevee, name) for name in _OCCLUSION}
     cycles, bounces = getattr(scene, "cycles", None), form_of(scene).bounces
-    if scene.tetflora.expand_everything or cycles is None:
-        return {}
-    before = {name: getattr(cycles, name) for name in _SETTINGS if getattr(cycles, name, bounces) < bounces}
-    for name in before:
-        setattr(cycles, name, bounces)
+    if not scene.tetflora.expand_everything and cycles is not None:
+        values = {("cycles", name): getattr(cycles, name, bounces) for name in _SETTINGS}
+        before |= {key: value for key, value in values.items() if value < bounces}
+    for engine, name in before:
+        setattr(getattr(scene, engine), name, bounces if engine == "cycles" else True)
     return before
+
+
+def restore_settings(scene: bpy.types.Scene, before: Mapping[tuple[str, str], int]) -> None:
+    """Undo `raise_settings`."""
+    for (engine, name), value in before.items():
+        setattr(getattr(scene, engine), name, value)
 
 
 def few_bounces(scene: bpy.types.Scene) -> str:
