@@ -79,7 +79,8 @@ def share_points(
     wood = np.maximum(np.ceil(WOOD * number).astype(np.int64), along)
     solid = are_solids(flora.rows)[parts.branches.row]
     squares, most = (pixels[solid] / PIXELS_IN_SOLID) ** 2, max(MOST_IN_SOLID * most // MOST, FEWEST_IN_SOLID)
-    number[solid] = times * np.ceil(np.clip(squares, FEWEST_IN_SOLID, most)).astype(np.int64)
+    # Cells that are filled are smaller than what cannot be opened: too few points make holes and lumps of it.
+    number[solid] = times**2 * np.ceil(np.clip(squares, FEWEST_IN_SOLID, most)).astype(np.int64)
     made = []
     for leafy in (True, False):
         area = parts.totals.leaf_area if leafy else parts.totals.wood_area
