@@ -41,11 +41,15 @@ ENOUGH_A_PIXEL, NEVER_TOO_MANY = 1.95, 1_500_000.0
 _HIDDEN, _FEW_HIDDEN = 0.3, 300_000.0
 #: Facets grow to so many times their size before real leaves become fewer.
 FACETS_FIRST = 6.0
-#: Reserved fraction of a budget that somebody has set, since expected numbers are means; and how many deviations of a
-#: number that is drawn at random, which is most for small budgets.
-_RESERVE, _DEVIATIONS = 0.06, 2.0
+#: Reserved fraction of a budget that somebody has set: of what was drawn to find out, and more of what was not, since
+#: that is expected by a mean; of what none was drawn of; and how many deviations of a number that is drawn at random,
+#: which is most for small budgets.
+_RESERVE, _OF_THE_REST, _UNKNOWN, _DEVIATIONS = 0.012, 0.075, 0.06, 2.0
+#: How far the logarithm of a factor may be from where parts were drawn to find it: where only the image is the limit,
+#: and where one that must hold is near; and how often they are drawn.
+_STRAYS, _DRAWS = (0.1, 0.03), 3
 #: Factors are found as closely as this, on their logarithm, from 1 to the largest.
-_CLOSE, _LARGEST = 0.005, 256.0
+_CLOSE, _LARGEST = 0.0015, 256.0
 #: A number that stands for none where it is divided by, or its logarithm is taken.
 _NOTHING = 1e-9
 #: Fraction of a limit up to which what is expected certainly fits.
@@ -56,6 +60,9 @@ _LARGEST_HIDDEN = 96.0
 _ON_TOP = 1_500_000.0
 #: Fraction of what is allowed that finer levels of near leaves may always have, and tolerances that are tried.
 _FINE, _TOLERANCES = 0.25, (*(TOLERANCE * 2.0**k for k in range(9)), np.inf)
+
+#: What is allowed, the weight of a facet, and whether other meshes count out of sight as well.
+_Limit = tuple[float, float, bool]
 
 
 @dataclass(frozen=True)
@@ -122,23 +129,35 @@ def afford(
             return detail
         return replace(detail, refinement=_fitted_shells(result, allowed, faces), tolerance=np.inf)
     count = Expected(flora, result, camera, AssetExpected(*assets) if assets else None)
-    # A sphere is a whole polygon for the limit on polygons, but only a part of one for memory: a budget for each.
-    # What other meshes have out of sight takes from what somebody allows, not from what the image shows.
     on_top = min(count.finer(settings.leaf_limit), _ON_TOP)
-    limits = [(enough(camera) + on_top, 1.0, False), (_unreserved(most), 1.0, True)]
-    limits += [(_unreserved(memory), primitive_bytes / BYTES_PER_POLYGON, True)]
-    count.tolerance = _tolerance(count, settings, limits)
-    hard = min(allowed for allowed, _, every in limits if every)
-    if np.isfinite(hard) and count.finer(settings.leaf_limit) > _RESERVE * hard:
+
+    def limits() -> list[_Limit]:
+        # A sphere is a whole polygon for the limit on polygons, but only a part of one for memory: a budget for each.
+        # What other meshes have out of sight takes from what somebody allows, not from what the image shows.
+        reserve = _RESERVE + _OF_THE_REST * count.undrawn if count.undrawn < 1.0 and not assets else _UNKNOWN
+        each = primitive_bytes / BYTES_PER_POLYGON
+        held = ((_unreserved(most, reserve), 1.0, True), (_unreserved(memory, reserve), each, True))
+        return [(enough(camera) + on_top, 1.0, False), *held]
+
+    hard = _unreserved(min(memory, most))
+    count.tolerance = _tolerance(count, settings, limits())
+    if np.isfinite(hard) and count.finer(settings.leaf_limit) > _UNKNOWN * hard:
         # A limit that somebody has set holds, however roughly near leaves can be counted.
         count.calibrate(FacetPixels(settings.facet), settings.leaf_limit, True)
-        count.tolerance = _tolerance(count, settings, limits)
-    factor, hidden = _affordable(count, settings, limits)
+        count.tolerance = _tolerance(count, settings, limits())
+    factor, hidden = _affordable(count, settings, limits())
     near = np.isfinite(hard) and count.together(settings) > _SURE * hard
-    if factor > 1.0 or hidden > 1.0 or near:
+    tried: list[tuple[float, float]] = []  # logarithms of factors of which parts were drawn, and what they led to
+    while len(tried) < _DRAWS and (factor > 1.0 or hidden > 1.0 or near):
         # What is expected of parts that will be opened is rough; some of them tell by how much.
+        at = float(np.log(factor))
         count.calibrate(FacetPixels(_side(factor, settings), hidden), _limit(factor, settings), near)
-        factor, hidden = _affordable(count, settings, limits)
+        factor, coarser = _affordable(count, settings, limits())
+        tried.append((at, float(np.log(factor))))
+        strays, hidden = max(abs(tried[-1][1] - at), abs(np.log(coarser / hidden))), coarser
+        if strays <= _STRAYS[int(near)]:
+            break
+        factor = float(np.exp(_meeting(tried, len(tried) == _DRAWS)))
     limit = _limit(factor, settings)
     small, sight = count.too_small(limit) if factor > 1.0 else np.zeros(0, bool), count.sight
     if small.any():
@@ -147,12 +166,23 @@ def afford(
     return Detail(result, FacetPixels(_side(factor, settings), hidden), limit, count.tolerance, sight)
 
 
-def _unreserved(budget: float) -> float:
+def _unreserved(budget: float, reserve: float = _UNKNOWN) -> float:
     """What may be expected where no more than a budget may be made."""
-    return max((1 - _RESERVE) * budget - _DEVIATIONS * budget**0.5, 0.0) if np.isfinite(budget) else budget
+    return max((1 - reserve) * budget - _DEVIATIONS * budget**0.5, 0.0) if np.isfinite(budget) else budget
 
 
-def _tolerance(count: Expected, settings: RefinementSettings, limits: list[tuple[float, float, bool]]) -> float:
+def _meeting(tried: list[tuple[float, float]], last: bool) -> float:
+    """Where what parts are drawn at is what they lead to: on the line through the last two; in the end not before."""
+    at, led = tried[-1]
+    if last:
+        return max(at, 2.0 * led - at)
+    if len(tried) == 1:
+        return led
+    slope = (led - tried[-2][1]) / (at - tried[-2][0] or _NOTHING)
+    return max(at + (led - at) / max(1.0 - slope, 0.5), 0.0)
+
+
+def _tolerance(count: Expected, settings: RefinementSettings, limits: list[_Limit]) -> float:
     """The smallest tolerance with which nothing else has to grow, or finer leaves are a small part of what is allowed.
 
     How wide leaves are that are real is that of a budget that suffices.
@@ -166,12 +196,8 @@ def _tolerance(count: Expected, settings: RefinementSettings, limits: list[tuple
     return tolerance
 
 
-def _affordable(
-    count: Expected, settings: RefinementSettings, limits: list[tuple[float, float, bool]]
-) -> tuple[float, float]:
-    """Factors on all facets and on hidden ones with which none of the limits is passed: what is allowed, the weight of
-    a facet, and whether other meshes count out of sight as well.
-    """
+def _affordable(count: Expected, settings: RefinementSettings, limits: list[_Limit]) -> tuple[float, float]:
+    """Factors on all facets and on hidden ones with which none of the limits is passed."""
     factor = hidden = 1.0
     for allowed, weight, every in limits:
         if np.isfinite(allowed):
@@ -205,6 +231,8 @@ def _factors(
 
     factor = _smallest(load)
     for_hidden = min(reserved, max(seen(factor), few))
+    if every:  # what is seen has all that the settings ask for
+        for_hidden = max(for_hidden, allowed - seen(factor))
     return factor, _smallest(lambda by: unseen(factor, by) / max(for_hidden, _NOTHING), largest)
 
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from .asset_expected import AssetExpected
 from .facets import portion_facets, sizes_of
 from .leaf_detail import TOLERANCE, LeafDetail
 from .plants import Block, Transition, portion_blocks
-from .portions import Portions, Sight
+from .portions import MIXED, Portions, Sight
 
 #: Fraction of the faces of twigs that are made where leaves are real.
 _TWIGS = 0.15
@@ -34,7 +34,7 @@ _TWIGS = 0.15
 _THIN = 0.21, 1.4
 #: Parts of plants that are drawn to find out what to expect: where only the image limits them, and where a limit that
 #: must hold is near; polygons that are too few to tell; and how far expectations may be corrected.
-_DRAWN, _SOME, _ROUGH = (800, 3000), 300.0, (0.4, 2.5)
+_DRAWN, _SOME, _ROUGH = (80, 400), 100.0, (0.05, 20.0)
 #: Parts from which on other processes draw some of them.
 _WORTH = 300
 #: Draw of this module: which parts. That of the transition would choose those whose wood is real.
@@ -43,26 +43,50 @@ _SAMPLE = 224
 _TELLING, _CHOSEN = 40_000, 225
 
 
+#: Polygons and facets that are drawn at least.
+_WORK = 15_000.0
+#: Parts that are seen, up to so many, are opened so many times where they are a larger part than that.
+_FEW_PARTS, _LEVELS = 2000, 4
+#: Parts that have so many times as many polygons and facets are another layer, of which more are drawn.
+_LAYER, _NOTHING = 16.0, 1e-9
+
+
 class Expected:
     """Expected polygons and facets of a refinement."""
 
     def __init__(self, flora: Flora, result: Refinement, camera: Camera, assets: AssetExpected | None = None) -> None:
         self.assets = assets
         self.sight = Sight(flora, result, camera)
-        self.every = portions = self.sight.portions()
+        portions = self._smaller(self.sight.portions())
         # Of polygons, and of facets that are seen or not, what was found over what was expected.
         self.found = np.ones(3)
+        self.undrawn = 1.0
         some = portions.visibility > 0
         self.flora, self.camera = flora, camera
         self.portions, self.sizes, self.times = self._telling(portions.take(np.flatnonzero(some)))
         self.faces_coarse = _real_faces(flora, self.portions, Transition(flora, camera, 1.0, np.inf))
         self.any_bare = bool((flora.leaf_count[self.portions.parts.branches.row] <= 0).any())
         self.tolerance = TOLERANCE
-        _, *self.unseen_sizes = self._telling(portions.take(np.flatnonzero(~some)))
+        self.unseen_portions, *self.unseen_sizes = self._telling(portions.take(np.flatnonzero(~some)))
         self.result, held, hidden = result, result.holdings.polygons, result.chosen(Decision.HIDDEN)
         self.cell = held.cell
         self.hidden = hidden[held.cell] | ~result.in_view[held.cell]
         self.faces = polygon_facet_sizes(held, camera, hidden)
+
+    def _smaller(self, portions: Portions) -> Portions:
+        """Portions, of which those that are seen are opened as they will be where they are few: each tells a little."""
+        sight = self.sight
+        for _ in range(_LEVELS):
+            seen = portions.visibility > 0
+            share = np.where(seen, portions.parts.extent**2, 0.0)
+            large = portions.parts.can_open(sight.flora) & (share * _FEW_PARTS > share.sum())
+            large &= sight.flora.leaf_count[portions.parts.branches.row] > 0  # `_bare` is of whole trees
+            if seen.sum() >= _FEW_PARTS or not large.any():
+                break
+            mixed = portions.mixed & (sight.pixels(portions) > MIXED)
+            opened = sight.opened(replace(portions, mixed=mixed).take(np.flatnonzero(large)))
+            portions = Portions.concatenate([portions.take(np.flatnonzero(~large)), opened])
+        return portions
 
     def _telling(self, portions: Portions) -> tuple[Portions, FacetSizes, NDArray[np.float64]]:
         """As many portions (n,) as tell about all, the sizes of their facets, and for how many each of them speaks.
@@ -101,23 +125,15 @@ class Expected:
 
         safe: never fewer than were expected before `calibrate`; some plants do not tell exactly about all.
         """
-        transition = Transition(self.flora, self.camera, limit)
-        branches = self.portions.parts.branches
-        real = np.where(self.portions.real, transition.of_branches(branches, self.portions.visibility), 0.0)
-        found = np.maximum(self.found, float(safe))
-        facets = found[1] * weight * self.sizes.counts(FacetPixels(pixels))
-        bare = _bare(self.flora, self.portions, self.camera, limit) if self.any_bare else 0.0
-        faces = found[0] * (self.faces_coarse + self.faces_finer + bare)
-        tubes = found[0] * _tubes(self.flora, self.portions, transition, real)
+        faces, facets = self._of_each(FacetPixels(pixels), limit)
         of_assets = self.assets.seen(pixels, limit, weight, safe) if self.assets else 0.0
-        of_plants = self.times * (self.portions.within * (real * faces + (1.0 - real) * facets) + tubes)
-        return float(of_plants.sum()) + of_assets
+        return float(self.times @ (self.found[0] * faces + self.found[1] * weight * facets)) + of_assets
 
     def unseen(self, pixels: FacetPixels, safe: bool = False) -> float:
         """Facets of all plants and assets that are not seen; safe as for `seen`."""
         sizes, times = self.unseen_sizes
         of_assets = self.assets.unseen(pixels) if self.assets else 0.0
-        return float(max(self.found[2], float(safe))) * float(times @ sizes.counts(pixels)) + of_assets
+        return float(self.found[2]) * float(times @ sizes.counts(pixels)) + of_assets
 
     def together(self, settings: RefinementSettings) -> float:
         """Expected polygons and facets of all, seen or not, at the details of the settings."""
@@ -126,27 +142,57 @@ class Expected:
         return self.seen(pixels, limit, 1.0, True) + of_meshes + self.unseen(FacetPixels(pixels), True)
 
     def calibrate(self, pixels: FacetPixels, limit: float, exactly: bool) -> None:
-        """Draw some of the plants, or more of them, and expect of all what was found of these."""
-        share = _DRAWN[int(exactly)] / max(len(self.every), 1)
-        # What no point tells about has almost nothing within the view, or very much: one of them would speak for all.
-        chosen = (uniform(self.every.parts.branches.key, _SAMPLE) < share) & (self.every.within >= 1.0) | (share >= 1.0)
-        some = self.every.take(np.flatnonzero(chosen))
+        """Draw some of the plants, or more of them, and expect of all what was found of these.
+
+        What has many polygons and facets is drawn more likely. Parts of about as many are a layer: what was found of
+        those of a layer that were drawn speaks for its others.
+        """
         transition = Transition(self.flora, self.camera, limit, self.tolerance)
-        weights = facet_weights(self.flora, ())
-        seen, sample = some.visibility > 0, _Sample(self.sight, transition, weights, pixels)
-        groups = [(kind, some.take(np.flatnonzero(group))) for kind, group in enumerate((seen | True, seen, ~seen))]
-        # The longest first.
-        facets_seen, real, facets_hidden = in_processes(
-            _drawn_of, sample, (groups[1], groups[0], groups[2]), len(some) > _WORTH
+        (faces, facets), seen = self._of_each(pixels, limit), (self.portions, self.unseen_portions)
+        hidden = self.unseen_sizes[0].counts(pixels)
+        layers = [_layers(number, some) for number, some in zip((faces + facets, hidden), seen, strict=True)]
+        wanted, groups, expected = _DRAWN[int(exactly)], [], []
+        whole = float(np.sqrt(faces + facets + 1.0).sum() + np.sqrt(hidden + 1.0).sum())
+        least = _WORK / max(float(self.times @ (faces + facets) + self.unseen_sizes[1] @ hidden), 1.0)
+        for some, layer, counts in zip(seen, layers, ((faces, facets), (hidden,)), strict=True):
+            times = self.times if some is self.portions else self.unseen_sizes[1]
+            for number in np.unique(layer):
+                own = np.flatnonzero(layer == number)
+                each = _LAYER ** (0.5 * number + 0.25) / whole if number >= 0 else 1.0 / len(own)
+                likely = min(max(wanted * each, least), 1.0)
+                drawn = own[uniform(some.parts.branches.key[own], _SAMPLE) < likely]
+                for kind, count in enumerate(counts, start=2 if some is not self.portions else 0):
+                    groups.append((kind, some.take(drawn)))
+                    expected.append((kind, float(count[drawn].sum()), float((times * count)[own].sum()), likely))
+        sample = _Sample(self.sight, transition, facet_weights(self.flora, ()), pixels)
+        number = sum(len(portions) for _, portions in groups)
+        if not groups:
+            return
+        found = np.array(list(in_processes(_drawn_of, sample, groups, number > _WORTH)))
+        kind, drawn, every, likely = np.array(expected).T
+        kind = kind.astype(int)
+        speaks = every / np.maximum(drawn, _NOTHING) * (drawn > 0.0)
+
+        def whole(of: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.bincount(kind, of, 3)
+
+        # What few were drawn of is as wrong as the rest.
+        mean = (whole(speaks * found) + _SOME) / (whole(speaks * drawn) + _SOME)
+        rough = np.where(likely < 1.0, _SOME, _NOTHING)
+        truly = every * (found + rough * mean[kind]) / (drawn + rough)
+        self.found = np.clip((whole(truly) + _NOTHING) / (whole(every) + _NOTHING), *_ROUGH)
+        self.undrawn = float((truly * (1.0 - likely)).sum() / max(truly.sum(), _NOTHING))
+
+    def _of_each(self, pixels: FacetPixels, limit: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Polygons (n,) and facets (n,) that are expected of each portion that is seen, before `calibrate`."""
+        transition = Transition(self.flora, self.camera, limit)
+        real = np.where(
+            self.portions.real, transition.of_branches(self.portions.parts.branches, self.portions.visibility), 0.0
         )
-        sizes, fraction = sizes_of(self.flora, some, self.sight.shadows), np.where(some.real, 1.0, 0.0)
-        fraction *= np.where(seen, transition.of_branches(some.parts.branches, some.visibility), 0.0)
-        faces = _real_faces(self.flora, some, transition) + transition.detail.more(some.parts, some.visibility)
-        faces += _bare(self.flora, some, self.camera, limit)
-        expected = (some.within * fraction * faces).sum() + _tubes(self.flora, some, transition, fraction).sum()
-        left = np.bincount(~seen, some.within * (1.0 - fraction) * sizes.counts(pixels), minlength=2)
-        found = np.array([real, facets_seen, facets_hidden])
-        self.found = np.clip((found + _SOME) / (np.array([expected, *left]) + _SOME), *_ROUGH)
+        bare = _bare(self.flora, self.portions, self.camera, limit) if self.any_bare else 0.0
+        faces = self.portions.within * real * (self.faces_coarse + self.faces_finer + bare)
+        facets = self.portions.within * (1.0 - real) * self.sizes.counts(pixels)
+        return faces + _tubes(self.flora, self.portions, transition, real), facets
 
     def polygons(self, pixels: float, limit: float, weight: float, every: bool) -> float:
         """Polygons of other meshes, and facets in their place; of what is seen, or of all."""
@@ -191,6 +237,15 @@ def _cost(block: Block) -> float:
 
 def _count(facets: Facets, _seen: bool) -> int:
     return len(facets)
+
+
+def _layers(number: NDArray[np.float64], portions: Portions) -> NDArray[np.int64]:
+    """Layer (n,) of portions with so many polygons and facets (n,).
+
+    What no point tells about is a layer of its own: it has almost nothing within the view, or very much.
+    """
+    layer = np.log(np.maximum(number, 1.0)) / np.log(_LAYER)
+    return np.where(portions.within >= 1.0, np.floor(layer), -1.0).astype(np.int64)
 
 
 def _tubes(flora: Flora, portions: Portions, transition: Transition, real: NDArray[np.float64]) -> NDArray[np.float64]:
