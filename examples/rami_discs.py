@@ -48,6 +48,8 @@ class Solid:
         ``spherical``, ``planophile`` or ``erectophile``.
     trunk : tuple of float
         Height, radius (metres) and reflectance of a cylinder below; empty without.
+    apart : bool
+        No disc cuts another: so in RAMI's own files. What Eradiate draws itself, HET06, is independent.
     """
 
     shape: str
@@ -59,6 +61,7 @@ class Solid:
     transmittance: float = 0.4
     inclination: str = "spherical"
     trunk: tuple[float, ...] = ()
+    apart: bool = True
 
     @property
     def leaf_area(self) -> float:
@@ -201,7 +204,7 @@ def canopy(name: str, seed: int = 0) -> Canopy:
 
 def _solid(shape: str, given: dict, radius: float, height: float = 0.0, trunk: tuple[float, ...] = ()) -> Solid:
     size = given["discs"], given["disc_radius_m"], given["reflectance"], given["transmittance"]
-    return Solid(shape, radius, height or 2 * radius, *size, trunk=trunk)
+    return Solid(shape, radius, height or 2 * radius, *size, trunk=trunk, apart=not trunk)
 
 
 def _scattered(
@@ -233,14 +236,14 @@ def _scattered(
     return places
 
 
-def discs(solid: Solid, seed: int, apart: bool = True) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def discs(solid: Solid, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Centres (n, 3), metres, evenly in the solid, and unit normals (n, 3) of its discs.
 
-    apart: none cuts another, as RAMI has it; that makes a crown of HET01 cover .88 instead of .87.
+    Where they do not cut each other they hide less of each other: a crown of HET01 covers .877 instead of .874.
     """
     random = np.random.default_rng(seed)
     centres, normals = _drawn(random, solid, solid.discs)
-    while apart:
+    while solid.apart:
         again = np.unique(intersecting(centres, normals, solid.disc_radius)[1])
         if not len(again):
             break

@@ -62,8 +62,8 @@ def test_copies_around_repeat_the_scene():
 
 @pytest.mark.parametrize("shape", ("sphere", "cylinder", "cone", "box"))
 def test_discs_fill_their_solid_evenly(shape):
-    solid = rami_discs.Solid(shape, 1.0, 2.0, 20_000, 0.001)
-    centres, _ = rami_discs.discs(solid, 3, apart=False)
+    solid = rami_discs.Solid(shape, 1.0, 2.0, 20_000, 0.001, apart=False)
+    centres, _ = rami_discs.discs(solid, 3)
     x, y, z = centres.T
     width = np.hypot(x, y)
     inside, middle = {
@@ -79,8 +79,8 @@ def test_discs_fill_their_solid_evenly(shape):
 
 @pytest.mark.parametrize("inclination", ("spherical", "planophile", "erectophile"))
 def test_normals_show_the_expected_area_from_above(inclination):
-    solid = rami_discs.Solid("box", 1.0, 1.0, 50_000, 0.0001, inclination=inclination)
-    _, normals = rami_discs.discs(solid, 5, apart=False)
+    solid = rami_discs.Solid("box", 1.0, 1.0, 50_000, 0.0001, inclination=inclination, apart=False)
+    _, normals = rami_discs.discs(solid, 5)
     assert np.allclose(np.linalg.norm(normals, axis=1), 1.0)
     assert np.abs(normals[:, 2]).mean() == pytest.approx(rami_discs.extinction(inclination), abs=0.005)
 
