@@ -28,6 +28,8 @@ _HET06_SIDE = 500.0
 #: Side of the scenes that are seen from above only, and radius of the discs of layers, metres.
 _LAYER_SIDE = 10.0
 _LAYER_DISC = 0.05
+#: Places that are tried for a crown.
+_TRIES = 10_000
 
 
 @dataclass(frozen=True)
@@ -220,7 +222,8 @@ def _scattered(
     found: dict[int, list[tuple[float, float]]] = {i: [] for i in range(len(radii))}
     for kind in kinds.tolist():
         radius = radii[kind]
-        for x, y in random.uniform(-reach, reach, (10_000, 2)).tolist():
+        for _ in range(_TRIES):
+            x, y = random.uniform(-reach, reach, 2).tolist()
             i, j = int(x // cell), int(y // cell)
             near = [p for a in (i - 1, i, i + 1) for b in (j - 1, j, j + 1) for p in grid.get((a, b), ())]
             if all((x - u) ** 2 + (y - v) ** 2 >= (radius + r) ** 2 for u, v, r in near):
