@@ -12,9 +12,9 @@ their first facet is drawn, in steps of a fraction of a second, with fewer rays 
 .02 of what all rays say (`tests/engine/proxies/test_quick_weights.py`). They follow from the species alone and are
 never refined later, so that no two frames of a film, and no two computers of a farm, have different ones.
 
-Sub-plants are tested together with their next siblings, because facets spill over. Where few facets stand for one,
-all that grow around it take part, because facets then reach across the gaps between neighbours of any parent. Facets
-of pieces are compared in the same way with what branches themselves bear.
+Sub-plants are tested together with all that grow around them, of any parent, because facets spill over and reach
+across the gaps between neighbours. Next siblings alone asked for up to a twentieth more area, and made aspens too
+dense. Facets of pieces are compared in the same way with what branches themselves bear.
 """
 
 from __future__ import annotations
@@ -43,14 +43,11 @@ from .sights import FAMILIES, LARGEST, Families, View, least_weights, look
 #: Weights of the shipped species, made by ``python -m devtools.facet_tables``. Raise `_METHOD` when facets or weights
 #: are made differently.
 TABLE = Path(__file__).resolve().parent.parent / "catalogue" / "tables" / "facet_weights.json"
-_METHOD = 2
+_METHOD = 3
 #: Facets of a sub-plant for which weights are known; in between, weights are linear in the logarithm.
-COUNTS = 4.0 ** np.arange(-2, 6)
-#: With fewer facets for a sub-plant its neighbours count, and not only its siblings.
-_FEW = 4.0
-#: Polygons of all families of a row; maximum members of one, siblings or neighbours.
-_POLYGONS = 50_000.0
-_SIBLINGS, _NEIGHBOURS = 12, 60
+COUNTS = 2.0 ** np.arange(-4, 11)
+#: Polygons of all families of a row, and the most members of one.
+_POLYGONS, _NEIGHBOURS = 150_000.0, 60
 #: Facets for each number, over all families: copies are made up to the first; with fewer than the second a number is
 #: skipped; after more than the third no larger number is tried.
 _WANTED, _NEEDED, _MOST = 250.0, 60.0, 5_000.0
@@ -203,54 +200,39 @@ def fitting(flora: Flora, number: int, rays: float = np.inf) -> Generator[float,
         Fraction that is done.
     """
     rows = np.flatnonzero(flora.rows["species"] == number)
-    few, out, seen, done = COUNTS < _FEW, np.ones((2, len(rows), len(COUNTS))), {}, 0
-    for siblings, counts in ((False, few), (True, ~few)):
-        for row, families in _families(flora, number, siblings).items():
-            apart = _apart(flora, families)
-            for kind, make in enumerate((Families.of_subplants, Families.of_branches)):
-                fitted = _fitted(make(flora, *apart), counts, rays, seen)
-                while True:
-                    try:
-                        yield min((done + next(fitted)) / (4 * len(rows)), 1.0)
-                    except StopIteration as stop:
-                        out[kind, row - rows[0], counts] = stop.value[counts]
-                        break
-                done += 1
+    out, seen, done = np.ones((2, len(rows), len(COUNTS))), {}, 0
+    for row, families in _families(flora, number).items():
+        apart = _apart(flora, families)
+        for kind, make in enumerate((Families.of_subplants, Families.of_branches)):
+            fitted = _fitted(make(flora, *apart), rays, seen)
+            while True:
+                try:
+                    yield min((done + next(fitted)) / (2 * len(rows)), 1.0)
+                except StopIteration as stop:
+                    out[kind, row - rows[0]] = stop.value
+                    break
+            done += 1
     return out
 
 
-def _families(flora: Flora, number: int, siblings: bool) -> dict[int, list[Branches]]:
-    """Sub-plants of each row of a species that grow together, in a few plants or on a few parents of each row."""
+def _families(flora: Flora, number: int) -> dict[int, list[Branches]]:
+    """Sub-plants of each row of a species that grow together, in a few plants."""
     n = FAMILIES
     which = np.full(n, number, np.int32)
     names = tuple(s.identifier for s in flora.species)
     seeds = Seeds(names, which, np.arange(n), np.zeros((n, 3)), np.tile(np.eye(3), (n, 1, 1)), np.ones(n))
     level, plant, found = trunks(flora.rows, seeds), np.arange(n), {}
-    parent = plant
     while len(level):
         some = []
         for row in np.unique(level.row):
             own, most = np.flatnonzero(level.row == row), _POLYGONS / FAMILIES / max(flora.polygons[row], 1.0)
-            choose = _siblings if siblings else _neighbours
-            for members in choose(level, own, parent if siblings else plant, most):
+            for members in _neighbours(level, own, plant, most):
                 some.append(members)
                 found.setdefault(int(row), []).append(level.take(members))
         chosen = np.concatenate(some)
         level, parent, _, _ = open_subplants(flora, level.take(chosen))
         plant = plant[chosen][parent]
     return {row: _affordable(flora, families) for row, families in found.items()}
-
-
-def _siblings(
-    level: Branches, own: NDArray[np.int64], parent: NDArray[np.int64], most: float
-) -> Iterator[NDArray[np.int64]]:
-    """Sub-plants in the middle of some parents."""
-    members = int(np.clip(most, 1, _SIBLINGS))
-    parents = np.unique(parent[own])
-    for p in parents[np.argsort(mix(parents.astype(np.uint64)))[:FAMILIES]]:
-        born = own[parent[own] == p]
-        first = (len(born) - min(members, len(born))) // 2
-        yield born[first : first + members]
 
 
 def _neighbours(
@@ -284,11 +266,10 @@ def _apart(flora: Flora, families: list[Branches]) -> tuple[Branches, NDArray[np
 
 def _fitted(
     sight: Families,
-    counts: NDArray[np.bool_],
     rays: float,
     seen: dict[object, list[tuple[View, NDArray[np.int64]]]],
 ) -> Generator[float, None, NDArray[np.float64]]:
-    """Weights (k,) for one row, of which those of some counts (k,) matter; yields the fraction that is done.
+    """Weights (k,) for one row; yields the fraction that is done.
 
     What rays meet is looked up in ``seen``, and noted there.
     """
@@ -299,12 +280,10 @@ def _fitted(
         looked = []
         for view in look(sight.grown(), sight.beyond):
             looked.append(view)
-            yield 0.1 * len(looked)
+            yield 0.05 * len(looked)
         seen[sight.content] = looked
     views, met = zip(*seen[sight.content], strict=True)
-    # One more, for those that are skipped.
-    some = np.flatnonzero(counts | np.append(False, counts[:-1]))
-    for k, count in zip(some.tolist(), COUNTS[some].tolist(), strict=True):
+    for k, count in enumerate(COUNTS.tolist()):
         expected = count * len(sight.area)
         copies = int(np.clip(np.ceil(_WANTED / expected), 1, _COPIES))
         if expected * copies < _NEEDED or not any(map(len, met)):
@@ -315,7 +294,7 @@ def _fitted(
         stride = _stride(blocked, rays, views[0].covered(facets))
         least = [least_weights(view.coarser(stride), facets) for view in views]
         out[k] = _weight(np.concatenate(least), max(round(blocked / stride**2), 1))
-        yield 0.5 + 0.5 * (k - some[0] + 1) / len(some)
+        yield 0.5 + 0.5 * (k + 1) / len(COUNTS)
         if expected > _MOST or (sight.leaf > side**2).all():
             break
     known = np.flatnonzero(np.isfinite(out))

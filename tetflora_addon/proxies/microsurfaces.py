@@ -24,12 +24,14 @@ from ..growth.hashing import Draw, child_key, mix, signed, uniform
 from ..growth.wind import moment
 from ..refinement.contents import Totals, piece_totals, subplant_totals
 from ..subplants.pieces import Pieces
+from .leaf_planes import leaf_planes
 
 _FACET_PATH = 1 << 40  # child indices of facets start here
 _WOOD_PATH = 1 << 41
 # Draws of this module. Wood and leaves have draws of their own; none may coincide, or facets bunch up.
 _LEAF_COUNT, _WOOD_COUNT, _TURN, _START, _PLACE = 201, 202, 203, 204, 205
 _MOVE = 211  # three draws from here on
+_FACE = 214
 _GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 _GOLDEN = (np.sqrt(5) - 1) / 2
 _MOVED = 0.04  # of the length of a sub-plant's branch
@@ -196,6 +198,13 @@ def _facet_colours(
     return np.clip(mean + gathered(flora.rows["leaf_colour"][:, 1], row) * deviation[:, None], 0, 1)
 
 
+def _in_a_face(flora: Flora, row: NDArray, key: NDArray[np.uint64], frame: NDArray) -> NDArray:
+    """Axes (n, 3, 3) of a face of leaves with axes (n, 3, 3) that branches of the rows (n,) bear."""
+    planes = leaf_planes(flora)
+    number = (uniform(key, _FACE) * planes.shape[1]).astype(np.int64)
+    return products(frame, planes[row, number])
+
+
 def _picked(
     flora: Flora, points: Points, subplants: Branches, owner: NDArray, index: NDArray, key: NDArray[np.uint64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
@@ -242,6 +251,7 @@ def _leaves_of_subplants(
     frame = settled(rows, leaf_row, frame, points.light[pick].astype(np.float64), _SKY)
     half_leaf = 0.5 * rows["leaf_size"][leaf_row, 0] * subplants.scale[owner]
     centre = place + half_leaf[:, None] * frame[:, :, 1]
+    frame = _in_a_face(flora, leaf_row, key, frame)
     # Sub-plants beyond the limbs know how far outside they are, which holds for all that grows on them.
     outward = np.where(rows["outward"][subplants.row[owner]], points.outward[pick], subplants.outward[owner])
     colour = _facet_colours(flora, leaf_row, key, area / one.clip(1e-300)[owner], outward, points.young[pick])
@@ -272,6 +282,7 @@ def _leaves_of_pieces(
     leaves = place_leaves(rows, own, lines, np.searchsorted(bearers, owner), index, key, t)
     frame = settled(rows, row[owner], leaves.frame, leaves.light, leaves.sky)
     centre = leaves.position + 0.5 * leaves.size[:, None] * frame[:, :, 1]
+    frame = _in_a_face(flora, row[owner], key, frame)
     places = outwardness(rows, branches, owner, t), youth(rows, row[owner], t)
     colour = _facet_colours(flora, row[owner], key, area / one.clip(1e-300)[owner], *places)
     colour = trapped(colour, weight[owner])

@@ -22,7 +22,7 @@ from .microsurfaces import CIRCUMRADIUS, SIN_60, Facets, piece_facets, subplant_
 #: Families that are seen side by side, at most.
 FAMILIES = 6
 #: Rays across a family, and directions of rays.
-_RAYS, _DIRECTIONS = 36, 4
+_RAYS, _DIRECTIONS = 36, 6
 #: Maximum weight.
 LARGEST = 1.6
 

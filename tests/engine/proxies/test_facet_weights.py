@@ -103,7 +103,8 @@ def test_between_known_numbers_weights_follow_the_logarithm(level: float, count:
     assert weights.of_subplants(np.array([1]), np.array([count]))[0] == pytest.approx(level)
     rising = np.tile(np.arange(len(subject.COUNTS), dtype=float), (2, 1))
     weights = subject.FacetWeights(rising, rising)
-    place = np.clip(np.log(count / subject.COUNTS[0]) / np.log(4), 0, len(subject.COUNTS) - 1)
+    step = np.log(subject.COUNTS[1] / subject.COUNTS[0])
+    place = np.clip(np.log(count / subject.COUNTS[0]) / step, 0, len(subject.COUNTS) - 1)
     assert weights.of_pieces(np.array([0]), np.array([count]))[0] == pytest.approx(place)
 
 

@@ -27,10 +27,12 @@ _VERSION = 2
 UNIT = (0.0, 1.0)
 #: How much more than the mean of both sides a leaf's underside reflects diffusely, and the upper side less: fewer
 #: pigments lie under its surface, hence most in blue. A third of what three species show (docs/species.md), because
-#: proxies have no sides: where leaves become proxies, light must not jump.
+#: spheres and shells have no sides: where leaves become proxies, light must not jump.
 PALER = (0.16, 0.12, 0.3)
 #: How much more than the mean of both sides the upper side mirrors: its wax is smooth, the underside hairy.
 GLOSSIER = 0.1
+#: How much rougher the gloss of the underside is, and the upper side's where no blade says otherwise.
+HAIRY, WAXY = 0.2, 0.5
 #: What of `GLOSS` is mirrored at all angles, and how much is added at a grazing one: g (a + b (1 - cos)^5), whose mean
 #: over all directions is g, as the cosine-weighted mean of (1 - cos)^5 is 1/21.
 _FACING, _GRAZING = 0.85, 0.15 * 21.0
@@ -165,24 +167,33 @@ def _built(graph: Graph, given: Any, blade: BladeLook) -> dict[str, Any]:
     tone, glow, height = _venation(graph, given, blade, place)
 
     back, through = (_varied(graph, mottled, *line) for line in ((tone, _VEIN_HUE), (glow, _THROUGH_HUE)))
-    paler = graph.vector('SCALE', PALER, graph.math('MULTIPLY', side, given["Paler Underside"]))
-    back = graph.vector('MULTIPLY', back, graph.vector('ADD', paler, (1.0, 1.0, 1.0)))
+    back = graph.vector('MULTIPLY', back, paler(graph, graph.math('MULTIPLY', side, given["Paler Underside"])))
     through = graph.vector('MULTIPLY', through, tuple(THROUGH_TINT.tolist()))
     back, through = (graph.tinted(given["Colour"], colour) for colour in (back, through))
     if blade.wear:
         dead = _dead(graph, given, place, own, noise)
         back, through = (_mixed(graph, dead, *pair) for pair in ((back, _DEAD), (through, _DEAD_THROUGH)))
 
-    facing = graph.node("ShaderNodeLayerWeight", {"Blend": 0.5}).outputs["Facing"]
-    sheen = graph.math('MULTIPLY_ADD', graph.math('POWER', facing, 5.0), _GRAZING, _FACING)
-    gloss = graph.math('MULTIPLY', graph.math('MULTIPLY_ADD', side, -GLOSSIER, 1.0), given["Gloss"])
     return {
         "Reflected": back,
         "Through": through,
-        "Gloss": graph.math('MULTIPLY', gloss, sheen),
-        "Roughness": graph.math('MULTIPLY_ADD', geometry["Backfacing"], 0.2, given["Roughness"]),
+        "Gloss": sheen(graph, side, given["Gloss"]),
+        "Roughness": graph.math('MULTIPLY_ADD', geometry["Backfacing"], HAIRY, given["Roughness"]),
         "Normal": _relief(graph, given, moved, height, side) if blade.relief else geometry["Normal"],
     }
+
+
+def paler(graph: Graph, side: Socket) -> Socket:
+    """Factors on what a side of leaves reflects: -1 is the upper one, 1 the underside, 0 the mean of both."""
+    return graph.vector('ADD', graph.vector('SCALE', PALER, side), (1.0, 1.0, 1.0))
+
+
+def sheen(graph: Graph, side: Socket, gloss: Any) -> Socket:
+    """What a side of leaves mirrors as they are seen, from what leaves mirror on the mean."""
+    facing = graph.node("ShaderNodeLayerWeight", {"Blend": 0.5}).outputs["Facing"]
+    grazing = graph.math('MULTIPLY_ADD', graph.math('POWER', facing, 5.0), _GRAZING, _FACING)
+    of_side = graph.math('MULTIPLY', graph.math('MULTIPLY_ADD', side, -GLOSSIER, 1.0), gloss)
+    return graph.math('MULTIPLY', of_side, grazing)
 
 
 def _venation(

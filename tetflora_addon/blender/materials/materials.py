@@ -16,7 +16,7 @@ from ...emission.light import BACK, FRONT
 from ...light.scattering import GLOSS
 from ..compat import disable_bump_correction
 from .bark import bark_group, bark_version, place_group
-from .blade import blade_group, blade_version
+from .blade import HAIRY, WAXY, blade_group, blade_version, paler, sheen
 from .microsphere import WHITE, scatter_group
 from .nodes import Graph, find_socket, surface_material
 
@@ -27,7 +27,7 @@ ASSET_SPHERE = "TetFlora asset microsphere"
 BAKED = "TetFlora baked"
 
 # Raise these when what they count changes: existing files then get the new nodes beside the old ones.
-_PROXY_VERSION = 2
+_PROXY_VERSION = 3
 _SPHERE_VERSION = 1
 _BAKED_VERSION = 1
 
@@ -124,11 +124,29 @@ def proxy_material(own: bool = False) -> bpy.types.Material:
     """Material "TetFlora proxy" of all microsurfaces: as a leaf where ``tf_transmission`` is above 0, else as bark.
 
     own: "TetFlora asset proxy", for what stands for the artist's own materials, which mostly are Principled.
+
+    Notes
+    -----
+    Facets have the sides of leaves: level leaves show their darker side to the sky, hanging ones the paler one to the
+    eye. As of leaves, light that was scattered before meets the mean of both.
     """
 
     def build(graph: Graph, _material: bpy.types.Material) -> None:
-        normal = graph.node("ShaderNodeNewGeometry").outputs["Normal"]
-        _lead_out(graph, _principled(graph) if own else _scattered(graph, _proxy_looks(graph, normal)))
+        geometry = graph.node("ShaderNodeNewGeometry").outputs
+        plain = _proxy_looks(graph, geometry["Normal"])
+        if own:
+            _lead_out(graph, _principled(graph))
+            return
+        side = graph.math('MULTIPLY_ADD', geometry["Backfacing"], 2.0, -1.0)
+        leaf = graph.math('GREATER_THAN', plain["Transmission"], 0.0)
+        sides = {
+            **plain,
+            "Reflected Tint": paler(graph, graph.math('MULTIPLY', side, leaf)),
+            "Gloss": sheen(graph, side, plain["Gloss"]),
+            "Gloss Roughness": graph.math('MULTIPLY_ADD', geometry["Backfacing"], HAIRY, WAXY),
+        }
+        scattered = graph.node("ShaderNodeLightPath").outputs["Is Diffuse Ray"]
+        _lead_out(graph, graph.mix(scattered, _scattered(graph, sides), _scattered(graph, plain)))
 
     return surface_material(ASSET_PROXY if own else PROXY, _PROXY_VERSION, build)
 
