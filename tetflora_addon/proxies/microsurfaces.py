@@ -198,11 +198,17 @@ def _facet_colours(
     return np.clip(mean + gathered(flora.rows["leaf_colour"][:, 1], row) * deviation[:, None], 0, 1)
 
 
-def _in_a_face(flora: Flora, row: NDArray, key: NDArray[np.uint64], frame: NDArray) -> NDArray:
-    """Axes (n, 3, 3) of a face of leaves with axes (n, 3, 3) that branches of the rows (n,) bear."""
+def _in_a_face(flora: Flora, row: NDArray, key: NDArray[np.uint64], frame: NDArray) -> tuple[NDArray, NDArray]:
+    """Two axes (n, 3), (n, 3) in a face of leaves with axes (n, 3, 3) that branches of the rows (n,) bear."""
     planes = leaf_planes(flora)
-    number = (uniform(key, _FACE) * planes.shape[1]).astype(np.int64)
-    return products(frame, planes[row, number])
+    number = row * planes.shape[1] + (uniform(key, _FACE) * planes.shape[1]).astype(np.int64)
+    # By component, see `products`.
+    x, y, z = np.moveaxis(frame, 2, 0)
+    across, along = (
+        sum(gathered(planes[:, :, k, axis].ravel(), number)[:, None] * v for k, v in enumerate((x, y, z)))
+        for axis in (0, 1)
+    )
+    return across, along
 
 
 def _picked(
@@ -251,14 +257,14 @@ def _leaves_of_subplants(
     frame = settled(rows, leaf_row, frame, points.light[pick].astype(np.float64), _SKY)
     half_leaf = 0.5 * rows["leaf_size"][leaf_row, 0] * subplants.scale[owner]
     centre = place + half_leaf[:, None] * frame[:, :, 1]
-    frame = _in_a_face(flora, leaf_row, key, frame)
+    across, along = _in_a_face(flora, leaf_row, key, frame)
     # Sub-plants beyond the limbs know how far outside they are, which holds for all that grows on them.
     outward = np.where(rows["outward"][subplants.row[owner]], points.outward[pick], subplants.outward[owner])
     colour = _facet_colours(flora, leaf_row, key, area / one.clip(1e-300)[owner], outward, points.young[pick])
     return Facets(
         centre,
-        frame[:, :, 0],
-        frame[:, :, 1],
+        across,
+        along,
         np.sqrt(area * weight[owner]),
         trapped(colour, weight[owner]),
         flora.leaf.transmission[leaf_row],
@@ -282,7 +288,7 @@ def _leaves_of_pieces(
     leaves = place_leaves(rows, own, lines, np.searchsorted(bearers, owner), index, key, t)
     frame = settled(rows, row[owner], leaves.frame, leaves.light, leaves.sky)
     centre = leaves.position + 0.5 * leaves.size[:, None] * frame[:, :, 1]
-    frame = _in_a_face(flora, row[owner], key, frame)
+    across, along = _in_a_face(flora, row[owner], key, frame)
     places = outwardness(rows, branches, owner, t), youth(rows, row[owner], t)
     colour = _facet_colours(flora, row[owner], key, area / one.clip(1e-300)[owner], *places)
     colour = trapped(colour, weight[owner])
@@ -291,7 +297,7 @@ def _leaves_of_pieces(
     if own.later is not None:
         there = place_leaves(rows, own.moved(), lines.later, leaves.branch, index, key, t)
         velocity = (there.position - leaves.position) / moment(rows)
-    return Facets(centre, frame[:, :, 0], frame[:, :, 1], np.sqrt(area * weight[owner]), colour, transmission, velocity)
+    return Facets(centre, across, along, np.sqrt(area * weight[owner]), colour, transmission, velocity)
 
 
 def _wood_of_subplants(
