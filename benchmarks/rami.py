@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from math import nan
 
 from devtools import session
 
@@ -96,7 +95,7 @@ def _tell(found: Measured, name: str, form: str, pixels: int, bounces: int) -> N
     for against, error in shown.items():
         print(
             f"{name} {form} {pixels} px against {against}: rms {error['rms']:.4f}, mean {error['mean']:+.4f}, "
-            f"hotspot {error.get('hotspot', nan):.4f} ({len(curve[0])} views)",
+            f"hotspot {error['hotspot']:.4f} ({len(curve[0])} views)",
             flush=True,
         )
 

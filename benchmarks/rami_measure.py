@@ -11,7 +11,7 @@ import json
 import time
 from collections.abc import Sequence
 from itertools import pairwise
-from math import ceil
+from math import ceil, nan
 from pathlib import Path
 
 import bpy
@@ -93,9 +93,14 @@ def _key(form: str, pixels: int, zenith: float, bounces: int) -> str:
 def errors(name: str, angles: NDArray, factors: NDArray, reference: tuple[NDArray, NDArray] | None = None) -> dict:
     """RMS of relative errors over all published angles, the largest beside the hotspot, and their mean.
 
-    Between the angles that were measured errors are linear, so that it does not matter where these are dense.
+    Between the angles that were measured errors are linear, so that it does not matter where these are dense. Of
+    another reference than the published one, which need not have all angles, only common ones count.
     """
     at, known = reference or published(name)
+    common = np.isin(angles, at)
+    if not common.any():
+        return dict.fromkeys(("rms", "hotspot", "mean"), nan)
+    angles, factors = angles[common], factors[common]
     relative = factors / np.interp(angles, at, known) - 1
     everywhere, _ = published(name)
     inside = everywhere[(everywhere >= angles[0]) & (everywhere <= angles[-1])]
