@@ -26,8 +26,9 @@ FEW, NO_GAIN, NO_POLYGONS = 0.005, 0.002, 20_000
 UNKNOWN = 4.0
 #: How much smaller than the limit leaves are at the far end of a tetrahedron that is divided for it.
 DEEP = 1.5
-#: Side of tetrahedra that facets stand for, over that of those of real leaves.
-FACET_BLOCK = 0.5
+#: Side of tetrahedra that facets stand for, over that of those of real leaves. Were they smaller, more would be found
+#: hidden from where on the first leaves are real, and all facets around would change their sizes and places there.
+FACET_BLOCK = 1.0
 #: Width from which on all leaves are real over the width up to which none is.
 BAND = 2.5
 

@@ -154,6 +154,27 @@ def test_what_is_real_stays_real_as_the_limit_falls_and_as_more_is_seen() -> Non
     assert set() < leaves[0] < leaves[1] < leaves[2]
 
 
+@pytest.mark.parametrize("place", [0.4, 0.6, 0.8])
+def test_a_larger_limit_adds_facets_and_moves_none(place: float) -> None:
+    """Also where the loop asks anew what is seen: facets are where they were, as large as they were, and leaves go."""
+    width = float(np.median(scene()[2].cells.feature))
+    facets, leaves = [], []
+    for limit in place * width * np.array([1.0, 1.1]):
+        flora, camera, result = scene(leaf_limit=float(limit))
+        transition = Transition(flora, camera, float(limit))
+        made = all_facets(flora, result, camera, transition)
+        facets.append({tuple(f) for f in np.column_stack([made.centre, made.side]).round(4)})
+        leaves.append(
+            {
+                tuple(p)
+                for m in leaf_meshes(explicit_blocks(flora, result, camera, transition))
+                for p in m.positions.round(4)
+            }
+        )
+    assert len(facets[0] - facets[1]) < 0.02 * len(facets[0]) < len(facets[1] - facets[0])
+    assert leaves[1] < leaves[0]
+
+
 def test_thick_wood_is_real_among_proxies() -> None:
     """A trunk of many pixels is a tube, and has no facets, although all around it is drawn as proxies."""
     flora, camera, result = scene()

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tests.engine import support
 from tetflora_addon.refinement.contents import Totals
 from tetflora_addon.refinement.decisions import (
+    BAND,
     FACET_BLOCK,
     Decision,
     Terminals,
@@ -168,3 +169,15 @@ def test_the_last_few_cells_are_not_worth_a_pass() -> None:
     assert not gains_nothing(many, cells, 0.01 * seen, CAMERA)
     assert not gains_nothing(splitting, replace(cells, pixels=1200.0 * seen), seen, CAMERA)
     assert not gains_nothing(splitting, replace(cells, totals=replace(totals, polygons=2e4 * seen)), seen, CAMERA)
+
+
+@given(
+    st.floats(6.0, 40.0).filter(lambda side: abs(side - FACET_BLOCK * SETTINGS.block) > 0.01),
+    st.floats(0.3, 1.0),
+    st.floats(0.01, 2.0 * BAND),
+)
+def test_how_finely_space_is_divided_does_not_tell_leaves_from_facets(side: float, seen: float, width: float) -> None:
+    """Else what is seen of all the others would be known better, or worse, from where on the first leaves are real."""
+    width *= SETTINGS.leaf_limit  # a pixel is a metre wide there
+    divided = become(side**2, seen, width=width) == Decision.SPLIT
+    assert divided == (side > FACET_BLOCK * SETTINGS.block)
