@@ -210,7 +210,7 @@ def test_generations_are_limited(limit: int) -> None:
 
 def test_a_finer_cutoff_divides_more() -> None:
     flora = support.small_flora()
-    camera = support.camera((0, -60, 6), (0, 0, 1.5), pixels=128, view=0.3)
+    camera = support.camera((0, -60, 6), (0, 0, 1.5), pixels=256, view=0.3)
     limits = {"leaf_limit": 1e9}  # leaves divide space for reasons of their own
     made = [
         run(flora, support.grove(16, 2.5), camera, cutoff=c, **limits)[1].tree.tetrahedra_made
