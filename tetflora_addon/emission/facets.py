@@ -25,6 +25,7 @@ from ..processes.pool import WORTH_PROCESSES, in_processes
 from ..proxies.drawn import Drawn
 from ..proxies.facet_sizes import HIDDEN_LEAVES, FacetPixels, FacetSizes, piece_facet_sizes, subplant_facet_sizes
 from ..proxies.facet_weights import FacetWeights, facet_weights
+from ..proxies.hotspots import light_ratios
 from ..proxies.microsurfaces import Facets, kept_out_of_view, piece_facets, subplant_facets
 from ..proxies.thrown_shadows import ThrownShadows
 from ..refinement.contents import bounding_cylinders, piece_totals
@@ -257,7 +258,15 @@ class _Maker:
     def _of_subplants(self, subplants: Branches, sizes: FacetSizes, real: NDArray[np.float64]) -> Facets:
         leaf, wood = sizes.sides(self.pixels)
         weight = self.weights.of_subplants(subplants.row, sizes.whole_optical / np.maximum(leaf, 1e-12) ** 2)
-        return subplant_facets(self.sight.flora, subplants, leaf, wood, weight, real)
+        return subplant_facets(
+            self.sight.flora, subplants, leaf, wood, weight, real, self._once(subplants, sizes, leaf)
+        )
+
+    def _once(self, branches: Branches, sizes: FacetSizes, side: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Light (n,) that leaves of branches send to the eye once over what facets do; 1 where nothing is seen."""
+        out, seen, shadows = np.ones(len(branches)), np.flatnonzero(~sizes.hidden), self.sight.shadows
+        out[seen] = light_ratios(self.sight.flora, branches.take(seen), side[seen], shadows.camera, shadows.lights)
+        return out
 
     def _of_bodies(self, portions: Portions) -> Facets:
         """Facets of branches alone, without wood that is real."""
@@ -275,4 +284,5 @@ class _Maker:
             bare = transition.of_bare_wood(branches, portions.visibility)
             tubes = (seen & np.where(real > 0, tubes | twigs, bare))[owner]
             real = real[owner]
-        return piece_facets(flora, pieces, leaf, wood, weight, real, tubes)
+        once = self._once(pieces.branches, sizes, leaf)
+        return piece_facets(flora, pieces, leaf, wood, weight, real, tubes, once)

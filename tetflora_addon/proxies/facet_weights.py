@@ -48,6 +48,8 @@ _METHOD = 3
 COUNTS = 2.0 ** np.arange(-4, 11)
 #: Polygons of all families of a row, and the most members of one.
 _POLYGONS, _NEIGHBOURS = 150_000.0, 60
+#: The same of solids of leaves, which have no parts that would tell as much with fewer.
+_POLYGONS_OF_SOLIDS = 400_000.0
 #: Facets for each number, over all families: copies are made up to the first; with fewer than the second a number is
 #: skipped; after more than the third no larger number is tried.
 _WANTED, _NEEDED, _MOST = 250.0, 60.0, 5_000.0
@@ -251,7 +253,8 @@ def _affordable(flora: Flora, families: list[Branches]) -> list[Branches]:
     """As many of the families as their polygons allow, and at least one."""
     families = [families[i] for i in np.argsort(mix(np.arange(len(families)).astype(np.uint64)))][:FAMILIES]
     total = np.cumsum([flora.face_counts(family).sum() for family in families])
-    return [family for family, sum_ in zip(families, total, strict=True) if sum_ <= _POLYGONS] or families[:1]
+    most = _POLYGONS_OF_SOLIDS if are_solids(flora.rows)[families[0].row[0]] else _POLYGONS
+    return [family for family, sum_ in zip(families, total, strict=True) if sum_ <= most] or families[:1]
 
 
 def _apart(flora: Flora, families: list[Branches]) -> tuple[Branches, NDArray[np.float64]]:

@@ -19,11 +19,12 @@ from ..compiled.flora import Flora
 from ..compiled.samples import Points
 from ..growth.axes import axes
 from ..growth.branches import Branches
-from ..growth.foliage import leaf_start, mean_leaf_colours, outwardness, place_leaves, settled, youth
+from ..growth.foliage import leaf_start, outwardness, place_leaves, settled, youth
 from ..growth.hashing import Draw, child_key, mix, signed, uniform
 from ..growth.wind import moment
 from ..refinement.contents import Totals, piece_totals, subplant_totals
 from ..subplants.pieces import Pieces
+from .facet_colours import dimmed, leaf_colours_of_facets
 from .leaf_planes import leaf_planes
 
 _FACET_PATH = 1 << 40  # child indices of facets start here
@@ -84,6 +85,7 @@ def subplant_facets(
     wood_side: NDArray[np.float64] | None = None,
     weight: NDArray[np.float64] | None = None,
     real: NDArray[np.float64] | None = None,
+    once: NDArray[np.float64] | None = None,
 ) -> Facets:
     """Facets of sub-plants.
 
@@ -98,13 +100,15 @@ def subplant_facets(
         Fraction of their area that facets get, see `facet_weights`.
     real : (n,) float64, optional
         Fraction of each sub-plant that is drawn as it is; as many of its facets are left out at random.
+    once : (n,) float64, optional
+        Light that leaves send to the eye once over what facets do, see `hotspots`.
     """
     totals = subplant_totals(flora, subplants)
     part = np.ones(len(subplants)) if weight is None else weight
     wood_side = leaf_side if wood_side is None else wood_side
     return Facets.concatenate(
         [
-            _leaves_of_subplants(flora, subplants, totals, leaf_side, part, real),
+            _leaves_of_subplants(flora, subplants, totals, leaf_side, part, real, once),
             _wood_of_subplants(flora, subplants, totals, wood_side, part, real),
         ]
     )
@@ -118,6 +122,7 @@ def piece_facets(
     weight: NDArray[np.float64] | None = None,
     real: NDArray[np.float64] | None = None,
     real_wood: NDArray[np.bool_] | None = None,
+    once: NDArray[np.float64] | None = None,
 ) -> Facets:
     """Facets of pieces of branches; parameters as for `subplant_facets`.
 
@@ -129,7 +134,7 @@ def piece_facets(
     part = np.ones(len(pieces)) if weight is None else weight
     return Facets.concatenate(
         [
-            _leaves_of_pieces(flora, pieces, totals, leaf_side, part, real),
+            _leaves_of_pieces(flora, pieces, totals, leaf_side, part, real, once),
             _wood_of_pieces(flora, pieces, totals, leaf_side if wood_side is None else wood_side, part),
         ]
     )
@@ -159,17 +164,6 @@ def kept_out_of_view(
     return replace(facets, centre=centre, side=facets.side * fraction)
 
 
-def trapped(colour: NDArray[np.float64], weight: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Colour (n, 3) of clusters of surfaces that are seen by a fraction ``weight`` (n,) of their area.
-
-    What one surface scatters meets another of its cluster with the probability p = 1 − weight, and is dimmed again:
-    ω (1 − p) / (1 − p ω) (Smolander and Stenberg, "Simple parameterizations of the radiation budget of uniform
-    broadleaved and coniferous canopies", 2005).
-    """
-    p = np.clip(1.0 - weight, 0.0, 1.0)[:, None]
-    return colour * (1.0 - p) / (1.0 - p * colour)
-
-
 def facet_numbers(
     key: NDArray, area: NDArray, facet: NDArray, path: int, draw: int, real: NDArray | None = None
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
@@ -187,15 +181,6 @@ def facet_numbers(
         return owner, index, own, one[owner]
     kept = np.flatnonzero(uniform(own, Draw.TRANSITION) >= real[owner])
     return owner[kept], index[kept], own[kept], one[owner[kept]]
-
-
-def _facet_colours(
-    flora: Flora, row: NDArray, key: NDArray, leaves: NDArray, outward: NDArray, young: NDArray
-) -> NDArray[np.float64]:
-    """Colours of facets that stand for several leaves (n,) each: a mean varies less than the colour of one leaf."""
-    deviation = signed(key, Draw.LEAF_COLOUR) / np.sqrt(np.maximum(leaves, 1))
-    mean = mean_leaf_colours(flora.rows, row, outward, young)
-    return np.clip(mean + gathered(flora.rows["leaf_colour"][:, 1], row) * deviation[:, None], 0, 1)
 
 
 def _in_a_face(flora: Flora, row: NDArray, key: NDArray[np.uint64], frame: NDArray) -> tuple[NDArray, NDArray]:
@@ -245,7 +230,13 @@ def _turned(base: NDArray[np.float64], again: NDArray[np.int64], some: NDArray[n
 
 
 def _leaves_of_subplants(
-    flora: Flora, subplants: Branches, totals: Totals, side: NDArray, weight: NDArray, real: NDArray | None
+    flora: Flora,
+    subplants: Branches,
+    totals: Totals,
+    side: NDArray,
+    weight: NDArray,
+    real: NDArray | None,
+    once: NDArray | None,
 ) -> Facets:
     rows, points = flora.rows, flora.samples.leaves
     one = flora.one_leaf_area(subplants)
@@ -260,20 +251,26 @@ def _leaves_of_subplants(
     across, along = _in_a_face(flora, leaf_row, key, frame)
     # Sub-plants beyond the limbs know how far outside they are, which holds for all that grows on them.
     outward = np.where(rows["outward"][subplants.row[owner]], points.outward[pick], subplants.outward[owner])
-    colour = _facet_colours(flora, leaf_row, key, area / one.clip(1e-300)[owner], outward, points.young[pick])
+    colour = leaf_colours_of_facets(flora, leaf_row, key, area / one.clip(1e-300)[owner], outward, points.young[pick])
     return Facets(
         centre,
         across,
         along,
         np.sqrt(area * weight[owner]),
-        trapped(colour, weight[owner]),
+        dimmed(colour, owner, weight, once),
         flora.leaf.transmission[leaf_row],
         _carried(flora, subplants, owner, centre),
     )
 
 
 def _leaves_of_pieces(
-    flora: Flora, pieces: Pieces, totals: Totals, side: NDArray, weight: NDArray, real: NDArray | None
+    flora: Flora,
+    pieces: Pieces,
+    totals: Totals,
+    side: NDArray,
+    weight: NDArray,
+    real: NDArray | None,
+    once: NDArray | None,
 ) -> Facets:
     branches, rows = pieces.branches, flora.rows
     row = branches.row
@@ -290,8 +287,8 @@ def _leaves_of_pieces(
     centre = leaves.position + 0.5 * leaves.size[:, None] * frame[:, :, 1]
     across, along = _in_a_face(flora, row[owner], key, frame)
     places = outwardness(rows, branches, owner, t), youth(rows, row[owner], t)
-    colour = _facet_colours(flora, row[owner], key, area / one.clip(1e-300)[owner], *places)
-    colour = trapped(colour, weight[owner])
+    colour = leaf_colours_of_facets(flora, row[owner], key, area / one.clip(1e-300)[owner], *places)
+    colour = dimmed(colour, owner, weight, once)
     transmission = flora.leaf.transmission[row[owner]]
     velocity = None
     if own.later is not None:

@@ -1,0 +1,69 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Facets are balanced against leaves by light and view, and send back as much in all directions together."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tetflora_addon.proxies.hotspots import balance, balanced_colours, mean_overlap, overlap
+
+EXTINCTION = st.floats(0.01, 20.0)
+SIZE = st.floats(0.005, 1.0)
+
+
+def test_light_and_eye_share_all_gaps_where_they_are_one_and_none_where_leaves_are_small() -> None:
+    assert overlap(np.array([1e4])) == pytest.approx([2.0], abs=1e-3)
+    assert overlap(np.array([1e-3])) == pytest.approx([1.0], abs=2e-3)
+    a = np.geomspace(1e-3, 1e3, 50)
+    assert (np.diff(overlap(a)) > 0).all()
+
+
+@given(st.floats(0.02, 50.0))
+def test_overlap_is_the_integral_of_the_bidirectional_gap_probability(a: float) -> None:
+    x = np.linspace(0.0, 30.0, 60_001)
+    gap = 2.0 * np.exp(-2.0 * x + a * (1.0 - np.exp(-x / a)))
+    assert overlap(np.array([a]))[0] == pytest.approx(np.trapezoid(gap, x), rel=2e-3)
+
+
+@given(EXTINCTION, SIZE, st.floats(1.0, 30.0))
+def test_light_in_all_directions_stays(extinction: float, leaf: float, times: float) -> None:
+    psi = (np.arange(4000) + 0.5) / 4000 * np.pi / 2
+    chord, one = 2.0 * np.sin(psi / 2), np.ones(len(psi))
+    ratio = balance(chord, extinction * one, leaf * one, times * leaf * one)
+    # Facets send by their own overlap; balanced, the mean over the half sphere is theirs.
+    own = overlap(0.6 * extinction * times * leaf / np.maximum(chord, 1e-3))
+    weight = np.sin(psi)
+    assert (weight * own * ratio).sum() == pytest.approx((weight * own).sum(), rel=0.01)
+
+
+@given(EXTINCTION, SIZE)
+def test_facets_as_large_as_leaves_stay_as_they_are(extinction: float, leaf: float) -> None:
+    chord = np.linspace(0.0, 2.0, 20)
+    same = np.full(20, leaf)
+    assert balance(chord, np.full(20, extinction), same, same) == pytest.approx(np.ones(20))
+
+
+def test_near_the_shadow_of_the_eye_large_facets_are_dimmed_and_far_from_it_lightened() -> None:
+    chord = 2.0 * np.sin(np.radians([10.0, 80.0]) / 2)
+    near, far = balance(chord, np.full(2, 0.2), np.full(2, 0.18), np.full(2, 0.8))
+    assert near < 0.97
+    assert far > 1.0
+
+
+@given(st.floats(0.01, 1.0), st.floats(0.8, 1.2))
+def test_colours_stay_colours_and_white_is_changed_least(colour: float, once: float) -> None:
+    given_, white = np.array([[colour] * 3]), np.ones((1, 3))
+    out = balanced_colours(given_, np.array([once]))
+    assert ((out >= 0.0) & (out <= 1.0)).all()
+    if once < 1.0:
+        assert (out / given_ <= balanced_colours(white, np.array([once])) + 1e-12).all()
+    assert balanced_colours(given_, np.ones(1)) == pytest.approx(given_)
+
+
+def test_mean_overlap_lies_between() -> None:
+    a = np.geomspace(1e-2, 1e2, 30)
+    assert (mean_overlap(a) >= overlap(a / np.sqrt(2.0)) - 1e-6).all()

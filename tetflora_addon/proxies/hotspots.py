@@ -1,0 +1,128 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The hotspot of facets: what is seen from where it is lit hides its own shadows, the more widely the larger it is.
+
+Light and eye share gaps within an angle of about the size of leaves over the distance between them. Facets that are
+larger than the leaves for which they stand have a wider hotspot, and crowns around the shadow of the viewer's head were
+a twentieth too bright. The colour of facets makes up for that by view and light, as the visibility of aggregates does
+for Zhou, Huang, Ramamoorthi, Sen and Yan ("Appearance-Preserving Scene Aggregation for Level-of-Detail Rendering"), so
+that crowns send back as much light in all directions together as before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera.camera import Camera
+from ..compiled.flora import Flora
+from ..growth.branches import Branches
+from ..refinement.lights import Light
+
+#: Probability that light which a leaf of a crown scatters meets another, about.
+_RECOLLISION = 0.62
+#: Fraction of its box that a crown fills.
+_FILLED = 0.6
+#: Mean chord of a sheet over the root of its area: .89 of a disc that faces the eye, two thirds of that of one that may
+#: face any way.
+_CHORD = 0.6
+#: What is seen is lit once and again by all the rest, of which a part is seen too: between the first power of the light
+#: that is scattered once, were only these surfaces to change, and the second, were all to.
+_POWER = 1.5
+#: Arguments for which `overlap` and its mean are known, and points of quadratures.
+_KNOWN, _POINTS = np.geomspace(1e-3, 1e4, 141), 48
+
+
+def _overlaps() -> NDArray[np.float64]:
+    x, weight = np.polynomial.laguerre.laggauss(_POINTS)
+    a = _KNOWN[:, None]
+    # ∫ 2 exp(−2x + a (1 − e^{−x / a})) dx, of which the quadrature's weights contain e^{−x}.
+    return (2.0 * weight * np.exp(np.minimum(-a * np.expm1(-x / a), x) - x)).sum(axis=1)
+
+
+def overlap(size: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How much more (n,) of a deep medium is lit and seen than if light and eye had gaps of their own: 1 to 2.
+
+    ``size`` (n,) is the extinction times the chord of a leaf over 2 sin(ψ / 2), with the angle ψ between light and eye.
+    Both reach a place at optical depth x with the probability exp(−2x + a (1 − e^{−x / a})) (Kuusk, "The hot spot
+    effect of a uniform vegetative cover", Soviet Journal of Remote Sensing, 1985).
+    """
+    return np.interp(np.log(np.maximum(size, _KNOWN[0])), np.log(_KNOWN), _OVERLAPS)
+
+
+def mean_overlap(size: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean (n,) of `overlap` over the directions of the light's half of the sphere, by extinction times chord (n,)."""
+    return np.interp(np.log(np.maximum(size, _KNOWN[0])), np.log(_KNOWN), _MEANS)
+
+
+def _means() -> NDArray[np.float64]:
+    place, weight = np.polynomial.legendre.leggauss(_POINTS)
+    chord = (place + 1.0) / np.sqrt(2.0)  # from 0 to √2; directions are as dense as that
+    return (weight * chord * overlap(_KNOWN[:, None] / chord)).sum(axis=1) / np.sqrt(2.0)
+
+
+_OVERLAPS = _overlaps()
+_MEANS = _means()
+
+
+def balance(
+    chord: NDArray[np.float64], extinction: NDArray[np.float64], leaf: NDArray[np.float64], facet: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Light (n,) that leaves send to the eye once over what facets do, which send as much in all directions.
+
+    Parameters
+    ----------
+    chord : (n,) float64
+        2 sin(ψ / 2) of the angle ψ between light and eye.
+    extinction : (n,) float64
+        1/m.
+    leaf, facet : (n,) float64
+        Roots of the areas, metres. Facets are not smaller than leaves.
+    """
+    chord = np.maximum(chord, 1e-3)
+    small, large = _CHORD * extinction * leaf, _CHORD * extinction * np.maximum(facet, leaf)
+    ratio = overlap(small / chord) / overlap(large / chord)
+    return ratio * mean_overlap(large) / mean_overlap(small)
+
+
+def balanced_colours(colour: NDArray[np.float64], once: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Colours (n, 3) with which light that is scattered once changes by factors (n,).
+
+    Of all light that a crown of albedo ω sends back, 1 − pω was scattered once.
+    """
+    single = 1.0 - _RECOLLISION * np.clip(colour, 0.0, 1.0)
+    return np.clip(colour * once[:, None] ** single**_POWER, 0.0, 1.0)
+
+
+def light_ratios(
+    flora: Flora, subplants: Branches, facet: NDArray[np.float64], camera: Camera, lights: Sequence[Light]
+) -> NDArray[np.float64]:
+    """`balance` (n,) of sub-plants with facets of sides (n,), metres: the mean over lamps by their strength there.
+
+    The sky has no hotspot. Where there are lamps, it is taken for little.
+    """
+    place = subplants.position + 0.5 * subplants.length[:, None] * subplants.frame[:, :, 2]
+    radius, low, high = flora.sampled_bound[subplants.row].T
+    volume = _FILLED * np.pi * radius**2 * (high - low) * subplants.length**3
+    extinction = 0.5 * flora.leaf_areas(subplants) / np.maximum(volume, 1e-300)
+    leaf, eye = np.sqrt(flora.one_leaf_area(subplants)), _towards_eye(camera, place)
+    total, strength = np.zeros(len(place)), np.zeros(len(place))
+    for light in lights:
+        towards, away = -light.direction, 1.0
+        if light.kind != "SUN":
+            away = np.maximum(np.linalg.norm(light.position - place, axis=1), 1e-9)
+            towards = (light.position - place) / away[:, None]
+        own = float(np.mean(light.colour)) / away**2
+        total += own * balance(np.linalg.norm(eye - towards, axis=1), extinction, leaf, facet)
+        strength += own
+    return np.where(strength > 0.0, total / np.maximum(strength, 1e-300), 1.0)
+
+
+def _towards_eye(camera: Camera, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit vectors (n, 3) from places to the eye."""
+    if camera.kind == "ORTHO":
+        return np.broadcast_to(camera.frame[:, 2], places.shape)
+    way = camera.position - places
+    return way / np.maximum(np.linalg.norm(way, axis=1), 1e-9)[:, None]
