@@ -53,14 +53,15 @@ def overlap(size: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def mean_overlap(size: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Mean (n,) of `overlap` over the directions of the light's half of the sphere, by extinction times chord (n,)."""
+    """Mean (n,) of `overlap` over all light through a surface that faces the lamp, by extinction times chord (n,)."""
     return np.interp(np.log(np.maximum(size, _KNOWN[0])), np.log(_KNOWN), _MEANS)
 
 
 def _means() -> NDArray[np.float64]:
     place, weight = np.polynomial.legendre.leggauss(_POINTS)
     chord = (place + 1.0) / np.sqrt(2.0)  # from 0 to √2; directions are as dense as that
-    return (weight * chord * overlap(_KNOWN[:, None] / chord)).sum(axis=1) / np.sqrt(2.0)
+    dense = weight * chord * (1.0 - chord**2 / 2.0) * np.sqrt(2.0)
+    return (dense * overlap(_KNOWN[:, None] / chord)).sum(axis=1)
 
 
 _OVERLAPS = _overlaps()

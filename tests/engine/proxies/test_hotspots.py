@@ -34,9 +34,9 @@ def test_light_in_all_directions_stays(extinction: float, leaf: float, times: fl
     psi = (np.arange(4000) + 0.5) / 4000 * np.pi / 2
     chord, one = 2.0 * np.sin(psi / 2), np.ones(len(psi))
     ratio = balance(chord, extinction * one, leaf * one, times * leaf * one)
-    # Facets send by their own overlap; balanced, the mean over the half sphere is theirs.
+    # Facets send by their own overlap; balanced, the mean is theirs.
     own = overlap(0.6 * extinction * times * leaf / np.maximum(chord, 1e-3))
-    weight = np.sin(psi)
+    weight = np.sin(psi) * np.cos(psi)  # through a surface that faces the lamp
     assert (weight * own * ratio).sum() == pytest.approx((weight * own).sum(), rel=0.01)
 
 
@@ -67,3 +67,4 @@ def test_colours_stay_colours_and_white_is_changed_least(colour: float, once: fl
 def test_mean_overlap_lies_between() -> None:
     a = np.geomspace(1e-2, 1e2, 30)
     assert (mean_overlap(a) >= overlap(a / np.sqrt(2.0)) - 1e-6).all()
+    assert (mean_overlap(a) <= 2.0).all()
