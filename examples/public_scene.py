@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from math import atan, tan
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -34,6 +35,8 @@ from tetflora_addon.blender.job import refine  # noqa: E402
 #: Height of plants in pixels, and plants of each species, by the name of the distance.
 DISTANCES = {"near": (94, 1), "middle": (24, 2), "far": (12, 2)}
 LIGHT = "side"
+#: Of a plant's column, what the image shows more on the left and on the right: oaks are wider than their columns.
+MARGIN = 0.35
 SAMPLES = 512
 #: Fraction of a pixel that plants cover where it counts.
 LEAST_COVERAGE = 0.05
@@ -44,10 +47,22 @@ def build(distance: str) -> bpy.types.Scene:
     """Fill the empty scene with seeds, sun, sky, ground and camera, for Cycles."""
     session.clean_file()
     scene = bpy.context.scene
-    stands.build(scene, DISTANCES[distance][0], LIGHT, DISTANCES[distance][1])
+    pixels, each = DISTANCES[distance]
+    stands.build(scene, pixels, LIGHT, each)
+    _widen(scene, MARGIN / (each * len(stands.SPECIES)))
     scene.render.engine = 'CYCLES'
     scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
     return scene
+
+
+def _widen(scene: bpy.types.Scene, part: float) -> None:
+    """Show a part of the width more on either side; nothing changes its size in the image, nor its height there."""
+    before = scene.render.resolution_x
+    scene.render.resolution_x += 2 * round(part * before)
+    wider = scene.render.resolution_x / before
+    camera = scene.camera.data
+    camera.angle = 2.0 * atan(wider * tan(camera.angle / 2.0))
+    camera.shift_y /= wider  # in widths of the image
 
 
 def make(scene: bpy.types.Scene, expand: bool) -> None:

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -29,6 +31,23 @@ def test_a_reference_is_no_different_from_itself_and_plants_are_where_its_mask_s
     light, seen = images.read_picture(reference)[:, :, :3].mean(axis=2), images.read_picture(mask)[:, :, 0]
     # Foliage is darker than the sky that it is seen before, and than the ground.
     assert light[seen > 0.9].mean() < 0.6 * light[seen == 0.0].mean()
+
+
+def test_the_image_shows_all_plants_in_full(clean_file):
+    mask = images.read_picture(public_scene.FOLDER / "near-mask.png")[:, :, 0]
+    assert not mask[:, [0, -1]].any()
+    assert not mask[[0, -1]].any()
+
+
+def test_the_readme_tells_the_noise_of_another_seed(clean_file, tmp_path):
+    readme = (public_scene.FOLDER / "README.md").read_text(encoding="utf-8")
+    found = re.search(r"far: all polygons, another seed \| (\S+) \| (\S+) \| (\S+) ", readme)
+    scene = public_scene.build("far")
+    public_scene.make(scene, expand=True)
+    path = tmp_path / "far.exr"
+    images.render(scene, path, public_scene.SAMPLES, seed=1, form='OPEN_EXR')
+    noise = public_scene.compare(path, public_scene.FOLDER / "far.exr", public_scene.FOLDER / "far-mask.png")
+    np.testing.assert_allclose(list(noise.values()), [float(value) for value in found.groups()], atol=0.002)
 
 
 def test_linear_light_counts_as_a_display_stores_it(clean_file):
