@@ -80,10 +80,37 @@ class SeenNodes:
         self.explicit = result.chosen(Decision.EXPLICIT)
         self.inside = result.in_view | self.explicit
         self.coarse = coarseness(result)
+        self._fill_empty(result)
         self.close = np.zeros(size, bool)
         if facets:
             self.close[nodes] = (result.decision == Decision.HIDDEN) & (result.cells.feature >= CLOSE)
             self.close &= result.in_view
+
+    def _fill_empty(self, result: Refinement) -> None:
+        """Give nodes that hold no point what the nearest ones that do have on average, where they are in the view.
+
+        A plant has a few points in the loop, so that parts of it lie in nodes of which the loop knows nothing. They are
+        no more hidden than what is around them.
+        """
+        tree, known = result.tree, np.zeros(len(result.tree), bool)
+        known[result.nodes] = result.decision != Decision.EMPTY
+        every = np.zeros(len(tree))
+        every[result.nodes] = np.maximum(result.cells.totals.optical_area, 1e-12)
+        every[~known] = 0.0
+        weight = np.where(result.in_view, every, 0.0)
+        sums = np.stack([every, weight, *(weight * v for v in (self.visibility, self.explicit, self.coarse))], axis=1)
+        levels = [np.flatnonzero(tree.level == level) for level in range(1, tree.levels)]
+        for nodes in reversed(levels):
+            np.add.at(sums, tree.parent[nodes], sums[nodes])
+        for nodes in levels:
+            bare = nodes[sums[nodes, 1] <= 0.0]
+            sums[bare] = sums[tree.parent[bare]]
+        # A view's own root knows which of its pieces are in the view; elsewhere they are where those around are.
+        within = tree.inside if tree.inside.any() else sums[:, 1] > 0.5 * sums[:, 0]
+        empty = np.flatnonzero((tree.children[:, 0] < 0) & ~known & within & (sums[:, 1] > 0.0))
+        mean = sums[empty, 2:] / sums[empty, 1:2]
+        self.visibility[empty], self.explicit[empty], self.coarse[empty] = mean[:, 0], mean[:, 1] > 0.0, mean[:, 2]
+        self.inside[empty] = True
 
     def of(self, points: SharePoints, count: int, close: NDArray[np.intp]) -> Seen:
         """What is seen of so many parts with points (m,) on them, of which some (k,) count as if they were near."""
