@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, column, nested
+from ..arrays import nested
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..proxies.thrown_shadows import ThrownShadows
@@ -25,7 +25,7 @@ from ..refinement.contents import PlantParts, feature_width
 from ..refinement.loop import Refinement
 from ..refinement.shared_parts import SharePoints, lowered
 from ..refinement.shares import opened, share_points
-from .seen import CLOSE, SeenNodes
+from .seen import CLOSE, Seen, SeenNodes
 
 #: Pixels from which on a part that is seen only here and there is opened.
 MIXED = 24.0
@@ -38,38 +38,17 @@ POINTS = 12
 
 
 @dataclass(frozen=True)
-class Portions(Arrays):
+class Portions(Seen):
     """Parts of plants (n), and what is seen of them.
 
     Attributes
     ----------
     parts : PlantParts of n
-    visibility : (n,) float64
-        Mean fraction of light that nothing in front blocks, 0 where all of it is hidden or beside the view.
-    best : (n,) float64
-        The largest visibility in any of its tetrahedra.
-    real : (n,) bool
-        Whether some of it may be drawn as it is: it reaches into an explicit tetrahedron.
-    mixed : (n,) bool
-        Seen in part only.
-    beside : (n,) bool
-        All of it is out of view.
-    coarse : (n,) float64
-        How much larger its facets are where it is hidden, see `facet_sizes.coarseness`.
-    rank : (n,) int32
-        Front-to-back order of the tetrahedra that they begin in.
     within : (n,) float64
         Fraction of their polygons and facets that are expected within the view; less than 1 only where no point tells.
     """
 
     parts: PlantParts = field(metadata=nested(PlantParts))
-    visibility: NDArray[np.float64]
-    best: NDArray[np.float64]
-    real: NDArray[np.bool_] = field(metadata=column(dtype=bool))
-    mixed: NDArray[np.bool_] = field(metadata=column(dtype=bool))
-    beside: NDArray[np.bool_] = field(metadata=column(dtype=bool))
-    coarse: NDArray[np.float64]
-    rank: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
     within: NDArray[np.float64]
 
 
@@ -110,7 +89,7 @@ class Sight:
 
     def _portions(self, parts: PlantParts, points: SharePoints) -> Portions:
         seen = self.nodes.of(points, len(parts), self._close_points(parts, points))
-        made = Portions(parts, *vars(seen).values(), np.ones(len(parts)))
+        made = Portions(**vars(seen), parts=parts, within=np.ones(len(parts)))
         if self._facets:
             self._let_in(made, np.bincount(points.part, minlength=len(parts)))
         return made
@@ -163,19 +142,20 @@ class Sight:
             parent.append(owner)
             count += len(new)
         every, owner, found = PlantParts.concatenate(parts), np.concatenate(parent), SharePoints.concatenate(points)
-        made = Portions(every, *(getattr(portions, name)[owner] for name in _INHERITED))
+        made = Portions(parts=every, **{name: getattr(portions, name)[owner] for name in _INHERITED})
         if not len(found):
             return made
         known = self._portions(every, SharePoints(found.part, lowered(self.tree, found), *_rest(found)[1:]))
         mixed = portions.mixed[owner]
-        return Portions(every, *(np.where(mixed, getattr(known, name), getattr(made, name)) for name in _INHERITED))
+        columns = {name: np.where(mixed, getattr(known, name), getattr(made, name)) for name in _INHERITED}
+        return Portions(parts=every, **columns)
 
     def pixels(self, portions: Portions) -> NDArray[np.float64]:
         """Extent (n,) of parts in the image."""
         return self.plants.pixels(portions.parts)
 
 
-_INHERITED = ("visibility", "best", "real", "mixed", "beside", "coarse", "rank", "within")
+_INHERITED = (*vars(Seen.empty()), "within")
 
 
 def _rest(points: SharePoints) -> tuple[NDArray, NDArray, NDArray, NDArray]:

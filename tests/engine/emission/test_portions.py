@@ -11,7 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.engine import support
 from tests.engine.emission.test_emission import scene, with_decision
+from tests.engine.refinement.test_loop import run
 from tetflora_addon.emission.portions import CLOSE_WOOD, MIXED, Portions, Sight, in_chunks
 from tetflora_addon.emission.seen import SOME
 from tetflora_addon.refinement.decisions import Decision
@@ -151,3 +153,22 @@ def test_runs_hold_about_what_is_asked_for(numbers: list[float], limit: float) -
     assert np.concatenate([np.zeros(0, int), *runs]).tolist() == list(range(len(expected)))
     assert all(expected[run[1:]].sum() <= limit * (1 + 1e-9) for run in runs)
     assert not numbers or all(len(run) for run in runs)
+
+
+@pytest.mark.parametrize("anchored", [False, True])
+def test_a_part_without_a_point_around_it_is_as_visible_as_its_neighbours(anchored: bool) -> None:
+    """A tree of a hundred pixels alone, in which nothing is hidden: no place in its crown counts as hidden either."""
+    flora = support.compiled(support.shipped("oak"))
+    seeds = support.plants(1)
+    camera = support.camera((0, -76, 4), (0, 0, 4), pixels=100, view=0.15)
+
+    _, result = run(flora, seeds, camera, hidden=0.0, anchored=anchored)
+    own = Sight(flora, result, camera)
+    _, pieces = support.grown(flora, seeds)
+    place = pieces.end[camera.clearance(pieces.end) < -0.5]
+    cell = result.tree.locate(place)
+    known = np.zeros(len(result.tree), bool)
+    known[result.nodes] = True
+    assert (~known[cell]).any()  # places in nodes that hold no point
+    assert (own.nodes.visibility[cell] > 0.0).mean() > 0.99
+    assert own.nodes.inside[cell].mean() > 0.99
