@@ -29,7 +29,7 @@ from ..growth.growth import trunks
 from ..growth.hashing import key_of_seed, mix, uniform
 from ..growth.seeds import Seeds
 from ..leaves.models import LeafModel
-from ..species.species import fingerprint
+from ..species.fingerprints import fingerprint
 from ..storage import remembered
 from .rays import WIDEST, Things, basis, cell_numbers, covered, opened, path_lengths, things_of
 

@@ -35,7 +35,7 @@ from ..growth.growth import trunks
 from ..growth.hashing import mix
 from ..growth.seeds import Seeds
 from ..jobs import at_once
-from ..species.species import fingerprint
+from ..species.fingerprints import fingerprint
 from ..storage import remembered
 from ..subplants.pieces import open_subplants
 from .sights import FAMILIES, LARGEST, Families, View, least_weights, look

@@ -8,19 +8,20 @@ The tables below are the reference of the file format; `docs/species.md` is writ
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from ..errors import NAME, SpeciesError, readable, shown
+from ..errors import SpeciesError, shown
 from ..files import json_of, read_whole
 from ..leaves.schema import read_forms
 from .extras import read_bud, read_dead
 from .members import expected_polygons
+from .reader import FileReader
 from .skeletons import MAX_ORDERS
-from .species import BARKS, CROWN_SHAPES, LEAF_ENVELOPES, LEAF_INCLINATIONS, LEAF_KINDS, Colour, Order, Range, Species
+from .species import BARKS, CROWN_SHAPES, LEAF_ENVELOPES, LEAF_INCLINATIONS, LEAF_KINDS, Order, Species
+from .year import read_year
 
 FORMAT = 1
 MAX_FILE_BYTES = 4_000_000
@@ -157,7 +158,7 @@ ORDER_KEYS: dict[str, Key] = {
 
 SPECIES_KEYS = (
     "format", "name", "description", "orders", "bark", "quality", "habit", "stand_leaves", "exact", "leaf",
-    "leaf_transmission", "blossom", "blossom_transmission", "spur", "bud", "dead",
+    "leaf_transmission", "blossom", "blossom_transmission", "spur", "bud", "dead", "year",
 )  # fmt: skip
 QUALITY_LIMITS = (0.001, 1000.0)
 #: The short shoot of a species that asks for some and describes none.
@@ -179,78 +180,7 @@ CHOICES = {
 }
 
 
-class _Reader:
-    """Names the file and the key in every complaint."""
-
-    def __init__(self, source: str) -> None:
-        self.source = source
-
-    def fail(self, key: str, problem: str) -> SpeciesError:
-        return SpeciesError(f"{self.source}: {key}: {problem}")
-
-    def number(self, value: Any, key: str, low: float, high: float) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.fail(key, f"must be a number from {low:g} to {high:g}, not {shown(value)}")
-        if not low <= value <= high:  # false for NaN as well
-            raise self.fail(key, f"must be from {low:g} to {high:g}, not {shown(value)}")
-        return float(value)
-
-    def range(self, value: Any, key: str, low: float, high: float) -> Range:
-        if isinstance(value, int | float) and not isinstance(value, bool):
-            return Range(self.number(value, key, low, high))
-        if not isinstance(value, list) or len(value) != 2:
-            raise self.fail(key, f"must be [mean, variation] within {low:g} to {high:g}, not {shown(value)}")
-        mean = self.number(value[0], f"{key}[0] (mean)", low, high)
-        variation = self.number(value[1], f"{key}[1] (variation)", 0, high - low)
-        if mean - variation < low - 1e-12 or mean + variation > high + 1e-12:
-            raise self.fail(
-                key,
-                f"mean ± variation is {mean - variation:g} to {mean + variation:g}, must be from {low:g} to {high:g}",
-            )
-        return Range(mean, variation)
-
-    def colour(self, value: Any, key: str) -> Colour:
-        form = "[[r, g, b], [variation of each]]"
-        if not (
-            isinstance(value, list) and len(value) == 2 and all(isinstance(v, list) and len(v) == 3 for v in value)
-        ):
-            raise self.fail(key, f"must be {form} with numbers from 0 to 1, not {shown(value)}")
-        channels = [self.range([m, v], f"{key}.{c}", 0, 1) for m, v, c in zip(*value, "rgb", strict=True)]
-        return Colour(tuple(c.mean for c in channels), tuple(c.variation for c in channels))
-
-    def rgb(self, value: Any, key: str) -> tuple[float, float, float]:
-        if not isinstance(value, list | tuple) or len(value) != 3:
-            raise self.fail(key, f"must be [r, g, b] with numbers from 0 to 1, not {shown(value)}")
-        return tuple(self.number(v, f"{key}.{c}", 0, 1) for v, c in zip(value, "rgb", strict=True))
-
-    def truth(self, value: Any, key: str) -> bool:
-        if not isinstance(value, bool):
-            raise self.fail(key, f"must be true or false, not {shown(value)}")
-        return value
-
-    def choice(self, value: Any, key: str, choices: tuple[str, ...]) -> str:
-        if value not in choices:
-            raise self.fail(key, f"must be one of {', '.join(choices)}, not {shown(value)}")
-        return value
-
-    def keys(self, value: Any, key: str, allowed: Mapping[str, Any] | tuple[str, ...]) -> None:
-        if not isinstance(value, dict):
-            raise self.fail(key, f"must be an object {{…}}, not {shown(value)}")
-        for name in value:
-            if name not in allowed:
-                name = readable(name, NAME)
-                near = get_close_matches(name.lower(), allowed, 1)
-                meant = f'did you mean "{near[0]}"? Allowed' if near else "allowed"
-                raise self.fail(f"{key}.{name}" if key else name, f"unknown key; {meant} keys: {', '.join(allowed)}")
-
-    def text(self, value: Any, key: str, least: int = 1) -> str:
-        text = readable(value) if isinstance(value, str) else ""
-        if not isinstance(value, str) or len(text.strip()) < least or len(value) > 1000:
-            raise self.fail(key, f"must be a string of {least} to 1000 characters, not {shown(value)}")
-        return text
-
-
-def _read_order(reader: _Reader, data: Any, where: str, first: bool, last: bool) -> Order:
+def _read_order(reader: FileReader, data: Any, where: str, first: bool, last: bool) -> Order:
     reader.keys(data, where, ORDER_KEYS)
     values: dict[str, Any] = {}
     for name, key in ORDER_KEYS.items():
@@ -309,7 +239,7 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
     SpeciesError
         Names the source, the key and what is allowed.
     """
-    reader = _Reader(source)
+    reader = FileReader(source)
     if not isinstance(data, dict):
         raise reader.fail("species", f"must be an object {{…}}, not {shown(data)}")
     reader.keys(data, "", SPECIES_KEYS)
@@ -346,6 +276,7 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
         habit=reader.number(data.get("habit", 0.0), "habit", 0, 1),
         stand_leaves=reader.number(data.get("stand_leaves", 1.0), "stand_leaves", 0.05, 1),
         exact=reader.truth(data.get("exact", False), "exact"),
+        year=read_year(reader, data.get("year")),
     )
     polygons = expected_polygons(species) * species.quality
     if polygons > MAX_POLYGONS:

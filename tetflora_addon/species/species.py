@@ -2,13 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a species is: ranges for each branch order and a sample leaf (paper, section 5).
 
-`crown_ratio` gives the length of branches along their parent; `fingerprint` identifies a species in the cache folder.
+`crown_ratio` gives the length of branches along their parent.
 """
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -17,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..leaves.models import LeafModel
 from .skeletons import Skeleton
+from .year import Year
 
 LEAF_KINDS = ("leaf", "blossom")
 LEAF_ENVELOPES = ("none", "sphere", "cylinder", "cone", "box")
@@ -271,6 +270,8 @@ class Species:
         Every plant is the same: ranges have their means, and seeds do not matter.
     form : Skeleton or None
         Trunk and lower orders modelled by hand; only the orders above are grown.
+    year : Year or None
+        When leaves appear, turn and fall.
     """
 
     identifier: str
@@ -290,6 +291,7 @@ class Species:
     stand_leaves: float = 1.0
     exact: bool = False
     form: Skeleton | None = None
+    year: Year | None = None
 
     def forms(self, kind: int) -> tuple[LeafModel | str, ...]:
         """Forms of leaves of a kind, by its index in `LEAF_KINDS`; leaves where there are no blossoms."""
@@ -350,44 +352,3 @@ def crown_ratio(shape: NDArray[np.integer], r: NDArray[np.float64]) -> NDArray[n
             0.4 + 0.6 * r,
         ],
     )
-
-
-#: Fields that depend on what other species there are, one that others give, and one that changes no area.
-_PLACES = {"species", "next", "drawn_rows", "sunlit", "dead"}
-#: Fields that came later, with the values that change nothing: species without them keep their fingerprint.
-_LATER: dict[str, Callable[[NDArray[np.void]], NDArray[np.float64] | float]] = {
-    "leaf_light_tip": lambda rows: rows["leaf_light"][:, 0],
-    "leaf_size_young": lambda _: 1.0,
-    "leaf_colour_young": lambda rows: rows["leaf_colour"][:, 0],
-    "envelope": lambda _: 0.0,
-    "envelope_radius": lambda _: 0.0,
-    "inclination": lambda _: 0.0,
-}
-#: Sorts of children in the first tables that were kept; others count where a species has them.
-_FIRST_SORTS = 3
-
-
-def fingerprint(rows: NDArray[np.void], forms: Sequence[Sequence[LeafModel]], method: int) -> str:
-    """Hash of a species' parameters and the forms of its leaves: 16 hexadecimal digits.
-
-    Parameters
-    ----------
-    rows : (r,) parameter table
-        Of this species alone.
-    forms : by kind
-        Models of leaves.
-    method : int
-        Counts the ways in which results were found so far.
-    """
-    content = hashlib.sha256(f"{method}".encode())
-    unused = {name for name, neutral in _LATER.items() if (rows[name] == neutral(rows)).all()}
-    for name in sorted(set(rows.dtype.names) - _PLACES - unused):
-        # Rounded, because versions of numpy may differ in the last digit.
-        value = np.round(rows[name].astype(np.float64), 6) + 0.0
-        if name in ("count", "start", "fraction") and not (rows["next"][:, _FIRST_SORTS:] >= 0).any():
-            value = value[:, :_FIRST_SORTS]
-        content.update(name.encode() + np.ascontiguousarray(value).tobytes())
-    for form in (model for models in forms for model in models):
-        content.update(np.ascontiguousarray(form.positions).tobytes())
-        content.update(np.ascontiguousarray(form.corner_verts).tobytes())
-    return content.hexdigest()[:16]

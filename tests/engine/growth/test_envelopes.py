@@ -30,7 +30,8 @@ from tetflora_addon.proxies.facet_sizes import FacetPixels
 from tetflora_addon.proxies.facet_weights import COUNTS, FacetWeights, facet_weights, fitting
 from tetflora_addon.proxies.microsurfaces import Facets
 from tetflora_addon.refinement.shares import SharedPlants
-from tetflora_addon.species.species import LEAF_ENVELOPES, LEAF_INCLINATIONS, fingerprint
+from tetflora_addon.species.fingerprints import fingerprint
+from tetflora_addon.species.species import LEAF_ENVELOPES, LEAF_INCLINATIONS
 
 SOLIDS, RADIUS, BARE = LEAF_ENVELOPES[1:], 0.3, 0.2
 #: Mean |cos| of the inclination, by integration of the densities.
