@@ -22,6 +22,7 @@ from ..growth.envelopes import reaches
 from ..growth.foliage import YOUTH
 from ..growth.growth import fullness
 from ..growth.rows import LATERAL, build_rows
+from ..growth.seasons import Season
 from ..growth.wind import Wind, is_windy, widest_sway, windy_rows
 from ..leaves.models import LeafModel
 from ..species.habit import with_habit
@@ -30,6 +31,7 @@ from ..species.species import LEAF_KINDS, Species
 from .averages import Averages, RowLeaves, average, quadratic, row_leaves
 from .bounds import leaf_reaches, sampled_bounds, unit_bounds, widest_radii
 from .clumping import Clumping, fit_clumping
+from .day import DayTotals, totals_of_day
 from .orientation import Orientation, orientation_of
 from .samples import Samples, draw_samples
 
@@ -82,6 +84,10 @@ class Flora:
         Area times mean colour at the same places.
     calm : Flora or None
         The same without the wind that this one is in.
+    summer : Flora or None
+        The same in summer, where this one is on another day of the year.
+    day : DayTotals or None
+        What the day leaves of leaves; with ``summer``.
     """
 
     #: Other processes keep it, and what it has computed for itself, see `processes.pool`.
@@ -109,11 +115,22 @@ class Flora:
     area_nodes: NDArray[np.float64]
     colour_nodes: NDArray[np.float64]
     calm: Flora | None = None
+    summer: Flora | None = None
+    day: DayTotals | None = None
 
     @property
     def at_rest(self) -> Flora:
         """The flora without wind: what is inside of sub-plants is known of plants that do not move."""
         return self.calm or self
+
+    @property
+    def in_leaf(self) -> Flora:
+        """The flora in summer without wind: what takes rays or samples to know is known of it."""
+        return self.at_rest.summer or self.at_rest
+
+    def in_year(self, season: Season) -> Flora:
+        """The flora on a day of the year, without wind; itself in summer where nothing differs on that day."""
+        return _on_day(self.in_leaf, replace(season, snow=0.0))
 
     def in_wind(self, wind: Wind) -> Flora:
         """The flora in a wind; bounds hold at all times."""
@@ -133,32 +150,32 @@ class Flora:
     @cached_property
     def samples(self) -> Samples:
         """Points on the leaves and wood of sub-plants; drawn when first asked for, as only proxies need them."""
-        if self.calm is not None:
-            return self.calm.samples
+        if self.in_leaf is not self:
+            return self.in_leaf.samples
         totals = self.averages
         return draw_samples(self.rows, totals.leaf_area[:, 1], _wood_totals(totals), totals.length)
 
     @cached_property
     def sampled_bound(self) -> NDArray[np.float64]:
         """Radius, and lowest and highest place along the branch (r, 3), of all samples; unit is the branch's length."""
-        if self.calm is not None:
-            return self.calm.sampled_bound
+        if self.in_leaf is not self:
+            return self.in_leaf.sampled_bound
         parts = (self.samples.leaves, self.samples.wood)
         return sampled_bounds(parts, len(self.rows))
 
     @cached_property
     def orientation(self) -> Orientation:
         """How the surfaces of sub-plants are turned; likewise."""
-        if self.calm is not None:
-            return self.calm.orientation
+        if self.in_leaf is not self:
+            return self.in_leaf.orientation
         totals = self.averages
         return orientation_of(self.rows, self.forms, totals.leaf_area[:, 1], _wood_totals(totals), totals.length)
 
     @cached_property
     def clumping(self) -> Clumping:
         """How much lighter sub-plants are than even fogs of their area; fitted when first asked for, as above."""
-        if self.calm is not None:
-            return self.calm.clumping
+        if self.in_leaf is not self:
+            return self.in_leaf.clumping
         totals = self.averages
         wood = _wood_totals(totals) * (totals.length * totals.radius)[:, None]
         area = totals.leaf_area[:, 1] + wood / 2
@@ -170,11 +187,13 @@ class Flora:
 
     def leaf_areas(self, subplants: Branches) -> NDArray[np.float64]:
         """Expected one-sided area (n,) of the leaves of sub-plants, m²."""
-        area = self._at_place(self.area_nodes, subplants)
+        area = self._at_place(self.area_nodes, subplants) if subplants.year is None else self.day.leaf_areas(subplants)
         return fullness(self.rows, subplants) * area * subplants.scale**2
 
     def leaf_colours(self, subplants: Branches) -> NDArray[np.float64]:
         """Mean linear RGB (n, 3) of the leaves of sub-plants, weighted by area; black where they have none."""
+        if subplants.year is not None:
+            return self.day.leaf_colours(subplants)
         area = self._at_place(self.area_nodes, subplants)
         return self._at_place(self.colour_nodes, subplants) / np.maximum(area, 1e-300)[:, None]
 
@@ -187,17 +206,23 @@ class Flora:
     def face_counts(self, subplants: Branches) -> NDArray[np.float64]:
         """Expected number (n,) of the faces of sub-plants, leaves and branches."""
         row, fixed = subplants.row, self.fixed_faces[subplants.row]
-        return fixed + fullness(self.rows, subplants) * (self.polygons[row] - fixed)
+        faces = self.polygons[row]
+        if subplants.year is not None:
+            faces = faces - self.leaf_faces[row] + self.day.leaf_faces(subplants)
+        return fixed + fullness(self.rows, subplants) * (faces - fixed)
 
     def branch_faces(self, subplants: Branches) -> NDArray[np.float64]:
         """Expected number (n,) of the faces of the branches of sub-plants."""
-        leaves = fullness(self.rows, subplants) * self.leaf_faces[subplants.row]
-        return self.face_counts(subplants) - leaves
+        faces = self.leaf_faces[subplants.row] if subplants.year is None else self.day.leaf_faces(subplants)
+        return self.face_counts(subplants) - fullness(self.rows, subplants) * faces
 
     def one_leaf_area(self, branches: Branches) -> NDArray[np.float64]:
         """Mean one-sided area (n,) of a single leaf of sub-plants, m²; 0 where they have none."""
-        area = self._at_place(self.area_nodes, branches)
-        return area / np.maximum(self.leaf_count[branches.row], 1e-300) * branches.scale**2
+        if branches.year is not None:
+            area, count = self.day.leaf_areas(branches), self.day.leaf_counts(branches)
+        else:
+            area, count = self._at_place(self.area_nodes, branches), self.leaf_count[branches.row]
+        return area / np.maximum(count, 1e-300) * branches.scale**2
 
     def _at_place(self, nodes: NDArray[np.float64], subplants: Branches) -> NDArray[np.float64]:
         """Values at the places of sub-plants between the inside and the outside of the crown."""
@@ -259,6 +284,13 @@ def _compiled(species: tuple[Species, ...]) -> Flora:
         area_nodes=totals.leaf_area.sum(axis=2),
         colour_nodes=totals.leaf_colour,
     )
+
+
+@lru_cache(maxsize=8)
+def _on_day(flora: Flora, season: Season) -> Flora:
+    """A flora in summer on a day of the year."""
+    found = totals_of_day(flora.rows, flora.species, season, flora.averages, flora.leaf)
+    return flora if found is None else replace(flora, rows=found[0], summer=flora, day=found[1])
 
 
 @lru_cache(maxsize=8)

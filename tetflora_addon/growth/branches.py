@@ -59,6 +59,8 @@ class Branches(Arrays):
         moves them and does not change how they grow.
     later : Pose or None
         Position and frame a moment later, where it is asked how plants move.
+    year : (n, 2) float64 or None
+        On a day of the year: the day that it is for the plant, and its place among the autumn colours of its species.
     """
 
     row: NDArray[np.int32] = field(metadata=column(dtype=np.int32))
@@ -73,6 +75,7 @@ class Branches(Arrays):
     outward: NDArray[np.float64]
     sky: NDArray[np.float64] | None = None
     later: Pose | None = None
+    year: NDArray[np.float64] | None = None
 
     def moved(self) -> Branches:
         """The same a moment later; only where that is known."""

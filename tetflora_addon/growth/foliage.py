@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Leaves on branches: where each sits, which way it grows and faces, its size and colour."""
+"""Leaves on branches: where each sits, which way it grows and faces, and its size."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from .envelopes import EVEN_JITTER, inclined, leaf_sites, leaf_start
 from .growth import level_azimuth
 from .hashing import Draw, child_key, signed, uniform
 from .rows import ranged
+from .seasons import Stages, leaf_stages, may_change
 from .wind import fluttered, gusts, is_windy
 
 _LEAF_PATH = 1 << 32  # child indices of leaves start here, so that they never meet those of branches
@@ -128,6 +129,15 @@ def leaf_lights(
     return np.clip(light + (rows["leaf_light_tip"][row] - rows["leaf_light"][row, 0]) * outward, 0, 1)
 
 
+def stages_of(
+    rows: NDArray[np.void], branches: Branches, owner: NDArray[np.int64], key: NDArray[np.uint64]
+) -> Stages | None:
+    """Stages of leaves with keys (m,) of branches (m,) on their plants' days; None where all are as in summer."""
+    if branches.year is None or not may_change(rows, _rows_of(branches, np.arange(len(branches))), branches.year):
+        return None
+    return leaf_stages(rows, _rows_of(branches, owner), key, np.take(branches.year[:, 0], owner))
+
+
 def _rows_of(branches: Branches, owner: NDArray[np.int64]) -> NDArray[np.int32]:
     """Row (m,) of each branch's parameters, or the only one (1,), which is as good and need not be gathered."""
     row = branches.row
@@ -166,6 +176,9 @@ def place_leaves(
     alike = not (rows["gradient"][row].any() or rows["sunlit"][row].any())
     outward = np.zeros(1) if alike else outwardness(rows, branches, owner, t)
     size = np.take(branches.scale, owner) * leaf_sizes(rows, row, key, outward, t)
+    stages = stages_of(rows, branches, owner, key)
+    if stages is not None:
+        size = size * stages.size
     solid = rows["envelope"][row] > 0
     if solid.any():  # from the middle to the base
         position -= (0.5 * size * solid)[:, None] * frame[:, :, 1]
@@ -348,53 +361,6 @@ def _length(a: NDArray) -> NDArray:
     return np.maximum(np.sqrt(_inner(a, a)), np.finfo(a.dtype).tiny)
 
 
-def leaf_colours(
-    rows: NDArray[np.void],
-    row: NDArray[np.integer],
-    key: NDArray[np.uint64],
-    outward: NDArray[np.float64] | None = None,
-    young: NDArray[np.float64] | None = None,
-) -> NDArray[np.float64]:
-    """Linear RGB (n, 3) of leaves of the rows (n,), or all of one row (1,).
-
-    ``outward`` (n,) is 0 inside the crown, ``young`` (n,) is `youth`; both or neither are given.
-    """
-    deviation = signed(key, Draw.LEAF_COLOUR)
-    if outward is None:
-        return _colours(rows["leaf_colour"][row], deviation)
-    mean = mean_leaf_colours(rows, row, outward, young)
-    return np.clip(mean + rows["leaf_colour"][row, 1] * deviation[:, None], 0, 1)
-
-
-def mean_leaf_colours(
-    rows: NDArray[np.void], row: NDArray[np.integer], outward: NDArray[np.float64], young: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Mean linear RGB (n, 3) of leaves of rows (n,) at places between inside (0) and outside (1) of the crown.
-
-    ``young`` (n,) is their `youth`.
-    """
-    inside, tip, new = (
-        gathered(colours, row)
-        for colours in (rows["leaf_colour"][:, 0], rows["leaf_colour_tip"], rows["leaf_colour_young"])
-    )
-    mean = inside + (tip - inside) * outward[:, None]
-    if (new != inside).any():
-        mean += (new - inside) * young[:, None]
-    return mean
-
-
 def leaf_forms(number: int, key: NDArray[np.uint64]) -> NDArray[np.int64]:
     """Which of a number of forms each leaf (n,) has."""
     return (uniform(key, Draw.LEAF_FORM) * number).astype(np.int64)
-
-
-def branch_colours(rows: NDArray[np.void], row: NDArray[np.integer], key: NDArray[np.uint64]) -> NDArray[np.float64]:
-    """Linear RGB (n, 3) of branches of the rows (n,), or all of one row (1,)."""
-    return _colours(rows["branch_colour"][row], signed(key, Draw.BRANCH_COLOUR))
-
-
-def _colours(colour: NDArray[np.float64], draw: NDArray[np.float64]) -> NDArray[np.float64]:
-    mean, variation = colour.transpose(1, 2, 0)
-    out = variation * draw
-    out += mean
-    return np.clip(out, 0, 1, out=out).T

@@ -21,6 +21,7 @@ from .branches import Branches, Pose
 from .envelopes import BOX
 from .hashing import Draw, child_key, key_of_seed, signed, uniform
 from .rows import DEAD, FORK, LATERAL, SPUR, flare_rings, ranged, varied
+from .seasons import plant_years
 from .seeds import Seeds
 from .wind import is_windy, moment
 
@@ -79,7 +80,8 @@ def trunks(rows: NDArray[np.void], seeds: Seeds) -> Branches:
     one, none = np.ones(len(seeds)), np.zeros(len(seeds))
     sky = by_component(np.tile(_SKY, (len(seeds), 1))) if is_windy(rows) else None
     later = Pose(seeds.position, frame, sky) if moment(rows) else None  # the foot of a plant stands still
-    return Branches(row, plant, key, seeds.position, frame, length, radius, scale, one, none, sky, later)
+    year = plant_years(rows, row, key)
+    return Branches(row, plant, key, seeds.position, frame, length, radius, scale, one, none, sky, later, year)
 
 
 def drawn_children(rows: NDArray[np.void], plants: Branches) -> tuple[Branches, NDArray[np.int64]]:
@@ -112,6 +114,7 @@ def chosen_drawn(
         plant.sky,
         # The drawing is bent when its lines are asked for.
         None if plant.later is None else Pose(position, frame, plant.sky),
+        plant.year,
     )
 
 
@@ -236,7 +239,8 @@ def chosen_children(
     if lines.later is not None:
         again = chosen_children(rows, parents.moved(), lines.later, owner, index, counts, sort)
         later = Pose(again.position, again.frame, again.sky)
-    return Branches(row, parent.plant, key, position, frame, length, radius, parent.scale, vigour, around, sky, later)
+    own = row, parent.plant, key, position, frame, length, radius, parent.scale, vigour, around, sky, later, parent.year
+    return Branches(*own)
 
 
 def sorts_of(rows: NDArray[np.void], parents: Branches) -> list[int]:

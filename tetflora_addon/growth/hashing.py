@@ -70,6 +70,10 @@ class Draw(IntEnum):
     LEAF_TWIST = 235
     ENVELOPE_ACROSS = 236
     ENVELOPE_AROUND = 237
+    LEAF_YEAR = 238
+    SPRING = 239
+    AUTUMN = 240
+    AUTUMN_HUE = 241
 
 
 def mix(z: NDArray[np.uint64]) -> NDArray[np.uint64]:
@@ -107,6 +111,12 @@ def child_key(key: NDArray[np.uint64], index: ArrayLike) -> NDArray[np.uint64]:
         return mix(np.asarray(key, dtype=np.uint64) ^ mix((index + np.uint64(1)) * _CHILD))
 
 
+def mix_draw(key: NDArray[np.uint64], draw: int) -> NDArray[np.uint64]:
+    """Random bits, 64 for each key (...); different draws of a key are independent, see `Draw`."""
+    with np.errstate(over="ignore"):
+        return mix(np.asarray(key, dtype=np.uint64) + np.uint64(draw) * _GOLDEN)
+
+
 def uniform(key: NDArray[np.uint64], draw: int) -> NDArray[np.float64]:
     """Numbers in [0, 1), one for each key.
 
@@ -116,8 +126,7 @@ def uniform(key: NDArray[np.uint64], draw: int) -> NDArray[np.float64]:
     draw : int
         What it is for, see `Draw`; different draws of a key are independent.
     """
-    with np.errstate(over="ignore"):
-        z = mix(np.asarray(key, dtype=np.uint64) + np.uint64(draw) * _GOLDEN)
+    z = mix_draw(key, draw)
     z >>= np.uint64(11)
     out = z.astype(np.float64)
     out *= _TO_UNIT

@@ -25,7 +25,7 @@ from ..errors import TetFloraError
 from ..setting import setting
 from .branches import Branches
 from .hashing import Draw, uniform
-from .rows import ROW_DTYPE, SPUR_ORDER
+from .rows import SPUR_ORDER
 
 #: Radians by which the tip of a trunk `_SLENDER` times as long as thick leans at `_STRONG` m/s; and over that for
 #: limbs, their branches, and all beyond, as they carry more leaves for their wood. A cantilever leans by the fourth
@@ -143,17 +143,17 @@ def windy_rows(
 
     Parameters
     ----------
-    rows : (r,) array of `rows.ROW_DTYPE`
+    rows : (r,) parameter table
     length, radius : (r,) float64
         Typical ones of their branches; only their ratio counts.
     wind : Wind
 
     Returns
     -------
-    (r,) array of `rows.ROW_DTYPE` and `WIND_COLUMNS`
+    (r,) array with `WIND_COLUMNS` besides
     """
-    out = np.zeros(len(rows), np.dtype(ROW_DTYPE.descr + WIND_COLUMNS))
-    for name in ROW_DTYPE.names:
+    out = np.zeros(len(rows), np.dtype(rows.dtype.descr + WIND_COLUMNS))
+    for name in rows.dtype.names:
         out[name] = rows[name]
     slender = rows["nominal"] * length / np.maximum(radius, 1e-9)
     # A part of a branch between forks leans by its part.

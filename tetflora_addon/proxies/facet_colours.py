@@ -9,17 +9,28 @@ from numpy.typing import NDArray
 
 from ..arrays import gathered
 from ..compiled.flora import Flora
-from ..growth.foliage import mean_leaf_colours
+from ..growth.branches import Branches
+from ..growth.colours import leaf_colours_at, mean_leaf_colours
 from ..growth.hashing import Draw, signed
+from ..growth.seasons import leaf_stages
 from .hotspots import balanced_colours
 
 
 def leaf_colours_of_facets(
-    flora: Flora, row: NDArray, key: NDArray, leaves: NDArray, outward: NDArray, young: NDArray
+    flora: Flora, row: NDArray, key: NDArray, leaves: NDArray, outward: NDArray, young: NDArray, on_day: Branches | None
 ) -> NDArray[np.float64]:
-    """Colours of facets that stand for several leaves (n,) each: a mean varies less than the colour of one leaf."""
-    deviation = signed(key, Draw.LEAF_COLOUR) / np.sqrt(np.maximum(leaves, 1))
+    """Colours of facets that stand for several leaves (n,) each: a mean varies less than the colour of one leaf.
+
+    ``on_day`` (n) are the branches whose leaves they are, where these may not be as in summer.
+    """
+    several = np.sqrt(np.maximum(leaves, 1))
+    deviation = signed(key, Draw.LEAF_COLOUR) / several
     mean = mean_leaf_colours(flora.rows, row, outward, young)
+    if on_day is not None:
+        summer, mean = mean, flora.day.own_colours(on_day, flora.rows["leaf_kind"][row], mean)
+        stages = leaf_stages(flora.rows, row, key, on_day.year[:, 0])
+        one = leaf_colours_at(flora.rows, row, summer, stages, on_day.year[:, 1])
+        mean = mean + np.where(stages.there, 1.0 / several, 0.0)[:, None] * (one - mean)
     return np.clip(mean + gathered(flora.rows["leaf_colour"][:, 1], row) * deviation[:, None], 0, 1)
 
 

@@ -108,7 +108,7 @@ def facet_weights(flora: Flora, species: Collection[int] | None = None) -> Facet
     Those of the shipped species are read from `TABLE`. Others take a second or two each, and are cached on disk too.
     """
     every = range(len(flora.species)) if species is None else species
-    return _of_flora(flora.at_rest, tuple(sorted(set(every))))
+    return _of_flora(flora.in_leaf, tuple(sorted(set(every))))
 
 
 @lru_cache(maxsize=8)
@@ -122,7 +122,7 @@ def _of_flora(flora: Flora, species: tuple[int, ...]) -> FacetWeights:
 
 def unmeasured(flora: Flora) -> list[int]:
     """Species (index) whose weights nobody has measured yet."""
-    return [number for number in range(len(flora.species)) if _known(flora.at_rest, number) is None]
+    return [number for number in range(len(flora.species)) if _known(flora.in_leaf, number) is None]
 
 
 def measuring(flora: Flora, species: Collection[int]) -> Generator[tuple[str, float], None, None]:
@@ -133,7 +133,7 @@ def measuring(flora: Flora, species: Collection[int]) -> Generator[tuple[str, fl
     str, float
         Name of the species at work, and the fraction of its measurement that is done.
     """
-    flora = flora.at_rest
+    flora = flora.in_leaf
     for number in sorted(set(species) & set(unmeasured(flora))):
         work, name = fitting(flora, number, RAYS), flora.species[number].name
         while True:

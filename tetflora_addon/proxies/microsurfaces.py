@@ -21,6 +21,7 @@ from ..growth.axes import axes
 from ..growth.branches import Branches
 from ..growth.foliage import leaf_start, outwardness, place_leaves, settled, youth
 from ..growth.hashing import Draw, child_key, mix, signed, uniform
+from ..growth.seasons import AREA, PRESENT
 from ..growth.wind import moment
 from ..refinement.contents import Totals, piece_totals, subplant_totals
 from ..subplants.pieces import Pieces
@@ -251,7 +252,9 @@ def _leaves_of_subplants(
     across, along = _in_a_face(flora, leaf_row, key, frame)
     # Sub-plants beyond the limbs know how far outside they are, which holds for all that grows on them.
     outward = np.where(rows["outward"][subplants.row[owner]], points.outward[pick], subplants.outward[owner])
-    colour = leaf_colours_of_facets(flora, leaf_row, key, area / one.clip(1e-300)[owner], outward, points.young[pick])
+    many = area / one.clip(1e-300)[owner]
+    day = None if subplants.year is None else subplants.take(owner)
+    colour = leaf_colours_of_facets(flora, leaf_row, key, many, outward, points.young[pick], day)
     return Facets(
         centre,
         across,
@@ -276,6 +279,9 @@ def _leaves_of_pieces(
     row = branches.row
     size, variation = rows["leaf_size"][row].T
     one = (size**2 + variation**2 / 3) * flora.leaf.area[row] * branches.scale**2
+    if branches.year is not None:
+        left = flora.day.left_on(branches, rows["leaf_kind"][row])
+        one = one * left[:, AREA] / np.maximum(left[:, PRESENT], 1e-300)
     facet = np.maximum(side**2, one)
     start = leaf_start(rows, branches)
     owner, index, key, area, t = _along(flora, pieces, totals.leaf_area, facet, start, _FACET_PATH, _LEAF_COUNT, real)
@@ -287,7 +293,10 @@ def _leaves_of_pieces(
     centre = leaves.position + 0.5 * leaves.size[:, None] * frame[:, :, 1]
     across, along = _in_a_face(flora, row[owner], key, frame)
     places = outwardness(rows, branches, owner, t), youth(rows, row[owner], t)
-    colour = leaf_colours_of_facets(flora, row[owner], key, area / one.clip(1e-300)[owner], *places)
+    many = area / one.clip(1e-300)[owner]
+    colour = leaf_colours_of_facets(
+        flora, row[owner], key, many, *places, None if branches.year is None else branches.take(owner)
+    )
     colour = dimmed(colour, owner, weight, once)
     transmission = flora.leaf.transmission[row[owner]]
     velocity = None

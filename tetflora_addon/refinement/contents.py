@@ -20,6 +20,7 @@ from ..compiled.flora import Flora
 from ..growth.branches import Branches
 from ..growth.envelopes import are_solids, reaches
 from ..growth.growth import fullness
+from ..growth.seasons import AREA, PRESENT
 from ..subplants.pieces import Pieces, leaf_fraction, piece_leaf_integrals, wood_areas
 from .polygons import Polygons
 
@@ -76,8 +77,12 @@ def subplant_totals(flora: Flora, subplants: Branches) -> Totals:
 
 def feature_width(flora: Flora, subplants: Branches) -> NDArray[np.float64]:
     """Width (n,) of the features of sub-plants, metres: that of their leaves, or of their branch without any."""
-    row = subplants.row
-    return np.where(flora.leaf_count[row] > 0, flora.leaf_width[row] * subplants.scale, 2.0 * subplants.radius)
+    row, wood = subplants.row, 2.0 * subplants.radius
+    width = np.where(flora.leaf_count[row] > 0, flora.leaf_width[row] * subplants.scale, wood)
+    if subplants.year is None:
+        return width
+    share = np.minimum(flora.day.leaf_share(subplants), 1.0)
+    return np.minimum(width, wood) + share * (width - np.minimum(width, wood))
 
 
 def piece_totals(flora: Flora, pieces: Pieces) -> Totals:
@@ -86,8 +91,12 @@ def piece_totals(flora: Flora, pieces: Pieces) -> Totals:
     row, leaf = branches.row, flora.leaf
     size, variation = flora.rows["leaf_size"][row].T
     leaves = flora.rows["leaves"][row, 0] * fullness(flora.rows, branches) * leaf_fraction(flora, pieces)
+    area = leaves * (size**2 + variation**2 / 3) * leaf.area[row] * branches.scale**2 * _size_factors(flora, pieces)
+    if branches.year is not None:
+        left = flora.day.left_on(branches, flora.rows["leaf_kind"][row])
+        area, leaves = area * left[:, AREA], leaves * left[:, PRESENT]
     return Totals(
-        leaves * (size**2 + variation**2 / 3) * leaf.area[row] * branches.scale**2 * _size_factors(flora, pieces),
+        area,
         wood_areas(flora, pieces),
         leaves * leaf.polygons[row] + flora.rows["sides"][row],
         np.where(leaves > 0, leaf.width[row] * size * branches.scale, 2 * branches.radius),

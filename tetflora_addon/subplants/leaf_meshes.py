@@ -19,19 +19,21 @@ from ..arrays import spread
 from ..buffers import MeshBuffers
 from ..compiled.flora import Flora
 from ..growth.branches import Branches
+from ..growth.colours import leaf_colours
 from ..growth.foliage import (
     in_wind,
-    leaf_colours,
     leaf_forms,
     leaf_keys,
     leaf_places,
     outwardness,
     place_leaves,
     settled,
+    stages_of,
     youth,
 )
 from ..growth.growth import WholeBranches, leaf_counts
 from ..growth.hashing import Draw, uniform
+from ..growth.seasons import is_seasonal
 from ..growth.wind import moment
 from ..leaves.kites import leaf_kites
 from ..leaves.levels import chosen_level, leaf_level
@@ -185,7 +187,7 @@ class _Bearers:
 
     def numbers(self) -> NDArray[np.int64]:
         """How many leaves there are of each form."""
-        if len(self.forms) == 1 and self.fraction is None and self.lengths is None:
+        if len(self.forms) == 1 and self.fraction is None and self.lengths is None and not is_seasonal(self.flora.rows):
             return np.array([self.counts.sum()])
         out = np.zeros(len(self.forms), np.int64)
         for part in self._chunks(1):
@@ -210,6 +212,9 @@ class _Bearers:
                 turned = settled(rows, self.row, again.frame, again.light, again.sky)
                 turned = in_wind(rows, branches, again, turned, seconds)
                 motion = (again.position - leaves.position) / seconds, (turned - frame) / np.float32(seconds)
+            stages = stages_of(rows, bearers.branches, owner, key)
+            if stages is not None:
+                places = (*(places or (None, None)), stages, np.take(bearers.branches.year[:, 1], owner))
             colours = leaf_colours(rows, self.row, key, *places)
             copies.add(key, leaves.position, frame, leaves.size, colours, motion)
 
@@ -250,6 +255,9 @@ class _Bearers:
             length = self.lengths[part][owner] * (_EARLIEST + (1.0 - _EARLIEST) * uniform(key, Draw.LEAF_LEVEL))
             for number, model in enumerate(self.forms):
                 kept &= (form != number) | (chosen_level(model, length) == self.step)
+        stages = stages_of(self.flora.rows, self.whole.branches.take(part), owner, key)
+        if stages is not None:
+            kept &= stages.there
         if kept.all():
             return owner, index, key, form
         kept = np.flatnonzero(kept)

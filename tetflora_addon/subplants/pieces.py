@@ -82,8 +82,13 @@ def piece_leaf_integrals(
 
 def piece_leaf_colours(flora: Flora, pieces: Pieces) -> NDArray[np.float64]:
     """Mean linear RGB (n, 3) of the leaves that branches themselves bear on pieces, weighted by area."""
-    row = pieces.branches.row
-    rows = flora.rows
+    row, rows = pieces.branches.row, flora.rows
+    colour = _summer_colours(flora, pieces)
+    return colour if flora.day is None else flora.day.own_colours(pieces.branches, rows["leaf_kind"][row], colour)
+
+
+def _summer_colours(flora: Flora, pieces: Pieces) -> NDArray[np.float64]:
+    row, rows = pieces.branches.row, flora.rows
     inside = rows["leaf_colour"][row, 0]
     if not rows["gradient"].any():
         return inside

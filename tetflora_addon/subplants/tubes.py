@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..buffers import MeshBuffers
 from ..compiled.flora import Flora
 from ..growth.branches import Branches
-from ..growth.foliage import branch_colours
+from ..growth.colours import branch_colours
 from ..growth.growth import WholeBranches
 from ..growth.wind import moment
 from .buds import BUD_RINGS, bud_numbers, bud_rings, bud_sides

@@ -17,7 +17,7 @@ from ..arrays import unit
 from ..buffers import MeshBuffers, concatenate_buffers
 from ..compiled.flora import Flora
 from ..growth.axes import Axes
-from ..growth.foliage import branch_colours
+from ..growth.colours import branch_colours
 from ..growth.growth import WholeBranches
 from ..growth.hashing import Draw, uniform
 from ..growth.wind import moment

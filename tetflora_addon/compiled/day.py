@@ -1,0 +1,197 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Averages of sub-plants on a day of the year: totals in summer by kind of leaf, times what the day leaves of them.
+
+Tables of days are those of `growth.seasons`; nothing is measured anew for a day.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..growth.branches import Branches
+from ..growth.seasons import (
+    AREA,
+    AUTUMN,
+    DRY,
+    FRESH,
+    PRESENT,
+    Season,
+    expected,
+    leaf_table,
+    mean_autumn_colours,
+    seasonal_rows,
+)
+from ..species.species import LEAF_KINDS, Species
+from ..species.year import DAYS
+from .averages import Averages, RowLeaves, average, quadratic
+
+KINDS = len(LEAF_KINDS)
+
+
+@dataclass(frozen=True, eq=False)
+class DayTotals:
+    """Totals of sub-plants by row (r) and kind of leaf (k) in summer, and what a day leaves of each.
+
+    Attributes
+    ----------
+    years : (r, k) array of the column ``year``
+        Of the species of each row.
+    table : (r, k) int64
+        Index into ``tables``.
+    tables : (t, d, 6) float64
+        See `growth.seasons.leaf_table`.
+    origin : (t,) float64
+        Days on which these begin.
+    area : (r, 3, k) float64
+        Expected one-sided area of leaves at `averages.NODES`, m² at plant scale 1.
+    colour : (r, 3, k, 3) float64
+        Area times mean colour in summer at the same places.
+    count, faces : (r, k) float64
+        Expected numbers of leaves and of their faces.
+    """
+
+    years: NDArray[np.void]
+    table: NDArray[np.int64]
+    tables: NDArray[np.float64]
+    origin: NDArray[np.float64]
+    area: NDArray[np.float64]
+    colour: NDArray[np.float64]
+    count: NDArray[np.float64]
+    faces: NDArray[np.float64]
+
+    def left(self, branches: Branches) -> NDArray[np.float64]:
+        """What is left of all kinds of leaves (n, k, 6) on the days of branches."""
+        which = self.table[branches.row]
+        day = branches.year[:, 0]
+        return np.stack([expected(self.tables, self.origin, which[:, k], day) for k in range(KINDS)], axis=1)
+
+    def left_on(self, branches: Branches, kind: NDArray[np.integer]) -> NDArray[np.float64]:
+        """What is left of one kind (n,) of leaves (n, 6)."""
+        return expected(self.tables, self.origin, self.table[branches.row, kind], branches.year[:, 0])
+
+    def leaf_areas(self, subplants: Branches) -> NDArray[np.float64]:
+        """Area (n,) of leaves at plant scale 1, without the fullness of sub-plants."""
+        area = np.einsum("nj,njk->nk", quadratic(subplants.outward), self.area[subplants.row])
+        return (area * self.left(subplants)[:, :, AREA]).sum(axis=1)
+
+    def leaf_counts(self, subplants: Branches) -> NDArray[np.float64]:
+        """Number (n,) of leaves, likewise."""
+        return (self.count[subplants.row] * self.left(subplants)[:, :, PRESENT]).sum(axis=1)
+
+    def leaf_faces(self, subplants: Branches) -> NDArray[np.float64]:
+        """Number (n,) of faces of leaves, likewise."""
+        return (self.faces[subplants.row] * self.left(subplants)[:, :, PRESENT]).sum(axis=1)
+
+    def leaf_colours(self, subplants: Branches) -> NDArray[np.float64]:
+        """Mean colours (n, 3) of leaves, weighted by area; black where there are none."""
+        weights, left = quadratic(subplants.outward), self.left(subplants)
+        area = np.einsum("nj,njk->nk", weights, self.area[subplants.row])
+        summer = np.einsum("nj,njkc->nkc", weights, self.colour[subplants.row])
+        total, out = np.zeros(len(subplants)), np.zeros((len(subplants), 3))
+        for kind in range(KINDS):
+            year = self.years[subplants.row, kind]
+            out += _mixed(summer[:, kind], area[:, kind], left[:, kind], year, subplants.year[:, 1])
+            total += area[:, kind] * left[:, kind, AREA]
+        return out / np.maximum(total, 1e-300)[:, None]
+
+    def own_colours(
+        self, branches: Branches, kind: NDArray[np.integer], summer: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Mean colours (n, 3) of leaves of one kind (n,), of which those in summer are known (n, 3)."""
+        left = self.left_on(branches, kind)
+        year = self.years[branches.row, kind]
+        mixed = _mixed(summer, np.ones(len(branches)), left, year, branches.year[:, 1])
+        some = left[:, AREA] > 0
+        return np.where(some[:, None], mixed / np.where(some, left[:, AREA], 1.0)[:, None], summer)
+
+    def leaf_share(self, subplants: Branches) -> NDArray[np.float64]:
+        """Area (n,) of leaves over that in summer, 1 where there are never any."""
+        area = self.area[subplants.row].mean(axis=1)
+        all_year = area.sum(axis=1)
+        left = (area * self.left(subplants)[:, :, AREA]).sum(axis=1)
+        return np.where(all_year > 0, left / np.where(all_year > 0, all_year, 1.0), 1.0)
+
+
+def _mixed(
+    summer: NDArray[np.float64],
+    area: NDArray[np.float64],
+    left: NDArray[np.float64],
+    year: NDArray[np.void],
+    hue: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Area times colour (n, 3) of leaves on a day, from those in summer (n, 3) of areas (n,)."""
+    green = left[:, AREA] - left[:, FRESH] - left[:, AUTUMN] - left[:, DRY]
+    out = green[:, None] * summer
+    for column, colour in ((FRESH, year["fresh"]), (AUTUMN, mean_autumn_colours(year, hue)), (DRY, year["dry"])):
+        out += (area * left[:, column])[:, None] * colour
+    return out
+
+
+def totals_of_day(
+    rows: NDArray[np.void], species: Sequence[Species], season: Season, totals: Averages, leaf: RowLeaves
+) -> tuple[NDArray[np.void], DayTotals] | None:
+    """Rows on a day, and totals of their sub-plants; None where no plant is other than in summer.
+
+    Parameters
+    ----------
+    rows : (r,) parameter table
+    species : sequence of Species
+    season : Season
+    totals : Averages
+        Of the same rows.
+    leaf : RowLeaves
+        Likewise.
+    """
+    if all(one.year is None for one in species):
+        return None
+    rows = seasonal_rows(rows, species, season)
+    own = [one.year and one.year.at_latitude(abs(season.latitude)) for one in species]
+    kinds = [[None if year is None else year.of_kind(k) for k in range(KINDS)] for year in own]
+    every = list(dict.fromkeys(leaf for some in kinds for leaf in some))
+    tables = np.stack([leaf_table(one) for one in every])
+    origin = np.array([0.0 if one is None else one.middle - DAYS / 2 for one in every])
+    of_species = np.array([[every.index(one) for one in some] for some in kinds])
+    years = np.zeros((len(species), KINDS), rows.dtype["year"])
+    for number in range(len(species)):
+        for kind in range(KINDS):
+            bearing = (rows["species"] == number) & (rows["leaf_kind"] == kind)
+            if bearing.any():
+                years[number, kind] = rows["year"][bearing][0]
+    number = rows["species"]
+    made = DayTotals(years[number], of_species[number], tables, origin, *_by_kind(rows, totals, leaf))
+    return (rows, made) if _differs(rows, made, of_species) else None
+
+
+def _by_kind(rows: NDArray[np.void], totals: Averages, leaf: RowLeaves) -> tuple[NDArray[np.float64], ...]:
+    """``area``, ``colour``, ``count`` and ``faces`` of `DayTotals`."""
+    kinds = np.arange(KINDS) == rows["leaf_kind"][:, None]  # (r, k), which kind each contributing row bears
+    area = totals.leaf_area @ kinds
+    colour = np.zeros((*area.shape, 3))
+    used = [kind for kind in range(KINDS) if area[..., kind].any()]
+    for kind in used:
+        if len(used) == 1:
+            colour[:, :, kind] = totals.leaf_colour
+            continue
+        some = rows.copy()
+        some["leaves"] *= kinds[:, kind, None]
+        colour[:, :, kind] = average(some, leaf).leaf_colour
+    return area, colour, totals.leaves @ kinds, (totals.leaves * leaf.polygons) @ kinds
+
+
+def _differs(rows: NDArray[np.void], made: DayTotals, of_species: NDArray[np.int64]) -> bool:
+    """Whether any plant may have other leaves than in summer."""
+    summer = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+    trunk = np.unique(rows["species"], return_index=True)[1]
+    for row, which in zip(rows[trunk], of_species, strict=True):
+        most = max(row["spring"], row["autumn"])
+        days = row["day"] + np.linspace(-most, most, 2 * int(most) + 3)
+        for table in which.tolist():
+            left = expected(made.tables, made.origin, np.full(len(days), table), days)
+            if np.abs(left - summer).max() > 1e-9:
+                return True
+    return False

@@ -1,0 +1,358 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Seasons: what stage each leaf is in on a day, as a function of its key, its plant and its species' year.
+
+Every leaf appears, grows, turns and falls on days of its own, which follow from its key, and every plant is early or
+late, and has autumn colours of its own, by its key. What that comes to on average for a plant on a day is a table of
+days for each kind of leaves, made once from the same functions, so that whatever is not grown agrees with what is.
+
+Rows of a flora on a day have the column of `YEAR_COLUMN` besides; others have not, and nothing here costs them
+anything. Branches of such a flora have a ``year``: the day that it is for their plant, and where the plant stands
+among the autumn colours of its species.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import TetFloraError
+from ..setting import setting
+from ..species.species import LEAF_KINDS, Species
+from ..species.year import DAYS, MAX_AUTUMN, LeafYear
+from .hashing import Draw, mix_draw, uniform
+
+#: Bits of a leaf's number for its days, for its colour, and for whether it follows the year at all.
+_BITS, _TINT_BITS = 13, 12
+#: Quantiles of deviations from a mean day in standard deviations: logistic, as courses of bud burst and leaf fall are,
+#: without the last hundredth at either end.
+_EVEN = 0.01 + 0.98 * (np.arange(1 << _BITS) + 0.5) / (1 << _BITS)
+_DEVIATIONS = np.sqrt(3) / np.pi * np.log(_EVEN / (1 - _EVEN))
+_DEVIATIONS /= _DEVIATIONS.std()
+#: Size of a leaf that has just appeared; what it takes to lose its fresh colour, in times of growth.
+_FIRST_SIZE, _FRESH = 0.12, 1.6
+#: How far the colours of a plant's leaves follow the plant rather than each leaf by itself.
+_OF_PLANT = 0.5
+#: Days between two entries of tables, and nodes of the integrals from which they are made.
+_STEP = 0.5
+_NODES = 64
+PRESENT, SIZE, AREA, FRESH, AUTUMN, DRY = range(6)
+"""Columns of tables: expected number of leaves there are, sum of their sizes and of the squares of these, all over what
+it is in summer; and the parts of the last that have the fresh colour, those of autumn, and that of dead leaves."""
+
+
+@dataclass(frozen=True)
+class Season:
+    """A day of the year at a place. Fields with a label are properties of a scene, and documented by their tooltips.
+
+    Raises
+    ------
+    TetFloraError
+        A number that is none or is out of its limits.
+    """
+
+    day: float = setting(
+        196.0,
+        "Day of Year",
+        "Day of the year, 1 to 365: 15 is mid January, 105 mid April, 196 mid July, 288 mid October. Animate it to go "
+        "through the year; beyond 365 the next year begins",
+        soft_min=1.0,
+        soft_max=365.0,
+        min=0.0,
+        max=100_000.0,
+        precision=1,
+    )
+    latitude: float = setting(
+        50.0,
+        "Latitude",
+        "Degrees north. Toward the pole spring comes later and autumn earlier; negative ones are south of the equator, "
+        "where seasons are half a year apart",
+        min=-70.0,
+        max=70.0,
+        precision=1,
+    )
+    spread: float = setting(
+        1.0,
+        "Spread",
+        "How far plants are ahead of or behind each other: 1 as much as their species says, 0 all on the same day",
+        subtype='FACTOR',
+        min=0.0,
+        max=2.0,
+    )
+    snow: float = setting(
+        0.0,
+        "Snow",
+        "Snow on leaves, branches and ground: 0 none, 1 on all that faces the sky",
+        subtype='FACTOR',
+        min=0.0,
+        max=1.0,
+    )
+
+    def __post_init__(self) -> None:
+        if not np.isfinite([self.day, self.latitude, self.spread, self.snow]).all():
+            raise TetFloraError("Seasons: Day of Year, Latitude, Spread and Snow must be finite numbers")
+        if abs(self.latitude) > 90 or self.spread < 0 or not 0 <= self.snow <= 1:
+            raise TetFloraError("Seasons: Latitude must be within 90°, Spread 0 or greater, and Snow between 0 and 1")
+
+
+_LEAF_DTYPE = np.dtype(
+    [(name, np.float64) for name in ("appear", "turn", "fall", "origin", "growth", "turning", "kept", "turnover")]
+    + [(name, np.float64) for name in ("appear_spread", "turn_spread", "fall_spread")]
+    + [("any_fresh", np.bool_), ("colours", np.int64), ("fresh", np.float64, (3,)), ("dry", np.float64, (3,))]
+    + [("autumn", np.float64, (MAX_AUTUMN, 3))]
+)
+YEAR_COLUMN = [
+    ("year", _LEAF_DTYPE),
+    ("follows", np.bool_),
+    *((name, np.float64) for name in ("day", "middle", "spring", "autumn")),
+]
+"""``year`` are the days of the leaves that the row bears, counted from ``origin``, half a year before the middle of
+their life, and of the fall those after the change of colour; ``follows`` whether there are any; ``day`` is the scene's
+day, ``middle`` that in the middle of the life of the species' leaves, ``spring`` and ``autumn`` are days by which its
+plants differ."""
+
+
+def seasonal_rows(rows: NDArray[np.void], species: Sequence[Species], season: Season) -> NDArray[np.void]:
+    """Rows on a day of the year.
+
+    Parameters
+    ----------
+    rows : (r,) array of `rows.ROW_DTYPE`
+    species : sequence of Species
+        That they count through.
+    season : Season
+
+    Returns
+    -------
+    (r,) array of `rows.ROW_DTYPE` and `YEAR_COLUMN`
+    """
+    out = np.zeros(len(rows), np.dtype(rows.dtype.descr + YEAR_COLUMN))
+    for name in rows.dtype.names:
+        out[name] = rows[name]
+    out["day"] = (season.day + (DAYS / 2 if season.latitude < 0 else 0.0)) % DAYS
+    out["year"]["turnover"] = 0.0
+    for number, one in enumerate(species):
+        own = rows["species"] == number
+        if one.year is None:
+            continue
+        year = one.year.at_latitude(abs(season.latitude))
+        first = year.leaf or year.blossom
+        out["middle"][own] = first.middle % DAYS if first is not None else 0.0
+        out["spring"][own], out["autumn"][own] = season.spread * year.spring, season.spread * year.autumn
+        for kind in range(len(LEAF_KINDS)):
+            leaf = year.of_kind(kind)
+            if leaf is not None:
+                out["year"][own & (rows["leaf_kind"] == kind)] = _numbers(leaf)
+                out["follows"][own & (rows["leaf_kind"] == kind)] = True
+    return out
+
+
+def is_seasonal(rows: NDArray[np.void]) -> bool:
+    """Whether rows are those of a flora on a day of the year."""
+    return "year" in rows.dtype.names
+
+
+def _numbers(leaf: LeafYear) -> np.void:
+    """The days of a kind of leaves, counted from half a year before the middle of their life."""
+    out = np.zeros((), _LEAF_DTYPE)
+    for name in ("growth", "turning", "kept", "turnover", "appear_spread", "turn_spread", "fall_spread", "dry"):
+        out[name] = getattr(leaf, name)
+    out["origin"] = leaf.middle - DAYS / 2
+    out["appear"], out["turn"] = leaf.appear - out["origin"], leaf.turn - out["origin"]
+    out["fall"] = leaf.fall - leaf.turn
+    out["any_fresh"], out["colours"] = leaf.fresh is not None, len(leaf.autumn)
+    out["fresh"] = leaf.fresh or 0.0
+    out["autumn"][: len(leaf.autumn)] = np.reshape(leaf.autumn, (-1, 3))
+    return out
+
+
+def plant_years(
+    rows: NDArray[np.void], row: NDArray[np.integer], key: NDArray[np.uint64]
+) -> NDArray[np.float64] | None:
+    """The day that it is for plants (n, 2), and where they stand among autumn colours, 0 to 1; None without seasons.
+
+    Parameters
+    ----------
+    rows : parameter table
+    row : (n,) int
+        Of their trunks.
+    key : (n,) uint64
+    """
+    if not is_seasonal(rows):
+        return None
+    own = rows[["day", "middle", "spring", "autumn"]][row]
+    # Spring's order passes into that of autumn where nothing happens, in the weeks around midsummer and midwinter.
+    spring = np.clip(0.5 - 2.0 * np.sin(2 * np.pi * (own["day"] - own["middle"]) / DAYS), 0.0, 1.0)
+    early, late = (2.0 * uniform(key, draw) - 1.0 for draw in (Draw.SPRING, Draw.AUTUMN))
+    ahead = spring * own["spring"] * early + (1.0 - spring) * own["autumn"] * late
+    return np.stack([own["day"] - ahead, uniform(key, Draw.AUTUMN_HUE)], axis=1)
+
+
+def may_change(rows: NDArray[np.void], row: NDArray[np.integer], year: NDArray[np.float64]) -> bool:
+    """Whether some leaves on rows (n,) or (1,), of plants with years (n, 2), may not be as in summer."""
+    own = rows["year"][row]
+    day = (year[:, 0] - own["origin"]) % DAYS
+    most = _DEVIATIONS[-1]
+    new = day < own["appear"] + most * own["appear_spread"] + _FRESH * own["growth"]
+    old = day > own["turn"] - most * own["turn_spread"] - np.maximum(own["turning"] / 2, -own["fall"])
+    return bool((rows["follows"][row] & (new | old)).any())
+
+
+@dataclass(frozen=True)
+class Stages:
+    """Stages of leaves (n,).
+
+    Attributes
+    ----------
+    there : (n,) bool
+        Not yet to come and not fallen.
+    size : (n,) float64
+        Over that in summer.
+    fresh, turned, dead : (n,) float64
+        How far each has the fresh colour, then its colour of autumn, and that of dead leaves.
+    tint : (n,) float64
+        Its place among the autumn colours but for what is the plant's, 0 to 1.
+    """
+
+    there: NDArray[np.bool_]
+    size: NDArray[np.float64]
+    fresh: NDArray[np.float64]
+    turned: NDArray[np.float64]
+    dead: NDArray[np.float64]
+    tint: NDArray[np.float64]
+
+
+def leaf_stages(
+    rows: NDArray[np.void], row: NDArray[np.integer], key: NDArray[np.uint64], day: NDArray[np.float64]
+) -> Stages:
+    """Stages of leaves on rows (n,) or (1,), with keys (n,), on days (n,) of their plants."""
+    bits = mix_draw(key, Draw.LEAF_YEAR)
+    mask = np.uint64((1 << _BITS) - 1)
+    place = [((bits >> np.uint64(64 - _BITS * (i + 1))) & mask).astype(np.int64) for i in range(4)]
+    tint = (bits & np.uint64((1 << _TINT_BITS) - 1)).astype(np.float64) / (1 << _TINT_BITS)
+    year = rows["year"][row]
+    day = np.broadcast_to((day - year["origin"]) % DAYS, len(key))
+    first, turns, falls = (_DEVIATIONS[p] for p in place[:3])
+    arrived, size, fresh = _springtime(year, day, first)
+    hangs, turned = _autumntime(year, day, turns, falls)
+    chance = (place[3] + 0.5) / (1 << _BITS)
+    follows = chance < year["turnover"]
+    alive = arrived & hangs
+    there = alive | ~follows | (chance < year["turnover"] * year["kept"])
+    live = alive & follows
+    return Stages(
+        there,
+        np.where(live, size, 1.0),
+        np.where(live, fresh, 0.0),
+        np.where(live, turned, 0.0),
+        (follows & ~alive).astype(np.float64),
+        tint,
+    )
+
+
+def _springtime(
+    year: np.void | NDArray[np.void], day: NDArray[np.float64], deviation: NDArray[np.float64]
+) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64]]:
+    """Whether leaves have appeared, their sizes, and how fresh they are; (...) as days and deviations together."""
+    age = day - year["appear"] - year["appear_spread"] * deviation
+    growth = np.maximum(year["growth"], 1e-6)
+    size = _FIRST_SIZE + (1.0 - _FIRST_SIZE) * _smooth(age / growth)
+    return age >= 0.0, size, np.where(year["any_fresh"], 1.0 - _smooth(age / (_FRESH * growth)), 0.0)
+
+
+def _autumntime(
+    year: np.void | NDArray[np.void],
+    day: NDArray[np.float64],
+    turns: NDArray[np.float64],
+    falls: NDArray[np.float64],
+) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    """Whether leaves still hang, and how far they have turned; likewise."""
+    since = day - year["turn"] - year["turn_spread"] * turns
+    turned = np.where(year["colours"] > 0, _smooth(since / np.maximum(year["turning"], 1e-6) + 0.5), 0.0)
+    return since < year["fall"] + year["fall_spread"] * falls, turned
+
+
+def _smooth(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """From 0 to 1 as x does, without a bend."""
+    x = np.clip(x, 0.0, 1.0)
+    return x * x * (3.0 - 2.0 * x)
+
+
+@lru_cache(maxsize=256)
+def leaf_table(leaf: LeafYear | None) -> NDArray[np.float64]:
+    """What to expect of leaves (t, 6) every half day from half a year before the middle of their life; see `PRESENT`.
+
+    All stages of spring are independent of those of autumn, so that expectations of their products are products.
+    """
+    days = np.arange(round(DAYS / _STEP) + 1) * _STEP
+    if leaf is None:
+        return np.tile([1.0, 1.0, 1.0, 0.0, 0.0, 0.0], (len(days), 1))
+    year = _numbers(leaf)
+    some = _DEVIATIONS.reshape(_NODES, -1).mean(axis=1)
+    finer = _DEVIATIONS.reshape(8 * _NODES, -1).mean(axis=1)
+    arrived, size, fresh = _springtime(year, days[:, None], finer)
+    hangs, turned = _autumntime(year, days[:, None, None], some[:, None], some)
+    number, lengths, area, young = ((arrived * v).mean(axis=1) for v in (1.0, size, size**2, size**2 * fresh))
+    held, coloured = hangs.mean(axis=(1, 2)), (hangs * turned).mean(axis=(1, 2))
+    gone = leaf.kept * (1.0 - number * held)  # and hangs on
+    out = np.stack(
+        [
+            number * held + gone,
+            lengths * held + gone,
+            area * held + gone,
+            young * (held - coloured),
+            area * coloured,
+            gone,
+        ],
+        axis=1,
+    )
+    out *= leaf.turnover
+    out[:, :3] += 1.0 - leaf.turnover
+    return out
+
+
+def expected(
+    tables: NDArray[np.float64], origin: NDArray[np.float64], which: NDArray[np.integer], day: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """What to expect of leaves (n, 6) on days (n,), from some of several tables (k, t, 6) with their origins (k,)."""
+    place = ((day - origin[which]) % DAYS) / _STEP
+    low = np.minimum(place.astype(np.int64), tables.shape[1] - 2)
+    before = tables[which, low]
+    return before + (place - low)[:, None] * (tables[which, low + 1] - before)
+
+
+def autumn_colours(year: NDArray[np.void], hue: NDArray[np.float64], tint: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Autumn colours (n, 3) of leaves, from their years (n,) or (1,), the hues (n,) of plants and their own tints."""
+    number = np.maximum(year["colours"], 1)
+    place = (1.0 - _OF_PLANT) * tint + _OF_PLANT * hue
+    which = np.minimum((place * number).astype(np.int64), number - 1)
+    autumn = year["autumn"]
+    return autumn[0][which] if len(autumn) == 1 else autumn[np.arange(len(which)), which]
+
+
+def mean_autumn_colours(year: NDArray[np.void], hue: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Means (n, 3) of the same over the leaves of plants with hues (n,)."""
+    number = np.maximum(year["colours"], 1)[:, None]
+    first = (_OF_PLANT * hue)[:, None]
+    edges = np.arange(MAX_AUTUMN + 1) / number
+    inside = np.clip(edges, first, first + 1.0 - _OF_PLANT)
+    share = np.diff(inside, axis=1) / (1.0 - _OF_PLANT)
+    return np.einsum("nk,nkc->nc", share, year["autumn"])
+
+
+def in_season(
+    summer: NDArray[np.float64],
+    fresh: NDArray[np.float64],
+    stages: Stages,
+    autumn: NDArray[np.float64],
+    dry: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Colours (n, 3) of leaves at their stages, from those that they have when they are at the end of each."""
+    out = summer + stages.fresh[:, None] * (fresh - summer)
+    out += stages.turned[:, None] * (autumn - out)
+    out += stages.dead[:, None] * (dry - out)
+    return out
