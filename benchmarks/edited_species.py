@@ -83,7 +83,7 @@ def forest(identifier: str) -> bpy.types.Scene:
 def first_picture(scene: bpy.types.Scene) -> float:
     """Seconds of the first refinement of a session, up to all meshes."""
     compiled._compiled.cache_clear()
-    facet_weights._of_flora.cache_clear()
+    facet_weights._of_states.cache_clear()
     facet_weights._found.clear()
     begun = time.thread_time()
     refine.refine(scene, bpy.context.evaluated_depsgraph_get())

@@ -64,7 +64,7 @@ def test_an_edited_species_is_looked_at_once(cache, tmp_path, monkeypatch):
     (tmp_path / "cache" / "notes.txt").write_text("mine")
 
     monkeypatch.setattr(facet_weights, "_found", {})
-    facet_weights._of_flora.cache_clear()
+    facet_weights._of_states.cache_clear()
     monkeypatch.setattr(facet_weights, "fitting", lambda *_: pytest.fail("looked at again"))
     refine.refine(scene, depsgraph())
     assert bpy.ops.tetflora.clear_cache() == {'FINISHED'}

@@ -272,8 +272,8 @@ def test_a_species_of_ones_own_is_looked_at_once_for_all_sessions(
     monkeypatch.setattr(facet_weights, "shipped", lambda: {facet_weights.digest(compile_species([other]), 0): TABLE})
     both = compile_species([other, one])
     rows = both.rows["species"] == 1
-    np.testing.assert_array_equal(facet_weights.facet_weights(both).whole[rows], weights.whole)
-    np.testing.assert_array_equal(facet_weights.facet_weights(both).own[rows], weights.own)
+    np.testing.assert_array_equal(facet_weights.facet_weights(both).whole[:, rows], weights.whole)
+    np.testing.assert_array_equal(facet_weights.facet_weights(both).own[:, rows], weights.own)
     for name in ("own", "root", "density"):
         np.testing.assert_array_equal(getattr(both.clumping, name)[rows], getattr(clumping, name))
     assert len(files(folder)) == 3  # the clumping of the other
@@ -291,7 +291,7 @@ def test_species_that_are_found_together_are_what_they_are_alone(monkeypatch: py
         monkeypatch.setattr(facet_weights, "_found", {})
         flora = compile_species(species)
         weights = facet_weights.facet_weights(flora)
-        found.append({one.identifier: weights.whole[flora.rows["species"] == n] for n, one in enumerate(species)})
+        found.append({one.identifier: weights.whole[:, flora.rows["species"] == n] for n, one in enumerate(species)})
     for name, alone in (found[0] | found[1]).items():
         np.testing.assert_array_equal(found[2][name], alone)
         np.testing.assert_array_equal(found[3][name], alone)

@@ -109,6 +109,18 @@ class DayTotals:
         some = left[:, AREA] > 0
         return np.where(some[:, None], mixed / np.where(some, left[:, AREA], 1.0)[:, None], summer)
 
+    def share_range(self, rows: NDArray[np.void], species: int) -> tuple[float, float]:
+        """Least and greatest `leaf_share` of plants of a species on the day of rows (r,)."""
+        trunk = np.flatnonzero(rows["species"] == species)[0]
+        most = max(rows["spring"][trunk], rows["autumn"][trunk])
+        days = rows["day"][trunk] + np.linspace(-most, most, 2 * int(most) + 3)
+        area = self.area[trunk].mean(axis=0)
+        left = [
+            expected(self.tables, self.origin, np.full(len(days), table), days)[:, AREA] for table in self.table[trunk]
+        ]
+        share = area @ np.array(left) / max(area.sum(), 1e-300) if area.sum() > 0 else np.ones(1)
+        return float(share.min()), float(share.max())
+
     def leaf_share(self, subplants: Branches) -> NDArray[np.float64]:
         """Area (n,) of leaves over that in summer, 1 where there are never any."""
         area = self.area[subplants.row].mean(axis=1)

@@ -257,10 +257,15 @@ class _Maker:
 
     def _of_subplants(self, subplants: Branches, sizes: FacetSizes, real: NDArray[np.float64]) -> Facets:
         leaf, wood = sizes.sides(self.pixels)
-        weight = self.weights.of_subplants(subplants.row, sizes.whole_optical / np.maximum(leaf, 1e-12) ** 2)
+        count, share = sizes.whole_optical / np.maximum(leaf, 1e-12) ** 2, self._share(subplants)
+        weight = self.weights.of_subplants(subplants.row, count, share)
         return subplant_facets(
             self.sight.flora, subplants, leaf, wood, weight, real, self._once(subplants, sizes, leaf)
         )
+
+    def _share(self, branches: Branches) -> NDArray[np.float64] | None:
+        """Part (n,) of their leaves that branches have on the day; None in summer."""
+        return None if branches.year is None else self.sight.flora.day.leaf_share(branches)
 
     def _once(self, branches: Branches, sizes: FacetSizes, side: NDArray[np.float64]) -> NDArray[np.float64]:
         """Light (n,) that leaves of branches send to the eye once over what facets do; 1 where nothing is seen."""
@@ -275,7 +280,8 @@ class _Maker:
         visibility, coarse = portions.visibility[owner], portions.coarse[owner]
         sizes = piece_facet_sizes(flora, pieces, piece_totals(flora, pieces), self.sight.shadows, visibility, coarse)
         leaf, wood = sizes.sides(self.pixels)
-        weight = self.weights.of_pieces(pieces.branches.row, sizes.whole_optical / np.maximum(leaf, 1e-12) ** 2)
+        count, share = sizes.whole_optical / np.maximum(leaf, 1e-12) ** 2, self._share(pieces.branches)
+        weight = self.weights.of_pieces(pieces.branches.row, count, share)
         real = tubes = None
         if transition is not None:
             seen = portions.visibility > 0

@@ -15,6 +15,9 @@ never refined later, so that no two frames of a film, and no two computers of a 
 Sub-plants are tested together with all that grow around them, of any parent, because facets spill over and reach
 across the gaps between neighbours. Next siblings alone asked for up to a twentieth more area, and made aspens too
 dense. Facets of pieces are compared in the same way with what branches themselves bear.
+
+Plants with fewer leaves have greater weights, as less hides behind them. So the same is measured of plants that have
+some of their leaves, and none: what a day of the year leaves lies between two of these.
 """
 
 from __future__ import annotations
@@ -28,7 +31,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled.flora import Flora
+from ..compiled.flora import Flora, compile_species
 from ..growth.branches import Branches
 from ..growth.envelopes import are_solids
 from ..growth.growth import trunks
@@ -36,6 +39,7 @@ from ..growth.hashing import mix
 from ..growth.seeds import Seeds
 from ..jobs import at_once
 from ..species.fingerprints import fingerprint
+from ..species.species import Order, Range, Species
 from ..storage import remembered
 from ..subplants.pieces import open_subplants
 from .sights import FAMILIES, LARGEST, Families, View, least_weights, look
@@ -61,14 +65,19 @@ RAYS, _PAIRS = 6_000.0, 40.0
 _KIND = "facet_shares"
 
 
+#: Parts of their leaves that plants have, of which weights are measured.
+SHARES = (1.0, 0.4, 0.1, 0.0)
+
+
 @dataclass(frozen=True)
 class FacetWeights:
     """Fraction of their area that facets get, by row and number of facets.
 
     Attributes
     ----------
-    whole, own : (r, k) float64
-        For each of `COUNTS`, of sub-plants, and of what branches themselves bear, by the facets of a whole branch.
+    whole, own : (s, r, k) float64
+        For the first s of `SHARES`, and each of `COUNTS`, of sub-plants, and of what branches themselves bear, by the
+        facets of a whole branch.
     solid : (r,) bool, optional
         Rows of which a branch has more facets than that: its leaves fill a solid and nothing else grows on it. Facets
         reach beyond its surface by a part of their side, so what is missing falls as the root of their number.
@@ -78,16 +87,36 @@ class FacetWeights:
     own: NDArray[np.float64]
     solid: NDArray[np.bool_] | None = None
 
-    def of_subplants(self, row: NDArray[np.integer], count: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Weights (n,) for sub-plants of rows (n,) and numbers of facets (n,)."""
-        return _between(self.whole, row, count)
+    def of_subplants(
+        self, row: NDArray[np.integer], count: NDArray[np.float64], share: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float64]:
+        """Weights (n,) for sub-plants of rows (n,), numbers of facets (n,), and parts of their leaves (n,)."""
+        return _with_share(self.whole, row, count, share)
 
-    def of_pieces(self, row: NDArray[np.integer], count: NDArray[np.float64]) -> NDArray[np.float64]:
+    def of_pieces(
+        self, row: NDArray[np.integer], count: NDArray[np.float64], share: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float64]:
         """Weights (n,) for pieces of branches, by rows (n,) and the numbers of facets (n,) of whole branches."""
-        out = _between(self.own, row, count)
+        out = _with_share(self.own, row, count, share)
         if self.solid is None or not self.solid.any():
             return out
         return np.where(self.solid[row], 1.0 - (1.0 - out) * np.sqrt(COUNTS[-1] / np.maximum(count, COUNTS[-1])), out)
+
+
+def _with_share(
+    tables: NDArray[np.float64], row: NDArray[np.integer], count: NDArray[np.float64], share: NDArray[np.float64] | None
+) -> NDArray[np.float64]:
+    """Weights (n,) between those of two shares, where the inverse is nearly linear in the share."""
+    if share is None or len(tables) == 1:
+        return _between(tables[0], row, count)
+    out, shares = _between(tables[0], row, count), np.array(SHARES)
+    low = np.clip(np.searchsorted(-shares, -share), 1, len(SHARES) - 1)
+    for node in np.unique(low[share < 1.0]).tolist():
+        some = np.flatnonzero((low == node) & (share < 1.0))
+        less, more = (1.0 / _between(tables[i], row[some], count[some]) for i in (node, node - 1))
+        place = (share[some] - shares[node]) / (shares[node - 1] - shares[node])
+        out[some] = 1.0 / (less + place * (more - less))
+    return out
 
 
 def _between(table: NDArray[np.float64], row: NDArray[np.integer], count: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -107,22 +136,56 @@ def facet_weights(flora: Flora, species: Collection[int] | None = None) -> Facet
 
     Those of the shipped species are read from `TABLE`. Others take a second or two each, and are cached on disk too.
     """
-    every = range(len(flora.species)) if species is None else species
-    return _of_flora(flora.in_leaf, tuple(sorted(set(every))))
+    every = sorted(set(range(len(flora.species)) if species is None else species))
+    return _of_states(flora.in_leaf, tuple((number, states_of(flora, number)) for number in every))
+
+
+def states_of(flora: Flora, number: int) -> tuple[int, ...]:
+    """Indices of `SHARES` between which plants of a species are on the day of a flora; those in summer have all."""
+    if flora.day is None:
+        return (0,)
+    low, high = flora.day.share_range(flora.rows, number)
+    shares = np.array(SHARES)
+    first = int(np.flatnonzero(shares >= high - 1e-9)[-1])
+    last = int(np.flatnonzero(shares <= low + 1e-9)[0])
+    return tuple(range(first, last + 1))
 
 
 @lru_cache(maxsize=8)
-def _of_flora(flora: Flora, species: tuple[int, ...]) -> FacetWeights:
-    weights = np.ones((2, len(flora.rows), len(COUNTS)))
-    for number in species:
-        at_once(measuring(flora, (number,)))
-        weights[:, flora.rows["species"] == number] = _known(flora, number)
+def _of_states(flora: Flora, species: tuple[tuple[int, tuple[int, ...]], ...]) -> FacetWeights:
+    number = 1 + max((state for _, states in species for state in states), default=0)
+    weights = np.ones((2, number, len(flora.rows), len(COUNTS)))
+    for one, states in species:
+        for state in states:
+            some, index = with_leaves(flora, one, SHARES[state])
+            at_once(_measuring(some, index))
+            weights[:, state, flora.rows["species"] == one] = _known(some, index)
     return FacetWeights(*weights, are_solids(flora.rows))
 
 
+def with_leaves(flora: Flora, number: int, share: float) -> tuple[Flora, int]:
+    """A flora in which plants of a species have a part of their leaves, and its index there."""
+    return (flora, number) if share == 1.0 else (_thinned(flora.species[number], share), 0)
+
+
+@lru_cache(maxsize=64)
+def _thinned(species: Species, share: float) -> Flora:
+    # What is compiled has its quality and habit already.
+    bare = replace(species, quality=1.0, habit=0.0, orders=tuple(_with_part(o, share) for o in species.orders))
+    if species.spur is not None:
+        bare = replace(bare, spur=_with_part(species.spur, share))
+    return compile_species([bare])
+
+
+def _with_part(order: Order, share: float) -> Order:
+    return replace(order, leaves=Range(share * order.leaves.mean, share * order.leaves.variation))
+
+
 def unmeasured(flora: Flora) -> list[int]:
-    """Species (index) whose weights nobody has measured yet."""
-    return [number for number in range(len(flora.species)) if _known(flora.in_leaf, number) is None]
+    """Species (index) whose weights, as of the day of the flora, nobody has measured yet."""
+    plain = flora.in_leaf
+    every = [(number, states_of(flora, number)) for number in range(len(flora.species))]
+    return [n for n, states in every if any(_known(*with_leaves(plain, n, SHARES[s])) is None for s in states)]
 
 
 def measuring(flora: Flora, species: Collection[int]) -> Generator[tuple[str, float], None, None]:
@@ -133,17 +196,26 @@ def measuring(flora: Flora, species: Collection[int]) -> Generator[tuple[str, fl
     str, float
         Name of the species at work, and the fraction of its measurement that is done.
     """
-    flora = flora.in_leaf
     for number in sorted(set(species) & set(unmeasured(flora))):
-        work, name = fitting(flora, number, RAYS), flora.species[number].name
-        while True:
-            try:
-                yield name, next(work)
-            except StopIteration as stop:
-                found = stop.value
-                break
-        content = digest(flora, number)
-        _keep(content, remembered(_KIND, content, found.shape, lambda found=found: found))
+        states = states_of(flora, number)
+        for i, state in enumerate(states):
+            for name, done in _measuring(*with_leaves(flora.in_leaf, number, SHARES[state])):
+                yield name, (i + done) / len(states)
+
+
+def _measuring(flora: Flora, number: int) -> Generator[tuple[str, float], None, None]:
+    """Measure the weights of one species, unless they are known."""
+    if _known(flora, number) is not None:
+        return
+    work, name = fitting(flora, number, RAYS), flora.species[number].name
+    while True:
+        try:
+            yield name, next(work)
+        except StopIteration as stop:
+            found = stop.value
+            break
+    content = digest(flora, number)
+    _keep(content, remembered(_KIND, content, found.shape, lambda: found))
 
 
 def _known(flora: Flora, number: int) -> NDArray[np.float64] | None:

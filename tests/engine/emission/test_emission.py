@@ -62,7 +62,7 @@ def all_real(flora: Flora, camera: Camera) -> Transition:
 def unweighted(monkeypatch: pytest.MonkeyPatch, flora: Flora) -> None:
     """Facets have all of the area that they stand for, not what leaves of a cluster show of it."""
     ones = np.ones((len(flora.rows), len(COUNTS)))
-    monkeypatch.setattr(facets, "facet_weights", lambda *_: FacetWeights(ones, ones))
+    monkeypatch.setattr(facets, "facet_weights", lambda *_: FacetWeights(ones[None], ones[None]))
 
 
 def positions(blocks: list) -> list[bytes]:

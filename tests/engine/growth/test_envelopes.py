@@ -173,7 +173,7 @@ def test_all_area_is_drawn_at_any_size(name: str, pixels: int, monkeypatch: pyte
     _, result = run(flora, seeds, camera)
     check(flora, seeds, result)
     ones = np.ones((len(flora.rows), len(COUNTS)))
-    monkeypatch.setattr(facets, "facet_weights", lambda *_: FacetWeights(ones, ones))
+    monkeypatch.setattr(facets, "facet_weights", lambda *_: FacetWeights(ones[None], ones[None]))
     sight, transition = Sight(flora, result, camera), Transition(flora, camera, 1.5)
     made = [f for part in facets.facet_parts(flora, result, camera, FacetPixels(0.5), transition) for f in drawn(part)]
     area = sum((some.side**2).sum() for some in made)
@@ -214,7 +214,7 @@ def test_weights_of_solids_are_whole_where_facets_are_as_small_as_leaves() -> No
     assert found[1, 0, 0] < 0.8
     weights = facet_weights(flora)
     many = weights.of_pieces(np.zeros(3, int), np.array([1024.0, 16 * 1024.0, 1e12]))
-    assert many[0] == pytest.approx(weights.own[0, -1])
+    assert many[0] == pytest.approx(weights.own[0, 0, -1])
     assert 1 - many[1] == pytest.approx((1 - many[0]) / 4)
     assert many[2] == pytest.approx(1.0, abs=1e-4)
 

@@ -99,10 +99,10 @@ def test_every_shipped_species_has_a_table() -> None:
 @given(st.floats(0.05, 1.6), st.floats(1e-3, 1e6))
 def test_between_known_numbers_weights_follow_the_logarithm(level: float, count: float) -> None:
     table = np.full((2, len(subject.COUNTS)), level)
-    weights = subject.FacetWeights(table, table)
+    weights = subject.FacetWeights(table[None], table[None])
     assert weights.of_subplants(np.array([1]), np.array([count]))[0] == pytest.approx(level)
     rising = np.tile(np.arange(len(subject.COUNTS), dtype=float), (2, 1))
-    weights = subject.FacetWeights(rising, rising)
+    weights = subject.FacetWeights(rising[None], rising[None])
     step = np.log(subject.COUNTS[1] / subject.COUNTS[0])
     place = np.clip(np.log(count / subject.COUNTS[0]) / step, 0, len(subject.COUNTS) - 1)
     assert weights.of_pieces(np.array([0]), np.array([count]))[0] == pytest.approx(place)
@@ -146,6 +146,6 @@ def test_a_species_is_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     alone = subject.facet_weights(compile_species([load_species("birch")]))
     again = subject.facet_weights(compile_species([load_species("dead_tree"), load_species("birch")]))
     assert asked == ["birch", "dead_tree"]
-    rows = len(alone.whole)
-    np.testing.assert_array_equal(again.whole[-rows:], alone.whole)
-    np.testing.assert_array_equal(again.own[-rows:], alone.own)
+    rows = alone.whole.shape[1]
+    np.testing.assert_array_equal(again.whole[:, -rows:], alone.whole)
+    np.testing.assert_array_equal(again.own[:, -rows:], alone.own)

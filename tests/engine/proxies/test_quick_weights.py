@@ -85,7 +85,7 @@ def seen_from(distance: float, limit: float, monkeypatch: pytest.MonkeyPatch) ->
 
     monkeypatch.setattr(subject, "fitting", noted)
     monkeypatch.setattr(subject, "_found", {})
-    subject._of_flora.cache_clear()
+    subject._of_states.cache_clear()
     flora = compile_species([edited("grass", leaves=1.4)])
     seeds = replace(support.plants(1), species=np.zeros(1, np.int32))
     frame = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
