@@ -6,7 +6,7 @@
 
 import bpy
 
-from . import add, assets, brush, ground_cover, ground_tools, marks, plants, populations, preview, refine, species
+from . import add, assets, brush, ground_cover, ground_tools, marks, plants, populations, preview, refine, species, year
 
 CLASSES = tuple(cls for module in tuple(vars().values()) for cls in getattr(module, "CLASSES", ()))
 

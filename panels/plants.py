@@ -10,12 +10,22 @@ from ..operators.marks import TETFLORA_OT_mark_field
 from ..operators.plants import TETFLORA_OT_remove_plants
 from ..operators.refine import TETFLORA_OT_make_plant_mesh
 from ..tetflora_addon.blender.assets.marks import is_species
+from ..tetflora_addon.blender.scene.ages import stage_text
 from ..tetflora_addon.blender.scene.fields import FIELD_TYPES, stored_size
 from ..tetflora_addon.blender.scene.objects import has_nodes
+from ..tetflora_addon.blender.scene.own_ages import has_ages
 from ..tetflora_addon.blender.scene.skeletons import FORM_TYPES
 from ..tetflora_addon.blender.species.asset_species import name_of
 from ..tetflora_addon.blender.species.edits import catalogue
-from .base import Button, SidebarPanel, TETFLORA_UL_field_species, draw_buttons, draw_properties, split_layout
+from .base import (
+    Button,
+    SidebarPanel,
+    TETFLORA_UL_field_species,
+    draw_below,
+    draw_buttons,
+    draw_properties,
+    split_layout,
+)
 from .menus import CONVERSIONS, PLANT_TOOLS, TETFLORA_MT_add_plant, draw_species_menu
 
 
@@ -33,7 +43,8 @@ class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
             column.prop(plant, "species_choice")
             if plant.species not in catalogue():
                 column.label(text=f'"{name_of(plant.species)}" is not in the catalog', icon='ERROR')
-            draw_properties(column, plant, "seed", "enabled", "form")
+            draw_properties(column, plant, "seed", "enabled", "form", "age")
+            draw_below(column, stage_text(context.scene, plant.species, plant.age))
         elif active is not None and active.tetflora.is_field:
             _draw_field(column, active)
         else:
@@ -76,6 +87,10 @@ def _draw_field(column: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         if species not in catalogue():
             column.label(text=f'"{name_of(species)}" is not in the catalog', icon='ERROR')
     draw_properties(column, field, "seed", "enabled")
+    if has_ages(obj):
+        column.label(text="Age by attribute", icon='INFO')
+    else:
+        column.prop(field, "age")
 
 
 class TETFLORA_PT_selected_plants(SidebarPanel, bpy.types.Panel):

@@ -189,13 +189,18 @@ class TETFLORA_PT_populate_arrangement(_PartOfPopulate, bpy.types.Panel):
 
 
 class TETFLORA_PT_populate_size(_PartOfPopulate, bpy.types.Panel):
-    """How large, and how upright."""
+    """How large, how upright, and how old."""
 
-    bl_label = "Size"
+    bl_label = "Size and Age"
 
     def draw_settings(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
         draw_properties(layout.column(align=True), settings, "scale_min", "scale_max")
         draw_properties(layout, settings, "scale_at_top", "tilt")
+        column = layout.column(align=True)
+        column.prop(settings, "age")
+        row = column.row()
+        row.active = settings.age > 0.0
+        row.prop(settings, "age_spread", slider=True)
 
 
 def _distance(settings: bpy.types.PropertyGroup) -> str:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Wind, output, previews, and statistics of the last refinement."""
+"""The year, wind, output, previews, and statistics of the last refinement."""
 
 import json
 from functools import lru_cache
@@ -9,10 +9,12 @@ import bpy
 
 from ..operators.preview import TETFLORA_OT_forget_levels, TETFLORA_OT_look_through, TETFLORA_OT_preview_levels
 from ..operators.refine import TETFLORA_OT_keep_results
+from ..operators.year import TETFLORA_OT_set_season
 from ..tetflora_addon.blender.job.forecast import polygons_text, seconds_text
 from ..tetflora_addon.blender.placing.plant_objects import plant_collections
+from ..tetflora_addon.blender.settings import date_text
 from ..tetflora_addon.blender.viewport import state
-from .base import SidebarPanel, TETFLORA_UL_output_species, draw_message, draw_properties, split_layout
+from .base import SidebarPanel, TETFLORA_UL_output_species, draw_below, draw_message, draw_properties, split_layout
 
 
 class TETFLORA_PT_wind(SidebarPanel, bpy.types.Panel):
@@ -30,6 +32,37 @@ class TETFLORA_PT_wind(SidebarPanel, bpy.types.Panel):
         column.active = wind.enabled
         column.use_property_decorate = True  # they can be animated
         draw_properties(column, wind, "speed", "direction", "gusts", "loop")
+
+
+class TETFLORA_MT_seasons(bpy.types.Menu):
+    """Days in the middle of the seasons."""
+
+    bl_label = "Season"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        self.layout.operator_enum(TETFLORA_OT_set_season.bl_idname, "season")
+
+
+class TETFLORA_PT_year(SidebarPanel, bpy.types.Panel):
+    """The day of the year, and the years that have passed."""
+
+    bl_label = "Year and Age"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        year = context.scene.tetflora.year
+        layout = split_layout(self)
+        row = layout.row(heading="Seasons")
+        row.prop(year, "enabled", text="")
+        row.menu(TETFLORA_MT_seasons.__name__)
+        column = layout.column()
+        column.active = year.enabled
+        column.use_property_decorate = True  # they can be animated
+        column.prop(year, "day")
+        draw_below(column, date_text(year.day))
+        draw_properties(column, year, "latitude", "spread", "snow")
+        layout.use_property_decorate = True
+        layout.prop(year, "years")
 
 
 class TETFLORA_PT_output(SidebarPanel, bpy.types.Panel):
@@ -220,6 +253,8 @@ class TETFLORA_PT_steps(SidebarPanel, bpy.types.Panel):
 
 
 CLASSES = (
+    TETFLORA_MT_seasons,
+    TETFLORA_PT_year,
     TETFLORA_PT_wind,
     TETFLORA_PT_output,
     TETFLORA_PT_ray_visibility,

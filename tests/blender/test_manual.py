@@ -14,7 +14,7 @@ from tetflora_addon.blender import preferences, properties
 from tetflora_addon.blender.cli.command import main
 from tetflora_addon.blender.placing.properties import TetFloraBrush, TetFloraMixEntry, TetFloraPopulation
 from tetflora_addon.blender.results import output_properties
-from tetflora_addon.blender.settings import TetFloraWind
+from tetflora_addon.blender.settings import TetFloraWind, TetFloraYear
 from tetflora_addon.blender.viewport import state
 
 MANUAL = (build.ROOT / "docs" / "manual.md").read_text(encoding="utf-8")
@@ -34,6 +34,7 @@ GROUPS = (
     state.TetFloraPreview,
     TetFloraBrush,
     TetFloraWind,
+    TetFloraYear,
     preferences.TetFloraPreferences,
 )
 

@@ -15,9 +15,9 @@ from tetflora_addon.blender import preferences, properties, saved_files
 from tetflora_addon.blender.job import contents
 from tetflora_addon.blender.placing.properties import TetFloraBrush, TetFloraPopulation
 from tetflora_addon.blender.results import leaf_objects
-from tetflora_addon.blender.settings import TetFloraWind
+from tetflora_addon.blender.settings import TetFloraWind, TetFloraYear
 from tetflora_addon.blender.species import catalogue, edits
-from tetflora_addon.growth import wind
+from tetflora_addon.growth import seasons, wind
 from tetflora_addon.planting import rules, strokes
 from tetflora_addon.refinement import settings
 
@@ -52,6 +52,7 @@ def _without_labels(settings_class):
         (rules.Rules, TetFloraPopulation, {"density", "weights", "companions"}),
         (strokes.Brush, TetFloraBrush, {"density", "scale_min", "scale_max", "weights"}),
         (wind.Wind, TetFloraWind, {"time", "loop", "moving", "origin"}),
+        (seasons.Season, TetFloraYear, set()),
     ],
     ids=lambda value: getattr(value, "__name__", ""),
 )

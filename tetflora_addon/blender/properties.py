@@ -3,7 +3,15 @@
 """What TetFlora stores in a file: ``Object.tetflora`` on plants, fields and occluders, ``Scene.tetflora`` otherwise."""
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
 
 from . import settings
 from .placing import properties
@@ -12,6 +20,7 @@ from .results.forms import form_property
 from .runtime import Listeners
 from .scene import scatterers
 from .scene.explicit import EXPLICIT_PROPERTY
+from .scene.own_ages import AGE_PROPERTY
 from .scene.skeletons import FORM_TYPES
 from .settings import AnimationProperties, RefinementProperties
 from .species import asset_species, editor, edits
@@ -65,11 +74,12 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
         override=_OVERRIDES,
     )
     form: PointerProperty(**_FORM, override=_OVERRIDES)
+    age: FloatProperty(**AGE_PROPERTY, override=_OVERRIDES)
     is_field: BoolProperty(
         name="Field of Plants",
         description=(
-            "Each point of this mesh or point cloud is a plant, defined by the attributes species, seed, rotation and "
-            "scale of the points. The attribute species is an index into the list of species"
+            "Each point of this mesh or point cloud is a plant, defined by the attributes species, seed, rotation, "
+            "scale and age of the points. The attribute species is an index into the list of species"
         ),
         options=set(),
     )
@@ -218,6 +228,7 @@ class TetFloraScene(RefinementProperties, AnimationProperties, bpy.types.Propert
     output: PointerProperty(type=output_properties.TetFloraOutput)
     brush: PointerProperty(type=properties.TetFloraBrush)
     wind: PointerProperty(type=settings.TetFloraWind)
+    year: PointerProperty(type=settings.TetFloraYear)
     preview: PointerProperty(type=state.TetFloraPreview)
     leaf_objects: CollectionProperty(
         name="Leaf Objects",

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of a scene that come from the engine: refinement with its qualities, animation, wind.
+"""Settings of a scene that come from the engine: refinement with its qualities, animation, wind, the year.
 
 Properties are generated from the engine's dataclasses, which hold their names, tooltips and ranges.
 """
@@ -8,15 +8,18 @@ Properties are generated from the engine's dataclasses, which hold their names, 
 from __future__ import annotations
 
 from dataclasses import fields
+from datetime import date, timedelta
 from math import degrees
 from types import SimpleNamespace
 from typing import Any
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ..camera.view_cells import ViewCells
 from ..errors import SceneError, readable, shown
+from ..growth.seasons import DAYS, Season
 from ..growth.wind import Wind
 from ..refinement.settings import QUALITIES, RefinementSettings
 from .preferences import QUALITY_ITEMS, preferences
@@ -24,6 +27,14 @@ from .preferences import QUALITY_ITEMS, preferences
 _MAKERS = {bool: BoolProperty, int: IntProperty, float: FloatProperty}
 #: From the frame to the middle of the exposure, in times that the shutter is open, by position of the shutter.
 _MIDDLE = {'START': 0.5, 'CENTER': 0.0, 'END': -0.5}
+
+#: Seasons in the order of their months in the north, December first.
+SEASONS = ("winter", "spring", "summer", "autumn")
+#: For dates in panels.
+MONTHS = (
+    *("January", "February", "March", "April", "May", "June"),
+    *("July", "August", "September", "October", "November", "December"),
+)
 
 
 def properties_of(settings: type, **common: Any) -> SimpleNamespace:
@@ -101,6 +112,7 @@ def check_limits(group: bpy.types.PropertyGroup, owner: str) -> None:
 
 _CELLS = properties_of(ViewCells)
 _WIND = properties_of(Wind)
+_SEASON = properties_of(Season)
 
 
 def _factor(name: str, description: str, default: float) -> Any:
@@ -228,6 +240,62 @@ def wind_of(scene: bpy.types.Scene) -> Wind | None:
     return Wind(group.speed, group.direction, group.gusts, frame / rate, group.loop / rate, blurred)
 
 
+class TetFloraYear(bpy.types.PropertyGroup):
+    """The day of the year, and the years that have passed; all but the switch can be animated."""
+
+    enabled: BoolProperty(
+        name="Seasons",
+        description=(
+            "Show plants as they are on a day of the year: leaves appear, grow, turn and fall. Off, it is summer. "
+            "Results of Refine do not follow the day; with Refine at Render, each frame of an animation has its own"
+        ),
+        options=set(),
+    )
+    day: _SEASON.day
+    latitude: _SEASON.latitude
+    spread: _SEASON.spread
+    snow: _SEASON.snow
+    years: FloatProperty(
+        name="Years",
+        description=(
+            "Years since planting, added to the age of every plant. Animate it to let plants grow. At 0, plants "
+            "without an age of their own are full-grown"
+        ),
+        default=0.0,
+        min=0.0,
+        soft_max=200.0,
+        max=10_000.0,
+        step=100,
+        precision=2,
+    )
+
+
+def season_of(scene: bpy.types.Scene) -> Season | None:
+    """The season at the scene's frame, its day within one year; None without seasons."""
+    group = scene.tetflora.year
+    if not group.enabled:
+        return None
+    return Season(group.day % DAYS, group.latitude, group.spread, group.snow)
+
+
+def years_of(scene: bpy.types.Scene) -> float:
+    """Years that are added to the age of all plants of a scene at its frame."""
+    return scene.tetflora.year.years
+
+
+def date_text(day: float) -> str:
+    """A day of the year as ``14 October``; days of other years are those of one year."""
+    shown = date(2001, 1, 1) + timedelta(days=int((day - 1.0) % DAYS))  # no leap year
+    return f"{shown.day} {iface(MONTHS[shown.month - 1])}"
+
+
+def season_name(season: Season) -> str:
+    """``spring``, ``summer``, ``autumn`` or ``winter``: quarters of the year as meteorologists cut it."""
+    north = season.latitude >= 0.0
+    month = (date(2001, 1, 1) + timedelta(days=int((season.day - 1.0) % DAYS))).month
+    return SEASONS[(month + (0 if north else 6)) % 12 // 3]
+
+
 def begin(scene: bpy.types.Scene) -> None:
     """Give a scene that has no plants yet the quality and memory limit of the preferences, unless it has its own."""
     group, chosen = scene.tetflora, preferences()
@@ -240,4 +308,4 @@ def begin(scene: bpy.types.Scene) -> None:
         group.max_memory = chosen.new_memory
 
 
-CLASSES = (TetFloraWind,)
+CLASSES = (TetFloraWind, TetFloraYear)

@@ -21,6 +21,8 @@ from panels.preferences import KEYMAP, KEYS
 from tests.blender.layouts import Layout
 from tests.blender.scenes import add_camera, add_plant
 from tetflora_addon.blender import preferences, properties, translations
+from tetflora_addon.blender.scene.ages import FULL_GROWN
+from tetflora_addon.blender.settings import MONTHS
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -172,6 +174,9 @@ def _texts():
     for identifier in _ids():
         group, name = identifier.split(".")
         found.add(getattr(getattr(bpy.ops, group), name).get_rna_type().name)
+    seasons = bpy.ops.tetflora.set_season.get_rna_type().properties["season"]
+    found |= {item.name for item in seasons.enum_items}
+    found |= {FULL_GROWN, *MONTHS}
     for path in (build.ROOT / "panels").glob("*.py"):
         found |= {n.value for n in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(n, ast.Constant)}
     return found

@@ -137,6 +137,7 @@ CASES: list[Case] = [
     ("populate as a field", ground_active, "populate", {"count": 12, "species": MIX, "as_field": 'FIELD'}),
     ("populate again", populated, "populate", {"count": 5, "species": MIX, "seed": 3}),
     ("first_forest", lambda: None, "first_forest", {}),
+    ("set_season", forest, "set_season", {"season": 'AUTUMN'}),
     ("drop_to_ground", forest, "drop_to_ground", {}),
     ("use_as_form", edges, "use_as_form", {}),
     ("assign_species", forest, "assign_species", {"species": "fern"}),

@@ -89,7 +89,8 @@ def test_a_number_beyond_its_limits_is_refused_by_name(scene, name, value):
 
 
 def test_every_setting_that_can_be_set_is_within_its_limits(scene):
-    for group in (scene.tetflora, scene.tetflora.wind, scene.tetflora.output, scene.tetflora.brush):
+    every = scene.tetflora
+    for group in (every, every.wind, every.year, every.output, every.brush):
         for prop in group.bl_rna.properties:
             if prop.type in {'INT', 'FLOAT'} and not prop.is_readonly:
                 for value in (prop.hard_min, prop.hard_max):

@@ -26,11 +26,12 @@ from ..assets.places import Places, read_places
 from ..results.forms import form_of
 from ..results.hiding import originals_shown
 from ..results.leaf_objects import resolved_species
+from ..scene.ages import grown_species
 from ..scene.explicit import Explicit, read_explicit
 from ..scene.lights import read_lights, read_sources, sky_suns
 from ..scene.objects import read_occluders
 from ..scene.plants import NoPlantsError, read_plants_of
-from ..settings import check_limits, wind_of
+from ..settings import check_limits, season_of, wind_of
 
 
 @dataclass(frozen=True)
@@ -99,6 +100,8 @@ class Given:
 
 def expected_polygons(flora: Flora, seeds: Seeds) -> float:
     """Approximate number of faces of plants."""
+    if flora.day is not None:
+        return float(flora.face_counts(trunks(flora.rows, seeds)).sum())
     return float(flora.polygons[trunks(flora.rows, seeds).row].sum())
 
 
@@ -143,15 +146,21 @@ def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph:
 
 
 def load_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Species]:
-    """The species that `compile_for` compiles; it alone needs the scene."""
+    """The species that `compile_for` compiles, at their ages; it alone needs the scene."""
     if not identifiers:
         return [load_species(min(list_species()))]
-    return [resolved_species(scene, identifier, depsgraph) for identifier in identifiers]
+    return [grown_species(scene, kind, resolved_species(scene, kind, depsgraph)) for kind in identifiers]
+
+
+def in_year(scene: bpy.types.Scene, flora: Flora) -> Flora:
+    """A flora on the scene's day of the year."""
+    season = season_of(scene)
+    return flora if season is None else flora.in_year(season)
 
 
 def in_wind(scene: bpy.types.Scene, flora: Flora, camera: Camera) -> Flora:
-    """A flora in the scene's wind at its frame, in the coordinates of a camera."""
-    wind = wind_of(scene)
+    """A flora on the scene's day, in its wind at its frame, in the coordinates of a camera."""
+    flora, wind = in_year(scene, flora), wind_of(scene)
     return flora if wind is None else flora.in_wind(replace(wind, origin=tuple(camera.origin.tolist())))
 
 
@@ -164,7 +173,7 @@ def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statisti
         As `read_scene` and `compile_for`.
     """
     given = read_scene(scene, depsgraph, depsgraph.view_layer)
-    flora = compile_for(given.species, scene, depsgraph)
+    flora = in_year(scene, compile_for(given.species, scene, depsgraph))
     instances = sum(len(one) for one in given.places)
     return Statistics(plants=len(given.seeds), polygons_full=given.polygons_full(flora), instances=instances)
 
@@ -177,7 +186,7 @@ def check_settings(scene: bpy.types.Scene) -> None:
     SceneError
         Names the setting, its value and the limits.
     """
-    for group in (scene.tetflora, scene.tetflora.wind, scene.tetflora.output):
+    for group in (scene.tetflora, scene.tetflora.wind, scene.tetflora.year, scene.tetflora.output):
         check_limits(group, f'Scene "{scene.name}"')
 
 

@@ -22,10 +22,12 @@ from ...errors import TetFloraError
 from ...refinement.estimate import Estimate, Stand, estimate
 from ..attributes import read
 from ..runtime import Handlers
+from ..scene.ages import crown_kinds
 from ..scene.camera import read_camera
 from ..scene.crowns import crown_to_draw
-from ..scene.fields import field_kinds, stored_size
+from ..scene.fields import PREFIX, field_kinds, stored_size
 from ..scene.objects import objects_within, renderable_objects
+from ..scene.own_ages import AGE, sound_ages
 from ..scene.skeletons import species_of
 from .contents import check_settings, memory_left, picture_bytes, settings_from
 
@@ -124,13 +126,13 @@ def _count(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand | N
                 single.append(obj)
         elif group.is_field:
             if group.enabled and stored_size(obj):
-                parts.append(_field(obj))
+                parts.append(_field(scene, obj))
         elif obj.instance_type == 'COLLECTION' and obj.instance_collection is not None:
             within = [o for o in objects_within(obj.instance_collection) if o.tetflora.is_plant]
             if within:
-                parts.append(_plants(within, np.array(obj.matrix_world)))
+                parts.append(_plants(scene, within, np.array(obj.matrix_world)))
     if single:
-        parts.append(_plants(single, np.eye(4)))
+        parts.append(_plants(scene, single, np.eye(4)))
     crowns: dict[str, Crown | None] = {}
     rows = []
     for number, foot, scale, species in parts:
@@ -160,16 +162,34 @@ def _some(number: int) -> NDArray[np.int64]:
 
 
 def _plants(
-    plants: list[bpy.types.Object], carried: NDArray[np.float64]
+    scene: bpy.types.Scene, plants: list[bpy.types.Object], carried: NDArray[np.float64]
 ) -> tuple[int, NDArray[np.float64], NDArray[np.float64], list[str]]:
-    """How many single plants there are; feet, scales and species of some."""
+    """How many single plants there are; feet, scales and kinds of some."""
     chosen = [plants[i] for i in _some(len(plants)).tolist()]
     matrices = carried @ np.array([o.matrix_world for o in chosen], dtype=np.float64)
     scale = np.cbrt(np.abs(np.linalg.det(matrices[:, :3, :3])))
-    return len(plants), matrices[:, :3, 3], scale, [o.tetflora.species for o in chosen]
+    kinds = list(dict.fromkeys(o.tetflora.species for o in chosen))
+    which = np.array([kinds.index(o.tetflora.species) for o in chosen])
+    ages = np.array([o.tetflora.age for o in chosen])
+    return len(plants), matrices[:, :3, 3], *_aged(scene, scale, kinds, which, ages)
 
 
-def _field(obj: bpy.types.Object) -> tuple[int, NDArray[np.float64], NDArray[np.float64], list[str]]:
+def _aged(
+    scene: bpy.types.Scene,
+    scale: NDArray[np.float64],
+    kinds: list[str],
+    which: NDArray[np.int64],
+    ages: NDArray[np.floating],
+) -> tuple[NDArray[np.float64], list[str]]:
+    """Scales of plants and their kinds, by their ages."""
+    sound = np.where(sound_ages(ages), ages, 0.0).astype(np.float64)
+    named, which, taller = crown_kinds(scene, kinds, which, sound if sound.any() else None)
+    return scale * taller, [named[i] for i in which.tolist()]
+
+
+def _field(
+    scene: bpy.types.Scene, obj: bpy.types.Object
+) -> tuple[int, NDArray[np.float64], NDArray[np.float64], list[str]]:
     """The same of a field, as it is stored: what nodes make of it is not known before they are evaluated."""
     number, kinds = stored_size(obj), [species_of(kind) for kind in field_kinds(obj)]
     chosen = _some(number)
@@ -179,7 +199,9 @@ def _field(obj: bpy.types.Object) -> tuple[int, NDArray[np.float64], NDArray[np.
     own = np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
     scale = own * (np.ones(len(chosen)) if scale is None else scale)
     which = np.zeros(len(chosen), np.int64) if species is None else np.clip(species, 0, len(kinds) - 1).astype(np.int64)
-    return number, foot, scale, [kinds[i] for i in which.tolist()]
+    ages = next((a for n in (PREFIX + AGE, AGE) if (a := _stored(obj.data, n, chosen)) is not None), None)
+    ages = np.full(len(chosen), obj.tetflora.age) if ages is None else ages
+    return number, foot, *_aged(scene, scale, kinds, which, ages)
 
 
 def _stored(points: bpy.types.Mesh | bpy.types.PointCloud, name: str, chosen: NDArray[np.int64]) -> NDArray | None:

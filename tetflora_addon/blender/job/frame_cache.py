@@ -22,15 +22,16 @@ from ..assets.measures import reach_of
 from ..assets.target import digest_of
 from ..compat import drawn_disc
 from ..results.hiding import hidden_originals, hide_originals, name_of, object_named, show_originals
-from ..results.leaf_objects import brought_materials, resolved_species
+from ..results.leaf_objects import brought_materials
 from ..results.output import REPLACED, remove_collection, result_collections
 from ..results.proxies import shade_again
+from ..scene.ages import grown_species
 from ..scene.camera import read_camera
 from ..scene.skeletons import species_of
-from ..settings import wind_of
+from ..settings import season_of, wind_of, years_of
 from ..species.asset_species import TetFloraAssetSpecies, asset_species
 from ..species.edits import species_for
-from .contents import Given, read_scene, settings_from
+from .contents import Given, load_for, read_scene, settings_from
 
 _MAX_SPECIES = 64
 _CHOICES = ("proxy_form", "baked_light", "expand_everything", "asset_detail", "bake_assets")
@@ -71,7 +72,7 @@ def scene_digest(
     camera: Camera | None = None,
     given: Given | None = None,
 ) -> str:
-    """Digest of camera, plants, meshes, assets, occluders, lights, settings, species, materials and wind.
+    """Digest of camera, plants, meshes, assets, occluders, lights, settings, species, materials, day and wind.
 
     In the wind it changes with each frame.
 
@@ -95,7 +96,7 @@ def scene_digest(
         meshes = given.explicit.meshes
         slots = [[getattr(material, "name_full", "") for material in slots] for slots in given.explicit.materials]
         explicit = meshes.surfaces, meshes.surface, meshes.linear, meshes.origin, slots
-    species = [resolved_species(scene, identifier, depsgraph) for identifier in given.species]
+    species = load_for(given.species, scene, depsgraph) if given.species else []
     targets = {one.target: "" for one in given.places}
     for target in targets:
         targets[target] = digest_of(target, depsgraph)
@@ -125,7 +126,8 @@ def choices(scene: bpy.types.Scene) -> list:
     materials = [(e.species, *(getattr(getattr(e, k), "name", "") for k in REPLACED)) for e in group.output.species]
     chosen = [getattr(group, name) for name in _CHOICES]
     assets = [(identifier, _asset_name(one), one.variants) for identifier, one in asset_species(scene).items()]
-    return [settings_from(scene), chosen, materials, assets, wind_of(scene), drawn_disc(scene.render.engine)]
+    moment = wind_of(scene), season_of(scene), years_of(scene)
+    return [settings_from(scene), chosen, materials, assets, *moment, drawn_disc(scene.render.engine)]
 
 
 def _asset_name(entry: TetFloraAssetSpecies) -> str:
@@ -183,7 +185,8 @@ def _around(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, given: Given
     """Spheres around meshes and assets, and around plants with all branches on the way to the last twig."""
     seeds, meshes = given.seeds, None if given.explicit is None else given.explicit.meshes
     # Lengths are in metres for trunks, and in those of their parents for all others.
-    orders = [species_for(scene, species_of(kind)).orders for kind in seeds.identifiers]
+    grown = [grown_species(scene, kind, species_for(scene, species_of(kind))) for kind in seeds.identifiers]
+    orders = [species.orders for species in grown]
     heights = np.array([np.cumprod([order.length.mean for order in own]).sum() for own in orders])
     centres, radii = [seeds.position], [heights[seeds.species] * seeds.scale]
     if meshes is not None:

@@ -24,9 +24,11 @@ from ..results.leaf_objects import leaf_objects, materials_of
 from ..results.meshes import write_mesh
 from ..results.output import remove_made
 from ..runtime import JobData, guarded, is_there
+from ..scene.ages import classed
+from ..scene.own_ages import ages_of
 from ..scene.skeletons import kind_of
 from ..worker import call_in_thread
-from .contents import compile_for, expected_polygons
+from .contents import compile_for, expected_polygons, in_year
 
 #: Most polygons of one conversion; more would fill the memory of most computers.
 MOST_POLYGONS = 30_000_000
@@ -136,8 +138,12 @@ def _make_plant_mesh_steps(
     for plant, good in zip(plants, sound, strict=True):
         if not good:
             raise SceneError(f'"{plant.name}": zero scale or an invalid position; clear them with Alt S and Alt G')
-    floras = {kind_of(p): compile_for((kind_of(p),), scene, depsgraph) for p in plants}
+    ages = ages_of(plants)
     seeds = [single_seed(kind_of(p), p.tetflora.seed, f) for p, f in zip(plants, frame, strict=True)]
+    each = [None] * len(plants) if ages is None else ages.reshape(-1, 1)
+    seeds = [aged for _, aged in classed(scene, [("", s, age) for s, age in zip(seeds, each, strict=True)])]
+    kinds = dict.fromkeys(s.identifiers[0] for s in seeds)
+    floras = {kind: in_year(scene, compile_for((kind,), scene, depsgraph)) for kind in kinds}
     polygons = sum(expected_polygons(floras[s.identifiers[0]], s) for s in seeds)
     if polygons > MOST_POLYGONS:
         raise SceneError(
@@ -149,12 +155,14 @@ def _make_plant_mesh_steps(
         for number, (plant, seed) in enumerate(zip(plants, seeds, strict=True)):
             progress = Progress(number / len(plants), f"mesh {number + 1:,} of {len(plants):,}")
             yield progress
-            flora = floras[kind_of(plant)]
-            parts = yield from call_in_thread(progress, plant_parts, flora, seed)
+            flora = floras[seed.identifiers[0]]
+            one = replace(seed, scale=np.ones(1))
+            parts = yield from call_in_thread(progress, plant_parts, flora, one)
             data.check()  # it may have waited for the thread meanwhile
             mesh = plant_mesh(scene, f"{plant.name} mesh", flora.species[0], parts)
             data_made += [mesh, *mesh.materials]
-            made.append(_placed(mesh, plant, frame[number] * scale[number], world[number, :3, 3]))
+            size = scale[number] * seed.scale[0]
+            made.append(_placed(mesh, plant, frame[number] * size, world[number, :3, 3]))
             data.add("a mesh that it made", made[-1], mesh)
             if plant.tetflora.enabled:
                 plant.tetflora.enabled = False

@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 from ...planting.canopy import Canopy, Sheet
 from ...planting.cover import Floor, Habitat, Suits, mapping
 from ..attributes import world_matrix
+from ..scene.ages import crown_kinds
 from ..scene.crowns import crown_for
-from ..scene.fields import field_kinds, fields_of, read_field
+from ..scene.fields import field_kinds, fields_of, read_aged_field
+from ..scene.own_ages import ages_of
 from ..scene.skeletons import species_of
 from ..worker import at_once
 
@@ -47,26 +49,22 @@ def canopy_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[C
 
     single = [o for o in objects if o.tetflora.is_plant]
     places = np.array([np.array(o.matrix_world) for o in single], dtype=np.float64).reshape(-1, 4, 4)
-    position, scale = [places[:, :3, 3]], [np.cbrt(np.abs(np.linalg.det(places[:, :3, :3])))]
-    kinds = [np.array([number_of(o.tetflora.species) for o in single], dtype=np.int32)]
+    names = list(dict.fromkeys(o.tetflora.species for o in single))
+    index = np.array([names.index(o.tetflora.species) for o in single], dtype=np.int32)
+    scale = np.cbrt(np.abs(np.linalg.det(places[:, :3, :3])))
+    parts = [(places[:, :3, 3], scale, *crown_kinds(scene, names, index, ages_of(single)))]
     for field in fields_of(objects):
-        read = read_field(field, depsgraph, world_matrix(field, depsgraph)[None])
-        own = np.array([number_of(species_of(kind)) for kind in read.identifiers], dtype=np.int32)
-        position.append(read.position)
-        scale.append(read.scale)
-        kinds.append(own[read.species])
-    species = np.concatenate(kinds)
-    size = np.concatenate(scale)
-    crowns = [crown_for(scene, identifier) for identifier in numbers]
-    radius, base, top, area = np.array([(c.radius, c.base, c.height, c.leaves) for c in crowns]).reshape(-1, 4).T
-    canopy = Canopy(
-        np.concatenate(position),
-        radius[species] * size,
-        base[species] * size,
-        top[species] * size,
-        area[species] * size**2,
-        species,
-    )
+        read, ages = read_aged_field(field, depsgraph, world_matrix(field, depsgraph)[None])
+        parts.append((read.position, read.scale, *crown_kinds(scene, read.identifiers, read.species, ages)))
+    species, crowns = [], []
+    for _, _, kinds, which, taller in parts:
+        own = [crown_for(scene, kind) for kind in kinds]
+        known = np.array([(c.radius, c.base, c.height, c.leaves) for c in own]).reshape(-1, 4)[which]
+        crowns.append(known * taller[:, None] ** [1, 1, 1, 2])
+        species.append(np.array([number_of(species_of(kind)) for kind in kinds], dtype=np.int32)[which])
+    position, size = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
+    radius, base, top, area = np.concatenate(crowns).T
+    canopy = Canopy(position, radius * size, base * size, top * size, area * size**2, np.concatenate(species))
     return canopy, tuple(numbers)
 
 

@@ -16,7 +16,8 @@ from ...planting.places import Placement, new_seeds
 from .. import settings
 from ..attributes import world_matrix
 from ..saved_files import VERSION
-from ..scene.fields import fields_of, quaternions, read_field, stored_size, write_field
+from ..scene.fields import fields_of, quaternions, read_aged_field, stored_size, write_field
+from ..scene.own_ages import ages_of
 from ..scene.plants import single_plants
 from ..scene.skeletons import form_of, species_of
 from ..species.edits import catalogue, display_height
@@ -79,6 +80,7 @@ def add_plants(
     placement: Placement,
     species: Sequence[str],
     collection: bpy.types.Collection | None = None,
+    ages: np.ndarray | None = None,
 ) -> list[bpy.types.Object]:
     """Make the empties of a placement.
 
@@ -89,13 +91,15 @@ def add_plants(
         Identifiers that ``placement.species`` refers to.
     collection : bpy.types.Collection, optional
         Where they go; the scene's collection for plants if not given.
+    ages : (n,) float, optional
+        Years; all are full-grown if not given.
 
     Returns
     -------
     list of bpy.types.Object
         In the placement's order.
     """
-    return at_once(add_plants_steps(scene, placement, species, collection))
+    return at_once(add_plants_steps(scene, placement, species, collection, ages))
 
 
 def add_plants_steps(
@@ -103,10 +107,11 @@ def add_plants_steps(
     placement: Placement,
     species: Sequence[str],
     collection: bpy.types.Collection | None = None,
+    ages: np.ndarray | None = None,
 ) -> Generator[list[bpy.types.Object], object, list[bpy.types.Object]]:
     """As `add_plants`; yields those that are made so far, which the caller removes if it goes no further."""
     rows = (placement.position, _eulers(placement), placement.scale, placement.species, placement.seed)
-    return _empties_steps(scene, rows, species, [None] * len(species), collection)
+    return _empties_steps(scene, rows, species, [None] * len(species), collection, ages)
 
 
 def _empties(*given: Any) -> list[bpy.types.Object]:
@@ -120,6 +125,7 @@ def _empties_steps(
     species: Sequence[str],
     forms: Sequence[bpy.types.Object | None],
     collection: bpy.types.Collection | None = None,
+    ages: np.ndarray | None = None,
 ) -> Generator[list[bpy.types.Object], object, list[bpy.types.Object]]:
     """One empty for each row of places, XYZ Euler angles, scales, numbers of kinds and seeds."""
     known = catalogue()
@@ -135,6 +141,8 @@ def _empties_steps(
         group.version, group.is_plant, group.species, group.seed = VERSION, True, species[kind], seeds[number]
         if forms[kind] is not None:
             group.form = forms[kind]
+        if ages is not None and ages[number] != 0.0:
+            group.age = ages[number]
         target.link(obj)
         if not count % _AT_ONCE:
             yield [obj for obj in made if obj is not None]
@@ -194,6 +202,7 @@ def add_field(
     placement: Placement,
     species: Sequence[str],
     collection: bpy.types.Collection | None = None,
+    ages: np.ndarray | None = None,
 ) -> bpy.types.Object:
     """Make one field of the plants of a placement.
 
@@ -204,9 +213,11 @@ def add_field(
         Identifiers that ``placement.species`` refers to.
     collection : bpy.types.Collection, optional
         Where it goes; the scene's collection for plants if not given.
+    ages : (n,) float, optional
+        Years; all are full-grown if not given.
     """
     rows = (placement.position, placement.rotation, placement.scale, placement.species, placement.seed)
-    return _link_field(scene, write_field(FIELD, *rows, species), collection)
+    return _link_field(scene, write_field(FIELD, *rows, species, ages=ages), collection)
 
 
 def field_from_plants(
@@ -231,7 +242,7 @@ def field_from_plants(
     read = single_plants(plants, depsgraph)
     species, forms = [species_of(kind) for kind in read.identifiers], [form_of(kind) for kind in read.identifiers]
     rows = (read.position, quaternions(read.frame), read.scale, read.species, read.seed)
-    made = _link_field(scene, write_field(FIELD, *rows, species, forms), collection)
+    made = _link_field(scene, write_field(FIELD, *rows, species, forms, ages_of(plants)), collection)
     remove_plants(plants)
     return made
 
@@ -257,7 +268,7 @@ def plants_from_field(
     SceneError
         The field has no points, too many, or cannot be read; nothing is changed.
     """
-    read = read_field(field, depsgraph, world_matrix(field, depsgraph)[None])
+    read, ages = read_aged_field(field, depsgraph, world_matrix(field, depsgraph)[None])
     if not 0 < len(read) <= most:
         raise SceneError(
             f'"{field.name}" has {len(read):,} plants; '
@@ -265,7 +276,8 @@ def plants_from_field(
         )
     angles = np.array([Matrix(frame).to_euler() for frame in read.frame])
     species, forms = [species_of(kind) for kind in read.identifiers], [form_of(kind) for kind in read.identifiers]
-    made = _empties(scene, (read.position, angles, read.scale, read.species, read.seed), species, forms, collection)
+    rows = (read.position, angles, read.scale, read.species, read.seed)
+    made = _empties(scene, rows, species, forms, collection, ages)
     remove_fields([field])
     return made
 

@@ -30,7 +30,7 @@ VERSION = 1
 
 _MIX = ("species", "weight", "companion", "companion_strength", "companion_distance", "habitat", "shed_by")
 #: Keys that are written only where they say something: earlier versions do not know them.
-_RARE = {"habitat": 'ANYWHERE', "shed_by": ""}
+_RARE = {"habitat": 'ANYWHERE', "shed_by": "", "age": 0.0, "age_spread": 0.0}
 #: Settings that hold identifiers of species.
 _IDENTIFIERS = ("species", "companion", "shed_by")
 MAX_FILE_BYTES = 4_000_000
@@ -117,6 +117,8 @@ def _population_data(population: TetFloraPopulation) -> dict[str, Any]:
     ]
     for prop in _simple_settings(population):
         value = getattr(population, prop.identifier)
+        if value == _RARE.get(prop.identifier, ...):
+            continue
         data[prop.identifier] = (
             (value.name if value is not None else None) if _is_pointer(prop) else _value(prop, value)
         )

@@ -15,15 +15,18 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ...jobs import Progress
+from ...planting.ages import plant_ages
 from ...planting.places import Placement
 from ..assets.marks import measure_all
 from ..runtime import JobData, guarded, is_there
 from ..scene.crowns import crown_steps
 from ..scene.fields import fields_of, stored_size
+from ..scene.own_ages import MOST_YEARS
 from ..worker import at_once, call_in_thread
 from .canopy import is_cover, standing
 from .plant_objects import (
@@ -165,15 +168,16 @@ def _make_plants_steps(
     returned = max(population.made - own_number(own), 0)
     field = makes_field(population, len(placement)) and len(placement)
     made: list[bpy.types.Object] = []
+    ages = own_ages(population, placement)
     if not own and not field:  # otherwise they go first, or their successors could not have their names
-        made = yield from _new_plants(scene, placement, search.species, collection_of(scene, population))
+        made = yield from _new_plants(scene, placement, search.species, collection_of(scene, population), ages)
     _release(copies)
     _remove(own)
     collection = collection_of(scene, population)
     if field:
-        made = [add_field(scene, placement, search.species, collection)]
+        made = [add_field(scene, placement, search.species, collection, ages)]
     elif own:
-        made = add_plants(scene, placement, search.species, collection)
+        made = add_plants(scene, placement, search.species, collection, ages)
     for number, obj in enumerate(made):
         group = obj.tetflora
         group.population, group.population_number = population.uid, number
@@ -194,11 +198,22 @@ def still_there(data: JobData, scene: bpy.types.Scene, uid: str) -> TetFloraPopu
     return found
 
 
+def own_ages(population: TetFloraPopulation, placement: Placement) -> NDArray[np.float32] | None:
+    """Ages (n,) of a population's plants in years; None where all are full-grown."""
+    if population.age == 0.0:
+        return None
+    return np.minimum(plant_ages(placement.seed, population.age, population.age_spread), np.float32(MOST_YEARS))
+
+
 def _new_plants(
-    scene: bpy.types.Scene, placement: Placement, species: tuple[str, ...], collection: bpy.types.Collection
+    scene: bpy.types.Scene,
+    placement: Placement,
+    species: tuple[str, ...],
+    collection: bpy.types.Collection,
+    ages: NDArray[np.float32] | None,
 ) -> Generator[Progress, object, list[bpy.types.Object]]:
     """Plants where none have to go before."""
-    steps, made = add_plants_steps(scene, placement, species, collection), []
+    steps, made = add_plants_steps(scene, placement, species, collection, ages), []
     try:
         while True:
             made = next(steps)

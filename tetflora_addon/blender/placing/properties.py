@@ -17,6 +17,7 @@ from ...planting.rules import Companion, Rules
 from ...planting.strokes import Brush
 from ...setting import LENGTH
 from ..runtime import Listeners
+from ..scene.own_ages import AGE_PROPERTY
 from ..settings import properties_of
 from ..species.catalogue import NO_SPECIES, SpeciesChoice, items_for, number_of
 from ..species.edits import catalogue
@@ -76,6 +77,7 @@ _BY_SPECIES = {
     "set": _choose_distance,
     "options": {'SKIP_SAVE'},
 }
+_AGE = "Age of the plants in years, half of them younger and half older; 0 is full-grown, as the species describes it"
 _SOURCE = {"name": "Distance From", "items": SOURCES, "default": 'UNSET', "options": {'HIDDEN'}}
 
 
@@ -259,6 +261,20 @@ class TetFloraPopulation(bpy.types.PropertyGroup):
 
     distance_from: EnumProperty(**_SOURCE)
     distance_by_species: BoolProperty(**_BY_SPECIES)
+
+    age: FloatProperty(**{**AGE_PROPERTY, "description": _AGE}, **_LIVE)
+    age_spread: FloatProperty(
+        name="Age Spread",
+        description=(
+            "How much the ages of plants differ: about two in three are within this fraction of Age, and as many "
+            "younger as older. 0 for plants of one age"
+        ),
+        default=0.0,
+        min=0.0,
+        max=1.0,
+        subtype='FACTOR',
+        **_LIVE,
+    )
 
 
 MODES = (

@@ -21,6 +21,8 @@ from ..runtime import call_soon, redraw
 from ..species.asset_species import TetFloraAssetSpecies, find_asset
 from ..species.edits import display_height, species_for
 from ..worker import call_in_thread
+from .ages import at_age
+from .skeletons import age_of, species_of
 
 #: Of a species that cannot be compiled: radius and base over height; leaf area over radius³, and polygons.
 _RADIUS, _BASE, _AREA, _POLYGONS = 0.2, 0.3, 0.5, 50_000.0
@@ -31,30 +33,30 @@ _finding: list[Generator] = []  # at most one
 _without: set[Species] = set()  # an object for a leaf
 
 
-def crown_for(scene: bpy.types.Scene, identifier: str) -> Crown:
-    """The mean crown of a species; a guess where it cannot be compiled."""
-    asset = find_asset(scene, identifier)
+def crown_for(scene: bpy.types.Scene, kind: str) -> Crown:
+    """The mean crown of a species at the age of a kind; a guess where it cannot be compiled."""
+    asset = find_asset(scene, species_of(kind))
     if asset is not None:
         return _measured(asset)
     try:
-        return crown_of(species_for(scene, identifier))
+        return crown_of(_grown(scene, kind))
     except SpeciesError:  # missing, broken, or with an object for a leaf
-        return _guess(identifier)
+        return _guess(species_of(kind))
 
 
-def crown_to_draw(scene: bpy.types.Scene, identifier: str) -> Crown | None:
+def crown_to_draw(scene: bpy.types.Scene, kind: str) -> Crown | None:
     """The same for a panel, without waiting: None where it is only being looked for; the window is then drawn again."""
-    asset = find_asset(scene, identifier)
+    asset = find_asset(scene, species_of(kind))
     if asset is not None:
         return _measured(asset)
     try:
-        species = species_for(scene, identifier)
+        species = _grown(scene, kind)
     except SpeciesError:
-        return _guess(identifier)
+        return _guess(species_of(kind))
     if _in_background():
-        return crown_for(scene, identifier)
+        return crown_for(scene, kind)
     if species in _without:
-        return _guess(identifier)
+        return _guess(species_of(kind))
     known = known_crown(species)
     if known is None:
         if species not in _wanted:
@@ -63,15 +65,17 @@ def crown_to_draw(scene: bpy.types.Scene, identifier: str) -> Crown | None:
     return known
 
 
-def crown_steps(
-    progress: Progress, scene: bpy.types.Scene, identifiers: Iterable[str]
-) -> Generator[Progress, object, None]:
-    """Find the crowns of species in the background, so that nobody has to wait for them later."""
+def crown_steps(progress: Progress, scene: bpy.types.Scene, kinds: Iterable[str]) -> Generator[Progress, object, None]:
+    """Find the crowns of kinds in the background, so that nobody has to wait for them later."""
     species = []
-    for identifier in sorted(identifiers):
+    for kind in sorted(kinds):
         with suppress(SpeciesError):
-            species.append(species_for(scene, identifier))
+            species.append(_grown(scene, kind))
     yield from call_in_thread(progress, _find_all, species)
+
+
+def _grown(scene: bpy.types.Scene, kind: str) -> Species:
+    return at_age(species_for(scene, species_of(kind)), age_of(kind))
 
 
 def _in_background() -> bool:

@@ -23,6 +23,7 @@ from ...growth.seeds import Seeds
 from ...planting.places import new_seeds
 from ..attributes import frames_of, read, values_of, write
 from .objects import geometry_of
+from .own_ages import AGE, MOST_YEARS, ages_of, sound_ages
 from .skeletons import kind_of, kind_of_choice, species_of
 
 #: Types of objects that can be marked as fields.
@@ -52,14 +53,19 @@ def stored_size(obj: bpy.types.Object) -> int:
     return len(obj.data.points if obj.type == 'POINTCLOUD' else obj.data.vertices) if obj.type in FIELD_TYPES else 0
 
 
-def read_field(
+def read_field(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, matrices: NDArray[np.float64]) -> Seeds:
+    """Plants of a field as `read_aged_field`, without their ages."""
+    return read_aged_field(obj, depsgraph, matrices)[0]
+
+
+def read_aged_field(
     obj: bpy.types.Object,
     depsgraph: bpy.types.Depsgraph,
     matrices: NDArray[np.float64],
     keys: NDArray[np.uint64] | None = None,
     geometry: bpy.types.GeometrySet | None = None,
-) -> Seeds:
-    """Plants of a field, once for each of its places.
+) -> tuple[Seeds, NDArray[np.float64] | None]:
+    """Plants of a field, once for each of its places, and their ages in years; None where all are full-grown.
 
     Transforms of points count as those of plants that are objects.
 
@@ -92,7 +98,8 @@ def read_field(
         sound &= np.isfinite(place.sum(axis=1))
     _refuse(obj, ~sound.reshape(len(matrices), -1).all(axis=0), "zero scale or an invalid position or rotation")
     species = np.tile(points.species.astype(np.int32), len(matrices))
-    return Seeds(kinds, species, points.seeds(keys), place, frame, scale)
+    ages = None if points.age is None else np.tile(points.age, len(matrices))
+    return Seeds(kinds, species, points.seeds(keys), place, frame, scale), ages
 
 
 def read_field_matrices(
@@ -105,7 +112,7 @@ def read_field_matrices(
 ) -> Iterator[tuple[str, NDArray[np.int64], NDArray[np.float64]]]:
     """Plants of a field of some species, with all of their transform: stretched and mirrored as the points are.
 
-    Parameters and errors are those of `read_field`.
+    Parameters and errors are those of `read_aged_field`.
 
     Yields
     ------
@@ -137,7 +144,10 @@ def read_field_matrices(
 
 @dataclass(frozen=True)
 class _Points:
-    """Points of a field in its own space; a rotation (3, 3, n), scale (1, n) or (3, n) along its axes."""
+    """Points of a field in its own space; a rotation (3, 3, n), scale (1, n) or (3, n) along its axes.
+
+    ``age`` is None where all plants are full-grown.
+    """
 
     kinds: tuple[str, ...]
     position: NDArray[np.float64]
@@ -145,6 +155,7 @@ class _Points:
     scale: NDArray[np.float64]
     species: NDArray[np.int64]
     seed: NDArray[np.int64]
+    age: NDArray[np.float64] | None
 
     def seeds(self, keys: NDArray[np.uint64] | None) -> NDArray[np.int64]:
         """Seeds of the points in all places with the given keys; those of the points themselves where it is None."""
@@ -174,7 +185,9 @@ def _read_points(
     kinds = field_kinds(obj)
     species = _joined([_integers(obj, part, "species", size, 0) for part, size in sized], (0,))
     _refuse(obj, (species < 0) | (species >= len(kinds)), f"a species number outside the list of {len(kinds)} species")
-    return _Points(kinds, position, rotation, own_scale, species, seed)
+    age = _joined([_ages(obj, part, size) for part, size in sized], (0,)).astype(np.float64)
+    _refuse(obj, ~sound_ages(age), f"an age that is not from 0 to {MOST_YEARS:,.0f} years")
+    return _Points(kinds, position, rotation, own_scale, species, seed, age if age.any() else None)
 
 
 def write_field(
@@ -186,6 +199,7 @@ def write_field(
     seed: NDArray[np.int32],
     identifiers: Sequence[str],
     forms: Sequence[bpy.types.Object | None] | None = None,
+    ages: NDArray[np.floating] | None = None,
 ) -> bpy.types.Object:
     """Make a field: an object with a mesh of vertices, not linked to any collection yet.
 
@@ -205,6 +219,8 @@ def write_field(
     identifiers : sequence of str
     forms : sequence of objects or None, optional
         Form of each kind.
+    ages : (n,) float, optional
+        Years. An age that all of them have becomes that of the object.
     """
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(len(seed))
@@ -213,11 +229,16 @@ def write_field(
     own = {"rotation": rotation, "scale": scale, "species": species, "seed": seed}
     for attribute, kind in FIELD_ATTRIBUTES.items():
         write(mesh, attribute, own[attribute], data_type=kind)
+    same = ages is None or np.ptp(ages) == 0.0
+    if not same:
+        write(mesh, AGE, ages, data_type='FLOAT')
     mesh.update()
     obj = bpy.data.objects.new(name, mesh)
     obj.matrix_world = Matrix.Translation(origin)
     group = obj.tetflora
     group.is_field = True
+    if ages is not None and same:
+        group.age = ages[0]
     for identifier, form in zip(identifiers, forms or [None] * len(identifiers), strict=True):
         entry = group.field_species.add()
         entry.species, entry.form = identifier, form
@@ -281,6 +302,15 @@ def _seeds(obj: bpy.types.Object, points: Points, size: int, first: int) -> NDAr
     stored = _attribute(obj, points, "seed", _INTEGERS) is not None
     seeds = _integers(obj, points, "seed" if stored else "id", size, np.arange(first, first + size))
     return new_seeds(seeds, roll).astype(np.int64) if roll or not stored else seeds
+
+
+def _ages(obj: bpy.types.Object, points: Points, size: int) -> NDArray[np.floating]:
+    """Age of each point in years; that of the object without the attribute."""
+    attribute = _attribute(obj, points, AGE, {'FLOAT', 'INT'})
+    if attribute is not None:
+        return values_of(attribute)
+    own = ages_of([obj])
+    return np.broadcast_to(np.zeros(1) if own is None else own, size)
 
 
 def _rotations(obj: bpy.types.Object, points: Points, size: int) -> NDArray[np.float64]:

@@ -19,9 +19,11 @@ from ...growth.seeds import Seeds
 from ..attributes import frames_of, world_matrix
 from ..species.asset_species import asset_of, asset_species, find_asset, name_of
 from ..species.edits import catalogue
-from .fields import read_field, read_field_matrices
+from .ages import Part, classed
+from .fields import read_aged_field, read_field_matrices
 from .instances import name_keys
 from .objects import Copies, copies_of, may_instance, renderable_objects
+from .own_ages import ages_of
 from .scatterers import is_drop
 from .skeletons import kind_of, kind_of_choice, species_of
 
@@ -62,28 +64,28 @@ def read_plants_of(
     grouped = [(o, group) for o, group in grouped if group.is_plant or group.is_field]
     own = [o for o, _ in grouped]
     single = [o for o, group in grouped if group.is_plant and group.enabled and group.species not in assets]
-    read = [(single[0].name if single else "", single_plants(single, depsgraph))]
+    read: list[Part] = [(single[0].name if single else "", single_plants(single, depsgraph), ages_of(single))]
     copies = copies_of([o for o in objects if may_instance(o)], depsgraph)
     enabled = [c for c in copies if c.owner.tetflora.enabled]
-    read += [(c.owner.name, _copied_plants(c)) for c in enabled if _is_plant(c) and _species(c.owner) not in assets]
+    read += [(c.owner.name, *_copied_plants(c)) for c in enabled if _is_plant(c) and _species(c.owner) not in assets]
     for obj in own:
         if obj.tetflora.is_field and obj.tetflora.enabled:
-            read.append((obj.name, read_field(obj, depsgraph, world_matrix(obj, depsgraph)[None])))
+            read.append((obj.name, *read_aged_field(obj, depsgraph, world_matrix(obj, depsgraph)[None])))
     read += [
-        (c.owner.name, read_field(c.owner, depsgraph, c.matrices, c.keys, c.geometry))
+        (c.owner.name, *read_aged_field(c.owner, depsgraph, c.matrices, c.keys, c.geometry))
         for c in enabled
         if c.owner.tetflora.is_field
     ]
-    read = [(name, growing) for name, seeds in read if len(growing := _grown(seeds, assets))]
+    read = [part for found in read if len((part := _grown(found, assets))[1])]
     if not read:
         found = own or copies
         off = found and not any(o.tetflora.enabled for o in (*own, *(c.owner for c in copies)))
         hidden = sum(o.tetflora.is_plant or o.tetflora.is_field for o in scene.objects) - len(own)
         raise NoPlantsError(_none_left(bool(off), [o.name for o in own if o.tetflora.is_field], hidden))
-    owners = [(name, len(seeds)) for name, seeds in read]
+    owners = [(name, len(seeds)) for name, seeds, _ in read]
     if single:
         owners[:1] = [(obj.name, 1) for obj in single]
-    return _merged(read), tuple(owners)
+    return _merged(classed(scene, read)), tuple(owners)
 
 
 def _is_plant(copies: Copies) -> bool:
@@ -94,10 +96,14 @@ def _species(plant: bpy.types.Object) -> str:
     return plant.tetflora.species
 
 
-def _grown(seeds: Seeds, assets: Container[str]) -> Seeds:
+def _grown(part: Part, assets: Container[str]) -> Part:
     """Plants without those whose species is an asset."""
+    name, seeds, ages = part
     grows = np.array([species_of(kind) not in assets for kind in seeds.identifiers], bool)
-    return seeds if grows.all() else seeds.take(np.flatnonzero(grows[seeds.species]))
+    if grows.all():
+        return part
+    own = np.flatnonzero(grows[seeds.species])
+    return name, seeds.take(own), None if ages is None else ages[own]
 
 
 @dataclass(frozen=True)
@@ -211,11 +217,13 @@ def single_plants(plants: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph
     return _placed(names, tuple(number), species, seeds, matrices)
 
 
-def _copied_plants(copies: Copies) -> Seeds:
-    """Instances of a plant, each an individual of its own: its key is added to the seed."""
+def _copied_plants(copies: Copies) -> tuple[Seeds, NDArray[np.float64] | None]:
+    """Instances of a plant, each an individual of its own: its key is added to the seed. And their ages."""
     plant = copies.owner
     seeds = child_key(key_of_seed(plant.tetflora.seed), copies.keys).view(np.int64)
-    return _placed([plant.name], (kind_of(plant),), np.zeros(len(seeds), np.int32), seeds, copies.matrices)
+    age = ages_of([plant])
+    found = _placed([plant.name], (kind_of(plant),), np.zeros(len(seeds), np.int32), seeds, copies.matrices)
+    return found, None if age is None else np.repeat(age, len(seeds))
 
 
 def _placed(

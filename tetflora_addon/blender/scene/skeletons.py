@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Plants modelled by hand: curves, mesh edges and hair curves as skeletons, and kinds of plants.
 
-A kind is a text of the species and, if there is one, the form: plants of one kind are compiled once.
+A kind is a text of the species and, if there are any, the form and the age: plants of one kind are compiled once.
 """
 
 from __future__ import annotations
@@ -188,7 +188,7 @@ def _attribute(curves: bpy.types.Curves, name: str, default: NDArray) -> NDArray
 
 
 def kind_of(plant: bpy.types.Object) -> str:
-    """Kind of a plant."""
+    """Kind of a plant, full-grown whatever its age."""
     return kind_of_choice(plant.tetflora)
 
 
@@ -197,12 +197,29 @@ def kind_of_choice(group: bpy.types.PropertyGroup) -> str:
     return group.species if group.form is None else f"{group.species}{_BREAK}{group.form.name_full}"
 
 
+def aged_kind(kind: str, age: float) -> str:
+    """The kind of plants of an age in years, from that of full-grown ones; the same where the age is 0."""
+    if age == 0.0:
+        return kind
+    return f"{kind}{_BREAK}{age!r}" if _BREAK in kind else f"{kind}{_BREAK}{_BREAK}{age!r}"
+
+
 def species_of(kind: str) -> str:
     """Identifier of the species of a kind of plant."""
-    return kind.partition(_BREAK)[0]
+    return _part(kind, 0)
 
 
 def form_of(kind: str) -> bpy.types.Object | None:
     """Object with the form of a kind of plant; None without one."""
-    name = kind.partition(_BREAK)[2]
+    name = _part(kind, 1)
     return next((o for o in bpy.data.objects if o.name_full == name), None) if name else None
+
+
+def age_of(kind: str) -> float:
+    """Age of a kind of plant in years; 0 is full-grown."""
+    return float(_part(kind, 2) or 0.0)
+
+
+def _part(kind: str, number: int) -> str:
+    parts = kind.split(_BREAK)
+    return parts[number] if number < len(parts) else ""

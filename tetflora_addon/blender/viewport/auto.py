@@ -31,7 +31,7 @@ from ..results.leaf_objects import leaf_objects
 from ..results.output import PURPOSE, remove_collection
 from ..runtime import GoneError, Handlers, call_off, call_soon, redraw
 from ..scene.view import view_camera
-from ..settings import wind_of
+from ..settings import season_of, wind_of, years_of
 from .state import camera_now
 
 #: Seconds without a change before it begins, and seconds of work between two redraws.
@@ -227,8 +227,9 @@ def on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
 
 def on_frame(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
-    """Another frame: in the wind all plants have moved."""
-    if not _state.working and scene.tetflora.auto_refine and wind_of(scene) is not None:
+    """Another frame: in the wind all plants have moved, and it may be another day."""
+    moves = wind_of(scene) is not None or season_of(scene) is not None or years_of(scene) > 0.0
+    if not _state.working and scene.tetflora.auto_refine and moves:
         schedule(scene)
 
 

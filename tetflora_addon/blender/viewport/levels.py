@@ -21,13 +21,14 @@ from ...preview.light_plants import Shapes, bounds_of_plants, light_plants
 from ...preview.simple_crowns import joined, simple_crowns
 from ...refinement.loop import refine as refine_loop
 from ..job.assets import bind_steps
-from ..job.contents import compile_for, load_for, memory_left, read_scene, refinement_settings
+from ..job.contents import compile_for, in_year, load_for, memory_left, read_scene, refinement_settings
 from ..runtime import Handlers, JobData, call_off, call_soon, guarded, redraw
 from ..scene.camera import read_camera
 from ..scene.crowns import crown_for
 from ..scene.objects import taking_part
 from ..scene.plants import NoPlantsError, read_asset_plants, read_plants
 from ..scene.scatterers import is_drop
+from ..settings import season_of, years_of
 from ..species import edits
 from ..worker import call_in_thread, steps_in_thread
 from . import state
@@ -67,6 +68,7 @@ def _level_steps(
     progress = Progress(0.02, "Compiling species")
     yield progress
     flora = yield from call_in_thread(progress, compile_species, load_for(given.species, scene, depsgraph))
+    flora = in_year(scene, flora)
     settings = refinement_settings(scene)
     bound = yield from bind_steps(scene, given.places, depsgraph, camera, memory_left(scene, camera))
     others = given.occluders, given.polygons, given.lights, None if bound is None else bound.placed
@@ -100,7 +102,7 @@ def read_shapes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Shape
     What is wrong with a plant is reported by `Preview.message`, for the panel, and the earlier plants stay.
     """
     begin, preview, form = time.perf_counter(), of(scene), scene.tetflora.preview.plants
-    preview.message, preview.objects = "", len(scene.objects)
+    preview.message, preview.objects, preview.moment = "", len(scene.objects), _moment(scene)
     try:
         if form == 'NONE':
             preview.shapes = None
@@ -131,7 +133,7 @@ def _shapes_of(
         if not crowns:
             raise
         return joined(crowns)
-    grown = make(compile_for(seeds.identifiers, scene, depsgraph), seeds)
+    grown = make(in_year(scene, compile_for(seeds.identifiers, scene, depsgraph)), seeds)
     return joined([grown, *crowns]) if crowns else grown
 
 
@@ -165,10 +167,20 @@ def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
                 return
         # Deleted objects are reported only as updates of what they were in.
         elif isinstance(datablock, (bpy.types.Scene, bpy.types.Collection)) and (
-            preview is None or len(scene.objects) != preview.objects
+            preview is None or len(scene.objects) != preview.objects or preview.moment != _moment(scene)
         ):
             schedule()
             return
+
+
+def _on_frame(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
+    preview = find(scene)
+    if scene.tetflora.preview.plants != 'NONE' and preview is not None and preview.moment != _moment(scene):
+        schedule()
+
+
+def _moment(scene: bpy.types.Scene) -> tuple:
+    return season_of(scene), years_of(scene)
 
 
 def _on_undo(scene: bpy.types.Scene, _other: object = None) -> None:
@@ -190,7 +202,9 @@ def _on_load_post(_path: object, _other: object = None) -> None:
 
 
 _HANDLERS = Handlers(load_pre=_on_load_pre, load_post=_on_load_post)
-_IN_WINDOW = Handlers(depsgraph_update_post=_on_update, undo_post=_on_undo, redo_post=_on_undo)
+_IN_WINDOW = Handlers(
+    depsgraph_update_post=_on_update, frame_change_post=_on_frame, undo_post=_on_undo, redo_post=_on_undo
+)
 
 
 def register() -> None:

@@ -52,6 +52,8 @@ class Preview:
         All plants in the form that is chosen.
     objects : int
         Objects of the scene when they were read.
+    moment : tuple
+        Its day of the year and years then.
     message : str
         Why plants cannot be shown; empty if they can.
     seconds : float
@@ -67,6 +69,7 @@ class Preview:
     frozen: Camera | None = None
     shapes: Shapes | None = None
     objects: int = 0
+    moment: tuple = ()
     message: str = ""
     seconds: float = 0.0
     made: int = 0

@@ -1,0 +1,56 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Ages that plants and fields have of their own, as they are stored."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SceneError
+
+MOST_YEARS = 10_000.0
+#: Attribute of fields whose plants differ in their ages; one with `fields.PREFIX` overrides it.
+AGE = "age"
+#: The age of a plant, for property groups.
+AGE_PROPERTY = {
+    "name": "Age",
+    "description": "Age in years; 0 is full-grown, as the species describes it. Species that are assets have none",
+    "default": 0.0,
+    "min": 0.0,
+    "soft_max": 200.0,
+    "max": MOST_YEARS,
+    "step": 100,
+    "precision": 1,
+}
+
+
+def ages_of(plants: Sequence[bpy.types.Object]) -> NDArray[np.float64] | None:
+    """Ages (n,) of plants that are objects, or of fields without the attribute; None where all are full-grown.
+
+    Raises
+    ------
+    SceneError
+        An age that a script has stored and no slider gives; names the object.
+    """
+    ages = np.array([obj.tetflora.age for obj in plants], dtype=np.float64)
+    bad = np.flatnonzero(~sound_ages(ages))
+    if len(bad):
+        raise SceneError(
+            f'"{plants[bad[0]].name}": Age is {ages[bad[0]]:g}; it must be from 0 to {MOST_YEARS:,.0f} years. Set it '
+            "again in the TetFlora tab of the sidebar"
+        )
+    return ages if ages.any() else None
+
+
+def has_ages(field: bpy.types.Object) -> bool:
+    """Whether points of a field have ages of their own, as far as they are stored."""
+    return any(name in field.data.attributes for name in (f"tf_{AGE}", AGE))
+
+
+def sound_ages(ages: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """Which ages are numbers within the limits."""
+    return (ages >= 0.0) & (ages <= MOST_YEARS)
