@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from ..growth.axes import profile, profile_integral
 from ..growth.foliage import YOUTH
+from ..growth.grown_rows import NOW, fullness_of, lengths, places
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR
 from ..leaves.models import LeafModel
 from ..species.members import dead_vigour, expected_forks
-from ..species.species import Range, crown_ratio
+from ..species.species import Range
 
 NODES = np.array([0.0, 0.5, 1.0])
 _FRACTIONS = (np.arange(256) + 0.5) / 256
@@ -270,12 +271,14 @@ def _sums(rows: NDArray[np.void], i: int, sort: int) -> _Sums:
     start, (low, high) = row["start"][sort, 0], row["fraction"][sort]
     end = row["start"][sort, 1] if sort == DEAD else 1.0
     t, fraction = start + (end - start) * _FRACTIONS, low + (high - low) * _FRACTIONS
+    if row["growing"][sort, NOW] > 0:
+        t = places(row, sort, _FRACTIONS)
     vigour = np.ones_like(t)
     if sort == LATERAL:
-        vigour = crown_ratio(np.full(t.shape, row["crown"]), 1 - fraction)
+        vigour = lengths(rows, np.full(t.shape, i), fraction)
     elif sort == DEAD:
         vigour = dead_vigour(fraction)
-    full = 1 - child["count_by_length"] * (1 - vigour)
+    full = fullness_of(rows, np.full(t.shape, row["next"][sort]), vigour)
     if sort == SPUR:
         mean, variation = child["length"]
         size, radius = np.full(t.shape, (mean**2 + variation**2 / 3) * thickness), thickness

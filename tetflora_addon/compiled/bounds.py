@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..growth.envelopes import reaches
+from ..growth.grown_rows import NOW
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR
 from ..growth.wind import widest_sway
 from ..species.species import crown_ratio
@@ -166,21 +167,25 @@ def _unit_bound(rows: NDArray[np.void], index: int, bounds: NDArray[np.float64])
             start, end = row["start"][sort]
         t = start + (end - start) * fraction
         fraction = row["fraction"][sort, 0] + np.ptp(row["fraction"][sort]) * fraction
+        growing = row["growing"][sort, NOW] > 0
+        first_fraction, last_fraction = fraction[:-1], fraction[1:]
+        if growing:  # any child may be anywhere
+            first_fraction, last_fraction = np.tile(row["fraction"][sort][:, None], (1, _SLABS))
         r, lo, hi = (np.interp(t, knot_t, v) for v in (radius, low, high))
         first = np.minimum((t[:-1] * row["segments"]).astype(int), len(turn) - 1)
         last = np.minimum((t[1:] * row["segments"]).astype(int), len(turn) - 1)
         dev = np.maximum(turn[first], turn[last])
         base, variation = child["angle"]
-        lean = base + (child["angle_tip"] - base) * fraction
-        most = np.clip(np.maximum(lean[:-1], lean[1:]) + variation + dev, 0, np.pi)
-        least = np.clip(np.minimum(lean[:-1], lean[1:]) - variation - dev, 0, np.pi)
+        lean = [base + (child["angle_tip"] - base) * one for one in (first_fraction, last_fraction)]
+        most = np.clip(np.maximum(*lean) + variation + dev, 0, np.pi)
+        least = np.clip(np.minimum(*lean) - variation - dev, 0, np.pi)
         longest = np.full(_SLABS, child["length"].sum() * row["nominal"])
         if sort == FORK:
             longest[:] = child["length"].sum()
             least[:] = 0.0  # a single stem goes straight on
         elif sort == DEAD:
             pass  # no crown's shape makes them shorter
-        elif row["start"][sort, 1] > 0:
+        elif row["start"][sort, 1] > 0 or growing:
             longest *= _crown_most(row, np.zeros(1), np.ones(1))[0]  # where children sit is not known
         else:
             longest *= _crown_most(row, fraction[:-1], fraction[1:])

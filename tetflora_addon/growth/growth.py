@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 
 from ..arrays import Arrays, by_component, columns, dot, spread
 from ..species.members import dead_vigour
-from ..species.species import crown_ratio
 from .axes import Axes, axes, profile
 from .branches import Branches, Pose
 from .envelopes import BOX
+from .grown_rows import NOW, fullness_of, lengths
 from .hashing import Draw, child_key, key_of_seed, signed, uniform
+from .nodes import Grown, child_number, grown_nodes
 from .rows import DEAD, FORK, LATERAL, SPUR, flare_rings, ranged, varied
 from .seasons import plant_years
 from .seeds import Seeds
@@ -120,8 +121,7 @@ def chosen_drawn(
 
 def fullness(rows: NDArray[np.void], branches: Branches) -> NDArray[np.float64]:
     """Factor (n,) on the numbers of branches and leaves: 1 for the longest branches of a crown, less for others."""
-    weight = rows["count_by_length"][branches.row]
-    return 1 - weight + weight * branches.vigour
+    return fullness_of(rows, branches.row, branches.vigour)
 
 
 def branch_counts(rows: NDArray[np.void], branches: Branches, sort: int = LATERAL) -> NDArray[np.int64]:
@@ -133,8 +133,23 @@ def branch_counts(rows: NDArray[np.void], branches: Branches, sort: int = LATERA
         number = np.maximum(np.floor(wanted + uniform(key, _ROUND[sort])), 1)  # what divides goes on
         return np.where(child >= 0, number, 0).astype(np.int64)
     whorl = np.maximum(rows["whorl"][child], 1)
-    number = np.floor(wanted * fullness(rows, branches) / whorl + uniform(key, _ROUND[sort])).astype(np.int64) * whorl
-    return np.where(child >= 0, number, 0)
+    nodes = np.floor(wanted * fullness(rows, branches) / whorl + uniform(key, _ROUND[sort])).astype(np.int64)
+    grown = _grown(rows, branches, sort)
+    if grown is not None:
+        nodes = np.where(grown.on, grown.number, nodes)
+    return np.where(child >= 0, nodes * whorl, 0)
+
+
+def _grown(rows: NDArray[np.void], branches: Branches, sort: int) -> Grown | None:
+    """Living nodes of branches that are not full-grown; None where all are."""
+    row, key = branches.row, branches.key
+    if sort == FORK or not rows["growing"][row, sort, NOW].any():
+        return None
+    whorl = np.maximum(rows["whorl"][rows["next"][row, sort]], 1)
+    wanted = varied(rows["count"][row, sort], key, _COUNT[sort]) * fullness(rows, branches) / whorl
+    start = rows["start"][row, sort]
+    start = start[:, 0] if sort == DEAD else varied(start, key, _START[sort])
+    return grown_nodes(rows, branches, sort, int(_PATHS[sort]), wanted, start, uniform(key, _ROUND[sort]))
 
 
 def leaf_counts(rows: NDArray[np.void], branches: Branches) -> NDArray[np.int64]:
@@ -179,9 +194,12 @@ def chosen_children(
     Branches of m
     """
     parent = parents.take(owner)
-    path = _PATHS[sort]
-    key = child_key(parent.key, index + path)
+    path = int(_PATHS[sort])
     row = rows["next"][parent.row, sort]
+    grown = _grown(rows, parents, sort)
+    if grown is not None:
+        index = index + np.where(grown.on, grown.first, 0)[owner] * rows["whorl"][row]
+    key = child_key(parent.key, child_number(index, path))
     if sort == FORK:
         whorl, node, within, fraction = counts[owner], np.zeros_like(index), index, np.ones(len(index))
         t = np.ones(len(index))
@@ -189,13 +207,18 @@ def chosen_children(
         # Branches of a whorl share their place: that of the first of them.
         whorl = rows["whorl"][row]
         node, within = index // whorl, index % whorl
-        place = signed(np.where(within > 0, child_key(parent.key, node * whorl + path), key), Draw.PLACE)
+        first = child_key(parent.key, child_number(node * whorl, path))
+        place = signed(np.where(within > 0, first, key), Draw.PLACE)
         fraction = (node + 0.5 + _PLACE_JITTER * place) / np.maximum(counts[owner] // whorl, 1)
         if sort == DEAD:
             start, end = rows["start"][parent.row, sort].T
         else:
             start, end = varied(rows["start"][parent.row, sort], parent.key, _START[sort]), 1.0
         t = start + (end - start) * fraction
+        if grown is not None:
+            there, part = grown.places(owner, node, 0.5 + _PLACE_JITTER * place)
+            on = grown.on[owner]
+            t, fraction = np.where(on, there, t), np.where(on, part, fraction)
         low, high = rows["fraction"][parent.row, sort].T
         fraction = low + (high - low) * fraction
     position, frame = lines.at(owner, t)
@@ -217,7 +240,7 @@ def chosen_children(
         around = np.where(limb, first + (last - first) * t, around)
     radius = radius_at(rows, parent, t)
     if sort == LATERAL:
-        vigour = crown_ratio(rows["crown"][parent.row], 1 - fraction)
+        vigour = lengths(rows, parent.row, fraction)
         measure = parent.length * rows["nominal"][parent.row] * vigour
         radius = np.where(
             rows["pipe"][parent.row] > 0, parent.radius * rows["pipe_radius"][parent.row] * vigour, radius

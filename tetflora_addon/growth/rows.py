@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..species.extras import dead_part
-from ..species.members import expected_forks
+from ..species.members import expected_forks, part_segments
 from ..species.skeletons import drawn_branches
 from ..species.species import (
     CROWN_SHAPES,
@@ -28,10 +28,11 @@ from ..species.species import (
     Order,
     Range,
     Species,
-    crown_ratio,
     fork_cuts,
+    whole_cuts,
 )
 from .drawn_lines import MAX_SEGMENTS, DrawnLines, drawn_lines
+from .grown_rows import UNTIL, grow_children, least_length, lengths
 from .hashing import signed
 
 LATERAL, FORK, SPUR, DEAD = range(4)
@@ -63,6 +64,8 @@ ROW_DTYPE = np.dtype(
     + [("envelope", np.int64), ("envelope_radius", np.float64), ("inclination", np.int64)]
     + [("next", np.int32, (4,)), ("count", np.float64, (4, 2)), ("start", np.float64, (4, 2))]
     + [("fraction", np.float64, (4, 2)), ("part", np.float64, (2,))]
+    + [("growing", np.float64, (4, 7)), ("settled", np.float64), ("conical", np.float64)]
+    + [("ramps", np.float64, (2,)), ("least", np.float64)]
     + [("nominal", np.float64), ("pipe_radius", np.float64), ("fork_power", np.float64)]
     + [("continues", np.bool_), ("outward", np.bool_), ("tropic", np.bool_), ("gradient", np.bool_)]
     + [("sunlit", np.bool_)]
@@ -81,7 +84,9 @@ in lengths of this; ``pipe_radius`` the radius of a lateral by the pipe model in
 stems beyond a fork; ``outward`` branches whose own axis leads from the inside of the crown to the outside; ``tropic``
 sub-plants whose shape depends on how they stand to the sky; ``gradient`` leaves whose size or colour differs between
 inside and outside, or old and young; ``sunlit`` leaves that turn to the sky otherwise outside than inside; ``exact``
-plants that are all the same; ``dead`` branches that are broken off or bare.
+plants that are all the same; ``dead`` branches that are broken off or bare. Of axes that are not full-grown ``growing``
+says where children of each sort are (`grown_rows`), ``settled``, ``conical`` and ``ramps`` are those of
+`species.growing.Growing`, and ``least`` is the vigour below which a branch has just begun to grow, or is about to die.
 
 A plant whose form is drawn by hand begins with a ``phantom`` row: a branch without wood, whose children are the
 ``drawn`` rows from the first to before the last of ``drawn_rows``. Each of these is one branch with ``knots`` (metres,
@@ -138,7 +143,12 @@ def _rows_of_species(one: Species, number: int, first: int) -> list[np.void]:
                 row["next"][SPUR] = spur
             if one.dead is not None and drawn is None and o <= 1:
                 _bear_dead(row, one.dead, order, o, dead)
-            out.append(_part(row, order, low, high, cuts[o][p - 1] if p else 0.0))
+            row = _part(row, order, p, low, high, cuts[o][p - 1] if p else 0.0)
+            if order.growing is not None:
+                _grow(row, order, p, one.dead if o <= 1 else None)
+            if o and (before := one.orders[o - 1].growing) is not None:
+                row["least"] = least_length(CROWN_SHAPES.index(one.orders[o - 1].crown), before.conical)
+            out.append(row)
             if row["next"][LATERAL] >= 0 and row["pipe"] > 0:
                 row["pipe_radius"] = _pipe_radius(row, one.orders[o + 1].thickness.high)
     if any(order.spurs.high > 0 for order in one.orders) and one.spur is not None:
@@ -231,22 +241,41 @@ def _row(order: Order, species: int, number: int) -> np.void:
     return row
 
 
-def _part(row: np.void, order: Order, low: float, high: float, before: float) -> np.void:
+def _grow(row: np.void, order: Order, p: int, dead: Dead | None) -> None:
+    """Where children of a part are, number ``p`` of an order that is not full-grown."""
+    own, cuts = order.growing, whole_cuts(order)
+    row["settled"], row["conical"], row["ramps"] = own.settled, own.conical, own.ramps
+    sorts = [(LATERAL, own.laterals, order.branches, order.branch_start)]
+    sorts += [(SPUR, own.spurs, order.spurs, order.spur_start)]
+    if dead is not None and row["next"][DEAD] >= 0:
+        low, high = dead_part(dead, order.branch_start.mean)
+        nodes = own.dead._replace(until=high)
+        sorts += [(DEAD, nodes, dead.on_limbs if row["order"] else dead.number, Range(low))]
+    for sort, nodes, number, start in sorts:
+        if row["next"][sort] >= 0:
+            row["count"][sort] = number
+            grow_children(row, sort, nodes, start, own.now, cuts, p)
+            if sort == DEAD:
+                row["start"][DEAD, 1] = max(row["start"][DEAD, 0], row["growing"][DEAD, UNTIL])
+
+
+def _part(row: np.void, order: Order, p: int, low: float, high: float, before: float) -> np.void:
     """Turn the row of an order into that of its part from ``low`` to ``high``; the part below begins at ``before``."""
-    if (low, high) == (0.0, 1.0):
+    if order.forks.high <= 0:
         return row
     length, tip = high - low, order.taper.mean
     row["part"], row["nominal"] = (low, high), 1 / length
-    row["segments"] = max(round(order.segments * length), 1)
+    row["segments"] = part_segments(order)[p]
     radius = [_radius(order, u) for u in (low, high)]
     row["taper"] = radius[1] / radius[0], row["taper"][1] * (1.0 if tip == 0 else min(1.0, radius[1] / radius[0]))
     row["taper"][1] = min(row["taper"][1], row["taper"][0], 1 - row["taper"][0])
-    middle = np.clip((0.5 - low) / length, 0, 1)  # of the order's branch, where its outer half begins
+    begin, end = whole_cuts(order)[p : p + 2]  # a part that is still growing bends as it will
+    middle = np.clip((0.5 - begin) / (end - begin), 0, 1)  # of the order's branch, where its outer half begins
     inner, outer = row["curvature"][0], row["curvature_tip"]
-    row["curvature"][0] = (inner if middle >= 0.5 else outer) * length
-    row["curvature_tip"] = (inner if middle > 0.5 else outer) * length
-    row["curvature"][1] *= length
-    row["attraction"] *= length
+    row["curvature"][0] = (inner if middle >= 0.5 else outer) * (end - begin)
+    row["curvature_tip"] = (inner if middle > 0.5 else outer) * (end - begin)
+    row["curvature"][1] *= end - begin
+    row["attraction"] *= end - begin
     for sort, start in ((LATERAL, order.branch_start), (SPUR, order.spur_start)):
         fraction = np.clip((np.array([low, high]) - start.mean) / (1 - start.mean), 0, 1)
         row["fraction"][sort] = fraction
@@ -306,7 +335,7 @@ def _pipe_radius(row: np.void, thickest: float) -> float:
     """Radius of a lateral of vigour 1 such that all together have what the taper takes away, in r^p."""
     low, high = row["fraction"][LATERAL]
     at = low + (high - low) * (np.arange(256) + 0.5) / 256
-    vigour = crown_ratio(np.full(at.shape, row["crown"]), 1 - at)
+    vigour = lengths(row[None], np.zeros(at.shape, np.int64), at)
     lost = 1 - row["taper"][0] ** row["pipe"]
     number = max(row["count"][LATERAL, 0], 1.0) * (vigour ** row["pipe"]).mean()
     return min((lost / number) ** (1 / row["pipe"]), 1 / max(thickest, 1e-9))

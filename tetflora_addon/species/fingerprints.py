@@ -22,6 +22,7 @@ _LATER: dict[str, Callable[[NDArray[np.void]], NDArray[np.float64] | float]] = {
     "envelope": lambda _: 0.0,
     "envelope_radius": lambda _: 0.0,
     "inclination": lambda _: 0.0,
+    **{name: lambda _: 0.0 for name in ("growing", "settled", "conical", "ramps", "least")},
 }
 #: Sorts of children in the first tables that were kept; others count where a species has them.
 _FIRST_SORTS = 3

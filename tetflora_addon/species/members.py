@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..leaves.models import LeafModel
 from .extras import dead_part
-from .species import CROWN_SHAPES, LEAF_KINDS, Dead, Order, Range, Species, crown_ratio, fork_cuts
+from .species import CROWN_SHAPES, LEAF_KINDS, Dead, Order, Range, Species, crown_ratio, fork_cuts, whole_cuts
 
 _FRACTIONS = (np.arange(256) + 0.5) / 256
 
@@ -83,7 +83,7 @@ def expected_forks(forks: Range, power: float = 1.0) -> float:
 
 def part_segments(order: Order) -> np.ndarray:
     """Straight pieces of each part of a branch between its forks."""
-    return np.maximum(np.rint(order.segments * np.diff(fork_cuts(order))), 1)
+    return np.maximum(np.rint(order.segments * np.diff(whole_cuts(order))), 1)
 
 
 def _fold(cuts: list[float], fold: np.ndarray, start: Range) -> float:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..leaves.models import LeafModel
+from .growing import Ages, Growing
 from .skeletons import Skeleton
 from .year import Year
 
@@ -27,6 +28,10 @@ BARKS = (
     "interlaced", "pitted", "papery",
 )  # fmt: skip
 """Characters of bark that materials know."""
+
+
+#: A fork is there once its stems are so long, in lengths of the full-grown branch.
+_FORKS_FROM = 1e-4
 
 
 class Range(NamedTuple):
@@ -145,6 +150,8 @@ class Order:
         Its radius, or half of the side of a box, as a fraction of the branch's length.
     leaf_inclination : str
         Which of `LEAF_INCLINATIONS` the leaves have.
+    growing : Growing or None
+        How far it has grown; None where it is as long as it will be.
     """
 
     length: Range
@@ -192,6 +199,7 @@ class Order:
     leaf_envelope: str = "none"
     leaf_envelope_radius: float = 0.5
     leaf_inclination: str = "branch"
+    growing: Growing | None = None
 
 
 @dataclass(frozen=True)
@@ -272,6 +280,8 @@ class Species:
         Trunk and lower orders modelled by hand; only the orders above are grown.
     year : Year or None
         When leaves appear, turn and fall.
+    ages : Ages or None
+        How it grows.
     """
 
     identifier: str
@@ -292,6 +302,7 @@ class Species:
     exact: bool = False
     form: Skeleton | None = None
     year: Year | None = None
+    ages: Ages | None = None
 
     def forms(self, kind: int) -> tuple[LeafModel | str, ...]:
         """Forms of leaves of a kind, by its index in `LEAF_KINDS`; leaves where there are no blossoms."""
@@ -300,10 +311,23 @@ class Species:
 
 def fork_cuts(order: Order) -> list[float]:
     """Ends of the parts into which forks divide the branches of an order, fractions of the length from 0 to 1."""
+    cuts = whole_cuts(order)
+    if order.growing is None:
+        return cuts
+    now = order.growing.now
+    return [*(cut / now for cut in cuts[: len(cuts) - 1]), 1.0]
+
+
+def whole_cuts(order: Order) -> list[float]:
+    """The same as fractions of the length when it is full-grown; forks that it has not reached yet are left out."""
     if order.forks.high <= 0:
         return [0.0, 1.0]
     levels = order.fork_levels
-    return [0.0, *(order.fork_at + (1 - order.fork_at) * k / levels for k in range(levels)), 1.0]
+    cuts = [0.0, *(order.fork_at + (1 - order.fork_at) * k / levels for k in range(levels)), 1.0]
+    if order.growing is None:
+        return cuts
+    reached = max(sum(cut < order.growing.now - _FORKS_FROM for cut in cuts[:-1]), 1)
+    return cuts[: reached + 1]
 
 
 CROWN_SHAPES = (

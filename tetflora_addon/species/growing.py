@@ -1,0 +1,152 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How a plant grows: sizes by age, and where branches leave a parent that is not as long as it will be.
+
+Sizes follow the function of Chapman and Richards (F. J. Richards, "A flexible growth function for empirical use", 1959;
+D. G. Chapman, 1961). Branches keep their place in metres while their parent grows beyond them. They are *nodes* on the
+full-grown axis, numbered from where its crown begins; those of younger years, below, have negative numbers and stand
+closer, because shoots were shorter then.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+@dataclass(frozen=True)
+class Ages:
+    """How a species grows; years.
+
+    Attributes
+    ----------
+    full : float
+        Age at which it is as described.
+    height, girth : tuple of float
+        Rate k, 1/year, and power p of the curves of the height and of the trunk's diameter, see `grown`.
+    lifespan, decline : float
+        Age at which it dies, and fraction of that from which on it declines.
+    base : float
+        The bare part of the trunk grows as this power of the height.
+    spread : float
+        Limbs grow as this power of the trunk's diameter.
+    flowers : float
+        Age from which on it bears short shoots with blossoms, cones or fruit.
+    scaled : bool
+        It only grows in size, without changing its form.
+    source : str
+        Where the curves are from.
+    """
+
+    full: float
+    height: tuple[float, float] = (0.04, 1.2)
+    girth: tuple[float, float] = (0.03, 1.2)
+    lifespan: float = 200.0
+    decline: float = 0.75
+    base: float = 2.0
+    spread: float = 0.8
+    flowers: float = 10.0
+    scaled: bool = False
+    source: str = ""
+
+    def heights(self, years: float) -> float:
+        """Height over that at the full age; it stands still when the plant declines."""
+        return grown(min(years, self.decline * self.lifespan), self.full, *self.height)
+
+    def girths(self, years: float) -> float:
+        """Diameter of the trunk over that at the full age; it stands still at death."""
+        return grown(min(years, self.lifespan), self.full, *self.girth)
+
+    def declined(self, years: float) -> float:
+        """How far it has declined: 0 in good health, 1 dead."""
+        return float(np.clip((years / self.lifespan - self.decline) / (1 - self.decline), 0, 1))
+
+
+def grown(years: float, full: float, rate: float, power: float) -> float:
+    """Size at an age over that at the full age (Chapman and Richards)."""
+    return (math.expm1(-rate * years) / math.expm1(-rate * full)) ** power
+
+
+class Nodes(NamedTuple):
+    """Where children of one sort are on axes that are not full-grown, see `node_at`.
+
+    Attributes
+    ----------
+    whole, below : float
+        Nodes between the begin and the end of the full-grown axis, and from its foot to there, over those that are
+        alive now.
+    begin, end : float
+        Where the first and the last are on the full-grown axis, as fractions of its length.
+    power : float
+        The number of nodes below grows as this power of the length.
+    until : float
+        Where the topmost are now, as a fraction of the present length;
+    kept : float
+        and of those, from the lowest up, the fraction that is left.
+    """
+
+    whole: float
+    below: float
+    begin: float
+    end: float = 1.0
+    power: float = 1.0
+    until: float = 1.0
+    kept: float = 1.0
+
+
+@dataclass(frozen=True)
+class Growing:
+    """How far the branches of an order have grown.
+
+    Attributes
+    ----------
+    now : float
+        Their length over that when they are full-grown.
+    settled : float
+        1 where the number of nodes on a full-grown branch is known as a whole number, 0 where it changes with time.
+    laterals, spurs, dead : Nodes
+        Their children.
+    conical : float
+        By how much the topmost children are shorter than the crown's shape would have them.
+    ramps : tuple of float
+        Fractions of the children, from the lowest up and from the topmost down, that are about to die or just grow.
+    """
+
+    now: float
+    settled: float
+    laterals: Nodes
+    spurs: Nodes
+    dead: Nodes
+    conical: float = 0.0
+    ramps: tuple[float, float] = (0.0, 0.0)
+
+
+def node_at(place: ArrayLike, begin: ArrayLike, end: ArrayLike, power: ArrayLike, whole: ArrayLike, below: ArrayLike):
+    """Number (...) of nodes from where the crown begins to places (...) on the full-grown axis, negative below that.
+
+    Parameters
+    ----------
+    place, begin, end : (...) float64
+        Fractions of the full-grown length.
+    power : (...) float64
+    whole, below : (...) float64
+        Number of nodes from ``begin`` to ``end`` (and on, as densely), and from the foot to ``begin``.
+    """
+    place, begin = np.asarray(place, np.float64), np.asarray(begin, np.float64)
+    above = whole * (place - begin) / np.maximum(end - begin, 1e-9)
+    part = np.clip(place / np.maximum(begin, 1e-9), 0, 1)
+    return np.where(place >= begin, above, below * (part**power - 1))
+
+
+def place_at(
+    node: ArrayLike, begin: ArrayLike, end: ArrayLike, power: ArrayLike, whole: ArrayLike, below: ArrayLike
+) -> NDArray[np.float64]:
+    """Place (...) of nodes (...), the inverse of `node_at`."""
+    node = np.asarray(node, np.float64)
+    above = begin + (end - begin) * node / np.maximum(whole, 1e-9)
+    part = np.clip(1 + node / np.maximum(below, 1e-9), 0, 1)
+    return np.where(node >= 0, above, begin * part ** (1 / np.asarray(power)))
