@@ -48,6 +48,7 @@ NAMES = (
     "blocks",
     "animation",
     "wind",
+    "year",
     "dolly",
     "endurance",
     "farm",
