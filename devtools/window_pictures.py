@@ -36,6 +36,7 @@ PANELS = {
         "TETFLORA_PT_visibility",
         "TETFLORA_PT_limits",
     ),
+    "year": ("TETFLORA_PT_year",),
     "wind": ("TETFLORA_PT_wind",),
     "animation": ("TETFLORA_PT_refine", "TETFLORA_PT_animation", "TETFLORA_PT_leaf_objects"),
     "output": ("TETFLORA_PT_output", "TETFLORA_PT_ray_visibility", "TETFLORA_PT_passes"),

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Images of the catalogue's species for menus: ``python -m examples.thumbnails [IDENTIFIER ...]``.
+"""Images of the catalogue's species for menus: ``python -m examples.thumbnails [--seasons] [IDENTIFIER ...]``.
 
 One plant of each species in daylight, rendered by Cycles in front of a light grey, 128 × 128 pixels, into
-``tetflora_addon/catalogue/thumbnails``. Images are stored with palettes, because all of them are in the extension.
+``tetflora_addon/catalogue/thumbnails``. Images are stored with palettes, because all of them are in the extension. With
+``--seasons``, those of spring, autumn and winter instead, of species that look different then.
 """
 
 from __future__ import annotations
@@ -20,11 +21,14 @@ FOLDER = session.ROOT / "tetflora_addon" / "catalogue" / "thumbnails"
 SIDE, SAMPLES, SEED = 128, 96, 11
 COLOURS = 128  # of a palette
 LARGEST = 12_000  # bytes
+#: Days of the seasons that have images of their own, and the least change of a plant's pixels, display values of 255.
+DAYS = {"spring": 125.0, "autumn": 293.0, "winter": 20.0}
+CHANGED = 6.0
 BACKDROP = (199, 209, 214)  # display values of 255; conifers would not be seen on the dark grey of menus
 
 
-def render_thumbnail(identifier: str, path: Path) -> None:
-    """Render one plant of a species as a PNG with a transparent background."""
+def render_thumbnail(identifier: str, path: Path, day: float | None = None) -> None:
+    """Render one plant of a species as a PNG with a transparent background, in summer or on a day of the year."""
     import bpy
     import numpy as np
     from mathutils import Vector
@@ -40,13 +44,17 @@ def render_thumbnail(identifier: str, path: Path) -> None:
     empty.tetflora.is_plant, empty.tetflora.species, empty.tetflora.seed = True, identifier, SEED
     scene.collection.objects.link(empty)
     bpy.context.view_layer.update()
-    steps = plant_mesh.make_plant_mesh_steps(scene, bpy.context.evaluated_depsgraph_get(), [empty])
-    (plant,) = at_once(steps)
+    graph = bpy.context.evaluated_depsgraph_get()
+    (plant,) = at_once(plant_mesh.make_plant_mesh_steps(scene, graph, [empty]))
     points = np.zeros((len(plant.data.vertices), 3), np.float32)
     plant.data.vertices.foreach_get("co", points.reshape(-1))
     # A few twigs that reach far out must not make the rest small.
     low, high = np.quantile(points, 0.002, axis=0), np.quantile(points, 0.998, axis=0)
     low[2] = min(low[2], 0.0)
+    if day is not None:  # in the frame of summer
+        bpy.data.objects.remove(plant)
+        scene.tetflora.year.enabled, scene.tetflora.year.day = True, day
+        at_once(plant_mesh.make_plant_mesh_steps(scene, graph, [empty]))
     middle, side = (low + high) / 2, max(float((high - low).max()), math.hypot(*(high - low)[:2])) * 1.06
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.data.type, camera.data.ortho_scale = 'ORTHO', side
@@ -80,21 +88,40 @@ def _shrink(source: Path, target: Path) -> None:
     few.save(target, "PNG", optimize=True)
 
 
-def main(wanted: list[str]) -> int:
+def _change(first: Path, second: Path) -> float:
+    """Mean difference of two images where a plant is in either, display values of 255."""
+    import numpy as np
+    from PIL import Image
+
+    one, other = (np.asarray(Image.open(path).convert("RGB"), float) for path in (first, second))
+    plant = (np.abs(one - BACKDROP).max(axis=2) > CHANGED) | (np.abs(other - BACKDROP).max(axis=2) > CHANGED)
+    return float(np.abs(one - other)[plant].mean()) if plant.any() else 0.0
+
+
+def main(arguments: list[str]) -> int:
     """Make the images that are asked for, or all; exit code 1 if one is too large."""
     session.start()
     from tetflora_addon.species import catalogue
 
     known = catalogue.list_species()
+    wanted = [one for one in arguments if one != "--seasons"] or list(known)
+    if "--seasons" in arguments:
+        yearly = [one for one in wanted if catalogue.load_species(one).year is not None]
+        images = [(one, day, f"{one}.{season}.png") for one in yearly for season, day in DAYS.items()]
+    else:
+        images = [(one, None, f"{one}.png") for one in wanted]
     FOLDER.mkdir(exist_ok=True)
     large = []
     with tempfile.TemporaryDirectory() as folder:
-        for identifier in wanted or known:
-            render_thumbnail(identifier, Path(folder) / "plant.png")
-            target = FOLDER / f"{identifier}.png"
+        for identifier, day, name in images:
+            render_thumbnail(identifier, Path(folder) / "plant.png", day)
+            target = FOLDER / name
             _shrink(Path(folder) / "plant.png", target)
+            if day is not None and _change(target, FOLDER / f"{identifier}.png") < CHANGED:
+                target.unlink()
+                continue
             print(f"{target.stat().st_size:>8,} {target.relative_to(session.ROOT)}", flush=True)
-            large += [identifier] if target.stat().st_size > LARGEST else []
+            large += [name] if target.stat().st_size > LARGEST else []
     session.stop()
     if large:
         print(f"larger than {LARGEST:,} bytes: {', '.join(large)}", file=sys.stderr)

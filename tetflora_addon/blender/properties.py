@@ -44,6 +44,10 @@ _FORM = {
 _OVERRIDES = {'LIBRARY_OVERRIDABLE'}
 
 
+def _show_again(_self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    state.listeners.notify()
+
+
 class TetFloraFieldEntry(bpy.types.PropertyGroup, SpeciesChoice):
     """One kind of plant of a field; the attribute ``species`` of its points is an index into these."""
 
@@ -74,7 +78,7 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
         override=_OVERRIDES,
     )
     form: PointerProperty(**_FORM, override=_OVERRIDES)
-    age: FloatProperty(**AGE_PROPERTY, override=_OVERRIDES)
+    age: FloatProperty(**AGE_PROPERTY, override=_OVERRIDES, update=_show_again)
     is_field: BoolProperty(
         name="Field of Plants",
         description=(

@@ -17,6 +17,7 @@ from tests.blender.scenes import add_camera, add_plant, datablocks, depsgraph, s
 from tetflora_addon.blender import preferences, saved_files
 from tetflora_addon.blender.job import contents
 from tetflora_addon.blender.placing import assets
+from tetflora_addon.blender.settings import SEASONS
 from tetflora_addon.blender.species import catalogue
 from tetflora_addon.blender.species.catalogue import FALLBACK_ICON, icon_of, items_for, thumbnail_file
 from tetflora_addon.species.catalogue import builtin_folder, list_species
@@ -41,7 +42,8 @@ def _shipped():
 def test_thumbnails_are_small_squares_of_known_species():
     folder = builtin_folder() / "thumbnails"
     thumbnails = sorted(folder.glob("*"))
-    assert {p.stem for p in thumbnails} <= set(_shipped())
+    assert {p.stem.partition(".")[0] for p in thumbnails} <= set(_shipped())
+    assert {p.stem.partition(".")[2] for p in thumbnails} <= {"", *SEASONS}
     assert len(thumbnails) >= 3
     for path in thumbnails:
         assert path.suffix == ".png"
@@ -79,6 +81,21 @@ def test_a_picture_is_loaded_once_and_again_when_it_changes(own_folder):
     os.utime(thumbnail, ns=(0, 0))
     assert set(_loaded("mine")) > {first}
     assert _loaded("bush")
+
+
+def test_a_season_has_a_picture_of_its_own_where_there_is_one(own_folder):
+    for name in ("mine.png", "mine.autumn.png"):
+        shutil.copy(thumbnail_file("bush"), own_folder / "thumbnails" / name)
+    year = bpy.context.scene.tetflora.year
+    names = {}
+    for season in ('SUMMER', 'AUTUMN', 'WINTER'):
+        bpy.ops.tetflora.set_season(season=season)
+        catalogue._thumbnails.clear()
+        icon_of("mine")
+        names[season] = [Path(name.partition("|")[0]).name for name in catalogue._thumbnails]
+    assert names == {'SUMMER': ["mine.png"], 'AUTUMN': ["mine.autumn.png"], 'WINTER': ["mine.png"]}
+    year.enabled = False
+    assert thumbnail_file("mine", "autumn").name == "mine.autumn.png"
 
 
 def test_the_library_holds_a_plant_of_each_species(tmp_path):

@@ -24,6 +24,7 @@ from ...files import inside, is_identifier, is_regular, write_whole
 from ...species.catalogue import FIRST_BEFORE, SpeciesInfo, builtin_folder, checked_identifier
 from ...species.schema import species_file, species_from_json
 from ..preferences import own_species_folder, species_folders
+from ..settings import season_name, season_of
 from .asset_species import PICTURE_SIDE, PREFIX, TetFloraAssetSpecies, datablock_of, find_asset, name_of, picture_of
 from .edits import catalogue, grown, species_data, species_for, tell_listeners
 
@@ -41,14 +42,26 @@ Item = tuple[str, str, str, str | int, int]
 
 # Seconds for which a thumbnail is not looked for again: menus and panels ask for all of them at each redraw.
 _TRUSTED = 0.0 if bpy.app.background else 1.0
-_icons: dict[str, tuple[float, int]] = {}
+_icons: dict[tuple[str, str], tuple[float, int]] = {}  # by species and season
 _kept: dict[tuple, list[Item]] = {}  # items by content: Blender keeps no copy of the strings of dynamic items
 _thumbnails: previews.ImagePreviewCollection | None = None
 
 
-def thumbnail_file(identifier: str) -> Path | None:
-    """The thumbnail of a species: ``thumbnails/identifier.png`` in the user's folder or among the shipped ones."""
-    return _found([folder / FOLDER for folder in (*species_folders(), builtin_folder())], identifier, THUMBNAIL_ENDING)
+def thumbnail_file(identifier: str, season: str = "") -> Path | None:
+    """The thumbnail of a species: ``thumbnails/identifier.png`` in the user's folder or among the shipped ones.
+
+    That of a season, ``identifier.autumn.png``, comes before it where one is asked for.
+    """
+    folders = [folder / FOLDER for folder in (*species_folders(), builtin_folder())]
+    endings = (f".{season}{THUMBNAIL_ENDING}", THUMBNAIL_ENDING) if season else (THUMBNAIL_ENDING,)
+    return next((path for folder in folders for e in endings if (path := _found([folder], identifier, e))), None)
+
+
+def _season() -> str:
+    """The season that the open scene shows, empty for summer or none."""
+    scene = getattr(bpy.context, "scene", None)  # none while add-ons are enabled
+    season = season_of(scene) if scene is not None else None
+    return "" if season is None else season_name(season).replace("summer", "")
 
 
 def _found(folders: Iterable[Path], identifier: str, ending: str) -> Path | None:
@@ -63,19 +76,19 @@ def _found(folders: Iterable[Path], identifier: str, ending: str) -> Path | None
 
 def icon_of(identifier: str) -> int:
     """Number of a species' thumbnail for items and layouts, loaded at first use; 0 where it has none."""
-    now = time.monotonic()
-    seen, icon = _icons.get(identifier, (-_TRUSTED, 0))
+    now, season = time.monotonic(), _season()
+    seen, icon = _icons.get((identifier, season), (-_TRUSTED, 0))
     if now - seen >= _TRUSTED:
-        icon = _icon_of(identifier)
-        _icons[identifier] = now, icon
+        icon = _icon_of(identifier, season)
+        _icons[identifier, season] = now, icon
     return icon
 
 
-def _icon_of(identifier: str) -> int:
+def _icon_of(identifier: str, season: str) -> int:
     asset = find_asset(None, identifier)
     if asset is not None:
         return _icon_of_asset(asset)
-    path = thumbnail_file(identifier)
+    path = thumbnail_file(identifier, season)
     if path is None or _thumbnails is None:
         return 0
     name = f"{path}|{path.stat().st_mtime_ns}"  # so that a replaced file is loaded again
