@@ -20,6 +20,7 @@ from ..growth.seasons import (
     DRY,
     FRESH,
     PRESENT,
+    SIZE,
     Season,
     expected,
     leaf_table,
@@ -31,6 +32,7 @@ from ..species.year import DAYS
 from .averages import Averages, RowLeaves, average, quadratic
 
 KINDS = len(LEAF_KINDS)
+_SEEN = (AREA, FRESH, AUTUMN, DRY)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +45,7 @@ class DayTotals:
         Of the species of each row.
     table : (r, k) int64
         Index into ``tables``.
-    tables : (t, d, 6) float64
+    tables : (t, 6, d) float64
         See `growth.seasons.leaf_table`.
     origin : (t,) float64
         Days on which these begin.
@@ -53,6 +55,8 @@ class DayTotals:
         Area times mean colour in summer at the same places.
     count, faces : (r, k) float64
         Expected numbers of leaves and of their faces.
+    twig : (r,) float64
+        Mean width of what bears the leaves of sub-plants, metres at plant scale 1; without leaves that of the branch.
     """
 
     years: NDArray[np.void]
@@ -63,51 +67,63 @@ class DayTotals:
     colour: NDArray[np.float64]
     count: NDArray[np.float64]
     faces: NDArray[np.float64]
+    twig: NDArray[np.float64]
 
-    def left(self, branches: Branches) -> NDArray[np.float64]:
-        """What is left of all kinds of leaves (n, k, 6) on the days of branches."""
-        which = self.table[branches.row]
-        day = branches.year[:, 0]
-        return np.stack([expected(self.tables, self.origin, which[:, k], day) for k in range(KINDS)], axis=1)
+    @property
+    def kinds(self) -> NDArray[np.int64]:
+        """Kinds of leaves that any plants bear."""
+        return np.flatnonzero(self.count.any(axis=0))
 
-    def left_on(self, branches: Branches, kind: NDArray[np.integer]) -> NDArray[np.float64]:
-        """What is left of one kind (n,) of leaves (n, 6)."""
-        return expected(self.tables, self.origin, self.table[branches.row, kind], branches.year[:, 0])
+    def left(self, branches: Branches, kind: int | NDArray[np.integer], *columns: int) -> list[NDArray[np.float64]]:
+        """What is left of leaves of a kind, or of kinds (n,), on the days of branches (n): some columns (n,)."""
+        which = self.table[branches.row, kind]
+        return expected(self.tables, self.origin, which, branches.year[:, 0], columns)
+
+    def _summed(self, subplants: Branches, each: NDArray[np.float64], column: int) -> NDArray[np.float64]:
+        """Sum (n,) over kinds of leaves of what they have in summer (n, k) and the day leaves."""
+        return sum(each[:, kind] * self.left(subplants, kind, column)[0] for kind in self.kinds)
 
     def leaf_areas(self, subplants: Branches) -> NDArray[np.float64]:
         """Area (n,) of leaves at plant scale 1, without the fullness of sub-plants."""
         area = np.einsum("nj,njk->nk", quadratic(subplants.outward), self.area[subplants.row])
-        return (area * self.left(subplants)[:, :, AREA]).sum(axis=1)
+        return self._summed(subplants, area, AREA)
 
     def leaf_counts(self, subplants: Branches) -> NDArray[np.float64]:
         """Number (n,) of leaves, likewise."""
-        return (self.count[subplants.row] * self.left(subplants)[:, :, PRESENT]).sum(axis=1)
+        return self._summed(subplants, self.count[subplants.row], PRESENT)
 
     def leaf_faces(self, subplants: Branches) -> NDArray[np.float64]:
         """Number (n,) of faces of leaves, likewise."""
-        return (self.faces[subplants.row] * self.left(subplants)[:, :, PRESENT]).sum(axis=1)
+        return self._summed(subplants, self.faces[subplants.row], PRESENT)
 
     def leaf_colours(self, subplants: Branches) -> NDArray[np.float64]:
         """Mean colours (n, 3) of leaves, weighted by area; black where there are none."""
-        weights, left = quadratic(subplants.outward), self.left(subplants)
+        weights = quadratic(subplants.outward)
         area = np.einsum("nj,njk->nk", weights, self.area[subplants.row])
         summer = np.einsum("nj,njkc->nkc", weights, self.colour[subplants.row])
         total, out = np.zeros(len(subplants)), np.zeros((len(subplants), 3))
-        for kind in range(KINDS):
-            year = self.years[subplants.row, kind]
-            out += _mixed(summer[:, kind], area[:, kind], left[:, kind], year, subplants.year[:, 1])
-            total += area[:, kind] * left[:, kind, AREA]
+        for kind in self.kinds:
+            year, left = self.years[subplants.row, kind], self.left(subplants, kind, *_SEEN)
+            out += _mixed(summer[:, kind], area[:, kind], left, year, subplants.year[:, 1])
+            total += area[:, kind] * left[0]
         return out / np.maximum(total, 1e-300)[:, None]
 
     def own_colours(
         self, branches: Branches, kind: NDArray[np.integer], summer: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Mean colours (n, 3) of leaves of one kind (n,), of which those in summer are known (n, 3)."""
-        left = self.left_on(branches, kind)
-        year = self.years[branches.row, kind]
-        mixed = _mixed(summer, np.ones(len(branches)), left, year, branches.year[:, 1])
-        some = left[:, AREA] > 0
-        return np.where(some[:, None], mixed / np.where(some, left[:, AREA], 1.0)[:, None], summer)
+        left = self.left(branches, kind, *_SEEN)
+        mixed = _mixed(summer, np.ones(len(branches)), left, self.years[branches.row, kind], branches.year[:, 1])
+        some = left[0] > 0
+        return np.where(some[:, None], mixed / np.where(some, left[0], 1.0)[:, None], summer)
+
+    def widths(self, subplants: Branches, leaf: NDArray[np.float64], bare: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Widths (n,) between those of leaves in summer (n,) and of what bears them (n,), by area and by growth."""
+        area = self.area[subplants.row].mean(axis=1)
+        grown, left = self._summed(subplants, area, SIZE), self._summed(subplants, area, PRESENT)
+        share = np.minimum(self.leaf_share(subplants), 1.0)
+        size = np.where(left > 0, grown / np.where(left > 0, left, 1.0), 1.0)
+        return bare + share * (leaf * size - bare)
 
     def share_range(self, rows: NDArray[np.void], species: int) -> tuple[float, float]:
         """Least and greatest `leaf_share` of plants of a species on the day of rows (r,)."""
@@ -115,32 +131,31 @@ class DayTotals:
         most = max(rows["spring"][trunk], rows["autumn"][trunk])
         days = rows["day"][trunk] + np.linspace(-most, most, 2 * int(most) + 3)
         area = self.area[trunk].mean(axis=0)
-        left = [
-            expected(self.tables, self.origin, np.full(len(days), table), days)[:, AREA] for table in self.table[trunk]
-        ]
-        share = area @ np.array(left) / max(area.sum(), 1e-300) if area.sum() > 0 else np.ones(1)
+        every = (np.full(len(days), table) for table in self.table[trunk].tolist())
+        left = [expected(self.tables, self.origin, which, days, [AREA])[0] for which in every]
+        share = area @ np.array(left) / area.sum() if area.sum() > 0 else np.ones(1)
         return float(share.min()), float(share.max())
 
     def leaf_share(self, subplants: Branches) -> NDArray[np.float64]:
         """Area (n,) of leaves over that in summer, 1 where there are never any."""
         area = self.area[subplants.row].mean(axis=1)
         all_year = area.sum(axis=1)
-        left = (area * self.left(subplants)[:, :, AREA]).sum(axis=1)
+        left = self._summed(subplants, area, AREA)
         return np.where(all_year > 0, left / np.where(all_year > 0, all_year, 1.0), 1.0)
 
 
 def _mixed(
     summer: NDArray[np.float64],
     area: NDArray[np.float64],
-    left: NDArray[np.float64],
+    left: list[NDArray[np.float64]],
     year: NDArray[np.void],
     hue: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Area times colour (n, 3) of leaves on a day, from those in summer (n, 3) of areas (n,)."""
-    green = left[:, AREA] - left[:, FRESH] - left[:, AUTUMN] - left[:, DRY]
-    out = green[:, None] * summer
-    for column, colour in ((FRESH, year["fresh"]), (AUTUMN, mean_autumn_colours(year, hue)), (DRY, year["dry"])):
-        out += (area * left[:, column])[:, None] * colour
+    """Area times colour (n, 3) of leaves on a day, from those in summer (n, 3) of areas (n,), by columns of `_SEEN`."""
+    every, *others = left
+    out = (every - sum(others))[:, None] * summer
+    for part, colour in zip(others, (year["fresh"], mean_autumn_colours(year, hue), year["dry"]), strict=True):
+        out += (area * part)[:, None] * colour
     return out
 
 
@@ -175,7 +190,9 @@ def totals_of_day(
             if bearing.any():
                 years[number, kind] = rows["year"][bearing][0]
     number = rows["species"]
-    made = DayTotals(years[number], of_species[number], tables, origin, *_by_kind(rows, totals, leaf))
+    count = totals.leaves.sum(axis=1)
+    twig = np.where(count > 0, totals.leaves @ totals.radius / np.maximum(count, 1e-300), totals.radius)
+    made = DayTotals(years[number], of_species[number], tables, origin, *_by_kind(rows, totals, leaf), 2.0 * twig)
     return (rows, made) if _differs(rows, made, of_species) else None
 
 
@@ -197,13 +214,13 @@ def _by_kind(rows: NDArray[np.void], totals: Averages, leaf: RowLeaves) -> tuple
 
 def _differs(rows: NDArray[np.void], made: DayTotals, of_species: NDArray[np.int64]) -> bool:
     """Whether any plant may have other leaves than in summer."""
-    summer = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+    summer = np.array([[1.0], [1.0], [1.0], [0.0], [0.0], [0.0]])
     trunk = np.unique(rows["species"], return_index=True)[1]
     for row, which in zip(rows[trunk], of_species, strict=True):
         most = max(row["spring"], row["autumn"])
         days = row["day"] + np.linspace(-most, most, 2 * int(most) + 3)
         for table in which.tolist():
             left = expected(made.tables, made.origin, np.full(len(days), table), days)
-            if np.abs(left - summer).max() > 1e-9:
+            if np.abs(np.array(left) - summer).max() > 1e-9:
                 return True
     return False

@@ -31,7 +31,7 @@ from ..growth.growth import WholeBranches, trunks
 from ..growth.hashing import Draw, uniform
 from ..growth.seeds import Seeds
 from ..processes.pool import WORTH_PROCESSES, in_processes
-from ..refinement.contents import feature_width
+from ..refinement.contents import TWIGS, feature_width
 from ..refinement.decisions import real_fraction
 from ..refinement.loop import Refinement
 from ..species.species import LEAF_KINDS
@@ -46,8 +46,6 @@ from .portions import MIXED, Portions, Sight, in_chunks
 _LEAST_REAL = 0.1
 #: Width in pixels up to which real leaves are kites.
 KITES = 2.0
-#: Among real leaves, wood counts as so many times as wide: a triangle is thrice as wide at its base as the wood.
-TWIGS = 4.0
 #: Width in pixels from which wood is tubes however little is seen of it: its facets would be a row of shards. A budget
 #: that makes leaves facets at more than so many pixels takes tubes in the same proportion.
 SHARDS, _GIVES_WAY = 1.4, 2.2

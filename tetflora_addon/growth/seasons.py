@@ -41,7 +41,7 @@ _OF_PLANT = 0.5
 _STEP = 0.5
 _NODES = 64
 PRESENT, SIZE, AREA, FRESH, AUTUMN, DRY = range(6)
-"""Columns of tables: expected number of leaves there are, sum of their sizes and of the squares of these, all over what
+"""Rows of tables: expected number of leaves there are, sum of their sizes and of the squares of these, all over what
 it is in summer; and the parts of the last that have the fresh colour, those of autumn, and that of dead leaves."""
 
 
@@ -284,13 +284,13 @@ def _smooth(x: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @lru_cache(maxsize=256)
 def leaf_table(leaf: LeafYear | None) -> NDArray[np.float64]:
-    """What to expect of leaves (t, 6) every half day from half a year before the middle of their life; see `PRESENT`.
+    """What to expect of leaves (6, t) every half day from half a year before the middle of their life; see `PRESENT`.
 
     All stages of spring are independent of those of autumn, so that expectations of their products are products.
     """
     days = np.arange(round(DAYS / _STEP) + 1) * _STEP
     if leaf is None:
-        return np.tile([1.0, 1.0, 1.0, 0.0, 0.0, 0.0], (len(days), 1))
+        return np.repeat([[1.0], [1.0], [1.0], [0.0], [0.0], [0.0]], len(days), axis=1)
     year = _numbers(leaf)
     some = _DEVIATIONS.reshape(_NODES, -1).mean(axis=1)
     finer = _DEVIATIONS.reshape(8 * _NODES, -1).mean(axis=1)
@@ -299,30 +299,34 @@ def leaf_table(leaf: LeafYear | None) -> NDArray[np.float64]:
     number, lengths, area, young = ((arrived * v).mean(axis=1) for v in (1.0, size, size**2, size**2 * fresh))
     held, coloured = hangs.mean(axis=(1, 2)), (hangs * turned).mean(axis=(1, 2))
     gone = leaf.kept * (1.0 - number * held)  # and hangs on
-    out = np.stack(
-        [
-            number * held + gone,
-            lengths * held + gone,
-            area * held + gone,
-            young * (held - coloured),
-            area * coloured,
-            gone,
-        ],
-        axis=1,
-    )
+    sums = (number * held + gone, lengths * held + gone, area * held + gone)
+    out = np.stack([*sums, young * (held - coloured), area * coloured, gone])
     out *= leaf.turnover
-    out[:, :3] += 1.0 - leaf.turnover
+    out[:3] += 1.0 - leaf.turnover
     return out
 
 
 def expected(
-    tables: NDArray[np.float64], origin: NDArray[np.float64], which: NDArray[np.integer], day: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """What to expect of leaves (n, 6) on days (n,), from some of several tables (k, t, 6) with their origins (k,)."""
+    tables: NDArray[np.float64],
+    origin: NDArray[np.float64],
+    which: NDArray[np.integer],
+    day: NDArray[np.float64],
+    columns: Sequence[int] = range(6),
+) -> list[NDArray[np.float64]]:
+    """What to expect of leaves, some columns (n,) each, on days (n,), from some (n,) of tables (k, 6, t).
+
+    ``origin`` (k,) are the days on which the tables begin.
+    """
+    days = tables.shape[2]
     place = ((day - origin[which]) % DAYS) / _STEP
-    low = np.minimum(place.astype(np.int64), tables.shape[1] - 2)
-    before = tables[which, low]
-    return before + (place - low)[:, None] * (tables[which, low + 1] - before)
+    low = np.minimum(place.astype(np.int64), days - 2)
+    place -= low
+    low += which * (6 * days)
+    flat, out = tables.reshape(-1), []
+    for column in columns:
+        before = np.take(flat, low + column * days)
+        out.append(before + place * (np.take(flat, low + (column * days + 1)) - before))
+    return out
 
 
 def autumn_colours(year: NDArray[np.void], hue: NDArray[np.float64], tint: NDArray[np.float64]) -> NDArray[np.float64]:

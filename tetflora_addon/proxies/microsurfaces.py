@@ -280,8 +280,8 @@ def _leaves_of_pieces(
     size, variation = rows["leaf_size"][row].T
     one = (size**2 + variation**2 / 3) * flora.leaf.area[row] * branches.scale**2
     if branches.year is not None:
-        left = flora.day.left_on(branches, rows["leaf_kind"][row])
-        one = one * left[:, AREA] / np.maximum(left[:, PRESENT], 1e-300)
+        shown, number = flora.day.left(branches, rows["leaf_kind"][row], AREA, PRESENT)
+        one = one * shown / np.maximum(number, 1e-300)
     facet = np.maximum(side**2, one)
     start = leaf_start(rows, branches)
     owner, index, key, area, t = _along(flora, pieces, totals.leaf_area, facet, start, _FACET_PATH, _LEAF_COUNT, real)

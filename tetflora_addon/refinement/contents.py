@@ -26,6 +26,8 @@ from .polygons import Polygons
 
 #: Side in pixels from which on a polygon is large: more than facets have, hidden ones included.
 LARGE = 2.0
+#: Among real leaves, wood counts as so many times as wide: a triangle is thrice as wide at its base as the wood.
+TWIGS = 4.0
 _NONE = np.zeros(0, np.int32)
 
 Kind = TypeVar("Kind", Branches, Pieces, Polygons)
@@ -77,12 +79,12 @@ def subplant_totals(flora: Flora, subplants: Branches) -> Totals:
 
 def feature_width(flora: Flora, subplants: Branches) -> NDArray[np.float64]:
     """Width (n,) of the features of sub-plants, metres: that of their leaves, or of their branch without any."""
-    row, wood = subplants.row, 2.0 * subplants.radius
-    width = np.where(flora.leaf_count[row] > 0, flora.leaf_width[row] * subplants.scale, wood)
+    row = subplants.row
+    width = np.where(flora.leaf_count[row] > 0, flora.leaf_width[row] * subplants.scale, 2.0 * subplants.radius)
     if subplants.year is None:
         return width
-    share = np.minimum(flora.day.leaf_share(subplants), 1.0)
-    return np.minimum(width, wood) + share * (width - np.minimum(width, wood))
+    # Without leaves it is twigs that one sees; they count as where they stand among leaves.
+    return flora.day.widths(subplants, width, np.minimum(width, TWIGS * flora.day.twig[row] * subplants.scale))
 
 
 def piece_totals(flora: Flora, pieces: Pieces) -> Totals:
@@ -93,14 +95,12 @@ def piece_totals(flora: Flora, pieces: Pieces) -> Totals:
     leaves = flora.rows["leaves"][row, 0] * fullness(flora.rows, branches) * leaf_fraction(flora, pieces)
     area = leaves * (size**2 + variation**2 / 3) * leaf.area[row] * branches.scale**2 * _size_factors(flora, pieces)
     if branches.year is not None:
-        left = flora.day.left_on(branches, flora.rows["leaf_kind"][row])
-        area, leaves = area * left[:, AREA], leaves * left[:, PRESENT]
-    return Totals(
-        area,
-        wood_areas(flora, pieces),
-        leaves * leaf.polygons[row] + flora.rows["sides"][row],
-        np.where(leaves > 0, leaf.width[row] * size * branches.scale, 2 * branches.radius),
-    )
+        left = flora.day.left(branches, flora.rows["leaf_kind"][row], AREA, PRESENT)
+        area, leaves = area * left[0], leaves * left[1]
+    width = np.where(leaves > 0, leaf.width[row] * size * branches.scale, 2 * branches.radius)
+    if branches.year is not None:
+        width = flora.day.widths(branches, width, np.minimum(width, TWIGS * 2 * branches.radius))
+    return Totals(area, wood_areas(flora, pieces), leaves * leaf.polygons[row] + flora.rows["sides"][row], width)
 
 
 def polygon_totals(polygons: Polygons, width: NDArray[np.float64] | None = None) -> Totals:
