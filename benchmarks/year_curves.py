@@ -1,10 +1,60 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Leaf area by day, and height and girth by age, against published curves."""
+"""Leaf area by day against published courses, and height and girth by age against published ranges.
+
+The leaf area of a species on a day is what its compiled form expects of `PLANTS` plants, each early or late as its key
+has it, over what they have in summer. Courses of a near relative tell how fast leaves come and go, not when: there the
+species has the relative's dates (`devtools.leaf_area`).
+"""
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devtools import leaf_area
+from tetflora_addon.compiled.flora import compile_species
+from tetflora_addon.growth.growth import trunks
+from tetflora_addon.growth.seasons import Season
+from tetflora_addon.growth.seeds import Seeds
+from tetflora_addon.species.catalogue import load_species
+
+PLANTS = 256
+
 
 def run() -> dict[str, float]:
-    """Measure."""
-    return {}
+    """Largest and mean errors of leaf area over that in summer, of all courses and of each."""
+    figures: dict[str, float] = {}
+    for course in leaf_area.published()["curves"]:
+        error = np.abs(area_by_day(course) - course["area"])
+        name = course["species"]
+        figures |= {f"leaf_area_error_max_{name}": float(error.max()), f"leaf_area_error_mean_{name}": error.mean()}
+    worst = [value for name, value in figures.items() if "_max_" in name]
+    mean = [value for name, value in figures.items() if "_mean_" in name]
+    return {
+        "leaf_area_courses": len(worst),
+        "leaf_area_error_max": max(worst),
+        "leaf_area_error_mean": float(np.mean(mean)),
+    } | {name: float(value) for name, value in figures.items()}
+
+
+def area_by_day(course: dict[str, Any]) -> NDArray[np.float64]:
+    """Leaf area (n,) on the days of a course over that in summer."""
+    species = load_species(course["species"])
+    year, latitude = species.year, course.get("latitude", species.year.latitude)
+    if course["kin"]:
+        leaf = replace(year.leaf, **{phase: course[phase] for phase in ("appear", "turn", "fall")})
+        species = replace(species, year=replace(year, leaf=leaf))
+    flora = compile_species([species])
+    none = np.zeros(PLANTS)
+    upright = np.tile(np.eye(3), (PLANTS, 1, 1))
+    seeds = Seeds(("",), none.astype(np.int32), np.arange(PLANTS), np.zeros((PLANTS, 3)), upright, none + 1.0)
+    summer = flora.leaf_areas(trunks(flora.rows, seeds)).sum()
+    found = []
+    for day in course["days"]:
+        then = flora.in_year(Season(day=float(day), latitude=float(latitude)))
+        found.append(then.leaf_areas(trunks(then.rows, seeds)).sum() / summer)
+    return np.array(found)

@@ -1,0 +1,303 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The same place in four seasons: a meadow with lone trees before a wooded hill, and nothing but the day changes.
+
+    python -m examples.seasons            # docs/images/seasons.jpg
+    python -m examples.seasons --out out/seasons --only winter --width 640 --samples 16
+
+The sun stands as high as it does in each of the seasons, in the morning or in the afternoon.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from dataclasses import dataclass
+from math import radians
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Vector
+from numpy.typing import NDArray
+
+from devtools import session
+
+from .close_ups import among_others, render, store_sheet
+
+ROOT = Path(__file__).resolve().parent.parent
+Rgb = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Look:
+    """A season's day, its snow, and its light.
+
+    Attributes
+    ----------
+    day : float
+    snow : float
+    sun : tuple of float
+        Height over the horizon and azimuth where the light comes from, from north to the east; degrees.
+    energy : float
+    tint : Rgb
+        Of sunlight.
+    sky : tuple of Rgb
+        At the horizon, above it, and at the zenith.
+    strength : float
+        Of the sky.
+    clouds : float
+        Fraction of the sky.
+    haze : tuple of float and Rgb
+        Extinction, 1/m, and airlight.
+    grey : float
+        Mean that the exposure aims at.
+    """
+
+    day: float
+    snow: float
+    sun: tuple[float, float]
+    energy: float
+    tint: Rgb
+    sky: tuple[Rgb, Rgb, Rgb]
+    strength: float
+    clouds: float
+    haze: tuple[float, Rgb]
+    grey: float
+
+
+LOOKS = {
+    "winter": Look(
+        18.0, 1.0, (13.0, 232.0), 4.2, (1.0, 0.80, 0.60),
+        ((0.86, 0.84, 0.86), (0.48, 0.60, 0.80), (0.16, 0.28, 0.52)), 0.75, 0.3, (0.0011, (0.66, 0.72, 0.82)), 0.50,
+    ),
+    "spring": Look(
+        121.0, 0.0, (40.0, 236.0), 5.0, (1.0, 0.94, 0.84),
+        ((0.78, 0.86, 0.95), (0.38, 0.56, 0.86), (0.10, 0.24, 0.56)), 0.8, 0.45, (0.0005, (0.55, 0.66, 0.80)), 0.42,
+    ),
+    "summer": Look(
+        200.0, 0.0, (52.0, 240.0), 5.2, (1.0, 0.95, 0.86),
+        ((0.74, 0.84, 0.95), (0.34, 0.53, 0.86), (0.08, 0.21, 0.54)), 0.8, 0.35, (0.0006, (0.55, 0.66, 0.80)), 0.40,
+    ),
+    "autumn": Look(
+        288.0, 0.0, (24.0, 238.0), 4.8, (1.0, 0.88, 0.70),
+        ((0.86, 0.86, 0.86), (0.46, 0.60, 0.82), (0.14, 0.28, 0.54)), 0.75, 0.4, (0.0014, (0.66, 0.68, 0.72)), 0.42,
+    ),
+}  # fmt: skip
+#: Sides of the land, metres, and of its part around the eye, of which every blade is planted.
+_LAND, _NEAR = 640.0, 130.0
+_EYE, _AHEAD, _LENS = (-9.0, -33.0, 2.0), (2.5, 12.0, 5.6), 31.0
+#: Trees of the hill, with relative numbers, those along its edge, and trees by themselves: species, seed, place, size.
+_HILL = {"beech": 0.30, "oak": 0.16, "birch": 0.16, "maple": 0.12, "larch": 0.10, "spruce": 0.16}
+_EDGE = {"hazel": 0.45, "rowan": 0.25, "birch": 0.15, "bush": 0.15}
+_LONE = (
+    ("oak", 1, (7.0, 9.0), 1.0),
+    ("birch", 3, (-13.5, 1.5), 0.95),
+    ("birch", 8, (-17.0, 5.0), 1.05),
+    ("birch", 12, (-12.0, 8.5), 0.8),
+    ("cherry_blossom", 5, (-2.5, 17.0), 1.0),
+    ("maple", 4, (24.0, 20.0), 0.9),
+    ("spruce", 2, (-25.0, 22.0), 0.9),
+    ("spruce", 6, (-29.0, 27.0), 0.7),
+    ("larch", 7, (-34.0, 30.0), 0.85),
+)
+_WOOD, _MARGIN = "wood", "edge"
+
+
+def height(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Of the land, metres: a meadow in a shallow dip, and a hill behind it."""
+    waves = 0.8 * np.sin(0.024 * x + 0.5) * np.cos(0.03 * y) + 0.12 * np.sin(0.14 * x - 0.11 * y)
+    far = np.clip((y - 35.0 + 0.12 * x) / 300.0, 0.0, 1.0)
+    return waves + 58.0 * far**1.35 * (1.0 + 0.28 * np.sin(0.011 * x + 0.6)) + 0.0008 * np.maximum(-y, 0.0) ** 2
+
+
+def wooded(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Metres behind the edge of the wood, which waves."""
+    return y - (44.0 + 9.0 * np.sin(0.035 * x + 2.2) + 4.0 * np.sin(0.1 * x) - 0.10 * x)
+
+
+def build(scene: bpy.types.Scene) -> None:
+    """Fill an empty scene with land, trees and what covers the ground; `dress` gives it a season."""
+    for species, seed, (x, y), scale in _LONE:
+        plant = bpy.data.objects.new(f"{species} {seed}", None)
+        plant.location = (x, y, float(height(np.float64(x), np.float64(y))))
+        plant.rotation_euler.z, plant.scale = 2.4 * seed, (scale,) * 3
+        plant.tetflora.is_plant, plant.tetflora.species, plant.tetflora.seed = True, species, seed
+        scene.collection.objects.link(plant)
+    for name, side, step, hole in (("Near", _NEAR, 2.0, 0.0), ("Far", _LAND, 5.0, _NEAR)):
+        ground = _ground(name, side, step, hole)
+        scene.collection.objects.link(ground)
+        _plant(scene, ground)
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.lens, camera.data.clip_start, camera.data.clip_end = _LENS, 0.05, 3000.0
+    eye, ahead = (Vector((x, y, z + float(height(np.float64(x), np.float64(y))))) for x, y, z in (_EYE, _AHEAD))
+    camera.location, camera.rotation_euler = eye, (ahead - eye).to_track_quat('-Z', 'Y').to_euler()
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    scene.tetflora.refine_at_render = False
+
+
+def dress(scene: bpy.types.Scene, look: Look) -> None:
+    """Give the place a season; the one that it had goes."""
+    from .daylight import add_daylight
+
+    year = scene.tetflora.year
+    year.enabled, year.day, year.snow = True, look.day, look.snow
+    for old in [o for o in scene.objects if o.type == 'LIGHT' or o.name.startswith("Haze")]:
+        bpy.data.objects.remove(old)
+    add_daylight(scene, elevation=look.sun[0], azimuth=look.sun[1] - 180.0)
+    sun = next(o for o in scene.objects if o.type == 'LIGHT').data
+    sun.energy, sun.color, sun.angle = look.energy, look.tint, radians(0.8)
+    scene.world = sky(look)
+    _air(scene, look)
+
+
+def _ground(name: str, side: float, step: float, hole: float) -> bpy.types.Object:
+    """A grid with a square hole in its middle, of sides in metres; where wood and edge are become attributes."""
+    from tetflora_addon.blender.attributes import write
+
+    number = round(side / step) + 1
+    along = np.linspace(-side / 2, side / 2, number)
+    x, y = (values.reshape(-1) for values in np.meshgrid(along, along))
+    first = (np.arange(number - 1)[:, None] * number + np.arange(number - 1)).reshape(-1)
+    faces = np.stack([first, first + 1, first + number + 1, first + number], axis=1)
+    middle = np.maximum(np.abs(x[faces].mean(axis=1)), np.abs(y[faces].mean(axis=1)))
+    seen = y[faces].mean(axis=1) > -60.0
+    mesh = bpy.data.meshes.new(name)
+    points = np.stack([x, y, height(x, y)], axis=1)
+    mesh.from_pydata(points.tolist(), [], faces[(middle > hole / 2) & seen].tolist(), shade_flat=False)
+    inside = wooded(x, y)
+    write(mesh, _WOOD, np.clip(inside / 4.0, 0.0, 1.0).astype(np.float32))
+    write(mesh, _MARGIN, np.clip(1.0 - np.abs(inside - 1.0) / 4.5, 0.0, 1.0).astype(np.float32))
+    return bpy.data.objects.new(name, mesh)
+
+
+def _plant(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
+    """Plant the hill and its edge on a ground, and cover all of it."""
+    from tetflora_addon.blender.placing import cover, populations
+    from tetflora_addon.blender.worker import at_once
+
+    for mask, mix, apart, density, sizes, habit in (
+        (_WOOD, _HILL, 3.2, 480.0, (0.6, 1.15), 0.35),
+        (_MARGIN, _EDGE, 1.5, 700.0, (0.45, 0.95), 0.0),
+    ):
+        some = populations.add_population(scene, [ground], name=f"{ground.name} {mask}")
+        for species, weight in mix.items():
+            entry = some.mix.add()
+            entry.species, entry.weight = (among_others(scene, species, habit) if habit else species), weight
+        some.vertex_group, some.min_distance = mask, apart
+        some.by_density, some.density = True, density
+        some.scale_min, some.scale_max, some.seed = *sizes, 3
+        populations.make_plants(scene, bpy.context.evaluated_depsgraph_get(), some)
+        bpy.context.view_layer.update()
+    steps = cover.cover_steps(scene, bpy.context.evaluated_depsgraph_get(), some, masks={"vertex_group": ""})
+    at_once(steps)
+
+
+def _air(scene: bpy.types.Scene, look: Look) -> None:
+    """Haze over the land."""
+    from .haze import add_haze
+
+    ground = scene.objects["Far"]
+    ground.name = "Ground"
+    try:
+        add_haze(scene, *look.haze)
+    finally:
+        ground.name = "Far"
+
+
+def sky(look: Look) -> bpy.types.World:
+    """Three colours from the horizon to the zenith, with clouds; seen less bright than its light, as on film."""
+    from tetflora_addon.blender.compat import shader_tree
+
+    world = bpy.data.worlds.new("Sky")
+    tree = shader_tree(world)
+    tree.nodes.clear()
+    new, link = tree.nodes.new, tree.links.new
+    place, split, ramp = new("ShaderNodeTexCoord"), new("ShaderNodeSeparateXYZ"), new("ShaderNodeValToRGB")
+    stops = ramp.color_ramp.elements
+    stops.new(0.5)
+    for element, position, colour in zip(stops, (0.0, 0.16, 0.75), look.sky, strict=True):
+        element.position, element.color = position, (*colour, 1.0)
+    link(place.outputs["Generated"], split.inputs[0])
+    link(split.outputs["Z"], ramp.inputs[0])
+    background, output = new("ShaderNodeBackground"), new("ShaderNodeOutputWorld")
+    path, seen = new("ShaderNodeLightPath"), new("ShaderNodeMapRange")
+    seen.inputs["To Min"].default_value, seen.inputs["To Max"].default_value = look.strength, 0.85 * look.strength
+    link(path.outputs["Is Camera Ray"], seen.inputs["Value"])
+    link(seen.outputs[0], background.inputs["Strength"])
+    link(_clouds(tree, place, split, ramp.outputs["Color"], look.clouds), background.inputs["Color"])
+    link(background.outputs[0], output.inputs["Surface"])
+    return world
+
+
+def _clouds(
+    tree: bpy.types.NodeTree,
+    place: bpy.types.ShaderNode,
+    split: bpy.types.ShaderNode,
+    sky: bpy.types.NodeSocket,
+    cover: float,
+) -> bpy.types.NodeSocket:
+    """Clouds on a plane overhead, which come together at the horizon."""
+    new, link = tree.nodes.new, tree.links.new
+    above, flat, noise = new("ShaderNodeMath"), new("ShaderNodeVectorMath"), new("ShaderNodeTexNoise")
+    above.operation, above.inputs[1].default_value = 'ADD', 0.14
+    link(split.outputs["Z"], above.inputs[0])
+    flat.operation = 'DIVIDE'
+    link(place.outputs["Generated"], flat.inputs[0])
+    link(above.outputs[0], flat.inputs[1])
+    link(flat.outputs[0], noise.inputs["Vector"])
+    noise.inputs["Scale"].default_value, noise.inputs["Detail"].default_value = 0.9, 9.0
+    noise.inputs["Roughness"].default_value = 0.58
+    dense = new("ShaderNodeMapRange")
+    dense.interpolation_type = 'SMOOTHSTEP'
+    for socket, value in (("From Min", 0.68 - 0.4 * cover), ("From Max", 0.95 - 0.4 * cover), ("To Max", 0.8)):
+        dense.inputs[socket].default_value = value
+    link(noise.outputs[0], dense.inputs["Value"])
+    mix = new("ShaderNodeMix")
+    mix.data_type = 'RGBA'
+    weight = next(s for s in mix.inputs if s.type == 'VALUE' and s.name == "Factor")
+    first, second = (s for s in mix.inputs if s.type == 'RGBA')
+    link(dense.outputs[0], weight)
+    link(sky, first)
+    second.default_value = (0.95, 0.95, 0.97, 1.0)
+    return next(s for s in mix.outputs if s.type == 'RGBA')
+
+
+def render_seasons(
+    folder: Path, only: tuple[str, ...] = tuple(LOOKS), size: tuple[int, int] = (750, 422), samples: int = 96
+) -> list[Path]:
+    """Render the place, which the scene holds, in some seasons; the pictures."""
+    made = []
+    for name in only:
+        dress(bpy.context.scene, LOOKS[name])
+        made.append(folder / f"{name}.png")
+        render(made[-1], size, samples, grey=LOOKS[name].grey)
+    return made
+
+
+def main() -> int:
+    """Render the sheet of the documentation, or single pictures."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, help="leave pictures of single seasons here instead")
+    parser.add_argument("--only", nargs="+", choices=tuple(LOOKS), default=tuple(LOOKS))
+    parser.add_argument("--width", type=int, default=750)
+    parser.add_argument("--samples", type=int, default=96)
+    arguments = parser.parse_args()
+    session.start()
+    session.clean_file()
+    build(bpy.context.scene)
+    given = tuple(arguments.only), (arguments.width, round(arguments.width * 9 / 16)), arguments.samples
+    if arguments.out:
+        arguments.out.mkdir(parents=True, exist_ok=True)
+        render_seasons(arguments.out, *given)
+        return 0
+    with tempfile.TemporaryDirectory() as folder:
+        made = render_seasons(Path(folder), *given)
+        store_sheet([made[i : i + 2] for i in range(0, len(made), 2)], ROOT / "docs" / "images" / "seasons.jpg")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
