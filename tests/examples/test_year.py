@@ -1,0 +1,61 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The benchmark of the year counts what proxies do beyond what plants do, and tells meshes apart."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from PIL import Image
+
+from benchmarks import year_costs, year_frames, year_scene
+from tetflora_addon.blender.job import refine
+
+STATES = tuple((day, 0.0) for day in (1.0, 6.0, 11.0))
+SERIES = year_frames.Series("year", lambda scene: None, STATES, 1)
+TIMES = {f"{kind}_{what}": 1 for kind in year_frames.KINDS for what in ("s", "render_s", "polygons", "facets")}
+
+
+def frames(folder, refined, expanded):
+    """Pictures of flat greys, and their record."""
+    for grey, kind in ((refined, "refined"), (expanded, "expanded")):
+        for state, value in zip(STATES, grey, strict=True):
+            picture = Image.fromarray(np.full((16, 16, 3), value, np.uint8))
+            picture.save(year_frames._path(folder, state, kind))
+    return year_frames.figures(folder, SERIES, {year_frames._key(state): TIMES for state in STATES})
+
+
+def test_what_plants_do_does_not_count(tmp_path, clean_file):
+    found = frames(tmp_path, (60, 120, 180), (60, 120, 180))
+    assert found["year_flip_expanded_step_max"] > 0.1
+    assert found["year_flip_steps_max"] == found["year_flip_other_change_max"] == found["year_flip"] == 0.0
+
+
+def test_a_constant_difference_is_no_pop(tmp_path, clean_file):
+    found = frames(tmp_path, (70, 130, 190), (60, 120, 180))
+    assert found["year_flip_other_change_max"] == pytest.approx(0.0, abs=2e-3)
+    assert found["year_flip"] > 0.01
+
+
+def test_a_pop_of_proxies_counts_where_it_is(tmp_path, clean_file):
+    found = frames(tmp_path, (60, 60, 120), (60, 60, 60))
+    assert found["year_flip_steps_max"] > 0.1 and found["year_flip_steps_max_at"] == 11.0
+    assert found["year_flip_other_change_max"] > 0.1
+
+
+def test_digests_are_of_what_was_made(clean_file):
+    scene = bpy.context.scene
+    year_scene.lone(scene, "bush", 2.0, (64, 64), age=0.0)
+    digests = []
+    for day in (None, None, 15.0):
+        year_scene.set_day(scene, day)
+        refine.refine(scene, bpy.context.evaluated_depsgraph_get())
+        digests.append(year_scene.digest(scene))
+    assert digests[0] == digests[1] != digests[2]
+
+
+def test_arrays_that_are_shared_count_once():
+    one = np.zeros(10)
+    assert year_costs.nbytes((one, one[2:], [one])) == one.nbytes
+    assert year_costs.nbytes((one, one.copy())) == 2 * one.nbytes
