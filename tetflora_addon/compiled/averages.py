@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..growth.axes import profile, profile_integral
 from ..growth.foliage import YOUTH
-from ..growth.grown_rows import NOW, fullness_of, lengths, places
+from ..growth.grown_rows import NOW, fullness_of, lengths, spread_children
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR
 from ..leaves.models import LeafModel
 from ..species.members import dead_vigour, expected_forks
@@ -271,11 +271,12 @@ def _sums(rows: NDArray[np.void], i: int, sort: int) -> _Sums:
     start, (low, high) = row["start"][sort, 0], row["fraction"][sort]
     end = row["start"][sort, 1] if sort == DEAD else 1.0
     t, fraction = start + (end - start) * _FRACTIONS, low + (high - low) * _FRACTIONS
+    weight, fading = 1.0, 1.0
     if row["growing"][sort, NOW] > 0:
-        t = places(row, sort, _FRACTIONS)
+        t, fraction, weight, fading = spread_children(row, sort)
     vigour = np.ones_like(t)
     if sort == LATERAL:
-        vigour = lengths(rows, np.full(t.shape, i), fraction)
+        vigour = lengths(rows, np.full(t.shape, i), fraction) * fading
     elif sort == DEAD:
         vigour = dead_vigour(fraction)
     full = fullness_of(rows, np.full(t.shape, row["next"][sort]), vigour)
@@ -286,13 +287,17 @@ def _sums(rows: NDArray[np.void], i: int, sort: int) -> _Sums:
         here = np.full(t.shape, i)
         piped = sort == LATERAL and row["pipe"] > 0
         thick = row["pipe_radius"] * vigour if piped else profile(rows, here, np.zeros(len(t), np.uint64), t)
-        size, radius = vigour * row["nominal"] * child["length"][0] * thick * thickness, float(thick.mean() * thickness)
+        size, radius = (
+            vigour * row["nominal"] * child["length"][0] * thick * thickness,
+            float((weight * thick).mean() * thickness),
+        )
+    full = weight * full
     nodes = number * full.mean() * np.eye(3)
     if row["order"] == 1:
         outward = row["part"][0] + (row["part"][1] - row["part"][0]) * t
         nodes = np.tile(number * (full[:, None] * quadratic(outward)).mean(axis=0), (3, 1))
-    length = float(row["nominal"] * child["length"][0] * vigour.mean())
-    means = (float(number * m.mean()) for m in (full, size, size * full))
+    length = float(row["nominal"] * child["length"][0] * (weight * vigour).mean())
+    means = (float(number * m.mean()) for m in (full, weight * size, size * full))
     return _Sums(number, *means, nodes, length, radius)
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import gathered
 from ..growth.branches import Branches
 from ..growth.seasons import (
     AREA,
@@ -109,21 +110,42 @@ class DayTotals:
         return out / np.maximum(total, 1e-300)[:, None]
 
     def own_colours(
-        self, branches: Branches, kind: NDArray[np.integer], summer: NDArray[np.float64]
+        self,
+        branches: Branches,
+        kind: NDArray[np.integer],
+        summer: NDArray[np.float64],
+        owner: NDArray[np.integer] | None = None,
     ) -> NDArray[np.float64]:
-        """Mean colours (n, 3) of leaves of one kind (n,), of which those in summer are known (n, 3)."""
+        """Mean colours (n, 3) of leaves of one kind (n,), of which those in summer are known (n, 3).
+
+        ``owner`` (n,) are their branches, if not one for each.
+        """
+        out = summer.copy()
+        for one in self.kinds:
+            factor, added = self._mixture(branches, int(one))
+            if owner is not None and (kind == one).all():
+                return gathered(factor, owner)[:, None] * summer + gathered(added, owner)
+            some = np.flatnonzero(kind == one)
+            which = some if owner is None else owner[some]
+            out[some] = factor[which, None] * summer[some] + added[which]
+        return out
+
+    def _mixture(self, branches: Branches, kind: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Factor (n,) on the mean colour of leaves in summer on the day of branches, and what is added to it (n, 3)."""
         left = self.left(branches, kind, *_SEEN)
-        mixed = _mixed(summer, np.ones(len(branches)), left, self.years[branches.row, kind], branches.year[:, 1])
+        one, none = np.ones(len(branches)), np.zeros((len(branches), 3))
+        added = _mixed(none, one, left, self.years[branches.row, kind], branches.year[:, 1])
         some = left[0] > 0
-        return np.where(some[:, None], mixed / np.where(some, left[0], 1.0)[:, None], summer)
+        every = np.where(some, left[0], 1.0)
+        return np.where(some, (left[0] - left[1] - left[2] - left[3]) / every, 1.0), added / every[:, None]
 
     def widths(self, subplants: Branches, leaf: NDArray[np.float64], bare: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Widths (n,) between those of leaves in summer (n,) and of what bears them (n,), by area and by growth."""
-        area = self.area[subplants.row].mean(axis=1)
-        grown, left = self._summed(subplants, area, SIZE), self._summed(subplants, area, PRESENT)
-        share = np.minimum(self.leaf_share(subplants), 1.0)
-        size = np.where(left > 0, grown / np.where(left > 0, left, 1.0), 1.0)
-        return bare + share * (leaf * size - bare)
+        """Widths (n,) between those of leaves in summer (n,) and of what bears them (n,), by number and by growth."""
+        count = self.count[subplants.row]
+        every, left = count.sum(axis=1), self._summed(subplants, count, PRESENT)
+        size = self._summed(subplants, count, SIZE) / np.maximum(left, 1e-300)
+        share = left / np.maximum(every, 1e-300)
+        return np.where(every > 0, bare + share * (leaf * size - bare), leaf)
 
     def share_range(self, rows: NDArray[np.void], species: int) -> tuple[float, float]:
         """Least and greatest `leaf_share` of plants of a species on the day of rows (r,)."""

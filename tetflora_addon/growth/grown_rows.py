@@ -3,7 +3,8 @@
 """Rows of axes that are not full-grown: where their children are, part by part between forks; and how long these are.
 
 ``growing`` of a row holds for each sort of children: the present length of the row over the full-grown one; the
-`Nodes` of the row, begin, end, until (of the present length), power, whole and below.
+`Nodes` of the row, begin, end, until (of the present length), power, whole and below, where those that live for a while
+are (of the present length), and how many there are for each of the others.
 """
 
 from __future__ import annotations
@@ -13,10 +14,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..species.growing import Nodes, node_at, place_at
+from ..species.growing import Nodes, node_at, place_at, shortened, some_nodes
 from ..species.species import crown_ratio
 
-NOW, BEGIN, END, UNTIL, POWER, WHOLE, BELOW = range(7)
+NOW, BEGIN, END, UNTIL, POWER, WHOLE, BELOW, FRESH, EXTRA = range(9)
 """Columns of ``growing``."""
 
 
@@ -59,27 +60,41 @@ def grow_children(
     power = nodes.power if p == 0 else 1.0
     inside = low < start[0] * now < high
     mean = float(np.clip((start[0] * now - low) / here, 0, 0.999))
-    until = float(np.clip((float(place_at(last, *law)) - low) / here, mean, 1))
+    ends = place_at([last - nodes.fresh * (last - first), last], *law)
+    fresh, until = np.clip((ends - low) / here, mean, 1)
     own = begin, end, power, whole, below
-    there = float(np.diff(node_at(np.array([mean, until]) * here / full, *own))[0])
+    base, some, tip = node_at(np.array([mean, fresh, until]) * here / full, *own)
+    there = float(tip - base + nodes.extra * (tip - some))
     row["fraction"][sort] = fraction
     row["count"][sort] *= there / number
     variation = min(start[1] * now / here, mean, 0.999 - mean) if inside else 0.0
     row["start"][sort] = mean, variation
     if there > 0:
-        row["growing"][sort] = here / full, begin, end, until, power, whole / there, below / there
+        row["growing"][sort] = (
+            *(here / full, begin, end, until, power, whole / there, below / there),
+            *(fresh, nodes.extra),
+        )
 
 
-def places(row: np.void, sort: int, fraction: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Where on a row its children at fractions (n,) of them are, from the lowest to the topmost; for mean ranges."""
-    start = row["start"][sort, 0]
-    own = row["growing"][sort]
-    if own[NOW] <= 0:
-        return start + (1.0 - start) * fraction
-    number = row["count"][sort, 0]
+def spread_children(row: np.void, sort: int) -> tuple[NDArray[np.float64], ...]:
+    """Children of one sort of a mean branch of a row that is not full-grown, as many as stand for all.
+
+    Returns
+    -------
+    t, fraction : (512,) float64
+        Where they are on the branch, and among those of the order's branch.
+    weight : (512,) float64
+        How many each stands for; 1 on the mean.
+    fading : (512,) float64
+        Factor on their lengths.
+    """
+    own, number = row["growing"][sort], row["count"][sort, 0]
     law = own[BEGIN], own[END], own[POWER], own[WHOLE] * number, own[BELOW] * number
-    first, last = node_at(np.array([start, own[UNTIL]]) * own[NOW], *law)
-    return np.clip(place_at(first + (last - first) * fraction, *law) / own[NOW], 0, 1)
+    base, some, tip = node_at(np.array([row["start"][sort, 0], own[FRESH], own[UNTIL]]) * own[NOW], *law)
+    node, weight, fading = some_nodes((base, some, tip), own[EXTRA])
+    low, high = row["fraction"][sort]
+    fraction = low + (high - low) * (node - base) / max(tip - base, 1e-9)
+    return np.clip(place_at(node, *law) / own[NOW], 0, 1), fraction, weight, fading
 
 
 def lengths(rows: NDArray[np.void], row: NDArray[np.integer], fraction: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -87,16 +102,8 @@ def lengths(rows: NDArray[np.void], row: NDArray[np.integer], fraction: NDArray[
     out = crown_ratio(rows["crown"][row], 1 - fraction)
     ramps = rows["ramps"][row]
     if ramps.any() or rows["conical"][row].any():
-        out = out * (1 - rows["conical"][row] * fraction)
-        low, high = np.maximum(ramps, 1e-9).T
-        out *= np.clip(fraction / low, 0, 1) * np.clip((1 - fraction) / high, 0, 1)
+        out = out * shortened(fraction, rows["conical"][row], *ramps.T)
     return out
-
-
-def least_length(crown: int, conical: float) -> float:
-    """Shortest length ratio of laterals that are neither new nor about to die."""
-    fraction = np.linspace(0, 1, 65)
-    return float((crown_ratio(np.full(65, crown), 1 - fraction) * (1 - conical * fraction)).min())
 
 
 def fullness_of(rows: NDArray[np.void], row: NDArray[np.integer], vigour: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -136,7 +136,7 @@ def branch_counts(rows: NDArray[np.void], branches: Branches, sort: int = LATERA
     nodes = np.floor(wanted * fullness(rows, branches) / whorl + uniform(key, _ROUND[sort])).astype(np.int64)
     grown = _grown(rows, branches, sort)
     if grown is not None:
-        nodes = np.where(grown.on, grown.number, nodes)
+        nodes = np.where(grown.on, grown.number.sum(axis=0), nodes)
     return np.where(child >= 0, nodes * whorl, 0)
 
 
@@ -198,8 +198,10 @@ def chosen_children(
     row = rows["next"][parent.row, sort]
     grown = _grown(rows, parents, sort)
     if grown is not None:
-        index = index + np.where(grown.on, grown.first, 0)[owner] * rows["whorl"][row]
+        index, more, extra = grown.chosen(owner, index, rows["whorl"][row])
+        path = path + more
     key = child_key(parent.key, child_number(index, path))
+    fading = 1.0
     if sort == FORK:
         whorl, node, within, fraction = counts[owner], np.zeros_like(index), index, np.ones(len(index))
         t = np.ones(len(index))
@@ -216,7 +218,7 @@ def chosen_children(
             start, end = varied(rows["start"][parent.row, sort], parent.key, _START[sort]), 1.0
         t = start + (end - start) * fraction
         if grown is not None:
-            there, part = grown.places(owner, node, 0.5 + _PLACE_JITTER * place)
+            there, part, fading = grown.places(owner, node, 0.5 + _PLACE_JITTER * place, extra)
             on = grown.on[owner]
             t, fraction = np.where(on, there, t), np.where(on, part, fraction)
         low, high = rows["fraction"][parent.row, sort].T
@@ -240,7 +242,7 @@ def chosen_children(
         around = np.where(limb, first + (last - first) * t, around)
     radius = radius_at(rows, parent, t)
     if sort == LATERAL:
-        vigour = lengths(rows, parent.row, fraction)
+        vigour = lengths(rows, parent.row, fraction) * fading
         measure = parent.length * rows["nominal"][parent.row] * vigour
         radius = np.where(
             rows["pipe"][parent.row] > 0, parent.radius * rows["pipe_radius"][parent.row] * vigour, radius

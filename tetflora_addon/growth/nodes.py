@@ -13,12 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..species.growing import node_at, place_at
+from ..species.growing import FADING, node_at, place_at
 from .branches import Branches
-from .grown_rows import BEGIN, BELOW, END, NOW, POWER, UNTIL, WHOLE
+from .grown_rows import BEGIN, BELOW, END, EXTRA, FRESH, NOW, POWER, UNTIL, WHOLE
 from .hashing import Draw, child_key, signed
 
-_NEGATIVE = 1 << 28  # numbers of nodes below the first are counted back from here: none meets another sort's
+#: Where numbers of nodes that live for a while begin, and those below the first are counted back from: no child
+#: index of one is that of another, nor of another sort.
+_EXTRA, _NEGATIVE = 1 << 27, 1 << 28
 
 
 def child_number(index: NDArray[np.integer], path: int) -> NDArray[np.int64]:
@@ -26,7 +28,7 @@ def child_number(index: NDArray[np.integer], path: int) -> NDArray[np.int64]:
     return np.where(index < 0, index + _NEGATIVE, index) + path if (index < 0).any() else index + path
 
 
-def within_node(key: NDArray[np.uint64]) -> NDArray[np.float64]:
+def _within(key: NDArray[np.uint64]) -> NDArray[np.float64]:
     """Where in their node the children of keys (n,) sit, 0 to 1."""
     return 0.5 + 0.5 * signed(key, Draw.PLACE)
 
@@ -39,16 +41,16 @@ class Grown:
     ----------
     on : (n,) bool
         Whether they are still growing; if not, the rest has no meaning.
-    first, number : (n,) int64
-        Number of the lowest node, and how many there are.
+    first, number : (2, n) int64
+        Number of the lowest node, and how many there are: of those that stay, and those that live for a while.
     now : (n,) float64
         Length over that when full-grown.
     law : tuple of (n,) float64
         See `species.growing.node_at`.
-    ends : (2, n) float64
-        First and last place in nodes.
-    up : (n,) float64
-        Nodes above the begin over those of the law.
+    ends : (3, n) float64
+        Where nodes begin, where those begin that live for a while, and where all end, in nodes.
+    density : (2, n) float64
+        Nodes above the begin, and nodes that live for a while, over those of the law.
     """
 
     on: NDArray[np.bool_]
@@ -57,17 +59,36 @@ class Grown:
     now: NDArray[np.float64]
     law: tuple[NDArray[np.float64], ...]
     ends: NDArray[np.float64]
-    up: NDArray[np.float64]
+    density: NDArray[np.float64]
+
+    def chosen(
+        self, owner: NDArray[np.integer], index: NDArray[np.integer], whorl: NDArray[np.integer]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+        """Index that is theirs for life, where child numbers begin, and which live for a while (m,), of children (m,).
+
+        These are given by branch and index among the living; a node bears as many as a whorl has.
+        """
+        node, within = index // whorl, index % whorl
+        on, stay = self.on[owner], self.number[0][owner]
+        extra = on & (node >= stay)
+        node = node + np.where(on, np.where(extra, self.first[1][owner] - stay, self.first[0][owner]), 0)
+        return node * whorl + within, np.where(extra, _EXTRA, 0), extra
 
     def places(
-        self, owner: NDArray[np.integer], node: NDArray[np.integer], within: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Fractions of the branch, and of its children (m,), (m,) for nodes (m,) of branches (m,)."""
+        self,
+        owner: NDArray[np.integer],
+        node: NDArray[np.integer],
+        within: NDArray[np.float64],
+        extra: NDArray[np.bool_],
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Fractions of the branch, and of its children (m,), (m,), for nodes (m,), and a factor on lengths (m,)."""
         own = node + within
-        own = np.where(own >= 0, own / np.maximum(self.up[owner], 1e-9), own)
+        dense = np.where(extra, self.density[1][owner], np.where(own >= 0, self.density[0][owner], 1.0))
+        own = own / np.maximum(dense, 1e-9)
         t = place_at(own, *(one[owner] for one in self.law)) / self.now[owner]
-        low, high = self.ends[:, owner]
-        return np.clip(t, 0, 1), np.clip((own - low) / np.maximum(high - low, 1e-9), 0, 1)
+        low, some, high = self.ends[:, owner]
+        fading = np.where(extra, np.clip((own - some) / np.maximum(FADING * (high - some), 1e-9), 0, 1), 1.0)
+        return np.clip(t, 0, 1), np.clip((own - low) / np.maximum(high - low, 1e-9), 0, 1), fading
 
 
 def grown_nodes(
@@ -106,14 +127,16 @@ def grown_nodes(
     law = begin, np.maximum(own[:, END], begin), power, whole, wanted * own[:, BELOW]
     settled = rows["settled"][row]
     rounded = (1 - settled) * whole + settled * np.floor(whole + chance)
-    up = np.where(whole > 0, rounded / np.maximum(whole, 1e-12), 1.0)
-    ends = np.stack([node_at(place * now, *law) for place in (start, own[:, UNTIL])])
-    ends[1] = np.maximum(ends[0], ends[1])
-    counted = np.where(ends > 0, ends * up, ends)
-    node = np.floor(counted)
+    density = np.stack([np.where(whole > 0, rounded / np.maximum(whole, 1e-12), 1.0), own[:, EXTRA]])
+    ends = np.stack([node_at(place * now, *law) for place in (start, own[:, FRESH], own[:, UNTIL])])
+    ends = np.maximum(ends, ends[0])
     whorl = np.maximum(rows["whorl"][rows["next"][row, sort]], 1)
-    passed = [
-        number + (within_node(child_key(key, child_number(number * whorl, path))) < part)
-        for number, part in zip(node.astype(np.int64), counted - node, strict=True)
-    ]
-    return Grown(on, passed[0], np.maximum(passed[1] - passed[0], 0), now, law, ends, up)
+
+    def passed(place: NDArray[np.float64], begin: int) -> NDArray[np.int64]:
+        node = np.floor(place)
+        first = child_key(key, child_number((node * whorl).astype(np.int64), path + begin))
+        return node.astype(np.int64) + (_within(first) < place - node)
+
+    stay = [passed(np.where(place > 0, place * density[0], place), 0) for place in (ends[0], ends[2])]
+    first, last = np.stack([stay, [passed(place * density[1], _EXTRA) for place in ends[1:]]], axis=1)
+    return Grown(on, first, np.maximum(last - first, 0), now, law, ends, density)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..species.extras import dead_part
-from ..species.members import expected_forks, part_segments
+from ..species.members import expected_forks, least_length, part_segments
 from ..species.skeletons import drawn_branches
 from ..species.species import (
     CROWN_SHAPES,
@@ -32,7 +32,7 @@ from ..species.species import (
     whole_cuts,
 )
 from .drawn_lines import MAX_SEGMENTS, DrawnLines, drawn_lines
-from .grown_rows import UNTIL, grow_children, least_length, lengths
+from .grown_rows import NOW, UNTIL, grow_children, lengths, spread_children
 from .hashing import signed
 
 LATERAL, FORK, SPUR, DEAD = range(4)
@@ -64,7 +64,7 @@ ROW_DTYPE = np.dtype(
     + [("envelope", np.int64), ("envelope_radius", np.float64), ("inclination", np.int64)]
     + [("next", np.int32, (4,)), ("count", np.float64, (4, 2)), ("start", np.float64, (4, 2))]
     + [("fraction", np.float64, (4, 2)), ("part", np.float64, (2,))]
-    + [("growing", np.float64, (4, 7)), ("settled", np.float64), ("conical", np.float64)]
+    + [("growing", np.float64, (4, 9)), ("settled", np.float64), ("conical", np.float64)]
     + [("ramps", np.float64, (2,)), ("least", np.float64)]
     + [("nominal", np.float64), ("pipe_radius", np.float64), ("fork_power", np.float64)]
     + [("continues", np.bool_), ("outward", np.bool_), ("tropic", np.bool_), ("gradient", np.bool_)]
@@ -146,8 +146,8 @@ def _rows_of_species(one: Species, number: int, first: int) -> list[np.void]:
             row = _part(row, order, p, low, high, cuts[o][p - 1] if p else 0.0)
             if order.growing is not None:
                 _grow(row, order, p, one.dead if o <= 1 else None)
-            if o and (before := one.orders[o - 1].growing) is not None:
-                row["least"] = least_length(CROWN_SHAPES.index(one.orders[o - 1].crown), before.conical)
+            if o:
+                row["least"] = least_length(one.orders[o - 1])
             out.append(row)
             if row["next"][LATERAL] >= 0 and row["pipe"] > 0:
                 row["pipe_radius"] = _pipe_radius(row, one.orders[o + 1].thickness.high)
@@ -334,11 +334,13 @@ def flare_rings(number: int) -> NDArray[np.float64]:
 def _pipe_radius(row: np.void, thickest: float) -> float:
     """Radius of a lateral of vigour 1 such that all together have what the taper takes away, in r^p."""
     low, high = row["fraction"][LATERAL]
-    at = low + (high - low) * (np.arange(256) + 0.5) / 256
-    vigour = lengths(row[None], np.zeros(at.shape, np.int64), at)
+    at, weight, fading = low + (high - low) * (np.arange(256) + 0.5) / 256, 1.0, 1.0
+    if row["growing"][LATERAL, NOW] > 0:
+        _, at, weight, fading = spread_children(row, LATERAL)
+    vigour = lengths(row[None], np.zeros(at.shape, np.int64), at) * fading
     lost = 1 - row["taper"][0] ** row["pipe"]
-    number = max(row["count"][LATERAL, 0], 1.0) * (vigour ** row["pipe"]).mean()
-    return min((lost / number) ** (1 / row["pipe"]), 1 / max(thickest, 1e-9))
+    number = max(row["count"][LATERAL, 0], 1.0) * (weight * vigour ** row["pipe"]).mean()
+    return min((lost / max(number, 1e-12)) ** (1 / row["pipe"]), 1 / max(thickest, 1e-9))
 
 
 def without_variation(species: Species) -> Species:

@@ -197,7 +197,8 @@ def may_change(rows: NDArray[np.void], row: NDArray[np.integer], year: NDArray[n
     own = rows["year"][row]
     day = (year[:, 0] - own["origin"]) % DAYS
     most = _DEVIATIONS[-1]
-    new = day < own["appear"] + most * own["appear_spread"] + _FRESH * own["growth"]
+    growing = np.where(own["any_fresh"], _FRESH, 1.0) * own["growth"]
+    new = day < own["appear"] + most * own["appear_spread"] + growing
     old = day > own["turn"] - most * own["turn_spread"] - np.maximum(own["turning"] / 2, -own["fall"])
     return bool((rows["follows"][row] & (new | old)).any())
 

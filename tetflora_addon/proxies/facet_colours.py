@@ -15,21 +15,25 @@ from ..growth.hashing import Draw, signed
 from ..growth.seasons import leaf_stages
 from .hotspots import balanced_colours
 
+OnDay = tuple[Branches, NDArray[np.integer]] | None
+
 
 def leaf_colours_of_facets(
-    flora: Flora, row: NDArray, key: NDArray, leaves: NDArray, outward: NDArray, young: NDArray, on_day: Branches | None
+    flora: Flora, row: NDArray, key: NDArray, leaves: NDArray, outward: NDArray, young: NDArray, on_day: OnDay
 ) -> NDArray[np.float64]:
     """Colours of facets that stand for several leaves (n,) each: a mean varies less than the colour of one leaf.
 
-    ``on_day`` (n) are the branches whose leaves they are, where these may not be as in summer.
+    ``on_day`` are branches, and those (n,) whose leaves they are, where these may not be as in summer.
     """
     several = np.sqrt(np.maximum(leaves, 1))
     deviation = signed(key, Draw.LEAF_COLOUR) / several
     mean = mean_leaf_colours(flora.rows, row, outward, young)
     if on_day is not None:
-        summer, mean = mean, flora.day.own_colours(on_day, flora.rows["leaf_kind"][row], mean)
-        stages = leaf_stages(flora.rows, row, key, on_day.year[:, 0])
-        one = leaf_colours_at(flora.rows, row, summer, stages, on_day.year[:, 1])
+        branches, owner = on_day
+        summer, mean = mean, flora.day.own_colours(branches, flora.rows["leaf_kind"][row], mean, owner)
+        day, hue = (gathered(branches.year[:, i], owner) for i in range(2))
+        stages = leaf_stages(flora.rows, row, key, day)
+        one = leaf_colours_at(flora.rows, row, summer, stages, hue)
         mean = mean + np.where(stages.there, 1.0 / several, 0.0)[:, None] * (one - mean)
     return np.clip(mean + gathered(flora.rows["leaf_colour"][:, 1], row) * deviation[:, None], 0, 1)
 

@@ -253,7 +253,7 @@ def _leaves_of_subplants(
     # Sub-plants beyond the limbs know how far outside they are, which holds for all that grows on them.
     outward = np.where(rows["outward"][subplants.row[owner]], points.outward[pick], subplants.outward[owner])
     many = area / one.clip(1e-300)[owner]
-    day = None if subplants.year is None else subplants.take(owner)
+    day = None if subplants.year is None else (subplants, owner)
     colour = leaf_colours_of_facets(flora, leaf_row, key, many, outward, points.young[pick], day)
     return Facets(
         centre,
@@ -295,7 +295,7 @@ def _leaves_of_pieces(
     places = outwardness(rows, branches, owner, t), youth(rows, row[owner], t)
     many = area / one.clip(1e-300)[owner]
     colour = leaf_colours_of_facets(
-        flora, row[owner], key, many, *places, None if branches.year is None else branches.take(owner)
+        flora, row[owner], key, many, *places, None if branches.year is None else (branches, owner)
     )
     colour = dimmed(colour, owner, weight, once)
     transmission = flora.leaf.transmission[row[owner]]

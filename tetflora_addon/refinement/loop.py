@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..camera.camera import Camera
 from ..camera.silhouette import expected_pixels
 from ..compiled.flora import Flora
+from ..growth.branches import Branches
 from ..growth.seeds import Seeds
 from ..tetrahedra.geometry import squared_edges
 from ..tetrahedra.tree import TetrahedralTree
@@ -40,6 +41,8 @@ SLACK = 2.0
 #: Fragments of polygons, beside two for each polygon, from which on none are cut any more: each goes where most of it
 #: is. Large faces that cross each other's space a thousand times would fill all memory.
 MOST_FRAGMENTS = 200_000
+#: Blocks are so many times as large where no plant has leaves: what is seen through hides little that is worth finding.
+BARE_BLOCK = 1.5
 #: Weight of the pixels of what is divided for its shadow: as often as possible, where it is in view.
 ALWAYS = 1e30
 
@@ -164,6 +167,7 @@ def refine(
     seeds, polygons, placed = strays.others(seeds, polygons, placed)
     filled = bool(np.isfinite(settings.proxy_block))
     plants, assets = SharedPlants(flora, seeds, camera, filled), SharedAssets(placed, camera, filled)
+    settings = _on_day(settings, flora, plants.parts.branches)
     camera = widened_for(camera, settings.margin, flora, plants.parts.branches, polygons, assets.parts)
     slack = _slack(camera, settings.visibility_resolution)
     own = Held.none(Polygons) if polygons is None else in_the_root(polygons, large_polygons(polygons, camera))
@@ -290,6 +294,14 @@ def _slack(camera: Camera, resolution: int) -> Slack:
 def _no_cuts(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """A slack beyond which nothing reaches."""
     return np.full(len(points), np.inf)
+
+
+def _on_day(settings: RefinementSettings, flora: Flora, plants: Branches) -> RefinementSettings:
+    """Settings for plants (n,) with the leaves that they have on a day of the year."""
+    if flora.day is None or not len(plants):
+        return settings
+    share = float(np.minimum(flora.day.leaf_share(plants), 1.0).mean())
+    return replace(settings, block=settings.block * (BARE_BLOCK + share * (1.0 - BARE_BLOCK)))
 
 
 def _split(
