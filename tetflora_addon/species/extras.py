@@ -1,16 +1,18 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reading what a species file says besides orders and leaves: buds, and dead branches."""
+"""Reading what a species file says besides orders and leaves: buds, dead branches, and growth."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
+from .growing import Ages
 from .species import Bud, Dead, Order
 
 BUD_KEYS = ("length", "width", "lateral", "colour")
 DEAD_KEYS = ("number", "from", "into", "on_limbs", "orders")
+AGE_KEYS = ("full", "height", "girth", "lifespan", "decline", "base", "spread", "flowers", "scaled", "source")
 #: Of the wood that has lost its bark, and of bark without life.
 _GREY = [[0.14, 0.122, 0.102], [0.03, 0.027, 0.023]]
 #: Dead branches of a species that only says how many: broken off or bare, with bare twigs.
@@ -83,3 +85,40 @@ def read_dead(reader: Any, data: Any, read_order: Callable[[Any, str, bool], Ord
 def dead_part(dead: Dead, start: float) -> tuple[float, float]:
     """From where to where dead branches are, fractions of an axis that is bare up to a fraction of it."""
     return dead.low * start, start + dead.high * (1 - start)
+
+
+def read_ages(reader: Any, data: Any) -> Ages | None:
+    """The key ``age`` of a species; None where there is none.
+
+    Raises
+    ------
+    SpeciesError
+        Names the field and what it may be.
+    """
+    if data is None:
+        return None
+    reader.keys(data, "age", AGE_KEYS)
+    if "full" not in data:
+        raise reader.fail("age.full", "missing; add this key")
+
+    def number(key: str, low: float, high: float) -> float:
+        return reader.number(data.get(key, getattr(Ages, key, None)), f"age.{key}", low, high)
+
+    def curve(key: str) -> tuple[float, float]:
+        value = data.get(key, list(getattr(Ages, key)))
+        if not isinstance(value, list) or len(value) != 2:
+            raise reader.fail(f"age.{key}", "must be [rate, power]")
+        return reader.number(value[0], f"age.{key}[0]", 0.0001, 10), reader.number(value[1], f"age.{key}[1]", 0.2, 5)
+
+    return Ages(
+        full=number("full", 0.1, 5000),
+        height=curve("height"),
+        girth=curve("girth"),
+        lifespan=number("lifespan", 0.2, 20000),
+        decline=number("decline", 0.05, 0.99),
+        base=number("base", 1, 10),
+        spread=number("spread", 0.2, 2),
+        flowers=number("flowers", 0, 5000),
+        scaled=reader.truth(data.get("scaled", False), "age.scaled"),
+        source=reader.text(data.get("source", ""), "age.source", least=0),
+    )

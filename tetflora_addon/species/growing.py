@@ -87,6 +87,8 @@ class Nodes(NamedTuple):
         Where the topmost are now, as a fraction of the present length;
     kept : float
         and of those, from the lowest up, the fraction that is left.
+    extra, fresh : float
+        For each node so many more that live only for a while: on the topmost fraction of the others.
     """
 
     whole: float
@@ -96,6 +98,8 @@ class Nodes(NamedTuple):
     power: float = 1.0
     until: float = 1.0
     kept: float = 1.0
+    extra: float = 0.0
+    fresh: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -150,3 +154,41 @@ def place_at(
     above = begin + (end - begin) * node / np.maximum(whole, 1e-9)
     part = np.clip(1 + node / np.maximum(below, 1e-9), 0, 1)
     return np.where(node >= 0, above, begin * part ** (1 / np.asarray(power)))
+
+
+FADING = 0.25
+"""Lowest part of the children that live for a while in which they grow shorter before they go."""
+_EVEN = (np.arange(256) + 0.5) / 256
+
+
+def some_nodes(ends: ArrayLike, extra: float) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Places of children in nodes, as many as stand for all.
+
+    Parameters
+    ----------
+    ends : (3,) float64
+        Where nodes begin, where those begin that live for a while, and where all end.
+    extra : float
+        As of `Nodes`.
+
+    Returns
+    -------
+    node : (512,) float64
+    weight : (512,) float64
+        How many children each stands for, 1 on the mean.
+    fading : (512,) float64
+        Factor on their lengths.
+    """
+    base, some, tip = ends
+    weight = np.array([tip - base, extra * (tip - some)])
+    node = np.concatenate([base + (tip - base) * _EVEN, some + (tip - some) * _EVEN])
+    fading = np.concatenate([np.ones(len(_EVEN)), np.clip(_EVEN / FADING, 0, 1)])
+    return node, np.repeat(weight / max(weight.mean(), 1e-12), len(_EVEN)), fading
+
+
+def shortened(
+    fraction: NDArray[np.float64], conical: ArrayLike, low: ArrayLike, high: ArrayLike
+) -> NDArray[np.float64]:
+    """Factor (...) on the lengths of laterals at fractions (...) of them, see `Growing`: ``conical`` and ``ramps``."""
+    new = np.clip((1 - fraction) / np.maximum(high, 1e-9), 0, 1)
+    return (1 - conical * fraction) * np.clip(fraction / np.maximum(low, 1e-9), 0, 1) * new

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..leaves.models import LeafModel
 from .extras import dead_part
+from .growing import node_at, place_at, shortened, some_nodes
 from .species import CROWN_SHAPES, LEAF_KINDS, Dead, Order, Range, Species, crown_ratio, fork_cuts, whole_cuts
 
 _FRACTIONS = (np.arange(256) + 0.5) / 256
@@ -63,14 +64,44 @@ def expected_members(species: Species) -> Members:
         if species.dead is not None and species.form is None and i <= 1:
             dead += full * _dead_on(species.dead, order, i, cuts, fold)
         if i + 1 < len(species.orders):
-            start = order.branch_start.mean
-            stems_there = fold[np.searchsorted(cuts[1:-1], start + (1 - start) * _FRACTIONS, side="right")]
-            vigour = crown_ratio(np.full(_FRACTIONS.shape, CROWN_SHAPES.index(order.crown)), 1 - _FRACTIONS)
+            at, vigour, weight = _laterals(order)
+            stems_there = weight * fold[np.searchsorted(cuts[1:-1], at, side="right")]
             follow = 1 - species.orders[i + 1].count_by_length * (1 - vigour)
+            if order.growing is not None:
+                follow = follow * np.clip(vigour / least_length(order), 0, 1)
             number = full * order.branches.mean * float(stems_there.mean())
             full = full * order.branches.mean * float((stems_there * follow).mean())
     on_spur = species.spur.leaves.mean if species.spur is not None else 0.0
     return Members(branches, stems, segments, leaves, spurs, spurs * on_spur, tuple(dead))
+
+
+def _laterals(order: Order) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | float]:
+    """Places (n,) of laterals on a branch of an order, length ratios (n,), and how many each stands for (n,)."""
+    start, fraction, shorter, weight = order.branch_start.mean, _FRACTIONS, 1.0, 1.0
+    at = start + (1 - start) * fraction
+    own = order.growing
+    if own is not None and order.branches.mean > 0:
+        nodes, number = own.laterals, order.branches.mean
+        law = nodes.begin, nodes.end, nodes.power, nodes.whole * number, nodes.below * number
+        base, tip = node_at(np.array([start, nodes.until]) * own.now, *law)
+        tip = base + nodes.kept * (tip - base)
+        node, weight, fading = some_nodes((base, tip - nodes.fresh * (tip - base), tip), nodes.extra)
+        at = np.clip(place_at(node, *law) / own.now, 0, 1)
+        fraction = nodes.kept * (node - base) / max(tip - base, 1e-9)
+        shorter = fading * shortened(fraction, own.conical, *own.ramps)
+    return at, shorter * _ratios(order, fraction), weight
+
+
+def _ratios(order: Order, fraction: NDArray[np.float64]) -> NDArray[np.float64]:
+    return crown_ratio(np.full(fraction.shape, CROWN_SHAPES.index(order.crown)), 1 - fraction)
+
+
+def least_length(order: Order) -> float:
+    """Shortest length ratio of laterals of an order that is still growing, but for new ones; 0 if it is full-grown."""
+    if order.growing is None:
+        return 0.0
+    fraction = np.linspace(0, 1, 65)
+    return float((_ratios(order, fraction) * (1 - order.growing.conical * fraction)).min())
 
 
 def expected_forks(forks: Range, power: float = 1.0) -> float:

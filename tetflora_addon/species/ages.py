@@ -1,0 +1,391 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Age: the same species as a seedling, a sapling, old, dying or dead.
+
+A young tree is no small old one. Its trunk is slender and its limbs set out near the ground; twigs and leaves are
+nearly as large as they will be, there are fewer of them, and what is no longer than a twig bears leaves itself. Limbs
+stay where they are while the trunk grows above them, until they die at the crown's base. In old age twigs go from the
+ends of branches inwards; a dead tree loses them from the thinnest to the thickest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from .extras import dead_part
+from .growing import Ages, Growing, Nodes, node_at
+from .habit import with_habit
+from .members import expected_members
+from .skeletons import Skeleton
+from .species import Colour, Dead, Order, Range, Species
+
+STAGES = ("seedling", "sapling", "mature", "old", "dying", "dead")
+#: Below a crown, nodes grow as this power of the height; with forks, there are so many more of them.
+_POWER, _MORE = 0.4, 1.5
+#: A bare part longer than this is the stem of a palm, whose crown is as long at any age.
+_ROSETTE = 0.9
+#: Powers by which limbs and twigs of a plant without branches between them, and twigs of others, follow the limbs.
+_TWIGS = 0.25
+#: Longest branches in lengths of their parents, where the description has shorter ones; sharpness of that limit.
+_LONGEST, _SHARP = 0.6, 4.0
+#: Girth follows length as this power; radius of the thinnest tips, metres.
+_STOUT, _TIP = 1.15, 0.0012
+_SHORTER_TOP = 0.55
+#: Branches that live for a while, for each of the others, at most; steps in which their number is found.
+_EXTRA, _STEPS = 4.0, 14
+#: Of the length of a leafy twig: what is longer than so many bears no leaves itself.
+_LEAFY = 4.0
+#: A leaf is at most this fraction of the plant's height, and a seedling has so many.
+_LEAF, _FIRST = 1 / 3, 4.0
+#: Nodes over which branches grow, and within which change of length those of full-grown plants come to be.
+_RAMP, _NEAR = 1.5, 0.1
+#: What is left of twigs and boughs at death, and years until they have fallen: twigs, boughs, limbs.
+_LEFT, _FALLEN = (0.3, 0.6, 1.0), (4.0, 12.0, 45.0)
+_GREY = (0.14, 0.122, 0.102)
+_GREYING = 4.0
+
+
+def ages_of(species: Species) -> Ages:
+    """How a species grows; without a description, as plants of its size do."""
+    if species.ages is not None:
+        return species.ages
+    stem = _stem(species)
+    height = float(np.prod([order.length.mean for order in species.orders[: stem + 1]]))
+    if height < 1.5 or len(species.orders) < 3 or species.form is not None:
+        full = 1.0 if height < 1.5 else 3.0 * height
+        return Ages(full, (3.0 / full, 1.3), (3.0 / full, 1.6), lifespan=np.inf, scaled=True)
+    full = 10.0 + 2.0 * height
+    rate = 1.6 / full
+    return Ages(full, (rate, 1.3), (0.7 * rate, 1.5), lifespan=6.0 * full, flowers=0.3 * full)
+
+
+def stage(species: Species, years: float) -> str:
+    """One of `STAGES`; 0 years stand for a plant as described."""
+    ages = ages_of(species)
+    if years <= 0:
+        return "mature"
+    declined = ages.declined(years)
+    if declined > 0:
+        return "dead" if declined >= 1 else "dying" if declined > 0.5 else "old"
+    height = ages.heights(years)
+    return "seedling" if height < 0.06 else "sapling" if height < 0.55 else "mature"
+
+
+@lru_cache(maxsize=256)
+def with_age(species: Species, years: float) -> Species:
+    """A species as its plants are at an age.
+
+    Parameters
+    ----------
+    species : Species
+        As described; its habit is applied.
+    years : float
+        0, or the age at which it is as described, returns the species itself.
+
+    Returns
+    -------
+    Species
+        Of orders, short shoots and dead branches, lengths, thicknesses and numbers differ, and where they are.
+    """
+    ages = ages_of(species)
+    if years <= 0 or years == ages.full or (ages.scaled and years >= ages.full):
+        return species
+    species = replace(with_habit(species, species.habit), habit=0.0)
+    if ages.scaled or species.form is not None:
+        return _scaled(species, min(ages.heights(years), 1.0))
+    return _Aged(species, ages, years).species()
+
+
+def _scaled(species: Species, factor: float) -> Species:
+    """A species of another size and the same form."""
+    trunk, *rest = species.orders
+    orders = (replace(trunk, length=_times(trunk.length, factor)), *rest)
+    orders = tuple(replace(order, leaf_size=_times(order.leaf_size, factor)) for order in orders)
+    spur, bud, form = species.spur, species.bud, species.form
+    if spur is not None:
+        spur = replace(spur, length=_times(spur.length, factor), leaf_size=_times(spur.leaf_size, factor))
+    if bud is not None:
+        bud = replace(bud, length=factor * bud.length)
+    if form is not None:
+        form = Skeleton(factor * form.points, factor * form.radius, form.parent, form.line)
+    return replace(species, orders=orders, spur=spur, bud=bud, form=form)
+
+
+def _stem(species: Species) -> int:
+    """Number of the order that stands upright: 1 for shrubs, whose stems grow from a stool."""
+    first, *rest = species.orders
+    return int(bool(rest) and first.length.mean < 1.0 and rest[0].length.mean > 2.0)
+
+
+def _times(value: Range, factor: float) -> Range:
+    return Range(factor * value.mean, factor * value.variation)
+
+
+class _Aged:
+    """One species at one age, which is not that of its description.
+
+    Attributes
+    ----------
+    stem, last : int
+        Order of the stem, and of the twigs.
+    whole : list of float
+        Typical lengths when full-grown, metres, by order.
+    now, before : list of float
+        Lengths over those, now and a year ago.
+    stout : list of float
+        Radii over those when full-grown.
+    fresh : float
+        Fraction of the branches on which there are more that live for a while.
+    """
+
+    def __init__(self, species: Species, ages: Ages, years: float) -> None:
+        self.one, self.ages, self.years = species, ages, years
+        self.stem, self.last = _stem(species), len(species.orders) - 1
+        self.whole = np.cumprod([order.length.mean for order in species.orders]).tolist()
+        self.now, self.before = (self._lengths(max(year, 1e-3)) for year in (years, years - 1))
+        girth = ages.girths(years)
+        self.stout = [girth if o == self.stem else now**_STOUT for o, now in enumerate(self.now)]
+        self.youth = float(np.clip((1 - self.now[self.stem]) / 0.5, 0, 1))
+        self.declined = ages.declined(years)
+        self.dead = max(years - ages.lifespan, 0.0)
+        self.fresh = 0.0
+        self.rosette = self._starts(species.orders[self.stem]) > _ROSETTE
+
+    @staticmethod
+    def _starts(order: Order) -> float:
+        return order.branch_start.mean
+
+    def _lengths(self, years: float) -> list[float]:
+        """Lengths by order over those when full-grown."""
+        height, limbs = self.ages.heights(years), self.ages.girths(years) ** self.ages.spread
+        limbs = float(np.clip(limbs, 0.45 * height, 1.4 * height**0.8))
+        out = [height**0.5] * self.stem + [height]
+        for o in range(self.stem + 1, self.last + 1):
+            steps = self.last - self.stem - 1
+            power = 1 - (1 - _TWIGS) * (o - self.stem - 1) / steps if steps else _TWIGS
+            ratio = self.one.orders[o].length.mean
+            longest = 1e9 if self._starts(self.one.orders[self.stem]) > _ROSETTE else max(_LONGEST, 1.15 * ratio)
+            out.append(_least(limbs**power, longest / ratio * out[o - 1], longest / ratio))
+        return out
+
+    def species(self) -> Species:
+        """The species at that age."""
+        out = self._made()
+        if self.now[self.stem] >= 1 or self.stem + 1 >= self.last or self.dead:
+            return out
+        # As many leaves above each square metre of ground as when full-grown: young trees have more branches on a
+        # metre than will stay (leaf areas of McPherson, van Doorn and Peper, 2016).
+        wanted = _leaf_area(self.one) * self.now[self.stem + 1] ** 2 * self.leafless
+        low, high = 0.0, 1.0
+        for _ in range(_STEPS):
+            self.fresh = (low + high) / 2
+            low, high = (low, self.fresh) if _leaf_area(self._made()) > wanted else (self.fresh, high)
+        return self._made()
+
+    def _made(self) -> Species:
+        one = self.one
+        orders = tuple(self._order(o) for o in range(len(one.orders)))
+        spur, dead = one.spur, one.dead
+        if spur is not None:
+            size = min(1.0, _LEAF * self.height / max(spur.length.high, 1e-9))
+            spur = self._barked(replace(spur, length=_times(spur.length, size), leaf_size=self._leaf(spur)))
+        if dead is not None:
+            number, on_limbs = (self._dead_nodes(o)[0] for o in range(2))
+            dead = replace(self._dead(), number=_times(dead.number, number), on_limbs=_times(dead.on_limbs, on_limbs))
+        bud = None if self.dead else one.bud
+        return replace(one, orders=orders, spur=spur, dead=dead, bud=bud)
+
+    @property
+    def height(self) -> float:
+        """Metres."""
+        return self.now[self.stem] * self.whole[self.stem]
+
+    @property
+    def leafless(self) -> float:
+        """Factor on the number of leaves."""
+        ages = self.ages
+        dying = np.clip((ages.lifespan - self.years) / (0.03 * ages.lifespan), 0, 1)
+        return float((1 - 0.4 * self.declined) * dying)
+
+    def _order(self, o: int) -> Order:
+        order, now = self.one.orders[o], self.now[o]
+        stool, size = o < self.stem, 1.0 if o < self.stem else now
+        numbers, nodes = zip(*self._sorts(o), strict=True)
+        conical = 0.0 if order.crown == "conical" or o != self.stem else _SHORTER_TOP * float(np.clip(1 - now, 0, 1))
+        ramp = min(_RAMP / max(order.branches.mean * numbers[0], 1e-9), 0.35) * min(abs(size - 1) / _NEAR, 1)
+        settled = 1.0 if o <= self.stem else float(np.clip(1 - abs(now - 1) / _NEAR, 0, 1))
+        changes: dict[str, Any] = {
+            "length": _times(order.length, now if o == 0 else now / self.now[o - 1]),
+            "thickness": self._thickness(o),
+            "growing": Growing(size, settled, *nodes, conical, (ramp, ramp)),
+            "branches": _times(order.branches, numbers[0]),
+            "spurs": _times(order.spurs, numbers[1]),
+        }
+        for name in ("branch_start", "spur_start"):
+            start = getattr(order, name)
+            mean = min(self._bare(o, start.mean) / size, 0.99)
+            variation = start.variation * mean / start.mean if start.mean > 0 else 0.0
+            changes[name] = Range(mean, min(variation, mean, 0.99 - mean))
+        if not stool:
+            changes |= self._leaves(o)
+            changes["taper"] = self._taper(order, self._radius(o))
+            changes["flare"] = order.flare * min(self.stout[o], 1.0) ** 0.5
+        if o > self.stem:
+            old = min(now, 1.0)
+            lean = 0.55 + 0.45 * old
+            changes["angle"] = Range(
+                order.angle_tip + (order.angle.mean - order.angle_tip) * lean, order.angle.variation
+            )
+            if order.attraction.mean < 0:
+                changes["attraction"] = _times(order.attraction, 0.2 + 0.8 * old)
+        return self._barked(replace(order, **changes))
+
+    def _bare(self, o: int, start: float) -> float:
+        """Where the crown of an axis begins, in lengths of the full-grown one."""
+        now = self.now[o]
+        if o < self.stem:
+            return start
+        if o > self.stem:
+            return start * now
+        if start > _ROSETTE:
+            return max(now - (1 - start) * now**0.2, 0.2 * start * now)
+        return start * now**self.ages.base
+
+    def _sorts(self, o: int) -> list[tuple[float, Nodes]]:
+        """Laterals, short shoots and dead branches of an order: factor on their number, and where they are."""
+        order, now = self.one.orders[o], self.now[o]
+        # Branches grow from the shoots of the years before.
+        until = 1 - (1 - self.before[o] / now) * self.youth if o >= self.stem else 0.3 + 0.7 * min(now, 1.0)
+        more = _MORE if o == self.stem and order.forks.high > 0 else 1.0
+        flowers = float(np.clip((self.years / max(self.ages.flowers, 1e-9) - 0.7) / 0.6, 0, 1))
+        if self.one.spur is not None and self.one.spur.leaf_kind == "leaf":
+            flowers = 1.0
+        extra = _EXTRA if self.stem <= o < self.last and order.branch_start.mean < _ROSETTE else 0.0
+        laterals = self._nodes(o, order.branch_start.mean, more, until, self._kept(o), 1.0, extra, self.fresh)
+        spurs = self._nodes(o, order.spur_start.mean, 1.0, 1.0, factor=0.0 if self.dead else flowers)
+        return [laterals, spurs, self._dead_nodes(o)]
+
+    def _nodes(
+        self,
+        o: int,
+        start: float,
+        more: float,
+        until: float,
+        kept: float = 1.0,
+        factor: float = 1.0,
+        extra: float = 0.0,
+        fresh: float = 0.0,
+    ) -> tuple[float, Nodes]:
+        """Factor on a number of children, and their nodes; with so many more of them below the crown."""
+        start, now = min(start, 0.99), 1.0 if o < self.stem else self.now[o]
+        power = 1.0 if start > _ROSETTE else _POWER
+        law = start, 1.0, power, 1.0, more * start / ((1 - start) * power)
+        first, top = (float(node_at(place, *law)) for place in (self._bare(o, start), until * now))
+        number = kept * (top - first) * (1 + extra * fresh)
+        if number <= 0:
+            return 0.0, Nodes(0.0, 0.0, start)
+        return factor * number, Nodes(1 / number, law[-1] / number, start, 1.0, power, until, kept, extra, fresh)
+
+    def _kept(self, o: int) -> float:
+        """Fraction of the laterals of an order that age has left."""
+        tier = min(self.last - 1 - o, 2)
+        if tier < 0 or (tier < 2 and o <= self.stem and not self.dead):
+            return 1.0
+        if o <= self.stem:
+            tier = 2
+        left = 1 - self.declined * (1 - _LEFT[tier])
+        return left * max(1 - self.dead / _FALLEN[tier], 0.0)
+
+    def _thickness(self, o: int) -> Range:
+        order = self.one.orders[o]
+        if o == 0:
+            factor = self.stout[0] / self.now[0]
+        else:
+            before = self.one.orders[o - 1]
+            factor = self.stout[o] / self.stout[o - 1]
+            if before.pipe > 0:
+                factor *= max(self._sorts(o - 1)[0][0], 1e-3) ** (1 / max(before.pipe, 1.0))
+        return _times(order.thickness, min(factor, 0.95 / order.thickness.high))
+
+    def _radius(self, o: int) -> float:
+        """Typical radius at the base, metres."""
+        radius = self.whole[0]
+        for order in self.one.orders[: o + 1]:
+            radius *= order.thickness.mean
+        return radius * self.stout[o]
+
+    @staticmethod
+    def _taper(order: Order, radius: float) -> Range:
+        mean = max(order.taper.mean, min(0.5, _TIP / max(radius, 1e-9)))
+        return Range(mean, min(order.taper.variation, mean, 1 - mean))
+
+    def _leaf(self, order: Order) -> Range:
+        largest = order.leaf_size.high * max(order.leaf_size_tip, 1.0) * max(order.leaf_size_young, 1.0)
+        return _times(order.leaf_size, min(1.0, _LEAF * self.height / largest))
+
+    def _leaves(self, o: int) -> dict[str, Any]:
+        """Leaves of an order: as many on a metre; on what is as short as a twig, as many as on twigs."""
+        order, now = self.one.orders[o], self.now[o]
+        own = order.leaves.mean * now * self.leafless
+        changes = {"leaves": _times(order.leaves, now * self.leafless), "leaf_size": self._leaf(order)}
+        bearers = [p for p in range(o + 1, self.last + 1) if self.one.orders[p].leaves.high > 0]
+        twig = self.one.orders[bearers[-1]] if bearers else order
+        if not bearers or twig.leaf_envelope != "none":
+            return changes
+        long = self.whole[bearers[-1]]
+        ratios = np.array([now, 1.0]) * self.whole[o] / long
+        fade, full = np.clip(1 - np.log(np.maximum(ratios, 1e-9)) / np.log(_LEAFY), 0, 1).tolist()
+        start = twig.leaf_start.mean
+        if o == self.stem:
+            start = max(start, self.before[o] / now)  # of a trunk the shoot of this year
+        number = twig.leaves.mean * self.whole[o] * now / long * (1 - start) * max(fade - full, 0.0)
+        number = self.leafless * max(number, _FIRST * fade * (o == self.stem))
+        if number <= own:
+            return changes
+        taken = {name: getattr(twig, name) for name in vars(order) if name.startswith("leaf")}
+        return {
+            **taken,
+            "leaves": Range(number, number * twig.leaves.variation / twig.leaves.mean),
+            "leaf_start": Range(min(start, 0.98)),
+            "leaf_size": self._leaf(twig),
+        }
+
+    def _barked(self, order: Order) -> Order:
+        """Grey in death, and without flowers."""
+        if not self.dead:
+            return order
+        grey = min(self.dead / _GREYING, 1.0)
+        mean, variation = order.branch_colour
+        mixed = tuple((1 - grey) * c + grey * g for c, g in zip(mean, _GREY, strict=True))
+        return replace(order, branch_colour=Colour(mixed, variation), leaves=Range(0.0))
+
+    def _dead_nodes(self, o: int) -> tuple[float, Nodes]:
+        dead = self.one.dead
+        if dead is None or o > 1:
+            return 0.0, Nodes(0.0, 0.0, 0.0)
+        start, now = self.one.orders[o].branch_start.mean, 1.0 if o < self.stem else self.now[o]
+        begin, end = dead_part(dead, start)
+        law = begin, end, 1.0, 1.0, begin / (end - begin)
+        ends = np.array(dead_part(self._dead(), min(self._bare(o, start) / now, 0.99))) * now
+        number = float(np.diff(node_at(ends, *law))[0])
+        return number, Nodes(1 / number, law[-1] / number, begin, end)
+
+    def _dead(self) -> Dead:
+        """Dead branches, which reach farther up, and farther out on limbs, as the plant declines."""
+        dead = self.one.dead
+        return replace(dead, high=dead.high + self.declined * max(0.9 - dead.high, 0.0))
+
+
+def _leaf_area(species: Species) -> float:
+    """Expected area of the leaves of a plant, in that of a leaf of unit length."""
+    leaves = expected_members(species).leaves
+    return sum(n * order.leaf_size.mean**2 for n, order in zip(leaves, species.orders, strict=True))
+
+
+def _least(a: float, b: float, full: float) -> float:
+    """The smaller of two, rounded off; 1 where a is 1 and b is ``full``."""
+    return ((a**-_SHARP + b**-_SHARP) / (1 + full**-_SHARP)) ** (-1 / _SHARP)
