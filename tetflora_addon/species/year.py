@@ -20,6 +20,8 @@ MAX_AUTUMN = 4
 #: phenological seasons in Germany", 2001, and others).
 _SPRING_DAYS, _AUTUMN_DAYS = 4.0, 2.0
 _MIDSUMMER, _MIDWINTER = 190.0, 10.0
+#: No leaf is farther from the mean than so many standard deviations.
+_FARTHEST = 2.8
 LEAF_YEAR_KEYS = (
     "appear", "appear_spread", "growth", "fresh", "turn", "turn_spread", "turning", "autumn", "fall", "fall_spread",
     "dry", "kept", "turnover",
@@ -113,8 +115,14 @@ class Year:
 
 
 def _moved(one: LeafYear, north: float) -> LeafYear:
-    """Dates so many degrees farther north: those before midsummer later, those after it earlier, and never swapped."""
+    """Dates so many degrees farther north: those before midsummer later, those after it earlier, and never swapped.
+
+    Where the year of the leaves would close, far in the south, the first and the last of them stay apart.
+    """
     appear, turn, fall = (day + _days_north(day) * north for day in (one.appear, one.turn, one.fall))
+    longest = DAYS - _FARTHEST * (one.appear_spread + one.turn_spread + one.fall_spread)
+    over = max(0.0, fall - appear - max(longest, one.fall - one.appear)) / 2
+    appear, turn, fall = appear + over, turn - over, fall - over
     turn = max(turn, appear + one.growth)
     return replace(one, appear=appear, turn=turn, fall=max(fall, turn + one.turning / 2))
 
