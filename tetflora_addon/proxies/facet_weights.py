@@ -110,11 +110,12 @@ def _with_share(
     if share is None or len(tables) == 1:
         return _between(tables[0], row, count)
     out, shares = _between(tables[0], row, count), np.array(SHARES)
-    low = np.clip(np.searchsorted(-shares, -share), 1, len(SHARES) - 1)
+    # Parts that bear little besides cones or blossoms may have fewer leaves than any plant has.
+    low = np.clip(np.searchsorted(-shares, -share), 1, len(tables) - 1)
     for node in np.unique(low[share < 1.0]).tolist():
         some = np.flatnonzero((low == node) & (share < 1.0))
         less, more = (1.0 / _between(tables[i], row[some], count[some]) for i in (node, node - 1))
-        place = (share[some] - shares[node]) / (shares[node - 1] - shares[node])
+        place = np.maximum(share[some] - shares[node], 0.0) / (shares[node - 1] - shares[node])
         out[some] = 1.0 / (less + place * (more - less))
     return out
 
