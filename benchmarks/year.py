@@ -9,8 +9,8 @@
 
 Pictures and records are left in ``out/year``. Without ``--keep`` a part begins anew.
 
-Reduced, since expanded plants take a processor long: the year of a wood is 320 × 180 pixels with 16 samples and 36
-plants of 14 to 38 years, the life of a birch 200 × 280 with 24; plants whose facets are compared are 12, 50 and 200
+Reduced, since expanded plants take a processor long: the year of a wood is 320 × 180 pixels with 16 samples and 32
+plants of 6 to 16 years, the life of a birch 200 × 280 with 24; plants whose facets are compared are 12, 50 and 200
 pixels high. Frames whose meshes are those of the frame before, to the bit, are that frame's picture.
 """
 

@@ -18,7 +18,7 @@ from devtools import session
 from tetflora_addon.blender.job import refine
 from tetflora_addon.compiled.flora import Flora, _compiled
 from tetflora_addon.growth.seasons import Season
-from tetflora_addon.species import catalogue
+from tetflora_addon.species import ages, catalogue
 
 from .year_scene import MIX, digest, set_day, wood
 
@@ -71,8 +71,6 @@ def refining(quick: bool, until: float = float("inf")) -> dict[str, float] | Non
 
 def compiling(quick: bool) -> dict[str, float]:
     """Seconds of compiling and the memory of tables, with a day and without, and at ages; worst of all species."""
-    from tetflora_addon.species import ages
-
     repeats = 3 if quick else 7
     figures: dict[str, float] = {}
     names = tuple(MIX) if quick else tuple(catalogue.list_species())

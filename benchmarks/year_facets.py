@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from devtools import session
 from examples import stands
 from tetflora_addon.compiled.crowns import crown_of
-from tetflora_addon.species import catalogue
+from tetflora_addon.species import ages, catalogue
 
 from .compare import read_picture, render
 from .fidelity_frames import LEAST_COVERAGE
@@ -105,8 +105,6 @@ def run(
 
 def row(scene: bpy.types.Scene, species: str) -> None:
     """Fill an empty scene with plants of all ages side by side, each as high as the others."""
-    from tetflora_addon.species import ages
-
     loaded = catalogue.load_species(species)
     crowns = [crown_of(ages.with_age(loaded, age) if age else loaded) for age in AGES]
     slot = _HEIGHT * max(0.85, max(2.3 * crown.radius / crown.height for crown in crowns))

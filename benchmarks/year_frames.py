@@ -30,8 +30,8 @@ from .row80 import timed_refine
 from .year_scene import digest, lone, set_day, wood
 
 KINDS = ("refined", "expanded")
-#: The wood's plants, and their ages: fully expanded, a wood of old trees takes more memory than there is.
-PLANTS, AGES = 36, (14.0, 38.0)
+#: The wood's plants, and their ages: fully expanded, old trees are a million polygons each.
+PLANTS, AGES = 32, (6.0, 16.0)
 WOOD_SIZE, BIRCH_SIZE = (320, 180), (200, 280)
 WOOD_SAMPLES, BIRCH_SAMPLES = 16, 24
 #: Height that the birch's camera sees, metres.

@@ -17,7 +17,7 @@ from tetflora_addon.growth.hashing import uniform
 #: Species of the wood with their relative numbers: two that turn yellow, one that turns brown, one evergreen, a shrub.
 MIX = {"birch": 0.3, "beech": 0.2, "oak": 0.2, "spruce": 0.15, "hazel": 0.15}
 #: Ground for each plant, m², nearest distance to the eye and height of the eye, metres; horizontal field of view.
-_ROOM, _NEAREST, _EYE, _VIEW = 22.0, 10.0, 1.7, radians(54.0)
+_ROOM, _NEAREST, _EYE, _VIEW = 14.0, 7.0, 1.7, radians(54.0)
 _ELEVATION, _AZIMUTH = 35.0, -60.0
 
 
