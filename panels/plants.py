@@ -44,7 +44,9 @@ class TETFLORA_PT_plants(SidebarPanel, bpy.types.Panel):
             if plant.species not in catalogue():
                 column.label(text=f'"{name_of(plant.species)}" is not in the catalog', icon='ERROR')
             draw_properties(column, plant, "seed", "enabled", "form", "age")
-            draw_below(column, stage_text(context.scene, plant.species, plant.age))
+            stage = stage_text(context.scene, plant.species, plant.age)
+            if stage:
+                draw_below(column, stage)
         elif active is not None and active.tetflora.is_field:
             _draw_field(column, active)
         else:

@@ -15,6 +15,7 @@ from bpy.props import (
 
 from . import settings
 from .placing import properties
+from .placing.plant_objects import show_age
 from .results import output_properties
 from .results.forms import form_property
 from .runtime import Listeners
@@ -44,7 +45,8 @@ _FORM = {
 _OVERRIDES = {'LIBRARY_OVERRIDABLE'}
 
 
-def _show_again(_self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+def _on_age(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    show_age(self.id_data)
     state.listeners.notify()
 
 
@@ -78,7 +80,7 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
         override=_OVERRIDES,
     )
     form: PointerProperty(**_FORM, override=_OVERRIDES)
-    age: FloatProperty(**AGE_PROPERTY, override=_OVERRIDES, update=_show_again)
+    age: FloatProperty(**AGE_PROPERTY, override=_OVERRIDES, update=_on_age)
     is_field: BoolProperty(
         name="Field of Plants",
         description=(

@@ -23,6 +23,7 @@ from tests.blender.scenes import add_camera, add_plant
 from tetflora_addon.blender import preferences, properties, translations
 from tetflora_addon.blender.scene.ages import FULL_GROWN
 from tetflora_addon.blender.settings import MONTHS
+from tetflora_addon.species.ages import STAGES
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -176,7 +177,7 @@ def _texts():
         found.add(getattr(getattr(bpy.ops, group), name).get_rna_type().name)
     seasons = bpy.ops.tetflora.set_season.get_rna_type().properties["season"]
     found |= {item.name for item in seasons.enum_items}
-    found |= {FULL_GROWN, *MONTHS}
+    found |= {FULL_GROWN, *MONTHS, *(stage.capitalize() for stage in STAGES)}
     for path in (build.ROOT / "panels").glob("*.py"):
         found |= {n.value for n in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(n, ast.Constant)}
     return found

@@ -17,7 +17,7 @@ from tests.blender.scene.test_wind import places
 from tests.blender.scenes import add_camera, add_plant, depsgraph
 from tetflora_addon import errors
 from tetflora_addon.blender import settings
-from tetflora_addon.blender.job import contents, frame_cache, plant_mesh, refine, render
+from tetflora_addon.blender.job import contents, forecast, frame_cache, plant_mesh, refine, render
 from tetflora_addon.blender.results.output import result_collections
 from tetflora_addon.blender.species import edits
 from tetflora_addon.blender.viewport import auto, levels
@@ -70,6 +70,18 @@ def test_winter_is_bare_in_all_that_is_made(scene):
 
     for bare, full in zip(made(WINTER), made(SUMMER), strict=True):
         assert bare < 0.7 * full
+
+
+def test_estimates_follow_the_day(scene):
+    def expected(day):
+        scene.tetflora.year.day = day
+        forecast._counted.stand = None
+        return float(forecast._stand_of(scene, bpy.context.view_layer).polygons[0])
+
+    bare, full = expected(WINTER), expected(SUMMER)
+    assert bare / full == pytest.approx(on(scene, WINTER) / on(scene, SUMMER), abs=0.15)
+    scene.tetflora.year.latitude = -50.0
+    assert expected(WINTER) == pytest.approx(full, rel=0.01)
 
 
 def test_previews_have_the_colors_of_the_day(scene):

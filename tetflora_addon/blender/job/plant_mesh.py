@@ -25,7 +25,7 @@ from ..results.meshes import write_mesh
 from ..results.output import remove_made
 from ..runtime import JobData, guarded, is_there
 from ..scene.ages import classed
-from ..scene.own_ages import ages_of
+from ..scene.own_ages import stored_ages
 from ..scene.skeletons import kind_of
 from ..worker import call_in_thread
 from .contents import compile_for, expected_polygons, in_year
@@ -138,7 +138,7 @@ def _make_plant_mesh_steps(
     for plant, good in zip(plants, sound, strict=True):
         if not good:
             raise SceneError(f'"{plant.name}": zero scale or an invalid position; clear them with Alt S and Alt G')
-    ages = ages_of(plants)
+    ages = stored_ages(plants)
     seeds = [single_seed(kind_of(p), p.tetflora.seed, f) for p, f in zip(plants, frame, strict=True)]
     each = [None] * len(plants) if ages is None else ages.reshape(-1, 1)
     seeds = [aged for _, aged in classed(scene, [("", s, age) for s, age in zip(seeds, each, strict=True)])]

@@ -21,7 +21,7 @@ from ..attributes import world_matrix
 from ..scene.ages import crown_kinds
 from ..scene.crowns import crown_for
 from ..scene.fields import field_kinds, fields_of, read_aged_field
-from ..scene.own_ages import ages_of
+from ..scene.own_ages import stored_ages
 from ..scene.skeletons import species_of
 from ..worker import at_once
 
@@ -52,7 +52,7 @@ def canopy_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[C
     names = list(dict.fromkeys(o.tetflora.species for o in single))
     index = np.array([names.index(o.tetflora.species) for o in single], dtype=np.int32)
     scale = np.cbrt(np.abs(np.linalg.det(places[:, :3, :3])))
-    parts = [(places[:, :3, 3], scale, *crown_kinds(scene, names, index, ages_of(single)))]
+    parts = [(places[:, :3, 3], scale, *crown_kinds(scene, names, index, stored_ages(single)))]
     for field in fields_of(objects):
         read, ages = read_aged_field(field, depsgraph, world_matrix(field, depsgraph)[None])
         parts.append((read.position, read.scale, *crown_kinds(scene, read.identifiers, read.species, ages)))

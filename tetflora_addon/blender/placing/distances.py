@@ -18,6 +18,7 @@ from ...compiled.crowns import Crown
 from ...errors import SpeciesError
 from ...planting.distances import suggested_distance
 from ..scene.crowns import crown_for, crown_to_draw
+from ..scene.skeletons import aged_kind
 from ..species.catalogue import default_species
 
 #: Square metres of the area that densities are counted on: foresters count trees by the hectare.
@@ -120,7 +121,8 @@ def _suggestion(
         mixture = _mixture_of(settings)
     except SpeciesError:  # an empty catalogue, of which Populate and the brush complain
         return settings.min_distance
-    crowns = [find(settings.id_data, identifier) for identifier in mixture.weights]
+    age = 0.0 if _is_brush(settings) else settings.age
+    crowns = [find(settings.id_data, aged_kind(identifier, age)) for identifier in mixture.weights]
     if None in crowns:
         return None
     radii = [crown.radius for crown in crowns]

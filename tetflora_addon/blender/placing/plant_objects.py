@@ -16,8 +16,9 @@ from ...planting.places import Placement, new_seeds
 from .. import settings
 from ..attributes import world_matrix
 from ..saved_files import VERSION
+from ..scene.ages import relative_heights
 from ..scene.fields import fields_of, quaternions, read_aged_field, stored_size, write_field
-from ..scene.own_ages import ages_of
+from ..scene.own_ages import stored_ages
 from ..scene.plants import single_plants
 from ..scene.skeletons import form_of, species_of
 from ..species.edits import catalogue, display_height
@@ -146,7 +147,11 @@ def _empties_steps(
         target.link(obj)
         if not count % _AT_ONCE:
             yield [obj for obj in made if obj is not None]
-    _set_at_once(made, rows, np.array([display_height(s) for s in species], dtype=np.float32))
+    heights = np.array([display_height(s) for s in species], dtype=np.float32)[rows[3]]
+    for kind in range(len(species)) if ages is not None else ():
+        own = rows[3] == kind
+        heights[own] *= relative_heights(species[kind], ages[own])
+    _set_at_once(made, rows, heights)
     prepare_scene(scene)
     return made
 
@@ -157,7 +162,7 @@ def _set_at_once(objects: Sequence[bpy.types.Object], rows: Sequence[np.ndarray]
     What is set object by object makes Blender slow when it deletes them later: 10,000 take several times as long as
     with ``foreach_set``, which needs a collection that holds these and nothing else.
     """
-    position, angles, scale, kind, _ = rows
+    position, angles, scale, *_ = rows
     arrow = bpy.types.Object.bl_rna.properties["empty_display_type"].enum_items['SINGLE_ARROW'].value
     within = bpy.data.collections.new(COLLECTION)
     for obj in objects:
@@ -166,7 +171,7 @@ def _set_at_once(objects: Sequence[bpy.types.Object], rows: Sequence[np.ndarray]
         ("location", position),
         ("rotation_euler", angles),
         ("scale", np.repeat(scale, 3)),
-        ("empty_display_size", heights[kind]),
+        ("empty_display_size", heights),
     ):
         within.objects.foreach_set(name, np.ascontiguousarray(values, dtype=np.float32).reshape(-1))
     within.objects.foreach_set("empty_display_type", np.full(len(objects), arrow, np.int32))
@@ -242,7 +247,7 @@ def field_from_plants(
     read = single_plants(plants, depsgraph)
     species, forms = [species_of(kind) for kind in read.identifiers], [form_of(kind) for kind in read.identifiers]
     rows = (read.position, quaternions(read.frame), read.scale, read.species, read.seed)
-    made = _link_field(scene, write_field(FIELD, *rows, species, forms, ages_of(plants)), collection)
+    made = _link_field(scene, write_field(FIELD, *rows, species, forms, stored_ages(plants)), collection)
     remove_plants(plants)
     return made
 
@@ -322,6 +327,14 @@ def prepare_scene(scene: bpy.types.Scene) -> None:
     scene.tetflora.version = VERSION
 
 
+def show_age(plant: bpy.types.Object) -> None:
+    """Let the arrow of a plant be as tall as its age makes it."""
+    group = plant.tetflora
+    if group.is_plant and plant.type == 'EMPTY' and plant.library is None:
+        ratio = relative_heights(group.species, np.array([group.age]))[0]
+        plant.empty_display_size = display_height(group.species) * ratio
+
+
 def assign_species(objects: Iterable[bpy.types.Object], identifier: str) -> int:
     """Make plants belong to a species; how many were changed. Their seeds stay."""
 
@@ -332,7 +345,9 @@ def assign_species(objects: Iterable[bpy.types.Object], identifier: str) -> int:
     changed = [o for o in plants_of(objects) if o.tetflora.species != identifier]
     for obj in changed:
         obj.tetflora.species = identifier
-        if obj.type == 'EMPTY':
+        if obj.tetflora.age > 0.0:
+            show_age(obj)
+        elif obj.type == 'EMPTY':
             obj.empty_display_size = height()
     return len(changed)
 

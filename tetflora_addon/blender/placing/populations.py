@@ -27,6 +27,7 @@ from ..runtime import JobData, guarded, is_there
 from ..scene.crowns import crown_steps
 from ..scene.fields import fields_of, stored_size
 from ..scene.own_ages import MOST_YEARS
+from ..scene.skeletons import aged_kind
 from ..worker import at_once, call_in_thread
 from .canopy import is_cover, standing
 from .plant_objects import (
@@ -150,9 +151,10 @@ def _make_plants_steps(
     refuse_frozen(population)
     species = {entry.species for entry in population.mix}
     measure_all(scene, depsgraph, species)
+    kinds = {aged_kind(identifier, population.age) for identifier in species}
     if is_cover(population):
-        species |= standing(scene)
-    yield from crown_steps(progress, scene, species)
+        kinds |= standing(scene)
+    yield from crown_steps(progress, scene, kinds)
     population = still_there(data, scene, uid)
     search = read_search(scene, depsgraph, population, set(_sorted_out(scene, population)[0]))
     progress = Progress(0.1, "Looking for places")

@@ -4,14 +4,17 @@
 
 Up to `MOST` different ages of a species are kinds of their own. Of more, each goes to the nearest of `MOST` classes at
 fixed ages, so that no plant depends on which others there are, and the scale of the plant makes up for the difference
-in height. The years that pass in a scene are added afterwards and change no class.
+in height. The classes of a species are a geometric series from its first year, or from a tenth of the age at which it
+is full-grown where that is less, to when the last limbs of a dead plant have fallen: each is some 1.6 times the one
+before. The years that pass in a scene are added afterwards and change no class.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import lru_cache
 
 import bpy
 import numpy as np
@@ -20,36 +23,27 @@ from numpy.typing import NDArray
 
 from ...errors import SpeciesError
 from ...growth.seeds import Seeds
+from ...species.ages import ages_of, stage, with_age
+from ...species.growing import Ages
 from ...species.species import Species
 from ..settings import years_of
 from ..species.edits import species_for
+from .own_ages import MOST_YEARS
 from .skeletons import age_of, aged_kind, species_of
 
-
-def with_age(species, years):  # noqa: D103 (until the engine has it)
-    return species
-
-
-def height(species, years):  # noqa: D103
-    return years + 1.0
-
-
-def stage(species, years):  # noqa: D103
-    return "mature"
-
-
-#: Classes of a species at most; the age of the first in years, and of each over the one before.
-MOST, FIRST, RATIO = 12, 1.0, 1.7
+#: Classes of a species at most, and years from its death to the last of them.
+MOST, _FALLEN = 12, 40.0
+_NODES = 512  # of heights by age, from a thousandth of a year on
 FULL_GROWN = "Full-grown"
 Part = tuple[str, Seeds, NDArray[np.float64] | None]
 """The name of an object, its plants, and their ages; None where all are full-grown."""
 
 
 def stage_text(scene: bpy.types.Scene, identifier: str, age: float) -> str:
-    """The stage of life that plants of a species are in at an age and the scene's years, for panels."""
+    """The stage of life that plants of a species are in at an age and the scene's years, for panels; empty for none."""
     try:
-        years = age + years_of(scene)
-        found = stage(species_for(scene, identifier), years).capitalize() if years > 0.0 else FULL_GROWN
+        species, years = species_for(scene, identifier), age + years_of(scene)
+        found = stage(species, years).capitalize() if years > 0.0 else FULL_GROWN
     except SpeciesError:
         return ""
     return iface(found)
@@ -63,10 +57,36 @@ def classed(scene: bpy.types.Scene, parts: Sequence[Part]) -> list[tuple[str, Se
     return [(name, seeds if ages is None else _classed(scene, seeds, ages, many)) for name, seeds, ages in parts]
 
 
-def class_ages(ages: NDArray[np.float64]) -> NDArray[np.float64]:
+def class_ages(species: Species, years: NDArray[np.float64]) -> NDArray[np.float64]:
     """Ages of the classes of ages (n,): the nearest by ratio; full-grown plants stay it."""
-    step = np.rint(np.log(np.maximum(ages, FIRST) / FIRST) / np.log(RATIO))
-    return np.where(ages > 0.0, FIRST * RATIO ** np.minimum(step, MOST - 1), 0.0)
+    ages = ages_of(species)
+    first = min(1.0, ages.full / 10.0)
+    ratio = ((ages.full if ages.scaled else ages.lifespan + _FALLEN) / first) ** (1.0 / (MOST - 1))
+    step = np.clip(np.rint(np.log(np.maximum(years, first) / first) / np.log(ratio)), 0, MOST - 1)
+    return np.where(years > 0.0, first * ratio**step, 0.0)
+
+
+def heights(species: Species, years: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Heights (n,) at ages (n,), over that at the full age."""
+    known = _heights(ages_of(species))
+    return np.interp(np.log(np.maximum(years, 1e-3)), *known)
+
+
+def relative_heights(identifier: str, years: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Heights (n,) of plants of a species at ages (n,) over that of the description, for what stands for them."""
+    try:
+        found = heights(species_for(None, identifier), years)
+    except SpeciesError:
+        return np.ones(len(years))
+    return np.where(years > 0.0, found, 1.0)
+
+
+@lru_cache(maxsize=64)
+def _heights(ages: Ages) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Logarithms of ages and heights; the same ones whatever plants there are."""
+    years = np.geomspace(1e-3, 2.0 * MOST_YEARS, _NODES)
+    found = np.array([ages.heights(year) for year in years.tolist()])
+    return np.log(years), np.minimum(found, 1.0) if ages.scaled else found
 
 
 def grown_species(scene: bpy.types.Scene, kind: str, species: Species) -> Species:
@@ -90,14 +110,10 @@ def _with_many(parts: Sequence[Part]) -> set[str]:
 
 
 def _classed(scene: bpy.types.Scene, seeds: Seeds, ages: NDArray[np.float64], many: set[str]) -> Seeds:
-    own = np.array([species_of(kind) in many for kind in seeds.identifiers], bool)[seeds.species]
-    classes = np.where(own, class_ages(ages), ages)
+    years, which = years_of(scene), [n for n, kind in enumerate(seeds.identifiers) if species_of(kind) in many]
+    classes, taller = _in_classes(scene, seeds.identifiers, seeds.species, ages, years, which)
     kinds, number = _by_age(seeds.identifiers, seeds.species, classes)
-    if not own.any():
-        return replace(seeds, identifiers=kinds, species=number)
-    years = years_of(scene)
-    taller = _taller(scene, seeds.identifiers, seeds.species, ages + years, classes + years)
-    return replace(seeds, identifiers=kinds, species=number, scale=seeds.scale * np.where(classes > 0.0, taller, 1.0))
+    return replace(seeds, identifiers=kinds, species=number, scale=seeds.scale * taller if which else seeds.scale)
 
 
 def crown_kinds(
@@ -118,8 +134,8 @@ def crown_kinds(
     if ages is None and years == 0.0:
         return tuple(kinds), number.astype(np.int32), np.ones(len(number))
     total = (0.0 if ages is None else ages) + np.full(len(number), years)
-    classes = class_ages(total)
-    return *_by_age(kinds, number, classes), _taller(scene, kinds, number, total, classes)
+    classes, taller = _in_classes(scene, kinds, number, total, 0.0, range(len(kinds)))
+    return *_by_age(kinds, number, classes), taller
 
 
 def _by_age(
@@ -136,18 +152,23 @@ def _by_age(
     return tuple(found), out
 
 
-def _taller(
+def _in_classes(
     scene: bpy.types.Scene,
     kinds: Sequence[str],
     number: NDArray[np.integer],
     ages: NDArray[np.float64],
-    classes: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Heights (n,) of plants over those of their classes; 1 where a species cannot be read, which is told elsewhere."""
-    out = np.ones(len(number))
-    for index, kind in enumerate(kinds):
-        own = np.flatnonzero((number == index) & (ages != classes) & (classes > 0.0))
+    years: float,
+    which: Iterable[int],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Ages of classes (n,) for plants (n,) of some of the kinds, and their heights over those (n,) in so many years.
+
+    Species that cannot be read are left as they are, which is told elsewhere.
+    """
+    classes, taller = ages.copy(), np.ones(len(number))
+    for index in which:
+        own = np.flatnonzero((number == index) & (ages > 0.0))
         with suppress(SpeciesError):
-            species = species_for(scene, species_of(kind))
-            out[own] = height(species, ages[own]) / height(species, classes[own])
-    return out
+            species = species_for(scene, species_of(kinds[index]))
+            classes[own] = class_ages(species, ages[own])
+            taller[own] = heights(species, ages[own] + years) / heights(species, classes[own] + years)
+    return classes, np.maximum(taller, 1e-3)

@@ -23,7 +23,7 @@ from ...growth.seeds import Seeds
 from ...planting.places import new_seeds
 from ..attributes import frames_of, read, values_of, write
 from .objects import geometry_of
-from .own_ages import AGE, MOST_YEARS, ages_of, sound_ages
+from .own_ages import AGE, MOST_YEARS, sound_ages, stored_ages
 from .skeletons import kind_of, kind_of_choice, species_of
 
 #: Types of objects that can be marked as fields.
@@ -309,7 +309,7 @@ def _ages(obj: bpy.types.Object, points: Points, size: int) -> NDArray[np.floati
     attribute = _attribute(obj, points, AGE, {'FLOAT', 'INT'})
     if attribute is not None:
         return values_of(attribute)
-    own = ages_of([obj])
+    own = stored_ages([obj])
     return np.broadcast_to(np.zeros(1) if own is None else own, size)
 
 

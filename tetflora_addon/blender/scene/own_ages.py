@@ -28,7 +28,7 @@ AGE_PROPERTY = {
 }
 
 
-def ages_of(plants: Sequence[bpy.types.Object]) -> NDArray[np.float64] | None:
+def stored_ages(plants: Sequence[bpy.types.Object]) -> NDArray[np.float64] | None:
     """Ages (n,) of plants that are objects, or of fields without the attribute; None where all are full-grown.
 
     Raises

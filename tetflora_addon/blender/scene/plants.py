@@ -23,7 +23,7 @@ from .ages import Part, classed
 from .fields import read_aged_field, read_field_matrices
 from .instances import name_keys
 from .objects import Copies, copies_of, may_instance, renderable_objects
-from .own_ages import ages_of
+from .own_ages import stored_ages
 from .scatterers import is_drop
 from .skeletons import kind_of, kind_of_choice, species_of
 
@@ -64,7 +64,7 @@ def read_plants_of(
     grouped = [(o, group) for o, group in grouped if group.is_plant or group.is_field]
     own = [o for o, _ in grouped]
     single = [o for o, group in grouped if group.is_plant and group.enabled and group.species not in assets]
-    read: list[Part] = [(single[0].name if single else "", single_plants(single, depsgraph), ages_of(single))]
+    read: list[Part] = [(single[0].name if single else "", single_plants(single, depsgraph), stored_ages(single))]
     copies = copies_of([o for o in objects if may_instance(o)], depsgraph)
     enabled = [c for c in copies if c.owner.tetflora.enabled]
     read += [(c.owner.name, *_copied_plants(c)) for c in enabled if _is_plant(c) and _species(c.owner) not in assets]
@@ -221,7 +221,7 @@ def _copied_plants(copies: Copies) -> tuple[Seeds, NDArray[np.float64] | None]:
     """Instances of a plant, each an individual of its own: its key is added to the seed. And their ages."""
     plant = copies.owner
     seeds = child_key(key_of_seed(plant.tetflora.seed), copies.keys).view(np.int64)
-    age = ages_of([plant])
+    age = stored_ages([plant])
     found = _placed([plant.name], (kind_of(plant),), np.zeros(len(seeds), np.int32), seeds, copies.matrices)
     return found, None if age is None else np.repeat(age, len(seeds))
 
