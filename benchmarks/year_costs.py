@@ -22,7 +22,7 @@ from tetflora_addon.species import ages, catalogue
 
 from .year_scene import MIX, digest, set_day, wood
 
-PLANTS, QUICK_PLANTS = 300, 24
+PLANTS, QUICK_PLANTS, ROOM = 300, 24, 30.0
 SIZE, QUICK_SIZE = (1920, 1080), (480, 270)
 #: Days, and ages in years, that are compared with summer at full age.
 DAYS, AGES = (15.0, 122.0, 145.0, 285.0, 300.0), (5.0, 20.0, 60.0, 150.0)
@@ -36,7 +36,7 @@ def refining(quick: bool, until: float = float("inf")) -> dict[str, float] | Non
     cases += [(f"_day_{day:g}", day, 0.0) for day in DAYS] + [(f"_years_{age:g}", None, age) for age in AGES]
     session.clean_file()
     scene = bpy.context.scene
-    wood(scene, QUICK_PLANTS if quick else PLANTS, QUICK_SIZE if quick else SIZE)
+    wood(scene, QUICK_PLANTS if quick else PLANTS, QUICK_SIZE if quick else SIZE, ROOM)
     scene.render.threads_mode, scene.render.threads = 'FIXED', 1
     first: dict[str, float] = {}
     least: dict[str, float] = {}
@@ -105,7 +105,7 @@ def summer(quick: bool) -> dict[str, float]:
     """1 where what is refined in summer with seasons is, to the bit, what is refined without them."""
     session.clean_file()
     scene = bpy.context.scene
-    wood(scene, QUICK_PLANTS, QUICK_SIZE if quick else (960, 540))
+    wood(scene, QUICK_PLANTS, QUICK_SIZE if quick else (960, 540), ROOM)
     digests = []
     for day in (None, SUMMER):
         set_day(scene, day)

@@ -30,8 +30,8 @@ from .row80 import timed_refine
 from .year_scene import digest, lone, set_day, wood
 
 KINDS = ("refined", "expanded")
-#: The wood's plants, and their ages: fully expanded, old trees are a million polygons each.
-PLANTS, AGES = 32, (6.0, 16.0)
+#: The wood's plants, ground for each, m², and their ages: fully expanded, old trees are a million polygons each.
+PLANTS, ROOM, AGES = 32, 14.0, (6.0, 16.0)
 WOOD_SIZE, BIRCH_SIZE = (320, 180), (200, 280)
 WOOD_SAMPLES, BIRCH_SAMPLES = 16, 24
 #: Height that the birch's camera sees, metres.
@@ -64,7 +64,7 @@ def year_of_a_wood(quick: bool = False) -> Series:
     plants = 8 if quick else PLANTS
     return Series(
         "wood",
-        lambda scene: wood(scene, plants, size, AGES),
+        lambda scene: wood(scene, plants, size, ROOM, AGES),
         tuple((day, 0.0) for day in days.tolist()),
         4 if quick else WOOD_SAMPLES,
     )

@@ -16,12 +16,14 @@ from tetflora_addon.growth.hashing import uniform
 
 #: Species of the wood with their relative numbers: two that turn yellow, one that turns brown, one evergreen, a shrub.
 MIX = {"birch": 0.3, "beech": 0.2, "oak": 0.2, "spruce": 0.15, "hazel": 0.15}
-#: Ground for each plant, m², nearest distance to the eye and height of the eye, metres; horizontal field of view.
-_ROOM, _NEAREST, _EYE, _VIEW = 14.0, 7.0, 1.7, radians(54.0)
+#: Nearest distance to the eye and height of the eye, metres; horizontal field of view.
+_NEAREST, _EYE, _VIEW = 7.0, 1.7, radians(54.0)
 _ELEVATION, _AZIMUTH = 35.0, -60.0
 
 
-def wood(scene: bpy.types.Scene, plants: int, size: tuple[int, int], ages: tuple[float, float] | None = None) -> None:
+def wood(
+    scene: bpy.types.Scene, plants: int, size: tuple[int, int], room: float, ages: tuple[float, float] | None = None
+) -> None:
     """Fill an empty scene with plants before the camera, evenly over the ground that it sees.
 
     Parameters
@@ -30,11 +32,13 @@ def wood(scene: bpy.types.Scene, plants: int, size: tuple[int, int], ages: tuple
     plants : int
     size : tuple of int
         Of the image, pixels.
+    room : float
+        Ground for each plant, m².
     ages : tuple of float, optional
         Youngest and oldest, in years; a handful of ages between them. Without it, plants are full-grown.
     """
     half = 0.94 * tan(_VIEW / 2)
-    farthest = np.sqrt(_NEAREST**2 + plants * _ROOM / half)
+    farthest = np.sqrt(_NEAREST**2 + plants * room / half)
     # A sequence of low discrepancy (Roberts, 2018), even over the ground that is seen.
     u, v = np.mod(0.5 + np.arange(1, plants + 1)[:, None] * [0.7548776662, 0.5698402910], 1.0).T
     away = np.sqrt(_NEAREST**2 + u * (farthest**2 - _NEAREST**2))
