@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cover the ground of a population."""
+"""Cover the ground of a population: with low plants and what falls on it, and with snow."""
 
 from collections.abc import Generator
 
@@ -8,10 +8,11 @@ import bpy
 from bpy.props import BoolProperty
 
 from ..tetflora_addon.blender.placing.cover import Covered, cover_steps, covered_population
+from ..tetflora_addon.blender.placing.ground_snow import cover_with_snow
 from ..tetflora_addon.blender.placing.rules import active_population
 from ..tetflora_addon.blender.viewport import points
 from ..tetflora_addon.jobs import Progress
-from .base import ModalJob, counted, in_object_mode, need
+from .base import ModalJob, Reporting, counted, in_object_mode, need
 
 
 class TETFLORA_OT_ground_cover(ModalJob, bpy.types.Operator):
@@ -48,4 +49,24 @@ class TETFLORA_OT_ground_cover(ModalJob, bpy.types.Operator):
         return self.done(f"{counted(result.made.number, 'plant')} cover the ground{kept}")
 
 
-CLASSES = (TETFLORA_OT_ground_cover,)
+class TETFLORA_OT_ground_snow(Reporting, bpy.types.Operator):
+    """Add the snow of the scene to the materials of the active population's ground, as a node before their output.
+
+    Soil of Ground Cover needs none of it.
+    """
+
+    bl_idname = "tetflora.ground_snow"
+    bl_label = "Snow on Ground"
+    needs = (
+        in_object_mode,
+        need(lambda context: active_population(context.scene), "Add a population first; its ground can then have snow"),
+    )
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        found = cover_with_snow(context.scene, covered_population(context.scene))
+        if not found:
+            return self.refused("The materials of the ground have snow already")
+        return self.done(f"{counted(len(found), 'material')} can have snow; set Snow under Year")
+
+
+CLASSES = (TETFLORA_OT_ground_cover, TETFLORA_OT_ground_snow)

@@ -6,7 +6,7 @@ import bpy
 
 from ..operators.add import TETFLORA_OT_populate
 from ..operators.brush import TETFLORA_OT_paint_plants
-from ..operators.ground_cover import TETFLORA_OT_ground_cover
+from ..operators.ground_cover import TETFLORA_OT_ground_cover, TETFLORA_OT_ground_snow
 from ..operators.marks import TETFLORA_OT_mark_occluder
 from ..operators.populations import (
     TETFLORA_OT_add_population,
@@ -62,6 +62,7 @@ class TETFLORA_MT_populations(bpy.types.Menu):
             Button(TETFLORA_OT_select_population, 'RESTRICT_SELECT_OFF'),
             Button(TETFLORA_OT_remove_population, 'REMOVE', "Remove but Keep Plants", {"keep_plants": True}),
             Button(TETFLORA_OT_forget_erased, 'LOOP_BACK'),
+            Button(TETFLORA_OT_ground_snow, 'FREEZE'),
             None,
             Button(TETFLORA_OT_import_populations, 'IMPORT', "Import..."),
             Button(TETFLORA_OT_export_populations, 'EXPORT', "Export..."),

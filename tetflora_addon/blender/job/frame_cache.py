@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 
 import bpy
 import numpy as np
@@ -21,6 +21,7 @@ from ...species.species import Species
 from ..assets.measures import reach_of
 from ..assets.target import digest_of
 from ..compat import drawn_disc
+from ..materials.snow import has_snow
 from ..results.hiding import hidden_originals, hide_originals, name_of, object_named, show_originals
 from ..results.leaf_objects import brought_materials
 from ..results.output import REPLACED, remove_collection, result_collections
@@ -126,7 +127,9 @@ def choices(scene: bpy.types.Scene) -> list:
     materials = [(e.species, *(getattr(getattr(e, k), "name", "") for k in REPLACED)) for e in group.output.species]
     chosen = [getattr(group, name) for name in _CHOICES]
     assets = [(identifier, _asset_name(one), one.variants) for identifier, one in asset_species(scene).items()]
-    moment = wind_of(scene), season_of(scene), years_of(scene)
+    # Snow follows its number by itself, once it is there.
+    season = season_of(scene)
+    moment = wind_of(scene), season and replace(season, snow=float(has_snow(scene))), years_of(scene)
     return [settings_from(scene), chosen, materials, assets, *moment, drawn_disc(scene.render.engine)]
 
 

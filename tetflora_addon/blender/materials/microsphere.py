@@ -84,7 +84,7 @@ def _shaders(graph: Graph, given: Any) -> dict[str, bpy.types.NodeSocket]:
     through = graph.vector('SCALE', graph.tinted(back, given["Through Tint"]), transmission)
     back = graph.vector('SCALE', back, graph.math('SUBTRACT', 1.0, transmission))
 
-    particle = _particle_normal(graph, given, geometry)
+    particle = particle_normal(graph, given, geometry)
     axis = graph.vector('NORMALIZE', given["Normal"])
     plane = graph.vector('SCALE', axis, _sign(graph, axis, incoming))
     width = _highlight_width(graph, given)
@@ -142,7 +142,7 @@ def _chosen(graph: Graph, first: Any, second: Any, which: Any) -> bpy.types.Node
     return graph.vector('ADD', first, graph.vector('SCALE', graph.vector('SUBTRACT', second, first), which))
 
 
-def _particle_normal(graph: Graph, given: Any, geometry: Any) -> bpy.types.NodeSocket:
+def particle_normal(graph: Graph, given: Any, geometry: Any) -> bpy.types.NodeSocket:
     """Normal m of the particle that was hit.
 
     The points of a sphere that a viewer sees have normals with density cos / π around him: those of I + q, with q

@@ -11,6 +11,7 @@ import bpy
 
 from ...buffers import MeshBuffers, PointBuffers
 from ...species.species import Species
+from ..materials import snow
 from ..materials.nodes import is_own, tag
 from ..runtime import JobData, is_there
 from .meshes import mesh_steps, point_object
@@ -75,6 +76,7 @@ class Results:
     def open(self) -> None:
         """Make the collection."""
         name = NAMES[self.purpose] + self.mark
+        snow.fit_soils()
         self.collection = bpy.data.collections.new(name)
         self._names.append((self.collection, name))
         self.collection[PURPOSE] = self.purpose
@@ -132,6 +134,7 @@ class Results:
     def use(self, materials: Sequence[bpy.types.Material]) -> None:
         """Let TetFlora's materials go with what is made, if it is discarded and nothing else uses them."""
         self._made += materials
+        snow.fit(materials)
 
     def shared(self, key: Hashable, make: Callable[[], _Made]) -> _Made:
         """What was made for a key, made only once for these results."""

@@ -1,0 +1,270 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Snow by nodes: what faces the sky turns white, on anything that has a surface shader.
+
+The group "TetFlora Snow" stands between a shader and the material output. How much snow there is is one number, which a
+driver takes from the scene that is rendered, so that it follows the slider, and each frame has its own. Materials of
+TetFlora have the group while a scene of the file has snow or may get some; others only where the artist adds it.
+
+Facets are leaves with two sides and get the same group; clouds, which have no surface, a group that asks the normals of
+their particles. Fresh snow reflects .85 to .9 of visible light or more, almost evenly (Warren, "Optical properties of
+snow", Reviews of Geophysics 20, 1982).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import bpy
+
+from .materials import ASSET_PROXY, ASSET_SPHERE, BAKED, PROXY, SPHERE
+from .microsphere import ENGINES, MICROSPHERE, UNIT, microsphere_group, particle_normal
+from .nodes import LEAF_GREEN, Graph, find_socket, is_own, shader_group
+from .shell import BAKED_SHELL, BAKED_SHELL_MATERIAL, SHELL, SHELL_MATERIAL
+from .soil import is_soil
+
+SNOW = "TetFlora Snow"
+AMOUNT = "TetFlora Snow Amount"
+CLOUD = "TetFlora Snow Cloud"
+_VERSION = 1
+#: On nodes that `fit` adds and takes away again; those that an artist adds have none.
+_MARK = "tetflora_snow"
+_NUMBER = "Snow of the Scene"
+_PATHS = {"snow": "tetflora.year.snow", "on": "tetflora.year.enabled"}
+#: Linear RGB, and how rough it is.
+WHITE = (0.86, 0.875, 0.9, 1.0)
+_ROUGH = 0.3
+#: Snow that lies on level ground at amount 1, over what has to lie anywhere until half of the place is white, and over
+#: how much of it white comes; how much noise adds or takes away, and how many patches there are to a meter.
+_WHITE, _SOFT, _UNEVEN, _PATCHES = 0.25, 0.2, 0.9, 4.0
+#: What of the snow stays on a twig, and how long the way around a branch is that has lost none, meters.
+_TWIG, _STOUT = 0.6, 0.4
+#: Leaves of a cluster shade each other's snow, facets in their place less so: measured as .83 to 1 for four species.
+_CLUSTER = (*(0.92 * c for c in WHITE[:3]), 1.0)
+#: Proxies of which what lets no light through stands for twigs.
+_PROXIES = (PROXY, SPHERE, BAKED)
+_OTHERS = (ASSET_PROXY, ASSET_SPHERE)  # stand for materials of the artist
+_CLOUDS = (SHELL_MATERIAL, BAKED_SHELL_MATERIAL)
+
+
+def has_snow(scene: bpy.types.Scene) -> bool:
+    """Whether there is snow in a scene, or may be in one of its frames."""
+    year = scene.tetflora.year
+    if not year.enabled:
+        return False
+    return year.snow > 0.0 or _is_keyed(scene)
+
+
+def _is_keyed(scene: bpy.types.Scene) -> bool:
+    """Whether the amount of snow has keys or a driver."""
+    animation = scene.animation_data
+    if animation is None:
+        return False
+    layers = animation.action.layers if animation.action is not None else ()
+    bags = [bag for layer in layers for strip in layer.strips for bag in strip.channelbags]
+    curves = [*animation.drivers, *(curve for bag in bags for curve in bag.fcurves)]
+    return bool(animation.nla_tracks) or any(curve.data_path == _PATHS["snow"] for curve in curves)
+
+
+def fit(materials: Iterable[bpy.types.Material | None]) -> None:
+    """Put snow on TetFlora's own materials if a scene of the file has any, and take it from them otherwise."""
+    snowy = any(has_snow(scene) for scene in bpy.data.scenes)
+    for material in set(materials) - {None}:
+        own = is_own(material) or is_soil(material)
+        if own and material.node_tree is not None and not material.name.startswith(_OTHERS):
+            _fit_cloud(snowy) if material.name in _CLOUDS else _fit_surface(material, snowy)
+
+
+def fit_soils() -> None:
+    """`fit` for the materials that Ground Cover made."""
+    fit(material for material in bpy.data.materials if is_soil(material))
+
+
+def add_snow(material: bpy.types.Material, mark: bool = False) -> bool:
+    """Put the group between a material's surface shaders and its outputs; False if it is there or there are none."""
+    added, tree = False, material.node_tree
+    for output in [node for node in tree.nodes if node.type == 'OUTPUT_MATERIAL']:
+        surface = output.inputs["Surface"]
+        if not surface.is_linked or _is_snow(surface.links[0].from_node):
+            continue
+        node = _group_node(tree, snow_group(), output, mark)
+        if material.name in _PROXIES:
+            node.inputs["Twigs"].default_value = 1.0
+            node.inputs["Color"].default_value = _CLUSTER
+        _put_between(tree, surface, node.inputs["Shader"], node.outputs["Shader"])
+        added = True
+    return added
+
+
+def snow_group() -> bpy.types.NodeTree:
+    """The group "TetFlora Snow".
+
+    Returns
+    -------
+    bpy.types.NodeTree
+        Inputs Shader, Carry, Color, Twigs; outputs Shader and Cover. The side of a sheet that faces up is white where
+        Cover is 1. From below, a leaf that lets light through is darker by what the snow keeps from it.
+    """
+    inputs = (
+        ("Shader", 'Shader'),
+        ("Carry", 'Float', 1.0, UNIT, "How much snow stays on it: less on thin things"),
+        ("Color", 'Color', WHITE),
+        ("Twigs", 'Float', 0.0, UNIT, "1: what lets no light through is thin, as in proxies"),
+    )
+
+    def build(graph: Graph, given: Any) -> dict[str, Any]:
+        normal = graph.node("ShaderNodeNewGeometry").outputs["Normal"]
+        upward = graph.node("ShaderNodeSeparateXYZ", {"Vector": normal}).outputs["Z"]
+        through = graph.attribute("tf_transmission", "Fac")
+        girth = graph.attribute("tf_girth", "Fac")
+        opaque = graph.math('LESS_THAN', through, 1e-6)
+        slight = graph.math('MULTIPLY', graph.math('GREATER_THAN', girth, 1e-6), graph.step(girth, _STOUT, 0.0))
+        unknown = graph.math('MULTIPLY', graph.math('LESS_THAN', girth, 1e-6), given["Twigs"])
+        thin = graph.math('MAXIMUM', slight, graph.math('MULTIPLY', unknown, opaque))
+        carry = graph.math('MULTIPLY', given["Carry"], graph.math('MULTIPLY_ADD', thin, _TWIG - 1.0, 1.0))
+        held = _held(graph, upward, carry)
+        above = graph.math('GREATER_THAN', upward, 0.0)
+        cover = graph.math('MULTIPLY', held, above)
+        kept = graph.math('MULTIPLY', held, graph.math('MAXIMUM', above, through))
+        colour = graph.vector('SCALE', given["Color"], above)
+        snow = graph.node("ShaderNodeBsdfDiffuse", {"Color": colour, "Roughness": _ROUGH})
+        return {"Shader": graph.mix(kept, given["Shader"], snow), "Cover": cover}
+
+    return shader_group(SNOW, _VERSION, inputs, (("Shader", 'Shader'), ("Cover", 'Float')), build)
+
+
+def _cloud_group() -> bpy.types.NodeTree:
+    """The group "TetFlora Snow Cloud": color and transmission of the particle that is hit in a cloud, under snow."""
+    inputs = (("Colour", 'Color', LEAF_GREEN), ("Transmission", 'Float', 0.0, UNIT))
+    outputs = (("Colour", 'Color'), ("Transmission", 'Float'), ("Cover", 'Float'))
+
+    def build(graph: Graph, given: Any) -> dict[str, Any]:
+        geometry = graph.node("ShaderNodeNewGeometry").outputs
+        particle = particle_normal(graph, {"Roundness": 1.0, "Facing": (0.0, 0.0, 0.0)}, geometry)
+        axis = graph.attribute("tf_normal", "Vector")
+        away = graph.math('LESS_THAN', graph.vector('DOT_PRODUCT', axis, geometry["Incoming"]), 0.0)
+        plane = graph.vector('SCALE', axis, graph.math('MULTIPLY_ADD', away, -2.0, 1.0))
+        held, cover = [], []
+        for normal in (particle, plane):
+            upward = graph.node("ShaderNodeSeparateXYZ", {"Vector": normal}).outputs["Z"]
+            held.append(_held(graph, upward, 1.0))
+            cover.append(graph.math('MULTIPLY', held[-1], graph.math('GREATER_THAN', upward, 0.0)))
+        share = graph.attribute("tf_plane", "Fac")
+        kept, white = (
+            graph.math('MULTIPLY_ADD', graph.math('SUBTRACT', second, first), share, first)
+            for first, second in (held, cover)
+        )
+        left = graph.math('SUBTRACT', 1.0, kept)
+        colour = graph.mixed(white, given["Colour"], _CLUSTER[:3])
+        return {"Colour": colour, "Transmission": graph.math('MULTIPLY', given["Transmission"], left), "Cover": white}
+
+    return shader_group(CLOUD, _VERSION, inputs, outputs, build)
+
+
+def _held(graph: Graph, upward: Any, carry: Any) -> Any:
+    """How white a place is on its side that faces up, 0 to 1, by the vertical component of its normal, of any sign."""
+    amount = graph.node("ShaderNodeGroup", node_tree=_amount_group()).outputs[0]
+    place = graph.vector('SCALE', graph.node("ShaderNodeNewGeometry").outputs["Position"], _PATCHES)
+    noise = graph.math('SUBTRACT', graph.noise(place, 2.0, 0.6)[0], 0.5)
+    caught = graph.math('MULTIPLY_ADD', noise, _UNEVEN, graph.math('ABSOLUTE', upward))
+    lying = graph.math('MULTIPLY', graph.math('MULTIPLY', amount, carry), caught)
+    return graph.step(lying, _WHITE - _SOFT, _WHITE + _SOFT)
+
+
+def _amount_group() -> bpy.types.NodeTree:
+    """The group "TetFlora Snow Amount": the number of the scene that is rendered, by a driver that needs no script."""
+
+    def build(graph: Graph, _given: Any) -> dict[str, Any]:
+        number = graph.node("ShaderNodeValue")
+        number.name = number.label = _NUMBER
+        number.outputs[0].default_value = 0.0
+        driver = graph.tree.driver_add(f'nodes["{_NUMBER}"].outputs[0].default_value').driver
+        driver.type = 'SCRIPTED'
+        for name, path in _PATHS.items():
+            variable = driver.variables.new()
+            variable.name, variable.type = name, 'CONTEXT_PROP'
+            variable.targets[0].context_property, variable.targets[0].data_path = 'ACTIVE_SCENE', path
+        driver.expression = " * ".join(_PATHS)
+        return {"Snow": number}
+
+    return shader_group(AMOUNT, _VERSION, (), (("Snow", 'Float'),), build)
+
+
+def _fit_surface(material: bpy.types.Material, snowy: bool) -> None:
+    if snowy:
+        add_snow(material, mark=True)
+    else:
+        _clear(material.node_tree)
+
+
+def _fit_cloud(snowy: bool) -> None:
+    """Snow within the groups of shells, whose materials hold nothing else."""
+    for name in (SHELL, BAKED_SHELL):
+        tree = bpy.data.node_groups.get((name, None))
+        if tree is None or not is_own(tree) or any(_MARK in node for node in tree.nodes) == snowy:
+            continue
+        if not snowy:
+            _clear(tree)
+        elif name == SHELL:
+            spheres = next(n for n in tree.nodes if n.type == 'GROUP' and n.node_tree.name == MICROSPHERE)
+            node = _group_node(tree, _cloud_group(), spheres, mark=True)
+            for key in ("Colour", "Transmission"):
+                _put_between(tree, spheres.inputs[key], node.inputs[key], node.outputs[key])
+        else:
+            _cover_baked_shell(tree)
+
+
+def _cover_baked_shell(tree: bpy.types.NodeTree) -> None:
+    """White particles that the lights of the scene illuminate, where there is snow, in place of baked light."""
+    end = next(node for node in tree.nodes if node.type == 'GROUP_OUTPUT')
+    cover = _group_node(tree, _cloud_group(), end, mark=True).outputs["Cover"]
+    for engine, _ in ENGINES:
+        added = end.inputs[engine].links[0].from_node
+        through = added.inputs[1].links[0].from_node.inputs["Color"].links[0].from_socket
+        opacity = tree.nodes.new("ShaderNodeMath")
+        opacity.operation = 'SUBTRACT'
+        opacity.inputs[0].default_value = 1.0
+        tree.links.new(through, opacity.inputs[1])
+        lit = _group_node(tree, microsphere_group(), added, mark=True)
+        lit.inputs["Colour"].default_value, lit.inputs["s"].default_value = _CLUSTER, 0.0
+        tree.links.new(opacity.outputs[0], lit.inputs["p"])
+        for key, name, output in (("Normal", "tf_normal", "Vector"), ("Plane", "tf_plane", "Fac")):
+            attribute = tree.nodes.new("ShaderNodeAttribute")
+            attribute.attribute_name, attribute[_MARK] = name, True
+            tree.links.new(find_socket(attribute.outputs, output), lit.inputs[key])
+        mixed = tree.nodes.new("ShaderNodeMixShader")
+        opacity[_MARK] = mixed[_MARK] = True
+        _put_between(tree, added.inputs[0], mixed.inputs[1], mixed.outputs[0])
+        tree.links.new(cover, mixed.inputs[0])
+        tree.links.new(find_socket(lit.outputs, engine), mixed.inputs[2])
+
+
+def _group_node(tree: bpy.types.NodeTree, group: bpy.types.NodeTree, before: Any, mark: bool) -> bpy.types.Node:
+    """A node with a group, left of another in the editor."""
+    node = tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = group
+    node.location = before.location.x - 190.0, before.location.y + 160.0
+    if mark:
+        node[_MARK] = True
+    return node
+
+
+def _put_between(tree: bpy.types.NodeTree, end: Any, into: Any, out: Any) -> None:
+    """Lead what feeds a socket through another node."""
+    tree.links.new(end.links[0].from_socket, into)
+    tree.links.new(out, end)
+
+
+def _clear(tree: bpy.types.NodeTree) -> None:
+    """Take away the nodes that `fit` has added; what went through one goes past it."""
+    for node in [node for node in tree.nodes if _MARK in node]:
+        for output in node.outputs:
+            into = next((socket for socket in node.inputs if socket.name == output.name and socket.is_linked), None)
+            for link in list(output.links) if into is not None else ():
+                tree.links.new(into.links[0].from_socket, link.to_socket)
+        tree.nodes.remove(node)
+
+
+def _is_snow(node: bpy.types.Node) -> bool:
+    return node.type == 'GROUP' and node.node_tree is not None and node.node_tree.name.startswith(SNOW)
