@@ -3,7 +3,7 @@
 """One oak at six ages, from left to right, on a meadow; a woman of 1.70 m and a pole of 4 m tell how large it is.
 
     python -m examples.ages            # docs/images/ages.jpg
-    python -m examples.ages --out out/ages.png --width 800 --samples 16
+    python -m examples.ages --out out/ages.jpg --width 800 --samples 16
 
 All six have the same seed: it is the same individual throughout.
 """
@@ -192,10 +192,18 @@ def labelled(picture: Image.Image, labels: list[tuple[float, str]]) -> Image.Ima
     return picture
 
 
-def main() -> int:
-    """Render the picture of the documentation, or a smaller one."""
+def render_ages(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES) -> None:
+    """The oaks as a JPEG; in an empty scene."""
     from .paper.pictures import save_jpeg
 
+    labels = build(bpy.context.scene, size)
+    with tempfile.TemporaryDirectory() as folder:
+        render(Path(folder) / "ages.png", size, samples, grey=_GREY)
+        save_jpeg(labelled(Image.open(Path(folder) / "ages.png"), labels), path)
+
+
+def main() -> int:
+    """Render the picture of the documentation, or a smaller one."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "images" / "ages.jpg")
     parser.add_argument("--width", type=int, default=SIZE[0])
@@ -203,11 +211,7 @@ def main() -> int:
     arguments = parser.parse_args()
     session.start()
     session.clean_file()
-    size = arguments.width, round(arguments.width * SIZE[1] / SIZE[0])
-    labels = build(bpy.context.scene, size)
-    with tempfile.TemporaryDirectory() as folder:
-        render(Path(folder) / "ages.png", size, arguments.samples, grey=_GREY)
-        save_jpeg(labelled(Image.open(Path(folder) / "ages.png"), labels), arguments.out)
+    render_ages(arguments.out, (arguments.width, round(arguments.width * SIZE[1] / SIZE[0])), arguments.samples)
     return 0
 
 

@@ -30,11 +30,13 @@ def main() -> int:
     session.start()
     import bpy
 
+    from .ages import render_ages
     from .close_ups import render_sheet as render_close_ups
     from .demo import run
     from .landscape import render_landscape
     from .million import render_million
     from .scattered import main as render_scattered
+    from .seasons import render_sheet as render_seasons
     from .species_sheet import render_opening, render_sheet
     from .wood import build as build_wood
     from .wood import render_dolly, render_interior
@@ -56,6 +58,9 @@ def main() -> int:
     build_wood(bpy.context.scene)
     render_dolly(IMAGES / "dolly.jpg")
     render_interior(IMAGES / "interior.jpg")
+    for render, name in ((render_seasons, "seasons"), (render_ages, "ages")):
+        session.clean_file()
+        render(IMAGES / f"{name}.jpg")
     session.clean_file()
     render_scattered([])
     session.stop()

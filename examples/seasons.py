@@ -27,6 +27,7 @@ from devtools import session
 from .close_ups import among_others, render, store_sheet
 
 ROOT = Path(__file__).resolve().parent.parent
+SIZE, SAMPLES = (750, 422), 96
 Rgb = tuple[float, float, float]
 
 
@@ -266,7 +267,7 @@ def _clouds(
 
 
 def render_seasons(
-    folder: Path, only: tuple[str, ...] = tuple(LOOKS), size: tuple[int, int] = (750, 422), samples: int = 96
+    folder: Path, only: tuple[str, ...] = tuple(LOOKS), size: tuple[int, int] = SIZE, samples: int = SAMPLES
 ) -> list[Path]:
     """Render the place, which the scene holds, in some seasons; the pictures."""
     made = []
@@ -277,25 +278,31 @@ def render_seasons(
     return made
 
 
+def render_sheet(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES) -> None:
+    """The place in all four seasons, as one picture; in an empty scene."""
+    build(bpy.context.scene)
+    with tempfile.TemporaryDirectory() as folder:
+        made = render_seasons(Path(folder), tuple(LOOKS), size, samples)
+        store_sheet([made[i : i + 2] for i in range(0, len(made), 2)], path)
+
+
 def main() -> int:
     """Render the sheet of the documentation, or single pictures."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, help="leave pictures of single seasons here instead")
     parser.add_argument("--only", nargs="+", choices=tuple(LOOKS), default=tuple(LOOKS))
-    parser.add_argument("--width", type=int, default=750)
-    parser.add_argument("--samples", type=int, default=96)
+    parser.add_argument("--width", type=int, default=SIZE[0])
+    parser.add_argument("--samples", type=int, default=SAMPLES)
     arguments = parser.parse_args()
     session.start()
     session.clean_file()
-    build(bpy.context.scene)
-    given = tuple(arguments.only), (arguments.width, round(arguments.width * 9 / 16)), arguments.samples
+    given = (arguments.width, round(arguments.width * 9 / 16)), arguments.samples
     if arguments.out:
         arguments.out.mkdir(parents=True, exist_ok=True)
-        render_seasons(arguments.out, *given)
-        return 0
-    with tempfile.TemporaryDirectory() as folder:
-        made = render_seasons(Path(folder), *given)
-        store_sheet([made[i : i + 2] for i in range(0, len(made), 2)], ROOT / "docs" / "images" / "seasons.jpg")
+        build(bpy.context.scene)
+        render_seasons(arguments.out, tuple(arguments.only), *given)
+    else:
+        render_sheet(ROOT / "docs" / "images" / "seasons.jpg", *given)
     return 0
 
 
