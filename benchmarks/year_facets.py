@@ -31,13 +31,13 @@ from .fidelity_frames import LEAST_COVERAGE
 from .row80 import timed_refine
 from .year_scene import add_plant, set_day
 
-SPECIES = ("birch", "oak", "spruce", "beech")
+SPECIES = ("birch", "oak", "spruce")
 DAYS = (20.0, 110.0, 118.0, 126.0, 140.0, 196.0, 268.0, 285.0, 298.0, 315.0)
 #: 0 is full-grown.
-AGES = (5.0, 15.0, 35.0, 90.0, 0.0)
+AGES = (4.0, 9.0, 16.0, 25.0, 0.0)
 HEIGHTS = (12, 50, 200)
 #: Plants of each age, and samples for a height of 50 pixels; as many for each area of the image.
-EACH, SAMPLES = 3, 64
+EACH, SAMPLES = 2, 48
 _COMPARED = 50
 _VIEW = radians(30.0)
 _HEIGHT = 12.0
