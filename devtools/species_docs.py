@@ -8,15 +8,17 @@ figures and plants that are measured. Tests say whether the page is current.
 
 from __future__ import annotations
 
+import datetime
 import json
 import re
 from dataclasses import fields
 
 from tetflora_addon.leaves.models import LEAF_MODELS, Spines
 from tetflora_addon.leaves.schema import OUTLINES
-from tetflora_addon.species.catalogue import load_species
+from tetflora_addon.species.catalogue import builtin_folder, load_species
 from tetflora_addon.species.schema import CHOICES, FOLLOWS, LENGTH_HIGH, ORDER_KEYS, Key
-from tetflora_addon.species.species import CROWN_SHAPES
+from tetflora_addon.species.species import CROWN_SHAPES, LEAF_KINDS
+from tetflora_addon.species.year import DAYS
 
 from . import forms
 from .house import ROOT
@@ -108,10 +110,32 @@ def form_table() -> str:
     return "\n".join(lines)
 
 
+def year_table() -> str:
+    """Markdown table of the days of the shipped species' leaves, and blossoms or fruit, and where they are from."""
+    lines = ["| species | at | appear | full-grown | turn | fall | source |", "|---|---|---|---|---|---|---|"]
+    for path in sorted(builtin_folder().glob("*.json")):
+        species = load_species(path.stem)
+        year = species.year
+        for part in LEAF_KINDS if year is not None else ():
+            one = getattr(year, part)
+            if one is not None:
+                days = (one.appear, one.appear + one.growth, one.turn, one.fall)
+                where = species.name if part == "leaf" else f"{species.name}, {part}"
+                cells = (where, f"{year.latitude:g}° N", *(_date(day) for day in days), year.source)
+                lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def _date(day: float) -> str:
+    """A day of the year, as a date of one that is no leap year."""
+    when = datetime.date(2001, 1, 1) + datetime.timedelta(days=round(day % DAYS) - 1)
+    return f"{when:%b} {when.day}"
+
+
 def updated(page: str) -> str:
     """The page with the tables of the file format written anew; they stand between comments that name them."""
     tables = {"keys": key_table(), "crowns": crown_list(), "leaves": leaf_table(), "outlines": outline_tables()}
-    return _filled(page, tables)
+    return _filled(page, {**tables, "years": year_table()})
 
 
 def with_forms(page: str) -> str:
