@@ -34,9 +34,11 @@ _TWIGS = 0.25
 _LONGEST, _SHARP = 0.6, 4.0
 #: Girth follows length as this power; radius of the thinnest tips, metres.
 _STOUT, _TIP = 1.15, 0.0012
-_SHORTER_TOP = 0.55
-#: Branches that live for a while, for each of the others, at most; steps in which their number is found.
-_EXTRA, _STEPS = 4.0, 14
+#: In a small plant, the topmost limbs are shorter than the crown's shape has them, crowns narrower than their limbs
+#: are long, the shoots of this year bare of branches, and trunks even cones.
+_SHORTER_TOP, _NARROW, _LEADER, _EVEN = 0.4, 0.2, 0.75, 1.3
+#: Branches that live for a while, for each of the others, on stems and on limbs; steps in which their number is found.
+_EXTRA, _STEPS = (4.0, 1.5), 14
 #: Of the length of a leafy twig: what is longer than so many bears no leaves itself.
 _LEAFY = 4.0
 #: A leaf is at most this fraction of the plant's height, and a seedling has so many.
@@ -96,8 +98,10 @@ def with_age(species: Species, years: float) -> Species:
         return species
     species = replace(with_habit(species, species.habit), habit=0.0)
     if ages.scaled or species.form is not None:
-        return _scaled(species, min(ages.heights(years), 1.0))
-    return _Aged(species, ages, years).species()
+        other = _scaled(species, min(ages.heights(years), 1.0))
+    else:
+        other = _Aged(species, ages, years).species()
+    return replace(other, aged=(species, years))
 
 
 def _scaled(species: Species, factor: float) -> Species:
@@ -179,7 +183,8 @@ class _Aged:
             return out
         # As many leaves above each square metre of ground as when full-grown: young trees have more branches on a
         # metre than will stay (leaf areas of McPherson, van Doorn and Peper, 2016).
-        wanted = _leaf_area(self.one) * self.now[self.stem + 1] ** 2 * self.leafless
+        width = self.now[self.stem + 1] * (1 - _NARROW * (1 - self.now[self.stem]))
+        wanted = _leaf_area(self.one) * width**2 * self.leafless
         low, high = 0.0, 1.0
         for _ in range(_STEPS):
             self.fresh = (low + high) / 2
@@ -234,9 +239,11 @@ class _Aged:
             changes |= self._leaves(o)
             changes["taper"] = self._taper(order, self._radius(o))
             changes["flare"] = order.flare * min(self.stout[o], 1.0) ** 0.5
+        if o == self.stem and order.pipe > _EVEN:
+            changes["pipe"] = order.pipe - self.youth * (order.pipe - _EVEN)
         if o > self.stem:
             old = min(now, 1.0)
-            lean = 0.55 + 0.45 * old
+            lean = 0.7 + 0.3 * old
             changes["angle"] = Range(
                 order.angle_tip + (order.angle.mean - order.angle_tip) * lean, order.angle.variation
             )
@@ -259,12 +266,13 @@ class _Aged:
         """Laterals, short shoots and dead branches of an order: factor on their number, and where they are."""
         order, now = self.one.orders[o], self.now[o]
         # Branches grow from the shoots of the years before.
-        until = 1 - (1 - self.before[o] / now) * self.youth if o >= self.stem else 0.3 + 0.7 * min(now, 1.0)
+        until = 1 - _LEADER * (1 - self.before[o] / now) * self.youth if o >= self.stem else 0.3 + 0.7 * min(now, 1.0)
         more = _MORE if o == self.stem and order.forks.high > 0 else 1.0
         flowers = float(np.clip((self.years / max(self.ages.flowers, 1e-9) - 0.7) / 0.6, 0, 1))
         if self.one.spur is not None and self.one.spur.leaf_kind == "leaf":
             flowers = 1.0
-        extra = _EXTRA if self.stem <= o < self.last and order.branch_start.mean < _ROSETTE else 0.0
+        tier = o - self.stem
+        extra = _EXTRA[tier] if 0 <= tier < len(_EXTRA) and order.branch_start.mean < _ROSETTE else 0.0
         laterals = self._nodes(o, order.branch_start.mean, more, until, self._kept(o), 1.0, extra, self.fresh)
         spurs = self._nodes(o, order.spur_start.mean, 1.0, 1.0, factor=0.0 if self.dead else flowers)
         return [laterals, spurs, self._dead_nodes(o)]
@@ -340,8 +348,8 @@ class _Aged:
         ratios = np.array([now, 1.0]) * self.whole[o] / long
         fade, full = np.clip(1 - np.log(np.maximum(ratios, 1e-9)) / np.log(_LEAFY), 0, 1).tolist()
         start = twig.leaf_start.mean
-        if o == self.stem:
-            start = max(start, self.before[o] / now)  # of a trunk the shoot of this year
+        if o == self.stem:  # of a trunk the shoot of this year
+            start, fade = max(start, 1 - _LEADER * (1 - self.before[o] / now)), max(fade, self.youth)
         number = twig.leaves.mean * self.whole[o] * now / long * (1 - start) * max(fade - full, 0.0)
         number = self.leafless * max(number, _FIRST * fade * (o == self.stem))
         if number <= own:

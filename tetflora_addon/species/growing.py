@@ -48,7 +48,7 @@ class Ages:
     lifespan: float = 200.0
     decline: float = 0.75
     base: float = 2.0
-    spread: float = 0.8
+    spread: float = 0.72
     flowers: float = 10.0
     scaled: bool = False
     source: str = ""
