@@ -23,6 +23,7 @@ def frames(folder, refined, expanded):
         for state, value in zip(STATES, grey, strict=True):
             picture = Image.fromarray(np.full((16, 16, 3), value, np.uint8))
             picture.save(year_frames._path(folder, state, kind))
+    Image.fromarray(np.full((16, 16, 3), 255, np.uint8)).save(folder / "nothing.png")
     return year_frames.figures(folder, SERIES, {year_frames._key(state): TIMES for state in STATES})
 
 
@@ -42,6 +43,7 @@ def test_a_pop_of_proxies_counts_where_it_is(tmp_path, clean_file):
     found = frames(tmp_path, (60, 60, 120), (60, 60, 60))
     assert found["year_flip_steps_max"] > 0.1 and found["year_flip_steps_max_at"] == 11.0
     assert found["year_flip_other_change_max"] > 0.1
+    assert found["year_flip_steps_max_where_plants"] == pytest.approx(found["year_flip_steps_max"])
 
 
 def test_digests_are_of_what_was_made(clean_file):
