@@ -58,6 +58,21 @@ def bears_needles(species: Species) -> bool:
     return species.leaf_transmission < NEEDLES
 
 
+def leaf_area(species: Species) -> float:
+    """Area of one leaf of a patch of litter, m², of a species that has leaves."""
+    bearing = [order for order in species.orders if order.leaves.mean > 0 and order.leaf_kind == LEAF_KINDS[0]]
+    size = max(order.leaf_size.mean for order in bearing)
+    if bears_needles(species):
+        return _HANDFUL * _needle(size) * _NEEDLE
+    areas = [form.area for form in species.leaf if isinstance(form, LeafModel)]
+    return size**2 * (sum(areas) / len(areas) if areas else 0.4)
+
+
+def _needle(size: float) -> float:
+    """Length of needles on the ground: shoots fall apart, so single ones lie there, a handful to a leaf."""
+    return min(max(0.12 * size, 0.016), 0.045)
+
+
 def litter_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | None:
     """The page of a patch of fallen leaves, or of needles, twigs and cones; None of a species without leaves.
 
@@ -70,14 +85,10 @@ def litter_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | N
     bearing = [order for order in species.orders if order.leaves.mean > 0 and order.leaf_kind == LEAF_KINDS[0]]
     if not bearing:
         return None
-    size = max(order.leaf_size.mean for order in bearing)
-    needles = bears_needles(species)
-    areas = [form.area for form in species.leaf if isinstance(form, LeafModel)]
-    area = size**2 * (sum(areas) / len(areas) if areas else 0.4)
-    # Shoots fall apart: on the ground lie single needles, a handful to a leaf of the patch.
-    needle = min(max(0.12 * size, 0.016), 0.045)
+    size, needles = max(order.leaf_size.mean for order in bearing), bears_needles(species)
+    area, needle = leaf_area(species), _needle(size)
     if needles:
-        size, area = _STREWN, _HANDFUL * needle * _NEEDLE
+        size = _STREWN
     number = min(max(_COVERED * pi * _RADIUS[1] ** 2 / area, _LEAVES[0]), _LEAVES[1])
     radius = min(max(sqrt(number * area / (_COVERED * pi)), _RADIUS[0], 1.3 * size), _RADIUS[1])
     if needles:

@@ -14,8 +14,11 @@ from tests.engine import support
 from tetflora_addon.compiled.crowns import crown_of
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.emission.plants import expanded_blocks
+from tetflora_addon.growth.growth import trunks
+from tetflora_addon.growth.seasons import Season
 from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.species.catalogue import builtin_folder, load_species
+from tetflora_addon.species.fallen import leaves_page, shed_share
 from tetflora_addon.species.litter import FALLEN
 from tetflora_addon.species.members import expected_polygons
 from tetflora_addon.species.schema import species_from_dict
@@ -102,3 +105,49 @@ def test_a_leaf_that_is_an_object_stays_one():
     made = FALLEN["litter"](replace(load_species("beech"), leaf=("My leaf",)), page)
     assert made["leaf"] == [{"object": "My leaf"}]
     species_from_dict(made, "beech_litter", "page")
+
+
+def _leaves(name: str):
+    page = leaves_page(load_species(name), json.loads((builtin_folder() / f"{name}.json").read_text("utf-8")))
+    return None if page is None else species_from_dict(json.loads(json.dumps(page)), f"{name}_leaves", "page")
+
+
+def _on_day(species, day: float) -> tuple[float, np.ndarray]:
+    """Mean area of the leaves of plants on a day, m², and their mean color."""
+    flora, many = compile_species([species]).in_year(Season(day)), 300
+    frames = np.repeat(np.eye(3)[None], many, axis=0)
+    seeds = Seeds(("one",), np.zeros(many, np.int32), np.arange(many), np.zeros((many, 3)), frames, np.ones(many))
+    plants = trunks(flora.rows, seeds)
+    areas = flora.leaf_areas(plants)
+    return float(areas.mean()), np.average(flora.leaf_colours(plants), axis=0, weights=areas + 1e-12)
+
+
+@pytest.mark.parametrize("name", support.SPECIES)
+def test_leaves_fall_from_what_is_bare_in_winter(name):
+    living, fallen = load_species(name), _leaves(name)
+    assert (fallen is None) == (shed_share(living) == 0.0)
+    if fallen is not None:
+        assert 20 < expected_polygons(fallen) < 3000
+        assert living.year.leaf.turnover >= 0.9
+
+
+@pytest.mark.parametrize("name", ["oak", "birch", "maple", "larch", "beech"])
+@pytest.mark.parametrize("day", [270, 290, 300, 310, 330, 360])
+def test_what_is_no_longer_on_the_trees_is_on_the_ground(name, day):
+    living, fallen = load_species(name), _leaves(name)
+    summer = _on_day(living, 196)[0]
+    patches = summer * shed_share(living) / crown_of(fallen).leaves
+    assert _on_day(living, day)[0] + patches * _on_day(fallen, day)[0] == pytest.approx(summer, rel=0.03)
+
+
+@pytest.mark.parametrize("name", ["oak", "birch", "maple", "larch", "beech"])
+def test_fallen_leaves_have_the_colors_of_autumn_and_turn_brown_and_are_gone_before_summer(name):
+    living, fallen = load_species(name), _leaves(name)
+    colours = np.array(living.year.leaf.autumn)
+    first, late = (_on_day(fallen, day)[1] for day in (living.year.leaf.fall - 5, living.year.leaf.fall + 90))
+    assert (first > 0.5 * colours.min(axis=0)).all() and (first < colours.max(axis=0)).all()
+    litter = np.array(_species(name, "litter").orders[1].leaf_colour.mean)
+    if name != "larch":  # whose needles are darker than leaves
+        np.testing.assert_allclose(late, litter, atol=0.02)
+    for day in (152, 196, 250):
+        assert _on_day(fallen, day)[0] == 0.0
