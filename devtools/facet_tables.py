@@ -2,51 +2,78 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Make the table of facet weights of the shipped species: ``python -m devtools.facet_tables [--anew]``.
 
-A fit takes up to a minute a species; those that have not changed since are kept.
+Each species is measured as described, with fewer leaves, and at other ages (`proxies.weight_variants`). A fit takes up
+to a minute; those that have not changed since are kept, and what is done is written all the time.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from typing import Any
 
-from tetflora_addon.compiled.flora import compile_species
+import numpy as np
+
+from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.jobs import at_once
 from tetflora_addon.proxies import facet_weights
+from tetflora_addon.proxies.weight_variants import variants
 from tetflora_addon.species.catalogue import list_species, load_species
+
+#: Blocked rays from which weights of variants follow; those of species as described follow from all.
+_RAYS = 40_000.0
+_WRITTEN = 20.0  # seconds from one writing to the next
 
 
 def main(anew: bool) -> None:
-    """Fit the species that the table does not have as they are now, or all anew; it is written after each of them."""
+    """Fit what the table does not have as it is now, or all anew."""
     facet_weights.TABLE.parent.mkdir(exist_ok=True)
-    before = {} if anew else facet_weights.shipped()
-    digests = {name: facet_weights.digest(compile_species([load_species(name)]), 0) for name in sorted(list_species())}
-    table = {digest: before[digest] for digest in digests.values() if digest in before}
-    missing = [name for name, digest in digests.items() if digest not in table]
+    before = {} if anew else _written()
+    table, missing = {}, []
+    for name in sorted(list_species()):
+        for number, (label, flora) in enumerate(variants(load_species(name))):
+            digest = facet_weights.digest(flora, 0)
+            if digest in before:
+                table[digest] = {**before[digest], "species": label}
+            else:
+                missing.append((name, number))
+    print(f"{len(table)} known, {len(missing)} to do", flush=True)
+    last = time.monotonic()
     with ProcessPoolExecutor() as pool:
-        for done in as_completed([pool.submit(_fitted, name) for name in missing]):
+        for done in as_completed([pool.submit(_fitted, *one) for one in missing]):
             digest, weights = done.result()
             table[digest] = weights
-            _write(table)
             print(weights["species"], flush=True)
+            if time.monotonic() - last > _WRITTEN:
+                _write({**before, **table})
+                last = time.monotonic()
     _write(table)
 
 
-def _fitted(identifier: str) -> tuple[str, dict]:
-    """The line of one species, with its digest."""
-    flora = compile_species([load_species(identifier)])
-    whole, own = at_once(facet_weights.fitting(flora, 0))
-    return facet_weights.digest(flora, 0), {
-        "species": identifier,
-        "whole": whole.round(3).tolist(),
-        "own": own.round(3).tolist(),
-    }
+def _written() -> dict[str, Any]:
+    try:
+        return json.loads(facet_weights.TABLE.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return {}
+
+
+def _fitted(identifier: str, number: int) -> tuple[str, dict]:
+    """The line of one variant of a species, with its digest."""
+    label, flora = list(variants(load_species(identifier)))[number]
+    return facet_weights.digest(flora, 0), {"species": label, **_weights(flora, number == 0)}
+
+
+def _weights(flora: Flora, described: bool) -> dict[str, Any]:
+    whole, own = at_once(facet_weights.fitting(flora, 0, np.inf if described else _RAYS))
+    digits = 3 if described else 2
+    return {"whole": whole.round(digits).tolist(), "own": own.round(digits).tolist()}
 
 
 def _write(table: dict[str, dict]) -> None:
-    """In the order of the catalogue, a line for each species."""
-    ordered = dict(sorted(table.items(), key=lambda item: item[1]["species"]))
+    """In the order of the catalogue, a line for each variant."""
+    ordered = dict(sorted(table.items(), key=lambda item: (item[1]["species"].split()[0], item[1]["species"])))
     facet_weights.TABLE.write_text(json.dumps(ordered, separators=(",", ":")).replace('},"', '},\n"') + "\n")
 
 

@@ -16,8 +16,7 @@ Sub-plants are tested together with all that grow around them, of any parent, be
 across the gaps between neighbours. Next siblings alone asked for up to a twentieth more area, and made aspens too
 dense. Facets of pieces are compared in the same way with what branches themselves bear.
 
-Plants with fewer leaves have greater weights, as less hides behind them. So the same is measured of plants that have
-some of their leaves, and none: what a day of the year leaves lies between two of these.
+What a day of the year or another age makes of a species lies between variants that are measured, `weight_variants`.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled.flora import Flora, compile_species
+from ..compiled.flora import Flora
 from ..growth.branches import Branches
 from ..growth.envelopes import are_solids
 from ..growth.growth import trunks
@@ -39,10 +38,10 @@ from ..growth.hashing import mix
 from ..growth.seeds import Seeds
 from ..jobs import at_once
 from ..species.fingerprints import fingerprint
-from ..species.species import Order, Range, Species
 from ..storage import remembered
 from ..subplants.pieces import open_subplants
 from .sights import FAMILIES, LARGEST, Families, View, least_weights, look
+from .weight_variants import SHARES, needed, states_of, weights_of
 
 #: Weights of the shipped species, made by ``python -m devtools.facet_tables``. Raise `_METHOD` when facets or weights
 #: are made differently.
@@ -63,10 +62,6 @@ _COPIES = 16
 RAYS, _PAIRS = 6_000.0, 40.0
 #: Name of the results in the cache folder. The first method, with all rays, had another.
 _KIND = "facet_shares"
-
-
-#: Parts of their leaves that plants have, of which weights are measured.
-SHARES = (1.0, 0.4, 0.1, 0.0)
 
 
 @dataclass(frozen=True)
@@ -141,52 +136,26 @@ def facet_weights(flora: Flora, species: Collection[int] | None = None) -> Facet
     return _of_states(flora.in_leaf, tuple((number, states_of(flora, number)) for number in every))
 
 
-def states_of(flora: Flora, number: int) -> tuple[int, ...]:
-    """Indices of `SHARES` between which plants of a species are on the day of a flora; those in summer have all."""
-    if flora.day is None:
-        return (0,)
-    low, high = flora.day.share_range(flora.rows, number)
-    shares = np.array(SHARES)
-    first = int(np.flatnonzero(shares >= high - 1e-9)[-1])
-    last = int(np.flatnonzero(shares <= low + 1e-9)[0])
-    return tuple(range(first, last + 1))
-
-
 @lru_cache(maxsize=8)
 def _of_states(flora: Flora, species: tuple[tuple[int, tuple[int, ...]], ...]) -> FacetWeights:
     number = 1 + max((state for _, states in species for state in states), default=0)
     weights = np.ones((2, number, len(flora.rows), len(COUNTS)))
     for one, states in species:
-        for state in states:
-            some, index = with_leaves(flora, one, SHARES[state])
-            at_once(_measuring(some, index))
-            weights[:, state, flora.rows["species"] == one] = _known(some, index)
+        found = weights_of(flora, one, states, _found_of)
+        weights[:, : found.shape[1], flora.rows["species"] == one] = found
     return FacetWeights(*weights, are_solids(flora.rows))
 
 
-def with_leaves(flora: Flora, number: int, share: float) -> tuple[Flora, int]:
-    """A flora in which plants of a species have a part of their leaves, and its index there."""
-    return (flora, number) if share == 1.0 else (_thinned(flora.species[number], share), 0)
-
-
-@lru_cache(maxsize=64)
-def _thinned(species: Species, share: float) -> Flora:
-    # What is compiled has its quality and habit already.
-    bare = replace(species, quality=1.0, habit=0.0, orders=tuple(_with_part(o, share) for o in species.orders))
-    if species.spur is not None:
-        bare = replace(bare, spur=_with_part(species.spur, share))
-    return compile_species([bare])
-
-
-def _with_part(order: Order, share: float) -> Order:
-    return replace(order, leaves=Range(share * order.leaves.mean, share * order.leaves.variation))
+def _found_of(flora: Flora, number: int) -> NDArray[np.float64]:
+    """Weights (2, r, k) of one species, measured if need be."""
+    at_once(_measuring(flora, number))
+    return _known(flora, number)
 
 
 def unmeasured(flora: Flora) -> list[int]:
     """Species (index) whose weights, as of the day of the flora, nobody has measured yet."""
-    plain = flora.in_leaf
-    every = [(number, states_of(flora, number)) for number in range(len(flora.species))]
-    return [n for n, states in every if any(_known(*with_leaves(plain, n, SHARES[s])) is None for s in states)]
+    every = range(len(flora.species))
+    return [n for n in every if any(_known(*variant) is None for variant in needed(flora, n))]
 
 
 def measuring(flora: Flora, species: Collection[int]) -> Generator[tuple[str, float], None, None]:
@@ -198,10 +167,10 @@ def measuring(flora: Flora, species: Collection[int]) -> Generator[tuple[str, fl
         Name of the species at work, and the fraction of its measurement that is done.
     """
     for number in sorted(set(species) & set(unmeasured(flora))):
-        states = states_of(flora, number)
-        for i, state in enumerate(states):
-            for name, done in _measuring(*with_leaves(flora.in_leaf, number, SHARES[state])):
-                yield name, (i + done) / len(states)
+        every = needed(flora, number)
+        for i, variant in enumerate(every):
+            for name, done in _measuring(*variant):
+                yield name, (i + done) / len(every)
 
 
 def _measuring(flora: Flora, number: int) -> Generator[tuple[str, float], None, None]:
@@ -224,7 +193,7 @@ def _known(flora: Flora, number: int) -> NDArray[np.float64] | None:
     name = digest(flora, number)
     table = shipped().get(name)
     if table is not None:
-        return np.array([table["whole"], table["own"]])
+        return table.astype(np.float64)
     if name not in _found:
         rows = int((flora.rows["species"] == number).sum())
         try:
@@ -250,12 +219,13 @@ def digest(flora: Flora, number: int) -> str:
 
 
 @cache
-def shipped() -> dict[str, dict[str, list[list[float]]]]:
-    """Weights of the shipped species by `digest`: ``whole`` and ``own`` (r, k) as lists, and their ``species``."""
+def shipped() -> dict[str, NDArray[np.float32]]:
+    """Weights (2, r, k) of the shipped species and their variants by `digest`."""
     try:
-        return json.loads(TABLE.read_text(encoding="utf-8"))
+        table = json.loads(TABLE.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return {}
+    return {digest: np.array([one["whole"], one["own"]], np.float32) for digest, one in table.items()}
 
 
 def fitting(flora: Flora, number: int, rays: float = np.inf) -> Generator[float, None, NDArray[np.float64]]:

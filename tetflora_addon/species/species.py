@@ -278,6 +278,8 @@ class Species:
         Every plant is the same: ranges have their means, and seeds do not matter.
     form : Skeleton or None
         Trunk and lower orders modelled by hand; only the orders above are grown.
+    aged : (Species, float) or None
+        Of what, and at how many years, this is another age; see `ages.with_age`.
     year : Year or None
         When leaves appear, turn and fall.
     ages : Ages or None
@@ -301,6 +303,7 @@ class Species:
     stand_leaves: float = 1.0
     exact: bool = False
     form: Skeleton | None = None
+    aged: tuple[Species, float] | None = None
     year: Year | None = None
     ages: Ages | None = None
 
