@@ -160,3 +160,28 @@ def test_dates_are_those_published(date: dict[str, Any]) -> None:
 def test_curves_are_of_four_species_at_least_and_of_all_that_are_named() -> None:
     assert len({course["species"] for course in COURSES}) >= 4
     assert {"beech", "oak", "birch", "maple"} <= {course["species"] for course in COURSES}
+
+
+@pytest.mark.parametrize(
+    ("name", "there", "gone"),
+    [
+        ("cherry_blossom", 110.0, 135.0),
+        ("wood_sorrel", 119.0, 160.0),
+        ("flower", 190.0, 280.0),
+        ("grass", 190.0, 130.0),
+        ("hazel", 230.0, 300.0),
+        ("rowan", 250.0, 130.0),
+        ("reed", 300.0, 170.0),
+        ("silver_fir", 220.0, 320.0),
+        ("prickly_pear", 260.0, 100.0),
+    ],
+)
+def test_blossoms_and_fruit_have_their_season(name: str, there: float, gone: float) -> None:
+    blossom = load_species(name).year.blossom
+    assert expect(blossom, there, PRESENT) >= 0.8
+    assert expect(blossom, gone, PRESENT) <= blossom.kept + 0.05
+
+
+def test_a_cherry_blooms_before_its_leaves() -> None:
+    year = load_species("cherry_blossom").year
+    assert leaf_area.leaf_area(year, year.leaf, np.array([year.blossom.appear + 5.0]))[0] < 0.15
