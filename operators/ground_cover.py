@@ -8,6 +8,7 @@ import bpy
 from bpy.props import BoolProperty
 
 from ..tetflora_addon.blender.placing.cover import Covered, cover_steps, covered_population
+from ..tetflora_addon.blender.placing.fallen import strew_steps
 from ..tetflora_addon.blender.placing.ground_snow import cover_with_snow
 from ..tetflora_addon.blender.placing.rules import active_population
 from ..tetflora_addon.blender.viewport import points
@@ -35,9 +36,19 @@ class TETFLORA_OT_ground_cover(ModalJob, bpy.types.Operator):
         default=True,
     )
 
+    fallen: BoolProperty(
+        name="Fallen Leaves",
+        description="With Seasons on, strew in a population of their own the leaves that the plants above shed in "
+        "autumn, as many as are no longer on them",
+        default=True,
+    )
+
     def steps(self, context: bpy.types.Context) -> Generator[Progress, bool | None, Covered]:
         scene, depsgraph = context.scene, context.evaluated_depsgraph_get()
-        return cover_steps(scene, depsgraph, covered_population(scene), self.soil)
+        made = yield from cover_steps(scene, depsgraph, covered_population(scene), self.soil)
+        if self.fallen and scene.tetflora.year.enabled:
+            yield from strew_steps(scene, depsgraph, covered_population(scene))
+        return made
 
     def finish(self, context: bpy.types.Context, result: Covered) -> set[str]:
         points.schedule()
@@ -66,7 +77,7 @@ class TETFLORA_OT_ground_snow(Reporting, bpy.types.Operator):
         found = cover_with_snow(context.scene, covered_population(context.scene))
         if not found:
             return self.refused("The materials of the ground have snow already")
-        return self.done(f"{counted(len(found), 'material')} can have snow; set Snow under Year")
+        return self.done(f"{counted(len(found), 'material')} can have snow; set Snow under Year and Age")
 
 
 CLASSES = (TETFLORA_OT_ground_cover, TETFLORA_OT_ground_snow)

@@ -24,6 +24,9 @@ _PATCHES = 2**34  # keys of patches, away from those of plants and clumps
 _LEAVES, _WOOD = 1.2, 3.0
 #: Fraction of low plants that dense litter smothers.
 _SMOTHERED = 0.45
+#: Leaves that lie on what is wholly suited to those that have just fallen, m² on a square meter: hardly any place under
+#: any wood gets more.
+FULL = 20.0
 #: Roots and shadow of a dense crown leave this much of what wants shade.
 _LEAST = 0.15
 
@@ -37,11 +40,12 @@ class Habitat(Enum):
     SHADE = (1.8, 0.85)
     LITTER = (1.1, 0.45)
     DEAD_WOOD = (6.0, 0.5)
+    FALLEN = (1.0, 0.0)
 
     @property
     def falls(self) -> bool:
         """Whether it lies where it fell, and does not grow."""
-        return self in (Habitat.LITTER, Habitat.DEAD_WOOD)
+        return self in (Habitat.LITTER, Habitat.DEAD_WOOD, Habitat.FALLEN)
 
 
 @dataclass(frozen=True)
@@ -96,6 +100,8 @@ class Floor:
             if species is not None and not 0 <= species < len(self.fallen):
                 return np.zeros(len(light))
             own = whole if species is None else self.fallen[species]
+            if habitat is Habitat.FALLEN:  # in the same amount, not only where they hide the ground
+                return np.minimum(own / FULL, 1.0)
             covered = 1.0 - np.exp(-whole / (_LEAVES if habitat is Habitat.LITTER else _WOOD))
             return covered * own / np.maximum(whole, 1e-12)
         return np.ones(len(light))

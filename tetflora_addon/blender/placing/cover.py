@@ -23,6 +23,7 @@ from ...growth.hashing import child_key, key_of_seed, uniform
 from ...jobs import Progress
 from ...planting.canopy import Canopy
 from ...planting.cover import Floor, Habitat, Stratum, covered, tinted
+from ...species.fallen import KIND, leaves_page
 from ...species.litter import FALLEN
 from ..materials.soil import is_soil, soil_material
 from ..runtime import JobData, guarded, is_there
@@ -52,9 +53,10 @@ MOST = 1_000_000
 #: Lower plants shed nothing that would be seen, meters.
 _SHEDS = 1.2
 #: What is covered where the plants above are of no population.
-_ANYBODY = "plants"
+ANYBODY = "plants"
 #: Fraction of the work after which plants are placed, and what is done before.
-_PLANTING, _UNDER = 0.7, "Light and litter under the plants"
+_PLANTING, UNDER = 0.7, "Light and litter under the plants"
+_PAGES = {**FALLEN, KIND: leaves_page}
 #: Soil without anything on it, linear RGB.
 HUMUS = np.array([0.036, 0.025, 0.016])
 #: How bright low plants are together, of how bright one blade is.
@@ -62,7 +64,7 @@ _SHADED = 0.72
 
 
 @dataclass(frozen=True)
-class _Part:
+class Part:
     """One species of a cover."""
 
     species: str
@@ -136,9 +138,9 @@ def _cover_steps(
     grounds: Iterable[bpy.types.Object] | None,
     masks: Mapping[str, Any],
 ) -> Generator[Progress, object, Covered]:
-    yield (progress := Progress(0.0, _UNDER))
-    uid = population.uid or _ANYBODY
-    found = _cover_of(scene, uid)
+    yield (progress := Progress(0.0, UNDER))
+    uid = population.uid or ANYBODY
+    found = cover_of(scene, uid)
     if found is not None:
         refuse_frozen(found)
     grounds = grounds_of(scene, population) if grounds is None else list(grounds)
@@ -148,38 +150,38 @@ def _cover_steps(
         )
     data.add_objects(grounds)
     yield from crown_steps(progress, scene, standing(scene))
-    population = _again(data, scene, population, uid)
+    population = again(data, scene, population, uid)
     own = {name: getattr(population, name) for name in MASKS} | dict(masks)
     ground = read_ground(grounds, depsgraph, **own)
     canopy, above = canopy_of(scene, depsgraph)
     if not len(canopy):
         raise SceneError(f'"{population.name}" has no plants whose ground could be covered; click Update first')
-    yield (progress := Progress(0.05, _UNDER))
+    yield (progress := Progress(0.05, UNDER))
     floor = yield from steps_in_thread(_told(floor_steps(canopy, ground.triangles, len(above))), progress)
     yield Progress(_PLANTING, "Planting")
-    population = _again(data, scene, population, uid)
-    with _restored(scene, uid):
+    population = again(data, scene, population, uid)
+    with restored(scene, uid):
         parts = _parts(scene, canopy, above)
-        found = _cover_of(scene, uid) or _add(scene, population, grounds, masks)
-        _mix(found, parts, ground.map_area)
+        found = cover_of(scene, uid) or add_cover(scene, population, grounds, masks)
+        mix(found, parts, ground.map_area)
         with closing(make_plants_steps(scene, depsgraph, found)) as steps:
             made = yield from _scaled(steps, _PLANTING)
-        bare = _lay_soil(scene, _cover_of(scene, uid), grounds, floor, above, ground.map_area) if soil else []
+        bare = _lay_soil(scene, cover_of(scene, uid), grounds, floor, above, ground.map_area) if soil else []
     return Covered(made, bare)
 
 
-def _again(
+def again(
     data: JobData, scene: bpy.types.Scene, population: bpy.types.PropertyGroup, uid: str
 ) -> bpy.types.PropertyGroup:
     """A population, fetched again after others may have been added; settings for new ones stay where they are."""
-    return population if uid == _ANYBODY else still_there(data, scene, uid)
+    return population if uid == ANYBODY else still_there(data, scene, uid)
 
 
 def _told(steps: Generator[float, object, Floor]) -> Generator[Progress, object, Floor]:
     """The maps, with their progress as a part of the whole."""
     while True:
         try:
-            yield Progress(0.05 + (_PLANTING - 0.05) * next(steps), _UNDER)
+            yield Progress(0.05 + (_PLANTING - 0.05) * next(steps), UNDER)
         except StopIteration as stop:
             return stop.value
 
@@ -195,15 +197,15 @@ def _scaled(steps: Generator[Progress, object, Made], begin: float) -> Generator
 
 
 @contextmanager
-def _restored(scene: bpy.types.Scene, uid: str) -> Iterator[None]:
+def restored(scene: bpy.types.Scene, uid: str, fallen: bool = False) -> Iterator[None]:
     """Where what is done ends early, forget a cover that is new, or what was added to one, and species of litter."""
-    group, found = scene.tetflora, _cover_of(scene, uid)
+    group, found = scene.tetflora, cover_of(scene, uid, fallen)
     active, species = group.populations_index, {edit.identifier for edit in group.species_edits}
     there, density = (len(found.mix), found.density) if found else (0, 0.0)
     try:
         yield
     except BaseException:  # an error, or Esc
-        cover = _cover_of(scene, uid) if is_there(scene) else None
+        cover = cover_of(scene, uid, fallen) if is_there(scene) else None
         if cover is not None and found is None:
             forget_population(scene, cover.uid, active)
         elif cover is not None:
@@ -216,19 +218,32 @@ def _restored(scene: bpy.types.Scene, uid: str) -> Iterator[None]:
         raise
 
 
-def _cover_of(scene: bpy.types.Scene, uid: str) -> bpy.types.PropertyGroup | None:
-    return next((p for p in scene.tetflora.populations if p.covers == uid or (p.uid == uid and is_cover(p))), None)
+def cover_of(scene: bpy.types.Scene, uid: str, fallen: bool = False) -> bpy.types.PropertyGroup | None:
+    """What covers the ground of a population, or the leaves that fall on it in autumn."""
+    return next(
+        (
+            p
+            for p in scene.tetflora.populations
+            if _is_fallen(p) == fallen and (p.covers == uid or (p.uid == uid and is_cover(p)))
+        ),
+        None,
+    )
 
 
-def _add(
+def _is_fallen(population: bpy.types.PropertyGroup) -> bool:
+    return bool(population.mix) and all(entry.habitat == 'FALLEN' for entry in population.mix)
+
+
+def add_cover(
     scene: bpy.types.Scene,
     population: bpy.types.PropertyGroup,
     grounds: list[bpy.types.Object],
     masks: Mapping[str, Any],
+    name: str = NAME,
 ) -> bpy.types.PropertyGroup:
     """A population for the cover, on the same ground and within the same limits; the covered one stays active."""
     index, uid = scene.tetflora.populations_index, population.uid
-    cover = add_population(scene, grounds, name=NAME)
+    cover = add_population(scene, grounds, name=name)
     populations = scene.tetflora.populations
     # Fetched again: adding to a list moves what is in it.
     source = next((p for p in populations if p.uid == uid), None)
@@ -237,7 +252,7 @@ def _add(
         scene.tetflora.populations_index = index
     for name, value in masks.items():
         setattr(cover, name, value)
-    cover.covers, cover.as_field, cover.by_density, cover.density = uid or _ANYBODY, 'FIELD', True, 0.0
+    cover.covers, cover.as_field, cover.by_density, cover.density = uid or ANYBODY, 'FIELD', True, 0.0
     cover.min_distance, cover.distance_from = 0.0, 'OWN'
     cover.clumping = cover.edge_falloff = 0.0
     cover.scale_min, cover.scale_max, cover.scale_at_top, cover.tilt = 0.7, 1.25, 1.0, 1.0
@@ -246,22 +261,26 @@ def _add(
     return cover
 
 
-def _parts(scene: bpy.types.Scene, canopy: Canopy, above: tuple[str, ...]) -> list[_Part]:
+def _parts(scene: bpy.types.Scene, canopy: Canopy, above: tuple[str, ...]) -> list[Part]:
     """Species of a cover; those of what falls are made where the file does not have them."""
     known = catalogue()
-    parts = [_Part(*one) for one in GROWN if one[0] in known]
-    # Those that shed most come first.
-    leaves = np.bincount(canopy.species, canopy.area + 1e-6 * canopy.top, minlength=len(above))
-    tall = np.zeros(len(above))
-    np.maximum.at(tall, canopy.species, canopy.top)
-    order = [above[i] for i in np.argsort(-leaves, kind="stable") if tall[i] >= _SHEDS]
+    parts = [Part(*one) for one in GROWN if one[0] in known]
+    order = shedders(canopy, above)
     for kind, habitat, number, most in DROPPED:
-        made = [(name, fallen) for name in order if (fallen := _fallen(scene, name, kind))][:most]
-        parts += [_Part(fallen, habitat, number, name) for name, fallen in made]
+        made = [(name, fallen) for name in order if (fallen := fallen_from(scene, name, kind))][:most]
+        parts += [Part(fallen, habitat, number, name) for name, fallen in made]
     return parts
 
 
-def _fallen(scene: bpy.types.Scene, identifier: str, kind: str) -> str:
+def shedders(canopy: Canopy, above: tuple[str, ...]) -> list[str]:
+    """Species from which anything falls that is seen; those that shed most come first."""
+    leaves = np.bincount(canopy.species, canopy.area + 1e-6 * canopy.top, minlength=len(above))
+    tall = np.zeros(len(above))
+    np.maximum.at(tall, canopy.species, canopy.top)
+    return [above[i] for i in np.argsort(-leaves, kind="stable") if tall[i] >= _SHEDS]
+
+
+def fallen_from(scene: bpy.types.Scene, identifier: str, kind: str) -> str:
     """Identifier of what falls from a species, made if the file and the catalog do not have it; empty if nothing falls.
 
     One that is there stays as it is, because it may be the artist's own.
@@ -270,7 +289,7 @@ def _fallen(scene: bpy.types.Scene, identifier: str, kind: str) -> str:
     if name in catalogue():
         return name
     try:
-        page = FALLEN[kind](species_for(scene, identifier), species_data(scene, identifier))
+        page = _PAGES[kind](species_for(scene, identifier), species_data(scene, identifier))
     except TetFloraError:  # broken, or not there: Refine says so
         return ""
     if page is None or not is_identifier(name):
@@ -279,7 +298,7 @@ def _fallen(scene: bpy.types.Scene, identifier: str, kind: str) -> str:
     return name
 
 
-def _mix(cover: bpy.types.PropertyGroup, parts: list[_Part], area: float) -> None:
+def mix(cover: bpy.types.PropertyGroup, parts: list[Part], area: float) -> None:
     """Add what the mixture of a cover lacks; what it has stays as the artist left it."""
     there = {entry.species for entry in cover.mix}
     before = sum(entry.weight for entry in cover.mix)

@@ -40,6 +40,7 @@ HABITATS = (
     ('SHADE', "In Shade", "Under dense crowns", 3),
     ('LITTER', "Where Leaves Fall", "Under the crowns that shed it", 4),
     ('DEAD_WOOD', "Where Wood Falls", "Under the crowns that shed it, and around them", 5),
+    ('FALLEN', "As Leaves Fall", "In autumn under the crowns that shed it, as much as they shed", 6),
 )
 NOBODY = ("NONE", "None", "No companion", 'NONE', 0)
 

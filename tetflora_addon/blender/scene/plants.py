@@ -20,6 +20,7 @@ from ..attributes import frames_of, world_matrix
 from ..species.asset_species import asset_of, asset_species, find_asset, name_of
 from ..species.edits import catalogue
 from .ages import Part, classed
+from .fallen import gone_species
 from .fields import read_aged_field, read_field_matrices
 from .instances import name_keys
 from .objects import Copies, copies_of, may_instance, renderable_objects
@@ -58,7 +59,7 @@ def read_plants_of(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, view_layer: bpy.types.ViewLayer
 ) -> tuple[Seeds, tuple[tuple[str, int], ...]]:
     """The same, and the names of the objects that they belong to, in their order, each with the number of its own."""
-    assets = asset_species(scene)
+    assets = {*asset_species(scene), *gone_species(scene)}
     objects = sorted(renderable_objects(view_layer), key=lambda o: o.name_full)
     grouped = [(o, o.tetflora) for o in objects]  # asking an object for its group is half of the time
     grouped = [(o, group) for o, group in grouped if group.is_plant or group.is_field]
@@ -97,7 +98,7 @@ def _species(plant: bpy.types.Object) -> str:
 
 
 def _grown(part: Part, assets: Container[str]) -> Part:
-    """Plants without those whose species is an asset."""
+    """Plants without those whose species is an asset, or not there."""
     name, seeds, ages = part
     grows = np.array([species_of(kind) not in assets for kind in seeds.identifiers], bool)
     if grows.all():
