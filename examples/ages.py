@@ -28,14 +28,14 @@ from .seasons import LOOKS, sky
 
 ROOT = Path(__file__).resolve().parent.parent
 SPECIES, SEED = "oak", 1
-AGES = (4.0, 12.0, 30.0, 70.0, 150.0, 420.0)
-SIZE, SAMPLES = (1600, 620), 96
+AGES = (5.0, 12.0, 25.0, 60.0, 150.0, 205.0)
+SIZE, SAMPLES = (1600, 470), 96
 #: Room between crowns, and before the first and behind the last, metres; sides of the meadow and of its nearer part.
-_BETWEEN, _BESIDE = 2.2, 3.0
-_SIDE, _VIEW, _EYE = 260.0, radians(26.0), 2.4
+_BETWEEN, _BESIDE = 1.2, 1.6
+_SIDE, _VIEW, _EYE = 560.0, radians(26.0), 2.2
 #: Trees that close the view: species, how far away, and how many.
-_BEHIND, _AWAY, _MANY = ("beech", "birch", "hornbeam", "spruce", "maple"), (105.0, 175.0), 150
-_GREY = 0.44
+_BEHIND, _AWAY, _MANY = ("beech", "birch", "hornbeam", "spruce", "maple"), (270.0, 330.0), 240
+_GREY = 0.5
 _FIGURE = 1.7
 #: Joints of the figure, in its heights: x, y, z and radius, of the spine, and of a leg and an arm; and what it wears.
 _SPINE = (
@@ -65,16 +65,17 @@ def build(scene: bpy.types.Scene, size: tuple[int, int]) -> list[tuple[float, st
     from tetflora_addon.species import ages, catalogue
 
     from .daylight import add_daylight
+    from .haze import add_haze
 
     species = catalogue.load_species(SPECIES)
     crowns = [crown_of(ages.with_age(species, age)) for age in AGES]
     radius = np.array([max(crown.radius, 0.4) for crown in crowns])
-    middle = np.cumsum(np.concatenate([[_BESIDE + radius[0] + 2.0], radius[:-1] + radius[1:] + _BETWEEN]))
+    middle = np.cumsum(np.concatenate([[_BESIDE + radius[0] + 2.6], radius[:-1] + radius[1:] + _BETWEEN]))
     width = middle[-1] + radius[-1] + _BESIDE
     for age, x in zip(AGES, (middle - width / 2).tolist(), strict=True):
         _plant(scene, SPECIES, SEED, (x, 0.0), age)
     first, second = (middle[:2] - width / 2).tolist()
-    scene.collection.objects.link(_figure((first - 1.4 - float(radius[0]), -0.6)))
+    scene.collection.objects.link(_figure((first - 1.7 - float(radius[0]), -0.6)))
     _pole((second - 1.1 - float(radius[1]), -0.3))
     _close_view(scene)
     distance = width / 2 / tan(_VIEW / 2)
@@ -82,14 +83,17 @@ def build(scene: bpy.types.Scene, size: tuple[int, int]) -> list[tuple[float, st
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.data.sensor_fit, camera.data.angle, camera.data.clip_end = 'HORIZONTAL', _VIEW, 2000.0
     camera.location, camera.rotation_euler = (0.0, -distance, _EYE), (pi / 2, 0.0, 0.0)
-    # The ground at the trees' feet lies a tenth above the lower edge.
-    camera.data.shift_y = 0.39 * size[1] / size[0] - _EYE / width
+    # The trees' feet are a fifth above the lower edge.
+    camera.data.shift_y = 0.3 * size[1] / size[0] - _EYE / width
     scene.collection.objects.link(camera)
     scene.camera = camera
     add_daylight(scene, elevation=44.0, azimuth=50.0)
     sun = next(o for o in scene.objects if o.type == 'LIGHT').data
     sun.energy, sun.color = 5.0, (1.0, 0.94, 0.85)
     scene.world = sky(LOOKS["summer"])
+    ground = next(o for o in scene.objects if o.type == 'MESH' and o.name.startswith("Grid"))
+    ground.name = "Ground"
+    add_haze(scene, 0.0009, LOOKS["summer"].haze[1])
     heights = [crown.height for crown in crowns]
     return [
         (float(x / width), f"{age:g} years\n{height:.1f} m")
@@ -118,9 +122,9 @@ def _meadow(scene: bpy.types.Scene, distance: float) -> None:
     from tetflora_addon.blender.placing.cover import cover_steps
     from tetflora_addon.blender.worker import at_once
 
-    bpy.ops.mesh.primitive_grid_add(x_subdivisions=90, y_subdivisions=90, size=1.6 * _SIDE, location=(0, 70.0, 0))
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=90, y_subdivisions=90, size=1.2 * _SIDE)
     ground = bpy.context.object
-    ground.location.y = 0.8 * _SIDE - distance - 12.0
+    ground.location.y = 0.6 * _SIDE - distance + 30.0
     bpy.context.view_layer.update()
     steps = cover_steps(scene, bpy.context.evaluated_depsgraph_get(), scene.tetflora.populate, grounds=[ground])
     at_once(steps)

@@ -70,38 +70,38 @@ class Look:
 
 LOOKS = {
     "winter": Look(
-        18.0, 1.0, (13.0, 232.0), 4.2, (1.0, 0.80, 0.60),
-        ((0.86, 0.84, 0.86), (0.48, 0.60, 0.80), (0.16, 0.28, 0.52)), 0.75, 0.3, (0.0011, (0.66, 0.72, 0.82)), 0.50,
+        18.0, 1.0, (13.0, 232.0), 4.6, (1.0, 0.78, 0.56),
+        ((0.92, 0.86, 0.82), (0.44, 0.58, 0.82), (0.10, 0.22, 0.48)), 0.8, 0.45, (0.0008, (0.66, 0.72, 0.82)), 0.50,
     ),
     "spring": Look(
-        121.0, 0.0, (40.0, 236.0), 5.0, (1.0, 0.94, 0.84),
-        ((0.78, 0.86, 0.95), (0.38, 0.56, 0.86), (0.10, 0.24, 0.56)), 0.8, 0.45, (0.0005, (0.55, 0.66, 0.80)), 0.42,
+        114.0, 0.0, (40.0, 236.0), 5.0, (1.0, 0.94, 0.84),
+        ((0.76, 0.86, 0.96), (0.26, 0.48, 0.86), (0.05, 0.17, 0.50)), 0.85, 0.6, (0.0005, (0.50, 0.64, 0.82)), 0.45,
     ),
     "summer": Look(
         200.0, 0.0, (52.0, 240.0), 5.2, (1.0, 0.95, 0.86),
-        ((0.74, 0.84, 0.95), (0.34, 0.53, 0.86), (0.08, 0.21, 0.54)), 0.8, 0.35, (0.0006, (0.55, 0.66, 0.80)), 0.40,
+        ((0.72, 0.84, 0.96), (0.22, 0.44, 0.86), (0.04, 0.15, 0.48)), 0.85, 0.5, (0.0005, (0.50, 0.64, 0.82)), 0.43,
     ),
     "autumn": Look(
-        288.0, 0.0, (24.0, 238.0), 4.8, (1.0, 0.88, 0.70),
-        ((0.86, 0.86, 0.86), (0.46, 0.60, 0.82), (0.14, 0.28, 0.54)), 0.75, 0.4, (0.0014, (0.66, 0.68, 0.72)), 0.42,
+        292.0, 0.0, (24.0, 238.0), 5.0, (1.0, 0.86, 0.66),
+        ((0.88, 0.86, 0.84), (0.36, 0.53, 0.82), (0.08, 0.22, 0.50)), 0.8, 0.5, (0.0009, (0.66, 0.68, 0.72)), 0.44,
     ),
 }  # fmt: skip
 #: Sides of the land, metres, and of its part around the eye, of which every blade is planted.
 _LAND, _NEAR = 640.0, 130.0
 _EYE, _AHEAD, _LENS = (-9.0, -33.0, 2.0), (2.5, 12.0, 5.6), 31.0
-#: Trees of the hill, with relative numbers, those along its edge, and trees by themselves: species, seed, place, size.
+#: Trees of the hill and along its edge, with relative numbers; trees by themselves: species, seed, place, size, age.
 _HILL = {"beech": 0.30, "oak": 0.16, "birch": 0.16, "maple": 0.12, "larch": 0.10, "spruce": 0.16}
 _EDGE = {"hazel": 0.45, "rowan": 0.25, "birch": 0.15, "bush": 0.15}
 _LONE = (
-    ("oak", 1, (7.0, 9.0), 1.0),
-    ("birch", 3, (-13.5, 1.5), 0.95),
-    ("birch", 8, (-17.0, 5.0), 1.05),
-    ("birch", 12, (-12.0, 8.5), 0.8),
-    ("cherry_blossom", 5, (-2.5, 17.0), 1.0),
-    ("maple", 4, (24.0, 20.0), 0.9),
-    ("spruce", 2, (-25.0, 22.0), 0.9),
-    ("spruce", 6, (-29.0, 27.0), 0.7),
-    ("larch", 7, (-34.0, 30.0), 0.85),
+    ("oak", 1, (8.0, 10.0), 1.0, 95.0),
+    ("birch", 3, (-13.5, 1.5), 0.95, 0.0),
+    ("birch", 8, (-17.0, 5.0), 1.05, 0.0),
+    ("birch", 12, (-12.0, 8.5), 0.8, 0.0),
+    ("cherry_blossom", 5, (-3.5, 15.0), 1.2, 0.0),
+    ("maple", 4, (27.0, 22.0), 0.9, 0.0),
+    ("spruce", 2, (-25.0, 22.0), 0.9, 0.0),
+    ("spruce", 6, (-29.0, 27.0), 0.7, 0.0),
+    ("larch", 7, (-34.0, 30.0), 0.85, 0.0),
 )
 _WOOD, _MARGIN = "wood", "edge"
 
@@ -120,11 +120,12 @@ def wooded(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64
 
 def build(scene: bpy.types.Scene) -> None:
     """Fill an empty scene with land, trees and what covers the ground; `dress` gives it a season."""
-    for species, seed, (x, y), scale in _LONE:
+    for species, seed, (x, y), scale, age in _LONE:
         plant = bpy.data.objects.new(f"{species} {seed}", None)
         plant.location = (x, y, float(height(np.float64(x), np.float64(y))))
         plant.rotation_euler.z, plant.scale = 2.4 * seed, (scale,) * 3
         plant.tetflora.is_plant, plant.tetflora.species, plant.tetflora.seed = True, species, seed
+        plant.tetflora.age = age
         scene.collection.objects.link(plant)
     for name, side, step, hole in (("Near", _NEAR, 2.0, 0.0), ("Far", _LAND, 5.0, _NEAR)):
         ground = _ground(name, side, step, hole)
@@ -262,7 +263,7 @@ def _clouds(
     first, second = (s for s in mix.inputs if s.type == 'RGBA')
     link(dense.outputs[0], weight)
     link(sky, first)
-    second.default_value = (0.95, 0.95, 0.97, 1.0)
+    second.default_value = (1.15, 1.13, 1.1, 1.0)
     return next(s for s in mix.outputs if s.type == 'RGBA')
 
 
