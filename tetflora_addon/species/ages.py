@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from .extras import dead_part
-from .growing import Ages, Growing, Nodes, node_at
+from .growing import Ages, Growing, Nodes, node_at, rounded_least
 from .habit import with_habit
-from .members import expected_members
+from .members import expected_leaf_area
 from .skeletons import Skeleton
 from .species import Colour, Dead, Order, Range, Species
 
@@ -30,8 +30,8 @@ _POWER, _MORE = 0.4, 1.5
 _ROSETTE = 0.9
 #: Powers by which limbs and twigs of a plant without branches between them, and twigs of others, follow the limbs.
 _TWIGS = 0.25
-#: Longest branches in lengths of their parents, where the description has shorter ones; sharpness of that limit.
-_LONGEST, _SHARP = 0.6, 4.0
+#: Longest branches in lengths of their parents, where the description has shorter ones.
+_LONGEST = 0.6
 #: Girth follows length as this power; radius of the thinnest tips, metres.
 _STOUT, _TIP = 1.15, 0.0012
 #: In a small plant, the topmost limbs are shorter than the crown's shape has them, crowns narrower than their limbs
@@ -39,6 +39,8 @@ _STOUT, _TIP = 1.15, 0.0012
 _SHORTER_TOP, _NARROW, _LEADER, _EVEN = 0.4, 0.2, 0.75, 1.3
 #: Branches that live for a while, for each of the others, on stems and on limbs; steps in which their number is found.
 _EXTRA, _STEPS = (4.0, 1.5), 14
+#: Metres of height up to which crowns have not closed.
+_SMALL = 3.0
 #: Of the length of a leafy twig: what is longer than so many bears no leaves itself.
 _LEAFY = 4.0
 #: A leaf is at most this fraction of the plant's height, and a seedling has so many.
@@ -58,8 +60,8 @@ def ages_of(species: Species) -> Ages:
     stem = _stem(species)
     height = float(np.prod([order.length.mean for order in species.orders[: stem + 1]]))
     if height < 1.5 or len(species.orders) < 3 or species.form is not None:
-        full = 1.0 if height < 1.5 else 3.0 * height
-        return Ages(full, (3.0 / full, 1.3), (3.0 / full, 1.6), lifespan=np.inf, scaled=True)
+        full = 1.0 if height < 3 else 3.0 * height
+        return Ages(full, (3.0 / full, 1.3), scaled=True)
     full = 10.0 + 2.0 * height
     rate = 1.6 / full
     return Ages(full, (rate, 1.3), (0.7 * rate, 1.5), lifespan=6.0 * full, flowers=0.3 * full)
@@ -142,26 +144,22 @@ class _Aged:
         Lengths over those, now and a year ago.
     stout : list of float
         Radii over those when full-grown.
-    fresh : float
-        Fraction of the branches on which there are more that live for a while.
+    fresh, thin : float
+        Fraction of the branches on which there are more that live for a while; factor on the number of leaves.
     """
 
     def __init__(self, species: Species, ages: Ages, years: float) -> None:
         self.one, self.ages, self.years = species, ages, years
         self.stem, self.last = _stem(species), len(species.orders) - 1
         self.whole = np.cumprod([order.length.mean for order in species.orders]).tolist()
+        self.rosette = species.orders[self.stem].branch_start.mean > _ROSETTE
         self.now, self.before = (self._lengths(max(year, 1e-3)) for year in (years, years - 1))
         girth = ages.girths(years)
         self.stout = [girth if o == self.stem else now**_STOUT for o, now in enumerate(self.now)]
         self.youth = float(np.clip((1 - self.now[self.stem]) / 0.5, 0, 1))
         self.declined = ages.declined(years)
-        self.dead = max(years - ages.lifespan, 0.0)
-        self.fresh = 0.0
-        self.rosette = self._starts(species.orders[self.stem]) > _ROSETTE
-
-    @staticmethod
-    def _starts(order: Order) -> float:
-        return order.branch_start.mean
+        self.dead = max(years - ages.lifespan, 1e-6) if years >= ages.lifespan else 0.0
+        self.fresh, self.thin = 0.0, 1.0
 
     def _lengths(self, years: float) -> list[float]:
         """Lengths by order over those when full-grown."""
@@ -172,23 +170,27 @@ class _Aged:
             steps = self.last - self.stem - 1
             power = 1 - (1 - _TWIGS) * (o - self.stem - 1) / steps if steps else _TWIGS
             ratio = self.one.orders[o].length.mean
-            longest = 1e9 if self._starts(self.one.orders[self.stem]) > _ROSETTE else max(_LONGEST, 1.15 * ratio)
-            out.append(_least(limbs**power, longest / ratio * out[o - 1], longest / ratio))
+            longest = 1e9 if self.rosette else max(_LONGEST, 1.15 * ratio)
+            out.append(rounded_least(limbs**power, longest / ratio * out[o - 1], longest / ratio))
         return out
 
     def species(self) -> Species:
         """The species at that age."""
         out = self._made()
-        if self.now[self.stem] >= 1 or self.stem + 1 >= self.last or self.dead:
+        if self.stem + 1 >= self.last or self.dead:
             return out
         # As many leaves above each square metre of ground as when full-grown: young trees have more branches on a
-        # metre than will stay (leaf areas of McPherson, van Doorn and Peper, 2016).
-        width = self.now[self.stem + 1] * (1 - _NARROW * (1 - self.now[self.stem]))
-        wanted = _leaf_area(self.one) * width**2 * self.leafless
+        # metre than will stay, old ones fewer leaves (leaf areas of McPherson, van Doorn and Peper, 2016).
+        height = self.now[self.stem]
+        width = self.now[self.stem + 1] * (1 - _NARROW * max(1 - height, 0.0))
+        wanted = expected_leaf_area(self.one) * width**2 * self.leafless * min(self.height / _SMALL, 1.0)
+        if height >= 1:
+            self.thin = min(wanted / max(expected_leaf_area(out), 1e-9), 1.0)
+            return self._made()
         low, high = 0.0, 1.0
         for _ in range(_STEPS):
             self.fresh = (low + high) / 2
-            low, high = (low, self.fresh) if _leaf_area(self._made()) > wanted else (self.fresh, high)
+            low, high = (low, self.fresh) if expected_leaf_area(self._made()) > wanted else (self.fresh, high)
         return self._made()
 
     def _made(self) -> Species:
@@ -214,7 +216,7 @@ class _Aged:
         """Factor on the number of leaves."""
         ages = self.ages
         dying = np.clip((ages.lifespan - self.years) / (0.03 * ages.lifespan), 0, 1)
-        return float((1 - 0.4 * self.declined) * dying)
+        return float((1 - 0.4 * self.declined) * dying) * self.thin
 
     def _order(self, o: int) -> Order:
         order, now = self.one.orders[o], self.now[o]
@@ -266,7 +268,7 @@ class _Aged:
         """Laterals, short shoots and dead branches of an order: factor on their number, and where they are."""
         order, now = self.one.orders[o], self.now[o]
         # Branches grow from the shoots of the years before.
-        until = 1 - _LEADER * (1 - self.before[o] / now) * self.youth if o >= self.stem else 0.3 + 0.7 * min(now, 1.0)
+        until = 1 - self._leader(o) * self.youth if o >= self.stem else 0.3 + 0.7 * min(now, 1.0)
         more = _MORE if o == self.stem and order.forks.high > 0 else 1.0
         flowers = float(np.clip((self.years / max(self.ages.flowers, 1e-9) - 0.7) / 0.6, 0, 1))
         if self.one.spur is not None and self.one.spur.leaf_kind == "leaf":
@@ -276,6 +278,11 @@ class _Aged:
         laterals = self._nodes(o, order.branch_start.mean, more, until, self._kept(o), 1.0, extra, self.fresh)
         spurs = self._nodes(o, order.spur_start.mean, 1.0, 1.0, factor=0.0 if self.dead else flowers)
         return [laterals, spurs, self._dead_nodes(o)]
+
+    def _leader(self, o: int) -> float:
+        """Fraction of an axis, from its tip down, that is bare of branches in a small plant."""
+        new = 1 - self.before[o] / self.now[o]
+        return new * (_LEADER + (1 - _LEADER) * new)
 
     def _nodes(
         self,
@@ -349,7 +356,7 @@ class _Aged:
         fade, full = np.clip(1 - np.log(np.maximum(ratios, 1e-9)) / np.log(_LEAFY), 0, 1).tolist()
         start = twig.leaf_start.mean
         if o == self.stem:  # of a trunk the shoot of this year
-            start, fade = max(start, 1 - _LEADER * (1 - self.before[o] / now)), max(fade, self.youth)
+            start, fade = max(start, 1 - self._leader(o)), max(fade, self.youth)
         number = twig.leaves.mean * self.whole[o] * now / long * (1 - start) * max(fade - full, 0.0)
         number = self.leafless * max(number, _FIRST * fade * (o == self.stem))
         if number <= own:
@@ -386,14 +393,3 @@ class _Aged:
         """Dead branches, which reach farther up, and farther out on limbs, as the plant declines."""
         dead = self.one.dead
         return replace(dead, high=dead.high + self.declined * max(0.9 - dead.high, 0.0))
-
-
-def _leaf_area(species: Species) -> float:
-    """Expected area of the leaves of a plant, in that of a leaf of unit length."""
-    leaves = expected_members(species).leaves
-    return sum(n * order.leaf_size.mean**2 for n, order in zip(leaves, species.orders, strict=True))
-
-
-def _least(a: float, b: float, full: float) -> float:
-    """The smaller of two, rounded off; 1 where a is 1 and b is ``full``."""
-    return ((a**-_SHARP + b**-_SHARP) / (1 + full**-_SHARP)) ** (-1 / _SHARP)

@@ -17,6 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+_SHARP = 4.0
+
 
 @dataclass(frozen=True)
 class Ages:
@@ -62,13 +64,18 @@ class Ages:
         return grown(min(years, self.lifespan), self.full, *self.girth)
 
     def declined(self, years: float) -> float:
-        """How far it has declined: 0 in good health, 1 dead."""
-        return float(np.clip((years / self.lifespan - self.decline) / (1 - self.decline), 0, 1))
+        """How far it has declined: 0 in good health, 1 dead; what only grows in size does not."""
+        return 0.0 if self.scaled else float(np.clip((years / self.lifespan - self.decline) / (1 - self.decline), 0, 1))
 
 
 def grown(years: float, full: float, rate: float, power: float) -> float:
     """Size at an age over that at the full age (Chapman and Richards)."""
     return (math.expm1(-rate * years) / math.expm1(-rate * full)) ** power
+
+
+def rounded_least(a: float, b: float, full: float) -> float:
+    """The smaller of two, rounded off; 1 where a is 1 and b is ``full``."""
+    return ((a**-_SHARP + b**-_SHARP) / (1 + full**-_SHARP)) ** (-1 / _SHARP)
 
 
 class Nodes(NamedTuple):

@@ -75,6 +75,12 @@ def expected_members(species: Species) -> Members:
     return Members(branches, stems, segments, leaves, spurs, spurs * on_spur, tuple(dead))
 
 
+def expected_leaf_area(species: Species) -> float:
+    """Expected area of the leaves of a plant, but those of short shoots, in that of a leaf of unit length."""
+    leaves = expected_members(species).leaves
+    return sum(n * order.leaf_size.mean**2 for n, order in zip(leaves, species.orders, strict=True))
+
+
 def _laterals(order: Order) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | float]:
     """Places (n,) of laterals on a branch of an order, length ratios (n,), and how many each stands for (n,)."""
     start, fraction, shorter, weight = order.branch_start.mean, _FRACTIONS, 1.0, 1.0
