@@ -4,7 +4,7 @@
 
 One plant of each species in daylight, rendered by Cycles in front of a light grey, 128 × 128 pixels, into
 ``tetflora_addon/catalogue/thumbnails``. Images are stored with palettes, because all of them are in the extension. With
-``--seasons``, those of spring, autumn and winter instead, of species that look different then.
+``--seasons``, those of the four seasons instead, of species that look different then.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ SIDE, SAMPLES, SEED = 128, 96, 11
 COLOURS = 128  # of a palette
 LARGEST = 12_000  # bytes
 #: Days of the seasons that have images of their own, and the least change of a plant's pixels, display values of 255.
-DAYS = {"spring": 125.0, "autumn": 293.0, "winter": 20.0}
+DAYS = {"spring": 125.0, "summer": 196.0, "autumn": 293.0, "winter": 20.0}
 CHANGED = 6.0
 BACKDROP = (199, 209, 214)  # display values of 255; conifers would not be seen on the dark grey of menus
 
 
 def render_thumbnail(identifier: str, path: Path, day: float | None = None) -> None:
-    """Render one plant of a species as a PNG with a transparent background, in summer or on a day of the year."""
+    """Render one plant of a species, full-grown or on a day of the year, as a PNG with a transparent background."""
     import bpy
     import numpy as np
     from mathutils import Vector
@@ -51,7 +51,7 @@ def render_thumbnail(identifier: str, path: Path, day: float | None = None) -> N
     # A few twigs that reach far out must not make the rest small.
     low, high = np.quantile(points, 0.002, axis=0), np.quantile(points, 0.998, axis=0)
     low[2] = min(low[2], 0.0)
-    if day is not None:  # in the frame of summer
+    if day is not None:  # in the same frame
         bpy.data.objects.remove(plant)
         scene.tetflora.year.enabled, scene.tetflora.year.day = True, day
         at_once(plant_mesh.make_plant_mesh_steps(scene, graph, [empty]))

@@ -58,10 +58,10 @@ def thumbnail_file(identifier: str, season: str = "") -> Path | None:
 
 
 def _season() -> str:
-    """The season that the open scene shows, empty for summer or none."""
+    """The season that the open scene shows, empty for none."""
     scene = getattr(bpy.context, "scene", None)  # none while add-ons are enabled
     season = season_of(scene) if scene is not None else None
-    return "" if season is None else season_name(season).replace("summer", "")
+    return "" if season is None else season_name(season)
 
 
 def _found(folders: Iterable[Path], identifier: str, ending: str) -> Path | None:
