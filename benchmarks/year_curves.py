@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from devtools import leaf_area
+from devtools import leaf_area, sizes
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seasons import Season
@@ -26,6 +26,11 @@ PLANTS = 256
 
 
 def run() -> dict[str, float]:
+    """Figures of leaf area and of sizes."""
+    return leaf_areas() | heights_and_girths()
+
+
+def leaf_areas() -> dict[str, float]:
     """Largest and mean errors of leaf area over that in summer, of all courses and of each."""
     figures: dict[str, float] = {}
     for course in leaf_area.published()["curves"]:
@@ -39,6 +44,26 @@ def run() -> dict[str, float]:
         "leaf_area_error_max": max(worst),
         "leaf_area_error_mean": float(np.mean(mean)),
     } | {name: float(value) for name, value in figures.items()}
+
+
+def heights_and_girths() -> dict[str, float]:
+    """Whether sizes are within the published ranges, and how far from the middle of these, as a fraction."""
+    figures: dict[str, float] = {}
+    every = [one for name in sizes.published()["species"] for one in sizes.compared(name)]
+    for quantity, plural in (("height", "heights"), ("diameter", "girths")):
+        own = [one for one in every if one.quantity == quantity]
+        off = np.array([one.measured / one.middle - 1.0 for one in own])
+        figures |= {
+            f"{plural}_within": float(all(one.low <= one.measured <= one.high for one in own)),
+            f"{plural}_compared": len(own),
+            f"{plural}_outside": sum(not one.low <= one.measured <= one.high for one in own),
+            f"{plural}_from_middle_mean": float(np.abs(off).mean()),
+            f"{plural}_from_middle_max": float(np.abs(off).max()),
+        }
+        for one in own:
+            if not one.low <= one.measured <= one.high:
+                print(f"  outside: {one}", flush=True)
+    return {"sizes_species": len(sizes.published()["species"])} | figures
 
 
 def area_by_day(course: dict[str, Any]) -> NDArray[np.float64]:
