@@ -8,7 +8,7 @@ its species; a trunk is two crossed triangles. Every plant has its own length, a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,8 @@ SIDES = 4
 _RINGS, _BAND = (0.25, 0.65), 0.2
 #: Fraction of the leaves that lie below a crown, and above it, and within its rings.
 _BELOW, _ABOVE, _WITHIN = 0.03, 0.995, 0.85
+#: Width of the crown of a bare plant over that in leaf, so that it is seen to be bare.
+_BARE = 0.45
 #: Direction to the light, and the fraction of light in its shade.
 _SUN, _SHADE = np.array([-0.45, -0.35, 0.82]), 0.45
 
@@ -71,6 +73,11 @@ def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
     angle = np.arange(SIDES) * 2.0 * np.pi / SIDES
     around = np.stack([np.cos(angle), np.sin(angle), np.zeros(SIDES)], axis=1)
     low, high, *radii = profile.T
+    wood, leaves = flora.wood_colour[trunk.row], flora.leaf_colours(trunk)
+    if trunk.year is not None:
+        left = _in_leaf(flora, trunk)
+        radii = [radius * (_BARE + (1.0 - _BARE) * left) for radius in radii]
+        leaves = wood + left[:, None] * (leaves - wood)
     crown = [np.stack([0 * low, 0 * low, low], axis=1)[:, None]]
     outward = [np.broadcast_to([0.0, 0.0, -1.0], (len(trunk), 1, 3))]
     for fraction, radius, up in zip(_RINGS, radii[:2], (-0.1, 0.5), strict=True):
@@ -89,9 +96,9 @@ def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
     light = np.clip(np.einsum("nij,nvj->nvi", trunk.frame, normals) @ (_SUN / np.linalg.norm(_SUN)), 0.0, 1.0)
     light = _SHADE + (1.0 - _SHADE) * light
     leafy = flora.leaf_count[trunk.row] > 0
-    leaves = np.where(leafy[:, None], flora.leaf_colours(trunk), flora.wood_colour[trunk.row])
+    leaves = np.where(leafy[:, None], leaves, wood)
     corners = 2 * SIDES + 2
-    base = np.repeat(np.stack([leaves, flora.wood_colour[trunk.row]], axis=1), (corners, SIDES + 1), axis=1)
+    base = np.repeat(np.stack([leaves, wood], axis=1), (corners, SIDES + 1), axis=1)
     return Shapes(
         positions.reshape(-1, 3).astype(np.float32),
         as_shown(base * light[:, :, None]).reshape(-1, 3),
@@ -122,6 +129,12 @@ def _shown(flora: Flora, seeds: Seeds, most: int) -> tuple[int, NDArray[np.float
     origin = origin_near(seeds.position)
     some = seeds.take(slice(None, None, max(-(-len(seeds) // most), 1))).counted_from(origin)
     return len(seeds), origin, trunks(flora.rows, some)
+
+
+def _in_leaf(flora: Flora, trunk: Branches) -> NDArray[np.float64]:
+    """Area of the leaves (n,) of plants over that in summer."""
+    summer = flora.in_leaf.leaf_areas(replace(trunk, year=None))
+    return np.clip(flora.leaf_areas(trunk) / np.maximum(summer, 1e-300), 0.0, 1.0)
 
 
 def _profile(flora: Flora, row: int) -> NDArray[np.float64]:

@@ -201,3 +201,19 @@ def test_the_panel_tells_the_date(scene):
     layout = Layout()
     panel.TETFLORA_PT_year.draw(SimpleNamespace(layout=layout), bpy.context)
     assert "14 October" in [options.get("text") for name, _, options in layout.drawn if name == "label"]
+
+
+def test_bare_plants_are_thin_and_brown_in_previews(scene):
+    scene.tetflora.preview.plants = 'LIGHT'
+
+    def shown(day):
+        scene.tetflora.year.day = day
+        shapes = levels.read_shapes(scene, depsgraph())
+        return np.ptp(shapes.positions[:, 0]), shapes.colours.astype(float)
+
+    (bare, brown), (full, green) = shown(WINTER), shown(SUMMER)
+    assert bare < 0.7 * full
+    assert brown.max(axis=1).min() > 0.05
+    assert (brown[0, 0] / brown[0, 1]) > (green[0, 0] / green[0, 1])
+    scene.tetflora.year.enabled = False
+    np.testing.assert_array_equal(shown(SUMMER)[1], green)
