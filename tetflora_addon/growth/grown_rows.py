@@ -4,7 +4,7 @@
 
 ``growing`` of a row holds for each sort of children: the present length of the row over the full-grown one; the
 `Nodes` of the row, begin, end, until (of the present length), power, whole and below, where those that live for a while
-are (of the present length), and how many there are for each of the others.
+are (of the present length), and how many there are for each of the others; variation of the begin over its mean.
 """
 
 from __future__ import annotations
@@ -12,13 +12,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..species.growing import Nodes, node_at, place_at, shortened, some_nodes
 from ..species.species import crown_ratio
 
-NOW, BEGIN, END, UNTIL, POWER, WHOLE, BELOW, FRESH, EXTRA = range(9)
+NOW, BEGIN, END, UNTIL, POWER, WHOLE, BELOW, FRESH, EXTRA, VARIES = range(10)
 """Columns of ``growing``."""
+_GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(5) / np.array([[1], [2]])
 
 
 def grow_children(
@@ -62,18 +63,26 @@ def grow_children(
     mean = float(np.clip((start[0] * now - low) / here, 0, 0.999))
     ends = place_at([last - nodes.fresh * (last - first), last], *law)
     fresh, until = np.clip((ends - low) / here, mean, 1)
-    own = begin, end, power, whole, below
-    base, some, tip = node_at(np.array([mean, fresh, until]) * here / full, *own)
-    there = float(tip - base + nodes.extra * (tip - some))
+    variation = min(start[1] * now / here, mean, 0.999 - mean) if inside else 0.0
+    starts = mean + variation * _GAUSS  # numbers are not linear in the start, so that their mean is not that of it
+    varies = start[1] / start[0] if start[0] > 0 else 0.0
+    begins = varied_begin(begin, varies, _GAUSS)
+    own = begins, np.maximum(end, begins), power, whole, below
+    base, some, tip = (node_at(place * here / full, *own) for place in (starts, fresh, until))
+    there = float(_WEIGHTS @ (np.maximum(tip - base, 0) + nodes.extra * np.maximum(tip - np.maximum(some, base), 0)))
     row["fraction"][sort] = fraction
     row["count"][sort] *= there / number
-    variation = min(start[1] * now / here, mean, 0.999 - mean) if inside else 0.0
     row["start"][sort] = mean, variation
     if there > 0:
         row["growing"][sort] = (
             *(here / full, begin, end, until, power, whole / there, below / there),
-            *(fresh, nodes.extra),
+            *(fresh, nodes.extra, varies),
         )
+
+
+def varied_begin(begin: ArrayLike, varies: ArrayLike, draw: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Where nodes of branches (n,) begin, by random numbers (n,) between -1 and 1."""
+    return np.minimum(begin * (1 + varies * draw), np.maximum(begin, 0.999))
 
 
 def spread_children(row: np.void, sort: int) -> tuple[NDArray[np.float64], ...]:

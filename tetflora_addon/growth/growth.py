@@ -147,9 +147,11 @@ def _grown(rows: NDArray[np.void], branches: Branches, sort: int) -> Grown | Non
         return None
     whorl = np.maximum(rows["whorl"][rows["next"][row, sort]], 1)
     wanted = varied(rows["count"][row, sort], key, _COUNT[sort]) * fullness(rows, branches) / whorl
-    start = rows["start"][row, sort]
-    start = start[:, 0] if sort == DEAD else varied(start, key, _START[sort])
-    return grown_nodes(rows, branches, sort, int(_PATHS[sort]), wanted, start, uniform(key, _ROUND[sort]))
+    start, draw = rows["start"][row, sort], np.zeros(len(row))
+    if sort != DEAD:
+        draw = signed(key, _START[sort])
+    start = start[:, 0] if sort == DEAD else start[:, 0] + start[:, 1] * draw
+    return grown_nodes(rows, branches, sort, int(_PATHS[sort]), wanted, start, draw, uniform(key, _ROUND[sort]))
 
 
 def leaf_counts(rows: NDArray[np.void], branches: Branches) -> NDArray[np.int64]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..species.growing import FADING, node_at, place_at
 from .branches import Branches
-from .grown_rows import BEGIN, BELOW, END, EXTRA, FRESH, NOW, POWER, UNTIL, WHOLE
+from .grown_rows import BEGIN, BELOW, END, EXTRA, FRESH, NOW, POWER, UNTIL, VARIES, WHOLE, varied_begin
 from .hashing import Draw, child_key, signed
 
 #: Where numbers of nodes that live for a while begin, and those below the first are counted back from: no child
@@ -98,6 +98,7 @@ def grown_nodes(
     path: int,
     wanted: NDArray[np.float64],
     start: NDArray[np.float64],
+    draw: NDArray[np.float64],
     chance: NDArray[np.float64],
 ) -> Grown:
     """Living nodes of branches for children of one sort.
@@ -110,8 +111,8 @@ def grown_nodes(
         Of children, and where their child indices begin.
     wanted : (n,) float64
         How many nodes there are to be.
-    start : (n,) float64
-        Bare part of each.
+    start, draw : (n,) float64
+        Bare part of each, and the random numbers between -1 and 1 that it follows.
     chance : (n,) float64
         Random numbers by which the nodes of the full-grown branch are rounded.
     """
@@ -119,9 +120,7 @@ def grown_nodes(
     own = rows["growing"][row, sort]
     on = own[:, NOW] > 0
     now = np.where(on, own[:, NOW], 1.0)
-    mean = rows["start"][row, sort, 0]
-    begin = own[:, BEGIN]
-    begin = np.minimum(begin * np.where(mean > 0, start / np.maximum(mean, 1e-12), 1.0), np.maximum(begin, 0.999))
+    begin = varied_begin(own[:, BEGIN], own[:, VARIES], draw)
     power = np.where(on, own[:, POWER], 1.0)
     whole = wanted * own[:, WHOLE]
     law = begin, np.maximum(own[:, END], begin), power, whole, wanted * own[:, BELOW]
