@@ -280,7 +280,7 @@ def test_a_species_of_ones_own_is_looked_at_once_for_all_sessions(
 
 
 _ROWS = len(compile_species([load_species("grass")]).rows)
-TABLE = {name: np.ones((_ROWS, len(facet_weights.COUNTS))).tolist() for name in ("whole", "own")}
+TABLE = np.ones((2, _ROWS, len(facet_weights.COUNTS)), np.float32)
 
 
 def test_species_that_are_found_together_are_what_they_are_alone(monkeypatch: pytest.MonkeyPatch) -> None:

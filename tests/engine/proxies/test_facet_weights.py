@@ -144,6 +144,7 @@ def test_a_species_is_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(subject, "fitting", noted)
     monkeypatch.setattr(subject, "shipped", dict)
     monkeypatch.setattr(subject, "_found", {})
+    subject._of_states.cache_clear()
     alone = subject.facet_weights(compile_species([load_species("birch")]))
     again = subject.facet_weights(compile_species([load_species("dead_tree"), load_species("birch")]))
     assert asked == ["birch", "dead_tree"]

@@ -44,8 +44,7 @@ def test_quick_weights_of_shipped_species_are_those_of_the_tables(identifier: st
     flora = compile_species([load_species(identifier)])
     known = subject.shipped()[subject.digest(flora, 0)]
     whole, own = at_once(subject.fitting(flora, 0, subject.RAYS))
-    np.testing.assert_allclose(whole, known["whole"], atol=MOST)
-    np.testing.assert_allclose(own, known["own"], atol=MOST)
+    np.testing.assert_allclose([whole, own], known, atol=MOST)
 
 
 @pytest.mark.parametrize(
