@@ -18,9 +18,10 @@ from ...compiled.flora import Flora, compile_species
 from ...errors import TetFloraError
 from ...growth.seeds import Seeds
 from ...species.species import Range
-from ..job.contents import compile_for
+from ..job.contents import in_year
 from ..job.plant_mesh import expected_polygons, plant_mesh, plant_parts, single_seed
 from ..materials.nodes import is_ours, tag
+from ..results.leaf_objects import resolved_species
 from ..runtime import Handlers, call_off, call_soon, redraw
 from ..species import edits, values
 
@@ -89,7 +90,9 @@ def refresh() -> None:
     try:
         depsgraph = scene.view_layers[0].depsgraph or bpy.context.evaluated_depsgraph_get()
         seeds = single_seed(identifier, editor.preview_seed)
-        flora, orders = _limited(compile_for((identifier,), scene, depsgraph), seeds)
+        # Full-grown whatever years have passed: that is what is edited.
+        flora, orders = _limited(compile_species([resolved_species(scene, identifier, depsgraph)]), seeds)
+        flora = in_year(scene, flora)
         mesh = plant_mesh(scene, NAME, flora.species[0], plant_parts(flora, seeds))
     except TetFloraError as error:
         _state.message, _state.failed = str(error), True
