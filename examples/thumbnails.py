@@ -106,8 +106,13 @@ def main(arguments: list[str]) -> int:
     known = catalogue.list_species()
     wanted = [one for one in arguments if one != "--seasons"] or list(known)
     if "--seasons" in arguments:
-        yearly = [one for one in wanted if catalogue.load_species(one).year is not None]
-        images = [(one, day, f"{one}.{season}.png") for one in yearly for season, day in DAYS.items()]
+        years = {one: year for one in wanted if (year := catalogue.load_species(one).year) is not None}
+        images = [
+            (one, day, f"{one}.{season}.png")
+            for one, year in years.items()
+            for season, day in DAYS.items()
+            if season != "summer" or year.blossom is not None  # otherwise it is as without seasons
+        ]
     else:
         images = [(one, None, f"{one}.png") for one in wanted]
     FOLDER.mkdir(exist_ok=True)
