@@ -17,8 +17,9 @@ from tests.blender.layouts import Layout
 from tests.blender.scene.test_fields import _field
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
 from tetflora_addon import errors
-from tetflora_addon.blender.job import contents, forecast, frame_cache, plant_mesh
+from tetflora_addon.blender.job import contents, forecast, frame_cache, plant_mesh, refine
 from tetflora_addon.blender.placing import canopy, distances, plant_objects, populations, rules
+from tetflora_addon.blender.results.output import result_collections
 from tetflora_addon.blender.scene import ages, fields, own_ages, skeletons
 from tetflora_addon.blender.scene.plants import read_plants
 from tetflora_addon.blender.viewport import levels
@@ -275,3 +276,16 @@ def test_the_panel_tells_the_stage(scene):
     assert "Full-grown" in told[0.0]
     assert "Seedling" in told[1.0]
     assert "Dead" in told[9_000.0]
+
+
+def test_ages_of_a_species_share_meshes(scene):
+    scene.render.resolution_x = scene.render.resolution_y = 120
+    row_of_plants([0.0, 0.0])
+    refine.refine(scene, depsgraph())
+    before = {o.name for c in result_collections(scene, 'VIEW') for o in c.all_objects if " 0" in o.name}
+    bpy.data.objects["plant 00"].tetflora.age = 30.0
+    statistics = refine.refine(scene, depsgraph())
+    (made,) = result_collections(scene, 'VIEW')
+    meshes = [o for o in made.all_objects if o.type == 'MESH' and ("leaf" in o.name or "bark" in o.name)]
+    assert {o.name for o in meshes} == {name for name in before if "leaf" in name or "bark" in name}
+    assert sum(len(o.data.polygons) for o in meshes) == statistics.polygons_meshed

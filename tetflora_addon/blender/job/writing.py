@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
+from dataclasses import replace
+from itertools import groupby
 from typing import TypeVar
 
 import bpy
 
-from ...buffers import MeshBuffers
+from ...buffers import MeshBuffers, concatenate_buffers
 from ...compiled.flora import Flora
 from ...emission.forms import Refined
 from ...emission.plants import Block
@@ -54,7 +56,22 @@ def write_blocks(
         _made(obj, block.buffers, statistics, baking, lit=True)
         return Progress(start + (0.95 - start) * block.fraction, f"Making polygons: {statistics.polygons_meshed:,}")
 
-    yield from _written(blocks, write, Progress(start, "Making polygons"))
+    yield from _written(_of_all_ages(flora, blocks), write, Progress(start, "Making polygons"))
+
+
+def _of_all_ages(flora: Flora, blocks: Iterator[Block]) -> Iterator[Block]:
+    """Blocks of which those of one species at several ages are one mesh: each object costs a renderer time."""
+    first: dict[str, int] = {}
+    same = [first.setdefault(one.identifier, n) if one.form is None else n for n, one in enumerate(flora.species)]
+    if same == list(range(len(same))):
+        yield from blocks
+        return
+    for _, run in groupby(blocks, key=lambda block: block.number):
+        parts: dict[tuple[int, str, int], list[Block]] = {}
+        for block in run:
+            parts.setdefault((same[block.species], block.kind, block.form), []).append(block)
+        for some in parts.values():
+            yield replace(some[-1], buffers=concatenate_buffers([block.buffers for block in some]))
 
 
 def write_polygons(
