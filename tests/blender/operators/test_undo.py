@@ -19,6 +19,7 @@ import operators
 from devtools import session
 from tests.blender.digests import difference, everything
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
+from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.placing import rules
 from tetflora_addon.blender.species.catalogue import delete_species_file
@@ -181,6 +182,7 @@ CASES: list[Case] = [
     ("forget_erased", lambda: (populated(), erase_place()), "forget_erased", {}),
     ("ground_cover", populated, "ground_cover", {}),
     ("ground_cover again", lambda: (populated(), cover(), change_population()), "ground_cover", {}),
+    ("ground_snow", lambda: (populated(), paint_ground()), "ground_snow", {}),
     ("set_population_ground", lambda: (populated(), select(add_mesh("other"))), "set_population_ground", {}),
 ]
 #: Operators with an undo step that cannot be called without a file from outside; their own case is below.
@@ -190,6 +192,12 @@ FROM_FILES = {"import_populations", "load_species"}
 def mark_ground() -> None:
     bpy.data.objects["ground"].tetflora.is_explicit = True
     select(bpy.data.objects["ground"])
+
+
+def paint_ground() -> None:
+    made = bpy.data.materials.new("ground")
+    compat.shader_tree(made)
+    bpy.data.objects["ground"].data.materials.append(made)
 
 
 def change_population() -> None:

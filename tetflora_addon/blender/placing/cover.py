@@ -64,7 +64,7 @@ _SHADED = 0.72
 
 
 @dataclass(frozen=True)
-class Part:
+class Ingredient:
     """One species of a cover."""
 
     species: str
@@ -261,14 +261,14 @@ def add_cover(
     return cover
 
 
-def _parts(scene: bpy.types.Scene, canopy: Canopy, above: tuple[str, ...]) -> list[Part]:
+def _parts(scene: bpy.types.Scene, canopy: Canopy, above: tuple[str, ...]) -> list[Ingredient]:
     """Species of a cover; those of what falls are made where the file does not have them."""
     known = catalogue()
-    parts = [Part(*one) for one in GROWN if one[0] in known]
+    parts = [Ingredient(*one) for one in GROWN if one[0] in known]
     order = shedders(canopy, above)
     for kind, habitat, number, most in DROPPED:
         made = [(name, fallen) for name in order if (fallen := fallen_from(scene, name, kind))][:most]
-        parts += [Part(fallen, habitat, number, name) for name, fallen in made]
+        parts += [Ingredient(fallen, habitat, number, name) for name, fallen in made]
     return parts
 
 
@@ -298,7 +298,7 @@ def fallen_from(scene: bpy.types.Scene, identifier: str, kind: str) -> str:
     return name
 
 
-def mix(cover: bpy.types.PropertyGroup, parts: list[Part], area: float) -> None:
+def mix(cover: bpy.types.PropertyGroup, parts: list[Ingredient], area: float) -> None:
     """Add what the mixture of a cover lacks; what it has stays as the artist left it."""
     there = {entry.species for entry in cover.mix}
     before = sum(entry.weight for entry in cover.mix)

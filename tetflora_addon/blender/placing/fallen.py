@@ -21,7 +21,7 @@ from ..runtime import JobData, guarded
 from ..scene.crowns import crown_for, crown_steps
 from ..species.edits import species_for
 from .canopy import canopy_of, standing
-from .cover import ANYBODY, UNDER, Part, add_cover, again, cover_of, fallen_from, mix, restored, shedders
+from .cover import ANYBODY, UNDER, Ingredient, add_cover, again, cover_of, fallen_from, mix, restored, shedders
 from .populations import Made, make_plants_steps, refuse_frozen
 from .rules import grounds_of
 
@@ -72,7 +72,7 @@ def _strew_steps(
             return (yield from steps)
 
 
-def _parts(scene: bpy.types.Scene, canopy: Canopy, above: tuple[str, ...]) -> list[Part]:
+def _parts(scene: bpy.types.Scene, canopy: Canopy, above: tuple[str, ...]) -> list[Ingredient]:
     """Fallen leaves of each species: as many patches as have the area of what falls."""
     parts = []
     for name in shedders(canopy, above):
@@ -80,5 +80,5 @@ def _parts(scene: bpy.types.Scene, canopy: Canopy, above: tuple[str, ...]) -> li
         share = shed_share(species_for(scene, name)) if patch else 0.0
         area = crown_for(scene, patch).leaves if share > 0.0 else 0.0
         if area > 0.0:
-            parts.append(Part(patch, 'FALLEN', FULL * share / (area * _SQUARE), name))
+            parts.append(Ingredient(patch, 'FALLEN', FULL * share / (area * _SQUARE), name))
     return parts
