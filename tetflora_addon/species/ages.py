@@ -208,8 +208,9 @@ class _Aged:
 
     @property
     def height(self) -> float:
-        """Metres."""
-        return self.now[self.stem] * self.whole[self.stem]
+        """Metres; of a palm with its fronds."""
+        top = self.now[self.stem + 1] * self.whole[self.stem + 1] if self.rosette else 0.0
+        return self.now[self.stem] * self.whole[self.stem] + top
 
     @property
     def leafless(self) -> float:
