@@ -35,6 +35,7 @@ class TETFLORA_OT_set_season(Reporting, bpy.types.Operator):
         year = context.scene.tetflora.year
         day = _DAYS[self.season] + (0.0 if year.latitude >= 0.0 else _HALF)
         year.enabled, year.day = True, (day - 1.0) % 365.0 + 1.0
+        context.scene.update_tag()  # as a slider does: previews and Refine Automatically listen
         return self.done(date_text(year.day))
 
 

@@ -22,6 +22,34 @@ STEP = 10  # pixels between two looks for a button
 SPECIES = ("broadleaf_tree", "conifer", "bush")
 
 
+def through_the_year(ui, scene):
+    """The day and the years change, by hand and by keyframes: plants are read again by themselves."""
+    year = scene.tetflora.year
+
+    def size():
+        return float(np.ptp(shapes(scene).positions[:, 2]))
+
+    def made():
+        return state.find(scene).made
+
+    tall, before = size(), made()
+    with ui.override():
+        bpy.ops.tetflora.set_season(season='WINTER')
+    yield from ui.until(lambda: made() > before, 20, "winter")
+    ui.values["winter"] = [year.enabled, year.day]
+    for frame, years in ((1, 0.0), (2, 3.0)):
+        year.years = years
+        year.keyframe_insert("years", frame=frame)
+    scene.frame_set(1)
+    yield from ui.until(lambda: size() > 0.9 * tall, 20, "full-grown plants")
+    scene.frame_set(2)
+    yield from ui.until(lambda: size() < 0.5 * tall, 20, "plants of three years")
+    scene.frame_set(1)
+    scene.animation_data_clear()
+    year.years, year.enabled = 0.0, False
+    yield from ui.until(lambda: size() > 0.9 * tall, 20, "plants as before")
+
+
 def steps(ui):
     """See devtools/window_driver.py."""
     scene = bpy.context.scene
@@ -57,6 +85,9 @@ def steps(ui):
     plants[0].location.z -= 30.0
     bpy.data.objects.remove(plants[-1])
     yield from ui.until(lambda: shapes(scene).plants == len(plants) - 1, 20, "deleted plant")
+    settings.plants = 'LIGHT'
+    yield from ui.until(lambda: shapes(scene).indices.shape[1] == 3, 20, "plants")
+    yield from through_the_year(ui, scene)
     settings.plants = 'NONE'
     yield 0.5
     ui.values["after_none"] = shapes(scene) is None

@@ -129,3 +129,9 @@ def test_forgotten_levels_are_not_drawn(seen: dict, views: Pictures) -> None:
     assert seen["forgotten"]
     saturation = views["forgotten"].max(axis=2) - views["forgotten"].min(axis=2)
     assert (saturation > 0.2).mean() < 0.01
+
+
+def test_plants_follow_the_year(seen):
+    enabled, day = seen["winter"]
+    assert enabled
+    assert day == pytest.approx(20.0)
