@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from tests.blender.assets.surfaces import SQUARE, Paint, cards, image, linear, look, read
+from tetflora_addon.blender.materials.means import Looks
+from tetflora_addon.blender.materials.snow import add_snow
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -366,3 +368,13 @@ def test_faces_without_area_and_coordinates_that_are_no_numbers_are_borne():
     surface = read(obj)[0].surfaces[0]
     np.testing.assert_allclose(surface.colour, 0.5, atol=0.003)
     np.testing.assert_allclose(surface.coverage, 1)
+
+
+def test_looks_are_those_without_snow():
+    paint = Paint()
+    paint.shader.inputs["Base Color"].default_value = (0.1, 0.3, 0.05, 1.0)
+    before, mean = look(paint), Looks().of(paint.material, {})
+    assert add_snow(paint.material)
+    for with_snow, without in zip(look(paint)[:3], before[:3], strict=True):
+        np.testing.assert_array_equal(with_snow, without)
+    assert Looks().of(paint.material, {}) == mean

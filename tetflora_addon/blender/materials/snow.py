@@ -91,7 +91,7 @@ def add_snow(material: bpy.types.Material, mark: bool = False) -> bool:
         node = _group_node(tree, snow_group(), output, mark)
         if material.name in _PROXIES:
             node.inputs["Twigs"].default_value = 1.0
-            node.inputs["Color"].default_value = _CLUSTER
+            node.inputs["Snow Color"].default_value = _CLUSTER
         _put_between(tree, surface, node.inputs["Shader"], node.outputs["Shader"])
         added = True
     return added
@@ -103,13 +103,13 @@ def snow_group() -> bpy.types.NodeTree:
     Returns
     -------
     bpy.types.NodeTree
-        Inputs Shader, Carry, Color, Twigs; outputs Shader and Cover. The side of a sheet that faces up is white where
-        Cover is 1. From below, a leaf that lets light through is darker by what the snow keeps from it.
+        Inputs Shader, Carry, Snow Color, Twigs; outputs Shader and Cover. The side of a sheet that faces up is white
+        where Cover is 1. From below, a leaf that lets light through is darker by what the snow keeps from it.
     """
     inputs = (
         ("Shader", 'Shader'),
         ("Carry", 'Float', 1.0, UNIT, "How much snow stays on it: less on thin things"),
-        ("Color", 'Color', WHITE),
+        ("Snow Color", 'Color', WHITE),
         ("Twigs", 'Float', 0.0, UNIT, "1: what lets no light through is thin, as in proxies"),
     )
 
@@ -127,7 +127,7 @@ def snow_group() -> bpy.types.NodeTree:
         above = graph.math('GREATER_THAN', upward, 0.0)
         cover = graph.math('MULTIPLY', held, above)
         kept = graph.math('MULTIPLY', held, graph.math('MAXIMUM', above, through))
-        colour = graph.vector('SCALE', given["Color"], above)
+        colour = graph.vector('SCALE', given["Snow Color"], above)
         snow = graph.node("ShaderNodeBsdfDiffuse", {"Color": colour, "Roughness": _ROUGH})
         return {"Shader": graph.mix(kept, given["Shader"], snow), "Cover": cover}
 

@@ -15,6 +15,7 @@ from .colour_maths import Values, luminance
 from .means import Look, Looks
 from .node_values import NodeValues, Notes, NotUnderstood, Stack, source_of
 from .nodes import active_output, find_socket
+from .snow import SNOW
 
 #: Shaders by what they let through of the light that they scatter, and the input of their colour.
 SIMPLE = {
@@ -129,6 +130,8 @@ class SurfaceShaders:
         return Scattered(1 - luminance(colour), _BLACK, _NONE)
 
     def _mix(self, values: NodeValues, node: bpy.types.Node, stack: Stack) -> Scattered:
+        if stack and stack[-1].node_tree.name.startswith(SNOW):  # looks are those without snow
+            return self._shader(values, find_socket(node.inputs, "Shader"), stack)
         factor = np.clip(self._number(values, node, "Fac", stack, 0.5), 0, 1)
         a, b = (self._shader(values, find_socket(node.inputs, key), stack) for key in ("Shader", "Shader_001"))
         return Scattered(*(x + factor * (y - x) for x, y in zip(a, b, strict=True)))
