@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from tetflora_addon.jobs import at_once
 from tetflora_addon.planting.canopy import CLUSTERED, DIRECTIONS, FACING, Canopy, Sheet, fallen_on, light_on
-from tetflora_addon.planting.cover import Floor, Habitat, Stratum, covered, mapping, tinted
+from tetflora_addon.planting.cover import FULL, Floor, Habitat, Stratum, covered, mapping, tinted
 from tetflora_addon.planting.places import place
 from tetflora_addon.planting.rules import Rules
 from tetflora_addon.planting.terrain import Path, Terrain
@@ -153,6 +153,24 @@ def test_what_nobody_sheds_lies_nowhere():
     floor = _floor(_wood())
     assert (floor.map_of(Habitat.LITTER, -1) == 0.0).all()
     assert (floor.map_of(Habitat.LITTER, None) >= floor.map_of(Habitat.LITTER, 0)).all()
+
+
+@pytest.mark.parametrize("species", [0, 1])
+def test_leaves_lie_where_they_fall_in_the_same_amount(species):
+    canopy = _wood()
+    floor = _floor(canopy)
+    suits = floor.map_of(Habitat.FALLEN, species)
+    np.testing.assert_allclose(FULL * suits, floor.fallen[species], rtol=1e-12)
+    # No patches: places suit as the map says.
+    points = np.random.default_rng(2).uniform(0.0, SIDE, (500, 2))
+    np.testing.assert_array_equal(floor.suits(Habitat.FALLEN, species, 5)(points), SHEET.at(suits, points))
+    assert not floor.map_of(Habitat.FALLEN, -1).any()
+
+
+def test_habitats_keep_the_patches_that_they_had():
+    """Their numbers are part of the keys of patches: a new one goes to the end."""
+    names = ["ANYWHERE", "LIGHT", "HALF_SHADE", "SHADE", "LITTER", "DEAD_WOOD", "FALLEN"]
+    assert [habitat.name for habitat in Habitat] == names
 
 
 def test_soil_takes_the_colors_of_what_hides_it():
