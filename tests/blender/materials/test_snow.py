@@ -11,7 +11,7 @@ from tests.blender.scenes import add_camera, add_plant, depsgraph
 from tetflora_addon import buffers
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import frame_cache, refine
-from tetflora_addon.blender.materials import materials, microsphere, nodes, shell, snow
+from tetflora_addon.blender.materials import materials, microsphere, nodes, shell, snow, soil
 from tetflora_addon.blender.results import meshes
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -241,3 +241,35 @@ def test_clouds_are_white_from_above_and_not_from_below(plane):
     np.testing.assert_allclose(below, GREEN, atol=0.02)
     assert above[1] > 0.7
     assert microsphere.MICROSPHERE not in bpy.data.node_groups  # asks no more than it needs
+
+
+def test_soil_has_snow_while_a_scene_has():
+    cells = np.full((2, 2, 3), 0.1)
+    made = soil.soil_material("soil", cells, np.zeros((2, 2)), np.full(3, 0.1), -4 * np.ones(2), 8 * np.ones(2))
+    small_scene(sky=1.0, samples=8)
+    _sheet(made)
+    before, dark = _nodes(made.node_tree), _mean()
+    _year(1.0)
+    snow.fit_soils()
+    assert _mean().min() > 0.8 > 2 * dark.max()
+    _year(0.0)
+    snow.fit_soils()
+    assert _nodes(made.node_tree) == before
+
+
+@pytest.mark.parametrize("turn", [0.0, np.pi / 2])
+def test_a_crown_of_facets_is_as_white_as_its_leaves(turn):
+    """From above and from the side; facets and leaves differ by up to a tenth, in summer too."""
+    small_scene(sky=0.5, sun=35.0, samples=24, size=48, width=14.0)
+    scene = bpy.context.scene
+    scene.render.film_transparent = True  # without the sky behind
+    scene.camera.location = (0.0, -50.0 * np.sin(turn), 7.0 + 50.0 * np.cos(turn))
+    scene.camera.rotation_euler = (turn, 0.0, 0.0)
+    add_plant(species="beech")
+    _year(0.5)
+    seen = []
+    for everything in (False, True):
+        scene.tetflora.expand_everything = everything
+        refine.refine(scene, depsgraph())
+        seen.append(_mean())
+    np.testing.assert_allclose(*seen, rtol=0.12)
