@@ -17,6 +17,8 @@ MADE = "tetflora_made"
 VERSION = "tetflora_version"
 #: Color of leaves where there is no other.
 LEAF_GREEN = (0.1, 0.25, 0.05, 1.0)
+#: Name of the group that `snow` makes.
+SNOW = "TetFlora Snow"
 
 Datablock = TypeVar("Datablock", bound=bpy.types.ID)
 

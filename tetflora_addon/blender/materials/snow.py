@@ -20,11 +20,10 @@ import bpy
 
 from .materials import ASSET_PROXY, ASSET_SPHERE, BAKED, PROXY, SPHERE
 from .microsphere import ENGINES, MICROSPHERE, UNIT, microsphere_group, particle_normal
-from .nodes import LEAF_GREEN, Graph, find_socket, is_own, shader_group
+from .nodes import LEAF_GREEN, SNOW, Graph, find_socket, is_own, shader_group
 from .shell import BAKED_SHELL, BAKED_SHELL_MATERIAL, SHELL, SHELL_MATERIAL
 from .soil import is_soil
 
-SNOW = "TetFlora Snow"
 AMOUNT = "TetFlora Snow Amount"
 CLOUD = "TetFlora Snow Cloud"
 _VERSION = 1

@@ -14,8 +14,7 @@ from ..compat import tree_in_use
 from .colour_maths import Values, luminance
 from .means import Look, Looks
 from .node_values import NodeValues, Notes, NotUnderstood, Stack, source_of
-from .nodes import active_output, find_socket
-from .snow import SNOW
+from .nodes import SNOW, active_output, find_socket
 
 #: Shaders by what they let through of the light that they scatter, and the input of their colour.
 SIMPLE = {
