@@ -4,7 +4,8 @@
 
 ``growing`` of a row holds for each sort of children: the present length of the row over the full-grown one; the
 `Nodes` of the row, begin, end, until (of the present length), power, whole and below, where those that live for a while
-are (of the present length), and how many there are for each of the others; variation of the begin over its mean.
+are (of the present length), and how many there are for each of the others; variation of the begin over its
+mean; and the fraction of the order's children at which those begin that live for a while.
 """
 
 from __future__ import annotations
@@ -14,10 +15,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..species.growing import Nodes, node_at, place_at, shortened, some_nodes
+from ..species.growing import Nodes, faded, node_at, place_at, shortened, some_nodes
 from ..species.species import crown_ratio
 
-NOW, BEGIN, END, UNTIL, POWER, WHOLE, BELOW, FRESH, EXTRA, VARIES = range(10)
+NOW, BEGIN, END, UNTIL, POWER, WHOLE, BELOW, FRESH, EXTRA, VARIES, FADES = range(11)
 """Columns of ``growing``."""
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(5) / np.array([[1], [2]])
 
@@ -76,7 +77,7 @@ def grow_children(
     if there > 0:
         row["growing"][sort] = (
             *(here / full, begin, end, until, power, whole / there, below / there),
-            *(fresh, nodes.extra, varies),
+            *(fresh, nodes.extra, varies, nodes.kept * (1 - nodes.fresh)),
         )
 
 
@@ -100,10 +101,10 @@ def spread_children(row: np.void, sort: int) -> tuple[NDArray[np.float64], ...]:
     own, number = row["growing"][sort], row["count"][sort, 0]
     law = own[BEGIN], own[END], own[POWER], own[WHOLE] * number, own[BELOW] * number
     base, some, tip = node_at(np.array([row["start"][sort, 0], own[FRESH], own[UNTIL]]) * own[NOW], *law)
-    node, weight, fading = some_nodes((base, some, tip), own[EXTRA])
+    node, weight, extra = some_nodes((base, some, tip), own[EXTRA])
     low, high = row["fraction"][sort]
     fraction = low + (high - low) * (node - base) / max(tip - base, 1e-9)
-    return np.clip(place_at(node, *law) / own[NOW], 0, 1), fraction, weight, fading
+    return np.clip(place_at(node, *law) / own[NOW], 0, 1), fraction, weight, faded(fraction, own[FADES], extra)
 
 
 def lengths(rows: NDArray[np.void], row: NDArray[np.integer], fraction: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Arrays, by_component, columns, dot, spread
+from ..species.growing import faded
 from ..species.members import dead_vigour
 from .axes import Axes, axes, profile
 from .branches import Branches, Pose
 from .envelopes import BOX
-from .grown_rows import NOW, fullness_of, lengths
+from .grown_rows import FADES, NOW, fullness_of, lengths
 from .hashing import Draw, child_key, key_of_seed, signed, uniform
 from .nodes import Grown, child_number, grown_nodes
 from .rows import DEAD, FORK, LATERAL, SPUR, flare_rings, ranged, varied
@@ -220,11 +221,13 @@ def chosen_children(
             start, end = varied(rows["start"][parent.row, sort], parent.key, _START[sort]), 1.0
         t = start + (end - start) * fraction
         if grown is not None:
-            there, part, fading = grown.places(owner, node, 0.5 + _PLACE_JITTER * place, extra)
+            there, part = grown.places(owner, node, 0.5 + _PLACE_JITTER * place, extra)
             on = grown.on[owner]
             t, fraction = np.where(on, there, t), np.where(on, part, fraction)
         low, high = rows["fraction"][parent.row, sort].T
         fraction = low + (high - low) * fraction
+        if grown is not None:
+            fading = faded(fraction, rows["growing"][parent.row, sort, FADES], extra)
     position, frame = lines.at(owner, t)
     sky = lines.sky_at(owner, t)
     angle_base, angle_spread = rows["angle"][row].T

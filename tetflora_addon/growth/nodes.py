@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..species.growing import FADING, node_at, place_at
+from ..species.growing import node_at, place_at
 from .branches import Branches
 from .grown_rows import BEGIN, BELOW, END, EXTRA, FRESH, NOW, POWER, UNTIL, VARIES, WHOLE, varied_begin
 from .hashing import Draw, child_key, signed
@@ -80,15 +80,14 @@ class Grown:
         node: NDArray[np.integer],
         within: NDArray[np.float64],
         extra: NDArray[np.bool_],
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Fractions of the branch, and of its children (m,), (m,), for nodes (m,), and a factor on lengths (m,)."""
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Fractions of the branch, and of its children, (m,), (m,), for nodes (m,) of branches (m,)."""
         own = node + within
         dense = np.where(extra, self.density[1][owner], np.where(own >= 0, self.density[0][owner], 1.0))
         own = own / np.maximum(dense, 1e-9)
         t = place_at(own, *(one[owner] for one in self.law)) / self.now[owner]
-        low, some, high = self.ends[:, owner]
-        fading = np.where(extra, np.clip((own - some) / np.maximum(FADING * (high - some), 1e-9), 0, 1), 1.0)
-        return np.clip(t, 0, 1), np.clip((own - low) / np.maximum(high - low, 1e-9), 0, 1), fading
+        low, _, high = self.ends[:, owner]
+        return np.clip(t, 0, 1), np.clip((own - low) / np.maximum(high - low, 1e-9), 0, 1)
 
 
 def grown_nodes(

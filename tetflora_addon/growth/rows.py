@@ -64,7 +64,7 @@ ROW_DTYPE = np.dtype(
     + [("envelope", np.int64), ("envelope_radius", np.float64), ("inclination", np.int64)]
     + [("next", np.int32, (4,)), ("count", np.float64, (4, 2)), ("start", np.float64, (4, 2))]
     + [("fraction", np.float64, (4, 2)), ("part", np.float64, (2,))]
-    + [("growing", np.float64, (4, 10)), ("settled", np.float64), ("conical", np.float64)]
+    + [("growing", np.float64, (4, 11)), ("settled", np.float64), ("conical", np.float64)]
     + [("ramps", np.float64, (2,)), ("least", np.float64)]
     + [("nominal", np.float64), ("pipe_radius", np.float64), ("fork_power", np.float64)]
     + [("continues", np.bool_), ("outward", np.bool_), ("tropic", np.bool_), ("gradient", np.bool_)]

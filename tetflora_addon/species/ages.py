@@ -36,9 +36,9 @@ _LONGEST = 0.6
 _STOUT, _TIP = 1.15, 0.0012
 #: In a small plant, the topmost limbs are shorter than the crown's shape has them, crowns narrower than their limbs
 #: are long, the shoots of this year bare of branches, and trunks even cones.
-_SHORTER_TOP, _NARROW, _LEADER, _EVEN = 0.4, 0.2, 0.75, 1.3
+_SHORTER_TOP, _NARROW, _LEADER, _EVEN = 0.5, 0.2, 0.75, 1.3
 #: Branches that live for a while, for each of the others, on stems and on limbs; steps in which their number is found.
-_EXTRA, _STEPS = (4.0, 1.5), 14
+_EXTRA, _STEPS = (3.0, 1.5), 14
 #: Metres of height up to which crowns have not closed.
 _SMALL = 3.0
 #: Of the length of a leafy twig: what is longer than so many bears no leaves itself.
@@ -223,7 +223,7 @@ class _Aged:
         order, now = self.one.orders[o], self.now[o]
         stool, size = o < self.stem, 1.0 if o < self.stem else now
         numbers, nodes = zip(*self._sorts(o), strict=True)
-        conical = 0.0 if order.crown == "conical" or o != self.stem else _SHORTER_TOP * float(np.clip(1 - now, 0, 1))
+        conical = _SHORTER_TOP * float(np.clip(1 - now, 0, 1)) if o == self.stem else 0.0
         ramp = min(_RAMP / max(order.branches.mean * numbers[0], 1e-9), 0.35) * min(abs(size - 1) / _NEAR, 1)
         settled = 1.0 if o <= self.stem else float(np.clip(1 - abs(now - 1) / _NEAR, 0, 1))
         changes: dict[str, Any] = {

@@ -163,12 +163,12 @@ def place_at(
     return np.where(node >= 0, above, begin * part ** (1 / np.asarray(power)))
 
 
-FADING = 0.25
-"""Lowest part of the children that live for a while in which they grow shorter before they go."""
+#: Lowest part of the children that live for a while in which they are the shorter the sooner they go.
+_FADING = 0.9
 _EVEN = (np.arange(256) + 0.5) / 256
 
 
-def some_nodes(ends: ArrayLike, extra: float) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def some_nodes(ends: ArrayLike, extra: float) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
     """Places of children in nodes, as many as stand for all.
 
     Parameters
@@ -183,14 +183,20 @@ def some_nodes(ends: ArrayLike, extra: float) -> tuple[NDArray[np.float64], NDAr
     node : (512,) float64
     weight : (512,) float64
         How many children each stands for, 1 on the mean.
-    fading : (512,) float64
-        Factor on their lengths.
+    extra : (512,) bool
+        Whether they live for a while.
     """
     base, some, tip = ends
     weight = np.array([tip - base, extra * (tip - some)])
     node = np.concatenate([base + (tip - base) * _EVEN, some + (tip - some) * _EVEN])
-    fading = np.concatenate([np.ones(len(_EVEN)), np.clip(_EVEN / FADING, 0, 1)])
-    return node, np.repeat(weight / max(weight.mean(), 1e-12), len(_EVEN)), fading
+    weight = np.repeat(weight / max(weight.mean(), 1e-12), len(_EVEN))
+    return node, weight, np.repeat([False, True], len(_EVEN))
+
+
+def faded(fraction: NDArray[np.float64], first: ArrayLike, extra: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Factor (n,) on the lengths of laterals at fractions (n,) of them: those that live for a while begin at one."""
+    part = np.clip((fraction - first) / np.maximum(_FADING * (1 - np.asarray(first)), 1e-9), 0, 1)
+    return np.where(extra, part, 1.0)
 
 
 def shortened(
