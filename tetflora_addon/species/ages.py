@@ -32,8 +32,8 @@ _ROSETTE = 0.9
 _TWIGS = 0.25
 #: Longest branches in lengths of their parents, where the description has shorter ones.
 _LONGEST = 0.6
-#: Girth follows length as this power; radius of the thinnest tips, metres.
-_STOUT, _TIP = 1.15, 0.0012
+#: Girth of branches follows length as this power, that of stools the stems'; radius of the thinnest tips, metres.
+_STOUT, _STOOL, _TIP = 1.15, 0.7, 0.0012
 #: In a small plant, the topmost limbs are shorter than the crown's shape has them, crowns narrower than their limbs
 #: are long, the shoots of this year bare of branches, and trunks even cones.
 _SHORTER_TOP, _NARROW, _LEADER, _EVEN = 0.5, 0.2, 0.75, 1.3
@@ -155,7 +155,8 @@ class _Aged:
         self.rosette = species.orders[self.stem].branch_start.mean > _ROSETTE
         self.now, self.before = (self._lengths(max(year, 1e-3)) for year in (years, years - 1))
         girth = ages.girths(years)
-        self.stout = [girth if o == self.stem else now**_STOUT for o, now in enumerate(self.now)]
+        powers = [_STOOL if o < self.stem else 1.0 for o in range(self.stem + 1)]
+        self.stout = [girth**power for power in powers] + [now**_STOUT for now in self.now[self.stem + 1 :]]
         self.youth = float(np.clip((1 - self.now[self.stem]) / 0.5, 0, 1))
         self.declined = ages.declined(years)
         self.dead = max(years - ages.lifespan, 1e-6) if years >= ages.lifespan else 0.0
