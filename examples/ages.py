@@ -28,14 +28,14 @@ from .seasons import LOOKS, sky
 
 ROOT = Path(__file__).resolve().parent.parent
 SPECIES, SEED = "oak", 1
-AGES = (5.0, 12.0, 25.0, 60.0, 150.0, 205.0)
-SIZE, SAMPLES = (1600, 470), 96
+AGES = (8.0, 18.0, 35.0, 80.0, 300.0, 545.0)
+SIZE, SAMPLES = (1600, 540), 96
 #: Room between crowns, and before the first and behind the last, metres; sides of the meadow and of its nearer part.
 _BETWEEN, _BESIDE = 1.2, 1.6
 _SIDE, _VIEW, _EYE = 560.0, radians(26.0), 2.2
 #: Trees that close the view: species, how far away, and how many.
 _BEHIND, _AWAY, _MANY = ("beech", "birch", "hornbeam", "spruce", "maple"), (270.0, 330.0), 240
-_GREY = 0.5
+_GREY = 0.47
 _FIGURE = 1.7
 #: Joints of the figure, in its heights: x, y, z and radius, of the spine, and of a leg and an arm; and what it wears.
 _SPINE = (
@@ -69,7 +69,7 @@ def build(scene: bpy.types.Scene, size: tuple[int, int]) -> list[tuple[float, st
 
     species = catalogue.load_species(SPECIES)
     crowns = [crown_of(ages.with_age(species, age)) for age in AGES]
-    radius = np.array([max(crown.radius, 0.4) for crown in crowns])
+    radius = np.array([max(crown.radius, 1.3) for crown in crowns])
     middle = np.cumsum(np.concatenate([[_BESIDE + radius[0] + 2.6], radius[:-1] + radius[1:] + _BETWEEN]))
     width = middle[-1] + radius[-1] + _BESIDE
     for age, x in zip(AGES, (middle - width / 2).tolist(), strict=True):
@@ -93,7 +93,7 @@ def build(scene: bpy.types.Scene, size: tuple[int, int]) -> list[tuple[float, st
     scene.world = sky(LOOKS["summer"])
     ground = next(o for o in scene.objects if o.type == 'MESH' and o.name.startswith("Grid"))
     ground.name = "Ground"
-    add_haze(scene, 0.0009, LOOKS["summer"].haze[1])
+    add_haze(scene, 0.00025, LOOKS["summer"].haze[1])
     heights = [crown.height for crown in crowns]
     return [
         (float(x / width), f"{age:g} years\n{height:.1f} m")
