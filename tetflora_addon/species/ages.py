@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from .extras import dead_part
-from .growing import Ages, Growing, Nodes, node_at, rounded_least
+from .growing import Ages, Nodes, PartGrown, node_at, rounded_least
 from .habit import with_habit
 from .members import expected_leaf_area
 from .skeletons import Skeleton
@@ -230,7 +230,7 @@ class _Aged:
         changes: dict[str, Any] = {
             "length": _times(order.length, now if o == 0 else now / self.now[o - 1]),
             "thickness": self._thickness(o),
-            "growing": Growing(size, settled, *nodes, conical, (ramp, ramp)),
+            "growing": PartGrown(size, settled, *nodes, conical, (ramp, ramp)),
             "branches": _times(order.branches, numbers[0]),
             "spurs": _times(order.spurs, numbers[1]),
         }

@@ -110,7 +110,7 @@ class Nodes(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Growing:
+class PartGrown:
     """How far the branches of an order have grown.
 
     Attributes
@@ -202,6 +202,6 @@ def faded(fraction: NDArray[np.float64], first: ArrayLike, extra: NDArray[np.boo
 def shortened(
     fraction: NDArray[np.float64], conical: ArrayLike, low: ArrayLike, high: ArrayLike
 ) -> NDArray[np.float64]:
-    """Factor (...) on the lengths of laterals at fractions (...) of them, see `Growing`: ``conical`` and ``ramps``."""
+    """Factor (...) on lengths of laterals at fractions (...) of them, by ``conical`` and ``ramps`` of `PartGrown`."""
     new = np.clip((1 - fraction) / np.maximum(high, 1e-9), 0, 1)
     return (1 - conical * fraction) * np.clip(fraction / np.maximum(low, 1e-9), 0, 1) * new

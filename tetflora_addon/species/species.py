@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..leaves.models import LeafModel
-from .growing import Ages, Growing
+from .growing import Ages, PartGrown
 from .skeletons import Skeleton
 from .year import Year
 
@@ -150,7 +150,7 @@ class Order:
         Its radius, or half of the side of a box, as a fraction of the branch's length.
     leaf_inclination : str
         Which of `LEAF_INCLINATIONS` the leaves have.
-    growing : Growing or None
+    growing : PartGrown or None
         How far it has grown; None where it is as long as it will be.
     """
 
@@ -199,7 +199,7 @@ class Order:
     leaf_envelope: str = "none"
     leaf_envelope_radius: float = 0.5
     leaf_inclination: str = "branch"
-    growing: Growing | None = None
+    growing: PartGrown | None = None
 
 
 @dataclass(frozen=True)
