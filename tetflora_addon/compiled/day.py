@@ -224,13 +224,12 @@ def _by_kind(rows: NDArray[np.void], totals: Averages, leaf: RowLeaves) -> tuple
     area = totals.leaf_area @ kinds
     colour = np.zeros((*area.shape, 3))
     used = [kind for kind in range(KINDS) if area[..., kind].any()]
-    for kind in used:
-        if len(used) == 1:
-            colour[:, :, kind] = totals.leaf_colour
-            continue
+    for kind in used[:-1]:
         some = rows.copy()
         some["leaves"] *= kinds[:, kind, None]
         colour[:, :, kind] = average(some, leaf).leaf_colour
+    if used:  # the last has what is left
+        colour[:, :, used[-1]] = np.maximum(totals.leaf_colour - colour.sum(axis=2), 0.0)
     return area, colour, totals.leaves @ kinds, (totals.leaves * leaf.polygons) @ kinds
 
 
