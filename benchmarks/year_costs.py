@@ -26,7 +26,7 @@ PLANTS, QUICK_PLANTS, ROOM = 300, 24, 30.0
 SIZE, QUICK_SIZE = (1920, 1080), (480, 270)
 #: Days, and ages in years, that are compared with summer at full age.
 DAYS, AGES = (15.0, 122.0, 145.0, 285.0, 300.0), (5.0, 20.0, 60.0, 150.0)
-SUMMER = 200.0
+SUMMER = 231.0
 TURNS = 2
 
 
