@@ -174,9 +174,9 @@ def _texts():
         found |= {item.name for p in settings if p.type == 'ENUM' for item in p.enum_items}
     for identifier in _ids():
         group, name = identifier.split(".")
-        found.add(getattr(getattr(bpy.ops, group), name).get_rna_type().name)
-    seasons = bpy.ops.tetflora.set_season.get_rna_type().properties["season"]
-    found |= {item.name for item in seasons.enum_items}
+        rna = getattr(getattr(bpy.ops, group), name).get_rna_type()
+        found |= {rna.name, *(prop.name for prop in rna.properties)}
+        found |= {item.name for prop in rna.properties if prop.type == 'ENUM' for item in prop.enum_items}
     found |= {FULL_GROWN, *MONTHS, *(stage.capitalize() for stage in STAGES)}
     for path in (build.ROOT / "panels").glob("*.py"):
         found |= {n.value for n in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(n, ast.Constant)}
