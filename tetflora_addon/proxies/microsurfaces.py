@@ -255,15 +255,29 @@ def _leaves_of_subplants(
     many = area / one.clip(1e-300)[owner]
     day = None if subplants.year is None else (subplants, owner)
     colour = leaf_colours_of_facets(flora, leaf_row, key, many, outward, points.young[pick], day)
-    return Facets(
+    of_day = None if day is None else _of_kinds(flora, subplants, owner, rows["leaf_kind"][leaf_row])
+    made = Facets(
         centre,
         across,
         along,
-        np.sqrt(area * weight[owner]),
+        np.sqrt(area * weight[owner] if of_day is None else area * weight[owner] * of_day),
         dimmed(colour, owner, weight, once),
         flora.leaf.transmission[leaf_row],
         _carried(flora, subplants, owner, centre),
     )
+    return made if of_day is None else made.take(np.flatnonzero(of_day > 0))
+
+
+def _of_kinds(flora: Flora, subplants: Branches, owner: NDArray, kind: NDArray) -> NDArray[np.float64] | None:
+    """Factors (m,) on areas of facets, whose samples are those of summer, by kind of leaf; None where there is one."""
+    if len(flora.day.kinds) < 2:
+        return None
+    out, share = np.zeros(len(owner)), np.maximum(flora.day.leaf_share(subplants), 1e-300)
+    for one in flora.day.kinds:
+        some = np.flatnonzero(kind == one)
+        (left,) = flora.day.left(subplants, int(one), AREA)
+        out[some] = (left / share)[owner[some]]
+    return out
 
 
 def _leaves_of_pieces(
